@@ -153,7 +153,7 @@ each_table() {
   "$1" pacing-unseen simulate pacing --seeds 101..112 --markdown
   "$1" traffic simulate traffic --seeds 541..550 --hours 1 --baseline --markdown
   "$1" odometry simulate line --score --seeds 1..10 --teeth 80,100,200 --markdown
-  "$1" odometry-worlds simulate line --score --worlds fresh:100@ab69c7ca736dbc67179d8ff6bee2be3892afd060 --markdown
+  "$1" odometry-worlds simulate line --score --worlds fresh:100@e22899068e662b3650012a1c39cb485724f235c7 --markdown
   # Recordings that may not be copied: the table is made where they are.
   if [[ -n ${FOOTPLATE_DATA:-} ]]; then
     "$1" standstill odometry --imu "$FOOTPLATE_DATA"/paris-metro-accel/*_accel.csv --score --markdown

@@ -14,6 +14,7 @@
 mod dcc_ex;
 mod dcc_ex_session;
 mod layout_file;
+mod loconet;
 mod marklin_can;
 mod marklin_can_session;
 mod marklin_serial;
@@ -30,7 +31,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use footplate_eval::choice::Choice;
+use footplate_eval::seeds::Choice;
 
 /// An input that takes longer is a finding, too (chosen: none of a few kilobytes takes a tenth of it).
 const SLOW: Duration = Duration::from_secs(5);
@@ -53,6 +54,14 @@ const TEXT: &[&[u8]] =
 const BOARD: &[&[u8]] =
     &[b"<l 24 0 128 0>", b"<t 24 72 1>", b"<iDCC-EX V-5>", b"<Q 7>", b"<q 7>", b"<", b">", b"<p1 MAIN>"];
 const FRAMES: &[&[u8]] = &[b"\x00\x23\x93\x46\x08", b"T00239346", b"\r", b"\x00\x11\x03\x00\x08"];
+const LINES: &[&[u8]] = &[
+    b"RECEIVE 83 7C\r\n",
+    b"SEND ",
+    b"SENT OK\r\n",
+    b"VERSION ",
+    b"E7 0E 05 33 18 3F 10 07 00 00 00 00 00 10",
+    b"\n",
+];
 const DATASETS: &[&[u8]] =
     &[b"\x0f\x00\x80\x00", b"\x07\x00\x40\x00\x61", b"\x09\x00\x40\x00\x43", b"\x04\x00\x10\x00"];
 const VEHICLE: &[&[u8]] =
@@ -73,6 +82,7 @@ const TARGETS: &[Target] = &[
     target("marklin_serial_session", marklin_serial_session::fuzz, &[], BYTES),
     target("dcc_ex", dcc_ex::fuzz, &[], BOARD),
     target("dcc_ex_session", dcc_ex_session::fuzz, &[], BOARD),
+    target("loconet", loconet::fuzz, &["testdata/wire/loconet.csv"], LINES),
     target("marklin_can", marklin_can::fuzz, &[], FRAMES),
     target("marklin_can_session", marklin_can_session::fuzz, &[], FRAMES),
     target("z21", z21::fuzz, &[], DATASETS),

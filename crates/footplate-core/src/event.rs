@@ -1,4 +1,4 @@
-//! What the railway reports and what it was told: the entries of every recording.
+//! Reports and commands: the entries of every recording.
 
 use core::fmt;
 
@@ -10,28 +10,28 @@ use crate::units::Length;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Event {
-    /// When the host saw or sent it.
+    /// When the host received or sent it.
     pub time: Timestamp,
-    /// What it was.
+    /// What happened.
     pub kind: EventKind,
 }
 
-/// What can stand in a recording.
+/// The kinds of entries.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum EventKind {
-    /// A trackside contact was reported as closed.
+    /// A sensor reported a train.
     Sensor(Report),
     /// A throttle step was commanded.
     Speed {
-        /// The train that was told.
+        /// The train.
         train: TrainId,
-        /// The step it was told.
+        /// The step.
         step: SpeedStep,
     },
     /// The train was commanded to reverse.
     Reverse {
-        /// The train that was told.
+        /// The train.
         train: TrainId,
     },
     /// A turnout was thrown.
@@ -41,43 +41,43 @@ pub enum EventKind {
         /// `true` for the diverging leg.
         curved: bool,
     },
-    /// A person measured where and when the train came to rest.
+    /// An operator measured where and when a train came to rest.
     Stopped {
-        /// The train that stopped.
+        /// The train.
         train: TrainId,
-        /// The contact from which the tape was laid.
+        /// The sensor that the tape was laid from.
         landmark: SensorId,
         /// How far past it the train's pickup came to rest.
         offset: Length,
     },
 }
 
-/// A contact that was seen closed, and what is known of the time at which it closed.
+/// A report of a sensor, and the uncertainty of its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Report {
-    /// The contact.
+    /// The sensor.
     pub sensor: SensorId,
-    /// The interval of the poll that reported it, from the reading before to the reading that saw it closed,
-    /// where the host recorded it; the contact closed within this span before the reading. On a link whose sensors report by
-    /// themselves it is the span of the delays that the report may have had, as the link's session knows them.
+    /// The interval of the poll that reported it, from the reading before to the reading that saw the sensor closed,
+    /// where the host recorded it: the sensor closed within this span before the reading. Where sensors report by
+    /// themselves, the range of possible delays of the report, as the link's session knows it.
     pub poll_interval: Option<TimeSpan>,
 }
 
-/// What a command station can be told.
+/// A command to the command station.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum Command {
-    /// Run a train at a throttle step; step 0 stops it by its own law.
+    /// Run a train at a throttle step; step 0 stops it by its decoder's braking law.
     Speed {
-        /// The train to tell.
+        /// The train.
         train: TrainId,
         /// The step.
         step: SpeedStep,
     },
-    /// Turn a train around. Only for a train at rest: one that runs is stopped dead.
+    /// Reverse a train. Only for a train at rest: a moving one stops at once.
     Reverse {
-        /// The train to tell.
+        /// The train.
         train: TrainId,
     },
     /// Throw a turnout.
@@ -87,9 +87,9 @@ pub enum Command {
         /// `true` for the diverging leg.
         curved: bool,
     },
-    /// Take the power from the whole track.
+    /// Switch track power off.
     PowerOff,
-    /// Give power to the track.
+    /// Switch track power on.
     PowerOn,
 }
 
@@ -107,7 +107,7 @@ impl fmt::Display for Command {
     }
 }
 
-/// From which side a speed was reached; the same throttle step reached from above is faster.
+/// From which side a speed was reached; a throttle step reached from above is faster.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum Approach {
@@ -115,6 +115,6 @@ pub enum Approach {
     Below,
     /// From a higher step.
     Above,
-    /// The recording begins with the train already running.
+    /// Unknown: the train was already running when the recording began.
     Unknown,
 }

@@ -1,4 +1,4 @@
-//! Everything Footplate knows about how trains move, as functions of what went in.
+//! Everything Footplate knows about how trains move: functions and state machines without side effects.
 //!
 //! No std, no input or output, no clock, no randomness: time is an argument, and the same input gives the
 //! same bytes on every machine. Layers from top to bottom; a module imports only from rows below its own,
@@ -7,7 +7,7 @@
 //! ```text
 //! control        drives trains: plans stops, dispatches, supervises, learns
 //! tracking  odometry
-//! model          how one train answers its commands, with uncertainty, and how that is learnt
+//! model          how one train responds to commands, with uncertainty, and how that is learnt
 //! kinematics  link  track
 //! event
 //! units  time  ids  linalg  estimate

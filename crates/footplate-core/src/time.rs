@@ -1,7 +1,7 @@
-//! Points in time and spans between them, as integer nanoseconds we own.
+//! Timestamps and time spans in integer nanoseconds.
 //!
-//! A test writes `Timestamp::ZERO` and never waits; only the program's runtime asks what time it is.
-//! Sums saturate at the ends (292 years), so that no input can overflow them.
+//! A test writes `Timestamp::ZERO` and never waits; only the app's runtime reads a clock. Sums saturate at the ends
+//! of the range (292 years): no input can overflow them.
 
 use core::ops::{Add, AddAssign, Neg, Sub, SubAssign};
 
@@ -53,7 +53,7 @@ impl Timestamp {
 }
 
 impl TimeSpan {
-    /// No time at all.
+    /// A span of zero.
     pub const ZERO: Self = Self(0);
 
     /// From whole nanoseconds.
@@ -106,7 +106,7 @@ impl TimeSpan {
         self.0 as f64 / NS_PER_MS as f64
     }
 
-    /// Its length without the sign.
+    /// The absolute value.
     #[inline]
     #[must_use]
     pub const fn abs(self) -> Self {

@@ -1,13 +1,13 @@
-//! Quantities that carry their unit, so that a speed cannot be added to a length.
+//! Quantities with units as types: adding a speed to a length does not compile.
 //!
-//! `f64` in SI units inside; constructors and getters name the unit. Products and quotients that mean
-//! something are one line each at the bottom; anything else does not compile.
+//! Values are `f64` in SI units; constructors and getters name the unit. Meaningful products and quotients are one
+//! line each at the end of the file.
 
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 use crate::time::TimeSpan;
 
-/// One newtype over `f64` in SI units with its constructors, getters and the operations every quantity has.
+/// Defines a newtype over `f64` in SI units with constructors, getters and the operations of every quantity.
 macro_rules! quantity {
     ($(#[$doc:meta])* $name:ident { $($(#[$unit_doc:meta])* $from:ident, $as:ident, $scale:expr;)+ }) => {
         $(#[$doc])*
@@ -16,7 +16,7 @@ macro_rules! quantity {
         pub struct $name(f64);
 
         impl $name {
-            /// Nothing of it.
+            /// Zero.
             pub const ZERO: Self = Self(0.0);
 
             $(
@@ -35,7 +35,7 @@ macro_rules! quantity {
                 }
             )+
 
-            /// Its size without the sign.
+            /// The absolute value.
             #[inline]
             #[must_use]
             pub const fn abs(self) -> Self {
@@ -161,7 +161,7 @@ quantity!(
     }
 );
 quantity!(
-    /// A signed jerk, the rate at which acceleration changes.
+    /// A signed jerk, the rate of change of acceleration.
     Jerk {
         /// From metres per second cubed.
         from_m_per_s3, as_m_per_s3, 1.0;
@@ -172,14 +172,14 @@ quantity!(
 quantity!(
     /// A number without a unit, such as a factor or a creepage.
     Ratio {
-        /// From the plain number, 1 = all of it.
+        /// From the plain number; 1 is 100 %.
         from_parts, as_parts, 1.0;
         /// From per cent.
         from_percent, as_percent, 1e-2;
     }
 );
 
-/// `$left * $right = $product`, both ways round, and `$product / $left = $right`.
+/// `$left * $right = $product`, in either order, and `$product / $left = $right`.
 macro_rules! product {
     ($left:ident * $right:ident = $product:ident) => {
         impl Mul<$right> for $left {

@@ -1,70 +1,71 @@
-//! Engines exchanged, wheels soiled, stations restarted, trains lifted: and what a watched driver makes of it.
+//! Faults of trains and station, and how a supervised driver copes: another engine under the same address, dirty
+//! wheels, a restarted station, a lifted train.
 
-mod attributed;
+mod association;
+mod disturbed_run;
 mod figures;
 mod kind;
 mod page;
-mod scene;
 
 use anyhow::ensure;
 use footplate_core::track::Layout;
 use footplate_core::{TimeSpan, TrainId};
 use footplate_sim::LivingSwitches;
 
-use self::attributed::{Attributed, attributed};
+use self::association::{AssociationCounts, associations};
+use self::disturbed_run::{DisturbedRun, OTHER, Outcomes, TRAIN};
 use self::kind::Kind;
 pub use self::page::Page;
-use self::scene::{OTHER, Outcomes, Scene, TRAIN};
-use crate::rehearsal::{Rehearsal, Way};
+use crate::testbed::{LongestCircuit, PreparedTrains};
 
-/// A third train, for telling trains apart.
+/// A third train, for data association.
 const THIRD: TrainId = TrainId(63);
 
-/// All of one seed.
+/// The results of one seed.
 pub struct Scored {
     /// The seed.
     pub seed: u64,
-    /// What happened, and what came of it.
+    /// One result for each kind of disturbance.
     runs: Vec<(Kind, Outcomes)>,
-    /// With how many trains running.
-    attributed: Vec<(usize, Attributed)>,
+    /// Data association by the number of running trains.
+    associations: Vec<(usize, AssociationCounts)>,
 }
 
 impl Scored {
-    /// What came to grief, and what was not noticed although something had happened.
+    /// Runs with faults of the simulated world, and disturbances that were not detected.
     #[must_use]
-    pub fn troubles(&self) -> Vec<String> {
-        let troubles = self.runs.iter().filter_map(|(kind, run)| {
-            let what = match run.mishaps {
+    pub fn failures(&self) -> Vec<String> {
+        let failures = self.runs.iter().filter_map(|(kind, run)| {
+            let what = match run.faults {
                 0 if *kind == Kind::Faultless || run.noticed.is_some() => return None,
                 0 => "not noticed".to_owned(),
-                1 => "1 mishap".to_owned(),
-                mishaps => format!("{mishaps} mishaps"),
+                1 => "1 fault".to_owned(),
+                faults => format!("{faults} faults"),
             };
-            Some(format!("{}: {what}", kind.says()))
+            Some(format!("{}: {what}", kind.description()))
         });
-        troubles.collect()
+        failures.collect()
     }
 }
 
-/// Everything that happens to the trains of one seed.
+/// Scores all disturbances with the trains of one seed.
 ///
 /// # Errors
-/// When no train can run round on the layout.
+/// The layout has no circuit.
 pub fn score(layout: &Layout, seed: u64, budget: TimeSpan) -> anyhow::Result<Scored> {
-    let way = Way::round(layout);
-    ensure!(!way.nodes.is_empty(), "no train can run round on this layout with all turnouts straight");
+    let circuit = LongestCircuit::of(layout);
+    ensure!(!circuit.nodes.is_empty(), "no train can run round on this layout with all turnouts straight");
     let trains = [TRAIN, OTHER, THIRD];
-    let stage = Rehearsal::prepare(layout, seed, &trains, &LivingSwitches::well_kept(), budget)?;
+    let prepared = PreparedTrains::prepare(layout, seed, &trains, &LivingSwitches::well_kept(), budget)?;
     let mut runs = Vec::new();
     for (nth, kind) in Kind::ALL.into_iter().enumerate() {
         let asked = seed.wrapping_mul(Kind::ALL.len() as u64).wrapping_add(nth as u64);
-        runs.push((kind, Scene::new(layout, &stage, &way, asked)?.run(kind, &way, seed)?));
+        runs.push((kind, DisturbedRun::new(layout, &prepared, &circuit, asked)?.run(kind, &circuit, seed)?));
     }
     let mut counted = Vec::new();
     for count in 2..=trains.len() {
         let running = trains.get(..count).unwrap_or_default();
-        counted.push((count, attributed(&stage, &way, running)?));
+        counted.push((count, associations(&prepared, &circuit, running)?));
     }
-    Ok(Scored { seed, runs, attributed: counted })
+    Ok(Scored { seed, runs, associations: counted })
 }

@@ -1,4 +1,5 @@
-//! Random trains, calibrated and driven to exact stops: by us, by one that knows the truth, and as course projects drive.
+//! Random trains, calibrated and then driven to exact stops: by Footplate, by an oracle that knows the train, and by
+//! the method of course projects.
 
 mod course_project;
 mod figures;
@@ -18,34 +19,35 @@ pub(crate) use self::known_train::known;
 pub use self::page::Page;
 use self::trial::{Counts, Trial, ahead, world};
 pub use self::trial::{Plan, TRAIN};
-use crate::rehearsal::{Calibrated, calibrate};
+use crate::testbed::{Calibrated, calibrate};
 
-/// What is asked of each train.
+/// The number of each kind of task per train.
 const COUNTS: Counts = Counts { mid_stops: 16, top_stops: 8, not_beyond: 12, moves: 12 };
 
-/// One train: calibrated, and then the same world driven by each.
+/// Calibrates one train and then has each driver carry out the same tasks in copies of the same world.
 ///
 /// # Errors
-/// When no train can run on the layout.
+/// No train can run on the layout.
 pub fn score(layout: &Layout, seed: u64, law: LawFamily, budget: TimeSpan) -> anyhow::Result<ScoredTrain> {
     let sections = SectionIndex::of(layout);
     let mut line = world(layout, seed, law)?;
     let calibrated = calibrate(layout, &mut line, TRAIN, budget);
-    // What is asked differs from train to train, and is the same whoever drives.
-    let asked = seed.wrapping_mul(LawFamily::ALL.len() as u64).wrapping_add(law as u64);
-    let way: Vec<_> = ahead(layout, &line, &calibrated.turnouts).into_iter().map(|(node, _)| node).collect();
+    // The tasks differ from train to train, and are the same for all drivers.
+    let ordered = seed.wrapping_mul(LawFamily::ALL.len() as u64).wrapping_add(law as u64);
+    let sensors: Vec<_> =
+        ahead(layout, &line, &calibrated.turnouts).into_iter().map(|(node, _)| node).collect();
     let context = TrackContext { layout, sections: &sections, turnouts: &calibrated.turnouts };
-    let knowing = known(context, line.station.world().truth(), TRAIN, &way)?;
+    let oracle = known(context, line.station.world().truth(), TRAIN, &sensors)?;
     let mut by = Vec::new();
-    for model in [calibrated.model.clone(), knowing] {
+    for model in [calibrated.model.clone(), oracle] {
         let mut world = line.clone();
         let known = Calibrated { model, ..calibrated.clone() };
-        let mut trial = Trial::new(layout, &mut world, known, asked);
+        let mut trial = Trial::new(layout, &mut world, known, ordered);
         trial.run(COUNTS);
         by.push(trial.results);
     }
     let mut world = line.clone();
-    let plan = Plan::new(&world, asked);
+    let plan = Plan::new(&world, ordered);
     by.push(CourseProject::new(layout, &mut world, calibrated.turnouts).run(plan, COUNTS));
     let (calibration_s, ending) = (calibrated.seconds, calibrated.ending);
     Ok(ScoredTrain { law, seed, calibration_s, ending, by })

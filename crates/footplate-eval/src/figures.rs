@@ -1,8 +1,8 @@
-//! What many measurements come to.
+//! Statistics of many values.
 
 use footplate_store::score::Coverage;
 
-/// The value below which a part of all values lies.
+/// The quantile `part`: the nearest value.
 pub fn quantile(values: impl Iterator<Item = f64>, part: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
@@ -10,7 +10,7 @@ pub fn quantile(values: impl Iterator<Item = f64>, part: f64) -> Option<f64> {
     values.get((last as f64 * part).round() as usize).copied()
 }
 
-/// The share of values within a bound about nothing, in percent.
+/// The share of absolute values within a bound, in percent.
 pub(crate) fn within_pct(values: impl Iterator<Item = f64>, bound: f64) -> Option<f64> {
     let [mut within, mut all] = [0_usize; 2];
     for value in values {
@@ -20,7 +20,7 @@ pub(crate) fn within_pct(values: impl Iterator<Item = f64>, bound: f64) -> Optio
     (all > 0).then(|| 100.0 * within as f64 / all as f64)
 }
 
-/// The root of the mean square.
+/// The root mean square.
 pub(crate) fn root_mean_square(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (count, sum) = values.fold((0_usize, 0.0), |(count, sum), value| (count + 1, sum + value * value));
     (count > 0).then(|| (sum / count as f64).sqrt())
@@ -31,7 +31,7 @@ pub fn shown(figure: Option<f64>, digits: usize) -> String {
     figure.map_or_else(|| "–".to_owned(), |figure| format!("{figure:.digits$}"))
 }
 
-/// The interval that holds the true probability with 95 %, from so many of so many (Wilson, 1927).
+/// The 95 % interval of a probability after `of` successes in `all` trials (Wilson, 1927).
 pub fn binomial_interval(of: usize, all: usize) -> [f64; 2] {
     if all == 0 {
         return [0.0, 1.0];
@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn figures_are_those_of_the_school() {
+    fn statistics_match_textbook_values() {
         let values = || [3.0, -4.0, 0.0, 5.0].into_iter();
         assert_eq!(quantile(values(), 0.0), Some(-4.0));
         assert_eq!(quantile(values(), 1.0), Some(5.0));

@@ -1,24 +1,25 @@
-//! Scorers: everything that knows the truth, to say how well the program does without it.
+//! Scores: code that knows the truth of a simulation and measures how well the program does without it.
 //!
-//! Each scorer makes a result of a seed, and a page of many results:
+//! Each score has a result per seed, and a page of many results:
 //!
 //! ```text
-//! driving  pacing  zones      trains driven to places, speeds and times
-//! traffic  disasters          several trains, and what happens to them
-//! survey                      lengths that driving finds
-//! rehearsal                   trains calibrated and put down: where every scored drive begins
-//! seeds  choice               who draws, and what is asked
-//! figures  written_scores     what many results come to, and how that is written
+//! driving  pacing  zones      trains driven to places, at speeds, to times
+//! traffic  disasters          several trains; faults
+//! survey                      lengths estimated from runs
+//! line                        odometers of full-size trains
+//! testbed                     calibrated trains in a simulated world: the start of every score
+//! seeds                       seeds and random tasks
+//! figures  written_scores     statistics and their output
 //! ```
 
-pub mod choice;
 pub mod disasters;
 pub mod driving;
 pub mod figures;
+pub mod line;
 pub mod pacing;
-pub mod rehearsal;
 pub mod seeds;
 pub mod survey;
+pub mod testbed;
 pub mod traffic;
 pub mod written_scores;
 pub mod zones;

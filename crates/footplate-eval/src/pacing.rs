@@ -16,8 +16,8 @@ use self::arrive::{Arrived, arrive};
 use self::follow::{Followed, Kept, follow};
 use self::hold::{Held, hold};
 pub use self::page::Page;
-use crate::choice::Choice;
-use crate::rehearsal::{Rehearsal, Way};
+use crate::seeds::Choice;
+use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// Three trains, in the order in which they would follow each other.
 const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(63)];
@@ -53,9 +53,9 @@ impl Scored {
 /// # Errors
 /// When no train can run round on the layout.
 pub fn score(layout: &Layout, seed: u64, budget: TimeSpan) -> anyhow::Result<Scored> {
-    let way = Way::round(layout);
+    let way = LongestCircuit::of(layout);
     ensure!(!way.nodes.is_empty(), "no train can run round on this layout with all turnouts straight");
-    let stage = Rehearsal::prepare(layout, seed, &TRAINS, &LivingSwitches::well_kept(), budget)?;
+    let stage = PreparedTrains::prepare(layout, seed, &TRAINS, &LivingSwitches::well_kept(), budget)?;
     let mut choice = Choice::new(seed);
     let (mut held, mut arrived) = (Vec::new(), Vec::new());
     for train in TRAINS {

@@ -1,24 +1,33 @@
-//! The seeds of runs, as a person gives them or as a commit draws them.
+//! Seeds, as given on the command line or as drawn by a commit.
 
 use std::collections::BTreeSet;
 use std::process::Command;
 
 use anyhow::{anyhow, bail};
 
-use crate::choice::Choice;
-
-/// More runs of a scenario say nothing new; a slip of the finger does.
-const MOST_SEEDS: u64 = 100_000;
-/// What stands before the number of seeds that a commit draws.
+/// The most seeds: more runs of a scenario add nothing, and a typing error should be rejected.
+const MAX_SEEDS: u64 = 100_000;
+/// The prefix of a number of seeds that a commit draws.
 pub const FRESH: &str = "fresh:";
-/// Digits of a commit's hash that its seeds are drawn from.
+
+const OF_FRESH_SEEDS: &str =
+    "The seeds are fresh: the commit behind the `@` drew them, and nobody chose them.";
+const OF_REGRESSION_SEEDS: &str = "The seeds are regression seeds: they were looked at while the program was made. `./ci.sh fresh` draws others.";
+
+/// Says on a page who chose its seeds.
+#[must_use]
+pub const fn seeds_sentence(are_fresh: bool) -> &'static str {
+    if are_fresh { OF_FRESH_SEEDS } else { OF_REGRESSION_SEEDS }
+}
+
+/// Digits of a commit's hash that determine its seeds.
 const HASH_DIGITS: usize = 12;
-/// Behind a hash where the files differ from the commit.
+/// The suffix of a hash if files differ from the commit.
 const CHANGED: &str = "+changes";
-/// Fresh seeds lie between these: above every seed that was ever chosen by hand, and short enough to be typed.
+/// The range of fresh seeds: above every seed that was ever chosen by hand, and short enough to type.
 const FRESH_SEEDS: [f64; 2] = [1e6, 1e7];
 
-/// One seed, all from one to another, or as many as are asked for that nobody chose.
+/// One seed, a range of seeds, or fresh seeds that a commit draws.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seeds {
     all: Vec<u64>,
@@ -26,11 +35,11 @@ pub struct Seeds {
 }
 
 impl Seeds {
-    /// Reads `7`, `1..100` with both ends, `fresh:64` for seeds that the current commit draws, or `fresh:64@5731edca1f20`
-    /// for those of another one.
+    /// Parses `7`, `1..100` with both ends, `fresh:64` for seeds that the current commit draws, or
+    /// `fresh:64@5731edca1f20` for those of another commit.
     ///
     /// # Errors
-    /// When the text is none of these, with what would be right; and where no commit is found.
+    /// The text is none of these, or no commit is found.
     pub fn parse(text: &str) -> anyhow::Result<Self> {
         match text.trim().strip_prefix(FRESH) {
             Some(fresh) => Self::fresh(fresh),
@@ -56,8 +65,8 @@ impl Seeds {
         if seeds.is_empty() {
             bail!("the range ends before it begins; it should be {}..{}", seeds.end(), seeds.start());
         }
-        if seeds.end() - seeds.start() >= MOST_SEEDS {
-            bail!("the range should have at most {MOST_SEEDS} seeds");
+        if seeds.end() - seeds.start() >= MAX_SEEDS {
+            bail!("the range should have at most {MAX_SEEDS} seeds");
         }
         let (first, last) = (seeds.start(), seeds.end());
         let written = if first == last { first.to_string() } else { format!("{first}..{last}") };
@@ -69,8 +78,8 @@ impl Seeds {
             Some((count, commit)) => (count, commit.to_owned()),
             None => (text, current_commit()?),
         };
-        let Some(count) = count.parse::<u64>().ok().filter(|count| (1..=MOST_SEEDS).contains(count)) else {
-            bail!("`{count}` is not a number of fresh seeds; write fresh:64, at most fresh:{MOST_SEEDS}");
+        let Some(count) = count.parse::<u64>().ok().filter(|count| (1..=MAX_SEEDS).contains(count)) else {
+            bail!("`{count}` is not a number of fresh seeds; write fresh:64, at most fresh:{MAX_SEEDS}");
         };
         let digits = commit.trim_end_matches(CHANGED);
         let Some(hash) = digits.get(..HASH_DIGITS).and_then(|hash| u64::from_str_radix(hash, 16).ok()) else {
@@ -85,18 +94,18 @@ impl Seeds {
         Ok(Self { all: drawn.into_iter().collect(), written })
     }
 
-    /// In order.
+    /// All seeds, in order.
     pub fn iter(&self) -> impl Iterator<Item = u64> + Clone + use<> {
         self.all.clone().into_iter()
     }
 
-    /// As it is given on the command line; fresh seeds with the commit that drew them.
+    /// The text for the command line; fresh seeds with the commit that drew them.
     pub fn written(&self) -> &str {
         &self.written
     }
 }
 
-/// The hash of the commit that the files around are of, marked where they differ from it.
+/// The hash of the current commit, marked if files differ from it.
 fn current_commit() -> anyhow::Result<String> {
     let git = |arguments: &[&str]| {
         let said = Command::new("git").args(arguments).output().ok().filter(|said| said.status.success());
@@ -114,6 +123,35 @@ fn current_commit() -> anyhow::Result<String> {
         commit += CHANGED;
     }
     Ok(commit)
+}
+
+/// A random generator of its own, so that tasks do not depend on the draws of the world (SplitMix64; Steele, Lea and
+/// Flood, 2014).
+pub struct Choice(u64);
+
+impl Choice {
+    /// The tasks of a seed.
+    pub const fn new(seed: u64) -> Self {
+        Self(seed ^ 0x9e37_79b9_7f4a_7c15)
+    }
+
+    fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// A number between two others.
+    pub fn between(&mut self, from: f64, to: f64) -> f64 {
+        from + (to - from) * ((self.bits() >> 11) as f64 / (1_u64 << 53) as f64)
+    }
+
+    /// A random element.
+    pub fn of<'a, T>(&mut self, all: &'a [T]) -> Option<&'a T> {
+        all.get((self.bits() % all.len().max(1) as u64) as usize)
+    }
 }
 
 #[cfg(test)]
@@ -143,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_seed_is_said_with_what_would_be_right() {
+    fn invalid_seeds_are_rejected_with_the_correct_form() {
         let refusal = |text| Seeds::parse(text).unwrap_err().to_string();
         assert!(refusal("x..3").starts_with("`x` is no seed"));
         assert_eq!(refusal("9..1"), "the range ends before it begins; it should be 1..9");

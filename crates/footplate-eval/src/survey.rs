@@ -1,4 +1,4 @@
-//! Layouts of which one length is known, surveyed by driving random trains, and scored by the true lengths.
+//! Layouts with one known length, surveyed by the runs of random trains and compared with the true lengths.
 
 mod page;
 
@@ -10,17 +10,17 @@ use footplate_sim::LivingSwitches;
 use footplate_sim::living::LivingLayout;
 
 pub use self::page::Page;
-use crate::rehearsal::Rehearsal;
+use crate::testbed::PreparedTrains;
 
 /// The number of the first train; the others follow.
 const FIRST_TRAIN: u16 = 24;
-/// How well a person measures the one length with a tape.
+/// The standard deviation of the one length measured with a tape.
 const TAPE: Length = Length::from_mm(2.0);
 
-/// One world: trains calibrated on the layout without its lengths, and what follows.
+/// Calibrates trains in one world on a layout without lengths, and scores the survey that follows.
 ///
 /// # Errors
-/// When no train can run on the layout.
+/// No train can run on the layout.
 pub fn score(
     layout: &Layout,
     known: StretchId,
@@ -32,24 +32,24 @@ pub fn score(
     let switches = LivingSwitches::well_kept();
     let truth = LivingLayout::draw(layout, seed, &trains, &switches)?;
     let bare = without_lengths(layout, known, &truth)?;
-    let rehearsal = Rehearsal::prepare_believing(layout, &bare, seed, &trains, &switches, budget)?;
+    let prepared = PreparedTrains::prepare_on(layout, &bare, seed, &trains, &switches, budget)?;
     let sections = SectionIndex::of(&bare);
-    let models: Vec<_> = trains.iter().filter_map(|train| rehearsal.models.get(train)).collect();
+    let models: Vec<_> = trains.iter().filter_map(|train| prepared.models.get(train)).collect();
     let survey = TrackSurvey::of(&bare, &sections, &models).ok_or_else(|| anyhow!("no train ran"))?;
     let mut surveyed = Surveyed {
         seed,
         distances: Vec::new(),
-        unseen: 0,
+        not_run: 0,
         scale: survey.scale(),
-        mishaps: rehearsal.world().mishaps().len(),
+        faults: prepared.world().mishaps().len(),
     };
     let mut seen = Vec::new();
     let known_hop = layout
         .hops()
         .find(|hop| hop.edges.iter().any(|edge| edge.stretch() == known) && is_between_sensors(layout, hop));
-    let felt = |hop: &Hop<'_>| felt_mm(&rehearsal, &trains, layout, hop);
-    // A survey by trains cannot be nearer than what they feel, which is by this factor longer on the known edge.
-    let factor = known_hop.and_then(|hop| Some(felt(&hop)? / true_mm(&truth, &hop))).unwrap_or(1.0);
+    let path_length = |hop: &Hop<'_>| path_length_mm(&prepared, &trains, layout, hop);
+    // Scales path lengths such that the known edge has its true length, as the survey does.
+    let factor = known_hop.and_then(|hop| Some(path_length(&hop)? / true_mm(&truth, &hop))).unwrap_or(1.0);
     for hop in layout.hops().filter(|hop| is_between_sensors(layout, hop)) {
         let Some(section) = sections.section(hop.id).filter(|section| !seen.contains(section)) else {
             continue;
@@ -57,7 +57,7 @@ pub fn score(
         seen.push(section);
         let Some([length, uncertainty]) = survey.distance(section).map(|known| known.map(Length::as_mm))
         else {
-            surveyed.unseen += 1;
+            surveyed.not_run += 1;
             continue;
         };
         let true_mm = true_mm(&truth, &hop);
@@ -67,37 +67,37 @@ pub fn score(
             true_mm,
             off_mm: length - true_mm,
             uncertainty_mm: uncertainty,
-            felt_off_mm: felt(&hop).map_or(0.0, |felt| felt / factor - true_mm),
+            path_off_mm: path_length(&hop).map_or(0.0, |path_length| path_length / factor - true_mm),
             is_known: known_hop.is_some_and(|known| sections.section(known.id) == Some(section)),
         });
     }
     Ok(surveyed)
 }
 
-/// What came of one world.
+/// The result of one world.
 pub struct Surveyed {
     /// The seed.
     pub seed: u64,
     distances: Vec<Distance>,
     /// Distances between sensors over which no train ran.
-    unseen: usize,
-    /// One standard deviation of the factor that all have in common, as the survey says.
+    not_run: usize,
+    /// The standard deviation of the common scale, as stated by the survey.
     scale: f64,
-    /// How often trains came to grief.
-    pub mishaps: usize,
+    /// Faults of the simulated world.
+    pub faults: usize,
 }
 
-/// A distance from sensor to sensor.
+/// The distance from one sensor to another.
 struct Distance {
     from: String,
     to: String,
     true_mm: f64,
-    /// How much longer the survey has it.
+    /// The surveyed length minus the true one.
     off_mm: f64,
-    /// One standard deviation that the survey says of it.
+    /// The standard deviation that the survey states.
     uncertainty_mm: f64,
-    /// How much longer it would be by a survey that knows exactly what trains feel, mean of both directions.
-    felt_off_mm: f64,
+    /// The same error for a survey that knows all path lengths exactly, mean of both directions: the lower bound.
+    path_off_mm: f64,
     is_known: bool,
 }
 
@@ -111,14 +111,14 @@ fn is_between_sensors(layout: &Layout, hop: &Hop<'_>) -> bool {
     hop.sensor.is_some() && layout.sensor_at(hop.from).is_some()
 }
 
-/// The longest edge from sensor to sensor: the one that a person would measure.
+/// The longest edge between two sensors: the one to measure with a tape.
 pub fn longest_between_sensors(layout: &Layout) -> Option<StretchId> {
     let single = layout.hops().filter(|hop| is_between_sensors(layout, hop) && hop.edges.len() == 1);
     let longest = single.max_by(|one, other| one.length.as_m().total_cmp(&other.length.as_m()))?;
     longest.edges.first().map(|edge| edge.stretch())
 }
 
-/// The layout as it is before anything was measured but one edge, and that truly.
+/// The layout without lengths, except the true length of one edge.
 fn without_lengths(layout: &Layout, known: StretchId, truth: &LivingLayout<'_>) -> anyhow::Result<Layout> {
     let lengths: Vec<StretchLength> = layout
         .edges()
@@ -135,16 +135,21 @@ fn true_mm(world: &LivingLayout<'_>, hop: &Hop<'_>) -> f64 {
     hop.edges.iter().map(|edge| world.truth().track().length(*edge).as_mm()).sum()
 }
 
-/// How long a hop feels in the mean of all trains and both directions.
-fn felt_mm(rehearsal: &Rehearsal<'_>, trains: &[TrainId], layout: &Layout, hop: &Hop<'_>) -> Option<f64> {
+/// The mean path length of a hop over all trains and both directions.
+fn path_length_mm(
+    prepared: &PreparedTrains<'_>,
+    trains: &[TrainId],
+    layout: &Layout,
+    hop: &Hop<'_>,
+) -> Option<f64> {
     let back: Vec<_> = hop.edges.iter().rev().map(|edge| edge.twin()).collect();
     let sensors =
         [hop.from, hop.to].map(|node| Some([layout.sensor_at(node)?, layout.sensor_at(node.reverse())?]));
     let [Some([from, from_back]), Some([to, to_back])] = sensors else { return None };
-    let truth = rehearsal.world().truth();
-    let felt = trains.iter().flat_map(|train| {
+    let truth = prepared.world().truth();
+    let path_length = trains.iter().flat_map(|train| {
         [truth.felt(*train, hop.edges, from, to), truth.felt(*train, &back, to_back, from_back)]
     });
-    let felt: Vec<f64> = felt.flatten().map(Length::as_mm).collect();
-    Some(felt.iter().sum::<f64>() / felt.len().max(1) as f64)
+    let path_length: Vec<f64> = path_length.flatten().map(Length::as_mm).collect();
+    Some(path_length.iter().sum::<f64>() / path_length.len().max(1) as f64)
 }

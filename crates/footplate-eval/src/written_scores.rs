@@ -1,10 +1,10 @@
-//! What every scorer can write: a text for people, a page of the documentation, JSON, and rates with their intervals.
+//! The outputs of every score: text, a page of the documentation, JSON, and rates with their intervals.
 
 use std::io::{self, Write};
 
 use crate::figures::binomial_interval;
 
-/// How often something happened that should not.
+/// A rate of unwanted events.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Rate {
     what: String,
@@ -14,18 +14,18 @@ pub struct Rate {
 }
 
 impl Rate {
-    /// So many times of so many.
+    /// A rate of `times` in `of`.
     pub fn new(what: impl Into<String>, times: usize, of: usize) -> Self {
         Self { what: what.into(), times, of, is_grief: false }
     }
 
-    /// So many times of so many something was broken: trains that touched, derailed or ran off the track.
+    /// The rate of collisions, derailments and overruns of the track end.
     pub fn grief(times: usize, of: usize) -> Self {
         Self { is_grief: true, ..Self::new("came to grief", times, of) }
     }
 
-    /// A row: who scored, what, how often, of how many, the share and its interval in percent. `./ci.sh fresh` looks for
-    /// rows of grief.
+    /// A table row: score, event, count, total, share and its interval in percent. `./ci.sh fresh` searches for rows of
+    /// grief.
     pub fn row(&self, scorer: &str) -> String {
         let [low, high] = binomial_interval(self.times, self.of).map(|share| 100.0 * share);
         let share = 100.0 * self.times as f64 / self.of.max(1) as f64;
@@ -35,23 +35,23 @@ impl Rate {
     }
 }
 
-/// What a scorer found.
+/// The results of a score.
 pub trait WrittenScores {
-    /// The name of the scorer on the command line.
+    /// The name of the score on the command line.
     const SCORER: &'static str;
-    /// What stands above the text on a page of the documentation, the command that makes it included.
+    /// The head of its page in the documentation, with the command that reproduces it.
     fn head(&self) -> String;
-    /// The text for people, which is that of the page, too.
+    /// Writes the text, which is also that of the page.
     ///
     /// # Errors
     /// Those of the output.
     fn write_text(&self, output: &mut dyn Write) -> io::Result<()>;
-    /// The same for machines.
+    /// Writes JSON.
     ///
     /// # Errors
     /// Those of the output.
     fn write_json(&self, output: &mut dyn Write) -> io::Result<()>;
-    /// How often happened what should not.
+    /// The rates of unwanted events.
     fn rates(&self) -> Vec<Rate>;
 }
 

@@ -11,8 +11,8 @@ use footplate_sim::LivingSwitches;
 
 pub use self::page::Page;
 use self::ride::{Ridden, Told, ride};
-use crate::choice::Choice;
-use crate::rehearsal::{Rehearsal, Way};
+use crate::seeds::Choice;
+use crate::testbed::{LongestCircuit, PreparedTrains};
 
 const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(63)];
 /// Zones at once on a way round, ...
@@ -42,9 +42,9 @@ impl Scored {
 /// # Errors
 /// When no train can run round on the layout.
 pub fn score(layout: &Layout, seed: u64, budget: TimeSpan) -> anyhow::Result<Scored> {
-    let way = Way::round(layout);
+    let way = LongestCircuit::of(layout);
     ensure!(!way.nodes.is_empty(), "no train can run round on this layout with all turnouts straight");
-    let stage = Rehearsal::prepare(layout, seed, &TRAINS, &LivingSwitches::well_kept(), budget)?;
+    let stage = PreparedTrains::prepare(layout, seed, &TRAINS, &LivingSwitches::well_kept(), budget)?;
     let mut choice = Choice::new(seed);
     let mut rides = Vec::new();
     for nth in 0..TRAINS.len() {
@@ -60,7 +60,7 @@ pub fn score(layout: &Layout, seed: u64, budget: TimeSpan) -> anyhow::Result<Sco
 }
 
 /// The layout with zones on the way round.
-fn restricted(layout: &Layout, way: &Way, choice: &mut Choice) -> anyhow::Result<Layout> {
+fn restricted(layout: &Layout, way: &LongestCircuit, choice: &mut Choice) -> anyhow::Result<Layout> {
     let mut taken: Vec<StretchId> = Vec::new();
     let mut found = layout.clone();
     for nth in 0..ZONES {

@@ -1,4 +1,4 @@
-//! A way round a layout that leads back to where it began, and the turnouts it needs.
+//! A closed path on a layout, and the turnout positions it needs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,20 +7,20 @@ use footplate_core::{EdgeId, Length, NodeId, SensorId, StretchId, TurnoutId};
 
 use crate::draws::{Draws, Purpose};
 
-/// Ways tried before a layout is said to have no circuit (chosen: far more than the few that the course layouts
+/// Random paths tried before a layout counts as one without a circuit (chosen: far more than the course layouts
 /// need).
-const TRIES: usize = 1000;
-/// The best of so many circuits is taken (chosen: long ones, but not always the same).
+const MAX_TRIES: usize = 1000;
+/// The best of this many circuits is used (chosen: long ones, but not always the same).
 const CANDIDATES: usize = 3;
-/// Trains on both legs of a turnout touch each other up to this far from its toe (worked out: 24.3° at a radius of
-/// 424.6 mm part the middles of the tracks by the 40 mm that two engines need).
+/// Trains on both legs of a turnout would touch up to this far from its toe (computed: at 24.3° and a radius of 424.6
+/// mm, the track centres are then 40 mm apart, the width of two locomotives).
 pub(crate) const FOULING_MM: f64 = 180.0;
-/// What the longest train needs, put down by hand (chosen: 165 mm and a hand's breadth).
-const ROOM_MM: f64 = 260.0;
-/// A way this many edges long that has not come back is given up.
-const LONGEST_WAY: usize = 400;
+/// Length that the longest train needs when placed by hand (chosen: 165 mm and a hand's breadth).
+const MIN_SIDING_MM: f64 = 260.0;
+/// A path of this many edges that has not returned is abandoned.
+const MAX_EDGES: usize = 400;
 
-/// A closed way.
+/// A closed path.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Circuit {
     edges: Vec<EdgeId>,
@@ -31,7 +31,7 @@ pub struct Circuit {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CircuitError {
-    /// No way out and back was found on the layout.
+    /// No path of the layout returned to its start.
     #[error(
         "no circuit with two sensors found on layout `{layout}`; name a layout on which a train can run round"
     )]
@@ -39,21 +39,21 @@ pub enum CircuitError {
         /// The layout.
         layout: String,
     },
-    /// The turnouts given lead elsewhere.
+    /// The given turnout positions lead elsewhere.
     #[error(
         "the path from {start} does not come back to it with the turnouts in their present positions: \
          it ends at {reached}; set the turnouts of a loop through {start}"
     )]
     DoesNotReturn {
-        /// The node it began at.
+        /// The node where the path starts.
         start: String,
-        /// The node beyond which there is no way, or at which the search was given up.
+        /// The node at which the path or the search ended.
         reached: String,
     },
 }
 
 impl Circuit {
-    /// The way that leads from a node back to it as the turnouts lie; an unknown turnout counts as straight.
+    /// The path from a node back to it with the given turnout positions; an unknown turnout counts as straight.
     ///
     /// # Errors
     /// [`CircuitError::DoesNotReturn`] if it leads off the layout or into another loop.
@@ -73,29 +73,29 @@ impl Circuit {
     /// A circuit with many sensors: the best of a few random ones, the same for the same seed.
     ///
     /// # Errors
-    /// [`CircuitError::NoneFound`] if no way came back.
+    /// [`CircuitError::NoneFound`] if no path returned.
     pub fn draw(layout: &Layout, seed: u64) -> Result<Self, CircuitError> {
         let mut draws = Draws::new(seed, Purpose::Scenario);
         let starts: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
-        let ways = Self::any(layout, &starts, &mut draws);
-        let best = ways.take(CANDIDATES).max_by_key(|(sensors, _)| *sensors);
+        let circuits = Self::drawn(layout, &starts, &mut draws);
+        let best = circuits.take(CANDIDATES).max_by_key(|(sensors, _)| *sensors);
         best.map(|(_, circuit)| circuit).ok_or_else(|| none_found(layout))
     }
 
-    /// Circuits for so many trains, such that each has a stretch to itself on which its train is in nobody's way while
-    /// another runs round; those with many sensors first. Fewer, but at least one, if there are no more.
+    /// Circuits for up to `count` trains, such that each has a stretch of its own on which its train blocks no other;
+    /// those with many sensors first. Fewer if there are no more, but at least one.
     ///
     /// # Errors
-    /// [`CircuitError::NoneFound`] if no way came back.
+    /// [`CircuitError::NoneFound`] if no path returned.
     pub(crate) fn draw_apart(
         layout: &Layout,
         count: usize,
         draws: &mut Draws,
     ) -> Result<Vec<Self>, CircuitError> {
         let starts: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
-        let mut found: Vec<(usize, Self)> = Self::any(layout, &starts, draws).collect();
+        let mut found: Vec<(usize, Self)> = Self::drawn(layout, &starts, draws).collect();
         found.sort_by_key(|(sensors, _)| std::cmp::Reverse(*sensors));
-        // One of each, whichever way round and wherever it begins.
+        // One circuit for each set of stretches, whatever its direction and start.
         let mut known: Vec<BTreeSet<StretchId>> = Vec::new();
         found.retain(|(_, circuit)| {
             let rails = circuit.edges.iter().map(|edge| edge.stretch()).collect();
@@ -125,7 +125,8 @@ impl Circuit {
         Ok(best.into_iter().cloned().collect())
     }
 
-    /// Edges of one of several circuits on which its train is in nobody's way, and between which offsets in mm.
+    /// Edges of one of several circuits on which its train blocks no other, each with the range of clear offsets in
+    /// mm.
     pub(crate) fn sidings(layout: &Layout, circuits: &[&Self], nth: usize) -> Vec<(EdgeId, [f64; 2])> {
         let Some(own) = circuits.get(nth) else { return Vec::new() };
         let others = || {
@@ -134,16 +135,16 @@ impl Circuit {
         let is_own = |edge: &&EdgeId| others().all(|theirs| theirs.stretch() != edge.stretch());
         let clear = |edge: &EdgeId| {
             let (there, back) = (layout.edge(*edge)?, layout.edge(edge.twin())?);
-            let kept_off = |leg: Option<Leg>| if leg.is_some() { FOULING_MM } else { 0.0 };
-            let range = [kept_off(there.leg), there.length.as_mm() - kept_off(back.leg)];
-            (range[1] - range[0] > ROOM_MM).then_some((*edge, range))
+            let clearance = |leg: Option<Leg>| if leg.is_some() { FOULING_MM } else { 0.0 };
+            let range = [clearance(there.leg), there.length.as_mm() - clearance(back.leg)];
+            (range[1] - range[0] > MIN_SIDING_MM).then_some((*edge, range))
         };
         own.edges.iter().filter(is_own).filter_map(clear).collect()
     }
 
-    /// Random circuits with how many sensors each has, as long as ways are tried.
-    fn any(layout: &Layout, starts: &[NodeId], draws: &mut Draws) -> impl Iterator<Item = (usize, Self)> {
-        (0..TRIES).filter_map(move |_| {
+    /// Random circuits, each with its number of sensors.
+    fn drawn(layout: &Layout, starts: &[NodeId], draws: &mut Draws) -> impl Iterator<Item = (usize, Self)> {
+        (0..MAX_TRIES).filter_map(move |_| {
             let start = *starts.get(draws.below(starts.len()))?;
             let circuit = walk(layout, start, |_| Leg::from_curved(draws.chance(0.5))).ok()?;
             Some((circuit.sensors(layout).len(), circuit)).filter(|(sensors, _)| *sensors >= 2)
@@ -156,7 +157,7 @@ impl Circuit {
         &self.edges
     }
 
-    /// The turnouts on it and how they have to lie.
+    /// Its turnouts and their positions.
     pub fn turnouts(&self) -> impl ExactSizeIterator<Item = (TurnoutId, Leg)> {
         self.turnouts.iter().map(|(turnout, leg)| (*turnout, *leg))
     }
@@ -167,7 +168,7 @@ impl Circuit {
         self.edges.iter().filter_map(|edge| layout.sensor_at(layout.edge(*edge)?.from)).collect()
     }
 
-    /// The sum of its edges as the layout has them.
+    /// The length of its edges by the layout's survey.
     #[must_use]
     pub fn length(&self, layout: &Layout) -> Length {
         self.edges.iter().filter_map(|edge| layout.edge(*edge)).map(|edge| edge.length).sum()
@@ -178,12 +179,12 @@ fn none_found(layout: &Layout) -> CircuitError {
     CircuitError::NoneFound { layout: layout.name().to_owned() }
 }
 
-/// Walks until the way returns to its start; `choose` decides each turnout once. Fails with the last node.
+/// Follows a path until it returns to its start; `choose` sets each facing turnout once. Fails with the last node.
 fn walk(layout: &Layout, start: NodeId, mut choose: impl FnMut(TurnoutId) -> Leg) -> Result<Circuit, NodeId> {
     let mut turnouts: BTreeMap<TurnoutId, Leg> = BTreeMap::new();
     let mut edges: Vec<EdgeId> = Vec::new();
     let mut node = start;
-    for _ in 0..LONGEST_WAY {
+    for _ in 0..MAX_EDGES {
         let id = match (layout.ways(node), layout.node(node).map(|node| node.kind)) {
             (Ways::Ahead(edge), _) => edge,
             (Ways::Legs { straight, curved }, Some(NodeKind::Branch(turnout))) => {
@@ -193,7 +194,8 @@ fn walk(layout: &Layout, start: NodeId, mut choose: impl FnMut(TurnoutId) -> Leg
             _ => return Err(node),
         };
         let Some(edge) = layout.edge(id) else { return Err(node) };
-        // Through a turnout from a leg: it has to lie for that leg, which is where the edge's twin leaves.
+        // A trailing turnout must be set for the leg on which the path arrives, which is where the edge's twin
+        // starts.
         if let Some(NodeKind::Merge(turnout)) = layout.node(edge.to).map(|node| node.kind) {
             let leg = layout.edge(id.twin()).and_then(|twin| twin.leg).ok_or(node)?;
             if *turnouts.entry(turnout).or_insert(leg) != leg {

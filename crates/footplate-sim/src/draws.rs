@@ -1,8 +1,8 @@
 //! Random draws that are the same on every machine and in every release.
 //!
-//! The stream is ChaCha8, whose output is fixed by its definition. The distributions are written out here
-//! with `libm`, because a library's sampler may change its values in a new version and a platform's
-//! logarithm its last bit; a seed in a test or a bug report has to mean one world for good.
+//! The stream is ChaCha8, whose output is fixed by its definition. The distributions are written here with `libm`: a
+//! library's sampler may change its values in a new version, and a platform's logarithm its last bit, but a seed in a
+//! test or a bug report must mean one world for ever.
 
 use core::f64::consts::TAU;
 use core::ops::Range;
@@ -10,25 +10,25 @@ use core::ops::Range;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
-/// What a stream of draws is used for; streams of one seed are independent, so that a further draw in one
-/// part of the world leaves every other part as it was.
+/// The purpose of a stream. Streams of one seed are independent: a further draw in one part of the world changes no
+/// other part.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Purpose {
     /// The parameters of a train.
     Train = 1,
-    /// True lengths, contact offsets, curves and dirt.
+    /// True lengths, sensor offsets, curves and dirt.
     Track = 2,
-    /// What differs from run to run: deviation, wander, stiction, scatter of stops.
+    /// Variation from run to run: deviation, wander, stiction, spread of stops.
     Motion = 3,
     /// The station's line: phase, jitter, delays.
     Line = 4,
-    /// Missed, spurious and stuck contacts.
+    /// Missed, spurious and stuck sensors.
     Faults = 5,
-    /// The choices of a scenario and the hand of the person who measures.
+    /// The choices of a scenario, and manual measurements.
     Scenario = 6,
-    /// A living layout: what its trains, turnouts and people draw from.
+    /// A living layout: its trains, turnouts and operators.
     Living = 7,
-    /// Physics from outside the usual ranges: see `PhysicsRange`.
+    /// Physics outside the usual ranges: see `PhysicsRange`.
     Physics = 8,
 }
 
@@ -72,8 +72,7 @@ impl Draws {
         mean + sd * radius * libm::cos(TAU * self.unit())
     }
 
-    /// Normal, drawn again until it lies within `sds` standard deviations: for parameters that a real train
-    /// or track could have.
+    /// Normal, truncated to `sds` standard deviations, for parameters of plausible trains and tracks.
     pub(crate) fn normal_within(&mut self, mean: f64, sd: f64, sds: f64) -> f64 {
         loop {
             let deviation = self.normal(0.0, 1.0);
@@ -83,7 +82,7 @@ impl Draws {
         }
     }
 
-    /// The waiting time to the next of events that happen `rate` times per unit; infinite for no rate.
+    /// The waiting time to the next event of a Poisson process with `rate` events per unit; infinite for a rate of 0.
     pub(crate) fn waiting(&mut self, rate: f64) -> f64 {
         if rate > 0.0 { -libm::log(1.0 - self.unit()) / rate } else { f64::INFINITY }
     }

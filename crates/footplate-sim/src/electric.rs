@@ -1,9 +1,9 @@
 //! A second train model: a direct-current motor under a decoder with load control.
 //!
-//! It shares no equation with [`motor`](crate::motor) and none with the estimator. The motor pulls in proportion to the
-//! voltage it gets less what it generates, dry friction with a Stribeck peak and a viscous part hold it back, so do
-//! gradients and curves, and a decoder measures the generated voltage every few milliseconds and sets the voltage by a
-//! proportional and integral rule. Forces stand here as accelerations in mm/s², that is, divided by the train's mass.
+//! It shares no equation with [`motor`](crate::motor) or the estimator. The pull is proportional to the voltage minus
+//! the back EMF; dry friction with a Stribeck peak, viscous friction, gradients and curves oppose it. The decoder
+//! measures the back EMF every few milliseconds and sets the voltage by a PI controller. Forces are expressed as
+//! accelerations in mm/s², that is, divided by the train's mass.
 
 use footplate_core::{Speed, SpeedStep};
 
@@ -19,10 +19,10 @@ const STEPS: u8 = 14;
 const COUNTS: f64 = 126.0;
 /// Acceleration of free fall.
 const GRAVITY_MM_PER_S2: f64 = 9810.0;
-/// How a curve that makes the usual model slower by a part holds this one back: by this times the part, in mm/s²
-/// (chosen: a tight curve takes as much as its dry friction).
+/// A curve that reduces the usual model's speed by a part acts on this one as a force of this times the part, in
+/// mm/s² (chosen: a tight curve as strong as the dry friction).
 const CURVE_MM_PER_S2: f64 = 2500.0;
-/// Slower than this without a voltage, friction has stopped it within the step.
+/// Below this speed without a voltage, friction stops it within one step.
 const REST_MM_PER_S: f64 = 0.02;
 /// Dry friction of a cold train over that of a warm one (chosen: oil).
 const COLD_FRICTION: f64 = 1.35;
@@ -32,29 +32,29 @@ const SETTLED_S: f64 = 25.0;
 /// Motor, gears and decoder of one train.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ElectricEngine {
-    /// Speed without load at full voltage, in mm/s.
+    /// No-load speed at full voltage, in mm/s.
     no_load: f64,
-    /// Pull at rest at full voltage, in mm/s².
+    /// Stall pull at full voltage, in mm/s².
     stall: f64,
-    /// Dry friction while it moves, its peak at rest over that, the speed over which the peak falls off, and the
-    /// viscous part per s.
+    /// Dry friction in motion; its peak at rest relative to that; the speed over which the peak falls off; viscous
+    /// friction per s.
     dry: f64,
     peak: f64,
     stribeck: f64,
     viscous: f64,
-    /// Proportional and integral part of the load control (the latter per s), and how often it measures, in s.
+    /// Proportional and integral gain of the load control (the latter per s), and its measuring interval, in s.
     proportional: f64,
     integral: f64,
     period_s: f64,
-    /// Relative noise of a measurement.
+    /// Relative noise of a back-EMF measurement.
     noise: f64,
     /// Set speeds at the lowest, the middle and the highest step, in mm/s (CV 2, 6 and 5).
     curve: [f64; 3],
     /// Seconds for a count up and down (CV 3 and 4).
     count_s: [f64; 2],
-    /// Whether the decoder shorts the motor at step 0, which brakes, or lets it run out.
+    /// Whether the decoder shorts the motor at step 0, which brakes, or leaves it open.
     shorts: bool,
-    /// Relative fall of what the motor generates from cold to warm: so much faster the load control lets it run.
+    /// Relative decrease of the back EMF from cold to warm: the load control lets a warm motor run faster by as much.
     fade: f64,
 }
 
@@ -80,7 +80,7 @@ impl ElectricEngine {
         }
     }
 
-    /// Steady speeds at every step, warm, on the level, on an average day: found by running it.
+    /// Steady speeds at every step, warm, on the level, on an average day, from a simulated run.
     pub(crate) fn speed_table(&self) -> SpeedTable {
         let mut draws = Draws::new(0, crate::draws::Purpose::Physics);
         let quiet = Self { noise: 0.0, ..*self };
@@ -111,18 +111,18 @@ impl ElectricEngine {
     }
 }
 
-/// What is around the train at a moment.
+/// The conditions of a train at a moment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Surroundings {
-    /// The rail's speed factor for the usual model.
+    /// The rail's speed factor in the usual model.
     pub(crate) rail: f64,
-    /// Its gradient, upwards positive.
+    /// The gradient, uphill positive.
     pub(crate) grade: f64,
     /// 0 cold, 1 warm.
     pub(crate) warmth: f64,
 }
 
-/// Such an engine under way.
+/// Such a motor in operation.
 #[derive(Debug, Clone)]
 pub(crate) struct ElectricMotor {
     engine: ElectricEngine,
@@ -132,12 +132,12 @@ pub(crate) struct ElectricMotor {
     until_count: f64,
     until_measured: f64,
     summed: f64,
-    /// Voltage on the motor as a part of the full one.
+    /// Motor voltage as a part of the full one.
     voltage: f64,
     pub(crate) speed: f64,
-    /// Friction at rest of this start, over the dry friction.
+    /// Static friction of this start, relative to the dry friction.
     sticks_at: f64,
-    /// Stands on dirt without a current.
+    /// At rest on dirt without current.
     is_cut_off: bool,
 }
 
@@ -158,7 +158,7 @@ impl ElectricMotor {
         }
     }
 
-    /// The same engine at rest in the same session.
+    /// The same motor at rest in the same session.
     pub(crate) fn reset(&self) -> Self {
         Self { session: self.session, ..Self::at_rest(self.engine) }
     }
@@ -186,7 +186,7 @@ impl ElectricMotor {
         self.speed == 0.0 && (self.target == 0.0 && self.count == 0.0 || self.is_cut_off)
     }
 
-    /// Speed one step of a millisecond later.
+    /// The speed after one more step of a millisecond.
     pub(crate) fn advance(&mut self, around: Surroundings, draws: &mut Draws) -> f64 {
         self.turn_counter();
         self.control(around, draws);
@@ -200,7 +200,7 @@ impl ElectricMotor {
         let dry = dry * oil * self.session.stop;
         let slope = GRAVITY_MM_PER_S2 * around.grade;
         let curve = CURVE_MM_PER_S2 * (1.0 - around.rail).max(0.0);
-        // The motor and the friction of its gears do not grow with what the train pulls.
+        // Motor and gear friction do not grow with the pulled load.
         let driving = pull / self.session.mass - slope;
         if self.speed == 0.0 {
             let sticks = dry * self.sticks_at;
@@ -213,7 +213,7 @@ impl ElectricMotor {
         let friction =
             dry * (1.0 + (peak - 1.0) * libm::exp(-falls_off * falls_off)) + viscous * self.speed + curve;
         let next = self.speed + (driving - friction / self.session.mass) * STEP_S;
-        // Worm gears: no slope rolls it on or back without a voltage.
+        // Worm gears: no slope moves it without a voltage.
         self.speed = if next < REST_MM_PER_S { 0.0 } else { next };
         self.speed
     }
@@ -262,7 +262,7 @@ mod tests {
         (ElectricEngine::draw(&mut draws), draws)
     }
 
-    /// How far a train runs on after it is commanded to stand from a step, in mm.
+    /// The stopping distance from a step, in mm.
     fn stop(engine: ElectricEngine, step: u8, around: Surroundings, draws: &mut Draws) -> f64 {
         let mut motor = ElectricMotor::at_rest(engine);
         motor.command(SpeedStep::new(step).unwrap(), draws);
@@ -270,9 +270,9 @@ mod tests {
             motor.advance(around, draws);
         }
         motor.command(SpeedStep::STAND, draws);
-        let way = (0..20_000).map(|_| motor.advance(around, draws) * STEP_S).sum();
+        let distance = (0..20_000).map(|_| motor.advance(around, draws) * STEP_S).sum();
         assert!(motor.stays_at_rest(), "it rests after 20 s");
-        way
+        distance
     }
 
     #[test]
@@ -294,7 +294,7 @@ mod tests {
         for seed in 0..20 {
             let (engine, mut draws) = drawn(seed);
             let level = stop(engine, 14, LEVEL, &mut draws);
-            // Real ones at top step: 580 to 1588 mm; the ranges are meant to be wider.
+            // Real stopping distances at top step: 580 to 1588 mm; the ranges are deliberately wider.
             assert!((150.0..2500.0).contains(&level), "seed {seed}: {level} mm");
             let falling = Surroundings { grade: -0.005, ..LEVEL };
             longer += usize::from(stop(engine, 14, falling, &mut draws) > level);

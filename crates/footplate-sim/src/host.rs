@@ -1,23 +1,23 @@
-//! The program that polls, and the person beside it: they follow a script and write down what they see.
+//! The polling program and its operator: they follow a script and record what they see.
 
 use footplate_core::{Event, EventKind, Length, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use crate::contacts::Closure;
 use crate::draws::Draws;
 use crate::path::Path;
 use crate::poller::{Line, Link, Poll};
 use crate::rolling::Rolling;
 use crate::script::{Order, What, When};
+use crate::sensors::Actuation;
 use crate::truth::{CommandTruth, ReportTruth, StopTruth};
 
-/// From standstill until a person has pressed the key (measured).
+/// From standstill until the operator presses the key (measured).
 const KEY_PRESS_S: core::ops::Range<f64> = 0.2..0.5;
 /// Standard deviation of a tape laid along the rails (chosen).
 const TAPE_SD_MM: f64 = 3.0;
 /// Tapes are read to the centimetre (as in the recordings).
 const TAPE_MARK_MM: f64 = 10.0;
 
-/// What was written down, and the truth behind it.
+/// The recording, and the truth behind it.
 #[derive(Debug, Default)]
 pub(crate) struct Notes {
     pub(crate) events: Vec<Event>,
@@ -26,31 +26,31 @@ pub(crate) struct Notes {
     pub(crate) stops: Vec<StopTruth>,
 }
 
-/// The program and the person during a run. Times in s since its start.
+/// The program and the operator during a run. Times in s since its start.
 #[derive(Debug)]
 pub(crate) struct Host<'w> {
     train: TrainId,
     link: &'w Link,
     clock: Timestamp,
     orders: std::slice::Iter<'w, Order>,
-    /// The order that is waited for, and the time at which it is ready once that is known.
+    /// The pending order, and the time at which it is ready once that is known.
     next: Option<(Order, Option<f64>)>,
-    /// When the order before was done.
+    /// When the previous order was done.
     since: f64,
-    /// How many new contacts were seen since then.
+    /// How many new sensor reports have come since then.
     seen: u32,
-    /// The contact whose report the last order waited for.
+    /// The sensor whose report the last order waited for.
     trigger: Option<SensorId>,
     /// Whether a command waits for the line.
     is_sending: bool,
-    /// What the last poll saw closed, and since when it was.
-    held: Vec<(SensorId, f64)>,
+    /// The sensors that the last poll saw closed, and since when.
+    closed_sensors: Vec<(SensorId, f64)>,
     draws: Draws,
     notes: Notes,
 }
 
 impl<'w> Host<'w> {
-    /// At the start of a run whose clock then shows `clock`; `events` have been written down before.
+    /// The start of a run, when the clock shows `clock`, after earlier `events`.
     pub(crate) fn new(
         train: TrainId,
         link: &'w Link,
@@ -61,23 +61,36 @@ impl<'w> Host<'w> {
     ) -> Self {
         let mut orders = orders.iter();
         let next = orders.next().map(|order| (*order, None));
-        let (since, seen, trigger, is_sending, held) = (0.0, 0, None, false, Vec::new());
+        let (since, seen, trigger, is_sending, closed_sensors) = (0.0, 0, None, false, Vec::new());
         let notes = Notes { events, ..Notes::default() };
-        Self { train, link, clock, orders, next, since, seen, trigger, is_sending, held, draws, notes }
+        Self {
+            train,
+            link,
+            clock,
+            orders,
+            next,
+            since,
+            seen,
+            trigger,
+            is_sending,
+            closed_sensors,
+            draws,
+            notes,
+        }
     }
 
-    /// Whether everything in the script is done.
+    /// Whether the script is done.
     pub(crate) const fn is_done(&self) -> bool {
         self.next.is_none()
     }
 
-    /// What was written down.
+    /// The recording and its truth.
     pub(crate) fn into_notes(self) -> Notes {
         self.notes
     }
 
-    /// Sees whether the next order is due at `now`, and gives it.
-    pub(crate) fn attend(
+    /// Carries out the next order if it is due.
+    pub(crate) fn follow_script(
         &mut self,
         now: f64,
         rolling: &Rolling<'_>,
@@ -91,7 +104,7 @@ impl<'w> Host<'w> {
         if ready.is_none() {
             *ready = match order.when {
                 When::After(span) => Some(self.since + span.as_s()),
-                // A person needs a moment to see it.
+                // The operator needs a moment to notice.
                 When::AtRest if rolling.stays_at_rest() => Some(match order.what {
                     What::Measure => rolling.rested_at().unwrap_or(now) + self.draws.uniform(KEY_PRESS_S),
                     What::Speed(_) => now,
@@ -112,7 +125,7 @@ impl<'w> Host<'w> {
         }
     }
 
-    /// A command went out; `heard` is when the decoder will have it.
+    /// Records a command that was sent; `heard` is when the decoder receives it.
     pub(crate) fn note_command(&mut self, step: SpeedStep, began: f64, heard: f64) {
         let event = self.write(began, EventKind::Speed { train: self.train, step });
         self.notes.commands.push(CommandTruth { event, step, heard: self.at(heard) });
@@ -120,36 +133,37 @@ impl<'w> Host<'w> {
         self.advance(began);
     }
 
-    /// A poll was answered.
-    pub(crate) fn note_poll(&mut self, poll: Poll, closed: &[Closure]) {
-        for closure in closed {
-            let before = self.held.iter().find(|(sensor, _)| *sensor == closure.sensor).map(|(_, at)| *at);
+    /// Records the answer of a poll.
+    pub(crate) fn note_poll(&mut self, poll: Poll, closed: &[Actuation]) {
+        for actuation in closed {
+            let before =
+                self.closed_sensors.iter().find(|(sensor, _)| *sensor == actuation.sensor).map(|(_, at)| *at);
             if before.is_none() {
-                self.see(closure.sensor, poll.stamp);
+                self.note_new_report(actuation.sensor, poll.stamp);
             }
             if before.is_some() && !self.link.repeats {
                 continue;
             }
             let interval = TimeSpan::from_s(poll.stamp - poll.stamp_before);
             let poll_interval = self.link.intervals.then_some(interval);
-            let report = Report { sensor: closure.sensor, poll_interval };
+            let report = Report { sensor: actuation.sensor, poll_interval };
             let event = self.write(poll.stamp, EventKind::Sensor(report));
             self.notes.reports.push(ReportTruth {
                 event,
-                sensor: closure.sensor,
-                cause: closure.cause_at(poll.before),
-                first: before != Some(closure.closed),
-                closed: self.at(closure.closed),
+                sensor: actuation.sensor,
+                cause: actuation.cause_at(poll.before),
+                first: before != Some(actuation.closed),
+                closed: self.at(actuation.closed),
                 reading: self.at(poll.reading),
                 reading_before: self.at(poll.before),
             });
         }
-        self.held.clear();
-        self.held.extend(closed.iter().map(|closure| (closure.sensor, closure.closed)));
+        self.closed_sensors.clear();
+        self.closed_sensors.extend(closed.iter().map(|actuation| (actuation.sensor, actuation.closed)));
     }
 
-    /// A contact is seen closed that was open at the poll before.
-    fn see(&mut self, sensor: SensorId, stamp: f64) {
+    /// Counts a sensor that was open at the previous poll.
+    fn note_new_report(&mut self, sensor: SensorId, stamp: f64) {
         let Some((Order { when: When::OnReport { skipped, wait }, .. }, ready @ None)) = &mut self.next
         else {
             return;
@@ -161,7 +175,7 @@ impl<'w> Host<'w> {
         self.seen += 1;
     }
 
-    /// Lays the tape from the landmark that the script or the way suggests.
+    /// Measures with a tape from the landmark that the script or the path suggests.
     fn measure(&mut self, now: f64, rolling: &Rolling<'_>, path: &Path) {
         let [here, _] = rolling.state();
         let passed = path.landmarks.partition_point(|point| point.at_mm <= here);
@@ -177,7 +191,7 @@ impl<'w> Host<'w> {
         self.notes.stops.push(StopTruth { event, rested, offset: Length::from_mm(true_mm) });
     }
 
-    /// The order is done; the next one is waited for.
+    /// Proceeds to the next order.
     fn advance(&mut self, now: f64) {
         self.next = self.orders.next().map(|order| (*order, None));
         self.since = now;

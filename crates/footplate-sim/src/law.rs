@@ -1,14 +1,14 @@
-//! The laws by which a decoder takes its motor from one speed to another: what each one is, and how fast.
+//! The laws by which a decoder changes the speed of its motor, with their rates.
 //!
-//! A law here is a process with a few settings, run forward in small steps by [`motor`](crate::motor). There
-//! are no closed forms of speed over time to look up, and none to share with the estimator that is judged.
+//! A law here is a process with a few settings, integrated in small steps by [`motor`](crate::motor). There is no
+//! closed form of speed over time, and none is shared with the estimator under test.
 
 use footplate_core::{Acceleration, TimeSpan};
 
 use crate::draws::Draws;
 use crate::speed_table::Shape;
 
-/// The name of a law without its settings.
+/// A law without its settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum LawFamily {
     /// The set speed moves at a constant rate.
@@ -17,11 +17,11 @@ pub enum LawFamily {
     Smooth,
     /// The set speed moves at a constant rate and is averaged over a window: constant jerk at both ends.
     SCurve,
-    /// The set speed jumps and the motor follows as its inertia allows.
+    /// The set speed jumps, and the motor follows with its inertia.
     Lag,
     /// A counter goes through the decoder's internal steps, one at a time (momentum, CV 3 and 4).
     Momentum,
-    /// Speeds up at a limited rate with a lag behind it, slows down by inertia alone.
+    /// Accelerates at a limited rate with a lag, decelerates by inertia alone.
     Mixed,
 }
 
@@ -50,55 +50,55 @@ impl core::fmt::Display for LawFamily {
     }
 }
 
-/// A law with its settings; `up` speeds up, `down` slows down.
+/// A law with its settings; `up` accelerates, `down` decelerates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Law {
     /// See [`LawFamily::Constant`].
     Constant {
-        /// Rate of speeding up.
+        /// Rate of acceleration.
         up: Acceleration,
-        /// Rate of slowing down, as a positive number.
+        /// Rate of deceleration, as a positive number.
         down: Acceleration,
     },
-    /// See [`LawFamily::Smooth`]; a change lasts `shortest` and in addition its size divided by the rate.
+    /// See [`LawFamily::Smooth`]; a change takes `shortest` plus its size divided by the rate.
     Smooth {
         /// Mean rate of a large change upwards.
         up: Acceleration,
         /// Mean rate of a large change downwards, as a positive number.
         down: Acceleration,
-        /// What the smallest change takes.
+        /// Duration of the smallest change.
         shortest: TimeSpan,
     },
     /// See [`LawFamily::SCurve`].
     SCurve {
-        /// Rate of speeding up in the middle of a large change.
+        /// Rate in the middle of a large acceleration.
         up: Acceleration,
-        /// Rate of slowing down in the middle of a large change, as a positive number.
+        /// Rate in the middle of a large deceleration, as a positive number.
         down: Acceleration,
-        /// The window of the average.
+        /// The averaging window.
         rounding: TimeSpan,
     },
     /// See [`LawFamily::Lag`].
     Lag {
-        /// Time constant of speeding up.
+        /// Time constant of acceleration.
         up: TimeSpan,
-        /// Time constant of slowing down.
+        /// Time constant of deceleration.
         down: TimeSpan,
     },
     /// See [`LawFamily::Momentum`].
     Momentum {
-        /// Time for one internal step upwards.
+        /// Time per internal step upwards.
         up_per_count: TimeSpan,
-        /// Time for one internal step downwards.
+        /// Time per internal step downwards.
         down_per_count: TimeSpan,
     },
     /// See [`LawFamily::Mixed`].
     Mixed {
-        /// Limit of the rate of speeding up.
+        /// Limit of the acceleration.
         up: Acceleration,
         /// Time constant behind that limit.
         up_lag: TimeSpan,
-        /// Time constant of slowing down.
+        /// Time constant of deceleration.
         down: TimeSpan,
     },
 }
@@ -122,12 +122,12 @@ impl Law {
         }
     }
 
-    /// Settings that give starts and stops like those of real engines of a shape (stop distances at top
-    /// speed: 820 to 970 mm even, 1210 to 1590 mm steep; even engines take 3 s to reach top speed, steep ones
+    /// Settings that give starts and stops like those of real locomotives of a shape (stopping distances at top
+    /// speed: 820 to 970 mm even, 1210 to 1590 mm steep; even locomotives take 3 s to reach top speed, steep ones
     /// less).
     pub(crate) fn draw(family: LawFamily, shape: Shape, draws: &mut Draws) -> Self {
         let rate = |mm_per_s2: f64| Acceleration::from_mm_per_s2(mm_per_s2);
-        // Ranges chosen so that numeric stops of the drawn trains cover the measured distances.
+        // Ranges chosen so that the stopping distances of drawn trains cover the measured ones.
         let (up, down) = match shape {
             Shape::Even => (draws.uniform(130.0..230.0), draws.uniform(190.0..300.0)),
             Shape::Steep => (draws.uniform(170.0..300.0), draws.uniform(130.0..200.0)),

@@ -1,11 +1,11 @@
-//! A decoder and its motor, run forward in steps of one millisecond.
+//! A decoder and its motor, integrated in steps of one millisecond.
 //!
-//! A command reaches the decoder, which after its dead time moves a *set speed* by its law; the motor follows
-//! the set speed with a lag. At step 0 nothing drives and friction brings the wheels to rest in finite time;
-//! at any other step the load control makes good for friction. From rest the wheels stick until the set speed
-//! passes the breakaway speed of this start, so low steps may never get going.
+//! After its dead time, a command moves the decoder's *set speed* by the law; the motor follows the set speed with a
+//! lag. At step 0 nothing drives the motor, and friction brings the wheels to rest in finite time; at any other step,
+//! load control compensates for friction. From rest, the wheels stick until the set speed exceeds the breakaway speed
+//! of this start: low steps may never start the train.
 //!
-//! Speeds in mm/s, times in s; the track's influence comes on top in [`load`](crate::load).
+//! Speeds in mm/s, times in s; the influence of the track is added in [`load`](crate::load).
 
 use core::ops::Deref;
 use std::collections::VecDeque;
@@ -20,72 +20,72 @@ use crate::traits::Session;
 /// The step of the integration. The shortest time constant of a drawn train is forty times longer.
 pub(crate) const STEP_S: f64 = 1e-3;
 
-/// Lag of a motor with load control behind a set speed that moves gently (chosen: below half a poll).
+/// Lag of a motor with load control behind a smooth set speed (chosen: below half a poll).
 const RAMPED_MOTOR_LAG_S: f64 = 0.04;
-/// Lag of a motor behind a counter that moves in jumps (chosen: jumps of 5 mm/s are not felt at the rail).
+/// Lag of a motor behind a counter that moves in jumps (chosen: jumps of 5 mm/s do not show at the rail).
 const COUNTED_MOTOR_LAG_S: f64 = 0.12;
-/// Time in which the play between the two speeds of a step is taken up (chosen; only counters show it).
+/// Time in which the difference between the two speeds of a step is taken up (chosen; only counters show it).
 const PLAY_S: f64 = 1.0;
 /// Relative standard deviation of the breakaway speed from start to start (chosen).
 const START_SD: f64 = 0.3;
 /// Relative standard deviation of the dead time from start to start (chosen).
 const DEAD_TIME_SD: f64 = 0.1;
-/// Wheels below this speed without drive have come to rest (chosen: 1 mm in 20 s).
+/// Below this speed without drive, the wheels are at rest (chosen: 1 mm in 20 s).
 const REST_MM_PER_S: f64 = 0.05;
-/// A stop is stretched or shortened by no more than this factor (chosen: beyond ten standard deviations).
+/// The range of the factor on the duration of a stop (chosen: beyond ten standard deviations).
 const STRETCH: core::ops::RangeInclusive<f64> = 0.75..=1.25;
-/// How much longer the trial stop lasts that tells what stretching does (chosen: small, far above rounding).
+/// Relative stretch of the trial stop that measures the effect of stretching (chosen: small, far above rounding).
 const TRIAL_STRETCH: f64 = 0.01;
 /// Samples in the longest moving average (chosen: ten seconds of them).
-const MOST_SAMPLES: f64 = 10_000.0;
-/// Friction of a train that rolls downhill without drive, over that on the level, at the least (chosen: worm gears).
-const LEAST_FRICTION: f64 = 0.3;
-/// No stop takes longer than this (chosen: ten times the longest measured).
-const LONGEST_STOP_S: f64 = 60.0;
+const MAX_SAMPLES: f64 = 10_000.0;
+/// Smallest friction of a train that rolls downhill without drive, relative to the level (chosen: worm gears).
+const MIN_FRICTION: f64 = 0.3;
+/// Longest stop (chosen: ten times the longest measured).
+const MAX_STOP_S: f64 = 60.0;
 
-/// The decoder's own variables, one form for each law.
+/// The state of the decoder, one form for each law.
 #[derive(Debug, Clone)]
 enum Process {
-    /// Moves at a constant rate.
+    /// A constant rate.
     Ramp { up: f64, down: f64 },
-    /// Moves at a rate that is a parabola over the change.
+    /// A rate that is a parabola over the change.
     Eased { up: f64, down: f64, shortest: f64, change: f64, lasts: f64, elapsed: f64 },
-    /// A ramp seen through a moving average.
+    /// A ramp through a moving average.
     Averaged { up: f64, down: f64, ramp: f64, window: VecDeque<f64>, sum: f64, level: usize },
-    /// Jumps; the motor does the rest.
+    /// A jump; the motor does the rest.
     Direct,
     /// Counts through internal steps; `play` is 0 at speeds reached from below, 1 from above.
     Counted { up_s: f64, down_s: f64, count: u16, until_next: f64, play: f64 },
     /// A ramp upwards, a jump downwards.
     RampUp { up: f64 },
-    /// A law of no usual family; `phase` is the time in s since its last jump.
+    /// An unusual law; `phase` is the time in s since its last jump.
     Other { phase: f64 },
 }
 
-/// A decoder and its motor under way; `T` is how its train is held, borrowed or shared.
+/// A decoder and its motor in operation; `T` is how its train is owned.
 #[derive(Debug, Clone)]
 pub(crate) struct Motor<T> {
     train: T,
     process: Process,
     step: SpeedStep,
     approach: Approach,
-    /// The speed of the step from that side.
+    /// The steady speed of the step, approached from its side.
     target: f64,
-    /// What the decoder asks of the motor.
+    /// The speed that the decoder demands of the motor.
     set_speed: f64,
-    /// How fast the wheels would turn on level straight track.
+    /// The wheel speed on level straight track.
     wheel_speed: f64,
-    /// A command that has arrived and waits for the dead time, in s, to pass.
+    /// A received command, and the rest of its dead time in s.
     pending: Option<(SpeedStep, f64)>,
     /// The set speed at which the wheels break away; `None` while they turn.
     breakaway: Option<f64>,
-    /// How fast the decoder's time runs: 1, but for stops, which scatter.
+    /// The rate of the decoder's time: 1, except for stops, which vary.
     pace: f64,
-    /// By how much the next start comes earlier than usual, in s.
-    hastened: f64,
-    /// What this session has of its own.
+    /// How much earlier than usual the next start is, in s.
+    start_advance: f64,
+    /// The factors of this session.
     session: Session,
-    /// What the gradient under it takes from its speed each second while nothing drives it, in mm/s².
+    /// The deceleration by the gradient while nothing drives it, in mm/s².
     pub(crate) slope: f64,
 }
 
@@ -105,7 +105,7 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
                 elapsed: 1.0,
             },
             Law::SCurve { up, down, rounding } => {
-                let samples = (rounding.as_s() / STEP_S).clamp(1.0, MOST_SAMPLES) as usize;
+                let samples = (rounding.as_s() / STEP_S).clamp(1.0, MAX_SAMPLES) as usize;
                 let window = VecDeque::from(vec![0.0; samples]);
                 Process::Averaged { up: mm(up), down: mm(down), ramp: 0.0, window, sum: 0.0, level: samples }
             }
@@ -130,13 +130,13 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
             pending: None,
             breakaway: Some(0.0),
             pace: 1.0,
-            hastened: 0.0,
+            start_advance: 0.0,
             session: Session::AVERAGE,
             slope: 0.0,
         }
     }
 
-    /// A train that has long been running steadily.
+    /// A train that has been running steadily for long.
     pub(crate) fn running(train: T, step: SpeedStep, approach: Approach) -> Self {
         let mut motor = Self::at_rest(train);
         motor.aim(step, approach);
@@ -164,7 +164,7 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         motor
     }
 
-    /// A command arrives at the decoder.
+    /// The decoder receives a command.
     pub(crate) fn command(&mut self, step: SpeedStep, draws: &mut Draws) {
         if self.is_at_rest() && self.step == SpeedStep::STAND {
             let breakaway = self.train.breakaway.as_mm_per_s();
@@ -177,17 +177,17 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
                     None => self.stall(),
                 }
             }
-            dead_time -= std::mem::take(&mut self.hastened);
+            dead_time -= std::mem::take(&mut self.start_advance);
             self.pending = Some((step, dead_time));
             return;
         }
         self.command_without_scatter(step);
         if step == SpeedStep::STAND {
-            // Dead time and averages do not stretch with the rest: ask the process itself what a slower pace
-            // makes of its way.
-            let usual = self.clone().way_to_rest_mm();
+            // Dead time and averages do not stretch with the rest: measure the effect of a slower process on the
+            // stopping distance.
+            let usual = self.clone().stopping_distance_mm();
             let slower = Self { pace: 1.0 / (1.0 + TRIAL_STRETCH), ..self.clone() };
-            let per_stretch = (slower.way_to_rest_mm() - usual) / TRIAL_STRETCH;
+            let per_stretch = (slower.stopping_distance_mm() - usual) / TRIAL_STRETCH;
             let scatter = self.train.stop_scatter.sd(Speed::from_mm_per_s(self.wheel_speed)).as_mm();
             let sd = if per_stretch > scatter { scatter / per_stretch } else { 0.0 };
             let stretch = draws.normal(1.0, sd).clamp(*STRETCH.start(), *STRETCH.end());
@@ -195,66 +195,66 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         }
     }
 
-    /// A command arrives at the decoder of a running train and is obeyed as on an average day.
+    /// The decoder of a running train receives a command and obeys as on an average day.
     pub(crate) fn command_without_scatter(&mut self, step: SpeedStep) {
         self.pace = 1.0;
         self.pending = Some((step, self.train.change_dead_time.as_s()));
     }
 
-    /// A train at rest is told a step and obeys as on an average day.
+    /// The decoder of a train at rest receives a command and obeys as on an average day.
     pub(crate) fn start_without_scatter(&mut self, step: SpeedStep) {
         self.breakaway = Some(self.train.breakaway.as_mm_per_s());
         self.pending = Some((step, self.train.start_dead_time.as_s()));
     }
 
-    /// How far the wheels roll within a time, in mm.
-    pub(crate) fn way_within_mm(&mut self, within: TimeSpan) -> f64 {
+    /// The distance that the wheels roll within a time, in mm.
+    pub(crate) fn distance_within_mm(&mut self, within: TimeSpan) -> f64 {
         let steps = (within.as_s().clamp(0.0, 600.0) / STEP_S) as usize;
-        (0..steps).fold(0.0, |way, _| {
+        (0..steps).fold(0.0, |distance, _| {
             let before = self.wheel_speed;
-            way + 0.5 * (before + self.advance()) * STEP_S
+            distance + 0.5 * (before + self.advance()) * STEP_S
         })
     }
 
-    /// How far the wheels still roll until they rest, on level straight track and without scatter, in mm.
-    pub(crate) fn way_to_rest_mm(mut self) -> f64 {
-        let mut way = 0.0;
-        for _ in 0..(LONGEST_STOP_S / STEP_S) as usize {
+    /// The remaining stopping distance on level straight track, without variation, in mm.
+    pub(crate) fn stopping_distance_mm(mut self) -> f64 {
+        let mut distance = 0.0;
+        for _ in 0..(MAX_STOP_S / STEP_S) as usize {
             if self.stays_at_rest() {
                 break;
             }
             let before = self.wheel_speed;
-            way += 0.5 * (before + self.advance()) * STEP_S;
+            distance += 0.5 * (before + self.advance()) * STEP_S;
         }
-        way
+        distance
     }
 
-    /// Another session begins, with what it has of its own.
+    /// Starts another session with its factors.
     pub(crate) fn begin_session(&mut self, session: Session) {
         self.session = session;
     }
 
-    /// The next start from rest comes earlier by a time in s.
-    pub(crate) fn hasten_next_start(&mut self, by: f64) {
-        self.hastened = by;
+    /// Makes the next start from rest earlier by a time in s.
+    pub(crate) fn advance_next_start(&mut self, by: f64) {
+        self.start_advance = by;
     }
 
-    /// The same train at rest in the same session, its decoder knowing nothing.
+    /// The same train at rest in the same session, with its decoder reset.
     pub(crate) fn reset(&self) -> Self {
         Self {
             session: self.session,
             slope: self.slope,
-            hastened: self.hastened,
+            start_advance: self.start_advance,
             ..Self::at_rest(self.train.clone())
         }
     }
 
-    /// Contact with the rail is lost at a crawl: the wheels stick until a higher step is commanded.
+    /// Loses rail contact at low speed: the wheels stick until a higher step is commanded.
     pub(crate) fn stall(&mut self) {
         self.breakaway = Some(f64::INFINITY);
     }
 
-    /// Speed of the wheels on level straight track, in mm/s.
+    /// Wheel speed on level straight track, in mm/s.
     pub(crate) fn wheel_speed(&self) -> f64 {
         self.wheel_speed
     }
@@ -264,29 +264,29 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         self.wheel_speed == 0.0
     }
 
-    /// `true` when the wheels do not turn and nothing that was commanded will turn them.
+    /// `true` while the wheels are at rest and no command will turn them.
     pub(crate) fn stays_at_rest(&self) -> bool {
         self.is_at_rest() && self.pending.is_none() && (self.step == SpeedStep::STAND || self.is_stalled())
     }
 
-    /// `true` when the wheels stick for good at a step that is not 0.
+    /// `true` while the wheels stick at a step other than 0.
     pub(crate) fn is_stalled(&self) -> bool {
         let sticks = self.breakaway.is_some_and(|needs| needs > self.target);
         self.is_at_rest() && self.step != SpeedStep::STAND && sticks
     }
 
-    /// Speed of the wheels on level straight track in mm/s, one step of [`STEP_S`] later.
+    /// Wheel speed on level straight track in mm/s, after one more step of [`STEP_S`].
     pub(crate) fn advance(&mut self) -> f64 {
         if let Some((step, left)) = self.pending {
             if left <= 0.0 {
-                self.obey(step);
+                self.start_change(step);
             } else {
                 self.pending = Some((step, left - STEP_S));
             }
         }
         let dt = STEP_S * if self.step == SpeedStep::STAND { self.pace } else { 1.0 };
-        self.set_speed = self.decide(dt);
-        self.follow(dt);
+        self.set_speed = self.update_set_speed(dt);
+        self.update_wheel_speed(dt);
         self.wheel_speed
     }
 
@@ -296,12 +296,12 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         self.target = self.train.speeds.speed(step, approach).as_mm_per_s();
     }
 
-    fn obey(&mut self, step: SpeedStep) {
+    fn start_change(&mut self, step: SpeedStep) {
         self.pending = None;
         if step == self.step {
             return;
         }
-        // A stalled train gets going again when it is pushed up a step.
+        // A stalled train starts when a higher step is commanded.
         let is_pushed = self.step != SpeedStep::STAND && step > self.step;
         if is_pushed && self.breakaway == Some(f64::INFINITY) {
             self.breakaway = Some(self.train.breakaway.as_mm_per_s());
@@ -314,8 +314,8 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         }
     }
 
-    /// The decoder: the set speed after `dt`.
-    fn decide(&mut self, dt: f64) -> f64 {
+    /// The set speed after `dt`.
+    fn update_set_speed(&mut self, dt: f64) -> f64 {
         let target = self.target;
         let counts = u16::from(self.step.get()) * COUNTS_PER_STEP;
         match &mut self.process {
@@ -361,8 +361,8 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         }
     }
 
-    /// The motor: wheels follow the set speed.
-    fn follow(&mut self, dt: f64) {
+    /// The motor: the wheels follow the set speed.
+    fn update_wheel_speed(&mut self, dt: f64) {
         if let Some(needs) = self.breakaway {
             if self.wheel_speed == 0.0 && self.set_speed < needs {
                 return;
@@ -375,7 +375,7 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         let drive = if stuck { 0.0 } else { self.set_speed };
         let lag = if stuck { RAMPED_MOTOR_LAG_S } else { self.lag(drive > self.wheel_speed) };
         let friction = if drive == 0.0 { self.rolling_friction().min(self.wheel_speed / dt) } else { 0.0 };
-        // Semi-implicit: the new speed on both sides, so that no lag however short can overshoot.
+        // Semi-implicit: with the new speed on both sides, no lag however short can overshoot.
         let next = (self.wheel_speed + dt * (drive / lag - friction)) / (1.0 + dt / lag);
         self.wheel_speed = if drive == 0.0 && next < REST_MM_PER_S { 0.0 } else { next };
         if self.wheel_speed == 0.0 && self.breakaway.is_none() {
@@ -383,10 +383,10 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         }
     }
 
-    /// What slows it down while nothing drives it, in mm/s²; a gear never rolls on by itself.
+    /// The deceleration while nothing drives it, in mm/s²; a worm gear never rolls on by itself.
     fn rolling_friction(&self) -> f64 {
         let flat = self.train.friction.as_mm_per_s2();
-        (flat + self.slope).max(LEAST_FRICTION * flat)
+        (flat + self.slope).max(MIN_FRICTION * flat)
     }
 
     fn lag(&self, speeds_up: bool) -> f64 {

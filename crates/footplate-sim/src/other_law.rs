@@ -1,46 +1,46 @@
-//! Laws of speed change that no estimator has a family for, each written as a rate at a speed.
+//! Laws of speed change outside every family of the estimators, each written as a rate at a speed.
 
 use crate::draws::Draws;
 
-/// How a decoder's set speed moves: speeds in mm/s, rates in mm/s².
+/// The law of a decoder's set speed: speeds in mm/s, rates in mm/s².
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum OtherLaw {
-    /// Speeds up at constant power and slows down at a rate that grows with speed: `pull` holds below `knee`.
+    /// Accelerates at constant power and decelerates at a rate that grows with speed: `pull` applies below `knee`.
     ConstantPower {
-        /// Rate of speeding up below the knee.
+        /// Acceleration below the knee.
         pull: f64,
-        /// Above this speed the rate falls in inverse proportion to speed.
+        /// The speed above which the acceleration is inversely proportional to speed.
         knee: f64,
-        /// Rate of slowing down at the knee.
+        /// Deceleration at the knee.
         brake: f64,
     },
-    /// Rolls out freely against a resistance with a constant, a linear and a quadratic part (W. J. Davis, 1926).
+    /// Rolls out against a resistance with a constant, a linear and a quadratic part (W. J. Davis, 1926).
     FreeRolling {
-        /// Rate of speeding up.
+        /// Acceleration.
         pull: f64,
         /// Constant part.
         constant: f64,
-        /// Part in proportion to speed, per s.
+        /// Part proportional to speed, per s.
         linear: f64,
-        /// Part in proportion to its square, per mm.
+        /// Part proportional to its square, per mm.
         quadratic: f64,
     },
-    /// Brakes hard down to a speed and gently from there, as decoders with two braking stages do.
+    /// Brakes hard down to a speed and gently below it, as decoders with two braking stages do.
     TwoStage {
-        /// Rate of speeding up.
+        /// Acceleration.
         pull: f64,
-        /// Rate of slowing down above the change of stages.
+        /// Deceleration above the change of stages.
         hard: f64,
-        /// And below it.
+        /// Deceleration below it.
         gentle: f64,
-        /// The speed at which stages change.
+        /// The speed at which the stages change.
         change: f64,
     },
-    /// Speed falls and rises in visible jumps, `every_s` seconds apart.
+    /// The speed changes in visible jumps, `every_s` seconds apart.
     Jumps {
-        /// Rate of speeding up, on average.
+        /// Mean acceleration.
         pull: f64,
-        /// Rate of slowing down, on average.
+        /// Mean deceleration.
         brake: f64,
         /// Time between two jumps, in s.
         every_s: f64,
@@ -70,7 +70,7 @@ impl OtherLaw {
         }
     }
 
-    /// The set speed `dt` later on its way to a target; `phase_s` counts the time since the last jump.
+    /// The set speed after `dt` towards a target; `phase_s` counts the time since the last jump.
     pub(crate) fn advance(&self, speed: f64, target: f64, dt: f64, phase_s: &mut f64) -> f64 {
         let rises = target > speed;
         let rate = match *self {

@@ -1,4 +1,4 @@
-//! What lies along the rails ahead of a train, by true distance from where its run begins.
+//! The objects along the rails ahead of a train, by true distance from the start of its run.
 
 use footplate_core::track::Layout;
 use footplate_core::{EdgeId, Length, SensorId};
@@ -6,34 +6,34 @@ use footplate_core::{EdgeId, Length, SensorId};
 use crate::gates::GATE_SPACING_MM;
 use crate::railway::Railway;
 
-/// Something at a point of the rails.
+/// An object at a point of the rails.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Point<T> {
     /// Where, in mm from the start of the run; negative behind it.
     pub(crate) at_mm: f64,
-    /// What.
+    /// The object.
     pub(crate) what: T,
 }
 
-/// Where a path begins: past one of the circuit's sensors, counted in the order of travel.
+/// Where a path starts: past a sensor of the circuit, counted in the order of travel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Origin {
-    /// Which sensor.
+    /// The index of the sensor.
     pub(crate) sensor: usize,
     /// How far past its node.
     pub(crate) past_mm: f64,
 }
 
-/// The way ahead, round and round a circuit, long enough for one run.
+/// The path ahead, lap after lap of a circuit, long enough for one run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Path {
-    /// Edges by where they begin.
+    /// Edges by their starts.
     pub(crate) edges: Vec<Point<EdgeId>>,
-    /// What the rails of each edge make of a speed, as a factor.
+    /// The speed factor of each edge.
     factors: Vec<f64>,
-    /// Contacts by where they close, in order.
-    pub(crate) contacts: Vec<Point<SensorId>>,
-    /// Nodes of sensors by where they are, in order: where a person lays the tape.
+    /// Sensors by where they close, in order.
+    pub(crate) sensors: Vec<Point<SensorId>>,
+    /// Nodes of sensors by position, in order: where the tape is laid from.
     pub(crate) landmarks: Vec<Point<SensorId>>,
     /// Dirty spots.
     pub(crate) dirty: Vec<Point<()>>,
@@ -42,7 +42,7 @@ pub(crate) struct Path {
 }
 
 impl Path {
-    /// The way from an origin, at least as long as `reach_mm`, with light gates (if any) in the middle of the
+    /// The path from an origin, at least as long as `reach_mm`, with light gates (if any) in the middle of the
     /// circuit's longest edge.
     pub(crate) fn new(railway: &Railway<'_>, origin: Origin, reach_mm: f64, has_gates: bool) -> Self {
         let Railway { layout, track, circuit } = railway;
@@ -66,8 +66,8 @@ impl Path {
             let edge = edges[place];
             if let Some(sensor) = sensor_before(layout, edges, place) {
                 path.landmarks.push(Point { at_mm: begins_mm, what: sensor });
-                path.contacts
-                    .push(Point { at_mm: begins_mm + track.contact_offset(sensor).as_mm(), what: sensor });
+                path.sensors
+                    .push(Point { at_mm: begins_mm + track.sensor_offset(sensor).as_mm(), what: sensor });
             }
             path.edges.push(Point { at_mm: begins_mm, what: edge });
             path.factors.push(track.speed_factor(edge).as_parts());
@@ -81,17 +81,17 @@ impl Path {
             }
             begins_mm += length_mm(edge);
         }
-        // Contacts a few millimetres apart may close in another order than their nodes lie.
-        path.contacts.sort_by(|a, b| a.at_mm.total_cmp(&b.at_mm));
+        // Sensors a few millimetres apart may close in another order than their nodes.
+        path.sensors.sort_by(|a, b| a.at_mm.total_cmp(&b.at_mm));
         path
     }
 
-    /// What the rails make of a speed once `begun` edges have been begun.
+    /// The speed factor of the rails after `begun` edges.
     pub(crate) fn factor(&self, begun: usize) -> f64 {
         begun.checked_sub(1).and_then(|last| self.factors.get(last)).copied().unwrap_or(1.0)
     }
 
-    /// The edge at a distance and how far along it that is.
+    /// The edge at a distance, and the offset on it.
     pub(crate) fn place(&self, at_mm: f64) -> Option<(EdgeId, Length)> {
         let after = self.edges.partition_point(|point| point.at_mm <= at_mm);
         let point = self.edges.get(after.checked_sub(1)?)?;
@@ -99,7 +99,7 @@ impl Path {
     }
 }
 
-/// The sensor at the node where an edge of a circuit begins.
+/// The sensor at the start node of an edge of a circuit.
 fn sensor_before(layout: &Layout, edges: &[EdgeId], at: usize) -> Option<SensorId> {
     layout.sensor_at(layout.edge(*edges.get(at)?)?.from)
 }

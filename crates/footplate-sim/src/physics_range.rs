@@ -1,4 +1,4 @@
-//! Ranges of physics that no estimator is built on, each by a name.
+//! Named ranges of physics outside the assumptions of every estimator.
 
 use footplate_core::{Ratio, TimeSpan};
 
@@ -9,38 +9,38 @@ use crate::other_law::OtherLaw;
 use crate::train::Train;
 use crate::traits::{SessionSpread, StickyStarts};
 
-/// What a world draws from wider ranges than the usual one.
+/// What a world draws from a wider range than usual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum PhysicsRange {
-    /// Nothing: the world that all other scorers drive in.
+    /// Nothing: the world of all other scorers.
     Usual,
-    /// Contacts far from their nodes, by direction, that trip 1 to 15 mm off from pass to pass.
+    /// Sensors far from their nodes, by direction, with a spread of 1 to 15 mm from pass to pass.
     AsymmetricSensors,
-    /// Gradients up to 2 %, and loads that make a train up to half as heavy again, by session.
+    /// Gradients up to 2 %, and loads that add up to half of a train's mass, by session.
     LoadAndGradient,
-    /// Starts 0.1 to 0.5 s early or late, or not before the train is pushed up a step.
+    /// Starts 0.1 to 0.5 s early or late, or only once a higher step is commanded.
     StickyStarts,
-    /// A decoder that counts slowly (CV 3 and 4 up to 9).
+    /// A decoder with strong momentum (CV 3 and 4 up to 9).
     DecoderMomentum,
     /// Cold starts, and 5 % of drift within an hour.
     WarmUp,
-    /// Voltage and cleanness that differ by session: speeds by 3 %, at the top by 4 % more, stops by 5 %.
+    /// Voltage and cleanness that differ by session: speeds by 3 %, 4 % more at the top, stops by 5 %.
     Sessions,
-    /// Laws of speed change of no usual family: see [`OtherLaw`].
+    /// Laws of speed change outside the usual families: see [`OtherLaw`].
     OtherLaws,
-    /// Interfaces that do not latch, answer late, lose replies or know only the dump of all modules.
+    /// Interfaces that do not latch, answer late, lose replies or support only the dump of all modules.
     Interface,
-    /// A second train model, by other equations: see [`ElectricEngine`].
+    /// A second train model with other equations: see [`ElectricEngine`].
     SecondModel,
-    /// Everything at once; every other world has the second train model.
+    /// All of these; every other world has the second train model.
     All,
 }
 
-/// Largest gradient either way (chosen: what clubs build at most on open line).
+/// Largest gradient in either direction (chosen: the usual maximum of clubs on open line).
 const STEEPEST: f64 = 0.02;
 
 impl PhysicsRange {
-    /// Every range, the usual one first.
+    /// Every range, beginning with the usual one.
     pub const EVERY: [Self; 11] = [
         Self::Usual,
         Self::AsymmetricSensors,
@@ -73,33 +73,33 @@ impl PhysicsRange {
         }
     }
 
-    /// The range of a name.
+    /// The range with a name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Self::EVERY.into_iter().find(|range| range.name() == name)
     }
 
-    /// Whether a world of this range draws from another, too.
+    /// Whether this range includes another.
     #[must_use]
     pub fn includes(self, other: Self) -> bool {
         self == other || self == Self::All
     }
 
-    /// The stream that everything unusual of a world or a train is drawn from.
+    /// The stream for everything unusual of a world or a train.
     pub(crate) fn draws(seed: u64) -> Draws {
         Draws::new(seed, Purpose::Physics)
     }
 
-    /// Gives a train what the range has in store for it; the same for the same seed.
+    /// Applies the range to a train; the same for the same seed.
     pub(crate) fn shape(self, seed: u64, train: &mut Train) {
         let mut draws = Self::draws(seed);
-        // All of it is drawn in any case, so that a range is the same alone and among all.
+        // Everything is drawn in any case, so that a range alone is the same as among all.
         let (irregular, stuck) = (draws.uniform(5.0..20.0), draws.uniform(0.0..3.0));
         let momentum = [draws.uniform(2.0..9.0), draws.uniform(2.0..9.0)].map(f64::round);
         let (drift, warm_up_s) = (draws.uniform(4.0..6.0), draws.uniform(900.0..1500.0));
         let drift = if draws.chance(0.25) { -drift } else { drift };
         let other_law = OtherLaw::draw(&mut draws);
-        let (grade_feel, load) = (draws.uniform(0.2..1.5), draws.uniform(0.1..0.5));
+        let (grade_sensitivity, load) = (draws.uniform(0.2..1.5), draws.uniform(0.1..0.5));
         let shoe_scatter_mm = draws.uniform(0.0..3.0);
         let is_second = draws.chance(0.5) || self == Self::SecondModel;
         let engine = ElectricEngine::draw(&mut draws);
@@ -113,7 +113,7 @@ impl PhysicsRange {
         }
         if self.includes(Self::LoadAndGradient) {
             traits.session.load = load;
-            traits.grade_feel = grade_feel;
+            traits.grade_sensitivity = grade_sensitivity;
         }
         if self.includes(Self::AsymmetricSensors) {
             traits.shoe_scatter_mm = shoe_scatter_mm;
@@ -136,18 +136,18 @@ impl PhysicsRange {
         }
     }
 
-    /// The gradient of a stretch of rail, drawn.
+    /// A random gradient of a stretch.
     pub(crate) fn grade(self, draws: &mut Draws) -> f64 {
         if self.includes(Self::LoadAndGradient) { draws.uniform(-STEEPEST..STEEPEST) } else { 0.0 }
     }
 
-    /// How far a contact of one direction lies from where the usual world has it, and how much it scatters from pass to
-    /// pass (standard deviation), both in mm.
-    pub(crate) fn contact(self, draws: &mut Draws) -> (f64, f64) {
+    /// The shift of a sensor for one direction from its usual place, and the standard deviation of its position from
+    /// pass to pass, both in mm.
+    pub(crate) fn sensor_offset_and_scatter(self, draws: &mut Draws) -> (f64, f64) {
         if !self.includes(Self::AsymmetricSensors) {
             return (0.0, 0.0);
         }
-        // Measured: some contacts trip within 2 mm, others within 15 mm.
+        // Measured: some sensors repeat within 2 mm, others within 15 mm.
         let scatter = libm::exp(draws.uniform(0.0..libm::log(15.0)));
         (draws.normal_within(0.0, 15.0, 2.5), scatter)
     }

@@ -1,9 +1,9 @@
-//! The slow line to a command station that has to be asked for its sensors, over and over.
+//! The slow line to a command station whose sensors must be polled.
 //!
-//! One exchange at a time: a poll, or a command that waited for the poll before it to be answered. A poll
-//! reads all contacts at one moment; the answer, stamped when it is complete, comes some time later. So a
-//! report says that its contact closed between the reading before and this one, and a command shifts every
-//! later reading by the time it took the line.
+//! One exchange at a time: a poll, or a command that waited for the answer of the poll before. A poll reads all
+//! sensors at one moment; the answer, stamped when complete, comes some time later. A report therefore means that its
+//! sensor closed between the previous reading and this one, and a command delays every later reading by its time on
+//! the line.
 //!
 //! Times are in seconds since the start of the run.
 
@@ -13,27 +13,27 @@ use footplate_core::TimeSpan;
 
 use crate::draws::{Draws, Purpose};
 
-/// How a host and a station talk: the settings of one line.
+/// The settings of one line between host and station.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Link {
-    /// From one poll to the next while nothing else is sent.
+    /// Time from one poll to the next while nothing else is sent.
     pub period: TimeSpan,
-    /// Standard deviation of the time one poll takes.
+    /// Standard deviation of the duration of a poll.
     pub jitter: TimeSpan,
-    /// From the reading of the contacts until their report is stamped.
+    /// Time from the reading of the sensors to the stamp of their report.
     pub reading_to_stamp: TimeSpan,
-    /// What one command takes of the line.
+    /// Time of one command on the line.
     pub command_time: TimeSpan,
-    /// Whether the station remembers a contact that closed and opened again between two readings.
+    /// Whether the station remembers a sensor that closed and opened again between two readings.
     pub latched: bool,
-    /// Whether the host records a contact at every poll that sees it closed, or only at the first.
+    /// Whether the host records a sensor at every poll that sees it closed, or only at the first.
     pub repeats: bool,
-    /// Whether the host records with each report how long ago the poll before was answered.
+    /// Whether the host records with each report the time since the answer of the previous poll.
     pub intervals: bool,
 }
 
 impl Link {
-    /// A 6051 on its 2400-baud line, five sensor modules, read by a program that does nothing else.
+    /// A 6051 on its 2400-baud line with five sensor modules, read by a program that does nothing else.
     ///
     /// Period and jitter measured on 1451 repeated reports; a command is two bytes of 11 bits.
     #[must_use]
@@ -41,7 +41,7 @@ impl Link {
         Self {
             period: TimeSpan::from_us(65_350),
             jitter: TimeSpan::from_us(50),
-            // Measured: contacts are read within the first 18 ms of a poll that takes 65.
+            // Measured: sensors are read within the first 18 ms of a poll that takes 65 ms.
             reading_to_stamp: TimeSpan::from_us(49_000),
             command_time: TimeSpan::from_us(9_167),
             latched: true,
@@ -50,13 +50,13 @@ impl Link {
         }
     }
 
-    /// The same line read by a program that records a contact once for each passing (period measured).
+    /// The same line read by a program that records a sensor once per passage (period measured).
     #[must_use]
     pub const fn first_reports() -> Self {
         Self { period: TimeSpan::from_us(69_640), repeats: false, ..Self::every_report() }
     }
 
-    /// Another line of the same kind, from 60 to 100 ms a poll as courses report; the same for the same seed.
+    /// Another line of the same kind, with 60 to 100 ms per poll as courses report; the same for the same seed.
     #[must_use]
     pub fn draw(seed: u64) -> Self {
         let mut draws = Draws::new(seed, Purpose::Line);
@@ -64,7 +64,7 @@ impl Link {
         let ms = |ms: f64| TimeSpan::from_s(ms * 1e-3);
         Self {
             period: ms(period),
-            // Chosen: from the busy loop that was measured to a program on a desktop computer.
+            // Chosen: from the measured busy loop to a program on a desktop computer.
             jitter: ms(draws.uniform(0.05..1.5)),
             reading_to_stamp: ms(period * draws.uniform(0.4..0.8)),
             repeats: draws.chance(0.5),
@@ -74,10 +74,10 @@ impl Link {
     }
 }
 
-/// No poll is shorter (chosen: a thousand a second is more than any line carries).
+/// Shortest poll (chosen: a thousand a second is more than any line carries).
 const SHORTEST_POLL_S: f64 = 1e-3;
 
-/// What happened on the line.
+/// A completed exchange on the line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Exchange<C> {
     /// A command was sent.
@@ -86,20 +86,20 @@ pub(crate) enum Exchange<C> {
     Answered { poll: Poll },
 }
 
-/// The three moments of a poll.
+/// The times of a poll.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Poll {
-    /// When the contacts were read the time before.
+    /// When the sensors were read by the previous poll.
     pub(crate) before: f64,
-    /// When the contacts were read.
+    /// When the sensors were read.
     pub(crate) reading: f64,
-    /// When the answer before was complete.
+    /// When the previous answer was complete.
     pub(crate) stamp_before: f64,
     /// When the answer was complete.
     pub(crate) stamp: f64,
 }
 
-/// The line under way; `C` is whatever a command is to its user.
+/// The line in operation; `C` is the user's type of a command.
 #[derive(Debug)]
 pub(crate) struct Line<C> {
     link: Link,
@@ -111,7 +111,7 @@ pub(crate) struct Line<C> {
 }
 
 impl<C> Line<C> {
-    /// A line on which polling has gone on for long before the run; its phase is random.
+    /// A line on which polling started long before the run; its phase is random.
     pub(crate) fn new(link: &Link, mut draws: Draws) -> Self {
         let period = link.period.as_s().max(SHORTEST_POLL_S);
         let free_at = draws.uniform(0.0..period);
@@ -120,12 +120,12 @@ impl<C> Line<C> {
         Self { link: link.clone(), draws, waiting: VecDeque::new(), asked: None, last, free_at }
     }
 
-    /// A command that may go out as soon as the line is free at or after a time.
+    /// Queues a command to be sent when the line is free at or after a time.
     pub(crate) fn send(&mut self, ready: f64, command: C) {
         self.waiting.push_back((ready, command));
     }
 
-    /// The next thing that was complete by a time, until `None`.
+    /// The next exchange that was complete by a time; call until `None`.
     pub(crate) fn poll_exchange(&mut self, by: f64) -> Option<Exchange<C>> {
         if self.asked.is_none() {
             if self.free_at > by {
@@ -147,7 +147,7 @@ impl<C> Line<C> {
 
     fn ask(&mut self) -> Poll {
         let period = self.link.period.as_s();
-        // No poll is ever answered before it was asked, nor read before the last.
+        // No poll is answered before it is sent, nor read before the previous one.
         let takes = self.draws.normal(period, self.link.jitter.as_s()).max(0.5 * period).max(SHORTEST_POLL_S);
         let stamp = self.free_at + takes;
         let reading = stamp - self.link.reading_to_stamp.as_s();

@@ -1,4 +1,4 @@
-//! A layout as people know it, the rails as they are, and a circuit on them.
+//! A layout as surveyed, the true rails, and a circuit on them.
 
 use footplate_core::track::Layout;
 use footplate_core::{Approach, Length, Speed, SpeedStep, TimeSpan};
@@ -10,11 +10,11 @@ use crate::train::Train;
 /// Where trains run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Railway<'l> {
-    /// The track as the survey has it: all that an estimator is given.
+    /// The surveyed track: all that an estimator is given.
     pub layout: &'l Layout,
-    /// The track as it is.
+    /// The true track.
     pub track: TrueTrack,
-    /// Where the trains run round.
+    /// The circuit that trains run on.
     pub circuit: Circuit,
 }
 
@@ -22,7 +22,7 @@ impl<'l> Railway<'l> {
     /// A circuit and true rails on a layout, the same for the same seed.
     ///
     /// # Errors
-    /// [`CircuitError::NoneFound`] if a train cannot run round on the layout.
+    /// [`CircuitError::NoneFound`] if the layout has no circuit.
     pub fn draw(layout: &'l Layout, seed: u64) -> Result<Self, CircuitError> {
         Ok(Self { layout, track: TrueTrack::draw(layout, seed), circuit: Circuit::draw(layout, seed)? })
     }
@@ -33,9 +33,9 @@ impl<'l> Railway<'l> {
         self.circuit.edges().iter().map(|edge| self.track.length(*edge)).sum()
     }
 
-    /// The true mean speed of a warm train over a whole lap of an average run: what a stopwatch would find.
+    /// The true mean speed of a warm train over a lap of an average run, as a stopwatch would measure it.
     ///
-    /// A lap takes the sum of what its edges take, so slow curves weigh more than their length.
+    /// A lap takes the sum of the times of its edges: slow curves weigh more than their length.
     #[must_use]
     pub fn lap_speed(&self, train: &Train, step: SpeedStep, approach: Approach) -> Speed {
         let level = train.speeds.speed(step, approach);
@@ -44,8 +44,9 @@ impl<'l> Railway<'l> {
         }
         let mut takes = TimeSpan::ZERO;
         for edge in self.circuit.edges() {
-            let felt = 1.0 + train.curve_feel * (self.track.speed_factor(*edge).as_parts() - 1.0);
-            takes += self.track.length(*edge) / (level * felt);
+            let rail_factor =
+                1.0 + train.curve_sensitivity * (self.track.speed_factor(*edge).as_parts() - 1.0);
+            takes += self.track.length(*edge) / (level * rail_factor);
         }
         if takes > TimeSpan::ZERO { self.circuit_length() / takes } else { level }
     }

@@ -1,8 +1,7 @@
-//! What a person would record in an evening: one train, one link, the runs of one scenario, pauses between them.
+//! An evening's recording: one train, one link, the runs of one scenario, with pauses between them.
 
 use footplate_core::{TimeSpan, Timestamp, TrainId};
 
-use crate::contacts::Faults;
 use crate::draws::{Draws, Purpose};
 use crate::law::LawFamily;
 use crate::load::warmth_after;
@@ -10,34 +9,35 @@ use crate::poller::Link;
 use crate::railway::Railway;
 use crate::run::{Conditions, SimulatedRun, World};
 use crate::scenario::Scenario;
+use crate::sensors::Faults;
 use crate::train::Train;
 
-/// How long a person takes between two runs (chosen).
+/// Duration of a pause between two runs (chosen).
 const PAUSE_S: core::ops::Range<f64> = 5.0..60.0;
-/// What the host's clock shows when it is new (chosen: long enough for turnouts thrown before the run).
+/// Initial reading of the host's clock (chosen: time for the turnouts thrown before the run).
 const NEW_CLOCK_S: core::ops::Range<f64> = 5.0..40.0;
-/// How often the program, and with it the clock, is started anew between two runs (measured: 3 times in 50).
+/// Probability that the program, and its clock, is restarted between two runs (measured: 3 times in 50).
 const CLOCK_RESTARTS: f64 = 0.06;
-/// Pauses are cooled through in steps of this.
+/// Step of cooling during pauses.
 const COOLING_STEP_S: f64 = 0.1;
 
-/// What was recorded of one train in one scenario, and everything that is true of it.
+/// The recording of one train in one scenario, with its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulatedRecording {
-    /// What the station calls the train.
+    /// The train's number at the station.
     pub train_id: TrainId,
-    /// The train as it is.
+    /// The true train.
     pub train: Train,
-    /// How the host read its sensors.
+    /// The link that the host used.
     pub link: Link,
-    /// What went wrong with contacts, and how often.
+    /// The faults of the sensors.
     pub faults: Faults,
     /// The runs, in order.
     pub runs: Vec<SimulatedRun>,
 }
 
 impl SimulatedRecording {
-    /// Draws a train that obeys a law and lets it go through a scenario; the same for the same seed.
+    /// Draws a train with a law and simulates a scenario; the same for the same seed.
     #[must_use]
     pub fn draw(
         railway: &Railway<'_>,

@@ -1,15 +1,15 @@
-//! A train on its way: the motor's speed, what the rails make of it, and what the shoe touches.
+//! A train in motion: the motor's speed, the effect of the rails, and the sensors that its shoe closes.
 
 use footplate_core::SpeedStep;
 
-use crate::contacts::Contacts;
 use crate::draws::Draws;
 use crate::load::{DIRTY_MM, Load};
 use crate::motor::{Motor, STEP_S};
 use crate::path::{Path, Point};
+use crate::sensors::Sensors;
 use crate::train::Train;
 
-/// A train under way on a path. Its distance is that of the leading end of its shoe.
+/// A train in motion on a path. Its distance is that of the leading end of its shoe.
 #[derive(Debug)]
 pub(crate) struct Rolling<'w> {
     path: &'w Path,
@@ -20,12 +20,12 @@ pub(crate) struct Rolling<'w> {
     distance_mm: f64,
     speed_mm_per_s: f64,
     rested_at: Option<f64>,
-    /// Commands on their way to the decoder, and when it has them.
+    /// Commands that the decoder has not received yet, with their times of arrival.
     commands: Vec<(f64, SpeedStep)>,
     passed: Passed,
 }
 
-/// How many of the points on the path lie behind.
+/// How many of the points of the path have been passed.
 #[derive(Debug, Default)]
 struct Passed {
     edges: usize,
@@ -47,8 +47,8 @@ impl<'w> Rolling<'w> {
         let shoe_mm = train.shoe.as_mm();
         let passed = Passed {
             edges: path.edges.partition_point(|point| point.at_mm <= 0.0),
-            closed: path.contacts.partition_point(|point| point.at_mm <= 0.0),
-            left: path.contacts.partition_point(|point| point.at_mm <= -shoe_mm),
+            closed: path.sensors.partition_point(|point| point.at_mm <= 0.0),
+            left: path.sensors.partition_point(|point| point.at_mm <= -shoe_mm),
             dirty: path.dirty.partition_point(|point| point.at_mm <= 0.0),
             gates: path.gates.partition_point(|point| point.at_mm <= 0.0),
         };
@@ -63,12 +63,12 @@ impl<'w> Rolling<'w> {
         [self.distance_mm, self.speed_mm_per_s]
     }
 
-    /// Since when, in s, the train has been at rest; `None` while it moves or before it ever did.
+    /// When the train came to rest, in s; `None` while it moves or before it ever did.
     pub(crate) const fn rested_at(&self) -> Option<f64> {
         self.rested_at
     }
 
-    /// Whether nothing that was commanded will set the train in motion.
+    /// Whether no command will set the train in motion.
     pub(crate) fn stays_at_rest(&self) -> bool {
         self.motor.stays_at_rest() && self.commands.is_empty()
     }
@@ -78,28 +78,23 @@ impl<'w> Rolling<'w> {
         &self.motor
     }
 
-    /// What acts on the speed.
+    /// The influences on the speed.
     pub(crate) const fn load(&self) -> &Load<&'w Train> {
         &self.load
     }
 
-    /// A command has left the line at a time in s; returns when the decoder has it.
-    pub(crate) fn tell(&mut self, step: SpeedStep, sent: f64) -> f64 {
+    /// A command was sent at a time in s; returns when the decoder receives it.
+    pub(crate) fn command(&mut self, step: SpeedStep, sent: f64) -> f64 {
         let delay = self.draws.normal(self.train.command_delay.as_s(), self.train.command_jitter.as_s());
-        // No command overtakes another.
+        // Commands arrive in the order of sending.
         let last = self.commands.last().map_or(sent, |(heard, _)| *heard);
         let heard = (sent + delay.max(0.0)).max(last);
         self.commands.push((heard, step));
         heard
     }
 
-    /// One integration step from `now`; contacts close and open, and gates passed are handed to `at_gate`.
-    pub(crate) fn advance(
-        &mut self,
-        now: f64,
-        contacts: &mut Contacts<'_>,
-        mut at_gate: impl FnMut(u8, f64),
-    ) {
+    /// One integration step from `now`: closes and opens sensors, and calls `at_gate` for light gates passed.
+    pub(crate) fn advance(&mut self, now: f64, sensors: &mut Sensors<'_>, mut at_gate: impl FnMut(u8, f64)) {
         if let Some(&(_, step)) = self.commands.first().filter(|(heard, _)| *heard <= now) {
             self.commands.remove(0);
             self.motor.command(step, &mut self.draws);
@@ -120,14 +115,14 @@ impl<'w> Rolling<'w> {
             self.rested_at = Some(now + STEP_S);
         }
 
-        // Within a millisecond the speed is as good as constant.
+        // Within a millisecond the speed is practically constant.
         let when = |at_mm: f64| now + STEP_S * ((at_mm - here) / (there - here)).clamp(0.0, 1.0);
-        for point in passed(&self.path.contacts, &mut self.passed.closed, there) {
-            contacts.close(point.what, when(point.at_mm));
+        for point in passed(&self.path.sensors, &mut self.passed.closed, there) {
+            sensors.close(point.what, when(point.at_mm));
         }
         let shoe_mm = self.train.shoe.as_mm();
-        for point in passed(&self.path.contacts, &mut self.passed.left, there - shoe_mm) {
-            contacts.leave(point.what, when(point.at_mm + shoe_mm));
+        for point in passed(&self.path.sensors, &mut self.passed.left, there - shoe_mm) {
+            sensors.leave(point.what, when(point.at_mm + shoe_mm));
         }
         for point in passed(&self.path.gates, &mut self.passed.gates, there) {
             at_gate(point.what, when(point.at_mm));
@@ -139,7 +134,7 @@ impl<'w> Rolling<'w> {
     }
 }
 
-/// The points that a train which has come to `to_mm` has newly passed; the count of those behind moves on.
+/// The points newly passed by a train at `to_mm`; `behind` counts all that have been passed.
 fn passed<'path, T>(points: &'path [Point<T>], behind: &mut usize, to_mm: f64) -> &'path [Point<T>] {
     let ahead = points.get(*behind..).unwrap_or_default();
     let count = ahead.iter().take_while(|point| point.at_mm <= to_mm).count();

@@ -1,9 +1,8 @@
-//! One run: train, rails, line and script, step by step, into events and their truth.
+//! One run: train, rails, line and script, step by step, give events and their truth.
 
 use footplate_core::track::Leg;
 use footplate_core::{Approach, Event, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use crate::contacts::{Contacts, Faults};
 use crate::draws::{Draws, Purpose};
 use crate::gates::{GateClock, GatePass};
 use crate::host::{Host, Notes};
@@ -13,63 +12,64 @@ use crate::poller::{Exchange, Line, Link};
 use crate::railway::Railway;
 use crate::rolling::Rolling;
 use crate::script::{Script, Start};
+use crate::sensors::{Faults, Sensors};
 use crate::train::Train;
 use crate::truth::{Motion, RunTruth, SAMPLE_STEPS};
 
-/// How far past a sensor's node a run begins (chosen: a hand puts the train there).
+/// How far past a sensor's node a run starts (chosen: the train is placed by hand).
 const START_PAST_MM: core::ops::Range<f64> = 5.0..90.0;
-/// How long ago the train closed the contact that a station remembers from before the run (chosen).
+/// When the train closed the sensor that a station remembers from before the run (chosen).
 const REMEMBERED_S: core::ops::Range<f64> = -20.0..-2.0;
-/// Between commands to turnouts before the run (as one team's program waits).
+/// Time between turnout commands before the run (as one team's program waits).
 const TURNOUT_PAUSE_S: f64 = 0.15;
-/// How much faster than its table a train may be: the path is laid out for that (chosen: all factors at worst).
-const FASTEST: f64 = 1.3;
-/// No run is longer (chosen: more than any experiment, and its truth still fits into memory).
-const LONGEST_RUN_S: f64 = 86_400.0;
-/// What the path is longer than the way at that speed (chosen: more than any shoe).
+/// Largest ratio of a train's speed to its table; the path is laid out for it (chosen: all factors at worst).
+const MAX_SPEED_FACTOR: f64 = 1.3;
+/// Longest run (chosen: more than any experiment, and its truth still fits into memory).
+const MAX_RUN_S: f64 = 86_400.0;
+/// Length of the path beyond the distance at that speed (chosen: more than any shoe).
 const SPARE_MM: f64 = 1000.0;
 
-/// Everything that a run takes place in and that it leaves as it was.
+/// Everything that a run takes place in and leaves unchanged.
 #[derive(Debug, Clone, Copy)]
 pub struct World<'w> {
-    /// The track, and where the train runs round.
+    /// The track, and the circuit of the train.
     pub railway: &'w Railway<'w>,
-    /// How the host talks to the station.
+    /// The link between host and station.
     pub link: &'w Link,
-    /// What goes wrong with contacts.
+    /// The faults of sensors.
     pub faults: &'w Faults,
-    /// What the station calls the train.
+    /// The train's number at the station.
     pub train_id: TrainId,
-    /// The train as it is.
+    /// The true train.
     pub train: &'w Train,
 }
 
-/// What one run hands on to the next.
+/// The state that one run passes to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conditions {
-    /// What the host's clock shows when the run begins.
+    /// The host's clock at the start of the run.
     pub clock: Timestamp,
-    /// How warm the train is, from 0, cold, to 1.
+    /// Warmth of the train, from 0 (cold) to 1.
     pub warmth: f64,
 }
 
-/// A recorded run, and what really happened.
+/// A recorded run and its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SimulatedRun {
     /// The train.
     pub train: TrainId,
-    /// The step it was running at when the run began; [`SpeedStep::STAND`] at rest.
+    /// The step at the start of the run; [`SpeedStep::STAND`] at rest.
     pub running_at: SpeedStep,
-    /// What was reported and commanded, in order of time.
+    /// Reports and commands, in order of time.
     pub events: Vec<Event>,
-    /// Passes of light gates, on a clock of theirs.
+    /// Passages of light gates, on the gates' clock.
     pub gates: Vec<GatePass>,
     /// For scorers only.
     pub truth: RunTruth,
 }
 
 impl World<'_> {
-    /// Lets a script happen, the same for the same seed. Returns what the run leaves to the next as well.
+    /// Simulates a script, the same for the same seed. Also returns the state for the next run.
     #[must_use]
     pub fn run(&self, script: &Script, conditions: Conditions, seed: u64) -> (SimulatedRun, Conditions) {
         let mut draws = Draws::new(seed, Purpose::Scenario);
@@ -82,10 +82,10 @@ impl World<'_> {
         };
         let path = self.path(script, Origin { sensor, past_mm });
         let sensors = self.railway.layout.sensors().map(|(sensor, _)| sensor).collect();
-        let mut contacts = Contacts::new(self.faults, sensors, Draws::new(seed, Purpose::Faults));
+        let mut sensors = Sensors::new(self.faults, sensors, Draws::new(seed, Purpose::Faults));
         let closed_at = draws.uniform(REMEMBERED_S);
-        for point in path.contacts.iter().take_while(|point| point.at_mm <= 0.0) {
-            contacts.remember(point.what, closed_at, point.at_mm > -self.train.shoe.as_mm());
+        for point in path.sensors.iter().take_while(|point| point.at_mm <= 0.0) {
+            sensors.remember(point.what, closed_at, point.at_mm > -self.train.shoe.as_mm());
         }
         let motion_draws = Draws::new(seed, Purpose::Motion);
         let mut rolling = Rolling::new(&path, self.train, motor, conditions.warmth, motion_draws);
@@ -106,16 +106,16 @@ impl World<'_> {
                 }
             }
             let now = step as f64 * STEP_S;
-            host.attend(now, &rolling, &path, &mut line);
-            rolling.advance(now, &mut contacts, |gate, at| gates.push(gate_clock.pass(gate, at)));
+            host.follow_script(now, &rolling, &path, &mut line);
+            rolling.advance(now, &mut sensors, |gate, at| gates.push(gate_clock.pass(gate, at)));
             while let Some(exchange) = line.poll_exchange(now + STEP_S) {
                 match exchange {
                     Exchange::Sent { command, began, ended } => {
-                        let heard = rolling.tell(command, ended);
+                        let heard = rolling.command(command, ended);
                         host.note_command(command, began, heard);
                     }
                     Exchange::Answered { poll } => {
-                        let closed = contacts.read(poll.before, poll.reading, self.link.latched);
+                        let closed = sensors.read(poll.before, poll.reading, self.link.latched);
                         host.note_poll(poll, &closed);
                     }
                 }
@@ -137,11 +137,11 @@ impl World<'_> {
     fn path(&self, script: &Script, origin: Origin) -> Path {
         let speeds = &self.train.speeds;
         let top = speeds.speed(speeds.highest(), Approach::Below).as_mm_per_s();
-        let reach_mm = FASTEST * top * lasts_s(script) + SPARE_MM;
+        let reach_mm = MAX_SPEED_FACTOR * top * lasts_s(script) + SPARE_MM;
         Path::new(self.railway, origin, reach_mm, script.has_gates)
     }
 
-    /// The turnouts of the circuit, thrown one after the other before the run.
+    /// The commands to the circuit's turnouts before the run.
     fn turnouts_thrown(&self, begins: Timestamp) -> Vec<Event> {
         let count = self.railway.circuit.turnouts().len();
         let event = |(nth, (turnout, leg)): (usize, (_, Leg))| Event {
@@ -152,7 +152,7 @@ impl World<'_> {
     }
 }
 
-/// How long a run lasts at most, in s.
+/// The longest duration of a run, in s.
 fn lasts_s(script: &Script) -> f64 {
-    script.lasts.as_s().clamp(0.0, LONGEST_RUN_S)
+    script.lasts.as_s().clamp(0.0, MAX_RUN_S)
 }

@@ -1,16 +1,16 @@
-//! Named experiments: what a person with a layout would do and record, run after run.
+//! Named experiments: what an operator with a layout would do and record, run after run.
 
 use footplate_core::{Approach, Ratio, SpeedStep, TimeSpan};
 
-use crate::contacts::Faults;
 use crate::draws::Draws;
 use crate::poller::Link;
 use crate::script::{Script, What, When};
+use crate::sensors::Faults;
 use crate::train::Train;
 
-/// The lowest step an experiment uses; below it most engines crawl and stall.
+/// Lowest step of an experiment; below it most locomotives creep and stall.
 const LOWEST_STEP: u8 = 4;
-/// How often a contact goes unnoticed on a clean layout (chosen: once in an hour of running).
+/// Probability of a missed detection on a clean layout (chosen: once in an hour of running).
 const CLEAN_MISSED: f64 = 0.001;
 
 /// A named family of experiments.
@@ -49,7 +49,7 @@ const SCENARIOS: [Scenario; 11] = [
     Scenario::new("gates", "already running past two light gates on a clock of their own", Kind::Gates),
     Scenario::new("warm-up", "half an hour at one step, from cold", Kind::WarmUp),
     Scenario::new("stalls", "low steps, at which some starts fail and dirt stops the train", Kind::Stalls),
-    Scenario::new("faults", "steady runs with missed, stuck and spurious contacts", Kind::Faults),
+    Scenario::new("faults", "steady runs with missed, stuck and spurious detections", Kind::Faults),
     Scenario::new(
         "driving",
         "ten minutes of speed changes, stops and starts at random reports",
@@ -73,7 +73,7 @@ impl Scenario {
         &SCENARIOS
     }
 
-    /// The scenario of a name.
+    /// The scenario with a name.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         SCENARIOS.into_iter().find(|scenario| scenario.name == name)
@@ -85,13 +85,13 @@ impl Scenario {
         self.name
     }
 
-    /// What it is, in half a sentence.
+    /// Its description, half a sentence.
     #[must_use]
     pub const fn says(&self) -> &'static str {
         self.says
     }
 
-    /// How the host of this scenario reads its sensors.
+    /// The link of this scenario.
     pub(crate) fn link(&self, seed: u64) -> Link {
         match self.kind {
             Kind::Gates => Link::first_reports(),
@@ -99,11 +99,11 @@ impl Scenario {
         }
     }
 
-    /// What goes wrong with contacts in this scenario.
+    /// The sensor faults of this scenario.
     pub(crate) fn faults(&self) -> Faults {
         let part = Ratio::from_parts;
         match self.kind {
-            // Chosen: worse than any contact of the recordings, of which one in ten misses now and then.
+            // Chosen: worse than any sensor of the recordings, of which one in ten misses now and then.
             Kind::Faults => Faults {
                 missed: part(0.05),
                 stuck: part(0.02),
@@ -114,7 +114,7 @@ impl Scenario {
         }
     }
 
-    /// How warm the train is at the beginning.
+    /// The train's warmth at the start.
     pub(crate) fn warmth(&self, draws: &mut Draws) -> f64 {
         if self.kind == Kind::WarmUp { 0.0 } else { draws.uniform(0.0..1.0) }
     }
@@ -182,7 +182,7 @@ const fn seconds(whole: i64) -> TimeSpan {
     TimeSpan::from_ms(1000 * whole)
 }
 
-/// Some place on the circuit; counted modulo its sensors.
+/// A random place on the circuit; counted modulo its sensors.
 fn anywhere(draws: &mut Draws) -> usize {
     draws.below(1000)
 }
@@ -201,7 +201,7 @@ fn start(number: u8, draws: &mut Draws) -> Script {
         .then(When::After(TimeSpan::ZERO), What::Speed(step(number)))
 }
 
-/// Running at a step, then at another, then at the first again: so once up and once down.
+/// Running at a step, then at another, then at the first again: once up and once down.
 fn change(number: u8, highest: u8, draws: &mut Draws) -> Script {
     let lowest = LOWEST_STEP.min(highest);
     let others: Vec<u8> = (lowest..=highest).filter(|other| *other != number).collect();
@@ -211,7 +211,7 @@ fn change(number: u8, highest: u8, draws: &mut Draws) -> Script {
         .then(When::After(TimeSpan::from_s(draws.uniform(8.0..16.0))), What::Speed(step(number)))
 }
 
-/// From rest to a step, by way of a faster one if given; stopped at a report and measured.
+/// From rest to a step, via a faster one if given; stopped at a report and measured.
 fn stop(number: u8, by_way_of: Option<u8>, draws: &mut Draws) -> Script {
     let first = by_way_of.unwrap_or(number);
     let mut script = Script { lasts: seconds(240), ..start(first, draws) };
@@ -230,7 +230,7 @@ fn short_move(quarters: i64, highest: u8, draws: &mut Draws) -> Script {
         .then(When::AtRest, What::Measure)
 }
 
-/// Ten minutes as somebody plays with a train.
+/// Ten minutes of free driving.
 fn drive(highest: u8, draws: &mut Draws) -> Script {
     let lowest = (LOWEST_STEP + 2).min(highest);
     let any = |draws: &mut Draws| step(lowest + draws.below(usize::from(highest - lowest) + 1) as u8);

@@ -1,71 +1,70 @@
-//! What is done in one run: how the train begins, what it is told and when, and how long it lasts.
+//! What is done in one run: the start, the orders and their times, and the duration.
 
 use footplate_core::{Approach, SpeedStep, TimeSpan};
 
-/// One run, written down before it happens.
+/// The plan of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Script {
-    /// What the train does when the run begins.
+    /// The state of the train at the start.
     pub start: Start,
-    /// What is done, one after the other.
+    /// The orders, one after the other.
     pub orders: Vec<Order>,
-    /// When the run ends at the latest, a day at most; earlier only once every order is done and the train
-    /// rests for good.
+    /// When the run ends at the latest, a day at most; earlier once every order is done and the train stays at rest.
     pub lasts: TimeSpan,
     /// Whether there are light gates on the track.
     pub has_gates: bool,
 }
 
-/// What the train does when a run begins. It does so just past a sensor, the counted one of the circuit.
+/// The state of the train at the start of a run, just past a sensor of the circuit, given by its index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
-    /// It stands.
+    /// At rest.
     AtRest {
-        /// The sensor it stands past.
+        /// The sensor behind it.
         past: usize,
     },
-    /// It has long been running.
+    /// Running steadily for long.
     Running {
         /// The sensor it has just passed.
         past: usize,
         /// At which step.
         step: SpeedStep,
-        /// From which side it got to that speed; the recording does not tell.
+        /// From which side it reached that speed; the recording does not show it.
         approach: Approach,
     },
 }
 
-/// Something done, and what it waits for once the order before it is done.
+/// An action, and the condition it waits for once the previous order is done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Order {
-    /// What it waits for.
+    /// The condition.
     pub when: When,
-    /// What is done.
+    /// The action.
     pub what: What,
 }
 
-/// What an order waits for.
+/// The condition of an order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum When {
-    /// A time since the order before was sent, or since the start of the run.
+    /// A time since the previous order was sent, or since the start of the run.
     After(TimeSpan),
-    /// A report of a contact that no report before it showed closed, and a time after that.
+    /// A report of a sensor that was open in the previous report, and a time after that.
     OnReport {
-        /// How many such reports are let pass first.
+        /// How many such reports are skipped first.
         skipped: u32,
         /// The time after it.
         wait: TimeSpan,
     },
-    /// The train's coming to rest.
+    /// The train has come to rest.
     AtRest,
 }
 
-/// What is done.
+/// The action of an order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum What {
     /// A throttle step is commanded.
     Speed(SpeedStep),
-    /// A person presses a key and lays a tape, from the sensor whose report the last order waited for, or
+    /// An operator presses a key and measures with a tape, from the sensor whose report the last order waited for, or
     /// else from the last one passed.
     Measure,
 }

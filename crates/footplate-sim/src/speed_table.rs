@@ -1,17 +1,17 @@
 //! The true steady speed of a train at every throttle step, reached from below and from above.
 //!
-//! Two shapes stand for the engines whose tables student teams have published since 2011:
-//! *even* engines, nearly linear in the step, and *steep* ones, slow at low steps and steep above. A train's
-//! own table is one of them, scaled, tilted and roughened as much as the same engine differs between teams.
+//! Two shapes represent the locomotives whose tables student teams have published since 2011: *even* ones, nearly
+//! linear in the step, and *steep* ones, slow at low steps and steep above. A train's own table is one of them,
+//! scaled, tilted and roughened as much as the same locomotive differs between teams.
 
 use footplate_core::{Approach, Speed, SpeedStep};
 
 use crate::draws::Draws;
 
-/// The steps of the Märklin decoders that all the measurements come from.
+/// The highest step of the Märklin decoders on which all measurements were made.
 const HIGHEST_STEP: u8 = 14;
 
-/// The form of the curve of speed over step.
+/// The shape of speed over step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Shape {
     /// Speed nearly linear in the step, slow to start.
@@ -27,7 +27,7 @@ const EVEN: [f64; 15] =
 const STEEP: [f64; 15] =
     [0.0, 9.0, 17.0, 26.0, 44.0, 75.0, 113.0, 166.0, 217.0, 282.0, 346.0, 405.0, 468.0, 539.0, 602.0];
 
-/// Standard deviation of a whole table: the same engine differs by 4 to 20 % between teams and years.
+/// Standard deviation of the scale of a table: the same locomotive differs by 4 to 20 % between teams and years.
 const SCALE_SD: f64 = 0.06;
 /// Standard deviation of the change of that scale from the lowest to the highest step (chosen: half the above).
 const TILT_SD: f64 = 0.03;
@@ -38,13 +38,14 @@ const WITH_HYSTERESIS: f64 = 7.0 / 8.0;
 const HYSTERESIS_MM_PER_S: core::ops::Range<f64> = 13.0..31.0;
 /// Below this speed the difference shrinks in proportion (measured on trains 1 and 78: 7 mm/s at 16 mm/s, 15 at 70).
 const FULL_HYSTERESIS_FROM_MM_PER_S: f64 = 120.0;
-/// A step stays at least this much below the next one (chosen: what a person could still distinguish).
-const LEAST_RISE_MM_PER_S: f64 = 2.0;
-/// The largest part of the way to the next step that hysteresis may take (chosen below 1: steps keep their order).
-const LARGEST_PART_OF_A_STEP: f64 = 0.9;
+/// A step is at least this much slower than the next one (chosen: what an observer could still distinguish).
+const MIN_RISE_MM_PER_S: f64 = 2.0;
+/// The largest part of the difference to the next step that hysteresis may take (chosen below 1: steps keep their
+/// order).
+const MAX_PART_OF_A_STEP: f64 = 0.9;
 
-/// No model train is faster (chosen: five times the fastest measured).
-const FASTEST_MM_PER_S: f64 = 5000.0;
+/// Highest speed of a model train (chosen: five times the fastest measured).
+const MAX_MM_PER_S: f64 = 5000.0;
 
 /// True steady speeds on level straight track, the train warm and its run an average one.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,8 +57,8 @@ pub struct SpeedTable {
 impl SpeedTable {
     /// A table from speeds at steps 0, 1, 2 … reached from below and from above.
     ///
-    /// The shorter of the two decides how many steps there are; step 0 stands whatever is given for it. Speeds
-    /// below zero count as zero, beyond 5 m/s as 5 m/s.
+    /// The shorter of the two determines the number of steps; step 0 is at rest whatever its speed. Speeds are
+    /// limited to the range from 0 to 5 m/s.
     #[must_use]
     pub fn new(below: &[Speed], above: &[Speed]) -> Self {
         let steps = below.len().min(above.len());
@@ -65,7 +66,7 @@ impl SpeedTable {
             let mut column: Vec<f64> = speeds
                 .iter()
                 .take(steps)
-                .map(|speed| Speed::ZERO.max(*speed).as_mm_per_s().min(FASTEST_MM_PER_S))
+                .map(|speed| Speed::ZERO.max(*speed).as_mm_per_s().min(MAX_MM_PER_S))
                 .collect();
             if let Some(stand) = column.first_mut() {
                 *stand = 0.0;
@@ -89,7 +90,7 @@ impl SpeedTable {
             let along = step as f64 / f64::from(HIGHEST_STEP) - 0.5;
             let roughness = draws.normal_within(1.0, ROUGHNESS_SD, 2.5);
             let speed = if step == 0 { 0.0 } else { anchor * scale * (1.0 + tilt * along) * roughness };
-            let speed = if step == 0 { 0.0 } else { speed.max(slowest + LEAST_RISE_MM_PER_S) };
+            let speed = if step == 0 { 0.0 } else { speed.max(slowest + MIN_RISE_MM_PER_S) };
             below.push(speed);
             slowest = speed;
         }
@@ -98,7 +99,7 @@ impl SpeedTable {
         let mut above = below.clone();
         if has_hysteresis {
             for (fast, pair) in above.iter_mut().zip(below.windows(2)) {
-                let (&[own, next], room) = (pair, LARGEST_PART_OF_A_STEP) else { continue };
+                let (&[own, next], room) = (pair, MAX_PART_OF_A_STEP) else { continue };
                 let taper = (own / FULL_HYSTERESIS_FROM_MM_PER_S).min(1.0);
                 *fast = own + (full * taper).min(room * (next - own));
             }
@@ -187,7 +188,7 @@ mod tests {
                 let table = drawn(seed, shape);
                 at(&table, 5, Approach::Below) / at(&table, 14, Approach::Below)
             };
-            // Real engines: 0.34 to 0.39 (trains 2, 47), 0.11 to 0.16 (trains 1, 24, 58, 77).
+            // Real locomotives: 0.34 to 0.39 (trains 2, 47), 0.11 to 0.16 (trains 1, 24, 58, 77).
             assert!(share(Shape::Even) > 0.28 && share(Shape::Steep) < 0.18);
         }
     }

@@ -1,4 +1,4 @@
-//! The rails as they really lie: not as long as the layout says, curved here, dirty there.
+//! The true rails: not as long as surveyed, curved here, dirty there.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use footplate_core::{EdgeId, Length, Ratio, SensorId};
 
 use crate::draws::{Draws, Purpose};
 
-/// Standard deviation of a contact's true place about its node (chosen: half of a survey's 10 mm).
+/// Standard deviation of a sensor's true place about its node (chosen: half of a survey's 10 mm).
 const CONTACT_SD_MM: f64 = 5.0;
 /// Share of stretches that are curves (chosen: a loop's ends and the legs of its turnouts).
 const CURVED: f64 = 0.4;
@@ -17,32 +17,32 @@ const CURVE_FACTOR: f64 = 0.97;
 const CURVE_FACTOR_SD: f64 = 0.012;
 /// Standard deviation of the factor of a straight (chosen: joints, slope, cleanness).
 const STRAIGHT_FACTOR_SD: f64 = 0.006;
-/// Dirty spots to a metre of rail (chosen: two or three on a loop of 5 m).
+/// Dirty spots per metre of rail (chosen: two or three on a loop of 5 m).
 const DIRTY_PER_M: f64 = 0.5;
-/// How much of its own length a short stretch may err by; so no length turns negative.
-const LARGEST_RELATIVE_SD: f64 = 0.2;
+/// Largest relative error of a short stretch, so that no length becomes negative.
+const MAX_RELATIVE_SD: f64 = 0.2;
 /// Deviations beyond this many standard deviations are drawn again.
-const MOST_SDS: f64 = 2.5;
+const MAX_SDS: f64 = 2.5;
 
-/// What is true of a stretch of rail in both directions.
+/// The true properties of a stretch of rail in both directions.
 #[derive(Debug, Clone, PartialEq)]
 struct Rail {
     length_mm: f64,
     factor: f64,
-    /// Places of dirty spots as parts of the length, in the direction of the stretch's first edge.
+    /// Dirty spots as parts of the length, in the direction of the stretch's first edge.
     dirty: Vec<f64>,
 }
 
-/// True lengths, contact places, and what the rails do to speed.
+/// True lengths, sensor places, and the speed factors of the rails.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrueTrack {
-    /// By the number of the stretch.
+    /// By stretch number.
     rails: Vec<Rail>,
     contact_offsets_mm: BTreeMap<SensorId, f64>,
 }
 
 impl TrueTrack {
-    /// Rails that differ from a layout as real ones do: lengths by the layout's own survey uncertainty.
+    /// Rails that differ from a layout as real ones do: lengths by the layout's survey uncertainty.
     #[must_use]
     pub fn draw(layout: &Layout, seed: u64) -> Self {
         let mut draws = Draws::new(seed, Purpose::Track);
@@ -50,14 +50,14 @@ impl TrueTrack {
         let mut rails: Vec<Rail> = Vec::with_capacity(layout.stretch_count());
         for (_, edge) in layout.edges().step_by(2) {
             let nominal_mm = edge.length.as_mm();
-            let sd = survey_mm.min(LARGEST_RELATIVE_SD * nominal_mm);
-            let length_mm = draws.normal_within(nominal_mm, sd, MOST_SDS);
+            let sd = survey_mm.min(MAX_RELATIVE_SD * nominal_mm);
+            let length_mm = draws.normal_within(nominal_mm, sd, MAX_SDS);
             let (mean, factor_sd) = if draws.chance(CURVED) {
                 (CURVE_FACTOR, CURVE_FACTOR_SD)
             } else {
                 (1.0, STRAIGHT_FACTOR_SD)
             };
-            let factor = draws.normal_within(mean, factor_sd, MOST_SDS);
+            let factor = draws.normal_within(mean, factor_sd, MAX_SDS);
             let mut dirty = Vec::new();
             let mut at = draws.waiting(DIRTY_PER_M * 1e-3);
             while at < length_mm {
@@ -68,12 +68,12 @@ impl TrueTrack {
         }
         let mut track = Self { rails, contact_offsets_mm: BTreeMap::new() };
         for (sensor, _) in layout.sensors() {
-            track.contact_offsets_mm.insert(sensor, draws.normal_within(0.0, CONTACT_SD_MM, MOST_SDS));
+            track.contact_offsets_mm.insert(sensor, draws.normal_within(0.0, CONTACT_SD_MM, MAX_SDS));
         }
         track
     }
 
-    /// Rails exactly as the layout says, level, straight and clean.
+    /// Rails exactly as surveyed, level, straight and clean.
     #[must_use]
     pub fn as_surveyed(layout: &Layout) -> Self {
         let rail = |length: Length| Rail { length_mm: length.as_mm(), factor: 1.0, dirty: Vec::new() };
@@ -83,30 +83,30 @@ impl TrueTrack {
         }
     }
 
-    /// The true length of an edge, and of its twin; nothing for an edge of another layout.
+    /// The true length of an edge, and of its twin; zero for an edge of another layout.
     #[must_use]
     pub fn length(&self, edge: EdgeId) -> Length {
         Length::from_mm(self.rail(edge).map_or(0.0, |rail| rail.length_mm))
     }
 
-    /// How far past its node, in its own direction of travel, a contact really closes.
+    /// How far past its node, in its own direction of travel, a sensor really closes.
     #[must_use]
-    pub fn contact_offset(&self, sensor: SensorId) -> Length {
+    pub fn sensor_offset(&self, sensor: SensorId) -> Length {
         Length::from_mm(self.contact_offsets_mm.get(&sensor).copied().unwrap_or(0.0))
     }
 
-    /// A contact closes further along by so much, in mm.
-    pub(crate) fn move_contact(&mut self, sensor: SensorId, by_mm: f64) {
+    /// Moves the place where a sensor closes further along, in mm.
+    pub(crate) fn move_sensor(&mut self, sensor: SensorId, by_mm: f64) {
         *self.contact_offsets_mm.entry(sensor).or_insert(0.0) += by_mm;
     }
 
-    /// Speed on an edge over speed on a level straight one, for a train that feels curves fully.
+    /// The speed factor of an edge relative to level straight track, for a train with full curve sensitivity.
     #[must_use]
     pub fn speed_factor(&self, edge: EdgeId) -> Ratio {
         Ratio::from_parts(self.rail(edge).map_or(1.0, |rail| rail.factor))
     }
 
-    /// Dirty spots from the beginning of an edge, in the direction of travel, in mm.
+    /// Dirty spots from the start of an edge, in the direction of travel, in mm.
     pub(crate) fn dirty_mm(&self, edge: EdgeId) -> Vec<f64> {
         let Some(rail) = self.rail(edge) else { return Vec::new() };
         let along = |part: &f64| if edge < edge.twin() { *part } else { 1.0 - *part };

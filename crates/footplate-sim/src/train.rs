@@ -1,4 +1,4 @@
-//! One true train: everything about it that an estimator has to find out and may never be told.
+//! The true parameters of one train: everything that an estimator has to find out and must not be given.
 
 use footplate_core::{Acceleration, Approach, Length, Ratio, Speed, SpeedStep, TimeSpan};
 
@@ -8,23 +8,23 @@ use crate::motor::Motor;
 use crate::speed_table::{Shape, SpeedTable};
 use crate::traits::Traits;
 
-/// How far stops from one speed scatter, over and above what run deviation and command jitter do.
+/// The variation of stops from one speed, beyond the effects of run deviation and command jitter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StopScatter {
-    /// Standard deviation at [`MID_SPEED`](Self::MID_SPEED); below, it shrinks in proportion to speed, because
-    /// how well a stop repeats goes with how long it is, but never to less than [`FLOOR`](Self::FLOOR).
+    /// Standard deviation at [`MID_SPEED`](Self::MID_SPEED); below, it is proportional to speed, because the
+    /// repeatability of a stop grows with its length, but never less than [`FLOOR`](Self::FLOOR).
     pub at_mid: Length,
-    /// Standard deviation at [`TOP_SPEED`](Self::TOP_SPEED); between and beyond it grows in proportion.
+    /// Standard deviation at [`TOP_SPEED`](Self::TOP_SPEED); between and beyond it is interpolated linearly.
     pub at_top: Length,
 }
 
 impl StopScatter {
-    /// Where repeated stops scattered by 4 mm in all (train 2 at step 8, measured 2020).
+    /// The speed at which repeated stops had a standard deviation of 4 mm in all (train 2 at step 8, measured 2020).
     pub const MID_SPEED: Speed = Speed::from_mm_per_s(390.0);
-    /// Where they scattered by 21 mm in all (train 77 at step 14, measured 2020).
+    /// The speed at which they had 21 mm in all (train 77 at step 14, measured 2020).
     pub const TOP_SPEED: Speed = Speed::from_mm_per_s(612.0);
 
-    /// What play in gears and rods leaves even of the shortest stop (chosen).
+    /// The effect of play in gears and rods on even the shortest stop (chosen).
     pub const FLOOR: Length = Length::from_mm(0.5);
 
     /// The standard deviation of the stopping distance from a speed.
@@ -39,53 +39,53 @@ impl StopScatter {
     }
 }
 
-/// A train with all its parameters, each open to be set by a test.
+/// A train with all its parameters, each of which a test may set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Train {
-    /// The form of its speed table.
+    /// The shape of its speed table.
     pub shape: Shape,
     /// Its steady speeds, warm, on level straight track, in an average run.
     pub speeds: SpeedTable,
-    /// How it changes speed.
+    /// Its law of speed change.
     pub law: Law,
-    /// From the end of a command on the line until the decoder has it, on average.
+    /// Mean time from the end of a command on the line until the decoder has it.
     pub command_delay: TimeSpan,
     /// Standard deviation of that delay.
     pub command_jitter: TimeSpan,
-    /// From the decoder's having a command until a standing train stirs, on average.
+    /// Mean time from the decoder's receipt of a command until a train at rest starts to move.
     pub start_dead_time: TimeSpan,
-    /// The same for a running train, always alike.
+    /// The same for a moving train, without variation.
     pub change_dead_time: TimeSpan,
-    /// Slowing down by friction alone; felt at step 0, made good by load control at any other.
+    /// Deceleration by friction alone; effective at step 0, compensated by load control at any other.
     pub friction: Acceleration,
-    /// Set speed at which wheels at rest begin to turn, on average; each start draws its own (30 %).
+    /// Mean set speed at which wheels at rest start to turn; each start varies (30 %).
     pub breakaway: Speed,
-    /// How stops scatter.
+    /// The variation of stops.
     pub stop_scatter: StopScatter,
-    /// Standard deviation of the speed of a whole run.
+    /// Standard deviation of the mean speed of a run.
     pub run_deviation: Ratio,
     /// Standard deviation of the slow wander of speed within a run.
     pub wander: Ratio,
-    /// Time over which that wander forgets.
+    /// Time constant of that wander.
     pub wander_time: TimeSpan,
-    /// How much faster (or, negative, slower) it runs warm than cold.
+    /// Relative increase of speed (negative: decrease) from cold to warm.
     pub warm_up: Ratio,
-    /// Time constant of warming up while it runs and of cooling down while it stands.
+    /// Time constant of warming in motion and cooling at rest.
     pub warm_up_time: TimeSpan,
-    /// How strongly curves slow it: 1 as the track says, 0 not at all.
-    pub curve_feel: f64,
-    /// Length of the shoe that holds contacts closed.
+    /// Sensitivity to curves: 1 is the track's full factor, 0 none.
+    pub curve_sensitivity: f64,
+    /// Length of the shoe that keeps sensors closed.
     pub shoe: Length,
     /// From the shoe's end at the nose to the nose itself.
     pub nose: Length,
     /// From the shoe's end at the tail to the end of the train.
     pub tail: Length,
-    /// What else is peculiar to it; nothing, unless the world draws from a wider range.
+    /// Its special traits; none, unless the world draws from a wider range.
     pub traits: Traits,
 }
 
 impl Train {
-    /// A random but plausible train that obeys a law: the same for the same seed.
+    /// A random but plausible train with a law: the same for the same seed.
     #[must_use]
     pub fn draw(seed: u64, family: LawFamily) -> Self {
         let mut draws = Draws::new(seed, Purpose::Train);
@@ -98,7 +98,7 @@ impl Train {
         let command_delay = span_ms(30.0..90.0);
         let command_jitter = span_ms(1.0..8.0);
         let change_dead_time = span_ms(50.0..160.0);
-        // Measured: 0.65 to 1.0 s for trains 45, 47 and 49; trains 24 and 58 stir at once.
+        // Measured: 0.65 to 1.0 s for trains 45, 47 and 49; trains 24 and 58 start at once.
         let start_dead_time = match shape {
             Shape::Even => span_ms(400.0..1000.0),
             Shape::Steep => span_ms(80.0..600.0),
@@ -119,38 +119,44 @@ impl Train {
                 at_mid: Length::from_mm(draws.uniform(2.0..4.0)),
                 at_top: Length::from_mm(draws.uniform(14.0..24.0)),
             },
-            // Measured: repeats of one run differ by 0.3 to 0.8 %; a third of it is given to the wander.
+            // Measured: repeats of one run differ by 0.3 to 0.8 %; a third of that is assigned to the wander.
             run_deviation: Ratio::from_percent(draws.uniform(0.3..0.7)),
             wander: Ratio::from_percent(draws.uniform(0.1..0.3)),
             // Chosen: between a hop (1 s) and a run (a minute).
             wander_time: TimeSpan::from_s(draws.uniform(4.0..20.0)),
-            // Chosen: full drift is of the order that tables lose within a day (4 %).
+            // Chosen: the full drift is about what tables lose within a day (4 %).
             warm_up: Ratio::from_percent(draws.uniform(-1.0..4.0)),
             warm_up_time: TimeSpan::from_s(draws.uniform(240.0..720.0)),
-            curve_feel: draws.uniform(0.5..1.5),
-            // Measured: repeats in the recordings of trains 1, 24, 74 and 78 fit 25 to 44 mm at every speed, if
-            // the station remembers, and no one length if it does not.
+            curve_sensitivity: draws.uniform(0.5..1.5),
+            // Measured: repeated reports in the recordings of trains 1, 24, 74 and 78 fit 25 to 44 mm at every speed
+            // if the station latches, and no single length if it does not.
             shoe: Length::from_mm(draws.uniform(25.0..45.0)),
-            // Measured: the shoe comes 2 cm behind the front of an engine one way and 9 cm the other way.
+            // Measured: the shoe is 2 cm behind the front of a locomotive in one direction and 9 cm in the other.
             nose: Length::from_mm(draws.uniform(15.0..25.0)),
             tail: Length::from_mm(draws.uniform(80.0..100.0)),
             traits: Traits::default(),
         }
     }
 
-    /// From the decoder's having the stop command until standstill, on level straight track, in an average
-    /// run without scatter; integrated, not looked up.
+    /// The stopping distance from the decoder's receipt of the command, on level straight track, in an average run
+    /// without variation; integrated, not looked up.
     #[must_use]
-    pub fn way_to_rest(&self, step: SpeedStep, approach: Approach) -> Length {
+    pub fn stopping_distance(&self, step: SpeedStep, approach: Approach) -> Length {
         let mut motor = Motor::running(self, step, approach);
         motor.command_without_scatter(SpeedStep::STAND);
-        Length::from_mm(motor.way_to_rest_mm())
+        Length::from_mm(motor.stopping_distance_mm())
     }
 
-    /// The way within a time since the decoder had a step, of a train that stood or ran steadily at another, on level
-    /// straight track, in an average run without scatter; integrated, not looked up.
+    /// The distance within a time since the decoder received a step, of a train at rest or running steadily at
+    /// another, on level straight track, in an average run without variation; integrated, not looked up.
     #[must_use]
-    pub fn way_after(&self, from: SpeedStep, approach: Approach, to: SpeedStep, within: TimeSpan) -> Length {
+    pub fn distance_after(
+        &self,
+        from: SpeedStep,
+        approach: Approach,
+        to: SpeedStep,
+        within: TimeSpan,
+    ) -> Length {
         let mut motor = if from == SpeedStep::STAND {
             let mut motor = Motor::at_rest(self);
             motor.start_without_scatter(to);
@@ -160,18 +166,18 @@ impl Train {
             motor.command_without_scatter(to);
             motor
         };
-        Length::from_mm(motor.way_within_mm(within))
+        Length::from_mm(motor.distance_within_mm(within))
     }
 
-    /// The distance of a short move from rest to rest, its stop reaching the decoder `run` after its start, on level straight
-    /// track and without scatter; integrated, not looked up.
+    /// The distance of a short move from rest to rest, whose stop reaches the decoder `run` after its start, on level
+    /// straight track and without variation; integrated, not looked up.
     #[must_use]
     pub fn short_move(&self, step: SpeedStep, run: TimeSpan) -> Length {
         let mut motor = Motor::at_rest(self);
         motor.start_without_scatter(step);
-        let before = motor.way_within_mm(run);
+        let before = motor.distance_within_mm(run);
         motor.command_without_scatter(SpeedStep::STAND);
-        Length::from_mm(before + motor.way_to_rest_mm())
+        Length::from_mm(before + motor.stopping_distance_mm())
     }
 }
 
@@ -200,13 +206,14 @@ mod tests {
 
     #[test]
     fn ways_to_rest_are_those_of_real_engines() {
-        // Real ones at top step: 817 mm (train 47) to 1588 mm (train 77); E stops of 13 from 580 to 640 mm.
+        // Real stopping distances at top step: 817 mm (train 47) to 1588 mm (train 77); emergency stops of 13 trains
+        // from 580 to 640 mm.
         for family in LawFamily::ALL {
             for seed in 0..60 {
                 let train = Train::draw(seed, family);
-                let top = train.way_to_rest(train.speeds.highest(), Approach::Below).as_mm();
+                let top = train.stopping_distance(train.speeds.highest(), Approach::Below).as_mm();
                 assert!((550.0..1900.0).contains(&top), "{family} {seed}: {top} mm");
-                let low = train.way_to_rest(SpeedStep::new(5).unwrap(), Approach::Below).as_mm();
+                let low = train.stopping_distance(SpeedStep::new(5).unwrap(), Approach::Below).as_mm();
                 assert!(low < 0.6 * top, "{family} {seed}: {low} of {top} mm");
             }
         }

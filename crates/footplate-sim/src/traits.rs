@@ -1,4 +1,4 @@
-//! What one train does beyond its speed table and its law: nothing in the usual world.
+//! Special traits of one train beyond its speed table and its law; none in the usual world.
 
 use footplate_core::Ratio;
 
@@ -6,36 +6,36 @@ use crate::draws::Draws;
 use crate::electric::ElectricEngine;
 use crate::other_law::OtherLaw;
 
-/// Peculiarities of one train; the default is none.
+/// The traits of one train; the default is none.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Traits {
-    /// Starts that do not begin when they usually do.
+    /// Starts at unusual times.
     pub sticky: Option<StickyStarts>,
-    /// How it changes speed, in place of its law.
+    /// An unusual law, in place of its own.
     pub other_law: Option<OtherLaw>,
-    /// The engine that drives it, in place of table and law.
+    /// A second motor model, in place of table and law.
     pub engine: Option<ElectricEngine>,
-    /// What differs from one session to the next.
+    /// The variation from one session to the next.
     pub session: SessionSpread,
-    /// Part of a gradient that load control does not make good: speed falls by this for each unit of gradient.
-    pub grade_feel: f64,
-    /// Standard deviation in mm of where along the rail the shoe closes a contact, over and above the contact's own.
+    /// The part of a gradient that load control does not compensate: speed falls by this per unit of gradient.
+    pub grade_sensitivity: f64,
+    /// Standard deviation in mm of the place where the shoe closes a sensor, in addition to the sensor's own.
     pub shoe_scatter_mm: f64,
 }
 
-/// Starts from rest that come early or late, or not at all until the train is pushed up a step.
+/// Starts from rest that are early or late, or fail until a higher step is commanded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StickyStarts {
-    /// How often a start is early or late.
+    /// Probability that a start is early or late.
     pub irregular: Ratio,
-    /// By how much at most, in s, either side; at least a fifth of it.
+    /// The largest deviation, in s, in either direction; the smallest is a fifth of it.
     pub by_s: f64,
-    /// How often a train sticks until it is commanded a higher step.
+    /// Probability that a train sticks until a higher step is commanded.
     pub stuck: Ratio,
 }
 
 impl StickyStarts {
-    /// By how much this start is late, in s; negative if early; `None` if the train sticks.
+    /// The delay of this start, in s; negative if early; `None` if the train sticks.
     pub(crate) fn draw(&self, draws: &mut Draws) -> Option<f64> {
         if draws.chance(self.stuck.as_parts()) {
             return None;
@@ -48,20 +48,20 @@ impl StickyStarts {
     }
 }
 
-/// Standard deviations of what a session has of its own: supply voltage, cleanness, what the train pulls.
+/// Standard deviations of a session's factors: supply voltage, cleanness, load.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SessionSpread {
     /// Of the speed at every step, relative.
     pub speed: f64,
-    /// Of the further change of speed at the top, relative; none at rest, with the square of speed in between.
+    /// Of the additional change of speed at the top, relative; proportional to the square of speed below.
     pub top: f64,
-    /// Of how fast it slows down when nothing drives it, relative.
+    /// Of the deceleration without drive, relative.
     pub stop: f64,
-    /// The heaviest load: masses grow by up to this part.
+    /// The heaviest load, as a part of the mass.
     pub load: f64,
 }
 
-/// What one session has of its own, as factors that are 1 on an average day.
+/// The factors of one session; 1 on an average day.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Session {
     pub(crate) speed: f64,
@@ -74,10 +74,10 @@ impl Session {
     pub(crate) const AVERAGE: Self = Self { speed: 1.0, top: 0.0, stop: 1.0, mass: 1.0 };
 
     /// Deviations beyond this many standard deviations are drawn again.
-    const MOST_SDS: f64 = 2.5;
+    const MAX_SDS: f64 = 2.5;
 
     pub(crate) fn draw(spread: &SessionSpread, draws: &mut Draws) -> Self {
-        let mut about_one = |sd: f64| draws.normal_within(1.0, sd, Self::MOST_SDS);
+        let mut about_one = |sd: f64| draws.normal_within(1.0, sd, Self::MAX_SDS);
         Self {
             speed: about_one(spread.speed),
             top: about_one(spread.top) - 1.0,

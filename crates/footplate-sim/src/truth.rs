@@ -1,11 +1,11 @@
-//! What really happened in a run: for scorers, and for nobody else.
+//! The truth of a run, for scorers only.
 
 use footplate_core::{Approach, EdgeId, Length, SensorId, Speed, SpeedStep, TimeSpan, Timestamp};
 
-use crate::contacts::Cause;
 use crate::path::{Path, Point};
+use crate::sensors::Cause;
 
-/// How densely motion is kept; between samples it is a cubic through places and speeds, good to micrometres.
+/// Integration steps per motion sample; a cubic through places and speeds interpolates, accurate to micrometres.
 pub(crate) const SAMPLE_STEPS: usize = 10;
 
 /// The truth of one run, on the clock of its events.
@@ -15,56 +15,56 @@ pub struct RunTruth {
     pub reports: Vec<ReportTruth>,
     /// One entry for each speed command among the events, in their order.
     pub commands: Vec<CommandTruth>,
-    /// One entry for each hand measurement among the events, in their order.
+    /// One entry for each manual measurement among the events, in their order.
     pub stops: Vec<StopTruth>,
-    /// Where the train was and how fast it ran.
+    /// Position and speed of the train.
     pub motion: Motion,
-    /// Side from which a train that runs from the start got to its speed.
+    /// The side from which a train that runs from the start reached its speed.
     pub approach_at_start: Approach,
-    /// The speed of this run over that of an average one.
+    /// The speed of this run relative to an average one.
     pub run_factor: f64,
-    /// Whether the train stood still at a step other than 0 when the run ended.
+    /// Whether the train was at rest at a step other than 0 when the run ended.
     pub stalled: bool,
 }
 
 /// The truth behind a sensor report.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ReportTruth {
-    /// Which of the events it belongs to.
+    /// The index of its event.
     pub event: usize,
-    /// The contact.
+    /// The sensor.
     pub sensor: SensorId,
     /// Why it was closed.
     pub cause: Cause,
-    /// Whether this is the first report of that closure.
+    /// Whether this is the first report of that actuation.
     pub first: bool,
     /// When it closed.
     pub closed: Timestamp,
-    /// When the reading took place that saw it closed.
+    /// When it was read.
     pub reading: Timestamp,
-    /// When the reading before took place.
+    /// When the previous reading took place.
     pub reading_before: Timestamp,
 }
 
 /// The truth behind a speed command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CommandTruth {
-    /// Which of the events it belongs to.
+    /// The index of its event.
     pub event: usize,
     /// The step commanded.
     pub step: SpeedStep,
-    /// When the decoder had it.
+    /// When the decoder received it.
     pub heard: Timestamp,
 }
 
-/// The truth behind a hand measurement.
+/// The truth behind a manual measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StopTruth {
-    /// Which of the events it belongs to.
+    /// The index of its event.
     pub event: usize,
     /// When the train came to rest.
     pub rested: Timestamp,
-    /// How far past the landmark's node it did.
+    /// How far past the landmark's node it came to rest.
     pub offset: Length,
 }
 
@@ -98,7 +98,7 @@ impl Motion {
         let Some(([x0, v0], [x1, v1], part)) = self.around(at) else { return Length::ZERO };
         let h = self.spacing.as_s();
         let (rest, all) = (1.0 - part, part);
-        // The cubic that has both places and both speeds (Hermite).
+        // The cubic through both places with both speeds (Hermite).
         let mm = x0 * rest * rest * (1.0 + 2.0 * all)
             + x1 * all * all * (1.0 + 2.0 * rest)
             + h * v0 * all * rest * rest
@@ -113,18 +113,18 @@ impl Motion {
         Speed::from_mm_per_s(v0 + (v1 - v0) * part)
     }
 
-    /// The edge and how far along it, by true lengths.
+    /// The edge and the offset on it, by true lengths.
     #[must_use]
     pub fn place(&self, at: Timestamp) -> Option<(EdgeId, Length)> {
         self.path.place(self.distance(at).as_mm())
     }
 
-    /// Every contact on the way, passed or still ahead, with its distance from the start of the run.
-    pub fn contacts(&self) -> impl ExactSizeIterator<Item = (SensorId, Length)> + '_ {
-        self.path.contacts.iter().map(|Point { at_mm, what }| (*what, Length::from_mm(*at_mm)))
+    /// Every sensor on the path, passed or ahead, with its distance from the start of the run.
+    pub fn sensors(&self) -> impl ExactSizeIterator<Item = (SensorId, Length)> + '_ {
+        self.path.sensors.iter().map(|Point { at_mm, what }| (*what, Length::from_mm(*at_mm)))
     }
 
-    /// When the train had gone a distance; `None` if it never did.
+    /// When the train had run a distance; `None` if it never did.
     #[must_use]
     pub fn time_at(&self, distance: Length) -> Option<Timestamp> {
         let mm = distance.as_mm();

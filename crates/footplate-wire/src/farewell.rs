@@ -1,11 +1,11 @@
-//! How far the end of a session has come with a station that confirms what it is commanded.
+//! The end of a session with a confirming station: stop all trains, then switch the power off.
 
 use footplate_core::{TimeSpan, Timestamp};
 
 use crate::locomotives::Locomotives;
 use crate::session::{Closing, Confirmation};
 
-/// How long the end waits for all stops to be confirmed before the power goes off all the same: several repeats.
+/// The power goes off after this time even if stops are unconfirmed; long enough for several repeats.
 const STOPS_WITHIN: TimeSpan = TimeSpan::from_ms(1_500);
 
 /// How far the end has come.
@@ -41,7 +41,7 @@ impl Farewell {
         }
     }
 
-    /// The power that is going off has to wait: trains have to be stopped again.
+    /// Stops the trains again before the power goes off.
     pub(crate) fn begin_again(&mut self, now: Timestamp) {
         if let Self::SwitchingOff { .. } = self {
             self.begin(now);
@@ -58,7 +58,7 @@ impl Farewell {
         is_due
     }
 
-    /// The station has said that the track has no power.
+    /// Notes that the station reported the track without power.
     pub(crate) fn power_went_off(&mut self) {
         if let Self::SwitchingOff { is_confirmed } = self {
             *is_confirmed = true;

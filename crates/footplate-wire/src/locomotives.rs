@@ -1,4 +1,4 @@
-//! What was commanded to each locomotive, and what the station has confirmed of it.
+//! The commanded state of each locomotive, and what the station has confirmed.
 
 use alloc::vec::Vec;
 
@@ -10,17 +10,17 @@ use crate::queue::Queue;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Locomotive {
     pub(crate) train: TrainId,
-    /// Which end leads, by the last command; `None` until the station has said how it is driven.
+    /// Whether it runs forward, by the last command; `None` until the station has reported its state.
     pub(crate) forward: Option<bool>,
     /// The step of the last command.
     pub(crate) step: SpeedStep,
-    /// Whether a speed was ever written for it, so that it has to be stopped at the end.
+    /// Whether a speed was ever written for it, so that the end must stop it.
     pub(crate) is_driven: bool,
     /// Whether the station has confirmed step 0 since the last other step.
     pub(crate) is_stopped: bool,
 }
 
-/// All that were commanded or asked for.
+/// All locomotives that were commanded or asked for.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Locomotives(Vec<Locomotive>);
 
@@ -33,7 +33,7 @@ impl Locomotives {
         self.0.iter_mut().find(|locomotive| locomotive.train == train)
     }
 
-    /// A locomotive is going to be commanded.
+    /// Adds a locomotive that will be commanded.
     pub(crate) fn know(&mut self, train: TrainId) {
         if self.get(train).is_none() {
             let step = SpeedStep::STAND;
@@ -41,7 +41,7 @@ impl Locomotives {
         }
     }
 
-    /// Whether it is known which end of a train leads.
+    /// Whether the direction of a train is known.
     pub(crate) fn has_direction(&self, train: TrainId) -> bool {
         self.get(train).is_some_and(|locomotive| locomotive.forward.is_some())
     }
@@ -54,7 +54,7 @@ impl Locomotives {
         self.0.iter_mut()
     }
 
-    /// A train is going to be stopped, whoever drove it.
+    /// Adds a train that must be stopped, no matter which throttle drove it.
     pub(crate) fn know_driven(&mut self, train: TrainId) {
         self.know(train);
         if let Some(locomotive) = self.get_mut(train) {
@@ -62,7 +62,7 @@ impl Locomotives {
         }
     }
 
-    /// Stops every train that ever had a speed.
+    /// Stops every train that was driven.
     pub(crate) fn stop_driven(&mut self, waiting: &mut Queue) {
         for locomotive in self.0.iter_mut().filter(|locomotive| locomotive.is_driven) {
             locomotive.is_stopped = false;
@@ -71,7 +71,7 @@ impl Locomotives {
         }
     }
 
-    /// Those that ever had a speed and have stopped, or not.
+    /// Returns the driven trains that have stopped, or those that have not.
     pub(crate) fn driven(&self, stopped: bool) -> Vec<TrainId> {
         let driven =
             self.0.iter().filter(|locomotive| locomotive.is_driven && locomotive.is_stopped == stopped);

@@ -1,15 +1,15 @@
-//! How fast requests may follow one another: stations drop what they have no room for, without a word.
+//! The pace of requests: stations silently drop what they have no room for.
 
 use footplate_core::{TimeSpan, Timestamp};
 
 /// When the next request may go.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pacing {
-    /// From request to request on average.
+    /// Mean time between requests.
     every: TimeSpan,
-    /// Requests that may go at once after a pause.
+    /// Number of requests that may go at once after a pause.
     at_once: i64,
-    /// What stops a train waits no longer than this for the request before.
+    /// A stop waits at most this long after the request before it.
     urgent_after: TimeSpan,
     /// The time up to which the average is used up.
     used_until: Timestamp,
@@ -17,17 +17,17 @@ pub(crate) struct Pacing {
 }
 
 impl Pacing {
-    /// A pace: the mean time between requests, how many may go at once, and how long what stops a train waits at most.
+    /// Creates a pace from the mean time between requests, the number that may go at once, and how long a stop waits at most.
     pub(crate) const fn new(every: TimeSpan, at_once: i64, urgent_after: TimeSpan) -> Self {
         Self { every, at_once, urgent_after, used_until: Timestamp::ZERO, last: None }
     }
 
-    /// When a request may go that can wait.
+    /// Returns when a request may go that is not urgent.
     pub(crate) fn usual_at(&self) -> Timestamp {
         self.used_until - TimeSpan::from_ns(self.every.as_ns() * (self.at_once - 1))
     }
 
-    /// When a request may go that stops something.
+    /// Returns when a request may go that stops something.
     pub(crate) fn urgent_at(&self) -> Timestamp {
         let after_last = self.last.map_or(self.usual_at(), |last| last + self.urgent_after);
         self.usual_at().min(after_last)

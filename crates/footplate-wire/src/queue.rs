@@ -1,14 +1,13 @@
-//! Commands that wait for the line: what stops goes first, what is outdated goes not at all.
+//! Commands that wait for the line: stops go first, outdated commands are dropped.
 
 use alloc::collections::VecDeque;
 
 use footplate_core::{Command, EventKind, SpeedStep, TrainId};
 
-/// More than this is no plan but a mistake: at 9 ms each, as on the fastest link, it is more than two seconds of nothing but
-/// commands.
+/// More waiting commands than this are a mistake: at 9 ms each they fill the line for more than two seconds.
 const LONGEST: usize = 256;
 
-/// The commands that wait, in the order in which they go.
+/// Waiting commands in their order.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Queue {
     /// Power off and speed 0.
@@ -17,7 +16,10 @@ pub(crate) struct Queue {
 }
 
 impl Queue {
-    /// Puts a command where it belongs; refuses it with the number of those that wait if there are too many.
+    /// Adds a command in its place.
+    ///
+    /// # Errors
+    /// The number of waiting commands, if there are too many.
     pub(crate) fn push(&mut self, command: Command) -> Result<(), usize> {
         match command {
             Command::PowerOff => {
@@ -35,7 +37,7 @@ impl Queue {
                 let last = self.usual.iter_mut().rfind(|waiting| concerns(waiting, train));
                 match last {
                     Some(waiting) if is_speed_of(waiting, train) => *waiting = command,
-                    // What comes before the turn keeps its place before the turn.
+                    // A speed before a reversal keeps its place before it.
                     Some(_) => self.push_usual(command)?,
                     None => {
                         self.push_usual(command)?;
@@ -66,12 +68,12 @@ impl Queue {
         Ok(())
     }
 
-    /// What was said already and goes again, unless something newer waits.
+    /// Adds a command that was sent before, unless a newer one replaces it.
     pub(crate) fn push_again(&mut self, command: Command) -> bool {
         !self.outdates(command) && self.push(command).is_ok()
     }
 
-    /// Whether something waits that is newer than a command and concerns the same.
+    /// Whether a waiting command replaces an earlier one.
     pub(crate) fn outdates(&self, command: Command) -> bool {
         self.iter().any(|waiting| match (command, waiting) {
             (Command::Speed { train, .. }, waiting) => concerns(waiting, train),
@@ -87,29 +89,29 @@ impl Queue {
         !self.urgent.is_empty()
     }
 
-    /// The next of those that stop something, of those that may go.
+    /// Removes and returns the next command that stops something and may go.
     pub(crate) fn next_urgent(&mut self, may_go: impl Fn(&Command) -> bool) -> Option<Command> {
         let at = self.urgent.iter().position(may_go)?;
         self.urgent.remove(at)
     }
 
-    /// The next of the rest that may go.
+    /// Removes and returns the next other command that may go.
     pub(crate) fn next_usual(&mut self, may_go: impl Fn(&Command) -> bool) -> Option<Command> {
         let at = self.usual.iter().position(may_go)?;
         self.usual.remove(at)
     }
 
-    /// Whether anything stops something or may go.
+    /// Whether a stop waits, or another command that may go.
     pub(crate) fn has_next(&self, may_go: impl Fn(&Command) -> bool) -> bool {
         !self.urgent.is_empty() || self.usual.iter().any(may_go)
     }
 
-    /// All that wait, in the order in which they would go.
+    /// All waiting commands in their order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Command> {
         self.urgent.iter().chain(&self.usual)
     }
 
-    /// The trains whose stops wait.
+    /// Trains with a waiting stop.
     pub(crate) fn stops(&self) -> impl Iterator<Item = TrainId> {
         self.urgent.iter().filter_map(train_of)
     }
@@ -128,8 +130,8 @@ pub(crate) const fn train_of(command: &Command) -> Option<TrainId> {
     }
 }
 
-/// The entry of the recording when a command leaves for the nth time; power has none, and a reversal that is repeated sets the
-/// same direction again.
+/// The recording's entry for a command that is sent for the nth time. Power has none; a repeated reversal sets the same direction
+/// again and has none either.
 pub(crate) const fn entry_of(command: &Command, nth: u8) -> Option<EventKind> {
     match *command {
         Command::Speed { train, step } => Some(EventKind::Speed { train, step }),

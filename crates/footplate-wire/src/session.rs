@@ -1,73 +1,75 @@
-//! A command station spoken to without a socket: bytes and commands in, bytes and entries of the recording out.
+//! A session with a command station, without a socket: bytes and commands in, bytes and entries of the recording out.
 
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt::{Display, Formatter, Result as FmtResult};
+use core::ops::RangeInclusive;
 
 use footplate_core::{Command, Event, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use crate::marklin_serial::ModuleReads;
 
-/// What the loop around a command station's line hands over and asks for.
+/// A session, driven by the loop around a station's line.
 ///
-/// Every `handle_…` may make outputs: take them with [`poll_output`](Self::poll_output) until there are none, at
-/// once, because a byte counts as written at the `now` of the call before. Then wait for whatever comes first, a byte,
-/// the hand-shake or [`next_timeout`](Self::next_timeout).
+/// Every `handle_…` may produce outputs. Take them at once with [`poll_output`](Self::poll_output) until there are none: a byte counts
+/// as written at the `now` of the call before. Then wait for a byte, the hand-shake or [`next_timeout`](Self::next_timeout).
 pub trait Session {
-    /// Bytes have come from the station.
+    /// Takes bytes from the station.
     fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]);
 
-    /// The station's hand-shake line is `up` (bytes may come) now; also said once at the beginning. Without effect on links
-    /// that have none.
+    /// Takes the state of the station's hand-shake line (`up`: bytes may be written), once at the beginning, too. No effect on links
+    /// without one.
     fn handle_cts(&mut self, _now: Timestamp, _up: bool) {}
 
-    /// The line was lost and has been opened again: what was on it is gone, and the station may wait for the rest of it.
+    /// Restarts after the line was lost and opened again: bytes on it are gone, and the station may wait for the rest of them.
     fn handle_reopened(&mut self, now: Timestamp);
 
-    /// Say this to the station as soon as the line is free.
+    /// Sends a command as soon as the line is free.
     ///
     /// # Errors
     ///
-    /// When the station has no bytes for it, too much is waiting already, or the session is being closed. Nothing is
-    /// said then.
+    /// When the station has no such command, too many commands wait, or the session is closing. Nothing is sent then.
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError>;
 
-    /// A command is expected to leave at this time: begin no poll that could still occupy the line then. A later
-    /// word replaces an earlier one; `None` takes it back. Without effect on links that do not poll.
+    /// Keeps the line free for a command at this time: no poll begins that could still occupy it then. A later call replaces an
+    /// earlier one; `None` cancels it. No effect on links that do not poll.
     fn hold_line(&mut self, _until: Option<Timestamp>) {}
 
-    /// Ask for the module of this contact often, for others now and then. `None`: for all alike. Without effect on links that
-    /// do not poll.
+    /// Polls the module of this sensor often and others rarely; `None`: all alike. No effect on links that do not poll.
     fn watch(&mut self, _sensor: Option<SensorId>) {}
 
-    /// The time has come that was asked for, or it is a good moment to look at the clock anyway.
+    /// Sets how much longer than usual for this station the line may delay a report (as measured): a sensor may have become occupied
+    /// that much earlier. No effect on links that poll, whose line is not shared.
+    fn expect_delays(&mut self, _excess: TimeSpan) {}
+
+    /// Advances the clock: [`next_timeout`](Self::next_timeout) is due, or the loop woke for another reason.
     fn handle_timeout(&mut self, now: Timestamp);
 
-    /// The next thing to do, until `None`.
+    /// Returns the next output, until `None`.
     fn poll_output(&mut self) -> Option<Transmit>;
 
-    /// When it wants to be asked again; later than the last `now` once all outputs are taken. `None`: only when
-    /// something comes.
+    /// Returns when to call [`handle_timeout`](Self::handle_timeout); later than the last `now` once all outputs are taken. `None`: only
+    /// when something arrives.
     fn next_timeout(&self) -> Option<Timestamp>;
 
-    /// Stop every train that was ever told a step, release what is powered, take the power from the track, and ask
-    /// for nothing more. What was waiting is dropped. [`LinkNotice::Closed`] says when it is done.
+    /// Ends the session: stops every train that was driven, releases solenoids and switches the track power off. Waiting commands are
+    /// dropped. [`LinkNotice::Closed`] reports the end.
     fn close(&mut self, now: Timestamp);
 
-    /// How far the closing has come; all that was not told yet if [`close`](Self::close) was never called.
+    /// Returns how far the end has come; before [`close`](Self::close), everything that it would have to do.
     fn closing(&self) -> Closing;
 }
 
-/// What a session asks of the loop around it.
+/// An output of a session.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Transmit {
     /// Write this byte now.
     Byte(u8),
-    /// Write these bytes now, in one piece: some stations do not put a message together that arrives in several.
+    /// Write these bytes now, in one piece: some stations cannot read a message that arrives in parts.
     Message(Vec<u8>),
-    /// An entry of the recording: a contact was reported, a command has left.
+    /// An entry of the recording: a detection, or a command that was sent.
     Event(Event),
-    /// For people to know.
+    /// Something a person should know.
     Notice(LinkNotice),
 }
 
@@ -77,19 +79,19 @@ pub enum Transmit {
 pub enum LinkNotice {
     /// The station has answered for the first time, or again after a silence.
     Answers,
-    /// A reply did not come whole; it was dropped, and the station is asked again.
+    /// A reply was incomplete; it was dropped, and the poll is repeated.
     ReplyLost {
         /// Bytes that were asked for.
         expected: usize,
         /// Bytes that came.
         found: usize,
     },
-    /// Bytes came that nobody asked for; what came with them was dropped, and the line is brought back into step.
+    /// Unexpected bytes arrived; they were dropped, and the line is synchronised again.
     UnexpectedBytes {
         /// How many since the last such notice.
         count: usize,
     },
-    /// Nothing that was asked has been answered for a while.
+    /// The station has not answered for a while.
     Silent {
         /// For how long.
         since: TimeSpan,
@@ -98,28 +100,28 @@ pub enum LinkNotice {
         /// What a person should check on this kind of link.
         check: &'static str,
     },
-    /// So much of what came could not be read that the line is out of order. Said once.
+    /// Too many bytes could not be read: the line is faulty. Reported once.
     Unreadable {
         /// Bytes that could not be read.
         bytes: usize,
         /// What a person should check on this kind of link.
         check: &'static str,
     },
-    /// The station has said what it is.
+    /// The station has identified itself.
     Identified {
         /// Its own words.
         identity: String,
     },
-    /// The station was reset: it has forgotten all commands, and trains stopped where they were when the power went.
+    /// The station was reset: it lost all commands, and trains stopped where they were when the power went off.
     Restarted,
-    /// The station did not confirm a command, however often it was repeated; it is given up.
+    /// The station did not confirm a command after all repeats; it was given up.
     Unconfirmed {
         /// The command.
         command: Command,
     },
     /// The station is locked for driving over the network.
     Locked,
-    /// The station does not tell this client everything that it was asked to.
+    /// The station does not report everything that this client subscribed to.
     BroadcastsRefused {
         /// The flags that it left out.
         missing: u32,
@@ -128,6 +130,11 @@ pub enum LinkNotice {
     TurnoutRefused {
         /// The turnout.
         turnout: TurnoutId,
+    },
+    /// The station has no slot for a train: others use all of them.
+    NoSlot {
+        /// The train.
+        train: TrainId,
     },
     /// Another throttle drives a train of this program.
     OtherThrottle {
@@ -143,26 +150,25 @@ pub enum LinkNotice {
         /// For how long.
         since: TimeSpan,
     },
-    /// A command went out shortly before a reply was lost, and was said again.
+    /// A command was sent shortly before a reply was lost, and was sent again.
     Repeated {
         /// The command.
         command: Command,
     },
-    /// A train was commanded to reverse shortly before a reply was lost. It is not said again, because a second time
-    /// would turn it back, and cannot be read back: see which way it faces.
+    /// A train was commanded to reverse shortly before a reply was lost. The command is not repeated, because it toggles, and the
+    /// direction cannot be read back: check which way the train faces.
     ReverseInDoubt {
         /// The train.
         train: TrainId,
     },
-    /// This contact was closed when the line was opened and still is: a train stands on it, or it is stuck.
-    /// It is reported when it has been open and closes again.
+    /// This sensor was occupied when the line was opened: a train is on it, or it is stuck. It is reported again after it was free.
     HeldClosed {
-        /// The contact.
+        /// The sensor.
         sensor: SensorId,
     },
     /// The interface does not answer all reads of sensor modules.
     Reads(ModuleReads),
-    /// The solenoid of a turnout has been powered for longer than it bears.
+    /// The solenoid of a turnout was powered for longer than it tolerates.
     SolenoidLate {
         /// The turnout.
         turnout: TurnoutId,
@@ -173,60 +179,60 @@ pub enum LinkNotice {
     Closed(Closing),
 }
 
-/// What on a link says that a station heard.
+/// How a link confirms that the station received a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Confirmation {
     /// Nothing.
     #[default]
     Nothing,
-    /// It took the bytes by its hand-shake; more than that, the link never confirms.
+    /// The hand-shake accepts the bytes; the link confirms no more than that.
     HandShake,
-    /// It answers each command; what was not answered is counted as not said.
+    /// The station answers each command; a command without an answer counts as not sent.
     Replies,
 }
 
-/// What the station was told at the end, and whether anything says that it heard.
+/// What the end of a session commanded, and how it was confirmed.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Closing {
     /// Trains that were commanded to stop.
     pub commanded_to_stop: Vec<TrainId>,
-    /// Trains that run or may run and were not commanded to stop.
+    /// Trains that may be running and were not commanded to stop.
     pub not_commanded: Vec<TrainId>,
     /// Whether the solenoids were released; `None` where the station does that by itself.
     pub solenoids_released: Option<bool>,
-    /// Whether the power was taken from the track.
+    /// Whether the track power was switched off.
     pub power_off: bool,
-    /// What says that the station heard.
+    /// How the station confirmed it.
     pub confirmation: Confirmation,
 }
 
 impl Closing {
-    /// Whether everything was said that had to be.
+    /// Whether everything necessary was commanded.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.not_commanded.is_empty() && self.solenoids_released != Some(false) && self.power_off
     }
 }
 
-/// Why a command was not taken.
+/// Why a command was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CommandError {
-    /// No locomotive decoder has this address here.
+    /// This link has no such locomotive address.
     Train {
         /// The train.
         train: TrainId,
         /// The first and the last address.
         addresses: (u16, u16),
     },
-    /// Beyond the steps of this link.
+    /// The step is above the highest of this link.
     Step {
         /// The step.
         step: SpeedStep,
         /// The highest.
         highest: u8,
     },
-    /// No turnout has this address here.
+    /// This link has no such turnout address.
     Turnout {
         /// The turnout.
         turnout: TurnoutId,
@@ -235,10 +241,26 @@ pub enum CommandError {
     },
     /// The station knows no such command.
     Unknown,
-    /// This many commands wait already; the line is stuck or is told more than it can carry.
+    /// This many commands wait already: the line is stuck or overloaded.
     TooManyWaiting(usize),
     /// The session is closed or being closed.
     Closed,
+}
+
+impl CommandError {
+    /// Refuses a train whose address a link does not have.
+    pub(crate) fn check_train(train: TrainId, addresses: &RangeInclusive<u16>) -> Result<(), Self> {
+        let has_address = addresses.contains(&train.0);
+        let addresses = (*addresses.start(), *addresses.end());
+        has_address.then_some(()).ok_or(Self::Train { train, addresses })
+    }
+
+    /// Refuses a turnout whose address a link does not have.
+    pub(crate) fn check_turnout(turnout: TurnoutId, addresses: &RangeInclusive<u16>) -> Result<(), Self> {
+        let has_address = addresses.contains(&turnout.0);
+        let addresses = (*addresses.start(), *addresses.end());
+        has_address.then_some(()).ok_or(Self::Turnout { turnout, addresses })
+    }
 }
 
 impl Display for CommandError {
@@ -310,6 +332,11 @@ impl Display for LinkNotice {
                 "the station has no turnout {turnout}: define it there (<T {turnout} DCC address sub>), or leave out \
                  `turnouts=defined`"
             ),
+            Self::NoSlot { train } => write!(
+                f,
+                "the station has no free slot for train {train}: release a locomotive at a throttle that drives none, or \
+                 restart the station"
+            ),
             Self::OtherThrottle { train, reversed } => write!(
                 f,
                 "another throttle {} train {train}; drive it from one place only",
@@ -347,7 +374,7 @@ impl Display for LinkNotice {
     }
 }
 
-/// A command in words.
+/// Prints a command.
 struct Said(Command);
 
 impl Display for Said {

@@ -1,15 +1,14 @@
-//! Whether a station answers at all, and since when it does not.
+//! Detects a station that has stopped answering.
 
 use footplate_core::{TimeSpan, Timestamp};
 
 use crate::session::LinkNotice;
 
-/// After so long without any message while one is due a person should know: six repeats, and short enough to act while trains
-/// still run.
+/// A station counts as silent after this time without a message while one is due: six repeats, and short enough to act while
+/// trains still run.
 const SILENT_AFTER: TimeSpan = TimeSpan::from_ms(1_500);
 
-/// Bytes that could not be read until a person should know: more than a message or two that were cut off when the line was
-/// opened.
+/// Unreadable bytes that are not reported yet: a message or two that were cut off when the line was opened.
 const NOISE: usize = 64;
 
 /// What a person should check on a kind of link.
@@ -42,18 +41,18 @@ impl Silence {
         Self { checks, since, unread, unread_in_all, is_silent, is_noise_known }
     }
 
-    /// A request has gone that will be answered.
+    /// Notes a request that expects an answer.
     pub(crate) fn asked(&mut self, at: Timestamp) {
         self.since.get_or_insert(at);
     }
 
-    /// A message has come; returns whether the station was called silent before.
+    /// Notes a message; returns whether the station was reported silent before.
     pub(crate) fn heard(&mut self) -> bool {
         (self.since, self.unread) = (None, 0);
         core::mem::take(&mut self.is_silent)
     }
 
-    /// Bytes have come that are no message; says so once.
+    /// Counts bytes that form no message; reports them once.
     pub(crate) fn heard_noise(&mut self, bytes: usize) -> Option<LinkNotice> {
         self.unread = self.unread.saturating_add(bytes);
         self.unread_in_all = self.unread_in_all.saturating_add(bytes);
@@ -64,7 +63,7 @@ impl Silence {
         Some(LinkNotice::Unreadable { bytes: self.unread_in_all, check: self.checks.noise })
     }
 
-    /// Whether it is silent by now; says so once.
+    /// Reports once that the station has become silent.
     pub(crate) fn watch(&mut self, now: Timestamp) -> Option<LinkNotice> {
         let since = now - self.since?;
         if since < SILENT_AFTER || self.is_silent {
@@ -75,7 +74,7 @@ impl Silence {
         Some(LinkNotice::Silent { since, bytes: self.unread, check })
     }
 
-    /// When to look again.
+    /// Returns when to look again.
     pub(crate) fn due(&self) -> Option<Timestamp> {
         self.since.filter(|_| !self.is_silent).map(|since| since + SILENT_AFTER)
     }

@@ -62,10 +62,10 @@ pub(crate) struct LayoutWatch<'l> {
 }
 
 impl<'l> LayoutWatch<'l> {
-    /// A session with so many trains begins.
+    /// A session with so many trains begins; all of them are at rest.
     pub(crate) fn new(layout: &'l Layout, trains: usize, recorder: Option<&'l mut dyn Recorder>) -> Self {
         let mut test = LayoutTest::default();
-        test.begin_run(trains);
+        test.begin_run_at_rest(trains);
         Self { layout, sections: SectionIndex::of(layout), test, recorder }
     }
 

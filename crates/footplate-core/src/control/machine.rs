@@ -1,44 +1,44 @@
-//! The four verbs of a machine that drives trains, and what it can ask for.
+//! The interface of a machine that drives trains: four verbs, and its outputs.
 
 use crate::event::{Command, Event};
 use crate::ids::SensorId;
 use crate::time::Timestamp;
 
-/// Drives trains by what is reported, without a clock, a cable or a thread.
+/// A state machine that turns reports into commands, without a clock, a cable or a thread.
 ///
-/// The loop around it, live or simulated, is always the same: hand over what happened, then ask for outputs until
-/// there are none, then wait for whatever comes first, the next entry or [`next_timeout`](Self::next_timeout).
+/// The loop around it, live or simulated, is always the same: pass on what happened, then take outputs until there
+/// are none, then wait for the next event or for [`next_timeout`](Self::next_timeout), whichever is first.
 ///
-/// Entries come in order of time and not before they are known: a report when its answer was complete, a command
-/// when its last bit had left. Their own times are those moments on the line (see
-/// [`Event::time`](crate::Event::time)), and never after `now`.
+/// Events come in order of time and not before they are known: a report when its answer was complete, a command when
+/// its last bit had been sent. Their own times are those moments on the line (see
+/// [`Event::time`](crate::Event::time)), never later than `now`.
 pub trait Machine {
-    /// What it has to say to people and programs.
+    /// What it reports to operators and programs.
     type Notice;
 
-    /// An entry of the recording: a report of a contact, or a command that has been sent.
+    /// Handles an event: a report of a sensor, or a command that has been sent.
     fn handle_event(&mut self, now: Timestamp, event: &Event);
 
-    /// The time has come that it asked for, or it is a good moment to look at the clock anyway.
+    /// Handles the time that it asked for; may be called at any time.
     fn handle_timeout(&mut self, now: Timestamp);
 
-    /// The next thing to do, until `None`; ask again after every `handle_…`.
+    /// The next output, until `None`; call again after every `handle_…`.
     fn poll_output(&mut self) -> Option<Output<Self::Notice>>;
 
-    /// When it wants to be asked again, if it does.
+    /// When it has to be called again at the latest.
     fn next_timeout(&self) -> Option<Timestamp>;
 }
 
-/// What a machine asks of the loop around it.
+/// What a machine requests from the loop around it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Output<Notice> {
-    /// Say this to the station, as soon as the line is free.
+    /// Send this to the station as soon as the line is free.
     Command(Command),
-    /// A command will come that should leave at this time: begin nothing that would still occupy the line then.
-    /// `None`: none is expected any more. A later word replaces an earlier one.
+    /// A command will have to be sent at this time: start nothing that would still occupy the line then. `None`: no
+    /// command is expected. Replaces an earlier request.
     HoldLine(Option<Timestamp>),
-    /// This contact is due: ask for its module more often than for others. `None`: for all alike.
+    /// A detection is due at this sensor: poll its module more often than others. `None`: poll all alike.
     Watch(Option<SensorId>),
-    /// For people and programs to know.
+    /// A report for operators and programs.
     Notice(Notice),
 }

@@ -1,11 +1,11 @@
-//! When to tell the trains what: state machines that turn reports into commands.
+//! State machines that turn reports into commands.
 //!
-//! - [`Machine`] is what all of them have in common: entries of the recording in, [`Output`]s out, and a time to be
-//!   asked again. None of them knows a clock or a cable.
-//! - [`Calibrator`] finds a train, plans experiments with it and learns how it moves.
-//! - [`Driver`] drives trains where they are ordered, and stops them there.
-//! - [`Dispatcher`] sends trains where they are asked to go, and keeps them apart.
-//! - [`Watchdog`] watches over that, and begins from the beginning when the future is no longer like the past.
+//! - [`Machine`] is their common interface: events in, [`Output`]s out, and the time of the next call. None of them has a
+//!   clock or a cable.
+//! - [`Calibrator`] locates a train, plans experiments with it and learns how it moves.
+//! - [`Driver`] carries out orders to trains, and stops them where they are ordered.
+//! - [`Dispatcher`] sends trains to destinations and keeps them apart.
+//! - [`Watchdog`] checks that trains behave as modelled, and recovers those that do not.
 
 mod dispatch;
 mod drive;

@@ -1,4 +1,5 @@
-//! What the driver, its watchdog and the dispatcher report, in one type: each machine passes on what the one inside it says.
+//! Notices of the driver, its watchdog and the dispatcher, in one type: each machine passes on those of the machine
+//! inside it.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -307,63 +308,63 @@ pub enum Notice {
     },
 }
 
-/// How a stop is going to be made.
+/// A planned stop.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlannedStop {
     /// The order.
     pub order: OrderId,
     /// The train.
     pub train: TrainId,
-    /// When the last bit of the command shall have left.
+    /// When the last bit of the command shall have been sent.
     pub leaves: Timestamp,
-    /// The last contact that the train passes while the command can still be moved.
+    /// The last sensor whose report can still change the time of the command.
     pub trigger: Option<SensorId>,
-    /// How long after that contact the command leaves.
+    /// How long after that sensor the command is sent.
     pub after_trigger: Option<TimeSpan>,
-    /// Where it will come to rest against the target.
+    /// The predicted place of rest, relative to the target.
     pub promise: Promise,
 }
 
-/// Where a train is from now on that holds a speed, in surveyed lengths.
+/// The line of a train that holds a speed, in surveyed lengths.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PacedLine {
     /// The order.
     pub order: OrderId,
     /// The train.
     pub train: TrainId,
-    /// A contact of its way.
+    /// The node of a sensor on its path.
     pub node: NodeId,
-    /// So far past it ...
+    /// The train is this far past it ...
     pub way: Length,
-    /// ... at this time, and onwards ...
+    /// ... at this time, and runs on from there ...
     pub time: Timestamp,
     /// ... at this speed.
     pub speed: Speed,
 }
 
-/// How a train comes to rest at a place in time.
+/// A planned arrival at a place at a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlannedArrival {
     /// The order.
     pub order: OrderId,
     /// The train.
     pub train: TrainId,
-    /// When it shall stand there.
+    /// When it shall be at rest there.
     pub by: Timestamp,
     /// For a train at rest: when it starts, and at which step.
     pub starts: Option<(Timestamp, SpeedStep)>,
-    /// How it runs until it stops; `None` for a start and a stop with nothing in between.
+    /// Its profile until the stop; `None` for a start followed directly by the stop.
     pub profile: Option<ArrivalProfile>,
 }
 
-/// Where a train comes to rest, counted from the target, negative short of it.
+/// A predicted place of rest relative to the target, negative short of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Promise {
-    /// The middle.
+    /// The median.
     pub median: Length,
-    /// 2.5 % of stops end before.
+    /// 2.5 % of stops end short of this.
     pub low: Length,
-    /// 2.5 % of stops end beyond.
+    /// 2.5 % of stops end beyond this.
     pub high: Length,
 }
 
@@ -376,37 +377,37 @@ pub struct Finished {
     pub train: TrainId,
     /// When.
     pub time: Timestamp,
-    /// Where the train is as far as is known; `None` if that is not known.
+    /// Where the train is estimated to be; `None` if its position is unknown.
     pub achieved: Option<Achieved>,
-    /// What was promised when the stop was commanded; only if there was a target.
+    /// The prediction when the stop was commanded; only with a target.
     pub promise: Option<Promise>,
-    /// A contact that should have reported the train on its way and did not: it was missed, or the train stands short of
-    /// it, and what is believed of it is wrong.
+    /// A sensor that should have reported the train and did not: it missed the train, or the train is at rest short
+    /// of it and its estimated position is wrong.
     pub unseen: Option<SensorId>,
 }
 
-/// Where a train came to rest, as is believed without having measured it.
+/// The estimated place of rest of a train.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Achieved {
     /// The place.
     pub at: Landmark,
-    /// One standard deviation of it.
+    /// One standard deviation.
     pub uncertainty: Length,
-    /// How far beyond the target that is, negative short of it; only if there was a target.
+    /// Distance beyond the target, negative short of it; only with a target.
     pub error: Option<Length>,
 }
 
-/// What a train was found to be.
+/// The result of a recovery.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Outcome {
-    /// As it was.
+    /// The train is unchanged.
     AsBefore,
-    /// The same, but faster or slower by a factor.
+    /// The same train, faster or slower by a factor.
     Rescaled {
-        /// New speed over old.
+        /// New speed divided by old.
         ratio: f64,
     },
-    /// Another train: it has been learnt anew.
+    /// Another train: its model was learnt from the start.
     LearntAnew,
 }

@@ -12,7 +12,7 @@ pub(super) struct Ahead {
     /// Speed and acceleration now.
     pub(super) speed: f64,
     pub(super) acceleration: f64,
-    /// Way to the target and speed there.
+    /// Distance to the target, and the speed there.
     pub(super) way: f64,
     pub(super) target_speed: f64,
 }
@@ -24,7 +24,7 @@ impl Ahead {
     #[inline(always)]
     pub(super) fn new(current: &MotionState, target: &MotionState) -> Self {
         let difference = (target.distance - current.distance).as_m();
-        // Where the target is here, the speeds tell which way is ahead.
+        // If the target is here, the speeds decide which direction is ahead.
         let back = difference < 0.0 || (difference == 0.0 && current.speed + target.speed < Speed::ZERO);
         let direction = if back { -1.0 } else { 1.0 };
         Self {
@@ -93,7 +93,7 @@ impl Ahead {
     }
 }
 
-/// How precisely a way can be known from the distances of two states.
+/// The precision of a distance computed from two states.
 pub(super) fn grain(current: &MotionState, target: &MotionState) -> f64 {
     ROUNDINGS * f64::EPSILON * current.distance.abs().max(target.distance.abs()).as_m()
 }

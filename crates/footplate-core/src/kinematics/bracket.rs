@@ -1,6 +1,6 @@
 //! Where a continuous function crosses zero between two points on either side of it.
 
-/// Steps after which the best point so far is taken: halving alone needs fewer to run out of digits.
+/// Steps after which the best point so far is returned: bisection alone needs fewer to use up all digits.
 const MOST_STEPS: u32 = 100;
 
 /// The argument between `low` and `high` at which `f` crosses zero, to a few units in the last place.

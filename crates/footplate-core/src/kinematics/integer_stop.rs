@@ -134,7 +134,7 @@ impl IntegerStop {
         whole_units(self.speed.times(i128::from(ticks), 0, 0))
     }
 
-    /// In how many ticks the train, running steadily, is so far ahead; negative if it has passed there.
+    /// Ticks until the train, running steadily, is `distance` ahead; negative if it has passed there.
     #[must_use]
     pub fn ticks_to(&self, distance: i32) -> i64 {
         whole_ticks(self.time_over(distance))
@@ -152,14 +152,15 @@ impl IntegerStop {
         (self.time + (1 << (TIME_BITS - 1))) >> TIME_BITS
     }
 
-    /// In how many ticks to send the command to stop, so that the train rests so far ahead of where it is now; negative if it
-    /// is late by as many.
+    /// Ticks until the stop command, so that the train comes to rest `distance` ahead of where it is now; negative if
+    /// it is too late by as many.
     #[must_use]
     pub fn command_in(&self, distance: i32) -> i64 {
         whole_ticks(self.time_over(distance) - i128::from(self.steady_time()))
     }
 
-    /// By how much the train runs beyond a place so far ahead if it is commanded to stop now; negative if it rests before it.
+    /// How far the train overruns a place `distance` ahead if it is commanded to stop now; negative if it comes to
+    /// rest before it.
     #[must_use]
     pub fn overrun(&self, distance: i32) -> i32 {
         let stop = self.speed.times(i128::from(self.steady_time()), TIME_BITS, LENGTH_BITS);

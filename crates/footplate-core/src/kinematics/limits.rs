@@ -13,7 +13,7 @@ pub struct Limits {
     pub acceleration: Acceleration,
     /// Rate at which it slows down.
     pub deceleration: Acceleration,
-    /// Rate at which either of the two builds up and fades; profiles of constant acceleration do not look at it.
+    /// Rate of change of both accelerations; profiles of constant acceleration do not use it.
     pub jerk: Jerk,
 }
 
@@ -55,16 +55,16 @@ pub enum ProfileError {
         /// Its acceleration.
         found: Acceleration,
     },
-    /// The train brakes so hard that it stands before the jerk limit lets it ease off.
+    /// The train brakes so hard that it is at rest before the jerk limit allows it to ease off.
     StandsFirst {
         /// Its acceleration.
         found: Acceleration,
     },
     /// The target is nearer than the train can reach its speed.
     TooNear {
-        /// The way left.
+        /// The remaining distance.
         found: Length,
-        /// The shortest way in which the target's speed can be reached.
+        /// The shortest distance in which the target's speed can be reached.
         shortest: Length,
     },
 }

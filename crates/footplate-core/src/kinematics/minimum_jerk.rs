@@ -28,7 +28,8 @@ pub struct MinimumJerk {
 }
 
 impl MinimumJerk {
-    /// Over a way, from a speed to another, in a time; one that is not positive is a change at once.
+    /// A motion over a distance from one speed to another in a time; with a time of zero or less, an instantaneous
+    /// change.
     #[must_use]
     pub fn new(way: Length, from: Speed, to: Speed, time: TimeSpan) -> Self {
         let (time, way) = (time.as_s().max(0.0), way.as_m());
@@ -37,7 +38,7 @@ impl MinimumJerk {
         Self { time, way, from, to, powers: [10.0 * d - 4.0 * w, -15.0 * d + 7.0 * w, 6.0 * d - 3.0 * w] }
     }
 
-    /// The slowest and the fastest speed on the way.
+    /// The lowest and the highest speed of the motion.
     #[must_use]
     pub fn speeds(&self) -> [Speed; 2] {
         let [a, _, c] = self.powers;

@@ -3,11 +3,11 @@
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
 
-/// Where a train is along its way, how fast it goes and how its speed changes, at one moment.
+/// Distance, speed and acceleration of a train at one moment.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotionState {
-    /// Distance along the way, from an origin that the caller chose.
+    /// Distance along the path, from an origin chosen by the caller.
     pub distance: Length,
     /// Speed, positive in the direction in which distance grows.
     pub speed: Speed,

@@ -1,7 +1,7 @@
 //! A stretch of constant jerk, counted from its slow end.
 //!
-//! Counting a stop from the standstill at its end instead of from the speed at its beginning keeps the digits
-//! where the train is slow: speed and way left go to zero together, without a difference of large numbers.
+//! Counting a stop from the standstill at its end instead of from the speed at its beginning keeps the digits where
+//! the train is slow: speed and remaining distance go to zero together, without a difference of large numbers.
 
 use super::slow_end::SlowEnd;
 

@@ -41,7 +41,7 @@ pub struct SCurve {
     sixth_jerk: f64,
     /// What each phase does.
     pattern: &'static Pattern,
-    /// The states at the borders between its phases: time in s since the start, way there in m, speed, and half
+    /// The states at the borders between its phases: time in s since the start, distance there in m, speed, and half
     /// the acceleration.
     times: [f64; KNOTS],
     ways: [f64; KNOTS],
@@ -166,7 +166,7 @@ impl SCurve {
         }
     }
 
-    /// From way, speed and acceleration ahead to those along the line.
+    /// From distance, speed and acceleration ahead to those along the line.
     #[inline]
     fn turned(&self, (way, speed, acceleration): Triple) -> MotionState {
         MotionState {

@@ -31,7 +31,7 @@ pub struct ShortMove<'t> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum ShortMoveError {
-    /// A short move starts from standstill and goes somewhere.
+    /// A short move starts from standstill and reaches a speed.
     NoStart {
         /// Speed before the start.
         from: Speed,
@@ -109,7 +109,7 @@ impl<'t> ShortMove<'t> {
         start: SpeedChange<'t>,
         stop: StoppingLaw<FromCommand>,
     ) -> Result<Self, ShortMoveError> {
-        // A step at the middle of an interval stands until then.
+        // A step at the middle of an interval stays at the start until then.
         let from = start.state_at(TimeSpan::from_ns(-1)).speed;
         let to = start.state_at(start.duration() + TimeSpan::from_ns(1)).speed;
         let leads_ahead = to.is_finite() && to > Speed::ZERO;
@@ -153,8 +153,7 @@ impl<'t> ShortMove<'t> {
         self.law_distance(stretched(command_time.as_s().max(0.0), measured, by_law))
     }
 
-    /// After which time to command the stop so that the train gets so far; `None` if that cannot be, or is not
-    /// ahead.
+    /// The time after which to command the stop for a distance; `None` if the distance is impossible or not ahead.
     #[must_use]
     pub fn command_time(&self, distance: Length) -> Option<TimeSpan> {
         let (measured, by_law) = self.corrections();

@@ -25,18 +25,18 @@ pub(super) struct SlowEnd {
 }
 
 impl SlowEnd {
-    /// Seconds to get `way` metres off, within a phase of `longest` seconds; 0 for no way at all.
+    /// The time (s) to move by `way` metres within a phase of `longest` seconds; 0 for no distance.
     //
     // Always inlined: passed through memory, its argument would be written by halves and read as a whole, which
     // makes the processor finish one call before it begins the next.
     #[inline(always)]
     pub(super) fn time_to_cover(&self, way: f64, longest: f64) -> f64 {
         let Self { speed: v, half_acceleration: h, sixth_jerk: k, quartic: q } = *self;
-        // Where the cubic term grows, it alone gives a first guess; where it fades, the square does.
+        // Where the cubic term grows, it alone gives an initial value; where it fades, the square term does.
         let growing = k > 0.0;
         let ratio = way / if growing { k } else { h };
         let first = least(if growing { rough_cube_root(ratio) } else { rough_square_root(ratio) }, longest);
-        // The higher powers at that guess make up an effective square term: one quadratic equation.
+        // The higher powers at that value add to an effective square term: one quadratic equation.
         let square = h + first * (k + first * q);
         let mut time = least(2.0 * way / (v + libm::sqrt(v * v + 4.0 * way * square)), longest);
         for _ in 0..2 {
@@ -49,7 +49,7 @@ impl SlowEnd {
         if way > 0.0 { least(time, longest) } else { 0.0 }
     }
 
-    /// The same to 11 %, for a phase without an end whose acceleration only grows.
+    /// The same within 11 %, for an unbounded phase whose acceleration only grows.
     #[inline(always)]
     pub(super) fn rough_time_to_cover(&self, way: f64) -> f64 {
         let Self { speed: v, half_acceleration: h, sixth_jerk: k, .. } = *self;

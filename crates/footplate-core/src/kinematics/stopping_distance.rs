@@ -26,7 +26,7 @@ pub struct FromBraking;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FromCommand;
 
-/// Counted from the contact whose report prompts the command, given at once.
+/// Counted from the sensor whose report prompts the command, which is sent at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FromReport;
 
@@ -45,7 +45,7 @@ pub struct StoppingDistance<From> {
 }
 
 impl<From> StoppingDistance<From> {
-    /// A length that was measured or worked out from where the type says.
+    /// A length measured or computed from where the type says.
     #[must_use]
     pub const fn new(length: Length) -> Self {
         Self { length, counted_from: PhantomData }
@@ -75,8 +75,8 @@ impl StoppingDistance<FromBraking> {
 }
 
 impl StoppingDistance<FromCommand> {
-    /// Of a train that runs at `speed` and starts to brake `command_delay` (τ₂) after the command. Less than
-    /// nothing tells that speed, delay and distance do not belong together.
+    /// From a distance counted from braking, for a train at `speed` that starts to brake `command_delay` (τ₂) after
+    /// the command. A negative result means that speed, delay and distance are inconsistent.
     #[must_use]
     pub fn counted_from_braking(
         self,
@@ -86,8 +86,8 @@ impl StoppingDistance<FromCommand> {
         self.longer(speed, -command_delay)
     }
 
-    /// In the mean, of a train that runs at `speed` over a contact reported `to_stamp` (φ) after a reading that
-    /// came `poll_interval` (π) after the reading before.
+    /// The mean, for a train that passes a sensor at `speed`, reported `to_stamp` (φ) after a reading that came
+    /// `poll_interval` (π) after the previous one.
     #[must_use]
     pub fn counted_from_report(
         self,
@@ -112,7 +112,7 @@ impl StoppingDistance<FromReport> {
     }
 }
 
-/// From the closing of a contact until the stamp of its report: φ + π/2.
+/// Mean time from the closing of a sensor to the stamp of its report: φ + π/2.
 pub(super) fn mean_report_delay(to_stamp: TimeSpan, poll_interval: TimeSpan) -> TimeSpan {
     to_stamp + TimeSpan::from_ns(poll_interval.as_ns() / 2)
 }

@@ -18,14 +18,14 @@ use super::stopping_distance::{FromBraking, FromCommand, FromReport, StoppingDis
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
 
-/// How speed goes to zero once braking has begun.
+/// How the speed falls to zero once braking has begun.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Braking {
     /// Evenly, by this much.
     Constant(Acceleration),
-    /// By the same share in every time constant; it counts as standing below [`Lag::SETTLED_WITHIN`], although
-    /// the whole way is only run in infinite time.
+    /// By the same share in every time constant; it counts as at rest below [`Lag::SETTLED_WITHIN`], although the
+    /// full distance takes infinite time.
     Exponential(TimeSpan),
 }
 
@@ -109,7 +109,7 @@ impl<From> StoppingLaw<From> {
         self.braking
     }
 
-    /// The whole way until it stands, from a speed in either direction.
+    /// The full distance until rest, from a speed in either direction.
     #[must_use]
     pub fn distance(&self, speed: Speed) -> StoppingDistance<From> {
         let speed = speed.abs().as_m_per_s();

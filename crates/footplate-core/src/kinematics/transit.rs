@@ -26,8 +26,8 @@ pub struct Transit {
 }
 
 impl Transit {
-    /// Over a way, from a speed to another, in a time, with changes by a law that take so long each. `None` where that is
-    /// more than half of the time, or a law without symmetry.
+    /// A motion over a distance from one speed to another in a time, with changes by a law that take `change` each.
+    /// `None` if that is more than half of the time, or for a law without symmetry.
     #[must_use]
     pub fn new(
         way: Length,

@@ -20,7 +20,7 @@ use crate::units::{Acceleration, Length, Speed};
 pub struct Trapezoid {
     direction: f64,
     origin: f64,
-    /// End of each phase in s since the start, and the way there in m; the last is the end of the profile.
+    /// End of each phase in s since the start, and the distance there in m; the last is the end of the profile.
     times: [f64; PHASES],
     ways: [f64; PHASES],
     /// And one more, for the time after the end.
@@ -95,7 +95,7 @@ impl Trapezoid {
     }
 }
 
-/// The way it takes to get from one end's speed to the other's at once.
+/// The distance of a direct change from one end's speed to the other's.
 #[inline(always)]
 fn shortest_way(ahead: &Ahead, limits: &Limits) -> f64 {
     let Ahead { speed: start, target_speed: end, .. } = *ahead;
@@ -103,7 +103,7 @@ fn shortest_way(ahead: &Ahead, limits: &Limits) -> f64 {
     0.5 * (end - start).abs() * (end + start) / rate.as_m_per_s2()
 }
 
-/// Why the target cannot be reached, unless it is only rounding that seems to stand in the way.
+/// Why the target cannot be reached, if the reason is more than rounding.
 #[cold]
 fn check(current: &MotionState, target: &MotionState, limits: &Limits) -> Result<(), ProfileError> {
     let ahead = Ahead::new(current, target);

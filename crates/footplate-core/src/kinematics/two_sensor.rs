@@ -40,7 +40,7 @@ pub struct TwoSensorRun {
     pub command_delay: Estimate<TimeSpan>,
 }
 
-/// What two sensors say of a change of speed.
+/// The result of a measurement with two sensors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TwoSensorVerdict {
     /// It was over before the second sensor.
@@ -57,27 +57,27 @@ pub enum TwoSensorVerdict {
         /// The speed over the second sensor.
         speed: Speed,
     },
-    /// It ended so near to the second sensor that the data cannot tell on which side.
+    /// It ended so close to the second sensor that the data do not show on which side.
     Undecided {
         /// Its acceleration if it was over.
         if_completed: Estimate<Acceleration>,
         /// Its acceleration if it was not.
         if_unfinished: Estimate<Acceleration>,
     },
-    /// It was over so soon that it cannot be told from one that took no time: take sensors that are nearer.
+    /// It was too short to be distinguished from an instantaneous change: use sensors that are closer together.
     TooQuick,
     /// The speed had not noticeably changed by the second sensor: take sensors farther apart. Nor may a change at once
     /// show over so short a distance.
     NotNoticed,
 }
 
-/// Why a run says nothing at all.
+/// Why a run gives no result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum TwoSensorError {
     /// A value or an uncertainty is not a finite number, or an uncertainty is negative.
     NotFinite,
-    /// The train stands or turns around, so that its time between two sensors means something else.
+    /// The train is at rest or changes its direction: its time between two sensors is then meaningless.
     NotForwards {
         /// Speed before.
         from: Speed,
@@ -166,7 +166,8 @@ impl TwoSensorRun {
         let d = (self.distance.value - self.from.value * self.before_command.value).as_m();
         let (v1, v2) = (self.from.value.as_m_per_s(), self.to.value.as_m_per_s());
         let (gain, mean, changing) = (v2 - v1, 0.5 * (v1 + v2), t - delay);
-        // From here on every way is counted in the sense of the change, so that slowing down needs no mirror.
+        // From here on every distance is counted in the direction of the change: decelerating needs no mirrored
+        // formulas.
         let sense = gain.signum();
 
         let lost = v2 * changing + v1 * delay - d;

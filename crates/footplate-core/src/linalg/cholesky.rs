@@ -1,4 +1,4 @@
-//! Cholesky's factorisation of a symmetric positive definite matrix, kept as a lower triangle row by row.
+//! Cholesky factorisation of a symmetric positive definite matrix, stored as a lower triangle row by row.
 #![expect(
     clippy::indexing_slicing,
     reason = "all indices stay below the size for which the vectors are made"
@@ -7,28 +7,28 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Where row `i` of a lower triangle begins.
+/// The index at which row `i` of a lower triangle starts.
 pub(super) const fn row(i: usize) -> usize {
     i * (i + 1) / 2
 }
 
-/// Rows of a factor that are worked out together, so that one sum need not wait for another.
-const TOGETHER: usize = 8;
+/// Rows of the factor that are computed together, so that their sums do not wait for one another.
+const ROWS_TOGETHER: usize = 8;
 
-/// The lower factor of a positive definite matrix, or `None` when it is not.
+/// The lower factor of a positive definite matrix, or `None` if the matrix is not.
 ///
-/// Every sum is taken in the order of the textbook's, term by term: whoever works out one row after the other gets the same bits.
+/// Every sum is taken term by term in the textbook's order: the result has the same bits as one row after another.
 pub(super) fn cholesky(a: &[f64], n: usize) -> Option<Vec<f64>> {
     let mut factor = a.to_vec();
-    // The rows under work, column by column.
-    let mut columns = vec![[0.0; TOGETHER]; n];
-    for first in (0..n).step_by(TOGETHER) {
-        let rows = TOGETHER.min(n - first);
+    // The rows in progress, column by column.
+    let mut columns = vec![[0.0; ROWS_TOGETHER]; n];
+    for first in (0..n).step_by(ROWS_TOGETHER) {
+        let rows = ROWS_TOGETHER.min(n - first);
         let (above, work) = factor.split_at_mut(row(first));
         let begins = |i: usize| row(i) - row(first);
         for j in 0..first {
             let line = &above[row(j)..row(j + 1)];
-            let mut sums = [0.0; TOGETHER];
+            let mut sums = [0.0; ROWS_TOGETHER];
             for (place, sum) in sums.iter_mut().enumerate().take(rows) {
                 *sum = work[begins(first + place) + j];
             }
@@ -64,8 +64,8 @@ pub(super) fn cholesky(a: &[f64], n: usize) -> Option<Vec<f64>> {
     Some(factor)
 }
 
-/// Lower triangle of the first `side` rows of the inverse of `factor · factorᵀ`: all of its columns at once, each as
-/// [`forward`] and [`backward`] would make it.
+/// The lower triangle of the first `side` rows of the inverse of `factor · factorᵀ`: all columns at once, each as by
+/// [`forward`] and [`backward`].
 pub(super) fn first_of_inverse(factor: &[f64], n: usize, side: usize) -> Vec<f64> {
     if side == 0 {
         return Vec::new();

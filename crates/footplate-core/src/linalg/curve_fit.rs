@@ -1,7 +1,7 @@
-//! Least squares of a curve that is not linear in its unknowns, with priors.
+//! Nonlinear least squares with priors.
 //!
-//! Gauss's and Newton's iteration, its steps damped until they lower the cost (Levenberg, 1944). Letters: `x` unknowns, `r`
-//! residual, `σ²` variance that one measurement counts with.
+//! Gauss-Newton iteration, damped until a step lowers the cost (Levenberg, 1944). Letters: `x` unknowns, `r`
+//! residual, `σ²` variance of one measurement.
 //!
 //! ```text
 //! cost = Σ r²/σ² + Σ (x − prior)²/spread²
@@ -12,40 +12,40 @@ use alloc::vec::Vec;
 
 use super::{NormalEquations, Solution};
 
-const MOST_ITERATIONS: usize = 80;
-/// A step that lowers the cost by less than this share is the last.
+const MAX_ITERATIONS: usize = 80;
+/// The iteration ends after a step that lowers the cost by less than this part.
 const CONVERGED: f64 = 1e-9;
-/// Damping at the beginning, and beyond which no step lowers the cost.
+/// Initial damping, and the damping beyond which no step lowers the cost.
 const DAMPING: f64 = 1e-3;
-const LEAST_DAMPING: f64 = 1e-9;
-const MOST_DAMPING: f64 = 1e9;
-/// How much less after a step that lowers the cost, how much more after one that does not.
-const DAMPED_LESS: f64 = 0.2;
-const DAMPED_MORE: f64 = 8.0;
-/// Information of an unknown that no measurement depends on: keeps its damping finite.
+const MIN_DAMPING: f64 = 1e-9;
+const MAX_DAMPING: f64 = 1e9;
+/// Factor of the damping after a step that lowers the cost, and after one that does not.
+const DAMPING_DECREASE: f64 = 0.2;
+const DAMPING_INCREASE: f64 = 8.0;
+/// Information of an unknown that no measurement depends on; keeps its damping finite.
 const LEAST_INFORMATION: f64 = 1e-12;
 
-/// One unknown of a curve: what is known of it beforehand, and how finely it is varied.
+/// One unknown: its prior, and the step of its numerical derivative.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Unknown {
     /// Mean of the prior.
     pub(crate) prior: f64,
     /// Standard deviation of the prior.
     pub(crate) spread: f64,
-    /// Step of the numerical derivative, as fine as the curve is smooth.
+    /// Step of the numerical derivative, small compared with the curvature.
     pub(crate) step: f64,
-    /// Whether it is found; if not, it stays as it is at the beginning.
+    /// Whether it is fitted; otherwise it keeps its initial value.
     pub(crate) is_free: bool,
 }
 
-/// A curve to fit: residuals of its measurements (measured less predicted), and the variance one of them counts with.
+/// A curve to fit: residuals of its measurements (measured minus predicted), and the variance of one measurement.
 pub(crate) struct CurveFit<'f, R, V> {
     pub(crate) unknowns: &'f [Unknown],
     pub(crate) residuals: R,
     pub(crate) variance: V,
 }
 
-/// Values of all unknowns, and how those that were free are known.
+/// The fitted unknowns and their covariance.
 #[derive(Debug, Clone)]
 pub(crate) struct FittedCurve {
     pub(crate) x: Vec<f64>,
@@ -54,13 +54,13 @@ pub(crate) struct FittedCurve {
 }
 
 impl<R: Fn(&[f64]) -> Vec<f64>, V: Fn(&[f64]) -> f64> CurveFit<'_, R, V> {
-    /// The unknowns with the lowest cost near `first`; `None` if they are not determined.
+    /// The unknowns with the lowest cost near `first`; `None` if the measurements do not determine them.
     pub(crate) fn fitted(&self, first: &[f64]) -> Option<FittedCurve> {
         let free: Vec<usize> = (0..self.unknowns.len()).filter(|&at| self.unknowns[at].is_free).collect();
         let mut x = first.to_vec();
         let mut variance = (self.variance)(&(self.residuals)(&x));
         let (mut damping, mut cost) = (DAMPING, self.cost(&x, variance));
-        for _ in 0..MOST_ITERATIONS {
+        for _ in 0..MAX_ITERATIONS {
             let step = self.equations(&x, variance, &free, damping).values()?;
             let mut next = x.clone();
             for (unknown, by) in free.iter().zip(&step) {
@@ -70,7 +70,7 @@ impl<R: Fn(&[f64]) -> Vec<f64>, V: Fn(&[f64]) -> f64> CurveFit<'_, R, V> {
             if next_cost < cost {
                 let gained = cost - next_cost;
                 x = next;
-                damping = (DAMPED_LESS * damping).max(LEAST_DAMPING);
+                damping = (DAMPING_DECREASE * damping).max(MIN_DAMPING);
                 let settled = gained < CONVERGED * cost;
                 variance = (self.variance)(&(self.residuals)(&x));
                 cost = self.cost(&x, variance);
@@ -78,8 +78,8 @@ impl<R: Fn(&[f64]) -> Vec<f64>, V: Fn(&[f64]) -> f64> CurveFit<'_, R, V> {
                     break;
                 }
             } else {
-                damping *= DAMPED_MORE;
-                if damping > MOST_DAMPING {
+                damping *= DAMPING_INCREASE;
+                if damping > MAX_DAMPING {
                     break;
                 }
             }
@@ -96,7 +96,7 @@ impl<R: Fn(&[f64]) -> Vec<f64>, V: Fn(&[f64]) -> f64> CurveFit<'_, R, V> {
         if cost.is_finite() { cost } else { f64::INFINITY }
     }
 
-    /// For the step from `x`, so that a prior counts with how far `x` is from it.
+    /// The normal equations of the step from `x`; the prior acts on the distance of `x` from it.
     fn equations(&self, x: &[f64], variance: f64, free: &[usize], damping: f64) -> NormalEquations {
         let residuals = (self.residuals)(x);
         let slopes: Vec<Vec<f64>> = free.iter().map(|unknown| self.slopes(x, *unknown)).collect();
@@ -118,7 +118,7 @@ impl<R: Fn(&[f64]) -> Vec<f64>, V: Fn(&[f64]) -> f64> CurveFit<'_, R, V> {
         equations
     }
 
-    /// Derivative of each prediction by one unknown.
+    /// The derivative of each prediction with respect to one unknown.
     fn slopes(&self, x: &[f64], unknown: usize) -> Vec<f64> {
         let (mut up, mut down) = (x.to_vec(), x.to_vec());
         up[unknown] += self.unknowns[unknown].step;
@@ -136,7 +136,7 @@ impl FittedCurve {
         place.map_or(0.0, |place| libm::sqrt(self.solution.variance(place)))
     }
 
-    /// A figure that follows from the unknowns, with its standard deviation to first order.
+    /// A function of the unknowns, with its standard deviation to first order.
     pub(crate) fn derived(&self, unknowns: &[Unknown], of: impl Fn(&[f64]) -> f64) -> (f64, f64) {
         let value = of(&self.x);
         let terms: Vec<(usize, f64)> = self

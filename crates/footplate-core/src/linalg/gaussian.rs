@@ -1,6 +1,6 @@
 //! A normal distribution of one number.
 
-/// A mean and its variance.
+/// Its mean and variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Gaussian {
     pub(crate) mean: f64,

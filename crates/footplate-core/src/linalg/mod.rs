@@ -1,4 +1,4 @@
-//! Linear algebra as small as the estimators need it.
+//! The linear algebra that the estimators need.
 
 mod cholesky;
 mod curve_fit;

@@ -1,8 +1,8 @@
-//! Least squares with prior knowledge, by normal equations and Cholesky's factorisation.
+//! Linear least squares with priors, by normal equations and Cholesky factorisation.
 //!
-//! Letters: `a` information matrix (lower triangle, row by row), `b` information vector, `n` unknowns.
-//! A measurement `z = h·x + e` with variance `r` adds `hᵀh / r` to `a` and `hᵀz / r` to `b`; a prior is a
-//! measurement of one unknown. Priors keep `a` positive definite, so no rank has to be guessed.
+//! Letters: `a` information matrix (lower triangle, row by row), `b` information vector, `n` unknowns. A measurement
+//! `z = h·x + e` with variance `r` adds `hᵀh / r` to `a` and `hᵀz / r` to `b`; a prior is a measurement of one
+//! unknown. Priors keep `a` positive definite, so that no rank decision is needed.
 #![expect(
     clippy::indexing_slicing,
     reason = "all indices stay below `unknowns`, the size both vectors are made for"
@@ -13,7 +13,7 @@ use alloc::vec::Vec;
 
 use super::cholesky::{backward, cholesky, first_of_inverse, forward, row};
 
-/// The sum of what all measurements and priors say of the unknowns.
+/// The sum of the information of all measurements and priors.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "Written"))]
 pub struct NormalEquations {
@@ -22,7 +22,7 @@ pub struct NormalEquations {
     b: Vec<f64>,
 }
 
-/// Equations as they stand in a file, before their sizes are checked.
+/// Equations as read from a file, before their sizes are checked.
 #[cfg(feature = "serde")]
 #[derive(serde::Deserialize)]
 struct Written {
@@ -43,24 +43,24 @@ impl TryFrom<Written> for NormalEquations {
     }
 }
 
-/// The best values of the unknowns and how they are known.
+/// The estimates of the unknowns and their covariance.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    /// One value an unknown.
+    /// One value for each unknown.
     pub values: Vec<f64>,
-    /// Lower triangle of the inverse of the information matrix, as far as it was asked for.
+    /// Lower triangle of the inverse of the information matrix, as far as requested.
     covariance: Vec<f64>,
 }
 
 impl NormalEquations {
-    /// Nothing known yet of this many unknowns.
+    /// Equations without information about this many unknowns.
     #[must_use]
     pub fn new(unknowns: usize) -> Self {
         Self { unknowns, a: vec![0.0; row(unknowns)], b: vec![0.0; unknowns] }
     }
 
-    /// Adds the measurement `Σ weight·x[unknown] = measured` with this variance. Terms name each unknown
-    /// at most once; a term beyond the last unknown is our bug and is left out.
+    /// Adds the measurement `Σ weight·x[unknown] = measured` with this variance. Each unknown occurs at most once; a
+    /// term beyond the last unknown is a bug of the caller and is ignored.
     pub fn add(&mut self, terms: &[(usize, f64)], measured: f64, variance: f64) {
         debug_assert!(variance > 0.0 && measured.is_finite());
         for &(i, left) in terms {
@@ -77,13 +77,13 @@ impl NormalEquations {
         }
     }
 
-    /// How many unknowns there are.
+    /// The number of unknowns.
     #[must_use]
     pub const fn unknowns(&self) -> usize {
         self.unknowns
     }
 
-    /// Appends unknowns of which nothing is known.
+    /// Appends unknowns without information.
     pub fn append(&mut self, count: usize) {
         self.unknowns += count;
         self.a.resize(row(self.unknowns), 0.0);
@@ -101,8 +101,8 @@ impl NormalEquations {
         self.b.swap(first, first + 1);
     }
 
-    /// Takes the last unknown out, so that the others are known as well as before without it (Schur complement).
-    /// `None` when it is tied to others without being bounded, which only rounding can bring about.
+    /// Removes the last unknown and keeps the information about the others (Schur complement). `None` if it is
+    /// correlated with others and not bounded, which only rounding can cause.
     pub fn eliminate_last(&mut self) -> Option<Eliminated> {
         let last = self.unknowns.checked_sub(1)?;
         let mut line = self.a.split_off(row(last));
@@ -126,7 +126,7 @@ impl NormalEquations {
         Some(Eliminated { line, pivot, right })
     }
 
-    /// By how much these values are less likely than the best: the sum of squares over variances, but for a constant.
+    /// The sum of squared residuals over variances at `x`, up to a constant.
     #[must_use]
     pub fn cost(&self, x: &[f64]) -> f64 {
         let mut sum = 0.0;
@@ -138,8 +138,8 @@ impl NormalEquations {
         sum
     }
 
-    /// Adds variances (the lower triangle of a covariance, row after row) to what is known of the unknowns: they may have
-    /// changed by so much since they were measured. Every unknown has to be bounded.
+    /// Adds variances (the lower triangle of a covariance, row by row) to the unknowns: they may have changed by as
+    /// much since they were measured. Every unknown must be bounded.
     pub fn widen(&mut self, by: &[f64]) {
         let Some(mut solution) = self.solve() else { return };
         for (variance, more) in solution.covariance.iter_mut().zip(by) {
@@ -153,8 +153,8 @@ impl NormalEquations {
         }
     }
 
-    /// Solves for the values of the unknowns alone, which takes a sixth of the time. `None` when something is neither
-    /// measured nor bounded by a prior.
+    /// Solves for the values without covariances, in a sixth of the time. `None` if an unknown is neither measured
+    /// nor bounded by a prior.
     #[must_use]
     pub fn values(&self) -> Option<Vec<f64>> {
         let factor = cholesky(&self.a, self.unknowns)?;
@@ -164,14 +164,14 @@ impl NormalEquations {
         Some(values)
     }
 
-    /// Solves for the unknowns. `None` when something is neither measured nor bounded by a prior.
+    /// Solves for the unknowns. `None` if an unknown is neither measured nor bounded by a prior.
     #[must_use]
     pub fn solve(&self) -> Option<Solution> {
         self.solve_for_first(self.unknowns)
     }
 
-    /// The same, but only of the first so many unknowns it is told how they are known: of a thousand of which ninety are asked
-    /// for that takes a tenth of the time.
+    /// The same with the covariance of only the first `known` unknowns: for ninety of a thousand, this takes a tenth
+    /// of the time.
     #[must_use]
     pub fn solve_for_first(&self, known: usize) -> Option<Solution> {
         let (n, side) = (self.unknowns, known.min(self.unknowns));
@@ -183,7 +183,7 @@ impl NormalEquations {
     }
 }
 
-/// An unknown that was taken out of equations, to be found again from the others.
+/// A removed unknown, which follows from the others.
 #[derive(Debug, Clone)]
 pub struct Eliminated {
     line: Vec<f64>,
@@ -192,7 +192,7 @@ pub struct Eliminated {
 }
 
 impl Eliminated {
-    /// Its value where these are the values of the unknowns before it.
+    /// Its value, given those of the unknowns before it.
     #[must_use]
     pub fn value(&self, others: &[f64]) -> f64 {
         let tied: f64 = self.line.iter().zip(others).map(|(tie, value)| tie * value).sum();
@@ -219,7 +219,7 @@ impl Solution {
         self.covariance[row(one.max(other)) + one.min(other)]
     }
 
-    /// The covariance of an unknown and the sum of some.
+    /// The covariance of one unknown and the sum of others.
     #[must_use]
     pub fn covariance_with_sum(&self, one: usize, of: &[usize]) -> f64 {
         of.iter().map(|other| self.covariance(one, *other)).sum()
@@ -252,15 +252,15 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_taken_out_leaves_the_same_answer_and_is_found_again() {
-        // Given a chain of three places of which one is measured, and a scale that all share,
+    fn eliminating_an_unknown_keeps_the_solution_and_its_value() {
+        // Given a chain of three places, one of them measured, and a scale common to all,
         let mut all = NormalEquations::new(4);
         all.add(&[(0, 1.0)], 1.0, 0.04);
         all.add(&[(1, 1.0)], 0.3, 0.01);
         all.add(&[(1, -1.0), (2, 1.0), (0, -2.0)], 0.1, 0.02);
         all.add(&[(2, -1.0), (3, 1.0), (0, -1.5)], -0.2, 0.03);
         let known = all.solve().unwrap();
-        // when the last two change places and are taken out one after the other,
+        // when the last two are swapped and removed one after the other,
         let mut fewer = all.clone();
         fewer.swap_last_two();
         let second = fewer.eliminate_last().unwrap();
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn what_may_have_changed_is_known_less_well() {
+    fn widening_increases_the_variance() {
         let mut equations = NormalEquations::new(2);
         equations.add(&[(0, 1.0)], 3.0, 0.5);
         equations.add(&[(0, -1.0), (1, 1.0)], 1.0, 0.25);
@@ -295,8 +295,8 @@ mod tests {
         assert!((known.covariance(0, 1) - 0.6).abs() < 1e-12);
     }
 
-    /// Twenty unknowns that all have to do with each other.
-    fn entangled() -> NormalEquations {
+    /// Twenty unknowns, all correlated.
+    fn correlated() -> NormalEquations {
         let mut equations = NormalEquations::new(20);
         for i in 0..20_usize {
             equations.add(&[(i, 1.0)], 0.1 * i as f64, 2.0);
@@ -309,9 +309,9 @@ mod tests {
     }
 
     #[test]
-    fn rows_that_are_worked_out_together_have_the_bits_of_rows_by_themselves() {
-        let NormalEquations { a, .. } = entangled();
-        // The textbook: one row after the other, one sum after the other.
+    fn rows_computed_together_have_the_bits_of_single_rows() {
+        let NormalEquations { a, .. } = correlated();
+        // The textbook's order: row by row, sum by sum.
         let mut textbook = a.clone();
         for i in 0..20 {
             for j in 0..=i {
@@ -324,8 +324,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_told_of_the_first_unknowns_is_what_is_told_of_all() {
-        let equations = entangled();
+    fn the_first_unknowns_have_the_same_covariance_in_a_partial_solution() {
+        let equations = correlated();
         let (some, all) = (equations.solve_for_first(6).unwrap(), equations.solve().unwrap());
         assert_eq!(some.values, all.values);
         for i in 0..6 {
@@ -333,7 +333,7 @@ mod tests {
                 assert_eq!(some.covariance(i, j), all.covariance(i, j));
             }
         }
-        // The inverse by its own definition: the matrix times a column of it is a column of the unit matrix.
+        // By definition of the inverse: the matrix times one of its columns is a column of the unit matrix.
         for column in 0..6 {
             for line in 0..20 {
                 let sum: f64 = (0..20)
@@ -345,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nothing_is_known_of_is_refused() {
+    fn an_unbounded_unknown_has_no_solution() {
         let mut half = NormalEquations::new(2);
         half.add(&[(0, 1.0)], 1.0, 1.0);
         assert!(half.solve().is_none());

@@ -1,4 +1,4 @@
-//! The interval in which a contact closed, as one report tells it.
+//! The interval in which a sensor closed, from one report.
 
 use super::poll_timing::PollTiming;
 use crate::time::{TimeSpan, Timestamp};
@@ -9,16 +9,15 @@ use crate::time::{TimeSpan, Timestamp};
 /// is the same for every report of a link, so it cancels in every difference of reports and is left in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ContactWindow {
-    /// Stamp of the last reading that saw the contact open.
+    /// Stamp of the last reading that saw the sensor open.
     pub after: Timestamp,
     /// Stamp of the reading that saw it closed: the report.
     pub until: Timestamp,
 }
 
 impl ContactWindow {
-    /// The window of a report stamped `stamp`: the recorded interval where the host kept one; otherwise the
-    /// interval that follows a reporting poll or an idle one, by the time since the last report of any
-    /// contact.
+    /// The window of a report stamped `stamp`: the recorded interval if the host kept one; otherwise the interval
+    /// after a reporting or an idle poll, by the time since the last report of any sensor.
     #[must_use]
     pub fn of_report(
         stamp: Timestamp,
@@ -33,7 +32,7 @@ impl ContactWindow {
         Self { after: stamp - interval.abs(), until: stamp }
     }
 
-    /// Its middle, the mean time of the contact.
+    /// Its middle, the mean time of detection.
     #[inline]
     #[must_use]
     pub fn middle(self) -> Timestamp {
@@ -47,7 +46,7 @@ impl ContactWindow {
         self.until - self.after
     }
 
-    /// The variance in s² of the time of contact, which is uniform in the window: width² / 12.
+    /// The variance in s² of the time of detection, which is uniform in the window: width² / 12.
     #[inline]
     #[must_use]
     pub fn variance_s2(self) -> f64 {

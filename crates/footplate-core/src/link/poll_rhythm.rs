@@ -1,7 +1,7 @@
-//! When the polls to come will be, as the reports so far let them be foreseen.
+//! Predicts future polls from the reports so far.
 //!
-//! A contact is reported by the first poll after it closed, so a report can be forecast better than the
-//! contact: it is stamped by a poll, and polls come like clockwork from one report to the next.
+//! A sensor is reported by the first poll after it closed. A report can therefore be predicted better than the
+//! closing: it is stamped by a poll, and polls follow one another regularly.
 
 use crate::time::{TimeSpan, Timestamp};
 
@@ -12,8 +12,8 @@ pub struct PollRhythm {
     pub(super) next: Timestamp,
     /// From poll to poll while nothing is reported.
     pub(super) period: TimeSpan,
-    /// Beyond this many polls the doubt of the period has grown to a fifth of it, and a poll can no longer be
-    /// told from its neighbour.
+    /// Beyond this many polls the uncertainty of the period has grown to a fifth of it, and neighbouring polls can no
+    /// longer be distinguished.
     pub(super) reaches: i64,
 }
 
@@ -27,7 +27,7 @@ impl PollRhythm {
         if period <= 0 {
             return None;
         }
-        // Rounded up: a contact between two polls waits for the later one.
+        // Rounded up: a detection between two polls waits for the later one.
         let polls = ahead.max(0).saturating_add(period - 1) / period;
         (polls <= self.reaches).then(|| self.next + TimeSpan::from_ns(polls * period))
     }

@@ -53,7 +53,7 @@ const FEWEST: usize = 8;
 /// A period found in this many gaps is only refined as long as gaps line up at it; the search for another one
 /// costs a hundred times more.
 const CONFIRMED: u32 = 16;
-/// Polls are distinguished while their doubt is below this part of the period.
+/// Polls are distinguished while their uncertainty is below this part of the period.
 const TOLD_APART: i64 = 5;
 
 /// Learns the rhythm of a link from the stamps of its reports.
@@ -65,7 +65,7 @@ pub struct PollTimingEstimator {
     last_stamp: Option<Timestamp>,
     fitted: Option<Estimate<TimeSpan>>,
     timing: PollTiming,
-    /// The count of gaps at which the rhythm is next fitted anew: it doubles, so the cost stays bounded.
+    /// The number of gaps at which the rhythm is fitted again: it doubles, so that the cost stays bounded.
     next_fit: usize,
 }
 
@@ -83,7 +83,7 @@ impl Default for PollTimingEstimator {
 }
 
 impl PollTimingEstimator {
-    /// The clock starts anew: the gap to the next report means nothing.
+    /// The clock was restarted: the gap to the next report is meaningless.
     pub fn restart(&mut self) {
         self.last_stamp = None;
     }
@@ -94,13 +94,13 @@ impl PollTimingEstimator {
         self.last_stamp = None;
     }
 
-    /// Takes in the stamp of a report of any contact.
+    /// Adds the stamp of a report of any sensor.
     #[inline]
     pub fn report(&mut self, stamp: Timestamp) {
         if let Some(last) = self.last_stamp.replace(stamp) {
             let gap = (stamp - last).as_s();
-            // Repeats of one contact come one interval after another and dominate; they say nothing of the
-            // idle period, so only every gap with an idle poll in it counts, and one repeat.
+            // Repeats of one sensor come one interval after another and dominate, but contain no information about
+            // the idle period: only every gap with an idle poll in it counts, and one repeat.
             if gap > SHORTEST_PERIOD_S && gap < LONGEST_GAP_S && gap > 1.5 * self.timing.after_report.as_s() {
                 self.gaps_s[self.seen % KEPT] = gap;
                 self.seen += 1;
@@ -112,7 +112,7 @@ impl PollTimingEstimator {
         }
     }
 
-    /// The rhythm as known so far; [`PollTiming::ASSUMED`] until the reports have shown one.
+    /// The rhythm known so far; [`PollTiming::ASSUMED`] until the reports have shown one.
     #[inline]
     #[must_use]
     pub fn timing(&self) -> PollTiming {

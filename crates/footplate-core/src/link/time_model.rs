@@ -16,7 +16,7 @@ pub struct TimeModel {
     pub soonest: TimeSpan,
     /// From a detection until its report can have changed a plan and the new command has left, at the longest.
     pub reaction: TimeSpan,
-    /// How long before its report a detection may have been, where the report does not say.
+    /// How long before its report a detection may have occurred, if the report does not say.
     pub report_window: TimeSpan,
 }
 

@@ -14,7 +14,7 @@ use super::uniform_normal::{normal_cdf, normal_density};
 
 /// Beyond so many standard deviations differences of Φ lose their digits; the tail is exponential there.
 const FAR: f64 = 6.0;
-/// A report that takes less than this part of a variance away says nothing.
+/// A report that reduces a variance by less than this part contains no information.
 const NOTHING: f64 = 1e-6;
 
 /// A forecast and the bounds of what was then reported; the unit is the caller's.
@@ -31,10 +31,10 @@ pub struct TruncatedNormal {
 }
 
 impl TruncatedNormal {
-    /// Mean and variance of the quantity once it is known to lie within the bounds.
+    /// Mean and variance of the quantity, given that it lies within the bounds.
     ///
-    /// The variance is never less than a normal report of the same width (variance width²/12) would leave: a forecast
-    /// that ended outside of the bounds was not as good as it said, and is not to be trusted more for that.
+    /// The variance is never less than that after a normal report of the same width (variance width²/12): a forecast
+    /// that lies outside the bounds was less accurate than stated, and must not gain certainty from that.
     #[must_use]
     pub fn moments(self) -> (f64, f64) {
         let s = libm::sqrt(self.variance.max(f64::MIN_POSITIVE));

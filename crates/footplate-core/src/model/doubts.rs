@@ -1,6 +1,6 @@
-//! What a model does not know of single changes of speed.
+//! Uncertainty of single changes of speed by the model.
 //!
-//! The way that a change adds is linear in a train's numbers, so its slopes are written down and nothing is allocated:
+//! The distance that a change adds is linear in the train's numbers, so its slopes are explicit and nothing is allocated:
 //! a change of speed `Δ = v − v′` over `n` steps displaces by `Δ (q + θ + κ|Δ| + ρ|n|/2)`, and starts and stops by what
 //! their nodes add.
 
@@ -10,8 +10,8 @@ use super::parameters::{
 };
 use super::priors::END_OF_STOP;
 
-/// By how much more than it is thought to a single change differs from its law in forecasts: shapes of decoders that the law
-/// does not have (chosen on simulated decoders of six laws, so that nine in ten intervals of 90 % hold).
+/// Factor on the shape error of a single change in forecasts, for shapes of decoders that the law lacks (chosen on simulated
+/// decoders of six laws, so that 90 % intervals hold nine times in ten).
 pub(crate) const OTHER_SHAPES: f64 = 2.0;
 
 impl MotionModel {
@@ -37,7 +37,7 @@ impl MotionModel {
         self.spread.variance(START_DELAY)
     }
 
-    /// One standard deviation (m) of the way to rest from a speed (m/s), for what is not known of the law.
+    /// One standard deviation (m) of the stopping distance from a speed (m/s), by the uncertainty of the law.
     pub(crate) fn stop_doubt(&self, speed: f64) -> f64 {
         let [(low, left), (high, right)] = nodes_about(speed);
         let [delay, (lag, by_lag), kappa, rho] = self.law_slopes(DOWN, speed, 0.0);
@@ -48,7 +48,7 @@ impl MotionModel {
         libm::hypot(libm::sqrt(self.spread.variance_along(&slopes)), END_OF_STOP)
     }
 
-    /// The same of where a train is that has started to a speed; the delay of the start apart.
+    /// The same for the place of a train that has started to a speed, without the delay of the start.
     pub(crate) fn start_doubt(&self, speed: f64) -> f64 {
         let [(low, left), (high, right)] = nodes_about(speed);
         let [_, lag, kappa, rho] = self.law_slopes(UP, 0.0, speed);
@@ -56,7 +56,7 @@ impl MotionModel {
         libm::sqrt(self.spread.variance_along(&slopes))
     }
 
-    /// The same of a change from one speed to another.
+    /// The same for a change from one speed to another.
     pub(crate) fn change_doubt(&self, from: f64, to: f64) -> f64 {
         let slopes = self.law_slopes(if to > from { UP } else { DOWN }, from, to);
         libm::sqrt(self.spread.variance_along(&slopes))
@@ -74,8 +74,8 @@ impl MotionModel {
         ]
     }
 
-    /// Slopes of what friction takes of a stop, `f θ² ln(1 + u)` with `u = A/(f θ)`, in lag and friction; as if nothing drove
-    /// from the beginning, which is when it takes the most.
+    /// Slopes in lag and friction of the distance by which friction shortens a stop, `f θ² ln(1 + u)` with `u = A/(f θ)`; as if
+    /// nothing drove from the beginning, where it is largest.
     fn friction_slopes(&self, speed: f64) -> (f64, f64) {
         let answers = self.answers();
         let (lag, _) = answers.lag_and_ramp(false, speed, 0.0);
@@ -85,7 +85,7 @@ impl MotionModel {
         (friction * lag * (2.0 * log - part), lag * lag * (log - part))
     }
 
-    /// The step whose speed is nearest; 0 for standstill.
+    /// The step with the nearest speed; 0 for standstill.
     pub(crate) fn step_near(&self, speed: f64) -> u8 {
         let answers = self.answers();
         let off = |step: &u8| (answers.speed(usize::from(*step), false) - speed).abs();

@@ -1,4 +1,4 @@
-//! What an experiment would see of a model's numbers, before it is made.
+//! Expected information: which sums of a model's numbers an experiment would measure, and how well.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -13,20 +13,20 @@ use crate::ids::SpeedStep;
 use crate::time::TimeSpan;
 use crate::units::Length;
 
-/// A contact is timed this well (s): the module that it is on is polled every 40 ms, 40/√12.
+/// Standard deviation of a detection's time (s): its module is polled every 40 ms, 40/√12.
 const TIMING: f64 = 0.012;
-/// A contact's place on the way is known this well (m) after some laps.
+/// Standard deviation of a sensor's place on the path after some laps (m).
 const PLACE: f64 = 0.003;
-/// A rest is aimed about this far (m) short of its contact.
+/// The planned place of rest is about this far short of its sensor (m).
 const CRAWL: f64 = 0.06;
-/// After a contact passed in braking, the next one is about this far (m).
+/// Distance to the next sensor after one passed while braking (m).
 const TO_NEXT: f64 = 0.3;
-/// A hop between two contacts (m).
+/// A typical hop between two sensors (m).
 const HOP: f64 = 0.39;
-/// Part of the way to rest by which no law's shape is true before its end.
+/// Standard deviation of a law's shape before its end, as part of the stopping distance.
 const SHAPE: f64 = 0.01;
 
-/// Sums of the model's numbers that an experiment would see, each with noise of its own.
+/// Sums of the model's numbers that an experiment measures, each with its own noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExpectedInformation {
     pub(super) seen: Vec<Seen>,
@@ -40,7 +40,7 @@ pub(super) struct Seen {
     pub(super) variance: f64,
 }
 
-/// The way of a stop (m), from the command on.
+/// The stopping distance (m), from the command on.
 pub(super) fn stop_way(answers: &Answers<'_>, step: u8, above: bool) -> f64 {
     let speed = answers.speed(usize::from(step), above);
     let segment = stop_from(answers, step, speed);
@@ -55,7 +55,7 @@ pub(super) fn start_to(answers: &Answers<'_>, step: u8) -> Segment {
     Segment::of(&SpeedCommand { sent: 0.0, from: 0, to: step, at_rest: true }, answers, Pace::steady(0.0))
 }
 
-/// The time (s) at which something that only grows reaches a value, by halving.
+/// The time (s) at which a growing function reaches a value, by bisection.
 pub(super) fn time_of(value: f64, of: impl Fn(f64) -> f64) -> f64 {
     let (mut early, mut late) = (0.0, 60.0);
     for _ in 0..40 {
@@ -70,7 +70,7 @@ pub(super) fn time_of(value: f64, of: impl Fn(f64) -> f64) -> f64 {
 }
 
 impl MotionModel {
-    /// How something changes with each of the numbers.
+    /// The slopes of a function in the model's numbers.
     pub(super) fn slopes(&self, of: impl Fn(&Answers<'_>) -> f64) -> Vec<(usize, f64)> {
         self.spread.slopes(&self.values, self.steps(), of)
     }
@@ -87,8 +87,8 @@ impl MotionModel {
         ExpectedInformation { seen: vec![Seen { slopes, variance }] }
     }
 
-    /// A stop from a steady step and a crawl to the next contact. With `past`, the train is to pass a contact so far
-    /// before it rests, and crawls to the one behind it.
+    /// A stop from a steady step, then creep to the next sensor. With `past`, the train passes a sensor this far before it comes
+    /// to rest, and creeps to the one after it.
     #[must_use]
     pub fn prospect_of_stop(
         &self,
@@ -102,7 +102,7 @@ impl MotionModel {
         let speed = answers.speed(usize::from(step), above);
         let scatter = self.scatter(speed);
         let whole = stop_way(&answers, step, above);
-        // Where it was when it was commanded to stop.
+        // The place of the train at the command.
         let begin = sum_of_squares(&[speed * TIMING, PLACE]);
         let mut seen = Vec::new();
         if let Some(past) = past {
@@ -128,7 +128,7 @@ impl MotionModel {
         ExpectedInformation { seen }
     }
 
-    /// A short move from a place of rest that was reached at a crawl, and another crawl to the next contact.
+    /// A short move from a place of rest that was reached at creep speed, then creep to the next sensor.
     #[must_use]
     pub fn prospect_of_move(&self, step: SpeedStep, run: TimeSpan, crawl: SpeedStep) -> ExpectedInformation {
         let (time, crawl_speed) = self.crawl(crawl, CRAWL);
@@ -145,7 +145,7 @@ impl MotionModel {
         ExpectedInformation { seen: vec![Seen { slopes, variance: late + scatter * scatter }] }
     }
 
-    /// The time (s) of a crawl over a way (m) from rest, and the speed (m/s) then.
+    /// The time (s) of creeping over a distance (m) from rest, and the speed (m/s) then.
     fn crawl(&self, step: SpeedStep, way: f64) -> (f64, f64) {
         let answers = self.answers();
         let start = start_to(&answers, step.get());

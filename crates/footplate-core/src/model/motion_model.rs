@@ -1,4 +1,4 @@
-//! How one train moves, as far as is known, and what follows from it.
+//! The motion model of one train, and what follows from it.
 
 use alloc::collections::BTreeMap;
 use alloc::vec;
@@ -25,22 +25,22 @@ use crate::units::{Acceleration, Length, Speed};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
 pub enum StepUse {
-    /// Never tried.
+    /// Not tried yet.
     Untried,
     /// It moves the train.
     Moves,
-    /// The train did not start, or stalled, at this step: not to be relied upon.
+    /// The train did not start, or stalled, at this step: not to be used.
     Unreliable,
 }
 
-/// The way and time to rest from a steady speed, counted from when the command left the line.
+/// Stopping distance and time from a steady speed, from when the command left the line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StopForecast {
-    /// The way, as the train feels it.
+    /// The stopping distance, as path length.
     pub distance: Length,
-    /// One standard deviation of what is not known of it.
+    /// One standard deviation of its uncertainty.
     pub doubt: Length,
-    /// One standard deviation of single stops about it.
+    /// One standard deviation of single stops.
     pub scatter: Length,
     /// The time.
     pub time: TimeSpan,
@@ -50,8 +50,8 @@ pub struct StopForecast {
 
 /// How one train answers its commands on one layout.
 ///
-/// Everything in it is in the train's own measure of way: a hop is as long as the train needs speed times time for it
-/// ([`length`](Self::length)), curves and slopes included, so that a stop takes as far in a curve as on the straight.
+/// All distances are path lengths: a hop is as long as speed times time of the train over it ([`length`](Self::length)), curves
+/// and slopes included. A stop takes the same path length in a curve as on the straight.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotionModel {
@@ -61,15 +61,15 @@ pub struct MotionModel {
     pub(crate) spread: Spread,
     /// By how much sections are longer than surveyed (m), with the variance.
     pub(crate) sections: BTreeMap<usize, (f64, f64)>,
-    /// By how much stops are longer for where they end.
+    /// By how much stops are longer because of where they end.
     #[cfg_attr(feature = "serde", serde(default))]
     pub(crate) stop_offsets: StopOffsets,
     uses: Vec<StepUse>,
-    /// Contacts passed and stops made at each step, from below and from above.
+    /// Sensors passed and stops made at each step, from below and from above.
     pub(crate) counts: Vec<[Counts; 2]>,
-    /// How far stops and starts scatter.
+    /// The scatter of stops and starts.
     pub(crate) scatter: Scatter,
-    /// What each number is off by for one standard deviation of the survey's scale.
+    /// The change of each number for one standard deviation of the survey's scale.
     pub(crate) scale: Vec<f64>,
     pub(crate) date: Timestamp,
 }
@@ -82,14 +82,14 @@ pub(crate) struct Counts {
     pub(crate) stops: u32,
 }
 
-/// A stop from rest takes no time; this long (s) is waited anyway before a train counts as standing.
+/// The shortest time of a stop (s), also of one from rest.
 const LEAST_STOP_S: f64 = 0.5;
 
-/// How many standard deviations of its time a ramp has to last to be one (95 % of normal errors are smaller).
+/// A ramp counts as one if it lasts this many standard deviations of its time (95 % of normal errors are smaller).
 const DECISIVE: f64 = 2.0;
 
 impl MotionModel {
-    /// What all model trains have in common, and nothing of this one.
+    /// The prior of any model train.
     #[must_use]
     pub fn unknown(train: TrainId, highest: SpeedStep) -> Self {
         let steps = usize::from(highest.get());
@@ -139,7 +139,7 @@ impl MotionModel {
         both.get(from_above).copied().unwrap_or_default()
     }
 
-    /// Its steady speed at a step; the count is of contacts passed at it. An unknown approach counts as from below.
+    /// Its steady speed at a step; the count is of sensors passed at it. An unknown approach counts as from below.
     #[must_use]
     pub fn speed(&self, step: SpeedStep, approach: Approach) -> Estimate<Speed> {
         let (place, above) = (usize::from(step.get()), approach == Approach::Above);
@@ -152,14 +152,14 @@ impl MotionModel {
         }
     }
 
-    /// The most likely steady speed at a step, without its uncertainty, which takes a hundred times as long.
+    /// The most likely steady speed at a step. Without the uncertainty, whose calculation takes a hundred times as long.
     pub(crate) fn steady_speed(&self, step: SpeedStep, approach: Approach) -> Speed {
         let above = approach == Approach::Above;
         Speed::from_m_per_s(self.answers().speed(usize::from(step.get()), above))
     }
 
-    /// One standard deviation of what follows from the model's numbers, in the measure of a tape: the scale of the survey
-    /// may be off, too.
+    /// One standard deviation of a function of the model's numbers, in surveyed lengths: the error of the survey's scale is
+    /// included.
     pub(crate) fn deviation_with_scale(&self, of: impl Fn(&Answers<'_>) -> f64) -> f64 {
         let slopes = self.spread.slopes(&self.values, self.steps(), of);
         let by_scale: f64 =
@@ -167,7 +167,7 @@ impl MotionModel {
         libm::hypot(libm::sqrt(self.spread.variance_along(&slopes)), by_scale)
     }
 
-    /// The model with what may have changed by another session: what a measurement of today promises for tomorrow.
+    /// The model for a later session: the process noise between two sessions is added.
     #[must_use]
     pub fn for_later_session(&self) -> Self {
         let mut later = self.clone();
@@ -175,13 +175,12 @@ impl MotionModel {
         later
     }
 
-    /// One standard deviation (s) by which starts from rest are late or early.
+    /// One standard deviation (s) of the time of starts from rest.
     pub(crate) fn start_scatter(&self) -> f64 {
         self.scatter.of_start()
     }
 
-    /// By how much an even change of speed of a running train is late: the delay of the command, and the lag with which
-    /// the train follows its decoder.
+    /// By how much an even change of speed of a running train is late: delay of the command plus lag behind the decoder.
     #[must_use]
     pub fn change_delay(&self, is_faster: bool) -> Estimate<TimeSpan> {
         let late = |answers: &Answers<'_>| {
@@ -219,13 +218,13 @@ impl MotionModel {
         })
     }
 
-    /// What experience says of a step.
+    /// Whether a step moves the train, by experience.
     #[must_use]
     pub fn uses(&self, step: SpeedStep) -> StepUse {
         self.uses.get(usize::from(step.get())).copied().unwrap_or(StepUse::Unreliable)
     }
 
-    /// Keeps in mind whether a step moved the train.
+    /// Records whether a step moved the train.
     pub fn note_use(&mut self, step: SpeedStep, found: StepUse) {
         if let Some(slot) = self.uses.get_mut(usize::from(step.get())) {
             *slot = found;
@@ -264,14 +263,14 @@ impl MotionModel {
         self.scatter.of_stop(speed)
     }
 
-    /// By how much (m) a stop from a speed (m/s) is longer that ends on a hop; or nobody knows where.
+    /// By how much (m) a stop from a speed (m/s) is longer that ends on a hop, or at an unknown place.
     pub(crate) fn stop_offset(&self, hop: Option<HopId>, speed: f64) -> Gaussian {
         let (share, offset) = (stop_offset_share(speed), self.stop_offsets.of(hop.map(HopId::index)));
         Gaussian { mean: share * offset.mean, variance: share * share * offset.variance }
     }
 
-    /// One standard deviation of what stops scatter by that nothing in the model explains, as promises that were broken show:
-    /// loads, wear, laws that are none of ours. It is part of every stop's scatter.
+    /// One standard deviation of the scatter of stops that the model does not explain, as broken promises show it: loads, wear,
+    /// laws that the model lacks. It is part of every stop's scatter.
     #[must_use]
     pub const fn unexplained_scatter(&self) -> Length {
         Length::from_m(self.scatter.floor)
@@ -288,7 +287,7 @@ impl MotionModel {
         TimeSpan::from_s(segment.settled().max(LEAST_STOP_S))
     }
 
-    /// The way over a hop as the train feels it, and one standard deviation of it.
+    /// The path length of a hop, and one standard deviation of it.
     #[must_use]
     pub fn length(&self, sections: &SectionIndex, hop: &Hop<'_>) -> [Length; 2] {
         let section = sections.section(hop.id);
@@ -299,22 +298,22 @@ impl MotionModel {
         [Length::from_m(length), Length::from_m(libm::sqrt(variance.max(0.0)))]
     }
 
-    /// The sections that it ran over: by how much they are longer than surveyed (m), with the variance.
+    /// The sections it ran over: by how much their path length exceeds the surveyed length (m), with the variance.
     pub fn sections(&self) -> impl Iterator<Item = (usize, f64, f64)> + '_ {
         self.sections.iter().map(|(section, (longer, variance))| (*section, *longer, *variance))
     }
 
-    /// Another estimate of by how much a section is longer than surveyed (m), with the variance.
+    /// Sets by how much a section's path length exceeds the surveyed length (m), with the variance.
     pub(crate) fn set_section(&mut self, section: usize, longer: f64, variance: f64) {
         self.sections.insert(section, (longer, variance));
     }
 
-    /// By how much a section is longer than surveyed (m), with the variance.
+    /// By how much a section's path length exceeds the surveyed length (m), with the variance.
     pub(crate) fn section(&self, section: usize) -> Option<(f64, f64)> {
         self.sections.get(&section).copied()
     }
 
-    /// How fast a train of which nothing is known may be at a step (m/s), one standard deviation above the usual.
+    /// The speed of an unknown train at a step, one standard deviation above the usual (m/s).
     #[must_use]
     pub fn fastest_of_unknown(step: SpeedStep, highest: SpeedStep) -> Speed {
         let (mean, deviation) = speed_prior(usize::from(step.get()).max(1), usize::from(highest.get()));

@@ -1,4 +1,4 @@
-//! The numbers that say how a train answers its commands, in one vector, and what is thought of them beforehand.
+//! The parameter vector of a train's response to commands, and its prior.
 //!
 //! SI units throughout. Letters: `q` delay from command to effect, `θ` lag, `κ` ramp time for a change of speed (half of
 //! it, so that a stop takes κv², which is v²/2a), `ρ` ramp time a throttle step, `h` by how much a step reached from above
@@ -14,11 +14,11 @@ pub(super) const UP: usize = 1;
 pub(super) const DOWN: usize = 5;
 /// Delay of a start from rest.
 pub(super) const START_DELAY: usize = 9;
-/// Slowing down by friction alone, when nothing drives (m/s²).
+/// Deceleration by friction alone, without drive (m/s²).
 pub(super) const FRICTION: usize = 10;
-/// What stops from these speeds are longer than the law says, by node.
+/// What the law of stops leaves over, by node of speed.
 pub(super) const STOP_NODES: usize = 11;
-/// The same for starts: how much farther a train has got once it runs.
+/// The same for starts: how much further the train has run once it is steady.
 pub(super) const START_NODES: usize = STOP_NODES + NODES;
 /// ln of the steady speeds from below, from step 1 on.
 pub(super) const SPEEDS: usize = START_NODES + NODES;
@@ -28,7 +28,7 @@ pub(super) const NODES: usize = 8;
 /// Their speeds (m/s): model trains on 14 steps run at up to 0.65 m/s (published tables).
 const NODE_SPACING: f64 = 0.1;
 
-/// Mean and standard deviation of the single numbers before anything is known of a train.
+/// Prior mean and standard deviation of the single numbers.
 ///
 /// Hysteresis: 13 to 31 mm/s in 7 of 8 published tables. Delays of running trains: 0.16 to 0.26 s from the stop command
 /// to the first slowing (trains 45, 47, 49); of starts up to 1.0 s. Lags up to 1.5 s, rates from 130 to 980 mm/s²
@@ -48,22 +48,22 @@ pub(super) const PRIOR: [(f64, f64); STOP_NODES] = [
     (0.015, 0.008),
 ];
 
-/// Top speed of all published trains on 14 steps: 0.57 to 0.65 m/s; on others nobody knows better.
+/// Top speed of all published trains on 14 steps: 0.57 to 0.65 m/s; nothing is published for others.
 const TOP_SPEED: (f64, f64) = (0.61, 0.2);
-/// Shape of speed over step between even and steep trains, and how far ln speed may be from it at the lowest step.
+/// Exponent of speed over step, between even and steep trains, and standard deviation of ln speed at the lowest step.
 const SPEED_POWER: f64 = 1.35;
 const SPEED_SPREAD: f64 = 0.8;
 /// How much ln speed bends from step to step beyond that shape (published tables, steps 3 and up).
 pub(super) const BEND: f64 = 0.12;
-/// How far hysteresis at one step is from that of the others (m/s).
+/// Standard deviation of hysteresis from step to step (m/s).
 pub(super) const HYSTERESIS_SPREAD: f64 = 0.004;
 /// Below this speed hysteresis shrinks in proportion (trains 1 and 78: 7 mm/s at 16 mm/s, 15 at 70).
 const FULL_HYSTERESIS_FROM: f64 = 0.12;
 
-/// What laws leave over: a few millimetres at a crawl, and this share of the speed (m per m/s).
+/// Prior standard deviation of what laws leave over: a few millimetres at creep speed, and this share of the speed (m per m/s).
 const RESIDUAL_FLOOR: f64 = 0.003;
 const RESIDUAL_BY_SPEED: f64 = 0.06;
-/// Over such a difference of speed (m/s) what is left over stays alike.
+/// Correlation length of what laws leave over, as a difference of speed (m/s).
 const RESIDUAL_LENGTH: f64 = 0.2;
 
 /// Places of a train's numbers: the single ones, the nodes, speeds, hysteresis by step.
@@ -81,14 +81,14 @@ pub(super) const fn hysteresis_at(step: usize, highest: usize) -> usize {
     SPEEDS + highest + step - 1
 }
 
-/// What is thought of ln speed at a step beforehand: mean and standard deviation.
+/// Prior mean and standard deviation of ln speed at a step.
 pub(super) fn speed_prior(step: usize, highest: usize) -> (f64, f64) {
     let part = step as f64 / highest.max(1) as f64;
     let mean = libm::log(TOP_SPEED.0) + SPEED_POWER * libm::log(part);
     (mean, TOP_SPEED.1 + SPEED_SPREAD * (1.0 - part))
 }
 
-/// All means, speeds included.
+/// All prior means, speeds included.
 pub(super) fn prior_means(highest: usize) -> Vec<f64> {
     let mut means: Vec<f64> = PRIOR.iter().map(|(mean, _)| *mean).collect();
     means.resize(SPEEDS, 0.0);
@@ -102,7 +102,7 @@ pub(super) const fn node_speed(node: usize) -> f64 {
     NODE_SPACING * (node + 1) as f64
 }
 
-/// Covariance of the nodes of what laws leave over: nodes of like speeds are alike.
+/// Prior covariance of two nodes of what laws leave over: nodes of similar speed are similar.
 pub(super) fn node_covariance(i: usize, j: usize) -> f64 {
     let size = |node: usize| RESIDUAL_FLOOR + RESIDUAL_BY_SPEED * node_speed(node).min(0.5);
     let apart = (node_speed(i) - node_speed(j)) / RESIDUAL_LENGTH;
@@ -111,7 +111,7 @@ pub(super) fn node_covariance(i: usize, j: usize) -> f64 {
     own * size(i) * size(j) * libm::exp(-0.5 * apart * apart)
 }
 
-/// The two nodes about a speed with their weights; below the first the rest shrinks to nothing at standstill.
+/// The two nodes next to a speed with their weights; below the first node the value falls to zero at standstill.
 pub(super) fn nodes_about(speed: f64) -> [(usize, f64); 2] {
     let along = speed / NODE_SPACING - 1.0;
     if along <= 0.0 {
@@ -122,7 +122,7 @@ pub(super) fn nodes_about(speed: f64) -> [(usize, f64); 2] {
     [(low, 1.0 - part), (low + 1, part)]
 }
 
-/// No train rolls for ever (m/s²): a tenth of a wheel on a level rail.
+/// Least friction (m/s²): a tenth of that of a wheel on a level rail.
 const LEAST_FRICTION: f64 = 1e-3;
 
 /// How a train answers, read from a vector of numbers.
@@ -155,8 +155,8 @@ impl<'v> Answers<'v> {
         (below + full * Self::hysteresis_part(below)).max(0.5 * below)
     }
 
-    /// The step, with parts, at which a train runs that has been told `near` and whose set speed (m/s) is this now: steps
-    /// below and above are looked at with the speeds that are reached from below, as a ramp passes them.
+    /// The fractional step that corresponds to a set speed (m/s) of a train commanded to `near`. Other steps count with their
+    /// speeds from below, as a ramp passes them.
     pub(super) fn step_at(&self, near: usize, set: f64) -> f64 {
         let near = near.min(self.highest);
         let settled = [self.speed(near, false), self.speed(near, true)];
@@ -175,7 +175,7 @@ impl<'v> Answers<'v> {
         self.highest as f64
     }
 
-    /// The part of full hysteresis that a speed (m/s) shows.
+    /// The part of full hysteresis at a speed (m/s).
     pub(super) const fn hysteresis_part(speed: f64) -> f64 {
         (speed / FULL_HYSTERESIS_FROM).min(1.0)
     }
@@ -190,13 +190,13 @@ impl<'v> Answers<'v> {
         self.at(START_DELAY).max(0.0)
     }
 
-    /// Slowing down by friction alone (m/s²).
+    /// Deceleration by friction alone (m/s²).
     pub(super) fn friction(&self) -> f64 {
         self.at(FRICTION).max(LEAST_FRICTION)
     }
 
-    /// Lag and ramp (s) of a change by so much speed over so many steps, as the numbers have them: either may come out
-    /// below zero where the numbers trade off against each other, and counts as such in displacements.
+    /// Lag and ramp (s) of a change by so much speed over so many steps. Either may be negative where the numbers trade off
+    /// against each other, and counts as such in displacements.
     pub(super) fn lag_and_ramp(&self, up: bool, change: f64, steps: f64) -> (f64, f64) {
         let first = if up { UP } else { DOWN };
         let lag = self.at(first + 1);
@@ -205,12 +205,12 @@ impl<'v> Answers<'v> {
         (lag, 2.0 * kappa * change.abs() + rho * steps.abs())
     }
 
-    /// What a stop from a speed is longer than the law says (m).
+    /// What the law leaves over of a stop from a speed (m).
     pub(super) fn stop_residual(&self, speed: f64) -> f64 {
         self.residual(STOP_NODES, speed)
     }
 
-    /// How much farther than the law says a train has got that started to a speed (m).
+    /// What the law leaves over of a start to a speed (m).
     pub(super) fn start_residual(&self, speed: f64) -> f64 {
         self.residual(START_NODES, speed)
     }

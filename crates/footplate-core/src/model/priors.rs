@@ -1,4 +1,4 @@
-//! What is known of any model train before this one has moved, as measurements.
+//! The prior of any model train, as measurements.
 
 use alloc::vec::Vec;
 
@@ -9,48 +9,46 @@ use super::parameters::{
 use super::survey::SectionIndex;
 use crate::linalg::NormalEquations;
 
-/// Nobody sees the last centimetres of a stop: dry friction and gears end it elsewhere than any law, the same way each time, and
-/// a start that seems later makes up for it. Healthy trains of two simulators that were written by other equations rested 5 to
-/// 8 mm further than believed (m).
+/// No sensor observes the last centimetres of a stop. Dry friction and gears end it elsewhere than any law, the same way each
+/// time, and a start that seems later compensates. Healthy trains of two simulators with other equations came to rest 5 to 8 mm
+/// beyond the estimate (m).
 pub(crate) const END_OF_STOP: f64 = 0.0035;
-/// Part of a change's displacement by which no shape for all decoders is true in its middle.
+/// Standard deviation of a law's shape in the middle of a change, as part of its displacement: no shape fits all decoders.
 pub(super) const SHAPE_ERROR: f64 = 0.04;
-/// A train feels a hop up to some per cent longer or shorter than it is, for curves and slopes (published section
-/// means: 1 to 3 %).
+/// Path lengths differ from surveyed lengths by some per cent because of curves and slopes (published section means: 1 to
+/// 3 %).
 pub(crate) const FELT: f64 = 0.02;
-/// A start is late or early by a tenth of its delay (seen on trains that need 0.5 to 1 s to stir).
+/// Starts are late or early by a tenth of their delay (observed on trains that need 0.5 to 1 s to start), in s.
 pub(crate) const LATE_START: f64 = 0.06;
 /// Repeats of a run differ by 0.3 to 0.8 %, ...
 pub(crate) const TRIP_DEVIATION: f64 = 0.006;
 /// ... and within a run speed wanders by some tenths of a per cent over ten seconds.
 pub(crate) const WANDER: f64 = 0.002;
-/// Part of the displacement of a change by which no law is true.
+/// Standard deviation of the displacement of a single change, as part of it.
 const CHANGE_ERROR: f64 = 0.05;
-/// ... and what is left where the displacement is nothing (m).
+/// ... and its least value (m).
 const LEAST_CHANGE_ERROR: f64 = 0.001;
 
-/// Half the published starts from one speed to another displace by about so much a speed change (s): only for the size
-/// of doubts.
+/// Displacement per change of speed in half of the published changes (s); only used for uncertainties.
 const USUAL_DELAY: f64 = 0.8;
 
-/// Variance beforehand of what a section is longer than its survey (m²).
+/// Prior variance of a section's path length over its surveyed length (m²).
 pub(crate) fn section_variance(sections: &SectionIndex, section: usize) -> f64 {
     let felt = FELT * sections.surveyed_length(section);
     sections.survey_variance(section) + felt * felt
 }
 
-/// Standard deviation of what a change adds to the way over what its law says (m), by its change of speed (m/s).
+/// Standard deviation of the distance that a change adds to its law (m), by its change of speed (m/s).
 pub(crate) fn change_error(change: f64) -> f64 {
     CHANGE_ERROR * USUAL_DELAY * change.abs() + LEAST_CHANGE_ERROR
 }
 
-/// Variance of ln of a speed by which a run differs from all others. A speed that is known for certain is that of the run: an
-/// oracle was told it.
+/// Variance of ln speed between runs. A speed without uncertainty was given to an oracle for this very run.
 pub(crate) fn run_variance(of_step: f64) -> f64 {
     if of_step > 0.0 { TRIP_DEVIATION * TRIP_DEVIATION } else { 0.0 }
 }
 
-/// What is known of the numbers of any train: the equations that a fit begins with.
+/// The prior of the numbers of any train: the equations that a fit begins with.
 pub(crate) fn prior(highest: usize) -> NormalEquations {
     let mut equations = NormalEquations::new(count(highest));
     for (column, (mean, deviation)) in PRIOR.iter().enumerate() {
@@ -76,7 +74,7 @@ pub(crate) fn prior(highest: usize) -> NormalEquations {
     equations
 }
 
-/// The nodes of what a law leaves over, alike where their speeds are: rows of the inverse of the covariance's root.
+/// The nodes of what a law leaves over, correlated by speed: rows of the inverse Cholesky factor of their covariance.
 fn add_nodes(equations: &mut NormalEquations, first: usize) {
     for (node, terms) in whitened().iter().enumerate() {
         let terms: Vec<(usize, f64)> =

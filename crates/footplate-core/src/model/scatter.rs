@@ -1,12 +1,12 @@
-//! How far single stops from one speed scatter, as far as model trains usually do.
+//! The scatter of single stops and starts: what is usual for model trains, and what this train shows.
 
 use super::priors::LATE_START;
 
-/// Repeated stops of train 2 at step 8, 0.39 m/s, scatter by 4 mm; below that in proportion to the speed, as their ways
-/// do. Of train 77 at step 14, 0.61 m/s, by 21 mm (both measured, 2020).
+/// Standard deviation of repeated stops: train 2 at step 8, 0.39 m/s, 4 mm; slower stops in proportion to the speed, as their
+/// distances. Train 77 at step 14, 0.61 m/s: 21 mm (both measured, 2020).
 const MID: (f64, f64) = (0.39, 0.004);
 const TOP: (f64, f64) = (0.61, 0.021);
-/// What is left at a crawl (m): the play of couplings and gears.
+/// The rest at creep speed (m): play of couplings and gears.
 const LEAST: f64 = 0.0005;
 
 /// One standard deviation (m) of stops from a speed (m/s).
@@ -19,20 +19,21 @@ pub(super) fn usual_scatter(speed: f64) -> f64 {
     mid + (top - mid) * (speed - mid_speed) / (top_speed - mid_speed)
 }
 
-/// How far stops and starts of a train scatter.
+/// Scatter of the stops and starts of one train.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Scatter {
-    /// Of stops, against what is usual at their speed, ...
+    /// Of stops: factor on the usual scatter at their speed, ...
     pub(super) stops: f64,
-    /// ... and what they scatter by besides (m), whatever their speed: slopes, loads, shapes of laws that are none of ours.
+    /// ... and a standard deviation (m) that does not depend on the speed: slopes, loads, and shapes of laws that the model
+    /// lacks.
     pub(super) floor: f64,
-    /// Of starts, against what is usual.
+    /// Of starts: factor on the usual scatter.
     pub(super) starts: f64,
 }
 
 impl Scatter {
-    /// As model trains usually do.
+    /// Usual for model trains.
     pub(super) const USUAL: Self = Self { stops: 1.0, floor: 0.0, starts: 1.0 };
 
     /// One standard deviation (m) of stops from a speed (m/s).
@@ -40,29 +41,29 @@ impl Scatter {
         libm::hypot(self.stops * usual_scatter(speed), self.floor)
     }
 
-    /// One standard deviation (s) of how late or early starts are.
+    /// Standard deviation (s) of how late or early starts are.
     pub(super) fn of_start(self) -> f64 {
         self.starts * LATE_START
     }
 }
 
-/// How much the scatter that a train has shown is worth against what is usual, in stops or starts.
+/// The usual scatter weighs as much as this many stops or starts of the train.
 const USUAL: f64 = 10.0;
-/// Measurements after which the past fades: of residuals, and of promises, which have to be noticed soon when they are broken.
+/// Measurements after which older ones fade: of residuals, and of promises, where a change has to show soon.
 const MEMORY: f64 = 60.0;
 const PROMISES_KEPT: f64 = 25.0;
-/// What is further off than this (squared standard deviations) was not by the train's own law; it counts as this far.
+/// Larger squared residuals (in variances) have another cause than the train's own scatter; they count as this large.
 const WILD: f64 = 9.0;
 const WILD_PROMISE: f64 = 16.0;
-/// Bounds of what is believed at all.
+/// Bounds of the factors.
 const SCALES: (f64, f64) = (0.4, 6.0);
-/// How many promises that were kept it is worth, beforehand, that stops have no floor.
+/// A priori stops have no floor; that weighs as much as this many promises that were kept.
 const NO_FLOOR: f64 = 3.0;
-/// Promises are weighted as if the floor were at least this (m), about what is not known of the next sensor anyway: by the
-/// weights of none at all, no promise would ever count against those that are worth beforehand.
+/// Promises are weighted as if the floor were at least this (m), about the uncertainty of the next sensor. With the weights of a
+/// zero floor, no promise would ever outweigh the prior.
 const LEAST_FLOOR: f64 = 0.015;
 
-/// Squares of what stops or starts of a train were off by, over what is usual of model trains.
+/// Sum of squared residuals of stops or starts, each divided by the usual variance.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct ScatterSum {
@@ -71,7 +72,7 @@ pub(crate) struct ScatterSum {
 }
 
 impl ScatterSum {
-    /// One more, whose mean square over the usual is this.
+    /// Adds one: its square divided by the usual variance.
     pub(super) fn take(&mut self, square: f64) {
         self.add(square.min(WILD), 1.0, MEMORY);
     }
@@ -82,14 +83,14 @@ impl ScatterSum {
         self.count = kept * self.count + weight;
     }
 
-    /// Standard deviation over the usual.
+    /// Standard deviation divided by the usual one.
     pub(super) fn scale(&self) -> f64 {
         libm::sqrt((self.sum + USUAL) / (self.count + USUAL)).clamp(SCALES.0, SCALES.1)
     }
 }
 
-/// Of stops and of starts; and of both together, by how much more than it should the first sensor after a stop was missed
-/// that had been promised (m²).
+/// Sums of stops, of starts, and of both together: by how much the squared error at the first sensor after a stop exceeds its
+/// predicted variance (m²).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct ScatterSums {
@@ -99,11 +100,10 @@ pub(crate) struct ScatterSums {
 }
 
 impl ScatterSums {
-    /// A promise was off by so much (squared, m²), of which scatter at its speed and what was not known yet explain
-    /// `explained` (m²), the floor left out.
+    /// Adds a promise with this squared error (m²). `explained` (m²) is its predicted variance without the floor.
     ///
-    /// The mean of what they leave over, each weighted by how sharply it tells a floor, is the square of the floor: the
-    /// maximum of the likelihood, approached one promise at a time.
+    /// The mean of what they leave over, each weighted by how sharply it determines the floor, is the square of the floor:
+    /// the maximum of the likelihood, approached one promise at a time.
     pub(super) fn take_promise(&mut self, square: f64, explained: f64) {
         let floor = self.floor() * self.floor();
         let left = square.min(WILD_PROMISE * (explained + floor)) - explained;
@@ -112,18 +112,18 @@ impl ScatterSums {
         self.promises.add(left, weight * weight, PROMISES_KEPT);
     }
 
-    /// Promises of other sums.
+    /// With the promises of other sums.
     pub(super) const fn with_promises_of(self, other: &Self) -> Self {
         Self { promises: other.promises, ..self }
     }
 
-    /// What promises that were broken say stops scatter by, whatever their speed (m).
+    /// The floor by the promises so far (m).
     fn floor(&self) -> f64 {
         libm::sqrt((self.promises.sum / (self.promises.count + NO_FLOOR)).max(0.0))
     }
 
-    /// How far stops and starts scatter. What residuals show is too little where a fit has much to explain them by;
-    /// promises that are broken say so.
+    /// The scatter by all sums. Residuals show too little where a fit has many parameters to explain them; broken promises
+    /// show the rest.
     pub(super) fn scatter(&self) -> Scatter {
         Scatter { stops: self.stops.scale(), floor: self.floor(), starts: self.starts.scale() }
     }

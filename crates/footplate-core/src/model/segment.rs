@@ -1,10 +1,10 @@
-//! What a train does between one command's effect and the next: a change of speed and the run behind it.
+//! The motion between one command's effect and the next: a change of speed and the run after it.
 
 use super::parameters::Answers;
 use super::priors::SHAPE_ERROR;
 use crate::kinematics::RampedLag;
 
-/// What a command asks of a train in the state it is in.
+/// A command, with the state of the train that receives it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct SpeedCommand {
@@ -13,7 +13,7 @@ pub(crate) struct SpeedCommand {
     /// The step before and the step commanded.
     pub(crate) from: u8,
     pub(crate) to: u8,
-    /// Whether the train stands when it takes effect.
+    /// Whether the train is at rest when it takes effect.
     pub(crate) at_rest: bool,
 }
 
@@ -30,7 +30,7 @@ impl SpeedCommand {
     }
 }
 
-/// How fast a train runs, and how fast its decoder would have it run at the same moment (m/s).
+/// Speed of a train, and set speed of its decoder at the same moment (m/s).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Pace {
@@ -39,12 +39,12 @@ pub(crate) struct Pace {
 }
 
 impl Pace {
-    /// Of a train that has been running, or standing, for long.
+    /// Of a train that has been running steadily, or at rest, for long.
     pub(crate) const fn steady(speed: f64) -> Self {
         Self { speed, set: speed }
     }
 
-    /// Faster by so much, as ln.
+    /// Multiplied by e to the power `by`.
     pub(crate) fn faster(self, by: f64) -> Self {
         let times = libm::exp(by);
         Self { speed: times * self.speed, set: times * self.set }
@@ -53,9 +53,9 @@ impl Pace {
 
 /// A change of speed that has taken effect, with distance counted from there.
 ///
-/// It begins where the last one was interrupted: the set speed goes on from where it was, and the train, which is behind
-/// it by its lag, catches up with it. Letters as in [`RampedLag`]: with `u` the set speed and `v` the speed when the change
-/// took effect, the way is `u τ + (u′ − u) R(τ) + (v − u) θ (1 − e^(−τ/θ))`.
+/// It begins where the last one was interrupted: the set speed continues from its value, and the train, which lags behind it,
+/// catches up. Letters as in [`RampedLag`]: with `u` the set speed and `v` the speed when the change took effect, the distance
+/// is `u τ + (u′ − u) R(τ) + (v − u) θ (1 − e^(−τ/θ))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Segment {
@@ -69,11 +69,11 @@ pub(crate) struct Segment {
     braking: Option<Rolling>,
 }
 
-/// The end of a stop: nothing drives any more, friction slows the train, and it comes to rest.
+/// The end of a stop: without drive, friction brings the train to rest.
 ///
 /// With `A` the speed when the set speed is down, `f` friction and `x` the time since then, `v = A e^(−x/θ) −
-/// f θ (1 − e^(−x/θ))`, which is zero at `x = θ ln(1 + A/(f θ))`, and friction has taken `f θ² ln(1 + A/(f θ))` from the way
-/// but for what the lag had left of it.
+/// f θ (1 − e^(−x/θ))`, which is zero at `x = θ ln(1 + A/(f θ))`. Friction shortens the distance by `f θ² ln(1 + A/(f θ))`, less
+/// what the lag had left of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Rolling {
@@ -85,14 +85,14 @@ struct Rolling {
 }
 
 impl Rolling {
-    /// What friction has taken of the speed, and of the way, so long after the stop took effect.
+    /// By how much friction has reduced speed and distance, so long after the stop took effect.
     fn taken(&self, since: f64, lag: f64) -> (f64, f64) {
         let time = (since - self.begins).clamp(0.0, self.lasts);
         let gone = -libm::expm1(-time / lag);
         (self.friction * lag * gone, self.friction * lag * (time - lag * gone))
     }
 
-    /// What friction has taken of the whole way, with what the lag alone would still have run.
+    /// By how much friction reduces the whole distance, with what the lag alone would still have run.
     fn loss(&self, lag: f64) -> f64 {
         self.friction * lag * self.lasts
     }
@@ -102,22 +102,21 @@ impl Rolling {
     }
 }
 
-/// Share of a change that counts as none: 3 % of a stop from 0.4 m/s are run at less than 12 mm/s.
+/// A change counts as done when this share of it is left: the last 3 % of a stop from 0.4 m/s are run at less than 12 mm/s.
 const SETTLED: f64 = 0.03;
 
-/// Part of its change of speed by which the speed in the middle of a change is not that of the shape: an eased ramp
-/// (3τ² − 2τ³) and an even one are apart by up to 0.096.
+/// Standard deviation of the speed in the middle of a change, as part of the change: an eased ramp (3τ² − 2τ³) and an even one
+/// differ by up to 0.096.
 const SHAPE_SPEED_ERROR: f64 = 0.07;
 
 impl Segment {
-    /// A train at rest, or running steadily since ever.
+    /// A train at rest, or running steadily.
     pub(crate) const fn steady(begins: f64, speed: f64) -> Self {
         let from = Pace::steady(speed);
         Self { begins, from, to: speed, shape: RampedLag::new(0.0, 0.0), residual: 0.0, braking: None }
     }
 
-    /// A start or a stop of which its law is known: from one steady speed to another, with friction (m/s²) where it ends
-    /// at rest.
+    /// A start or a stop by a known law: from one steady speed to another, with friction (m/s²) where it ends at rest.
     pub(crate) fn by_law(begins: f64, speeds: [f64; 2], shape: RampedLag, friction: Option<f64>) -> Self {
         let [from, to] = speeds;
         let from = Pace::steady(from);
@@ -126,12 +125,12 @@ impl Segment {
         segment
     }
 
-    /// Whether its speed is and stays the same.
+    /// Whether its speed is constant.
     pub(crate) fn is_steady(&self) -> bool {
         self.from == Pace::steady(self.to)
     }
 
-    /// What a command makes of a train that goes at a pace when it takes effect.
+    /// The change that a command causes in a train with a pace at the time of its effect.
     pub(crate) fn of(commanded: &SpeedCommand, answers: &Answers<'_>, from: Pace) -> Self {
         Self::toward(commanded, answers, from, answers.speed(usize::from(commanded.to), commanded.above()))
     }
@@ -139,11 +138,11 @@ impl Segment {
     /// The same where the steady speed at the step commanded is known to be `to`.
     pub(crate) fn toward(commanded: &SpeedCommand, answers: &Answers<'_>, from: Pace, to: f64) -> Self {
         let change = to - from.set;
-        // Those steps that the set speed still has to go: a change that is interrupted has not gone all of its own.
+        // The steps that the set speed still has to go: an interrupted change has not gone all of its own.
         let steps = f64::from(commanded.to) - answers.step_at(usize::from(commanded.from), from.set);
         let (lag, ramp) = answers.lag_and_ramp(change > 0.0, change, steps);
         let shape = RampedLag::new(ramp, lag);
-        // The shape cannot be less than nothing; the way that follows from the numbers is kept linear in them.
+        // A shape has no negative times; the distance stays linear in the numbers all the same.
         let cut = -change * (lag + 0.5 * ramp - shape.delay());
         let residual = if commanded.to == 0 {
             answers.stop_residual(from.set)
@@ -168,12 +167,12 @@ impl Segment {
         Rolling { friction, begins: ramp, lasts }
     }
 
-    /// The part of being behind the set speed at the beginning that is left.
+    /// The remaining part of the initial difference to the set speed.
     fn behind(&self, since: f64) -> f64 {
         libm::exp(-since / self.shape.lag())
     }
 
-    /// Way (m) run since it took effect; before that, at the speed before.
+    /// Distance (m) run since it took effect; before that, at the speed before.
     pub(crate) fn way(&self, time: f64) -> f64 {
         let since = time - self.begins;
         let Pace { speed, set } = self.from;
@@ -221,7 +220,7 @@ impl Segment {
         self.done(time - self.begins)
     }
 
-    /// A stop is done at rest, which friction brings before the lag alone would.
+    /// A stop is done at rest, which comes earlier with friction than with the lag alone.
     fn done(&self, since: f64) -> f64 {
         match self.braking {
             Some(rolling) if since >= rolling.ends() => 1.0,
@@ -230,12 +229,12 @@ impl Segment {
         }
     }
 
-    /// When the change is done but for a last bit (s, on the clock of the run).
+    /// When the change is done but for the rest that does not count (s, on the clock of the run).
     pub(crate) fn settled(&self) -> f64 {
         self.begins + self.braking.map_or_else(|| self.shape.settled(SETTLED), |rolling| rolling.ends())
     }
 
-    /// The whole way of a stop (m).
+    /// The whole distance of a stop (m).
     pub(crate) fn way_to_rest(&self) -> f64 {
         self.braking.map_or_else(|| self.displacement(), |rolling| self.way_of_stop(rolling))
     }
@@ -244,24 +243,24 @@ impl Segment {
         self.displacement() - rolling.loss(self.shape.lag())
     }
 
-    /// Mean time (s) by which the change is late against one at once.
+    /// Mean delay (s) of the change against an instantaneous one.
     pub(crate) const fn delay(&self) -> f64 {
         self.shape.delay()
     }
 
-    /// By how much the way once it is settled differs from that of a change at once (m).
+    /// By how much the distance after the change differs from that of an instantaneous change (m).
     pub(crate) fn displacement(&self) -> f64 {
         let Pace { speed, set } = self.from;
         (set - self.to) * self.shape.delay() + (speed - set) * self.shape.lag() + self.residual
     }
 
-    /// One standard deviation of where the train is within a change, as no shape is true of all decoders (m).
+    /// One standard deviation of the place within a change (m), because no shape fits all decoders.
     pub(crate) fn shape_error(&self, time: f64) -> f64 {
         let share = self.share(time);
         SHAPE_ERROR * 4.0 * share * (1.0 - share) * self.displacement().abs()
     }
 
-    /// The same of the speed (m/s).
+    /// The same for the speed (m/s).
     pub(crate) fn shape_speed_error(&self, time: f64) -> f64 {
         let share = self.share(time);
         SHAPE_SPEED_ERROR * 4.0 * share * (1.0 - share) * (self.to - self.from.speed).abs()

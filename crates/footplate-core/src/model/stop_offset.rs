@@ -1,8 +1,8 @@
-//! What stops are longer or shorter by for the place where they end: gradients, mostly.
+//! By how much stops are longer or shorter because of where they end, mostly through gradients.
 //!
-//! Downhill friction takes less of a stop, uphill more; nobody surveys the gradients of a layout. Each hop has a number of its
-//! own for how much longer stops that end on it are, learnt from where the train was found to have stopped. How far these
-//! numbers may be from nothing is learnt with them: on a level layout they stay there.
+//! Gravity lengthens a stop downhill and shortens it uphill; layouts come without surveyed gradients. Each hop therefore has a
+//! stop offset, learnt from where trains came to rest there. The standard deviation of these offsets is learnt with them: on a
+//! level layout they stay near zero.
 
 use alloc::collections::BTreeMap;
 
@@ -12,46 +12,46 @@ use crate::linalg::Gaussian;
 const FRICTION_SPEED: f64 = 0.03;
 /// Offsets are those of stops from this speed (m/s), a middle one.
 const REFERENCE_SPEED: f64 = 0.3;
-/// Offsets are at least so free (m), so that those of a level layout could still become something.
+/// Least prior standard deviation of an offset (m), so that offsets can still grow on a layout that seemed level.
 const LEAST_DEVIATION: f64 = 0.0005;
-/// Beforehand half of what stops scatter by beyond what is usual (m²) is by their places, ...
+/// A priori, half of the unexplained variance of stops (m²) comes from where they end; ...
 const BY_PLACE: f64 = 0.5;
-/// ... which is worth as much as so many hops.
+/// ... this prior weighs as much as four hops.
 const WORTH: f64 = 4.0;
 
-/// The part of its offset that a stop from a speed (m/s) shows.
+/// The share of its hop's offset that applies to a stop from a speed (m/s).
 ///
-/// A lagging stop is shorter by `f θ² ln(1 + v/(f θ))` for the friction `f`: what a gradient adds to `f` tells by the logarithm of
-/// the speed. The same shape does for other laws, which feel gradients less.
+/// Friction `f` shortens a lagging stop by `f θ² ln(1 + v/(f θ))`; a gradient adds to `f`, so its effect grows with the logarithm
+/// of the speed. The same shape serves for other laws, on which gradients have less effect.
 pub(super) fn stop_offset_share(speed: f64) -> f64 {
     libm::log1p(speed.max(0.0) / FRICTION_SPEED) / libm::log1p(REFERENCE_SPEED / FRICTION_SPEED)
 }
 
-/// By how much stops that end on a hop are longer than elsewhere, hop by hop.
+/// Stop offsets of all hops.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct StopOffsets {
     /// By hop: the offset of a stop from the reference speed (m), and its variance.
     pub(super) of_hop: BTreeMap<usize, (f64, f64)>,
-    /// One standard deviation of them (m).
+    /// The prior standard deviation of offsets (m).
     pub(super) deviation: f64,
 }
 
 impl StopOffsets {
-    /// Of a stop that ends on a hop, at the reference speed; of one that ends nobody knows where.
+    /// The offset of a stop that ends on a hop, at the reference speed; the prior for an unknown hop.
     pub(super) fn of(&self, hop: Option<usize>) -> Gaussian {
         let known = hop.and_then(|hop| self.of_hop.get(&hop).copied());
         let (mean, variance) = known.unwrap_or((0.0, self.variance()));
         Gaussian { mean, variance }
     }
 
-    /// Their variance about nothing (m²).
+    /// The prior variance of offsets (m²).
     pub(super) fn variance(&self) -> f64 {
         self.deviation.max(LEAST_DEVIATION) * self.deviation.max(LEAST_DEVIATION)
     }
 
-    /// A fit found these. The deviation goes towards what they and what is not known of them show, by expectation and
-    /// maximisation (Dempster, Laird and Rubin, 1977), from what stops scatter by anyway (m).
+    /// Takes the offsets of a fit and updates their prior deviation by expectation and maximisation (Dempster, Laird and Rubin,
+    /// 1977). `floor` is the unexplained scatter of stops (m), which the prior starts from.
     pub(super) fn learn(&mut self, found: BTreeMap<usize, (f64, f64)>, floor: f64) {
         let squares: f64 = found.values().map(|(offset, variance)| offset * offset + variance).sum();
         let count = found.len() as f64;

@@ -1,8 +1,7 @@
-//! By how much the numbers of a train change from one session to the next, and within one.
+//! Process noise: by how much the numbers of a train change between sessions and within one.
 //!
 //! The same engine in another team's session runs at 1 % another speed in the median and 10 % at worst (18 pairs of published
-//! tables); within an hour trains that get warm become some per cent faster. A model that was measured yesterday promises
-//! with what may have changed since.
+//! tables); within an hour trains that get warm become some per cent faster. Predictions from an older model include this.
 
 use super::parameters::{
     DOWN, FRICTION, HYSTERESIS, NODES, START_DELAY, START_NODES, STOP_NODES, UP, hysteresis_at, node_speed,
@@ -24,7 +23,7 @@ pub(super) struct Variation {
     kappa: f64,
     /// Of friction (m/s²).
     friction: f64,
-    /// Of what stops and starts are longer than their law, as part of the speed (m per m/s).
+    /// Of what the law of stops and starts leaves over, as part of the speed (m per m/s).
     residual: f64,
 }
 
@@ -57,7 +56,7 @@ impl Variation {
         }
     }
 
-    /// After so many times the time for which it is given, as a random walk goes.
+    /// After a multiple of its time, as a random walk.
     pub(super) fn over(self, times: f64) -> Self {
         let by = libm::sqrt(times.max(0.0));
         Self {

@@ -12,7 +12,7 @@ use super::reading_amounts::ReadingAmounts;
 use super::tolerance::distance_tolerance;
 use crate::units::Length;
 
-/// The way over which the amounts are judged (m); A.3.1.
+/// The distance over which the amounts are judged (m); A.3.1.
 const WINDOW_M: f64 = 5000.0;
 /// An amount beyond this (m) impairs; A.3.1.
 const IMPAIRED_BEYOND_M: f64 = 250.0;
@@ -147,11 +147,11 @@ mod tests {
 
     use super::*;
 
-    /// Runs a way in steps of 2 m with these parts of over- and under-reading, and says what came of it.
-    fn run(monitor: &mut AccuracyMonitor, sums: &mut ReadingAmounts, way_m: f64, over: f64, under: f64) {
-        for _ in 0..(way_m / 2.0) as u32 {
-            let way = Length::from_m(2.0);
-            sums.add(way, way * (1.0 - over), way * (1.0 + under));
+    /// Runs a distance in steps of 2 m with these parts of over- and under-reading.
+    fn run(monitor: &mut AccuracyMonitor, sums: &mut ReadingAmounts, distance_m: f64, over: f64, under: f64) {
+        for _ in 0..(distance_m / 2.0) as u32 {
+            let distance = Length::from_m(2.0);
+            sums.add(distance, distance * (1.0 - over), distance * (1.0 + under));
             monitor.take(*sums);
         }
     }
@@ -235,14 +235,14 @@ mod tests {
         /// stricter over 5000 m and what the window may be longer.
         #[test]
         fn the_window_is_neither_shorter_nor_much_longer_than_it_says(
-            ways in prop::collection::vec((0.0..200.0_f64, 0.0..0.12_f64), 1..400),
+            distances in prop::collection::vec((0.0..200.0_f64, 0.0..0.12_f64), 1..400),
         ) {
             let mut monitor = AccuracyMonitor::default();
             let mut history = std::vec![ReadingAmounts::default()];
-            for (way, part) in ways {
+            for (distance, part) in distances {
                 let mut now = *history.last().unwrap();
-                let way = Length::from_m(way);
-                now.add(way, way * (1.0 - part), way);
+                let distance = Length::from_m(distance);
+                now.add(distance, distance * (1.0 - part), distance);
                 let longest_period = 200.0;
                 let over = |window: f64| {
                     let start = history.iter().rev().find(|at| (now.travelled - at.travelled).as_m() >= window);

@@ -1,7 +1,7 @@
-//! What the command allows the train and its wheels to do right now.
+//! What the train and its wheels can do under the command.
 //!
-//! A brake takes time to build up and to release, and a wheel that was held back takes time to turn with the train
-//! again. What may still act is assumed to act; what may not act yet is not.
+//! A brake takes time to build up and to release, and a braked wheel takes time to turn with the train again. What may still act
+//! is assumed to act; what may not act yet is not.
 
 use super::sound::sound;
 use super::wheels::{Range, Vehicle, larger, smaller};
@@ -10,18 +10,18 @@ use super::wheels::{Range, Vehicle, larger, smaller};
 const COASTING: f64 = 0.02;
 /// How long full traction or full brake takes to fade (s): by 0.5 m/s³, the comfort limit of passenger trains.
 const FADE_S: f64 = 2.5;
-/// How long an acceleration is remembered because a window of counts may reach back over it (s).
+/// How long an acceleration counts (s): windows of counts reach back so far.
 const REMEMBERED_S: f64 = 0.9;
 
-/// Follows the command.
+/// The command and its after-effects.
 #[derive(Debug, Clone)]
 pub(super) struct CommandWatch {
     since_brake: f64,
     since_traction: f64,
-    /// Effort to which the brake has built up at least, and from which it has faded at most.
+    /// Least effort that the brake has built up, and largest from which it has not faded.
     built_up: f64,
     brake: f64,
-    /// Effort from which traction has faded at most.
+    /// Largest effort from which traction has not faded.
     traction: f64,
     widest: Range,
     narrower_for: f64,
@@ -38,7 +38,7 @@ pub(super) struct Allowed {
     pub(super) acceleration: Range,
     /// The same for a train whose wheels roll: brakes and motors do what is claimed of them.
     pub(super) rolling: Range,
-    /// What the command makes the train do where the rail carries it (m/s²); nothing if it is not recorded.
+    /// The commanded acceleration (m/s²); none if the command is not recorded.
     pub(super) commanded: Option<f64>,
     /// How much of full traction and of the full brake may act, 0 to 1.
     pub(super) traction: f64,
@@ -93,7 +93,7 @@ impl CommandWatch {
         let wanted = sound(-effort, 0.0, 1.0);
         let driven = sound(effort, 0.0, 1.0);
         self.built_up = smaller(wanted, self.built_up + t / larger(command.build_up.as_s(), t));
-        // Until the brake must have released, all of it may still act.
+        // All of the brake may act until it must have released.
         self.brake = larger(wanted, if slide { self.brake } else { self.brake - t / FADE_S });
         self.traction = larger(driven, if slip { self.traction } else { self.traction - t / FADE_S });
 

@@ -1,36 +1,44 @@
-//! Between which distances the train must be.
+//! The guaranteed interval of the distance.
 //!
-//! Two ways to bound a distance, and the better one counts. The bounds of the speed, summed up, are always good and
-//! always wide. The counts of a wheel that is known to turn no faster (or no slower) than the train moves are off by one
-//! pulse over any way; they are used from the moment on at which that is known.
+//! The better of two bounds counts. The integrated bounds of the speed always hold and are always wide. The counts of a wheel that
+//! cannot turn faster (or slower) than the train moves are off by a few pulses over any distance; they count from the moment
+//! from which that is certain.
 
 use super::vote::Vote;
 use super::wheels::{Range, larger, smaller};
 
-/// Pulses by which a way by counts can be off: one for the phase at the start and end, and one and a half for a row that
-/// was read so little late that its count surprises nobody.
+/// Error of a counted distance (pulses): one for the phase at start and end, one and a half for a row that was read too little
+/// late to be noticed.
 const PULSES_OFF: f64 = 2.5;
 
-/// A wheel's counts since it was last known to bound the distance from one side.
+/// What a wheel has counted since it began to bound the distance from one side.
 #[derive(Debug, Clone, Copy)]
 struct Anchor {
     /// The bound at which it was anchored (m).
     bound: f64,
-    /// What it has counted since, in pulses, weighted with the pitch (m).
+    /// Distance counted since (m).
     counted: f64,
     set: bool,
-    /// Since it was anchored there was a time when it could only loosen the bound.
+    /// At some time since, it could only loosen the bound.
     only_loosens: bool,
 }
 
 impl Anchor {
     const NONE: Self = Self { bound: 0.0, counted: 0.0, set: false, only_loosens: false };
 
-    /// The bound after `way` more (m), if the wheel held it for the whole period and before.
-    fn bound(&mut self, holds: bool, loosens: bool, way: f64, off: f64) -> Option<f64> {
+    /// Gives up what lies beyond the bound on which both wheels agree. Otherwise a faulty sensor would set the bound alone as soon
+    /// as the other wheel no longer bounds it.
+    fn agree(&mut self, own: f64, agreed: f64, off: f64) {
+        if self.set && (own - agreed).abs() > off {
+            self.bound += agreed - own;
+        }
+    }
+
+    /// The bound after `counted` more (m), if the wheel has bounded the distance all the time.
+    fn bound(&mut self, holds: bool, loosens: bool, counted: f64, off: f64) -> Option<f64> {
         self.set &= holds;
         self.only_loosens |= loosens;
-        self.counted += way;
+        self.counted += counted;
         self.set.then_some(self.bound + self.counted + off)
     }
 
@@ -41,16 +49,16 @@ impl Anchor {
     }
 }
 
-/// What one wheel turned in a period, and which bound of the distance that holds.
+/// What one wheel turned in a period, and from which side it bounds the distance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Counted {
     /// Signed pulses in the direction of travel.
     pub(super) pulses: f64,
-    /// By how many of them the count may be wrong.
+    /// How many of them may be wrong.
     pub(super) doubt: f64,
-    /// It may loosen the bound from below, but not set it: its sensor is in doubt, or traction may turn it faster.
+    /// It may loosen the lower bound but not set it: traction may turn it faster.
     pub(super) loosens_low: bool,
-    /// The same from above: its sensor is in doubt, or the brake may hold it back.
+    /// The same of the upper bound: the brake may turn it slower.
     pub(super) loosens_high: bool,
     /// Pitch (m).
     pub(super) pitch: Range,
@@ -60,7 +68,7 @@ pub(super) struct Counted {
     pub(super) at_most: bool,
 }
 
-/// Follows the bounds of the distance in the direction of travel, from where it began.
+/// Bounds of the distance in the direction of travel, from the first period.
 #[derive(Debug, Clone)]
 pub(super) struct DistanceBounds {
     distance: Range,
@@ -77,8 +85,8 @@ impl DistanceBounds {
         self.distance
     }
 
-    /// The train has moved for `t` seconds, its speed from within `before` to within `now`, its acceleration within
-    /// `acceleration`.
+    /// Moves on by `t` seconds, with the speed in `before` at first and in `now` at the end and the acceleration in
+    /// `acceleration`. Returns the distance.
     pub(super) fn moved(
         &mut self,
         before: Range,
@@ -87,13 +95,16 @@ impl DistanceBounds {
         wheels: &[Counted; 2],
         t: f64,
     ) -> Range {
-        // The mean of a speed with bounded acceleration is off the mean of its ends by at most (b - a) t / 8.
+        // With bounded acceleration, the mean speed differs from the mean of both ends by at most (b - a) t / 8.
         let bend = acceleration.width() * t * t * 0.125;
         let mut low = self.distance.low + 0.5 * (before.low + now.low) * t - bend;
         let mut high = self.distance.high + 0.5 * (before.high + now.high) * t + bend;
-        // Where both wheels bound the same side the looser bound counts: no single sensor can break it.
+        // Where both wheels bound the same side, the looser bound counts, so that no single sensor can break it.
         let (mut by_low, mut by_high) = (Vote::NONE, Vote::NONE);
-        for ((wheel, low_anchor), high_anchor) in wheels.iter().zip(&mut self.low).zip(&mut self.high) {
+        let mut own = [[None; 2]; 2];
+        for (((wheel, low_anchor), high_anchor), own) in
+            wheels.iter().zip(&mut self.low).zip(&mut self.high).zip(&mut own)
+        {
             let (short, long) = if wheel.pulses < 0.0 {
                 (wheel.pitch.high, wheel.pitch.low)
             } else {
@@ -105,17 +116,29 @@ impl DistanceBounds {
                 low_anchor.bound(wheel.at_least, wheel.loosens_low, wheel.pulses * short - doubt, -off)
             {
                 by_low = by_low.also(bound, low_anchor.only_loosens, smaller);
+                own[0] = Some(bound);
             }
             if let Some(bound) =
                 high_anchor.bound(wheel.at_most, wheel.loosens_high, wheel.pulses * long + doubt, off)
             {
                 by_high = by_high.also(bound, high_anchor.only_loosens, larger);
+                own[1] = Some(bound);
+            }
+        }
+        for ((anchors, vote), side) in
+            [(&mut self.low, by_low), (&mut self.high, by_high)].into_iter().zip([0, 1])
+        {
+            let Some(agreed) = vote.outcome() else { continue };
+            for ((anchor, own), wheel) in anchors.iter_mut().zip(&own).zip(wheels) {
+                if let Some(Some(own)) = own.get(side) {
+                    anchor.agree(*own, agreed, PULSES_OFF * wheel.pitch.high);
+                }
             }
         }
         low = by_low.outcome().map_or(low, |bound| larger(low, bound));
         high = by_high.outcome().map_or(high, |bound| smaller(high, bound));
         if low > high {
-            // Something taken for granted is not so; the speeds alone are left.
+            // A claim does not hold: only the speeds are left.
             (low, high) = (
                 (self.distance.low + before.low.min(now.low) * t).min(low),
                 (self.distance.high + before.high.max(now.high) * t).max(low),
@@ -131,12 +154,12 @@ impl DistanceBounds {
         self.distance
     }
 
-    /// The train is known to be within `place` (m from the start, in the direction of travel).
+    /// Sets the interval (m from the start, in the direction of travel).
     pub(super) fn relocate(&mut self, place: Range) {
         *self = Self::new(place);
     }
 
-    /// The bounds seen in the opposite direction, as the train turns round.
+    /// The same bounds in the opposite direction of travel.
     pub(super) fn reverse(&mut self) {
         *self = Self::new(self.distance.reversed());
     }
@@ -187,5 +210,19 @@ mod tests {
         let doubted = Counted { loosens_low: true, loosens_high: true, ..counted(37.0) };
         let alone = after([doubted, Counted { at_least: false, at_most: false, ..counted(0.0) }], 2000);
         assert!(alone.width() > 190.0, "the speeds alone: {alone:?}");
+    }
+
+    #[test]
+    fn a_sensor_that_counts_at_rest_does_not_have_its_way_once_the_other_is_not_asked() {
+        let mut bounds = DistanceBounds::new(Range::exactly(0.0));
+        let (speed, limits) = (Range { low: -0.3, high: 30.0 }, Range { low: -1.0, high: 1.0 });
+        let high = |pulses| Counted { at_most: false, ..counted(pulses) };
+        for _ in 0..200 {
+            bounds.moved(speed, speed, limits, &[high(0.0), high(24.0)], 0.05);
+        }
+        // Traction begins: the first wheel may slip and no longer bounds from below.
+        let slips = Counted { at_least: false, ..high(0.0) };
+        let distance = bounds.moved(speed, speed, limits, &[slips, high(24.0)], 0.05);
+        assert!(distance.low < 1.0, "{distance:?}: the train is at rest");
     }
 }

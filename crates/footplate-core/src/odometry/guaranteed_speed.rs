@@ -1,37 +1,37 @@
-//! Between which speeds the train must run as long as the claims of the vehicle file hold.
+//! The guaranteed interval of the speed, which holds as long as the claims of the vehicle file do.
 //!
-//! A set-membership observer: it shares nothing with the filters and minds no probability. Each hypothesis about the
-//! wheelsets has an interval that follows from the claims; the bounds span all of them that are not contradicted.
+//! A set-membership observer: it shares nothing with the filters and uses no probability. Its bounds span all states of the
+//! wheelsets that claims and counts do not contradict.
 //!
 //! - A wheel that is neither braked nor driven turns with the train; a braked one no faster, a driven one no slower.
 //! - Until the brake must have released, it may act; without a recorded command, brake and traction may always act.
 //! - While both wheelsets may slide, only the strongest acceleration that gradient and traction allow bounds the speed
 //!   from above, or what the vehicle file claims of its slide protection.
-//! - One sensor may be wrong: where both bound the same side, the looser bound counts, and one that says what no wheel
-//!   can do is passed over.
+//! - One sensor may be faulty: where both bound the same side, the looser bound counts, and a sensor that reports what no wheel
+//!   can do is disregarded.
 
 use super::command_watch::Allowed;
 use super::recent::Recent;
 use super::vote::Vote;
 use super::wheels::{Axle, Range, SlideProtection, larger, smaller};
 
-/// How long a sensor that said what no wheel can do is passed over (s).
-const PASSED_OVER_S: f64 = 3.0;
+/// How long a sensor that reported what no wheel can do is disregarded (s).
+const DISREGARDED_S: f64 = 3.0;
 
-/// What the counts of one wheel say, in the direction of travel.
+/// How the counts of one wheel bound its speed, in the direction of travel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WheelBounds {
-    /// Between which speeds it turns; `Range::ANY` if nothing is known.
+    /// Its speed; `Range::ANY` if nothing is known.
     pub(super) turns: Range,
     pub(super) axle: Axle,
 }
 
-/// Follows the bounds of the speed, in the direction of travel.
+/// Bounds of the speed in the direction of travel.
 #[derive(Debug, Clone)]
 pub(super) struct GuaranteedSpeed {
     speed: Range,
     top: f64,
-    /// How long each sensor is passed over yet (s).
+    /// How long each sensor is still disregarded (s).
     wrong_for: [f64; 2],
     shown: Recent,
     shown_low: Recent,
@@ -55,7 +55,7 @@ impl GuaranteedSpeed {
         self.speed
     }
 
-    /// Something else knows it better.
+    /// Sets them: something else has narrowed them.
     pub(super) fn set(&mut self, speed: Range) {
         self.speed = speed;
     }
@@ -65,12 +65,13 @@ impl GuaranteedSpeed {
         self.contradictions
     }
 
-    /// Which sensors are passed over.
+    /// Which sensors are disregarded.
     pub(super) fn wrong(&self) -> [bool; 2] {
         self.wrong_for.map(|left| left > 0.0)
     }
 
-    /// Narrows what the train can have got to in `t` seconds, at `least` (m/s), by what the wheels say.
+    /// Widens the bounds by what the train can do in `t` seconds, to no less than `least` (m/s), and narrows them by the
+    /// wheels.
     pub(super) fn narrow(
         &mut self,
         wheels: &[WheelBounds; 2],
@@ -92,7 +93,7 @@ impl GuaranteedSpeed {
         }
         let narrowed = possible.and(Range { low, high });
         self.speed = if narrowed.is_empty() {
-            // A claim does not hold: only what the train can do is left.
+            // A claim does not hold: only the limits of acceleration are left.
             self.contradictions += 1;
             possible.or(self.speed)
         } else {
@@ -101,13 +102,13 @@ impl GuaranteedSpeed {
         self.speed
     }
 
-    /// The bounds seen in the opposite direction, as the train turns round.
+    /// The same bounds in the opposite direction of travel.
     pub(super) fn reverse(&mut self) {
         let contradictions = self.contradictions;
         *self = Self { contradictions, ..Self::new(self.speed.reversed(), self.top) };
     }
 
-    /// Finds sensors that say what no wheel can do. What both say at once is the fault of neither.
+    /// Finds sensors that report what no wheel can do. If both do so at once, neither is to blame.
     fn watch(&mut self, wheels: &[WheelBounds; 2], allowed: &Allowed, possible: Range, t: f64) {
         let impossible = |wheel: &WheelBounds| {
             let slides = allowed.slide && wheel.axle.may_slide();
@@ -117,7 +118,7 @@ impl GuaranteedSpeed {
         let [first, second] = wheels;
         let said = [impossible(first), impossible(second)];
         for (left, impossible) in self.wrong_for.iter_mut().zip(said) {
-            *left = if impossible && said != [true; 2] { PASSED_OVER_S } else { *left - t };
+            *left = if impossible && said != [true; 2] { DISREGARDED_S } else { *left - t };
         }
     }
 
@@ -126,7 +127,7 @@ impl GuaranteedSpeed {
         let mut driven = f64::INFINITY;
         for (wheel, wrong) in wheels.iter().zip(self.wrong()) {
             if allowed.slip && wheel.axle.may_slip() {
-                // A driven wheel turns no slower than the train: it can only show that the other turns too fast.
+                // A driven wheel turns no slower than the train: it shows only that the other turns too fast.
                 driven = if wheel.turns.low.is_finite() && !wrong {
                     smaller(driven, wheel.turns.low)
                 } else {
@@ -149,7 +150,7 @@ impl GuaranteedSpeed {
         rolling.outcome().unwrap_or(f64::INFINITY)
     }
 
-    /// What the slide protection promises: but for a stated time, one wheelset turns nearly with the train.
+    /// The claim of the slide protection: except for a stated time, one wheelset turns nearly with the train.
     fn protected(
         &mut self,
         wheels: &[WheelBounds; 2],

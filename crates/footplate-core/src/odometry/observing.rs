@@ -1,4 +1,4 @@
-//! What one period says: the counts of both wheelsets, the bounds they guarantee, and what hypotheses have to explain.
+//! One period: the counts of both wheelsets, the bounds they guarantee, and what hypotheses have to explain.
 
 use super::command_watch::Allowed;
 use super::distance_bounds::Counted;
@@ -9,33 +9,37 @@ use super::odometer::Odometer;
 use super::wheel_channel::WheelChannel;
 use super::wheels::{Count, Direction, Heading, Period, Range, WheelReading};
 
-/// Faster than this a train does not turn round from one period to the next (m/s).
+/// A faster train cannot reverse between two periods (m/s).
 const CERTAIN_HEADING: f64 = 1.5;
-/// A larger reading is none of an accelerometer (m/s²).
+/// A larger reading of an accelerometer is a fault (m/s²).
 const LARGEST_READING: f64 = 50.0;
 
 impl Odometer {
-    /// Reads both wheelsets; how far each turned (m).
+    /// Reads both wheelsets. Returns how far each turned (m).
     pub(super) fn read(&mut self, period: &Period, allowed: &Allowed, t: f64) -> [f64; 2] {
         for (wheel, reading) in self.wheels.iter_mut().zip(&period.wheels) {
-            wheel.hear(reading, self.way, t);
+            wheel.read_direction(reading, self.direction, t);
         }
-        // One forward and the other backward: then neither says that the train has turned round.
+        // One forward and the other backward: neither proves that the train has reversed.
         let disputed = {
             let [first, second] = &self.wheels;
-            first.told.way() * second.told.way() < 0.0
+            first.reported.direction() * second.reported.direction() < 0.0
         };
-        if disputed && self.way < 0.0 {
-            // One of the two is wired the wrong way round; trains that run backward are rarer.
+        if disputed && self.direction < 0.0 {
+            // One of the two has swapped wires; trains that run backward are rarer.
             self.turn();
         }
-        let heading = Heading { way: self.way, certain: self.speed.abs() > CERTAIN_HEADING, disputed };
+        let heading =
+            Heading { direction: self.direction, certain: self.speed.abs() > CERTAIN_HEADING, disputed };
         let at = (t, self.vehicle.period.as_s());
         let [first, second] = &mut self.wheels;
-        [first.read(period, 0, at, heading, allowed), second.read(period, 1, at, heading, allowed)]
+        let counted =
+            [first.read(period, 0, at, heading, allowed), second.read(period, 1, at, heading, allowed)];
+        first.compare(second, t);
+        counted
     }
 
-    /// Narrows the guaranteed bounds by the counts and by an inertial sensor.
+    /// Narrows the guaranteed bounds by the counts and by an inertial sensor, and returns them.
     pub(super) fn narrow(&mut self, period: &Period, allowed: &Allowed, before: f64, t: f64) -> Range {
         let [first, second] = &self.wheels;
         let of = |wheel: &WheelChannel| WheelBounds {
@@ -43,22 +47,25 @@ impl Odometer {
             axle: wheel.wheelset.axle,
         };
         let wheels = [of(first), of(second)];
-        // Where no sensor tells a direction, a speed is an amount.
+        // Without a direction, a speed is an amount. Before its first pulse no sensor can report one.
         let tells = |reading: &WheelReading| {
             reading.direction != Direction::Unknown || matches!(reading.count, Count::Counter(_))
         };
         self.signed |= period.wheels.iter().any(tells);
-        let least = if self.signed { -self.vehicle.max_speed.as_m_per_s() } else { 0.0 };
+        self.turned |= period.wheels.iter().any(|reading| matches!(reading.count, Count::Pulses(1..)));
+        let unsigned = self.turned && !self.signed;
+        let least = if unsigned { 0.0 } else { -self.vehicle.max_speed.as_m_per_s() };
         let bounded = self.bounds.narrow(&wheels, allowed, self.vehicle.slide_protection, least, t);
         if self.settings.inertial { self.feel(period, before, bounded, t) } else { bounded }
     }
 
-    /// What the hypotheses are asked to explain.
+    /// What the hypotheses have to explain.
     pub(super) fn scene(&self, [first_counted, second_counted]: [f64; 2], allowed: &Allowed) -> Scene {
-        let of = |wheel: &WheelChannel, other: &WheelChannel, counted: f64| WheelScene {
+        let of = |wheel: &WheelChannel, counted: f64| WheelScene {
             counted,
+            late: wheel.late * wheel.pitch,
             read: wheel.is_read(),
-            stuck: wheel.is_stuck_beside(other),
+            stuck: wheel.stuck,
             speed: wheel.tracker.speed(),
             speed_deviation: wheel.tracker.speed_deviation(),
             acceleration: wheel.tracker.acceleration(),
@@ -70,7 +77,7 @@ impl Odometer {
         };
         let [first, second] = &self.wheels;
         Scene {
-            wheels: [of(first, second, first_counted), of(second, first, second_counted)],
+            wheels: [of(first, first_counted), of(second, second_counted)],
             acceleration: allowed.acceleration,
             rolling: allowed.rolling,
             commanded: allowed.commanded,
@@ -84,7 +91,7 @@ impl Odometer {
         }
     }
 
-    /// The share of the first wheelset, of the second and of what stands in for them.
+    /// The shares of the first wheelset, of the second, and of the prediction without wheels.
     pub(super) fn shares(&self) -> [f64; 3] {
         let [both, first_slips, second_slips, slip, creep, standing, first_dead, second_dead] =
             self.bank.probabilities();
@@ -94,22 +101,22 @@ impl Odometer {
         [one / total, other / total, (slip + creep) / total]
     }
 
-    /// Takes in the interval of the stated probability, which the guaranteed bounds narrow.
-    pub(super) fn enclose(&mut self, speed: Range, way: Range, bounded: Range) {
+    /// Takes in the interval of the stated probability. The guaranteed bounds narrow it.
+    pub(super) fn enclose(&mut self, speed: Range, distance: Range, bounded: Range) {
         let both = speed.and(bounded);
         self.probable_speed = if both.is_empty() { bounded } else { both };
-        let distance = self.probable_distance;
-        let distance = Range { low: distance.low + way.low, high: distance.high + way.high };
-        let both = distance.and(self.ways.distance());
-        self.probable_distance = if both.is_empty() { self.ways.distance() } else { both };
+        let before = self.probable_distance;
+        let distance = Range { low: before.low + distance.low, high: before.high + distance.high };
+        let both = distance.and(self.distance_bounds.distance());
+        self.probable_distance = if both.is_empty() { self.distance_bounds.distance() } else { both };
     }
 
-    /// What the wheels' counts say about the way of the period, as long as the claims hold.
+    /// How the counts bound the distance of the period, as long as the claims hold.
     pub(super) fn counted(&self, allowed: &Allowed) -> [Counted; 2] {
         let [first, second] = &self.wheels;
         let [first_wrong, second_wrong] = self.bounds.wrong();
-        let of = |wheel: &WheelChannel, other: &WheelChannel, wrong: bool| {
-            let good = wheel.doubt.is_finite() && !wrong && !wheel.is_stuck_beside(other);
+        let of = |wheel: &WheelChannel, wrong: bool| {
+            let good = wheel.doubt.is_finite() && !wrong && !wheel.stuck;
             let (slides, slips) = wheel.may_differ(allowed);
             Counted {
                 pulses: wheel.pulses,
@@ -121,14 +128,14 @@ impl Odometer {
                 at_most: good && !slides,
             }
         };
-        [of(first, second, first_wrong), of(second, first, second_wrong)]
+        [of(first, first_wrong), of(second, second_wrong)]
     }
 
-    /// Lets the inertial sensor narrow the bounds; what is left of them.
+    /// Lets the inertial sensor narrow the bounds, and returns them.
     fn feel(&mut self, period: &Period, before: f64, bounded: Range, t: f64) -> Range {
         let reading = period
             .acceleration
-            .map(|reading| self.way * reading.as_m_per_s2())
+            .map(|reading| self.direction * reading.as_m_per_s2())
             .filter(|reading| reading.abs() <= LARGEST_READING);
         if self.inertia.is_none() && reading.is_some() {
             self.inertia = Some(Inertia::new(before, self.bounds.speed()));

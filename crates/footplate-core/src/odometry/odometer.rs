@@ -1,7 +1,7 @@
 //! One period in, one estimate out.
 //!
-//! The order of a period: read both wheelsets; ask what the command allows; narrow the guaranteed bounds; let every
-//! hypothesis explain the counts; sum up the estimate and its interval; add up the distance.
+//! The order of a period: read both wheelsets; derive what the command allows; narrow the guaranteed bounds; update every
+//! hypothesis; combine them into an estimate and its interval; add up the distance.
 
 use super::balise_link::DistanceInterval;
 use super::command_watch::CommandWatch;
@@ -18,18 +18,18 @@ use super::wheel_channel::WheelChannel;
 use super::wheels::{Loss, Period, Range, Vehicle, VehicleError, larger, smaller};
 use crate::units::{Acceleration, Length, Speed};
 
-/// A longer time without a period breaks the run: the train can have done anything (s).
+/// A longer gap between periods breaks the run (s): the train can have done anything.
 const GAP_S: f64 = 2.0;
-/// Slower than this it may (m/s).
-const TURNED_ROUND: f64 = 0.1;
-/// First counts that differ by less are of one speed (pulses).
+/// The estimate has to run backwards by this much before the train counts as reversed (m/s).
+const REVERSED: f64 = 0.1;
+/// First counts that differ by less agree on a speed (pulses).
 const AGREE_PULSES: f64 = 2.5;
-/// Deviation of the speed that the first period tells (m/s): its counts may be a spike.
+/// Standard deviation of the speed from the first period (m/s): its counts may be a spike.
 const FIRST_SPEED: f64 = 20.0;
-/// What is larger is no command and no place on any line (m).
+/// A larger command, and a place that is farther (m), are faults.
 const LARGEST_EFFORT: f64 = 1.5;
 const FARTHEST_PLACE: f64 = 1e8;
-/// Wheels that turn this much faster than the train can run (part) are no noise.
+/// Wheels that turn this many times faster than the train can run are no noise.
 const TOO_FAST: f64 = 1.05;
 
 /// Follows one train from its first period.
@@ -39,23 +39,23 @@ pub struct Odometer {
     pub(super) settings: OdometrySettings,
     pub(super) wheels: [WheelChannel; 2],
     pub(super) command: CommandWatch,
-    /// Guaranteed bounds of speed and distance, in the direction of travel.
+    /// Guaranteed bounds of the speed and of the distance, in the direction of travel.
     pub(super) bounds: GuaranteedSpeed,
-    pub(super) ways: DistanceBounds,
+    pub(super) distance_bounds: DistanceBounds,
     pub(super) bank: Bank,
     /// The same with the stated probability.
     pub(super) probable_speed: Range,
     pub(super) probable_distance: Range,
     pub(super) last: Option<MotionEstimate>,
-    /// 1 the way in which distance grows, −1 the other.
-    pub(super) way: f64,
+    /// 1 where distance grows, −1 where it falls.
+    pub(super) direction: f64,
     /// Speed and acceleration in the direction of travel (m/s, m/s²), and the variance of the speed.
     pub(super) speed: f64,
     pub(super) acceleration: f64,
     pub(super) variance: f64,
     pub(super) distance: f64,
     pub(super) blind: f64,
-    /// How long no wheelset has told the speed (s).
+    /// How long both wheelsets have been taken to slip (s).
     pub(super) corrected_for: f64,
     /// No wheel has been read yet.
     pub(super) unread: bool,
@@ -68,12 +68,13 @@ pub struct Odometer {
     pub(super) amounts: [f64; 2],
     /// Periods in which both wheelsets turned faster than the train can run.
     pub(super) above_top: u64,
-    /// A sensor has told a direction.
+    /// A sensor has reported a direction; a wheel has turned.
     pub(super) signed: bool,
+    pub(super) turned: bool,
 }
 
 impl Odometer {
-    /// An odometer that knows the vehicle and nothing else.
+    /// An odometer for a vehicle, before its first period.
     ///
     /// # Errors
     /// The first value of the vehicle that no railway has.
@@ -82,13 +83,13 @@ impl Odometer {
         Ok(Self::fresh(vehicle, settings))
     }
 
-    /// How it works.
+    /// Its settings.
     #[must_use]
     pub fn settings(&self) -> OdometrySettings {
         self.settings
     }
 
-    /// What was learnt of the diameters; nothing if the settings do without.
+    /// The learnt diameters; none if the settings exclude balises.
     #[must_use]
     pub fn diameters(&self) -> Option<[WheelScale; 2]> {
         self.places.as_ref().map(|places| places.diameters().scales())
@@ -105,7 +106,7 @@ impl Odometer {
         let Some(last) = self.last else { return self.begin(period) };
         let t = (period.time - last.time).as_s();
         if t <= 0.0 {
-            // Time that stands still or goes back says nothing about the train.
+            // A time that does not advance tells nothing.
             return MotionEstimate { mode: worse(last.mode, Mode::Degraded), ..last };
         }
         if t > GAP_S {
@@ -117,11 +118,11 @@ impl Odometer {
         estimate
     }
 
-    /// A period after a first one of which nothing was read, as of running counters, whose first value says nothing.
+    /// A period after a first one without a count, as of running counters, whose first value only starts them.
     fn begin_late(&mut self, period: &Period, last: MotionEstimate, t: f64) -> MotionEstimate {
         let first = self.begin(period);
         let top = self.vehicle.max_speed.as_m_per_s();
-        let before = self.ways.distance();
+        let before = self.distance_bounds.distance();
         let reach = Range { low: before.low - top * t, high: before.high + top * t };
         self.relocate(reach, reach);
         self.distance += self.speed * t;
@@ -135,7 +136,8 @@ impl Odometer {
         let read = [first.begin(period, 0, t), second.begin(period, 1, t)];
         let pulse = larger(first.pitch, second.pitch) / t;
         let most = self.vehicle.max_speed.as_m_per_s();
-        let backwards = read.iter().flatten().any(|speed| *speed < 0.0) || read == [None, None];
+        let turns_forward = read.iter().flatten().any(|speed| *speed > 0.0);
+        let backwards = read.iter().flatten().any(|speed| *speed < 0.0) || !turns_forward;
         let bounds = Range { low: if backwards { -most } else { 0.0 }, high: most };
         let speed = match read {
             [Some(a), Some(b)] if (a - b).abs() < AGREE_PULSES * pulse => 0.5 * (a + b),
@@ -151,7 +153,7 @@ impl Odometer {
         self.bank = Bank::new(speed, FIRST_SPEED * FIRST_SPEED, &self.vehicle.wheelsets);
         (self.speed, self.acceleration, self.variance) = (speed, 0.0, FIRST_SPEED * FIRST_SPEED);
         self.probable_speed = bounds;
-        // Where within a pulse the wheels stand nothing tells.
+        // The phase of each wheel within its pulse is unknown.
         let Range { low, high } = self.probable_distance;
         self.probable_distance = Range { low: low - pulse * t, high: high + pulse * t };
         if let Some(published) = &mut self.published {
@@ -185,16 +187,17 @@ impl Odometer {
     /// A period after a gap in which the train can have done anything it is able to.
     fn resume(&mut self, period: &Period, last: MotionEstimate, t: f64) -> MotionEstimate {
         let top = self.vehicle.max_speed.as_m_per_s();
-        let before = self.ways.distance();
+        let before = self.distance_bounds.distance();
         let reach = Range { low: before.low - top * t, high: before.high + top * t };
         let fresh = Self::fresh(self.vehicle, self.settings);
         let mut fresh = Self {
-            way: self.way,
+            direction: self.direction,
             distance: self.distance,
             places: self.places.clone(),
             amounts: self.amounts,
             above_top: self.above_top,
             signed: self.signed,
+            turned: self.turned,
             ..fresh
         };
         fresh.relocate(reach, reach);
@@ -216,12 +219,12 @@ impl Odometer {
             wheels: [WheelChannel::new(first, &vehicle), WheelChannel::new(second, &vehicle)],
             command: CommandWatch::new(),
             bounds: GuaranteedSpeed::new(all, top),
-            ways: DistanceBounds::new(Range::exactly(0.0)),
+            distance_bounds: DistanceBounds::new(Range::exactly(0.0)),
             bank: Bank::new(0.0, top * top, &vehicle.wheelsets),
             probable_speed: all,
             probable_distance: Range::exactly(0.0),
             last: None,
-            way: 1.0,
+            direction: 1.0,
             speed: 0.0,
             acceleration: 0.0,
             variance: top * top,
@@ -240,6 +243,7 @@ impl Odometer {
             amounts: [0.0; 2],
             above_top: 0,
             signed: false,
+            turned: false,
         }
     }
 
@@ -276,16 +280,16 @@ impl Odometer {
         if let (Some(inertia), [None, None]) = (&mut self.inertia, lost) {
             inertia.align(self.speed, !allowed.slide && !allowed.slip);
         }
-        self.distance += self.way * ran;
-        self.ways.moved(speed_before, bounded, allowed.acceleration, &self.counted(&allowed), t);
+        self.distance += self.direction * ran;
+        self.distance_bounds.moved(speed_before, bounded, allowed.acceleration, &self.counted(&allowed), t);
         self.enclose(probable_speed, probable_way, bounded);
         self.place(period, effort, lost, ran);
         let states = self.states(lost, dead);
         let estimate = MotionEstimate {
             time: period.time,
-            speed: Speed::from_m_per_s(self.way * self.speed),
+            speed: Speed::from_m_per_s(self.direction * self.speed),
             speed_deviation: Speed::from_m_per_s(libm::sqrt(self.variance)),
-            acceleration: Acceleration::from_m_per_s2(self.way * self.acceleration),
+            acceleration: Acceleration::from_m_per_s2(self.direction * self.acceleration),
             distance: Length::from_m(self.distance),
             wheels: states,
             mode: self.mode(states),
@@ -293,31 +297,31 @@ impl Odometer {
             ..last
         };
         let estimate = self.finished(estimate, &last);
-        self.turn_round();
+        self.reverse_if_due();
         estimate
     }
 
-    /// The train is known to be between these places (m, in the direction of travel): guaranteed, and probably.
+    /// Sets both distance intervals (m, in the direction of travel).
     fn relocate(&mut self, guaranteed: Range, probable: Range) {
-        self.ways.relocate(guaranteed);
+        self.distance_bounds.relocate(guaranteed);
         self.probable_distance = probable;
     }
 
-    /// Lets balises correct the distance and the diameters. The train has just run `way` (m).
-    fn place(&mut self, period: &Period, effort: Option<f64>, lost: [Option<Loss>; 2], way: f64) {
+    /// Lets balises correct the distance and the diameters. The train has just run by `ran` (m).
+    fn place(&mut self, period: &Period, effort: Option<f64>, lost: [Option<Loss>; 2], ran: f64) {
         let Some(places) = &mut self.places else { return };
         let [first, second] = &self.wheels;
         let [first_lost, second_lost] = lost;
         let rolled = |wheel: &WheelChannel, lost: Option<Loss>| Rolled {
-            nominal: self.way * wheel.pulses * wheel.wheelset_pitch,
+            nominal: self.direction * wheel.pulses * wheel.wheelset_pitch,
             rolls: lost.is_none() && wheel.is_read() && wheel.doubt == 0.0,
         };
         places.roll(period.time, [rolled(first, first_lost), rolled(second, second_lost)], effort);
         let bounds_nothing = period.balise_deviation.is_some();
         let place = period.balise.filter(|place| place.as_m().abs() <= FARTHEST_PLACE && !bounds_nothing);
         let Some(balise) = place else { return };
-        let mut bounds = self.ways.distance();
-        if self.way < 0.0 {
+        let mut bounds = self.distance_bounds.distance();
+        if self.direction < 0.0 {
             bounds = bounds.reversed();
         }
         let now = DistanceInterval {
@@ -325,16 +329,16 @@ impl Odometer {
             low: Length::from_m(bounds.low),
             high: Length::from_m(bounds.high),
         };
-        let ran = Length::from_m(self.way * way);
+        let ran = Length::from_m(self.direction * ran);
         if let Some(known) = places.pass(period.time, balise, ran, &now) {
-            // What was uncertain up to here is summed up; what is uncertain from here on begins anew.
+            // The amounts of the stretch up to here are final; a new stretch begins.
             let [over, under] = &mut self.amounts;
             *over += (self.distance - bounds.low).max(0.0);
             *under += (bounds.high - self.distance).max(0.0);
             self.distance = known.estimate.as_m();
             let place = Range { low: known.low.as_m(), high: known.high.as_m() };
-            let place = if self.way < 0.0 { place.reversed() } else { place };
-            self.ways.relocate(place);
+            let place = if self.direction < 0.0 { place.reversed() } else { place };
+            self.distance_bounds.relocate(place);
             self.probable_distance = place;
         }
         for (wheel, (scale, bounds)) in self.wheels.iter_mut().zip(places.scales()) {
@@ -342,29 +346,29 @@ impl Odometer {
         }
     }
 
-    /// Looks the other way once the train has turned round.
-    fn turn_round(&mut self) {
-        let says = |wheel: &WheelChannel| wheel.told.way() * self.way;
-        let back = self.wheels.iter().any(|wheel| says(wheel) < 0.0 && wheel.told.convincing());
-        if self.speed > -TURNED_ROUND || !back || self.wheels.iter().any(|wheel| says(wheel) > 0.0) {
+    /// Changes the direction of travel once the train has reversed.
+    fn reverse_if_due(&mut self) {
+        let reports = |wheel: &WheelChannel| wheel.reported.direction() * self.direction;
+        let back = self.wheels.iter().any(|wheel| reports(wheel) < 0.0 && wheel.reported.convincing());
+        if self.speed > -REVERSED || !back || self.wheels.iter().any(|wheel| reports(wheel) > 0.0) {
             return;
         }
         self.turn();
     }
 
     pub(super) fn turn(&mut self) {
-        self.way = -self.way;
+        self.direction = -self.direction;
         self.speed = -self.speed;
         self.acceleration = -self.acceleration;
         self.bank.reverse();
         self.bounds.reverse();
-        self.ways.reverse();
+        self.distance_bounds.reverse();
         self.probable_speed = self.probable_speed.reversed();
         self.probable_distance = self.probable_distance.reversed();
         if let Some(published) = &mut self.published {
             published.restart(self.speed);
         }
-        // Its bias and the gradient are felt the other way round.
+        // Its bias and the gradient change sign.
         self.inertia = None;
         for wheel in &mut self.wheels {
             wheel.reverse();

@@ -1,4 +1,4 @@
-//! The way travelled and by how much at most it was read too long or too short: three sums that never decrease.
+//! Distance travelled, over-reading and under-reading: three sums that never decrease.
 //!
 //! An ETCS on-board unit subtracts two readings of such sums to know the confidence interval of any distance between
 //! them (SUBSET-026-3, 3.6.4). Over- and under-reading are kept apart, and running forward and backward both add
@@ -10,34 +10,32 @@ use crate::units::Length;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ReadingAmounts {
-    /// The way travelled as estimated, forward and backward added up.
+    /// Estimated distance travelled, forward plus backward.
     pub travelled: Length,
-    /// By how much at most it can be longer than the true way.
+    /// Over-reading: how much longer than the true distance it can be at most.
     pub over: Length,
-    /// By how much at most it can be shorter than the true way.
+    /// Under-reading: how much shorter than the true distance it can be at most.
     pub under: Length,
 }
 
 impl ReadingAmounts {
-    /// Adds what happened in one period: the estimated way, which is negative backwards, and the lowest and highest
-    /// that the true way can have been.
+    /// Adds a period: its estimated distance, negative backwards, and the least and largest that the true one can be.
     ///
-    /// An interval that does not hold the estimate adds to the side on which it lies and nothing to the other. What is
-    /// no number adds nothing.
-    pub fn add(&mut self, way: Length, low: Length, high: Length) {
-        let too_far_forward = (way - low).max(Length::ZERO);
-        let too_far_backward = (high - way).max(Length::ZERO);
-        let (over, under) = if way < Length::ZERO {
+    /// An interval without the estimate adds to one side only. NaN adds nothing.
+    pub fn add(&mut self, distance: Length, low: Length, high: Length) {
+        let too_far_forward = (distance - low).max(Length::ZERO);
+        let too_far_backward = (high - distance).max(Length::ZERO);
+        let (over, under) = if distance < Length::ZERO {
             (too_far_backward, too_far_forward)
         } else {
             (too_far_forward, too_far_backward)
         };
-        self.travelled += way.abs().max(Length::ZERO);
+        self.travelled += distance.abs().max(Length::ZERO);
         self.over += over;
         self.under += under;
     }
 
-    /// What was added since an earlier reading of the same sums.
+    /// What was added since an earlier reading.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
         Self {
@@ -54,9 +52,9 @@ mod tests {
 
     use super::*;
 
-    fn added(way: f64, low: f64, high: f64) -> ReadingAmounts {
+    fn added(distance: f64, low: f64, high: f64) -> ReadingAmounts {
         let mut amounts = ReadingAmounts::default();
-        amounts.add(Length::from_m(way), Length::from_m(low), Length::from_m(high));
+        amounts.add(Length::from_m(distance), Length::from_m(low), Length::from_m(high));
         amounts
     }
 
@@ -92,20 +90,20 @@ mod tests {
     }
 
     proptest! {
-        /// The sums bound the error of the way travelled, to and fro: neither can pass its amount.
+        /// The sums bound the error of the distance travelled, forward and backward.
         #[test]
         fn the_error_never_passes_the_amounts(
             periods in prop::collection::vec((-5.0..5.0_f64, 0.0..1.0_f64, 0.0..1.0_f64, 0.0..=1.0_f64), 1..200),
         ) {
             let mut amounts = ReadingAmounts::default();
             let mut truly = 0.0;
-            for (way, below, above, place) in periods {
-                // A train that runs one way within a period runs that way by the whole interval.
-                let low = if way < 0.0 { way - below } else { (way - below).max(0.0) };
-                let high = if way < 0.0 { (way + above).min(0.0) } else { way + above };
+            for (distance, below, above, place) in periods {
+                // Within a period a train runs in one direction: the whole interval has its sign.
+                let low = if distance < 0.0 { distance - below } else { (distance - below).max(0.0) };
+                let high = if distance < 0.0 { (distance + above).min(0.0) } else { distance + above };
                 truly += (low + (high - low) * place).abs();
                 let before = amounts;
-                amounts.add(Length::from_m(way), Length::from_m(low), Length::from_m(high));
+                amounts.add(Length::from_m(distance), Length::from_m(low), Length::from_m(high));
                 let added = amounts.since(&before);
                 prop_assert!(added.over.as_m() >= 0.0 && added.under.as_m() >= 0.0);
             }

@@ -49,7 +49,7 @@ impl Odometer {
 
     /// Fills in the bounds, in the sense in which distance grows, and the amounts that never decrease.
     pub(super) fn finished(&self, estimate: MotionEstimate, last: &MotionEstimate) -> MotionEstimate {
-        let sense = |range: Range| if self.way < 0.0 { range.reversed() } else { range };
+        let sense = |range: Range| if self.direction < 0.0 { range.reversed() } else { range };
         let bounds = |speed: Range, distance: Range| {
             let (speed, distance) = (sense(speed), sense(distance));
             MotionBounds {
@@ -59,9 +59,9 @@ impl Odometer {
                 distance_high: Length::from_m(distance.high),
             }
         };
-        let guaranteed = bounds(self.bounds.speed(), self.ways.distance());
+        let guaranteed = bounds(self.bounds.speed(), self.distance_bounds.distance());
         // Where a run begins the distance is guaranteed to be zero.
-        let probable = self.probable_distance.and(self.ways.distance());
+        let probable = self.probable_distance.and(self.distance_bounds.distance());
         let confidence = bounds(self.probable_speed, probable);
         let [over, under] = self.amounts;
         let over = (estimate.distance - guaranteed.distance_low + Length::from_m(over)).max(last.over);

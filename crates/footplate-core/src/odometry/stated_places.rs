@@ -1,46 +1,45 @@
-//! Distance and wheel scale by places of stated accuracy, some of which are wrong.
+//! Estimates distance and wheel scale from places of stated accuracy, some of which are wrong.
 //!
-//! A place that lies within a bound narrows bounds (`balise_link.rs`). A place with a standard deviation does not: a stop, a
-//! satellite fix or a kilometre post may be wrong by far more, and nothing says which of them. So all of the latest places
-//! are explained together, by a mixture: a place is right, with its deviation, or it is wrong and anywhere.
+//! A place within a bound narrows the guaranteed interval (`balise_link.rs`). A place with a standard deviation does not: a stop, a
+//! satellite fix or a kilometre post may be wrong by far more, and nothing marks it. All of the latest places are therefore
+//! estimated together as a mixture: a place is right, with its standard deviation, or it is wrong and anywhere.
 //!
-//! Letters: `x` distance as the odometer reckons it, `y` place, `c` what the reckoning lacks, `k` the logarithm of the scale of
-//! the reckoned distance, both estimated; `p` their covariance, `r` variance of a place, `w` probability that it is right.
-//! Between two places `c` grows by `k Δx` and by a random walk. A Kalman filter and its smoother (Rauch, Tung and Striebel,
-//! 1965) explain the places for given `w`; `w` follows from what is left of each (expectation and maximisation,
-//! Dempster, Laird and Rubin, 1977). The first rounds take the deviations for several times as large, so that a wrong
-//! place among the first ones does not decide.
+//! Letters: `x` distance by the odometer, `y` place, `c` error of the odometer's distance, `k` logarithm of its scale, both
+//! estimated; `p` their covariance, `r` variance of a place, `w` probability that it is right. Between two places `c` grows by
+//! `k Δx` and by a random walk. A Kalman filter and its smoother (Rauch, Tung and Striebel, 1965) estimate them for given
+//! `w`; `w` follows from the residuals (expectation and maximisation, Dempster, Laird and Rubin, 1977). The first
+//! rounds enlarge the standard deviations, so that a wrong place among the first ones does not decide.
 
 use libm::{exp, sqrt};
 
 use crate::units::Length;
 
-/// So many of the latest places are explained together; when there are more, every second one of the older half is dropped.
+/// Number of places that are estimated together. When there are more, every second one of the older half is dropped.
 pub const MOST_PLACES: usize = 64;
-/// The part of places that is wrong, before any is seen. Chosen: stops of trams are wrong in a few per cent.
+/// Prior share of wrong places. Chosen: stops of trams are wrong in a few per cent.
 const WRONG: f64 = 0.1;
-/// A wrong place is anywhere within so many metres, either way. Chosen: the next platform end; what is farther is no
-/// likelier to be right.
+/// A wrong place is anywhere within this distance (m). Chosen: the next platform end; what is farther is no likelier to be
+/// right.
 const WRONG_WITHIN_M: f64 = 30.0;
 /// Creepage that changes from hop to hop: 0.08 % of 500 m, as a random walk (m² a metre); chosen on 100 simulated rides so that 95 of
 /// 100 scales lie in their interval.
 const WALK_M2_PER_M: f64 = 3.0e-4;
-/// Where within a pulse the wheels stand, at the first row (m).
+/// Standard deviation of the phase within a pulse at the first row (m).
 const START_DEVIATION_M: f64 = 0.05;
-/// Before any place the reckoning may lack so much (m): its zero and that of the places need not be the same.
+/// Standard deviation of the zero of the odometer against that of the places (m).
 const UNKNOWN_START_M: f64 = 1e6;
-/// What of the scale creepage and cones leave open however many places there are. As for balises.
+/// Standard deviation of the scale that creepage and cones leave, however many places there are. As for balises.
 const NEVER_BETTER_THAN: f64 = 1e-4;
-/// By how much deviations are enlarged, round by round.
+/// Factors of the standard deviations, round by round.
 const ROUNDS: [f64; 12] = [8.0, 4.0, 4.0, 2.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
-/// A place that is less probable to be right is called wrong.
+/// A place with a smaller probability to be right counts as wrong.
 const PROBABLE: f64 = 0.5;
-/// No place counts for less (part), so that no variance is infinite.
+/// Least weight of a place, so that no variance is infinite.
 const LEAST_WEIGHT: f64 = 1e-9;
-/// A place that is better is not known to be so (m), and one that is worse says nothing.
+/// Limits of a stated standard deviation (m).
 const BEST_DEVIATION_M: f64 = 0.01;
 const WORST_DEVIATION_M: f64 = 1e5;
-/// What is farther is no place on any line (m).
+/// No place on a line is farther (m).
 const FARTHEST_M: f64 = 1e8;
 
 /// A value and its standard deviation.
@@ -55,13 +54,13 @@ pub struct PlacedValue {
 /// A place that was passed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Mark {
-    /// Reckoned distance (m).
+    /// Distance by the odometer (m).
     x: f64,
-    /// Where the place is said to lie (m).
+    /// Stated place (m).
     y: f64,
     /// Its variance (m²).
     r: f64,
-    /// Variance that the reckoning gained since the mark before (m²).
+    /// Variance gained since the mark before (m²).
     walked: f64,
     /// The probability that it is right.
     w: f64,
@@ -78,13 +77,13 @@ struct Known {
 }
 
 impl Known {
-    /// Carries it over a reckoned distance.
+    /// Predicts over a distance.
     fn moved(self, dx: f64, walked: f64) -> Self {
         let Self { c, k, p: [cc, ck, kk] } = self;
         Self { c: c + k * dx, k, p: [cc + 2.0 * dx * ck + dx * dx * kk + walked, ck + dx * kk, kk] }
     }
 
-    /// Takes in that the reckoning lacks `z`, with a variance.
+    /// Takes in a measurement `z` of the error, with a variance.
     fn measured(self, z: f64, r: f64) -> Self {
         let Self { c, k, p: [cc, ck, kk] } = self;
         let s = cc + r;
@@ -94,14 +93,14 @@ impl Known {
     }
 }
 
-/// Explains the places of one run. Fixed memory.
+/// The places of one run. Fixed memory.
 #[derive(Debug, Clone)]
 pub struct StatedPlaces {
     marks: [Mark; MOST_PLACES],
     count: usize,
     /// Variance of the logarithm of the scale before any place.
     prior: f64,
-    /// Variance that the reckoning gained while wheels slid, since the latest mark (m²).
+    /// Variance gained while wheels slid, since the latest mark (m²).
     slid: f64,
     latest: Known,
     at: f64,
@@ -109,10 +108,10 @@ pub struct StatedPlaces {
 }
 
 impl StatedPlaces {
-    /// No place has been passed; the scale of the reckoned distance lies within `tolerance` of 1.
+    /// Without a place; the scale of the distance lies within `tolerance` of 1.
     #[must_use]
     pub fn new(tolerance: f64) -> Self {
-        // Even within the tolerance.
+        // Uniform within the tolerance.
         let prior = (tolerance * tolerance / 3.0).max(NEVER_BETTER_THAN * NEVER_BETTER_THAN);
         let start = Mark { r: START_DEVIATION_M * START_DEVIATION_M, ..NO_MARK };
         let mut marks = [NO_MARK; MOST_PLACES];
@@ -123,7 +122,7 @@ impl StatedPlaces {
         Self { marks, count: 1, prior, slid: 0.0, latest, at: 0.0, passed: 0 }
     }
 
-    /// The reckoning was carried over a slide, which may be off by this.
+    /// A slide made the distance uncertain by this.
     pub fn slid(&mut self, deviation: Length) {
         let deviation = deviation.as_m();
         if deviation.abs() <= WORST_DEVIATION_M {
@@ -131,7 +130,7 @@ impl StatedPlaces {
         }
     }
 
-    /// A place was passed at a reckoned distance. What is no number is left out.
+    /// Takes in a place at a distance. NaN is ignored.
     pub fn pass(&mut self, reckoned: Length, place: Length, deviation: Length) {
         let (x, y, sd) = (reckoned.as_m(), place.as_m(), deviation.as_m());
         let known = x.abs() <= FARTHEST_M && y.abs() <= FARTHEST_M && sd > 0.0 && sd <= WORST_DEVIATION_M;
@@ -150,14 +149,14 @@ impl StatedPlaces {
         self.explain();
     }
 
-    /// How many places were passed, and how many of those that are remembered are wrong.
+    /// Number of places passed, and of wrong ones among those kept.
     #[must_use]
     pub fn passed_and_wrong(&self) -> [usize; 2] {
         let wrong = self.remembered().iter().skip(1).filter(|mark| mark.w < PROBABLE).count();
         [self.passed, wrong]
     }
 
-    /// What the places say of a reckoned distance ahead of the latest place: the distance.
+    /// Estimate of the true distance where the odometer has this one, ahead of the latest place.
     #[must_use]
     pub fn distance(&self, reckoned: Length) -> PlacedValue {
         let dx = reckoned.as_m() - self.at;
@@ -166,7 +165,7 @@ impl StatedPlaces {
         PlacedValue { value: reckoned.as_m() + now.c, deviation: sqrt(variance.max(0.0)) }
     }
 
-    /// True over reckoned distance.
+    /// True distance over that of the odometer.
     #[must_use]
     pub fn scale(&self) -> PlacedValue {
         let [.., variance] = self.latest.p;
@@ -183,7 +182,7 @@ impl StatedPlaces {
         self.remembered().last().copied().unwrap_or(NO_MARK)
     }
 
-    /// Drops every second mark of the older half, but not the start; what the reckoning walked to it goes on to the next.
+    /// Drops every second mark of the older half except the start; its variance goes to the next mark.
     fn make_room(&mut self) {
         if self.count < MOST_PLACES {
             return;
@@ -203,8 +202,8 @@ impl StatedPlaces {
         (self.marks, self.count) = (kept, count);
     }
 
-    /// Finds which places are right, and what they say together: places count from where the run began, unless more of them are
-    /// right if they count from elsewhere.
+    /// Estimates which places are right, and the state. Places count from the start of the run, unless more of them are right if they
+    /// count from elsewhere.
     fn explain(&mut self) {
         let from_start = self.explained(true);
         let from_elsewhere = self.explained(false);
@@ -217,7 +216,7 @@ impl StatedPlaces {
         (self.marks, self.latest, self.at) = (marks, latest, self.newest().x);
     }
 
-    /// The marks with their probabilities, and what is known at the last of them; with or without the start.
+    /// The marks with their probabilities, and the state at the last of them; with or without the start.
     fn explained(&self, from_start: bool) -> ([Mark; MOST_PLACES], Known) {
         let count = self.count;
         let mut marks = self.marks;
@@ -241,7 +240,7 @@ impl StatedPlaces {
                 };
                 (known, x) = (*after, mark.x);
             }
-            // Backwards: what all places say of each.
+            // Backwards: the smoother.
             let mut next: Option<(Known, Known, f64)> = None;
             let steps = marks.iter_mut().zip(&before).zip(&after).take(count).enumerate();
             for (at, ((mark, before), after)) in steps.rev() {
@@ -260,7 +259,7 @@ impl StatedPlaces {
     }
 }
 
-/// One step of the smoother: what was known after a mark, given what all say of the next one.
+/// One step of the smoother: the state after a mark, given the smoothed state after the next one.
 fn smoothed(after: &Known, predicted: &Known, next: &Known, dx: f64) -> Known {
     let [cc, ck, kk] = after.p;
     let [pcc, pck, pkk] = predicted.p;
@@ -288,7 +287,7 @@ fn smoothed(after: &Known, predicted: &Known, next: &Known, dx: f64) -> Known {
     }
 }
 
-/// The probability that a place is right, by the square of what is left of it and its variance.
+/// The probability that a place is right, from its squared residual and the variance of that.
 fn right(squared: f64, variance: f64) -> f64 {
     let density = exp(-0.5 * squared / variance) / sqrt(2.0 * core::f64::consts::PI * variance);
     let wrong = WRONG / (2.0 * WRONG_WITHIN_M);
@@ -360,7 +359,7 @@ mod tests {
     }
 
     proptest! {
-        /// Any places: every number stays one, and deviations stay above zero.
+        /// With any places, all numbers stay finite and standard deviations positive.
         #[test]
         fn any_places_leave_numbers(
             marks in prop::collection::vec((any::<f64>(), any::<f64>(), any::<f64>()), 0..20),

@@ -1,10 +1,10 @@
-//! What all wheels that bound something from one side agree on.
+//! The bound on which all wheels that bound one side agree.
 
-/// The bound on which every wheel asked agrees, so that one sensor that is wrong cannot break it.
+/// The loosest bound of all wheels that have one, so that one faulty sensor cannot break it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Vote {
     bound: Option<f64>,
-    /// One of the wheels is beyond doubt.
+    /// At least one of the wheels may set the bound.
     counts: bool,
 }
 

@@ -1,4 +1,4 @@
-//! One wheelset from its reading to what it shows: speed, acceleration, and the bounds that its counts set.
+//! One wheelset: from its reading to its speed, its acceleration and the bounds that its counts set.
 
 use super::command_watch::Allowed;
 use super::wheels::{
@@ -6,29 +6,30 @@ use super::wheels::{
     WheelReading, WheelTracker, Wheelset,
 };
 
-/// Pulses by which a count can surprise a wheel that rolls: one for the phase at either end, one for what its
-/// acceleration changed meanwhile ...
+/// A count of a rolling wheel differs from the expected one by no more than this (pulses): one for the phase at either end, one
+/// for a change of acceleration ...
 const SURPRISE_PULSES: f64 = 2.2;
-/// ... and by which it rarely does.
+/// ... and rarely by more than this.
 const RARE_PULSES: f64 = 1.5;
-/// Accelerations of a wheelset beyond which a count surprises (m/s²): of one that can only roll, and of one that can
-/// slip, slide or regain its grip.
+/// Largest accelerations of a wheelset (m/s²): of one that can only roll, and of one that can slip, slide or regain its grip.
 const ROLLING: f64 = 2.5;
 const SLIPPING: f64 = 30.0;
 /// A count that is the same for longer is hardly that of a wheel (s).
 const STUCK_AFTER_S: f64 = 0.7;
-/// Readings before the tracker knows enough to be surprised.
+/// Readings after which the tracker's expectation is good enough to reject a count.
 const WARM: u32 = 8;
-/// By how much a wheel may turn faster than the fastest train (m/s): spinning on the spot.
+/// How many times faster than the fastest train a wheel may turn: one that rolls or is braked, and one that a motor can
+/// spin, which slip control stops no sooner than the train's own wheels let it.
 const FASTER_THAN_TRAIN: f64 = 1.2;
+const FASTER_SPINNING: f64 = 4.0;
 
-/// What one wheelset tells the odometer.
+/// One wheelset as the odometer follows it.
 #[derive(Debug, Clone)]
 pub(super) struct WheelChannel {
     pub(super) wheelset: Wheelset,
-    /// By the diameter it is believed to have (m) ...
+    /// Pitch by the stated diameter (m) ...
     pub(super) wheelset_pitch: f64,
-    /// ... and by what was learnt of it.
+    /// ... and by the learnt one (m).
     pub(super) pitch: f64,
     pub(super) pitch_range: Range,
     /// The inverse of the pitch (1/m).
@@ -37,14 +38,18 @@ pub(super) struct WheelChannel {
     pub(super) quality: Quality,
     /// Pulses of the period in the direction of travel.
     pub(super) pulses: f64,
+    /// Those of them that were not read in the period.
+    pub(super) late: f64,
     pub(super) missing_for: f64,
     /// How long its count has been the same and not zero (s).
     same_for: f64,
-    /// By how many pulses its last count may be wrong.
+    /// That count is no wheel's.
+    pub(super) stuck: bool,
+    /// How many pulses its last count may be wrong by.
     pub(super) doubt: f64,
     doubt_before: f64,
-    /// Which way its sensor lately said it turned.
-    pub(super) told: ReportedDirection,
+    /// The direction that its sensor reported lately.
+    pub(super) reported: ReportedDirection,
     tachometer: Tachometer,
     windows: CountWindows,
     readings: u32,
@@ -55,6 +60,7 @@ impl WheelChannel {
     pub(super) fn new(wheelset: Wheelset, vehicle: &Vehicle) -> Self {
         let pitch = wheelset.pulse_pitch().as_m();
         let period = vehicle.period.as_s();
+        let faster = if wheelset.axle.may_slip() { FASTER_SPINNING } else { FASTER_THAN_TRAIN };
         Self {
             wheelset,
             wheelset_pitch: pitch,
@@ -64,19 +70,21 @@ impl WheelChannel {
             tracker: WheelTracker::new(pitch, period),
             quality: Quality::Missing,
             pulses: 0.0,
+            late: 0.0,
             missing_for: 0.0,
             same_for: 0.0,
+            stuck: false,
             doubt: 0.0,
             doubt_before: 0.0,
-            told: ReportedDirection::default(),
+            reported: ReportedDirection::default(),
             tachometer: Tachometer::new(),
             windows: CountWindows::new(period),
             readings: 0,
-            most_per_second: FASTER_THAN_TRAIN * vehicle.max_speed.as_m_per_s() / pitch,
+            most_per_second: faster * vehicle.max_speed.as_m_per_s() / pitch,
         }
     }
 
-    /// Takes in a reading, `t` seconds after the last one and `nominal` after by plan; says how far the wheel turned (m).
+    /// Takes in a reading, `t` seconds after the last one where `nominal` were planned. Returns how far the wheel turned (m).
     #[inline]
     pub(super) fn read(
         &mut self,
@@ -97,7 +105,7 @@ impl WheelChannel {
             if warm { SURPRISE_PULSES + acceleration * added } else { f64::INFINITY }
         };
         let expectation = Expected {
-            pulses: expected * heading.way,
+            pulses: expected * heading.direction,
             more: leeway(most),
             fewer: leeway(most),
             rolling: RARE_PULSES + ROLLING * added,
@@ -105,9 +113,10 @@ impl WheelChannel {
         };
         let turn = self.tachometer.read(reading, t / nominal, heading, &expectation);
         self.quality = turn.quality;
-        let pulses = turn.pulses * heading.way;
+        let pulses = turn.pulses * heading.direction;
         self.same_for = if pulses == self.pulses && pulses != 0.0 { self.same_for + t } else { 0.0 };
         self.pulses = pulses;
+        self.late = turn.late * heading.direction;
         let counted = self.pulses * self.pitch;
         self.doubt = turn.doubt;
         if turn.doubt.is_finite() {
@@ -134,18 +143,18 @@ impl WheelChannel {
         counted
     }
 
-    /// Minds which way the sensor says it turned.
-    pub(super) fn hear(&mut self, reading: &WheelReading, way: f64, t: f64) {
-        self.told.hear(reading, self.tachometer.wiring(), way * self.pulses, t);
+    /// Takes in the direction that the sensor reports.
+    pub(super) fn read_direction(&mut self, reading: &WheelReading, way: f64, t: f64) {
+        self.reported.read(reading, self.tachometer.wiring(), way * self.pulses, t);
     }
 
-    /// The first reading of a run: only a speed is known from it.
+    /// The first reading of a run, which tells only a speed.
     pub(super) fn begin(&mut self, period: &Period, which: usize, t: f64) -> Option<f64> {
         let reading = period.wheels.get(which)?;
         let most = self.most_per_second * t + SURPRISE_PULSES;
         let any = f64::INFINITY;
         let open = Expected { pulses: 0.0, more: any, fewer: any, rolling: any, most };
-        let uncertain = Heading { way: 1.0, certain: false, disputed: false };
+        let uncertain = Heading { direction: 1.0, certain: false, disputed: false };
         let turn = self.tachometer.read(reading, 1.0, uncertain, &open);
         self.quality = turn.quality;
         if turn.quality == Quality::Missing {
@@ -154,7 +163,7 @@ impl WheelChannel {
         Some(turn.pulses * self.pitch / t)
     }
 
-    /// Between which speeds the train must run if this wheel rolls; nothing if it is not asked.
+    /// The speeds that the train can have if this wheel rolls; any while its count is in doubt.
     pub(super) fn turns(&self, acceleration: Range) -> Range {
         if self.doubt.is_infinite() {
             return Range::ANY;
@@ -162,7 +171,7 @@ impl WheelChannel {
         self.windows.speed(self.pitch_range, acceleration)
     }
 
-    /// Its diameter is so many times the believed one.
+    /// Its diameter is `scale` times the stated one.
     pub(super) fn rescale(&mut self, scale: f64, bounds: Range) {
         self.pitch = self.wheelset_pitch * scale;
         self.pulses_per_m = 1.0 / self.pitch;
@@ -170,14 +179,28 @@ impl WheelChannel {
             Range { low: self.wheelset_pitch * bounds.low, high: self.wheelset_pitch * bounds.high };
     }
 
-    /// Its count stands still, where that of a wheel that turns goes to and fro by one.
-    fn is_stuck(&self) -> bool {
+    /// Whether its count has been constant for too long: that of a wheel that turns changes by one now and then.
+    fn stands_still(&self) -> bool {
         self.same_for > STUCK_AFTER_S
     }
 
-    /// The same, while the count of the other wheel moves.
-    pub(super) fn is_stuck_beside(&self, other: &Self) -> bool {
-        self.is_stuck() && other.is_read() && other.pulses != 0.0 && !other.is_stuck()
+    /// Whether its count changes as that of a wheel that turns.
+    fn moves(&self) -> bool {
+        self.is_read() && self.pulses != 0.0 && !self.stands_still()
+    }
+
+    /// Compares both counts of a period of `t` seconds. A constant count, not zero, beside one that changes is stuck until it
+    /// changes itself, even if the other wheel stops.
+    pub(super) fn compare(&mut self, other: &mut Self, t: f64) {
+        let (moves, other_moves) = (self.moves(), other.moves());
+        for (wheel, beside) in [(self, other_moves), (other, moves)] {
+            let was = wheel.stuck;
+            wheel.stuck = wheel.stands_still() && (was || beside);
+            if was && !wheel.stuck && wheel.doubt > 0.0 {
+                // What was followed while it was stuck says nothing.
+                wheel.tracker.restart(wheel.pulses * wheel.pitch / t);
+            }
+        }
     }
 
     /// The true pitch lies within this part of the assumed one.
@@ -185,7 +208,7 @@ impl WheelChannel {
         0.5 * self.pitch_range.width() * self.pulses_per_m
     }
 
-    /// The train has turned round.
+    /// Reverses everything: the train has reversed.
     pub(super) fn reverse(&mut self) {
         self.tracker.reverse();
         self.windows.reverse();
@@ -197,7 +220,7 @@ impl WheelChannel {
         (allowed.slide && axle.may_slide(), allowed.slip && axle.may_slip())
     }
 
-    /// Its sample was read.
+    /// Whether its sample was read.
     pub(super) fn is_read(&self) -> bool {
         self.quality != Quality::Missing
     }

@@ -1,4 +1,4 @@
-//! Circuits: ways that lead back to where they began, on which a train can run for as long as it likes.
+//! Circuits: routes that lead back to their start, on which a train can run without end.
 
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec;
@@ -12,19 +12,19 @@ use crate::units::Length;
 /// good enough to run on.
 const MAX_TRIED: usize = 1 << 16;
 
-/// Contacts that a way to a circuit may pass. A train that is farther away meets a better start on its way.
+/// The most sensors on the lead to a circuit. A train that is farther away passes a better start on the way.
 const LONGEST_LEAD: usize = 6;
 
-/// A closed way, and how to get onto it.
+/// A closed route, and the lead onto it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Circuit {
-    /// The way from the start to the first hop of the lap; none when the start lies on the lap.
+    /// The hops from the start to the first hop of the lap; none if the start is on the lap.
     pub lead: Vec<HopId>,
-    /// The lap: hop after hop, from a contact back to it.
+    /// The hops of the lap, from a sensor back to it.
     pub lap: Vec<HopId>,
     /// The length of one lap.
     pub length: Length,
-    /// How the turnouts on the lap have to lie, each once, those met from a leg included: points that give way wear.
+    /// The turnouts that the lap needs, each once, with trailed ones: trailed points wear.
     pub legs: Vec<(TurnoutId, Leg)>,
 }
 
@@ -36,12 +36,12 @@ impl Circuit {
 }
 
 impl Layout {
-    /// The best circuit that a train at a node can get onto without turning around: the one with the most contacts,
+    /// The best circuit that a train at a node can reach without reversing: the one with the most sensors,
     /// then the one with the fewest turnouts to be thrown for their curved leg, then the longest; always the same one.
     ///
     /// No hop of it touches a stretch in `avoid`, and no turnout in `held` has to lie otherwise than given there
-    /// (`None`: nobody knows how it lies, so that it is not to be met at its toe at all). Held turnouts cannot be
-    /// thrown just now, for a train stands on them or is too near.
+    /// (`None`: its position is unknown, so that it is not passed from its toe). Held turnouts cannot be thrown just now, as a
+    /// train is on them or too near.
     #[must_use]
     pub fn circuit_from(
         &self,
@@ -52,7 +52,7 @@ impl Layout {
         self.circuit_over(start, held, avoid, &|_| 1)
     }
 
-    /// The same where contacts count by the hop that leads to them: the circuit over which the most is gained.
+    /// The same with a value for each hop: the circuit with the greatest sum.
     #[must_use]
     pub fn circuit_over(
         &self,
@@ -80,13 +80,13 @@ struct Search<'l> {
 
 struct Best {
     circuit: Circuit,
-    /// Twice what the lap is worth, less its lead: a lead costs a contact's worth of time for each of its hops, once.
+    /// Twice the value of the lap, less one for each hop of its lead.
     worth: usize,
     curved: usize,
 }
 
 impl<'l> Search<'l> {
-    /// The shortest ways, by contacts, to every node that can be the first of a lap: the start itself first.
+    /// The leads with the fewest sensors to every node that can begin a lap, the start itself first.
     fn leads_from(&self, start: NodeId) -> Vec<Vec<HopId>> {
         let mut leads: Vec<Vec<HopId>> = vec![];
         let mut seen = vec![start];
@@ -107,7 +107,7 @@ impl<'l> Search<'l> {
         leads
     }
 
-    /// Whether a train may take a hop, as far as one hop can tell.
+    /// Whether a hop on its own may be part of a circuit.
     fn is_allowed(&self, hop: &Hop<'_>) -> bool {
         hop.sensor.is_some()
             && !hop.edges.iter().any(|edge| self.avoid.contains(&edge.stretch()))
@@ -161,7 +161,7 @@ impl<'l> Search<'l> {
         }
     }
 
-    /// Adds what a hop needs to what the lap needs so far, unless they contradict each other; the turnouts added.
+    /// Adds the needs of a hop to those of the lap, unless they contradict each other. Returns the turnouts added.
     fn agree(&self, hop: &Hop<'_>, legs: &mut BTreeMap<TurnoutId, Leg>) -> Option<Vec<TurnoutId>> {
         let mut added = Vec::new();
         for need in hop.needs {

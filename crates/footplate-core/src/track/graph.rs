@@ -60,7 +60,7 @@ pub struct Node {
 /// What is at a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum NodeKind {
-    /// A trackside contact.
+    /// A sensor.
     Sensor(SensorId),
     /// A turnout, met at its toe.
     Branch(TurnoutId),

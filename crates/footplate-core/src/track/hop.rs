@@ -81,7 +81,7 @@ impl Layout {
         self.hops.get(id)
     }
 
-    /// A length that a hop hardly falls short of. The end of a track that nobody measured may be right behind the last
+    /// A length that a hop hardly falls short of. The end of a track that was not measured may be right behind the last
     /// sensor before it.
     #[must_use]
     pub fn least_length(&self, hop: &Hop<'_>) -> Length {

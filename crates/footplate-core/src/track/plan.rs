@@ -46,7 +46,7 @@ pub struct PlannedZone {
 /// A place on the rails: a node for each direction of travel.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
-    /// A trackside contact that tells the direction of travel: it reports as one sensor or as the other.
+    /// A contact that shows the direction of travel: it reports as one sensor or as the other.
     Sensor {
         /// The names of the two directions.
         names: [String; 2],

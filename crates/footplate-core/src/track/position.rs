@@ -29,7 +29,7 @@ pub enum WayError {
     NotOnLayout,
     /// The way to go is no number.
     NotFinite,
-    /// A turnout decides where the way leads, and nobody knows how it lies.
+    /// A turnout of unknown position decides where the path leads.
     TurnoutUnknown {
         /// The turnout.
         turnout: TurnoutId,

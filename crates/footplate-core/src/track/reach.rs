@@ -1,6 +1,6 @@
 //! Reaches: the sensors that may report next when some on the way stay silent.
 //!
-//! A contact is missed now and then: after C15 comes E11, and D12 between them said nothing. A reach is one to
+//! A detection is missed now and then: after C15 comes E11, and D12 between them was silent. A reach is one to
 //! [`MAX_MISSED`] + 1 hops in a row; all but its last sensor were missed.
 
 use crate::ids::{EdgeId, NodeId, SensorId};

@@ -1,15 +1,20 @@
 //! Whether reports can come from a layout: a sensor follows another only where rails lead from one to the other.
 //!
-//! Turnouts may lie anyhow, up to [`LOOK_PAST`] sensors in a row may stay silent, sensors report by themselves now and
-//! then, and people lift trains. So single reports that do not fit prove nothing: a layout is contradicted when so many of
-//! them do not fit that the right layout would hardly ever show as many (a one-sided binomial test).
+//! Turnouts may lie anyhow, up to [`LOOK_PAST`] sensors in a row may stay silent, sensors report without a train now and
+//! then, and people lift trains. So a single report that does not fit proves nothing. The layout is contradicted when more
+//! reports do not fit than the right layout would show by chance (a one-sided binomial test). Reports while all trains are
+//! at rest are no evidence: no train caused them.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
 use crate::event::{Event, EventKind};
-use crate::ids::{NodeId, SensorId};
+use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
+use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Layout, TurnoutStates};
+
+/// A train is at rest this long after its stop command (the longest published stop).
+const STOPS_WITHIN: TimeSpan = TimeSpan::from_s(5.0);
 
 /// Sensors in a row that may have stayed silent.
 const LOOK_PAST: usize = 2;
@@ -56,14 +61,30 @@ pub struct SequenceTest {
     /// A report that did not fit: a train may be there after all.
     elsewhere: Option<NodeId>,
     last: Option<SensorId>,
+    /// Trains that have not been commanded yet and may be running.
+    uncommanded: usize,
+    /// The last command to each train: the time of a stop, `None` for a step that moves it.
+    stops: BTreeMap<TrainId, Option<Timestamp>>,
     followed: u32,
     stray: BTreeMap<(Option<SensorId>, SensorId), u32>,
 }
 
 impl SequenceTest {
-    /// A run begins in which so many trains move: nobody knows where they are.
+    /// Begins a run in which `trains` trains may be running already, at unknown places.
     pub fn begin_run(&mut self, trains: usize) {
+        self.begin_run_at_rest(trains);
+        self.uncommanded = self.trains;
+    }
+
+    /// Begins a run with `trains` trains at rest, at unknown places: none runs before a command says so.
+    pub fn begin_run_at_rest(&mut self, trains: usize) {
         self.trains = trains.max(1);
+        self.uncommanded = 0;
+        self.stops.clear();
+        self.forget_places();
+    }
+
+    fn forget_places(&mut self) {
         self.places.clear();
         (self.elsewhere, self.last) = (None, None);
     }
@@ -71,11 +92,29 @@ impl SequenceTest {
     /// The next entry of the run.
     pub fn take(&mut self, layout: &Layout, event: &Event) {
         match event.kind {
+            EventKind::Sensor(_) if self.all_at_rest(event.time) => {}
             EventKind::Sensor(report) => self.report(layout, report.sensor),
-            // Which of the places is that of the train nobody says; it goes back from there.
-            EventKind::Reverse { .. } => self.begin_run(self.trains),
-            EventKind::Speed { .. } | EventKind::Turnout { .. } | EventKind::Stopped { .. } => {}
+            // The places do not say which of them is this train's, and it goes back from there.
+            EventKind::Reverse { .. } => self.forget_places(),
+            EventKind::Speed { train, step } => {
+                let stop = (step == SpeedStep::STAND).then_some(event.time);
+                match self.stops.get_mut(&train) {
+                    // Stations repeat commands: the first one stopped the train.
+                    Some(known) => *known = stop.map(|time| known.unwrap_or(time)),
+                    None => {
+                        self.stops.insert(train, stop);
+                        self.uncommanded = self.uncommanded.saturating_sub(1);
+                    }
+                }
+            }
+            EventKind::Turnout { .. } | EventKind::Stopped { .. } => {}
         }
+    }
+
+    /// Whether the commands so far leave no train in motion.
+    fn all_at_rest(&self, now: Timestamp) -> bool {
+        let rests = |stop: &Option<Timestamp>| stop.is_some_and(|since| now - since >= STOPS_WITHIN);
+        self.uncommanded == 0 && self.stops.values().all(rests)
     }
 
     fn report(&mut self, layout: &Layout, sensor: SensorId) {
@@ -148,7 +187,6 @@ fn chance_of_as_many(count: u32, all: u32) -> f64 {
 mod tests {
     use super::*;
     use crate::event::Report;
-    use crate::time::Timestamp;
     use crate::track::example::oval;
 
     fn walked(trains: usize, names: &[&str]) -> SequenceVerdict {
@@ -171,6 +209,34 @@ mod tests {
         assert_eq!(walked(1, &names), SequenceVerdict::Fits);
         assert_eq!(walked(1, &[]), SequenceVerdict::Fits);
         assert_eq!(walked(1, &["A1", "E1", "B2"]), SequenceVerdict::Fits, "too few to tell");
+    }
+
+    #[test]
+    fn reports_while_all_trains_are_at_rest_are_no_evidence() {
+        let layout = oval();
+        let mut test = SequenceTest::default();
+        let sensors = ["A1", "E1", "A1", "E1", "B2", "E1", "A1", "E1"].map(|name| layout.sensor_named(name));
+        let take = |test: &mut SequenceTest, time: f64, kind| {
+            test.take(&layout, &Event { time: Timestamp::from_s(time), kind });
+        };
+        let stray = |test: &mut SequenceTest, from: f64| {
+            for (nth, sensor) in sensors.into_iter().flatten().enumerate() {
+                let kind = EventKind::Sensor(Report { sensor, poll_interval: None });
+                take(test, from + nth as f64, kind);
+            }
+        };
+        test.begin_run_at_rest(1);
+        stray(&mut test, 0.0);
+        assert_eq!(test.verdict(), SequenceVerdict::Fits, "no command so far");
+        let command = |step| EventKind::Speed { train: TrainId(24), step: SpeedStep::new(step).unwrap() };
+        for (time, step) in [(20.0, 5), (30.0, 0)] {
+            test.take(&layout, &Event { time: Timestamp::from_s(time), kind: command(step) });
+        }
+        stray(&mut test, 36.0);
+        assert_eq!(test.verdict(), SequenceVerdict::Fits, "stopped 6 s before");
+        test.take(&layout, &Event { time: Timestamp::from_s(50.0), kind: command(5) });
+        stray(&mut test, 51.0);
+        assert!(matches!(test.verdict(), SequenceVerdict::Contradicts { .. }), "it runs");
     }
 
     #[test]

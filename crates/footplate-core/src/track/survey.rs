@@ -56,7 +56,7 @@ pub enum StretchLength {
         /// One standard deviation of it.
         uncertainty: Length,
     },
-    /// Nobody has measured it.
+    /// Not measured.
     Unknown,
 }
 
@@ -66,7 +66,7 @@ impl From<Length> for StretchLength {
     }
 }
 
-/// Mean and standard deviation of the length of an edge that nobody has measured. Edges of layouts are 50 to 2000 mm
+/// Mean and standard deviation of the length of an edge that was not measured. Edges of layouts are 50 to 2000 mm
 /// long, and short ones are more frequent: those of the built-in layouts are 0 to 875 mm, 248 mm in the mean.
 const USUAL: (Length, Length) = (Length::from_mm(350.0), Length::from_mm(350.0));
 
@@ -85,7 +85,7 @@ impl StretchLength {
         }
     }
 
-    /// A length that the stretch hardly falls short of, for whoever has to stop or throw a turnout before its end.
+    /// A length that the stretch hardly falls short of, for stops and throws before its end.
     #[must_use]
     pub fn shortest(self) -> Length {
         match self {

@@ -40,7 +40,7 @@ impl fmt::Display for Leg {
     }
 }
 
-/// A turnout on somebody's way, and the leg by which the way runs.
+/// A turnout on a path, and the leg by which the path runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct TurnoutNeed {
     /// The turnout.

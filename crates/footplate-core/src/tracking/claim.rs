@@ -1,9 +1,9 @@
-//! How likely it is that a train closed a contact, as one of several things that may have.
+//! Likelihood that a train closed a sensor, for data association.
 //!
-//! A density of the time at which the contact closed, in 1/s, so that trains, lost trains and contacts that close by
-//! themselves can be weighed against each other. Two components: a train that runs as its model says, and, seldom, one
-//! that has changed and is a good part of its way since the last contact off. Without the second a train with dirty
-//! wheels would not be followed for long enough to notice that it has.
+//! A density of the time at which the sensor closed, in 1/s, so that trains, lost trains and spurious reports can be compared.
+//! Two components: a train that runs by its model and, rarely, one that has changed and is off by a good part of its path since
+//! the last sensor. Without the second, a train with dirty wheels would not be tracked for long enough to notice the
+//! change.
 
 use super::locator::{CONTACT_SCATTER_M, LEAST_SPEED_M_PER_S, Locator, log_density};
 use super::path_length::{LOG_CHANCE_OF_SILENCE, path_reaches};
@@ -13,16 +13,16 @@ use crate::linalg::Gaussian;
 use crate::link::ContactWindow;
 use crate::model::MotionModel;
 
-/// One train in a thousand is not as its model says when it comes to a contact, as ln (chosen: engines are exchanged and
-/// wheels get dirty once in an afternoon, after as many contacts).
+/// Chance that a train no longer runs by its model when it reaches a sensor, one in a thousand, as ln (chosen: engines are
+/// exchanged and wheels get dirty once in an afternoon, after as many sensors).
 const LOG_CHANGED: f64 = -6.908;
-/// A changed train is off by about this part of its way since the last contact (chosen: dirt takes a fifth, other
-/// engines of a course differ by up to a half).
+/// A changed train is off by about this part of its path since the last sensor (chosen: dirt takes a fifth, other engines of a
+/// course differ by up to a half).
 const CHANGED_PART: f64 = 0.3;
 
 impl Locator {
-    /// The logarithm of the density (1/s) with which this train closed a contact within a window; `None` while it is
-    /// lost, and where no way as the turnouts lie leads there past at most two silent contacts.
+    /// The logarithm of the density (1/s) with which this train closed a sensor within a window; `None` while it is lost, and
+    /// where no path as the turnouts lie leads there with at most two missed detections.
     #[must_use]
     pub fn claim(
         &self,

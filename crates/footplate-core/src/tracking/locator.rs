@@ -1,8 +1,8 @@
-//! Where one train is between two contacts, through changes of speed, and where it would come to rest.
+//! Position of one train between two sensors, through changes of speed, and where it would come to rest.
 //!
-//! Ways are counted from a contact passed, in lengths as the train feels them: a contact-to-contact hop is as long as
-//! [`MotionModel::length`] says. What people call a place, so many millimetres past a contact, is counted in lengths of a
-//! tape, which a train feels a little longer or shorter.
+//! Distances count from the sensor passed last, in path lengths: a hop from sensor to sensor is as long as
+//! [`MotionModel::length`] gives. Places that people name, so many millimetres past a sensor, count in surveyed lengths, which
+//! differ a little from path lengths.
 
 use super::motion_filter::MotionFilter;
 use super::path_length::{PathReach, hop_length, path_reaches, taping_doubt};
@@ -18,42 +18,42 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::HopId;
 use crate::units::{Length, Speed};
 
-/// Contacts close a little earlier or later from one passage to the next (m).
+/// Standard deviation of where a sensor closes, from one passage to the next (m).
 pub(super) const CONTACT_SCATTER_M: f64 = 0.0015;
-/// Nobody knows where a train is that is lost, to this far (m).
+/// Standard deviation of the position of a lost train (m).
 const ANYWHERE_M: f64 = 30.0;
-/// A contact that is this many standard deviations behind the train has been missed.
+/// A sensor that is this many standard deviations behind the train was missed.
 const MISSED_BEYOND: f64 = 4.0;
-/// A report this unlikely (ln of a density in 1/s) is of another train, or of none.
+/// A less likely report (ln of a density in 1/s) belongs to another train, or to none.
 const LEAST_LIKELIHOOD: f64 = -40.0;
-/// A report that is off by more standard deviations contradicts what is believed of the train or of the way.
-pub(super) const BELIEVED: f64 = 3.0;
-/// A moment (s) in which a train at rest could have come a little further than is known.
+/// A report with a larger innovation (standard deviations) contradicts the estimate of the train or of the path.
+pub(super) const GATE: f64 = 3.0;
+/// The least speed with which times are converted to distances (m/s): a train thought at rest may still creep.
 pub(super) const LEAST_SPEED_M_PER_S: f64 = 0.005;
 
-/// A place on the way of a train, counted in lengths as the train feels them.
+/// A place on the path of a train, in path lengths.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WayPoint {
-    /// The node of the contact from which it is counted.
+    /// The node of the sensor from which it counts.
     pub node: NodeId,
-    /// How far past it, along the way as the turnouts lie.
+    /// Distance past it, along the path as the turnouts lie.
     pub way: Length,
 }
 
-/// Where a train is and how sure that is.
+/// Position and speed of a train, with their uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Located {
     /// The most likely place of its pickup.
     pub at: WayPoint,
-    /// One standard deviation of the way.
+    /// One standard deviation of the distance.
     pub uncertainty: Length,
     /// Its speed.
     pub speed: Speed,
-    /// One standard deviation of that.
+    /// One standard deviation of the speed.
     pub speed_uncertainty: Speed,
-    /// The step it was commanded last.
+    /// The step commanded last.
     pub step: SpeedStep,
-    /// Whether it stands, as far as is known.
+    /// Whether it is at rest, by the model.
     pub at_rest: bool,
 }
 
@@ -62,63 +62,64 @@ pub struct Located {
 pub struct Rest {
     /// The most likely place.
     pub at: WayPoint,
-    /// One standard deviation of what is not known: the place now and the way to rest.
+    /// One standard deviation of what is unknown: the present place and the stopping distance.
     pub doubt: Length,
-    /// One standard deviation of what no knowledge would narrow: how stops from there scatter.
+    /// One standard deviation of single stops, which no further measurement reduces.
     pub scatter: Length,
-    /// When it stands, at the latest as far as is foreseen.
+    /// When it is predicted to be at rest, at the latest.
     pub time: Timestamp,
 }
 
-/// The next contact that is due.
+/// The next sensor and when its detection is due.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DueContact {
-    /// The contact.
+    /// The sensor.
     pub sensor: SensorId,
     /// When it should close.
     pub time: Timestamp,
-    /// One standard deviation of that.
+    /// One standard deviation of the time.
     pub uncertainty: TimeSpan,
-    /// How fast the train will be there.
+    /// The speed of the train there.
     pub speed: Speed,
 }
 
-/// A contact that the train passed, beside what had been expected.
+/// A sensor that the train passed, compared with its prediction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PassedContact {
-    /// The contact.
+    /// The sensor.
     pub sensor: SensorId,
-    /// When it closed, as the report has it.
+    /// When it closed, by the report.
     pub window: ContactWindow,
-    /// When it closed most likely, as report and forecast have it together.
+    /// When it closed most likely, by report and prediction together.
     pub at: Timestamp,
-    /// How much later than expected the middle of the window was, and one standard deviation of that expectation with
-    /// the window in it; `None` for the first contact after the train was lost.
+    /// By how much the middle of the window was later than predicted, and one standard deviation of that (prediction and
+    /// window); `None` for the first sensor after the train was lost.
     pub late: Option<[TimeSpan; 2]>,
-    /// The same as way: how far the train was short of the contact when it was expected there.
+    /// The same as a distance: how far the train was short of the sensor at the predicted time.
     pub short: Option<Length>,
-    /// Contacts between the one passed before and this one that did not report.
+    /// Sensors between the one passed before and this one that did not report.
     pub missed: usize,
 }
 
-/// Follows one train.
+/// Estimates the position of one train.
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Locator {
     train: TrainId,
-    /// Where the clock of `following` begins.
+    /// Where the clock of the filter begins.
     epoch: Timestamp,
-    /// The contact from which ways are counted; `None` while the train is lost.
+    /// The sensor from which distances count; `None` while the train is lost.
     node: Option<NodeId>,
-    following: MotionFilter,
+    #[cfg_attr(feature = "serde", serde(rename = "following"))]
+    filter: MotionFilter,
 }
 
 impl Locator {
-    /// A train that stands nobody knows where.
+    /// A train at rest at an unknown place.
     #[must_use]
     pub fn new(train: TrainId) -> Self {
         let nowhere = Gaussian { mean: 0.0, variance: ANYWHERE_M * ANYWHERE_M };
-        Self { train, epoch: Timestamp::ZERO, node: None, following: MotionFilter::at_rest(0.0, nowhere) }
+        Self { train, epoch: Timestamp::ZERO, node: None, filter: MotionFilter::at_rest(0.0, nowhere) }
     }
 
     /// The train.
@@ -127,13 +128,13 @@ impl Locator {
         self.train
     }
 
-    /// Whether anybody knows where it is.
+    /// Whether its position is known.
     #[must_use]
     pub const fn is_located(&self) -> bool {
         self.node.is_some()
     }
 
-    /// The contact from which its way is counted; `None` while it is lost.
+    /// The sensor from which its distance counts; `None` while it is lost.
     pub(super) const fn node(&self) -> Option<NodeId> {
         self.node
     }
@@ -146,46 +147,45 @@ impl Locator {
         self.epoch + TimeSpan::from_s(seconds)
     }
 
-    /// The train stands here, within one standard deviation: a person put it there or read it off a tape.
+    /// The train is at rest here, within one standard deviation: placed by hand or measured with a tape.
     pub fn place(&mut self, now: Timestamp, at: WayPoint, uncertainty: Length) {
         let sd = uncertainty.as_m();
         let place = Gaussian { mean: at.way.as_m(), variance: sd * sd };
-        self.following = MotionFilter::at_rest(self.seconds(now), place);
+        self.filter = MotionFilter::at_rest(self.seconds(now), place);
         self.node = Some(at.node);
     }
 
-    /// Nobody knows where the train is: it was lifted, or reports make no sense. It runs on at the step it was told.
+    /// The position of the train is lost: it was lifted, or reports contradict it. It keeps running at the commanded step.
     pub const fn lose(&mut self) {
         self.node = None;
-        self.following.doubt_place(ANYWHERE_M * ANYWHERE_M);
+        self.filter.doubt_place(ANYWHERE_M * ANYWHERE_M);
     }
 
-    /// Whether from now on it is told the same again and again, so that what its changes have in common is worth learning.
+    /// Whether the same commands repeat from now on, so that the filter should learn what its changes have in common.
     pub(crate) fn repeat(&mut self, is_repeating: bool) {
-        self.following.repeat(is_repeating);
+        self.filter.repeat(is_repeating);
     }
 
-    /// A command to the train has left the line. Other entries say nothing here.
+    /// A command to the train has left the line. Other entries are ignored.
     pub fn handle_command(&mut self, context: TrackContext<'_>, model: &MotionModel, event: &Event) {
         match event.kind {
             EventKind::Speed { train, step } if train == self.train => {
-                self.following.command(model, self.seconds(event.time), step.get());
-                self.following.stop_on(self.stops_on(context, model, &self.following));
+                self.filter.command(model, self.seconds(event.time), step.get());
+                self.filter.stop_on(self.stops_on(context, model, &self.filter));
             }
-            // It faces the other way now; how far its pickup reaches on that side is not known here.
+            // It faces the other direction now; how far its pickup reaches on that side is unknown here.
             EventKind::Reverse { train } if train == self.train => self.lose(),
             _ => {}
         }
     }
 
-    /// The node from which its way is counted, where it is from there (m) and how fast it runs (m/s); `None` while it is
-    /// lost.
+    /// The node from which its distance counts, the distance (m) and the speed (m/s); `None` while it is lost.
     pub(super) fn motion_at(&self, model: &MotionModel, at: Timestamp) -> Option<(NodeId, Gaussian, f64)> {
         let time = self.seconds(at);
-        Some((self.node?, self.following.place(model, time), self.following.speed(model, time).mean))
+        Some((self.node?, self.filter.place(model, time), self.filter.speed(model, time).mean))
     }
 
-    /// The way to a contact that fits best, and how far the train was short of it when it reported.
+    /// The most likely path to a sensor, how far the train was short of it when it reported, and the log-likelihood.
     pub(super) fn best_reach(
         &self,
         context: TrackContext<'_>,
@@ -194,8 +194,8 @@ impl Locator {
         window: ContactWindow,
     ) -> Option<(PathReach, Gaussian, f64)> {
         let time = self.seconds(window.middle());
-        let place = self.following.place(model, time);
-        let speed = self.following.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
+        let place = self.filter.place(model, time);
+        let speed = self.filter.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
         let noise = CONTACT_SCATTER_M * CONTACT_SCATTER_M + speed * speed * window.variance_s2();
         let short = |reach: &PathReach| Gaussian {
             mean: reach.length.mean - place.mean,
@@ -209,8 +209,8 @@ impl Locator {
             .max_by(|(_, _, one), (_, _, other)| one.total_cmp(other))
     }
 
-    /// How likely it is that this train closed a contact within a window: the logarithm of the probability density in
-    /// 1/s, `None` if it cannot be. A train that is lost may be anywhere (`0`).
+    /// Log-likelihood that this train closed a sensor within a window: ln of a probability density in 1/s, `None` if it is
+    /// impossible. A lost train may be anywhere (`0`).
     #[must_use]
     pub fn likelihood(
         &self,
@@ -226,7 +226,7 @@ impl Locator {
         Some(likelihood).filter(|likelihood| *likelihood > LEAST_LIKELIHOOD)
     }
 
-    /// The train passed a contact: it is judged to have been this train.
+    /// Takes a report that data association assigned to this train.
     pub fn pass(
         &mut self,
         context: TrackContext<'_>,
@@ -238,36 +238,36 @@ impl Locator {
         let known = PassedContact { sensor, window, at: window.middle(), late: None, short: None, missed: 0 };
         let Some(node) = context.node_of(sensor) else { return known };
         let Some((reach, short, _)) = self.best_reach(context, model, sensor, window) else {
-            // Lost until now, or no way leads here: it is here all the same, as fast as it was.
-            self.following.doubt_place(ANYWHERE_M * ANYWHERE_M);
-            self.following.shift(-self.following.place(model, time).mean, 0.0);
+            // Lost until now, or no path leads here: the train is here all the same, at the speed it had.
+            self.filter.doubt_place(ANYWHERE_M * ANYWHERE_M);
+            self.filter.shift(-self.filter.place(model, time).mean, 0.0);
             let here = Gaussian { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
-            self.following.pass(model, time, window.variance_s2(), here);
+            self.filter.pass(model, time, window.variance_s2(), here);
             self.node = Some(node);
             return known;
         };
-        let speed = self.following.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
+        let speed = self.filter.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
         let scatter = CONTACT_SCATTER_M * CONTACT_SCATTER_M;
-        let contradicts = short.mean * short.mean > BELIEVED * BELIEVED * short.variance;
+        let contradicts = short.mean * short.mean > GATE * GATE * short.variance;
         let mut at = window.middle();
         if !contradicts {
             at = self.fuse(model, &reach, window, time + short.mean / speed);
-        } else if self.following.doubt_change(model, time, short.mean) {
-            // What was believed is off by more than it said of itself; a change of speed under way will go on to be.
-            // The contact says where the train is past it, however little is known of the way there.
-            self.following.shift(-reach.length.mean, reach.length.variance);
+        } else if self.filter.doubt_change(model, time, short.mean) {
+            // The innovation exceeds its predicted variance, and a change of speed under way will continue to deviate. The
+            // sensor gives the position, however uncertain the path to it is.
+            self.filter.shift(-reach.length.mean, reach.length.variance);
             let here = Gaussian { mean: 0.0, variance: scatter };
-            self.following.pass(model, time, window.variance_s2(), here);
+            self.filter.pass(model, time, window.variance_s2(), here);
         } else {
-            // Something is not as it is believed to be. What the way may be wrong by is not laid to the train's speed, so
-            // that the next contacts go on saying it.
+            // Model and report contradict each other. An error of the path is not attributed to the train's speed, so that
+            // the next sensors still show it.
             let place = Gaussian { variance: reach.length.variance + scatter, ..reach.length };
-            self.following.pass(model, time, window.variance_s2(), place);
-            self.following.shift(-reach.length.mean, 0.0);
-            // Where it is the contact says all the same: what was believed is off by more than it said of itself.
-            self.following.doubt_place(short.mean * short.mean);
+            self.filter.pass(model, time, window.variance_s2(), place);
+            self.filter.shift(-reach.length.mean, 0.0);
+            // The sensor gives the position all the same: the innovation exceeds its predicted variance.
+            self.filter.doubt_place(short.mean * short.mean);
             let here = Gaussian { mean: 0.0, variance: scatter };
-            self.following.pass(model, time, window.variance_s2(), here);
+            self.filter.pass(model, time, window.variance_s2(), here);
         }
         self.node = Some(node);
         let late = [-short.mean / speed, libm::sqrt(short.variance) / speed].map(TimeSpan::from_s);
@@ -280,14 +280,14 @@ impl Locator {
         }
     }
 
-    /// Takes in a report that agrees with the forecast, by which the train was due at a time (s): it came to the sensor
-    /// within the window, and no time in it is more likely than the forecast makes it. Places are counted from there
-    /// from now on. Returns when the train was there most likely.
+    /// Updates with a report that agrees with the prediction, by which the train was due at a time (s). The train reached the
+    /// sensor within the window; within it, the prediction alone says which times are likely. Distances count from this
+    /// sensor from now on. Returns the most likely time of the passage.
     fn fuse(&mut self, model: &MotionModel, reach: &PathReach, window: ContactWindow, due: f64) -> Timestamp {
         let [after, until] = [window.after, window.until].map(|end| self.seconds(end));
         let time = due.clamp(after, until.max(after));
-        let place = self.following.place(model, time);
-        let speed = self.following.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
+        let place = self.filter.place(model, time);
+        let speed = self.filter.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
         let scatter = CONTACT_SCATTER_M * CONTACT_SCATTER_M;
         let short = TruncatedNormal {
             mean: reach.length.mean - place.mean,
@@ -296,33 +296,33 @@ impl Locator {
             high: speed * (until - time),
         };
         let (measured, variance) = short.as_measurement();
-        self.following.shift(-reach.length.mean, reach.length.variance);
+        self.filter.shift(-reach.length.mean, reach.length.variance);
         let here = Gaussian { mean: -measured, variance: scatter + variance };
-        self.following.pass(model, time, 0.0, here);
+        self.filter.pass(model, time, 0.0, here);
         self.timestamp(time + short.moments().0 / speed)
     }
 
-    /// Where it is at a time that is not before the last entry; `None` while it is lost.
+    /// Position and speed at a time not before the last entry; `None` while it is lost.
     #[must_use]
     pub fn locate(&self, context: TrackContext<'_>, model: &MotionModel, at: Timestamp) -> Option<Located> {
         let node = self.node?;
         let time = self.seconds(at);
-        let place = self.following.place(model, time);
+        let place = self.filter.place(model, time);
         let here = WayPoint { node, way: Length::from_m(place.mean) };
         let taping = taping_doubt(context, model, here);
-        let speed = self.following.speed(model, time);
-        let at_rest = self.following.at(model, time).rests_at(time);
+        let speed = self.filter.speed(model, time);
+        let at_rest = self.filter.at(model, time).rests_at(time);
         Some(Located {
             at: here,
             uncertainty: Length::from_m(libm::sqrt(place.variance + taping * taping)),
             speed: Speed::from_m_per_s(if at_rest { 0.0 } else { speed.mean }),
             speed_uncertainty: Speed::from_m_per_s(libm::sqrt(speed.variance)),
-            step: SpeedStep::new(self.following.step()).unwrap_or(SpeedStep::STAND),
+            step: SpeedStep::new(self.filter.step()).unwrap_or(SpeedStep::STAND),
             at_rest,
         })
     }
 
-    /// The contact it comes to next if nothing else is commanded; `None` while it stands, stops short of it or is lost.
+    /// The sensor it reaches next without another command; `None` while it is at rest, stops short of it or is lost.
     #[must_use]
     pub fn next_contact(
         &self,
@@ -332,7 +332,7 @@ impl Locator {
     ) -> Option<DueContact> {
         let node = self.node?;
         let time = self.seconds(now);
-        let here = self.following.place(model, time);
+        let here = self.filter.place(model, time);
         let mut way = Gaussian { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
         for hop in context.hops_ahead(node).take(MOST_HOPS) {
             let reach = hop_length(context, model, &hop);
@@ -342,8 +342,8 @@ impl Locator {
                 continue;
             }
             let sensor = hop.sensor?;
-            let (due, doubt) = self.following.reaches(model, way, time)?;
-            let speed = self.following.speed(model, due).mean;
+            let (due, doubt) = self.filter.reaches(model, way, time)?;
+            let speed = self.filter.speed(model, due).mean;
             return Some(DueContact {
                 sensor,
                 time: self.timestamp(due),
@@ -354,18 +354,18 @@ impl Locator {
         None
     }
 
-    /// Where it most likely goes from here; `None` while it is lost.
+    /// The most likely motion from here; `None` while it is lost.
     pub(crate) fn rollout(&self) -> Option<Rollout> {
-        Some(Rollout::new(self.node?, self.epoch, self.following.course()))
+        Some(Rollout::new(self.node?, self.epoch, self.filter.course()))
     }
 
-    /// What is to be reckoned with from here.
+    /// All motion that is possible from here.
     pub(crate) const fn reachable_set(&self) -> ReachableSet {
-        ReachableSet::new(self.node, self.epoch, self.following)
+        ReachableSet::new(self.node, self.epoch, self.filter)
     }
 
-    /// Where it would come to rest if step 0 left the line at a time (not before the last entry), after any commands
-    /// that were sent. For a train that was commanded to stop already, where it comes to rest anyway.
+    /// Where it would come to rest if step 0 left the line at a time not before the last entry. For a train that was commanded
+    /// to stop already, where it comes to rest anyway.
     #[must_use]
     pub fn rest_if_stopped(
         &self,
@@ -373,12 +373,12 @@ impl Locator {
         model: &MotionModel,
         at: Timestamp,
     ) -> Option<Rest> {
-        let mut stopped = self.following;
+        let mut stopped = self.filter;
         stopped.command(model, self.seconds(at), 0);
         self.rest_of(context, stopped, model)
     }
 
-    /// The same for a train at rest that is first told a step at `start`: what a short move is made of.
+    /// The same for a train at rest that receives a step at `start` first: a short move.
     #[must_use]
     pub fn rest_after_move(
         &self,
@@ -388,20 +388,20 @@ impl Locator {
         step: SpeedStep,
         stop: Timestamp,
     ) -> Option<Rest> {
-        let mut moved = self.following;
+        let mut moved = self.filter;
         moved.command(model, self.seconds(start), step.get());
         moved.command(model, self.seconds(stop.max(start)), 0);
         self.rest_of(context, moved, model)
     }
 
-    /// The hop on which a train that was commanded to stop comes to rest, as far as is known before that is distinguished by hops.
+    /// The hop on which a train that was commanded to stop comes to rest, before stop offsets are applied.
     fn stops_on(
         &self,
         context: TrackContext<'_>,
         model: &MotionModel,
-        following: &MotionFilter,
+        filter: &MotionFilter,
     ) -> Option<HopId> {
-        let mut anywhere = *following;
+        let mut anywhere = *filter;
         anywhere.stop_on(None);
         let (rest, ..) = anywhere.rest(model)?;
         let mut way = 0.0;
@@ -417,12 +417,12 @@ impl Locator {
     fn rest_of(
         &self,
         context: TrackContext<'_>,
-        mut following: MotionFilter,
+        mut filter: MotionFilter,
         model: &MotionModel,
     ) -> Option<Rest> {
         let node = self.node?;
-        following.stop_on(self.stops_on(context, model, &following));
-        let (place, scatter, time) = following.rest(model)?;
+        filter.stop_on(self.stops_on(context, model, &filter));
+        let (place, scatter, time) = filter.rest(model)?;
         let at = WayPoint { node, way: Length::from_m(place.mean) };
         let taping = taping_doubt(context, model, at);
         Some(Rest {
@@ -434,7 +434,7 @@ impl Locator {
     }
 }
 
-/// Hops looked at ahead of a train: more than its way to rest and a few silent contacts.
+/// Hops considered ahead of a train: more than its stopping distance and a few missed detections.
 const MOST_HOPS: usize = 8;
 
 /// ln of the density of a normal distribution at zero.

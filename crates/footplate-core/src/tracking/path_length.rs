@@ -1,4 +1,4 @@
-//! Ways in a train's own measure: from contact to contact, to a place on the layout, and back.
+//! Path lengths: from sensor to sensor, to a place on the layout, and back.
 
 use super::locator::WayPoint;
 use super::track_context::TrackContext;
@@ -8,36 +8,36 @@ use crate::model::{FELT, MotionModel};
 use crate::track::{Hop, Landmark, Layout, Position, Reach};
 use crate::units::Length;
 
-/// Contacts that may stay silent in a row before the way is no longer believed.
-const BELIEVED_MISSED: usize = 2;
-/// One contact in so many stays silent, as ln: dirty track, a light pickup (chosen; the trains of the course miss fewer).
+/// With more missed detections in a row than this, a path is not considered.
+const MOST_MISSED: usize = 2;
+/// Chance of a missed detection, as ln: dirty track, a light pickup (chosen; the trains of the course miss fewer).
 const LOG_MISSED: f64 = -3.9;
-/// The same where trains are distinguished, as ln: 0.3 % on a layout that is looked after (chosen from what course reports
-/// complain about). What a single train is followed past may be more, because nothing else is there to explain it.
+/// The same where trains are distinguished, as ln: 0.3 % on a well-kept layout (chosen from the complaints of course reports).
+/// For a single train it may be higher, because there is no other explanation of a report.
 pub(super) const LOG_CHANCE_OF_SILENCE: f64 = -5.809;
-/// Hops that a way to a place may take: more than a lap of any layout in use.
+/// Most hops of a path to a place: more than a lap of any layout in use.
 const MOST_HOPS: usize = 200;
-/// A contact closes within this of where the survey has it, one standard deviation (m): half a pickup's springiness and a
-/// contact track's own length (chosen; tapes laid from contacts agree to it).
+/// One standard deviation of where a sensor closes against the survey (m): half a pickup's springiness and the length of a
+/// contact track (chosen; tapes laid from sensors agree with it).
 const CONTACT_PLACE_M: f64 = 0.005;
 
-/// A way to a contact, past contacts that stayed silent, as a train feels it.
+/// A path to a sensor, past missed detections, in path lengths.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PathReach {
     /// Its length (m).
     pub(super) length: Gaussian,
-    /// Contacts on the way that did not report.
+    /// Sensors on the path that did not report.
     pub(super) missed: usize,
 }
 
 impl PathReach {
-    /// ln of the chance that those contacts stay silent.
+    /// ln of the chance that these detections were missed.
     pub(super) fn log_chance(&self) -> f64 {
         LOG_MISSED * self.missed as f64
     }
 }
 
-/// A hop as a train feels it (m).
+/// The path length of a hop (m).
 pub(super) fn hop_length(context: TrackContext<'_>, model: &MotionModel, hop: &Hop<'_>) -> Gaussian {
     let [length, uncertainty] = model.length(context.sections, hop).map(Length::as_m);
     Gaussian { mean: length, variance: uncertainty * uncertainty }
@@ -52,7 +52,7 @@ fn felt(context: TrackContext<'_>, model: &MotionModel, layout: &Layout, reach: 
     PathReach { length, missed: reach.missed() }
 }
 
-/// Every way from a node to a sensor that is open as far as the turnouts are known.
+/// Every path from a node to a sensor that is open by the known turnouts.
 pub(super) fn path_reaches<'g>(
     context: TrackContext<'g>,
     model: &'g MotionModel,
@@ -61,13 +61,13 @@ pub(super) fn path_reaches<'g>(
 ) -> impl Iterator<Item = PathReach> + 'g {
     context
         .layout
-        .reaches(from, context.turnouts, BELIEVED_MISSED)
+        .reaches(from, context.turnouts, MOST_MISSED)
         .filter(move |reach| reach.sensor == Some(sensor))
         .map(move |reach| felt(context, model, context.layout, &reach))
 }
 
-/// The way from a waypoint's node to a place on the layout, as the train feels it and as the turnouts lie; `None` if
-/// none leads there within one lap.
+/// The path length from a waypoint's node to a place on the layout, as the turnouts lie; `None` if no path leads there within
+/// one lap.
 #[must_use]
 pub fn way_to(context: TrackContext<'_>, model: &MotionModel, from: NodeId, to: Position) -> Option<Length> {
     let mut way = Length::ZERO;
@@ -88,9 +88,9 @@ pub fn way_to(context: TrackContext<'_>, model: &MotionModel, from: NodeId, to: 
     None
 }
 
-/// The length of a hop as a tape finds it between the two contacts (m): the survey knows it to the errors of its edges and
-/// of where contacts close, the train to what it feels longer or shorter of curves and slopes. Both count by how well they
-/// know it, and the train mostly knows better.
+/// The length of a hop between its two sensors by tape (m). The survey knows it to the errors of its edges and of where sensors
+/// close, the train to the difference between path length and surveyed length. Both are weighted by their variance; the train
+/// mostly knows it better.
 pub(super) fn taped_length(context: TrackContext<'_>, model: &MotionModel, hop: &Hop<'_>) -> Gaussian {
     let felt = hop_length(context, model, hop);
     let surveyed = hop.length.as_m();
@@ -106,8 +106,8 @@ pub(super) fn taped_length(context: TrackContext<'_>, model: &MotionModel, hop: 
     Gaussian { mean: (surveyed * one + felt.mean * other) / (one + other), variance: 1.0 / (one + other) }
 }
 
-/// The way from a waypoint's node to a landmark ahead, in lengths as the train feels them: so many millimetres past the
-/// contact of its name, whatever the survey says of the rest of the hop. `None` if none leads there within one lap.
+/// The path length from a waypoint's node to a landmark ahead: so many millimetres past the sensor of its name, whatever the
+/// survey has for the rest of the hop. `None` if no path leads there within one lap.
 #[must_use]
 pub fn way_to_landmark(
     context: TrackContext<'_>,
@@ -134,7 +134,7 @@ pub fn way_to_landmark(
     (left == Length::ZERO).then_some(way)
 }
 
-/// The way to a node at which hops begin or end, and how long a taped length feels on the hop before it.
+/// The path to a node at which hops begin or end, and the ratio of path length to taped length on the hop before it.
 fn way_to_node(
     context: TrackContext<'_>,
     model: &MotionModel,
@@ -159,22 +159,22 @@ fn way_to_node(
     None
 }
 
-/// A point of the way as people name it and find it with a tape: from the last contact before it. Whole laps make no
-/// difference to the place.
+/// A point of the path as people name it and measure it with a tape: from the last sensor before it. Whole laps do not change
+/// the place.
 #[must_use]
 pub fn landmark_of(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> Landmark {
     let [landmark, _] = taped(context, model, at);
     landmark
 }
 
-/// How well a point of the way is known as people name it (m), where the train itself knows it without doubt: so far past a
-/// contact nobody knows how long a taped length feels.
+/// Standard deviation of a point of the path as people name it (m), for a train that knows its position exactly: past a sensor
+/// the ratio of path length to taped length is uncertain.
 pub(super) fn taping_doubt(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> f64 {
     let [_, doubt] = taped(context, model, at);
     doubt.offset.as_m()
 }
 
-/// The landmark of a point on the way, and one standard deviation of its offset in the same form.
+/// The landmark of a point on the path, and one standard deviation of its offset in the same form.
 fn taped(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> [Landmark; 2] {
     let mut from = at.node;
     let mut left = at.way.as_m();
@@ -198,7 +198,7 @@ fn part(of: Length, whole: Length) -> f64 {
     if whole > Length::ZERO { of / whole } else { 0.0 }
 }
 
-/// The place on the layout of a point on the way, as the turnouts lie; for a point behind its node, the node.
+/// The place on the layout of a point on the path, as the turnouts lie; for a point behind its node, the node.
 #[must_use]
 pub fn place_of(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> Option<Position> {
     let mut left = at.way.max(Length::ZERO);

@@ -1,4 +1,4 @@
-//! Where one train most likely goes from here, commands that have not been given included.
+//! The most likely motion of a train from here, further commands included.
 
 use super::filter_state::FilterState;
 use super::motion_filter::INTERRUPTED;
@@ -6,10 +6,10 @@ use crate::ids::{NodeId, SpeedStep};
 use crate::model::MotionModel;
 use crate::time::Timestamp;
 
-/// What is asked "and if it were told this then?", again and again, of copies.
+/// Answers "what if this were commanded then?", thousands of times, on copies.
 ///
-/// In plain numbers, because searches ask thousands of times: ways in m past [`node`](Self::node) in lengths as the train
-/// feels them, times in s on a clock whose zero [`seconds`](Self::seconds) knows.
+/// In plain numbers for speed: distances are path lengths in m past [`node`](Self::node), times are in s on a clock whose zero
+/// [`seconds`](Self::seconds) knows.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rollout {
     node: NodeId,
@@ -17,7 +17,7 @@ pub(crate) struct Rollout {
     course: FilterState,
 }
 
-/// By this much (s) later every change of speed is over.
+/// After this time (s) every change of speed is complete.
 const LONG_AFTER: f64 = 20.0;
 
 impl Rollout {
@@ -25,7 +25,7 @@ impl Rollout {
         Self { node, epoch, course }
     }
 
-    /// The contact from which ways are counted.
+    /// The sensor from which distances count.
     pub(crate) const fn node(&self) -> NodeId {
         self.node
     }
@@ -40,31 +40,31 @@ impl Rollout {
         self.course.step()
     }
 
-    /// A step leaves the line at a time that is not before what was asked last.
+    /// A step leaves the line at a time that is not before the last query.
     pub(crate) fn command(&mut self, model: &MotionModel, sent: f64, step: SpeedStep) {
         self.course.settle(model, sent);
         self.course.command(sent, step.get());
     }
 
-    /// How much way (m) nobody can foresee if it were told another step at a time that is not before what was asked last.
+    /// One standard deviation (m) of the distance that a further command adds, given at a time not before the last query.
     pub(crate) fn doubt_of_interruption(&mut self, model: &MotionModel, time: f64) -> f64 {
         self.course.settle(model, time);
         INTERRUPTED * self.course.unsettled(time)
     }
 
-    /// The way at a time that is not before what was asked last.
+    /// The distance at a time that is not before the last query.
     pub(crate) fn place(&mut self, model: &MotionModel, time: f64) -> f64 {
         self.course.settle(model, time);
         self.course.place(time)
     }
 
-    /// Way and speed at such a time.
+    /// Distance and speed at such a time.
     pub(crate) fn place_and_speed(&mut self, model: &MotionModel, time: f64) -> [f64; 2] {
         [self.place(model, time), self.course.speed(time)]
     }
 
-    /// Once all that was told has taken effect: the way at a time if the train had always run at the speed that it will
-    /// have then, and that speed.
+    /// Once all commands have taken effect: the distance at a time as if the train had always run at its final speed, and that
+    /// speed.
     pub(crate) fn settled_place_and_speed(mut self, model: &MotionModel, time: f64) -> [f64; 2] {
         let [place, speed] = self.place_and_speed(model, time + LONG_AFTER);
         [place - speed * LONG_AFTER, speed]

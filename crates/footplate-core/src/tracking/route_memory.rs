@@ -1,4 +1,4 @@
-//! Where a train has been, at which steps, and which route it took when it was last at a turnout.
+//! Which hops a train has run over, at which steps, and its last route at each turnout.
 
 use alloc::vec::Vec;
 
@@ -15,14 +15,14 @@ pub(super) struct RouteMemory {
 }
 
 impl RouteMemory {
-    /// Whether the train has run over every hop of a way at this step before.
+    /// Whether the train has run over every hop of a path at this step before.
     pub(super) fn has_passed(&self, way: &Reach, step: SpeedStep) -> bool {
         way.hops()
             .iter()
             .all(|hop| self.passed.get(hop.index()).is_some_and(|steps| steps >> step.get() & 1 == 1))
     }
 
-    /// The train took a way at this step.
+    /// The train took a path at this step.
     pub(super) fn remember(&mut self, layout: &Layout, way: &Reach, step: SpeedStep) {
         for hop in way.hops() {
             if self.passed.len() <= hop.index() {
@@ -41,7 +41,7 @@ impl RouteMemory {
         }
     }
 
-    /// The next contact as the turnouts are known to lie, or else as the train went last time.
+    /// The next sensor as the turnouts are known to lie, or else by the train's last route.
     pub(super) fn likely_way(
         &self,
         layout: &Layout,
@@ -59,7 +59,7 @@ impl RouteMemory {
         )
     }
 
-    /// Which contact had been named as the next before the train took this way.
+    /// Which sensor had been named as the next before the train took this path.
     pub(super) fn named(&self, layout: &Layout, way: &Reach) -> Option<SensorId> {
         let first = way.hops().first().and_then(|hop| layout.hop(*hop))?;
         self.habit(first.from)

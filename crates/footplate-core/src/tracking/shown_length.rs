@@ -1,31 +1,31 @@
-//! What a train shows of the way between two contacts when it passes the second.
+//! What a detection shows of the length of the hop before it.
 //!
-//! Letters: `L` the hop as the train feels it, known to the variance `σ²`; `r` how far the train was short of the contact
-//! when it reported, by its motion alone; `s²` the variance that was expected of that, `σ²` included. The same report that
-//! says where the train is says of the hop
+//! Letters: `L` the path length of the hop, with variance `σ²`; `r` how far the train was short of the sensor when it
+//! reported, by its motion alone; `s²` the predicted variance of that, `σ²` included. The report that updates the position
+//! also updates the hop:
 //!
 //! ```text
 //! L ← L − (σ²/s²) r        σ² ← σ² (1 − σ²/s²)
 //! ```
 //!
-//! A calibration narrows σ to a millimetre or two for the ways in which it drove. A train that is told something else twice
-//! a second goes over the same hop otherwise each time, and what a hop then seems to be differs by more: σ never counts for
-//! less than [`BEST_KNOWN`].
+//! A calibration narrows σ to a millimetre or two for the speeds at which it drove. A train that changes speed twice a second
+//! covers the same hop differently each time, and the apparent length varies more: σ never counts for less than
+//! [`BEST_KNOWN`].
 
-use super::locator::{BELIEVED, Locator};
+use super::locator::{GATE, Locator};
 use super::track_context::TrackContext;
 use crate::ids::SensorId;
 use crate::linalg::Gaussian;
 use crate::link::ContactWindow;
 use crate::model::MotionModel;
 
-/// No hop is known better (m): a third of what one report says of it is believed then (chosen by what repeats from lap to
-/// lap on simulated layouts: up to 16 mm after a calibration of five minutes).
+/// Least standard deviation of a hop (m): a report then moves the length by a third of its innovation (chosen by what repeats
+/// from lap to lap on simulated layouts: up to 16 mm after a calibration of five minutes).
 const BEST_KNOWN: f64 = 0.005;
 
 impl Locator {
-    /// What a report that this train is about to be judged to have caused says of the hop to its contact: the section,
-    /// and by how much that is longer than surveyed (m). `None` unless it is the next one.
+    /// What a report that is about to be assigned to this train shows of the hop to its sensor: the section, and by how much its
+    /// path length exceeds the survey (m). `None` unless it is the next sensor.
     pub(crate) fn shown_length(
         &self,
         context: TrackContext<'_>,
@@ -36,7 +36,7 @@ impl Locator {
         let hop = context.hop_from(self.node()?).filter(|hop| hop.sensor == Some(sensor))?;
         let section = context.sections.section(hop.id)?;
         let (reach, short, _) = self.best_reach(context, model, sensor, window)?;
-        if reach.missed > 0 || short.mean * short.mean > BELIEVED * BELIEVED * short.variance {
+        if reach.missed > 0 || short.mean * short.mean > GATE * GATE * short.variance {
             return None;
         }
         let unknown = reach.length.variance.max(BEST_KNOWN * BEST_KNOWN);

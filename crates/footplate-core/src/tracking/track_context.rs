@@ -1,22 +1,22 @@
-//! What a train moves on, as far as it is known: the layout, its sections and how the turnouts lie.
+//! What a train runs on: the layout, its sections and the known positions of its turnouts.
 
 use crate::ids::{NodeId, SensorId};
 use crate::model::survey::SectionIndex;
 use crate::track::{Hop, Layout, TurnoutStates};
 
-/// The track under a train. Copied freely; it only points.
+/// The track under a train; references only, copied freely.
 #[derive(Debug, Clone, Copy)]
 pub struct TrackContext<'g> {
     /// The layout.
     pub layout: &'g Layout,
-    /// Its sections, by which lengths are kept.
+    /// Its sections, which carry the lengths.
     pub sections: &'g SectionIndex,
     /// How the turnouts lie.
     pub turnouts: &'g TurnoutStates,
 }
 
 impl<'g> TrackContext<'g> {
-    /// The one open hop that leads on from a node; `None` where the way forks over a turnout nobody knows of.
+    /// The one open hop that leads on from a node; `None` where the path divides over a turnout whose position is unknown.
     #[must_use]
     pub fn hop_from(&self, node: NodeId) -> Option<Hop<'g>> {
         let mut open = self.layout.open_hops_from(node, self.turnouts);
@@ -24,8 +24,8 @@ impl<'g> TrackContext<'g> {
         open.next().is_none().then_some(hop)
     }
 
-    /// The hops ahead of a node, one after the other, as the turnouts lie: round and round on a circuit, and to where
-    /// the way ends or is not known.
+    /// The hops ahead of a node in order, as the turnouts lie: round and round on a circuit, or until the path ends or is
+    /// unknown.
     pub fn hops_ahead(&self, from: NodeId) -> impl Iterator<Item = Hop<'g>> + use<'g> {
         let context = *self;
         let mut node = Some(from);

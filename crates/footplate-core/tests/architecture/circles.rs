@@ -7,10 +7,10 @@ use crate::project::{Fault, assert_none, sources_below};
 use crate::source::Source;
 
 const CORE: &str = "crates/footplate-core/src/";
-/// More files than these cannot be read one after the other.
+/// A larger group cannot be read file by file.
 const LARGEST: usize = 2;
 
-/// Which files of a list each file names something of.
+/// The files of a list that each file imports from.
 fn imports(sources: &[Source]) -> Vec<BTreeSet<usize>> {
     let files = sources.iter().enumerate().filter(|(_, source)| !source.path.ends_with("/mod.rs"));
     let at: BTreeMap<Vec<String>, usize> = files.map(|(at, source)| (source.module(), at)).collect();
@@ -25,7 +25,7 @@ fn imports(sources: &[Source]) -> Vec<BTreeSet<usize>> {
     sources.iter().enumerate().map(of).collect()
 }
 
-/// Everything that is reached from each file.
+/// All files reachable from each file.
 fn reached(imports: &[BTreeSet<usize>]) -> Vec<BTreeSet<usize>> {
     let from = |start: usize| {
         let (mut seen, mut next) = (BTreeSet::new(), vec![start]);
@@ -37,7 +37,7 @@ fn reached(imports: &[BTreeSet<usize>]) -> Vec<BTreeSet<usize>> {
     (0..imports.len()).map(from).collect()
 }
 
-/// Groups of files each of which reaches all others of its group.
+/// Groups of files that all reach each other.
 fn circles(sources: &[Source]) -> Vec<Vec<&str>> {
     let reached = reached(&imports(sources));
     let group = |file: usize| -> Vec<usize> {

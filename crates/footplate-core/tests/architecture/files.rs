@@ -1,5 +1,4 @@
-//! The shape of every file: its length, its name, its first sentence, and no trace of the machine it was
-//! written on.
+//! The shape of every file: its length, name and first sentence, and no trace of the machine it was written on.
 
 use crate::project::{Fault, TextFile, assert_none, text_files};
 use crate::source::Source;
@@ -7,20 +6,20 @@ use crate::source::Source;
 /// Files settle between 100 and 400 lines; beyond this one is split by noun.
 const LONGEST_FILE: usize = 500;
 
-/// Endings of the files that people write.
+/// Extensions of files that people write.
 const WRITTEN: [&str; 6] = [".rs", ".py", ".js", ".css", ".html", ".sh"];
 
-/// Folders of other people's files, kept as they came.
+/// Folders of third-party files, kept unchanged.
 const FOREIGN: [&str; 1] = ["vendor"];
 
-/// Names that say nothing about what is inside.
+/// File names without a meaning.
 const EMPTY_NAMES: [&str; 9] =
     ["util", "utils", "helper", "helpers", "common", "misc", "manager", "prelude", "extras"];
 
-/// Folders of one machine that no other has.
+/// Folders of a particular machine.
 const MACHINE_FOLDERS: [&str; 5] = ["work", "tmp", "root", "home", "Users"];
 
-/// Servers that a package is fetched from, by name and domain; the ordinary client knows them, or knows a mirror.
+/// Servers of package registries, by name and domain; the ordinary client knows them or a mirror.
 const REGISTRIES: [(&str, &str); 6] = [
     ("index", "crates.io"),
     ("static", "crates.io"),
@@ -44,12 +43,12 @@ fn first_sentence_fault(text: &str) -> Option<&'static str> {
     (sentence.trim().is_empty() || !ends).then_some("opens with a paragraph that does not end its sentence")
 }
 
-/// Where a line names a folder of one machine or a registry, and which.
+/// The machine folder or registry that a line names, if any.
 fn machine_trace(line: &str) -> Option<String> {
     let folders = MACHINE_FOLDERS.iter().map(|folder| format!("/{folder}/"));
     let absolute = folders.into_iter().find(|folder| {
         line.match_indices(folder.as_str()).any(|(at, _)| {
-            // Within a longer path or an address it is somebody else's folder.
+            // Within a longer path or an address it is another folder.
             let before = line.get(..at).and_then(|text| text.chars().next_back());
             !before.is_some_and(|c| c.is_alphanumeric() || "._-~}/*)>]".contains(c))
         })

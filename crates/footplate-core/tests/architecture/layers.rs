@@ -19,8 +19,7 @@ const ROWS: [&[&str]; 6] = [
     &["units", "time", "ids", "linalg", "estimate"],
 ];
 
-/// Row-mates that may know each other: importer, imported. The lower of two such modules knows nothing of the
-/// other.
+/// Modules of one row of which the first may import the second, but not the reverse.
 const ACQUAINTED: [(&str, &str); 2] = [
     // A speed times a time span is a length.
     ("units", "time"),
@@ -28,10 +27,10 @@ const ACQUAINTED: [(&str, &str); 2] = [
     ("estimate", "time"),
 ];
 
-/// What the simulator may know of core: words and places, and no formula that it is there to test.
+/// What the simulator may import from core: words and places, but no formula that it is there to test.
 const SHARED_WITH_SIMULATOR: [&str; 5] = ["units", "time", "ids", "event", "track"];
 
-/// Which module each name at the root of core comes from: itself for a module, its home for a re-export.
+/// The module that each name at the root of core comes from: itself for a module, its home for a re-export.
 struct Homes(BTreeMap<String, String>);
 
 impl Homes {
@@ -58,7 +57,7 @@ fn row_of(module: &str) -> Option<usize> {
     ROWS.iter().position(|row| row.contains(&module))
 }
 
-/// What one module's import of another breaks, if anything.
+/// Why one module may not import another, if so.
 fn objection(importer: &str, imported: &str) -> Option<String> {
     let (Some(here), Some(there)) = (row_of(importer), row_of(imported)) else {
         return Some(format!("`{importer}` imports `{imported}`, and one of them stands in no row"));

@@ -1,4 +1,4 @@
-//! Documentation that points at things that exist: relative links, headings, and paths named in passing.
+//! Documentation refers to things that exist: relative links, headings, and paths.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use crate::project::{Fault, TextFile, assert_none, paths, text_files};
 
 const READING_ORDER: &str = "docs/README.md";
 
-/// What one page points at, and which places in it can be pointed at.
+/// The references of one page, and the anchors that it offers.
 #[derive(Default)]
 struct Page {
     links: Vec<Pointer>,
@@ -45,13 +45,13 @@ impl Page {
     }
 }
 
-/// The name by which a heading can be linked to: lower case, no punctuation, hyphens for spaces.
+/// The anchor of a heading: lower case, no punctuation, hyphens for spaces.
 fn anchor(heading: &str) -> String {
     let kept = heading.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
     kept.flat_map(char::to_lowercase).map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
-/// The path from the top that a link on a page leads to, or `None` above the top.
+/// The path from the root that a link on a page leads to, or `None` above the root.
 fn follow(page: &str, link: &str) -> Option<String> {
     let mut parts: Vec<&str> = page.split('/').collect();
     parts.pop();
@@ -67,7 +67,7 @@ fn follow(page: &str, link: &str) -> Option<String> {
     Some(parts.join("/"))
 }
 
-/// Everything a link can lead to: the project's files and the folders they are in.
+/// The possible targets of links: the project's files and their folders.
 struct Targets(BTreeSet<String>);
 
 impl Targets {
@@ -78,18 +78,18 @@ impl Targets {
         Self(folders.map(String::from).chain(paths.iter().cloned()).collect())
     }
 
-    /// Whether a file or folder of this path from the top belongs to the project.
+    /// Whether a file or folder with this path from the root exists.
     fn contains(&self, path: &str) -> bool {
         self.0.contains(path.trim_end_matches('/'))
     }
 
-    /// Whether the end of some path reads like this: how a page that said where it is names what is there.
+    /// Whether some path ends like this: a page may name a file relative to a folder it has named.
     fn contains_end(&self, end: &str) -> bool {
         let end = format!("/{}", end.trim_end_matches('/'));
         self.0.iter().any(|path| path.ends_with(&end))
     }
 
-    /// What is wrong with something that a page shows as code, if it is a path.
+    /// What is wrong with a code span, if it is a path.
     fn objection(&self, span: &str) -> Option<String> {
         let pattern = span.contains(['*', '{', '…', ' ', '<']);
         let from_top = span.split_once('/').is_some_and(|(first, _)| self.contains(first));
@@ -142,7 +142,7 @@ fn every_relative_link_leads_somewhere() {
 fn every_path_named_in_passing_exists() {
     let targets = Targets::read();
     let mut faults = Vec::new();
-    // What a change log tells of may be gone by now.
+    // A change log may name what no longer exists.
     for file in pages().into_iter().filter(|file| file.path != "CHANGELOG.md") {
         for span in Page::read(&file.text).code_spans {
             if let Some(what) = targets.objection(&span.target) {

@@ -1,7 +1,7 @@
-//! What the folders promise, checked: the layers of core, what is absent from core and wire, the shape of every
-//! file, and documentation that points at things that exist.
+//! Checks of the architecture: the layers of core, what is absent from core and wire, the shape of every file, and
+//! documentation that refers to things that exist.
 //!
-//! Each test lists everything that breaks its promise, with file and line, and says what would be right.
+//! Each test lists every violation with file and line, and what would be right.
 #![expect(clippy::expect_used, clippy::panic, reason = "a test may stop at the first surprise")]
 
 mod circles;

@@ -9,12 +9,12 @@ use crate::source::Source;
 
 /// A text file of the project.
 pub(crate) struct TextFile {
-    /// Its path from the top of the project, with `/` between folders.
+    /// Its path from the root of the project, with `/` between folders.
     pub(crate) path: String,
     pub(crate) text: String,
 }
 
-/// One broken promise.
+/// One violation.
 pub(crate) struct Fault {
     pub(crate) path: String,
     /// Counted from 1.
@@ -28,7 +28,7 @@ impl Display for Fault {
     }
 }
 
-/// Fails with everything that was found.
+/// Fails with a list of all violations.
 pub(crate) fn assert_none(faults: &[Fault]) {
     let mut list = String::new();
     for fault in faults {
@@ -37,7 +37,7 @@ pub(crate) fn assert_none(faults: &[Fault]) {
     assert!(faults.is_empty(), "{} to mend:\n{list}", faults.len());
 }
 
-/// Every file that is tracked, or new and not ignored, by its path from the top of the project, sorted.
+/// Every file that is tracked, or new and not ignored, by its path from the root, sorted.
 pub(crate) fn paths() -> Vec<String> {
     let list = Command::new("git")
         .current_dir(top())
@@ -55,24 +55,24 @@ pub(crate) fn paths() -> Vec<String> {
     paths
 }
 
-/// Every text file with one of these endings, or of any ending when there are none.
+/// Every text file with one of these extensions, or every text file if there are none.
 pub(crate) fn text_files(endings: &[&str]) -> Vec<TextFile> {
     let wanted = |path: &str| endings.is_empty() || endings.iter().any(|ending| path.ends_with(ending));
     let read = |path: String| {
         let bytes = std::fs::read(top().join(&path)).expect("a listed file should be readable");
-        // What is no UTF-8 is no text.
+        // A file that is not UTF-8 is not text.
         String::from_utf8(bytes).ok().map(|text| TextFile { path, text })
     };
     paths().into_iter().filter(|path| wanted(path)).filter_map(read).collect()
 }
 
-/// The folder of sources of each crate, with a `/` at its end.
+/// The source folder of each crate, with a final `/`.
 pub(crate) fn source_folders() -> BTreeSet<String> {
     let split = |path: &String| path.split_once("/src/").map(|(package, _)| format!("{package}/src/"));
     paths().iter().filter_map(split).collect()
 }
 
-/// The Rust sources below a folder, which ends in `/`, less those that only tests have.
+/// The Rust sources below a folder, which ends in `/`, except test modules.
 pub(crate) fn sources_below(folder: &str) -> Vec<Source> {
     let below = text_files(&[".rs"]).into_iter().filter(|file| file.path.starts_with(folder));
     let mut sources: Vec<Source> = below.map(|file| Source::read(&file.path, &file.text)).collect();
@@ -81,7 +81,7 @@ pub(crate) fn sources_below(folder: &str) -> Vec<Source> {
     sources
 }
 
-/// The folder of the project. Asked when the test runs: checkouts that share a target folder share its binary.
+/// The folder of the project, found when the test runs: checkouts that share a target folder share its binary.
 fn top() -> PathBuf {
     let package = std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo should say where the package is");
     Path::new(&package).join("../..")

@@ -1,5 +1,5 @@
-//! What is absent on purpose: std, clocks, randomness and dependencies from core and wire, floating point from what runs on
-//! controllers that have none, and from everything the mathematics that differs from machine to machine.
+//! What is absent on purpose: std, clocks, randomness and dependencies from core and wire, floating point from files
+//! for controllers without it, and platform-dependent mathematics from everything.
 
 use std::str::FromStr as _;
 
@@ -10,7 +10,7 @@ use crate::source::Source;
 
 const PURE: [&str; 2] = ["crates/footplate-core/src/", "crates/footplate-wire/src/"];
 
-/// First segments of paths that bring the world in, and what to do instead.
+/// First path segments of impure crates, and what to use instead.
 const WORLD: [(&str, &str); 5] = [
     ("std", "take it from core or alloc; input and output belong in the program"),
     ("rand", "draw random numbers in the simulator"),
@@ -19,8 +19,8 @@ const WORLD: [(&str, &str); 5] = [
     ("rand_distr", "draw random numbers in the simulator"),
 ];
 
-/// Methods of `f64` that take the platform's word for it, each in the last bit another. Rust promises exactness
-/// for the rest (the four operations, `sqrt`, rounding).
+/// Methods of `f64` that use the platform's library, which differs in the last bit. Rust guarantees the rest (the
+/// four operations, `sqrt`, rounding).
 const PLATFORM_MATHEMATICS: [&str; 22] = [
     "exp", "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10", "powf", "cbrt", "hypot", "sin", "cos",
     "tan", "sin_cos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh",
@@ -32,7 +32,7 @@ const INTEGER_FILES: [&str; 2] = [
     "crates/footplate-core/src/kinematics/integer_stop/power_of_half.rs",
 ];
 
-/// Words that bring floating point in: its types, its functions, and quantities, which are made of it.
+/// Words that imply floating point: its types, its functions, and quantities, which contain it.
 const FLOATING_POINT: [&str; 9] =
     ["f16", "f32", "f64", "f128", "libm", "units", "Length", "Speed", "TimeSpan"];
 
@@ -40,7 +40,7 @@ const FLOATING_POINT: [&str; 9] =
 const DEPENDENCIES: [(&str, &[&str]); 2] = [
     // Elementary functions, and derives for the crates that write files.
     ("crates/footplate-core/Cargo.toml", &["libm", "serde"]),
-    // Inflating the list of locomotives that a Central Station sends compressed.
+    // Inflates the list of locomotives that a Central Station sends compressed.
     ("crates/footplate-wire/Cargo.toml", &["footplate-core", "miniz_oxide"]),
 ];
 
@@ -68,7 +68,7 @@ fn platform_mathematics(source: &Source) -> impl Iterator<Item = Fault> {
     })
 }
 
-/// Where a file's text outside its tests names or writes a number in floating point: the line and the word.
+/// Where a file outside its tests names or writes a floating-point number: the line and the word.
 fn floating_point(text: &str) -> Vec<(usize, String)> {
     let before_tests = text.split("#[cfg(test)]").next().unwrap_or_default();
     let tokens = TokenStream::from_str(before_tests).unwrap_or_else(|e| panic!("{before_tests}: {e}"));
@@ -93,7 +93,7 @@ fn floating_point(text: &str) -> Vec<(usize, String)> {
     found
 }
 
-/// Whether a literal is such a number: with a point, an exponent or a type that says so; `0x1e5` has none.
+/// Whether a literal is floating point: with a point, an exponent or a type suffix; `0x1e5` is not.
 fn is_floating_point(literal: &str) -> bool {
     let is_decimal = literal.starts_with(|c: char| c.is_ascii_digit())
         && !["0x", "0b", "0o"].iter().any(|prefix| literal.starts_with(prefix));

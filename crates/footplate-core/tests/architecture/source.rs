@@ -1,20 +1,20 @@
-//! One Rust file as tokens: which paths it names and which items it defines, its tests left out.
+//! One Rust file as tokens: the paths it names and the items it defines, without its tests.
 
 use std::str::FromStr as _;
 
 use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 
-/// What one file says outside its tests.
+/// The contents of one file outside its tests.
 pub(crate) struct Source {
-    /// Its path from the top of the project.
+    /// Its path from the root of the project.
     pub(crate) path: String,
-    /// Each path of two segments or more, with `crate`, `self` and `super` followed to where they lead.
+    /// Each path of two segments or more, with `crate`, `self` and `super` resolved.
     pub(crate) named: Vec<NamedPath>,
-    /// Each method that is called.
+    /// Each method call.
     pub(crate) called: Vec<Word>,
-    /// The keyword, such as `struct`, of each item that stands in the file itself, not in a module within it.
+    /// The keyword, such as `struct`, of each item of the file itself, not of a module within it.
     pub(crate) items: Vec<Word>,
-    /// The modules of other files that only tests have, from the crate's root.
+    /// Test-only modules in other files, from the crate's root.
     pub(crate) test_modules: Vec<Vec<String>>,
 }
 
@@ -24,7 +24,7 @@ pub(crate) struct NamedPath {
     pub(crate) segments: Vec<String>,
 }
 
-/// One word and where it stands.
+/// One word and its line.
 pub(crate) struct Word {
     pub(crate) line: usize,
     pub(crate) word: String,
@@ -33,7 +33,7 @@ pub(crate) struct Word {
 const ITEM_KEYWORDS: [&str; 7] = ["struct", "enum", "union", "trait", "impl", "fn", "macro_rules"];
 
 impl Source {
-    /// Reads a file; `path` says which module it is.
+    /// Reads a file; `path` determines its module.
     pub(crate) fn read(path: &str, text: &str) -> Self {
         let tokens = TokenStream::from_str(text).unwrap_or_else(|e| panic!("{path}: {e}"));
         let mut source = Self {
@@ -47,7 +47,7 @@ impl Source {
         source
     }
 
-    /// The modules the file stands in, from the crate's root: `track`, `graph` for `…/src/track/graph.rs`.
+    /// The modules that contain the file, from the crate's root: `track`, `graph` for `…/src/track/graph.rs`.
     pub(crate) fn module(&self) -> Vec<String> {
         module_of(&self.path)
     }
@@ -99,7 +99,7 @@ impl Source {
         }
     }
 
-    /// Takes the path that begins at `at`, each leaf of it if it ends in a group, and says where it ends.
+    /// Adds the path that starts at `at`, each leaf of it if it ends in a group, and returns where it ends.
     fn take_path(
         &mut self,
         tokens: &[TokenTree],
@@ -137,7 +137,7 @@ impl Source {
     }
 }
 
-/// Follows `crate`, `self` and `super` from a module to a path that begins with `crate`.
+/// Resolves `crate`, `self` and `super` in a path to one that starts with `crate`.
 fn resolve(segments: &[String], module: &[String]) -> Vec<String> {
     let mut place: Option<Vec<String>> = None;
     let mut rest = segments;
@@ -171,7 +171,7 @@ fn is_path_separator(tokens: &[TokenTree], at: usize) -> bool {
     colon(tokens.get(at)) && colon(tokens.get(at.wrapping_add(1)))
 }
 
-/// Whether the word at `at` is a method and its arguments follow.
+/// Whether the word at `at` is a method, followed by its arguments.
 fn is_call(tokens: &[TokenTree], at: usize) -> bool {
     matches!(tokens.get(at.wrapping_sub(1)), Some(TokenTree::Punct(p)) if p.as_char() == '.')
         && matches!(tokens.get(at + 1), Some(TokenTree::Group(g)) if g.delimiter() == Delimiter::Parenthesis)
@@ -185,7 +185,7 @@ fn is_braces(group: &Group) -> bool {
     group.delimiter() == Delimiter::Brace
 }
 
-/// The brackets of the outer attribute that begins at `at`.
+/// The brackets of the outer attribute that starts at `at`.
 fn attribute(tokens: &[TokenTree], at: usize) -> Option<&Group> {
     match (tokens.get(at), tokens.get(at + 1)) {
         (Some(TokenTree::Punct(p)), Some(TokenTree::Group(group)))
@@ -201,14 +201,14 @@ fn is_cfg_test(attribute: &Group) -> bool {
     attribute.stream().to_string().replace(' ', "") == "cfg(test)"
 }
 
-/// The first token after the item whose attributes begin at `at`.
+/// The first token after the item whose attributes start at `at`.
 fn after_item(tokens: &[TokenTree], mut at: usize) -> usize {
     while attribute(tokens, at).is_some() {
         at += 2;
     }
     let head: Vec<String> = words(tokens.get(at..).unwrap_or_default()).collect();
     let has = |word: &str| head.iter().any(|found| found == word);
-    // The braces of these are a group of names or a value, not the end.
+    // Their braces are a group of names or a value, not the end.
     let ends_in_semicolon = ["use", "extern", "static", "type", "const"].into_iter().any(has) && !has("fn");
     while tokens.get(at).is_some_and(|token| !ends_item(token, ends_in_semicolon)) {
         at += 1;
@@ -222,7 +222,7 @@ fn words(item: &[TokenTree]) -> impl Iterator<Item = String> {
     head.filter_map(|token| if let TokenTree::Ident(word) = token { Some(word.to_string()) } else { None })
 }
 
-/// The name of the module, if the item is one whose text is in another file.
+/// The name of the module, if its text is in another file.
 fn module_elsewhere(item: &[TokenTree]) -> Option<String> {
     let elsewhere = matches!(item.last(), Some(TokenTree::Punct(p)) if p.as_char() == ';');
     elsewhere.then(|| words(item).skip_while(|word| word != "mod").nth(1)).flatten()

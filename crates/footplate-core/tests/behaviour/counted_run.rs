@@ -1,4 +1,5 @@
-//! A run as a wheel counts it, and how well an estimate follows it: a generator that knows nothing of filters.
+//! A run as a wheel counts its pulses, and the score of an estimate of it; the generator shares no formula with the
+//! filters.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -9,27 +10,27 @@ use crate::draw::Draw;
 
 pub(crate) const PERIOD: f64 = 0.05;
 const DIAMETER: f64 = 0.86;
-/// What every run begins with (m/s).
+/// Initial speed of every run (m/s).
 pub(crate) const FIRST_SPEED: f64 = 16.0;
 pub(crate) const SEEDS: Range<u64> = 1..11;
 
-/// The variance of a count over a period of random phase, with a little jitter, in pulses².
+/// Variance of a count over a period of random phase, with a little jitter, in pulses².
 pub(crate) const VARIANCE_OF_A_COUNT: f64 = 1.0 / 6.0 + 0.05;
-/// What a filter is told instead so that it knows what it knows: errors of successive counts cancel, for a pulse
-/// that is missed now is counted next time, and a mean over many is far better than if they did not.
-pub(crate) const VARIANCE_TOLD: f64 = 1.0 / 40.0;
+/// The variance given to a filter: errors of successive counts cancel, because a pulse missed now is counted next
+/// time, and a mean over many is much better than with independent errors.
+pub(crate) const FILTER_VARIANCE: f64 = 1.0 / 40.0;
 
 /// Decelerations (m/s²).
 pub(crate) const SERVICE_BRAKE: f64 = 0.6;
 pub(crate) const EMERGENCY_BRAKE: f64 = 1.3;
 
-/// From 16 m/s, which it keeps for 200 s, up to 89 m/s, and from 575 s on down again.
+/// 16 m/s for 200 s, acceleration to 89 m/s, and deceleration from 575 s on.
 pub(crate) struct Run {
     /// Speed and acceleration at the end of every period.
     pub(crate) truth: Vec<[f64; 2]>,
-    /// Counts of two wheels that roll, as speeds.
+    /// Counts of two rolling wheels, as speeds.
     pub(crate) counts: Vec<[f64; 2]>,
-    /// How much one pulse in a period is (m/s).
+    /// The speed of one pulse in a period (m/s).
     pub(crate) quantum: f64,
 }
 
@@ -39,7 +40,7 @@ impl Run {
         let pitch = PI * DIAMETER / teeth;
         let phases = [draw.share(), draw.share()];
         let jerk = 0.5 + braking;
-        let (mut way, mut speed, mut acceleration): (f64, f64, f64) = (0.0, FIRST_SPEED, 0.0);
+        let (mut distance, mut speed, mut acceleration): (f64, f64, f64) = (0.0, FIRST_SPEED, 0.0);
         let mut counted = [0.0; 2];
         let (mut truth, mut counts) = (Vec::new(), Vec::new());
         let fine = PERIOD / 10.0;
@@ -52,10 +53,10 @@ impl Run {
                 _ => -braking,
             };
             acceleration += (wanted - acceleration).clamp(-jerk * fine, jerk * fine);
-            way += fine * (speed + 0.5 * fine * acceleration);
+            distance += fine * (speed + 0.5 * fine * acceleration);
             speed += fine * acceleration;
             if moment % 10 == 9 {
-                let now = phases.map(|phase| (way / pitch + phase + draw.within(-0.05, 0.05)).floor());
+                let now = phases.map(|phase| (distance / pitch + phase + draw.within(-0.05, 0.05)).floor());
                 let [[first, second], [first_before, second_before]] = [now, counted];
                 let pulses = [first - first_before, second - second_before];
                 counts.push(pulses.map(|pulses| pulses * pitch / PERIOD));
@@ -69,19 +70,19 @@ impl Run {
 
 #[derive(Debug)]
 pub(crate) struct Score {
-    /// Root mean square of the error of speed.
+    /// Root mean square error of the speed.
     pub(crate) rms: f64,
-    /// The largest error while the train begins to accelerate, from 200 to 205 s.
+    /// Largest error at the start of the acceleration, from 200 to 205 s.
     pub(crate) onset: f64,
-    /// The largest error while it begins to brake, from 575 to 580 s.
+    /// Largest error at the start of the braking, from 575 to 580 s.
     pub(crate) braking: f64,
-    /// The mean normalised estimation error squared, a component: 1 if the covariance is that of the errors.
+    /// Mean normalised estimation error squared, per component: 1 if the covariance matches the errors.
     pub(crate) nees: f64,
-    /// Part of the time that the true speed lies within two standard deviations.
+    /// Part of the time for which the true speed is within two standard deviations.
     pub(crate) inside: f64,
 }
 
-/// The score of what is made of each period and its counts: speed, acceleration and the filter they are from.
+/// Scores an estimator of speed, acceleration and their filter, from each period and its counts.
 pub(crate) fn score(
     run: &Run,
     mut estimate: impl FnMut(usize, [f64; 2]) -> ([f64; 2], Option<LocalFilter>),

@@ -1,4 +1,4 @@
-//! Dispatched trains come where they are sent, are never where they hold no track, and no turnout moves under them.
+//! Dispatched trains reach their destinations, stay on reserved track, and no turnout moves under them.
 #![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
 
 use std::sync::OnceLock;
@@ -7,7 +7,7 @@ use footplate_core::control::{
     Dispatcher, Driver, Journey, LinkNews, Machine, Notice, Order, Output, Refusal, Reservation, TrainLengths,
 };
 use footplate_core::model::MotionModel;
-use footplate_core::track::{Layout, Leg, Position};
+use footplate_core::track::{Layout, Leg, Position, TurnoutStates};
 use footplate_core::tracking::WayPoint;
 use footplate_core::{Command, EdgeId, Length, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
 use proptest::collection::vec;
@@ -17,14 +17,14 @@ use crate::toy_body::ToyBody;
 use crate::toy_railway::{ToyRailway, known_model, step, straight};
 
 pub(crate) const TRAINS: [TrainId; 2] = [TrainId(24), TrainId(58)];
-/// Both of these are on the circuit.
+/// Both starts are on the circuit.
 const STARTS: [(&str, f64); 2] = [("D1", 500.0), ("B1", 150.0)];
 const LENGTHS: TrainLengths = TrainLengths { overhang: Length::from_mm(50.0), pickup: Length::from_mm(30.0) };
-/// Destinations: contacts of the circuit, in both directions.
+/// Destinations: sensors of the circuit, in both directions.
 pub(crate) const PLACES: [&str; 8] = ["A1", "A2", "B1", "B2", "C1", "C2", "D1", "D2"];
-/// What is said of a train that is where it may not be.
+/// The fault of a train that is outside its reservation.
 pub(crate) const STRAYED: &str = "is on track that it does not hold";
-/// Places are sums of lengths.
+/// Positions are sums of lengths.
 const ROUNDING: Length = Length::from_mm(0.5);
 
 fn model(train: TrainId) -> MotionModel {
@@ -39,7 +39,7 @@ pub(crate) struct Traffic {
     pub(crate) dispatcher: Dispatcher,
     pub(crate) notices: Vec<Notice>,
     bodies: [ToyBody; 2],
-    /// What went wrong, if anything did.
+    /// The faults found so far.
     pub(crate) wrongs: Vec<String>,
 }
 
@@ -48,7 +48,7 @@ impl Traffic {
         Self::with(Dispatcher::new, STARTS)
     }
 
-    /// The same under a watchdog.
+    /// The same with a watchdog.
     fn watched() -> Self {
         Self::with(Dispatcher::watched, STARTS)
     }
@@ -89,12 +89,14 @@ impl Traffic {
         }
     }
 
-    /// Whoever wants a turnout thrown holds it, and nobody else does.
+    /// Every commanded turnout is reserved for exactly one train.
     fn check_turnout(&mut self, command: Command) {
         let Command::Turnout { turnout, .. } = command else { return };
-        let holds = |train: &&TrainId| self.dispatcher.holds(**train).is_some_and(|held| held.takes(turnout));
-        if TRAINS.iter().filter(holds).count() != 1 {
-            self.wrongs.push(format!("turnout {turnout} was thrown for nobody who alone holds it"));
+        let has_reserved =
+            |train: &&TrainId| self.dispatcher.holds(**train).is_some_and(|reserved| reserved.takes(turnout));
+        if TRAINS.iter().filter(has_reserved).count() != 1 {
+            self.wrongs
+                .push(format!("turnout {turnout} was thrown without being reserved for exactly one train"));
         }
     }
 
@@ -115,7 +117,7 @@ impl Traffic {
             }
             if looks_at <= self.world.now {
                 looks_at += TimeSpan::from_ms(20);
-                self.look();
+                self.check_reservations();
             }
         }
     }
@@ -128,19 +130,19 @@ impl Traffic {
         }
     }
 
-    /// Everything that a train really is on it holds, and nobody holds what another does.
-    fn look(&mut self) {
+    /// The track under each train is reserved for it, and no track is reserved twice.
+    fn check_reservations(&mut self) {
         let [one, two] = TRAINS.map(|train| self.dispatcher.holds(train).expect("dispatched"));
         let mut wrongs = Vec::new();
         if one.meets(two) {
             wrongs.push("two trains hold the same track".to_owned());
         }
-        for ((train, held), body) in TRAINS.into_iter().zip([one, two]).zip(&self.bodies) {
+        for ((train, reserved), body) in TRAINS.into_iter().zip([one, two]).zip(&self.bodies) {
             let at = self.world.trains.iter().find(|found| found.id == train).expect("on the rails").at;
             let layout = &self.world.layout;
             let points = body.points(layout, at, LENGTHS.ahead(), LENGTHS.behind());
-            if !points.into_iter().all(|point| is_held(layout, point, held)) {
-                wrongs.push(format!("train {train} {STRAYED}: {at:?} of {held:?}"));
+            if !points.into_iter().all(|point| is_held(layout, point, reserved)) {
+                wrongs.push(format!("train {train} {STRAYED}: {at:?} of {reserved:?}"));
             }
         }
         self.wrongs.extend(wrongs);
@@ -153,23 +155,23 @@ impl Traffic {
     }
 }
 
-fn is_held(layout: &Layout, point: Position, held: &Reservation) -> bool {
+fn is_held(layout: &Layout, point: Position, reserved: &Reservation) -> bool {
     let length = layout.edge(point.edge).map_or(Length::ZERO, |edge| edge.length);
     let first = EdgeId(2 * point.edge.stretch().0);
     let offset = if point.edge == first { point.offset } else { length - point.offset };
-    held.spans().any(|(stretch, span)| {
+    reserved.spans().any(|(stretch, span)| {
         stretch == point.edge.stretch() && span.from <= offset + ROUNDING && offset - ROUNDING <= span.to
     })
 }
 
 #[test]
-fn a_train_goes_where_it_is_sent_and_another_makes_room() {
+fn a_dispatched_train_arrives_and_another_makes_room() {
     let mut traffic = Traffic::new();
     traffic.go(TRAINS[0], "C1+150mm");
     traffic.run(90.0);
     assert_eq!(traffic.wrongs, Vec::<String>::new());
     assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
-    // The other one stands there.
+    // The other train is at rest there.
     traffic.go(TRAINS[0], "B1+150mm");
     traffic.run(120.0);
     assert_eq!(traffic.wrongs, Vec::<String>::new());
@@ -192,17 +194,17 @@ fn a_train_driven_by_hand_stops_before_the_track_of_another() {
 }
 
 #[test]
-fn a_train_that_was_not_seen_before_the_end_of_the_track_is_looked_for_behind() {
-    // Given a train on a track that ends, which the last contact before the end did not see,
+fn a_train_missed_before_the_end_of_its_track_is_located_behind_it() {
+    // Given a train on a dead-end track, missed by the last sensor before the end,
     let mut traffic = Traffic::with(Dispatcher::new, [("EN1", 150.0), ("B1", 150.0)]);
-    traffic.world.dead.insert(traffic.world.layout.sensor_named("F1").expect("a contact"));
+    traffic.world.dead.insert(traffic.world.layout.sensor_named("F1").expect("a sensor"));
     traffic.go(TRAINS[0], "F1+400mm");
     traffic.run(30.0);
     assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
     // when it is sent back,
     traffic.go(TRAINS[0], "E1+300mm");
     traffic.run(60.0);
-    // then it comes there, and nobody has to say where it stands.
+    // then it arrives without anyone entering its position.
     assert_eq!(traffic.arrivals(TRAINS[0]), 2, "{:#?}", traffic.notices);
     let lost = |notice: &Notice| matches!(notice, Notice::ReservedAsUnknown { .. });
     assert!(!traffic.notices.iter().any(lost), "{:#?}", traffic.notices);
@@ -210,8 +212,8 @@ fn a_train_that_was_not_seen_before_the_end_of_the_track_is_looked_for_behind() 
 }
 
 #[test]
-fn a_train_too_near_a_turnout_to_throw_it_backs_away_and_comes_again() {
-    // Given a train whose overhang is over turnout 1, which lies for the other leg,
+fn a_train_too_close_to_a_turnout_to_throw_it_backs_away_first() {
+    // Given a train whose overhang is over turnout 1, which is set for the other leg,
     let mut traffic = Traffic::with(Dispatcher::new, [("D1", 500.0), ("B1", 250.0)]);
     let go = |traffic: &mut Traffic, place: &str| {
         let journey =
@@ -222,9 +224,9 @@ fn a_train_too_near_a_turnout_to_throw_it_backs_away_and_comes_again() {
     go(&mut traffic, "A1+160mm");
     assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
     assert_eq!(traffic.world.turnouts.get(TurnoutId(1)), Some(Leg::Straight));
-    // when it is sent over the leg for which it does not lie, and has to come from this side,
+    // when it is sent over the leg for which the turnout is not set, and has to come from this side,
     go(&mut traffic, "C1+150mm");
-    // then it comes there, really, over the turnout thrown for it.
+    // then it arrives over the turnout thrown for it.
     assert_eq!(traffic.wrongs, Vec::<String>::new());
     assert_eq!(traffic.arrivals(TRAINS[0]), 2, "{:#?}", traffic.notices);
     let at = traffic.world.trains[0].at;
@@ -237,7 +239,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(12))]
 
     #[test]
-    fn nobody_is_ever_where_it_holds_no_track(
+    fn every_train_stays_on_its_reserved_track(
         sent in vec((0_usize..2, 0_usize..8, 0.0..180.0_f64, 2.0..25.0_f64), 4..10),
         deaf in vec(0_u16..8, 0..2),
     ) {
@@ -255,7 +257,7 @@ proptest! {
 }
 
 #[test]
-fn a_journey_that_a_silent_station_interrupted_is_ended_once_the_train_has_been_found_again() {
+fn a_journey_interrupted_by_a_silent_station_is_completed_after_recovery() {
     let mut traffic = Traffic::watched();
     traffic.go(TRAINS[0], "C1+150mm");
     traffic.run(2.5);
@@ -274,7 +276,7 @@ fn a_journey_that_a_silent_station_interrupted_is_ended_once_the_train_has_been_
 }
 
 #[test]
-fn a_train_driven_by_hand_is_stopped_before_another_and_can_be_sent_somewhere_then() {
+fn a_train_driven_by_hand_is_stopped_before_another_and_can_be_dispatched_afterwards() {
     let mut traffic = Traffic::new();
     traffic
         .dispatcher
@@ -283,7 +285,7 @@ fn a_train_driven_by_hand_is_stopped_before_another_and_can_be_sent_somewhere_th
     traffic.run(60.0);
     assert!(traffic.wrongs.is_empty(), "{:?}", traffic.wrongs);
     assert!(traffic.world.trains[0].speed_mm_per_s < 1.0);
-    // The one that stood holds no more than where it stands: both can go their ways.
+    // The train at rest keeps only the track under it: both can reach their destinations.
     traffic.go(TRAINS[1], "D1+150mm");
     traffic.run(60.0);
     traffic.go(TRAINS[0], "A1+150mm");
@@ -293,7 +295,7 @@ fn a_train_driven_by_hand_is_stopped_before_another_and_can_be_sent_somewhere_th
 }
 
 #[test]
-fn nobody_is_sent_anywhere_while_a_train_stands_nobody_knows_where() {
+fn no_train_is_dispatched_while_the_position_of_another_is_unknown() {
     let traffic = Traffic::new();
     let mut driver = Driver::new(traffic.world.layout.clone(), straight());
     TRAINS.into_iter().for_each(|train| driver.add_train(model(train)));
@@ -306,4 +308,37 @@ fn nobody_is_sent_anywhere_while_a_train_stands_nobody_knows_where() {
     assert_eq!(refused, Err(Refusal::OtherNowhere { train: known, other }));
     let refused = dispatcher.go(traffic.world.now, other, journey);
     assert_eq!(refused, Err(Refusal::Lost { train: other }));
+}
+
+/// The same two trains, where nobody has set any turnout.
+fn with_unknown_turnouts(starts: [(&str, f64); 2]) -> Traffic {
+    Traffic::with(
+        |now, driver| {
+            let mut unknown = Driver::new(driver.layout().clone(), TurnoutStates::unknown());
+            for train in TRAINS {
+                let located = driver.locate(train, now).expect("placed");
+                unknown.add_train(model(train));
+                unknown.place(now, train, located.at, located.uncertainty);
+            }
+            Dispatcher::watched(now, unknown)
+        },
+        starts,
+    )
+}
+
+#[test]
+fn turnouts_that_nobody_has_set_are_set_for_a_journey() {
+    let mut traffic = with_unknown_turnouts([("A1", 50.0), ("B1", 300.0)]);
+    traffic.go(TRAINS[0], "C1+100mm");
+    traffic.run(60.0);
+    assert!(traffic.wrongs.is_empty(), "{:?}", traffic.wrongs);
+    assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
+}
+
+#[test]
+fn a_journey_is_refused_while_a_train_may_be_on_a_turnout_of_unknown_position() {
+    let mut traffic = with_unknown_turnouts([("D1", 500.0), ("A1", 250.0)]);
+    let journey = Journey::to(traffic.world.layout.landmark("C1").expect("a place"));
+    let refused = traffic.dispatcher.go(traffic.world.now, TRAINS[0], journey);
+    assert_eq!(refused, Err(Refusal::TurnoutUnknown { turnout: TurnoutId(1), train: TRAINS[1] }));
 }

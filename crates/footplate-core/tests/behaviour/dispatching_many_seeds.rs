@@ -1,7 +1,7 @@
-//! Hundreds of short worlds, each of a seed: whatever is asked of trains and whatever fails, nobody is where it may not be.
+//! Hundreds of short random worlds: whatever is ordered and whatever fails, every train stays on its reserved track.
 //!
-//! `FOOTPLATE_SEED=7 cargo nextest run -p footplate-core dispatched_worlds` runs only that one; `FOOTPLATE_SEEDS=1..5000`
-//! others than the usual ones.
+//! `FOOTPLATE_SEED=7 cargo nextest run -p footplate-core dispatched_worlds` runs only that world;
+//! `FOOTPLATE_SEEDS=1..5000` selects others.
 #![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
 use std::ops::RangeInclusive;
@@ -14,21 +14,21 @@ use crate::dispatching::{PLACES, STRAYED, TRAINS, Traffic};
 use crate::draw::Draw;
 use crate::toy_railway::step;
 
-/// Worlds that every test run looks at.
+/// Worlds of every test run.
 const SEEDS: RangeInclusive<u64> = 1..=1_000;
-/// Of worlds in which contacts fail that often, this share may end with a train on track that it does not hold.
+/// With sensors failing this often, at most this part of the worlds may end with a train outside its reservation.
 const MOST_STRAYS: f64 = 0.015;
 /// The smallest machine that runs the tests has two cores.
 const THREADS: usize = 2;
-/// What happens in one world: so many times somebody asks for something, and then the trains come to rest.
+/// One world: this many orders, then all trains come to rest.
 const ASKED: usize = 5;
-/// Steps at which trains are commanded to run by hand: 0 stands, and slower ones were not measured well.
+/// Steps commanded by hand: 0 stops, and slower steps were not measured well.
 const SPEEDS: [u8; 6] = [0, 4, 6, 8, 10, 11];
-/// How often a contact is deaf, or one closes by itself, between two things asked for.
+/// Probability of a dead sensor, and of a spurious detection, between two orders.
 const DEAF: f64 = 0.05;
 const BY_ITSELF: f64 = 0.1;
 
-/// Everything that was commanded, and when: the same for the same seed.
+/// Everything commanded, with its time: identical for the same seed.
 type Said = String;
 
 fn live(seed: u64, faults: bool) -> Result<Said, String> {
@@ -46,7 +46,7 @@ fn live(seed: u64, faults: bool) -> Result<Said, String> {
         } else {
             let speed = SPEEDS[(draw.share() * SPEEDS.len() as f64) as usize];
             let order = Order::Speed { train, step: step(speed) };
-            // Who has just been commanded to stop may not be told this now.
+            // A train just commanded to stop may reject this order.
             let _ = traffic.dispatcher.order(traffic.world.now, order);
         }
         traffic.run(1.0 + draw.share() * 10.0);
@@ -61,7 +61,7 @@ fn live(seed: u64, faults: bool) -> Result<Said, String> {
     }
 }
 
-/// The seeds that are asked for.
+/// The selected seeds.
 fn seeds() -> RangeInclusive<u64> {
     let number = |text: &str| text.trim().parse::<u64>().expect("a seed is a whole number");
     if let Ok(seed) = std::env::var("FOOTPLATE_SEED") {
@@ -76,7 +76,7 @@ fn seeds() -> RangeInclusive<u64> {
     }
 }
 
-/// The worlds that went wrong, of all those that are asked for.
+/// The faults of all selected worlds.
 fn wrongs(faults: bool) -> Vec<String> {
     let seeds = seeds();
     let next = AtomicU64::new(*seeds.start());
@@ -97,24 +97,25 @@ fn wrongs(faults: bool) -> Vec<String> {
 }
 
 #[test]
-fn no_seed_of_many_dispatched_worlds_goes_wrong() {
+fn no_seed_of_many_dispatched_worlds_violates_a_reservation() {
     let failed = wrongs(false);
-    let said = failed.iter().take(10).cloned().collect::<Vec<_>>().join("\n");
+    let report = failed.iter().take(10).cloned().collect::<Vec<_>>().join("\n");
     assert!(
         failed.is_empty(),
-        "{} worlds went wrong; one alone with FOOTPLATE_SEED=…:\n{said}",
+        "{} worlds went wrong; one alone with FOOTPLATE_SEED=…:\n{report}",
         failed.len()
     );
 }
 
-/// A contact that closes by itself just ahead of a train that runs there cannot be told from the train. Such closures come
-/// here a thousand times as often as in a well-kept laboratory (0.05 a minute on 80 contacts).
+/// A spurious detection just ahead of a running train cannot be distinguished from the train's own. Here they are a
+/// thousand times as frequent as in a well-kept laboratory (0.05 a minute on 80 sensors).
 #[test]
-fn with_failing_contacts_no_track_is_held_twice_and_few_trains_stray() {
+fn with_failing_sensors_no_track_is_reserved_twice_and_few_trains_stray() {
     let failed = wrongs(true);
     let strays = failed.iter().filter(|wrong| wrong.contains(STRAYED)).count();
-    let said = failed.iter().filter(|wrong| !wrong.contains(STRAYED)).cloned().collect::<Vec<_>>().join("\n");
-    assert!(said.is_empty(), "one alone with FOOTPLATE_SEED=…:\n{said}");
+    let report =
+        failed.iter().filter(|wrong| !wrong.contains(STRAYED)).cloned().collect::<Vec<_>>().join("\n");
+    assert!(report.is_empty(), "one alone with FOOTPLATE_SEED=…:\n{report}");
     let worlds = seeds().count();
     assert!(
         strays as f64 <= MOST_STRAYS * worlds as f64 + 1.0,
@@ -124,7 +125,7 @@ fn with_failing_contacts_no_track_is_held_twice_and_few_trains_stray() {
 }
 
 #[test]
-fn the_same_seed_commands_the_same_in_dispatched_worlds() {
+fn the_same_seed_gives_the_same_commands_in_dispatched_worlds() {
     for seed in [1, 17, 400] {
         assert!(live(seed, true) == live(seed, true), "seed {seed} is not the same world twice");
     }

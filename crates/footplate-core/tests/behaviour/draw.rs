@@ -1,4 +1,4 @@
-//! Random cases that are the same on every machine and in every run.
+//! Random numbers that are the same on every machine and in every run.
 
 use footplate_core::{Speed, TimeSpan};
 
@@ -18,7 +18,7 @@ impl Draw {
         z ^ (z >> 31)
     }
 
-    /// Evenly from 0 up to 1.
+    /// Uniform from 0 to 1, exclusive.
     pub(crate) fn share(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -27,12 +27,12 @@ impl Draw {
         low + (high - low) * self.share()
     }
 
-    /// Every order of magnitude as often as any other.
+    /// Uniform in the logarithm.
     pub(crate) fn magnitude(&mut self, low: f64, high: f64) -> f64 {
         low * (high / low).powf(self.share())
     }
 
-    /// With mean 0 and standard deviation 1 (Box and Muller, 1958).
+    /// Normal with mean 0 and standard deviation 1 (Box and Muller, 1958).
     pub(crate) fn normal(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.share()).ln()).sqrt();
         radius * (core::f64::consts::TAU * self.share()).cos()
@@ -42,7 +42,7 @@ impl Draw {
         self.bits().is_multiple_of(n)
     }
 
-    /// From a crawl of 1 mm/s to 100 m/s; one in five stands.
+    /// From 1 mm/s to 100 m/s; one in five is zero.
     pub(crate) fn speed(&mut self) -> Speed {
         if self.one_in(5) { Speed::ZERO } else { Speed::from_m_per_s(self.magnitude(1e-3, 100.0)) }
     }

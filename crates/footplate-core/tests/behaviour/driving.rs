@@ -1,5 +1,5 @@
-//! A driver brings trains to rest where they are ordered, says beforehand what it cannot do, and never waits for a
-//! report that may not come.
+//! A driver stops trains at their targets, rejects what it cannot do in advance, and never waits for a report that
+//! may not come.
 #![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
 use footplate_core::control::{Aim, Driver, Notice, Order, Refusal, StopOrder};
@@ -23,7 +23,7 @@ fn speed_of_stop(command: &Command) -> bool {
     matches!(command, Command::Speed { step, .. } if step.get() == 0)
 }
 
-/// Stops from rest at places near and far; how far beyond each the train really came to rest.
+/// Stops from rest at near and far places; returns how far beyond each the train really came to rest.
 fn stops(places: &[&str], order: impl Fn(StopOrder) -> StopOrder) -> Vec<(f64, f64, f64)> {
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let mut driver = driver_of(&world, "D1", 300.0);
@@ -41,17 +41,17 @@ fn stops(places: &[&str], order: impl Fn(StopOrder) -> StopOrder) -> Vec<(f64, f
 }
 
 #[test]
-fn a_train_comes_to_rest_within_what_was_promised_of_the_place_it_was_ordered_to() {
+fn stops_at_a_place_end_within_the_promised_interval() {
     let places = ["B1+120mm", "A1-30mm", "MR2+40mm", "D1+700mm", "A1+150mm", "B1-80mm", "D1+55mm", "A1"];
     for (missed, low, high) in stops(&places, |stop| stop) {
         assert!((low..=high).contains(&missed), "{missed} mm of {low} to {high} mm");
-        // With a contact on the way at a settled speed 100 mm; without one it is as good as starts are known.
+        // 100 mm with a sensor passed at a settled speed; without one, the uncertainty of the start.
         assert!(high - low < 200.0 && missed.abs() < 45.0, "{missed} mm of {low} to {high} mm");
     }
 }
 
 #[test]
-fn what_must_not_be_passed_is_aimed_short_of() {
+fn a_stop_not_beyond_a_place_ends_short_of_it() {
     let share = Aim::NotBeyond(Ratio::from_percent(0.1));
     for (missed, _, _) in stops(&["B1+120mm", "D1+700mm", "B1-80mm"], |stop| StopOrder { aim: share, ..stop })
     {
@@ -60,7 +60,7 @@ fn what_must_not_be_passed_is_aimed_short_of() {
 }
 
 #[test]
-fn a_short_move_ends_within_what_was_promised_of_where_it_should() {
+fn short_moves_end_within_the_promised_interval() {
     let mut world = ToyRailway::new(24, "D1", 100.0);
     let mut driver = driver_of(&world, "D1", 100.0);
     for mm in [40.0, 120.0, 250.0] {
@@ -77,28 +77,28 @@ fn a_short_move_ends_within_what_was_promised_of_where_it_should() {
 }
 
 #[test]
-fn a_running_train_stops_without_slowing_down_first_and_one_too_near_is_told_so() {
-    // Given a train that runs at step 10,
+fn a_moving_train_stops_directly_and_too_near_a_target_is_rejected() {
+    // Given a train running at step 10,
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let mut driver = driver_of(&world, "D1", 300.0);
     driver.order(world.now, Order::Speed { train: TRAIN, step: step(10) }).expect("a step");
     world.run_until(&mut driver, 30.0, |world| world.beyond_mm("B1") > 20.0 && world.beyond_mm("B1") < 40.0);
     world.notices.clear();
-    // when a place is nearer than it can stop,
+    // when the target is nearer than it can stop,
     let near = stop_at(&driver, "B1+100mm");
     let refused = driver.order(world.now, Order::Stop(near)).expect_err("nearer than it can stop");
-    // then it is refused with the nearest place, and stays refused,
+    // then the order is rejected with the nearest place, repeatedly,
     let Refusal::TooNear { nearest, beyond, round: Some(round), .. } = &refused else { panic!("{refused}") };
     assert!(driver.order(world.now, Order::Stop(near)).is_err());
     assert!((round.as_mm() - 2_300.0).abs() < 40.0, "{round:?}");
-    // the nearest place can be kept,
+    // a stop at the nearest place succeeds,
     let nearest_mm = driver.layout().landmark(nearest).expect("a place").offset.as_mm();
     assert!((nearest_mm - 100.0 - beyond.as_mm()).abs() < 12.0, "{refused}");
     let a_little_further = stop_at(&driver, &format!("B1+{:.0}mm", nearest_mm + 30.0));
     driver.order(world.now, Order::Stop(a_little_further)).expect("the nearest place and a little");
     assert!(world.run_until(&mut driver, 20.0, is_done));
     assert!(world.beyond_mm("B1+100mm") > 0.0);
-    // and the one refused is reached on the next round.
+    // and the rejected target is reached on the next lap.
     driver.order(world.now, Order::Speed { train: TRAIN, step: step(10) }).expect("a step");
     world.run_until(&mut driver, 60.0, |world| (0.0..20.0).contains(&world.beyond_mm("B1+20mm")));
     world.notices.clear();
@@ -109,8 +109,8 @@ fn a_running_train_stops_without_slowing_down_first_and_one_too_near_is_told_so(
 }
 
 #[test]
-fn a_quick_link_lets_a_train_stop_sooner_by_what_it_runs_meanwhile() {
-    // Given a train that runs at step 10, and a stop that is refused,
+fn a_faster_link_shortens_the_earliest_stop_by_the_distance_run_meanwhile() {
+    // Given a train running at step 10, and a stop that is rejected,
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let mut driver = driver_of(&world, "D1", 300.0);
     driver.order(world.now, Order::Speed { train: TRAIN, step: step(10) }).expect("a step");
@@ -123,10 +123,10 @@ fn a_quick_link_lets_a_train_stop_sooner_by_what_it_runs_meanwhile() {
         }
     };
     let over_the_slowest = missed_by(&mut driver);
-    // when the command leaves within 6 ms instead of 66 ms,
+    // when the command is sent within 6 ms instead of 66 ms,
     driver.set_link(TimeModel { soonest: TimeSpan::from_ms(6), ..TimeModel::POLLED_2400_BAUD });
     let sooner = over_the_slowest - missed_by(&mut driver);
-    // then it stops sooner by what it runs in 60 ms.
+    // then the nearest stop is closer by the distance run in 60 ms.
     let speed = driver.locate(TRAIN, world.now).expect("a place").speed;
     let runs = speed * TimeSpan::from_ms(60);
     assert!(runs > Length::from_mm(15.0), "{runs:?}");
@@ -134,22 +134,22 @@ fn a_quick_link_lets_a_train_stop_sooner_by_what_it_runs_meanwhile() {
 }
 
 #[test]
-fn the_stop_is_commanded_by_the_clock_when_no_contact_reports() {
-    // Given a train on its way to a stop,
+fn a_stop_is_commanded_by_the_clock_when_no_sensor_reports() {
+    // Given a train running to a stop,
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let mut driver = driver_of(&world, "D1", 300.0);
     driver.order(world.now, Order::Stop(stop_at(&driver, "D1+100mm"))).expect("one round");
     world.run_until(&mut driver, 20.0, |world| world.beyond_mm("A1") > 0.0 && world.beyond_mm("A1") < 40.0);
-    // when from then on every contact is silent,
+    // when all sensors are silent from then on,
     world.dead = (0..8).map(SensorId).collect();
-    // then it is commanded to stop all the same, and not far from where it should.
+    // then the stop is still commanded, and ends near its target.
     assert!(world.run_until(&mut driver, 60.0, is_done), "{:#?}", world.notices);
     assert!(world.commands.iter().any(|(_, command)| speed_of_stop(command)));
     assert!(world.beyond_mm("D1+100mm").abs() < 150.0, "{} mm", world.beyond_mm("D1+100mm"));
 }
 
 #[test]
-fn a_train_nobody_can_find_is_looked_for_and_then_stopped_where_it_should() {
+fn a_lost_train_is_located_and_then_stopped_at_its_target() {
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let mut driver = Driver::new(world.layout.clone(), straight());
     driver.add_train(known_model(24));
@@ -159,7 +159,7 @@ fn a_train_nobody_can_find_is_looked_for_and_then_stopped_where_it_should() {
 }
 
 #[test]
-fn a_train_that_has_vanished_is_given_up_and_told_to_stop() {
+fn a_vanished_train_is_given_up_and_commanded_to_stop() {
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let mut driver = driver_of(&world, "D1", 300.0);
     driver.order(world.now, Order::Speed { train: TRAIN, step: step(10) }).expect("a step");
@@ -173,7 +173,7 @@ fn a_train_that_has_vanished_is_given_up_and_told_to_stop() {
 }
 
 #[test]
-fn after_turning_around_a_train_is_known_to_the_centimetre_and_stops_in_the_other_direction() {
+fn after_reversing_a_train_is_located_to_a_centimetre_and_stops_in_the_other_direction() {
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let mut driver = driver_of(&world, "D1", 300.0);
     driver.order(world.now, Order::Speed { train: TRAIN, step: step(8) }).expect("a step");
@@ -187,7 +187,7 @@ fn after_turning_around_a_train_is_known_to_the_centimetre_and_stops_in_the_othe
     let located = driver.locate(TRAIN, world.now).expect("it is not lost");
     assert!(located.at_rest && located.uncertainty < Length::from_mm(30.0), "{located:?}");
     world.notices.clear();
-    driver.order(world.now, Order::Stop(stop_at(&driver, "D2+200mm"))).expect("back the way it came");
+    driver.order(world.now, Order::Stop(stop_at(&driver, "D2+200mm"))).expect("back along its path");
     assert!(world.run_until(&mut driver, 60.0, is_done), "{:#?}", world.notices);
     assert!(world.beyond_mm("D2+200mm").abs() < 40.0, "{} mm", world.beyond_mm("D2+200mm"));
 }
@@ -205,7 +205,7 @@ fn a_train_never_runs_off_the_end_of_the_track() {
 }
 
 #[test]
-fn a_train_stays_within_its_limit_whatever_it_was_ordered_and_whatever_is_reported() {
+fn a_train_keeps_its_end_of_authority_whatever_is_ordered_or_reported() {
     for (throttle, is_deaf) in [(6, false), (10, true), (14, false), (14, true)] {
         let mut world = ToyRailway::new(24, "D1", 300.0);
         let mut driver = driver_of(&world, "D1", 300.0);
@@ -213,18 +213,18 @@ fn a_train_stays_within_its_limit_whatever_it_was_ordered_and_whatever_is_report
             world.dead.extend(world.layout.sensors().map(|(sensor, _)| sensor));
         }
         let limit = WayPoint { node: stop_at(&driver, "D1").target.node, way: Length::from_mm(2_000.0) };
-        driver.set_limit(world.now, TRAIN, Some(limit));
+        driver.set_end_of_authority(world.now, TRAIN, Some(limit));
         driver.order(world.now, Order::Speed { train: TRAIN, step: step(throttle) }).expect("a step");
         world.run(&mut driver, 40.0);
         let beyond = world.beyond_mm("D1+2000mm");
         assert!((-400.0..0.0).contains(&beyond) && world.train().speed_mm_per_s < 1.0, "{beyond} mm");
         assert!(world.notices.iter().any(|notice| matches!(notice, Notice::AuthorityEnds { .. })));
-        // Where it was turned around nobody allowed it to go.
+        // After reversing, its authority ends where it is.
         driver.order(world.now, Order::Reverse { train: TRAIN, then: step(throttle) }).expect("a train");
         let before = world.train().travelled_mm;
         world.run(&mut driver, 20.0);
         assert!(world.train().travelled_mm - before < 60.0, "{} mm", world.train().travelled_mm - before);
-        driver.set_limit(world.now, TRAIN, None);
+        driver.set_end_of_authority(world.now, TRAIN, None);
         driver.order(world.now, Order::Speed { train: TRAIN, step: step(6) }).expect("a step");
         world.run(&mut driver, 5.0);
         assert!(world.train().speed_mm_per_s > 1.0);
@@ -232,16 +232,16 @@ fn a_train_stays_within_its_limit_whatever_it_was_ordered_and_whatever_is_report
 }
 
 #[test]
-fn a_stop_beyond_the_limit_ends_at_the_limit() {
+fn a_stop_beyond_the_end_of_authority_ends_before_it() {
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let mut driver = driver_of(&world, "D1", 300.0);
     let stop = stop_at(&driver, "A1+400mm");
-    driver.set_limit(
+    driver.set_end_of_authority(
         world.now,
         TRAIN,
         Some(WayPoint { node: stop_at(&driver, "D1").target.node, way: Length::from_mm(1_100.0) }),
     );
-    driver.order(world.now, Order::Stop(stop)).expect("a way leads there");
+    driver.order(world.now, Order::Stop(stop)).expect("a path leads there");
     world.run(&mut driver, 20.0);
     let given_up =
         |notice: &Notice| matches!(notice, Notice::GivenUp { why: Refusal::AtLimit { train: TRAIN }, .. });
@@ -257,13 +257,13 @@ fn a_turnout_is_never_thrown_under_a_train() {
     let refused = driver.order(world.now, throw(1));
     assert_eq!(refused, Err(Refusal::TurnoutOccupied { turnout: TurnoutId(1), train: TRAIN }));
     assert_eq!(driver.order(world.now, throw(9)), Err(Refusal::UnknownTurnout { turnout: TurnoutId(9) }));
-    driver.order(world.now, throw(2)).expect("nobody is there");
+    driver.order(world.now, throw(2)).expect("no train is there");
     world.run(&mut driver, 1.0);
     assert!(driver.turnouts().get(TurnoutId(2)).is_some_and(|leg| leg.is_curved()));
 }
 
 #[test]
-fn a_turnout_that_did_not_move_is_found_out_by_where_the_train_went() {
+fn a_failed_turnout_is_detected_by_the_path_of_the_train() {
     let mut world = ToyRailway::new(24, "D1", 300.0);
     world.stuck.insert(TurnoutId(1));
     let mut driver = driver_of(&world, "D1", 300.0);
@@ -279,7 +279,7 @@ fn a_turnout_that_did_not_move_is_found_out_by_where_the_train_went() {
 }
 
 #[test]
-fn orders_that_make_no_sense_are_refused_and_change_nothing() {
+fn invalid_orders_are_rejected_and_change_nothing() {
     let world = ToyRailway::new(24, "D1", 300.0);
     let mut driver = driver_of(&world, "D1", 300.0);
     let now = world.now;

@@ -1,4 +1,4 @@
-//! Whatever is ordered and whatever is reported, a driver neither panics nor plans beyond a target.
+//! Whatever is ordered and reported, a driver neither panics nor plans a stop beyond its target.
 #![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
 
 use std::sync::OnceLock;
@@ -16,12 +16,12 @@ use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_assert, prop_o
 
 use crate::toy_railway::{ToyRailway, driver_of, known_model, layout, step, straight};
 
-/// One thing that happens to a driver.
+/// One input of a driver.
 #[derive(Debug, Clone)]
 enum Happening {
     Ordered(Order),
     Reported(u16, Option<u32>),
-    /// A command that was asked for leaves.
+    /// A commanded command is sent.
     Left,
     Stranger(EventKind),
     Waited(u32),
@@ -105,7 +105,7 @@ proptest! {
                 Happening::Ordered(order) => {
                     let first = driver.clone().order(now, order);
                     let again = driver.order(now, order);
-                    // What is refused stays refused, for the same reason.
+                    // A rejected order is rejected again for the same reason.
                     prop_assert!(matches!((&first, &again), (Ok(_), Ok(_)) | (Err(_), Err(_))));
                     if let Err(why) = &again {
                         prop_assert!(!why.to_string().is_empty());
@@ -153,7 +153,7 @@ proptest! {
             while let Some(output) = driver.poll_output() {
                 match output {
                     Output::Command(command) => waiting.push(command),
-                    // By its own forecast a stop never ends beyond the target in the middle of what may be.
+                    // The predicted median of a stop never lies beyond its target.
                     Output::Notice(Notice::Planned(plan)) => {
                         prop_assert!(plan.promise.median <= Length::from_mm(1.0), "{plan:?}");
                     }
@@ -164,7 +164,7 @@ proptest! {
     }
 
     #[test]
-    fn a_stop_is_commanded_whatever_contacts_stay_silent(
+    fn a_stop_is_commanded_whatever_detections_are_missed(
         silent in vec(0_u16..8, 0..8),
         from_mm in 250.0..850.0_f64,
         target in 0.0..2_200.0_f64,

@@ -1,5 +1,5 @@
-//! Two wheelsets and a virtual sensor, fused: a wheelset that slides costs nothing once it is known to slide, and the
-//! covariance is that of the errors.
+//! Two wheelsets and a virtual sensor, fused: a sliding wheelset costs nothing once its slide is detected, and the
+//! covariance matches the errors.
 
 use std::ops::Range;
 
@@ -7,14 +7,14 @@ use footplate_core::odometry::paper::{
     FederatedFilter, Fusion, Manoeuvre, ManoeuvreSettings, MeasuredSpeed, Sharing,
 };
 
-use crate::counted_run::{FIRST_SPEED, PERIOD, Run, SEEDS, SERVICE_BRAKE, Score, VARIANCE_TOLD, score};
+use crate::counted_run::{FILTER_VARIANCE, FIRST_SPEED, PERIOD, Run, SEEDS, SERVICE_BRAKE, Score, score};
 
-/// While the second wheelset slides (periods), and how fast it turns beside the train.
+/// When the second wheelset slides (periods), and its relative speed.
 const SLIDING: Range<usize> = 11_520..11_720;
 const CREEPAGE: f64 = 0.8;
 
 fn fused(run: &Run, fusion: Fusion, slides: bool) -> Score {
-    let variance = VARIANCE_TOLD * run.quantum * run.quantum;
+    let variance = FILTER_VARIANCE * run.quantum * run.quantum;
     let mut manoeuvre = Manoeuvre::new(ManoeuvreSettings::recommended());
     let first = MeasuredSpeed { speed: FIRST_SPEED, variance };
     let mut filter = FederatedFilter::starting_at(fusion, first);
@@ -23,8 +23,8 @@ fn fused(run: &Run, fusion: Fusion, slides: bool) -> Score {
         if sliding {
             second *= CREEPAGE;
         }
-        let believed = [true, !sliding];
-        let shares = Sharing::PAPER.shares([first, second, 0.0], believed);
+        let trusted = [true, !sliding];
+        let shares = Sharing::PAPER.shares([first, second, 0.0], trusted);
         let [first, second] = [first, second].map(|speed| MeasuredSpeed { speed, variance });
         filter.step(&manoeuvre.next_step(PERIOD), [first, second, MeasuredSpeed::MISSING], shares);
         manoeuvre.learn(filter.master().state[1], true);
@@ -33,7 +33,7 @@ fn fused(run: &Run, fusion: Fusion, slides: bool) -> Score {
 }
 
 #[test]
-fn a_slide_that_is_known_costs_nothing_and_as_printed_it_costs_metres_a_second() {
+fn a_detected_slide_costs_nothing_and_the_printed_method_loses_metres_per_second() {
     for teeth in [80.0, 200.0] {
         for seed in SEEDS {
             let run = Run::new(teeth, SERVICE_BRAKE, seed);
@@ -45,7 +45,7 @@ fn a_slide_that_is_known_costs_nothing_and_as_printed_it_costs_metres_a_second()
                 );
                 assert!(sliding.braking < 0.2, "{fusion:?}, seed {seed}: {sliding:?}");
             }
-            // Half of a fifth of 89 m/s: what the shares say has no effect.
+            // Half of a fifth of 89 m/s: the shares have no effect.
             let literal = fused(&run, Fusion::Literal, true);
             assert!(literal.braking > 8.0, "seed {seed}: {literal:?}");
         }
@@ -53,15 +53,15 @@ fn a_slide_that_is_known_costs_nothing_and_as_printed_it_costs_metres_a_second()
 }
 
 #[test]
-fn they_claim_no_more_than_they_know() {
+fn the_stated_covariance_is_not_too_small() {
     for teeth in [80.0, 100.0, 200.0] {
         for fusion in [Fusion::Reset, Fusion::CovarianceIntersection] {
             let scores: Vec<Score> =
                 SEEDS.map(|seed| fused(&Run::new(teeth, SERVICE_BRAKE, seed), fusion, false)).collect();
             for score in &scores {
                 assert!(score.rms < 0.04 && score.onset < 0.15, "{fusion:?}, {teeth} teeth: {score:?}");
-                // Both count the same pulses: at equal diameters the second wheelset may tell nothing new, or, half
-                // a pulse apart, almost everything that the first does not.
+                // Both count the same pulses: at equal diameters the second wheelset may add no information, or, half
+                // a pulse apart, almost as much as the first.
                 assert!((0.1..1.0).contains(&score.nees), "{fusion:?}, {teeth} teeth: {score:?}");
                 assert!(score.inside > 0.97, "{fusion:?}, {teeth} teeth: {score:?}");
             }

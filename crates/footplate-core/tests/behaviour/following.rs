@@ -1,4 +1,4 @@
-//! A train keeps its gap to the one ahead, never comes too near to it, and refuses what could not be safe.
+//! A train keeps its gap to its leader, never comes too close, and unsafe gaps are rejected.
 #![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
 
 use footplate_core::control::{Driver, Gap, Notice, Order, Refusal};
@@ -7,10 +7,10 @@ use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 
 use crate::toy_railway::{ToyRailway, add_train, driver_of, step};
 
-/// The one behind, and the one ahead.
+/// The follower, and its leader.
 const FOLLOWER: TrainId = TrainId(24);
 const LEADER: TrainId = TrainId(58);
-/// Reach ahead of and behind the pickup's leading end.
+/// Lengths ahead of and behind the pickup's leading end.
 const REACH: [Length; 2] = [Length::from_mm(25.0), Length::from_mm(125.0)];
 
 fn two_trains() -> (ToyRailway, Driver) {
@@ -36,20 +36,20 @@ fn run_leader(world: &ToyRailway, driver: &mut Driver, at: u8) {
     driver.order(world.now, Order::Speed { train: LEADER, step: step(at) }).expect("a step");
 }
 
-/// From bumper to bumper (mm), as the trains really stand.
+/// True clearance between the two (mm).
 fn between(world: &ToyRailway) -> f64 {
     let at = |id: TrainId| world.trains.iter().find(|train| train.id == id).expect("a train").at;
-    let way = world.layout.distance_ahead(at(FOLLOWER), at(LEADER), &world.turnouts);
-    (way.expect("one oval") - REACH[0] - REACH[1]).as_mm()
+    let apart = world.layout.distance_ahead(at(FOLLOWER), at(LEADER), &world.turnouts);
+    (apart.expect("one oval") - REACH[0] - REACH[1]).as_mm()
 }
 
 /// True gaps (s) since a time.
 fn gaps(world: &ToyRailway, since: Timestamp) -> Vec<f64> {
     let led = |at: Timestamp, sensor: SensorId| {
         let passes = world.passes.iter().rev();
-        passes.filter(|(_, _, who)| *who == LEADER).find(|(led, of, _)| *of == sensor && *led <= at)
+        passes.filter(|(_, _, passer)| *passer == LEADER).find(|(led, of, _)| *of == sensor && *led <= at)
     };
-    let own = world.passes.iter().filter(|(at, _, who)| *who == FOLLOWER && *at >= since);
+    let own = world.passes.iter().filter(|(at, _, passer)| *passer == FOLLOWER && *at >= since);
     own.filter_map(|(at, sensor, _)| Some((*at - led(*at, *sensor)?.0).as_s())).collect()
 }
 
@@ -72,7 +72,7 @@ fn a_gap_in_time_is_kept_while_the_leader_changes_its_speed() {
 }
 
 #[test]
-fn a_gap_that_no_stop_could_keep_is_refused_with_the_shortest_that_could() {
+fn too_short_a_gap_is_rejected_with_the_shortest_safe_one() {
     let (mut world, mut driver) = two_trains();
     run_leader(&world, &mut driver, 8);
     world.run(&mut driver, 3.0);
@@ -82,13 +82,12 @@ fn a_gap_that_no_stop_could_keep_is_refused_with_the_shortest_that_could() {
     driver.order(world.now, follow(Gap::Time(shortest + TimeSpan::from_ms(1)))).expect("what was offered");
     let own = Order::Follow { train: LEADER, leader: FOLLOWER, gap: seconds(5.0) };
     assert!(matches!(driver.order(world.now, own), Err(Refusal::FollowsInCircle { .. })));
-    let nobody = Order::Follow { train: FOLLOWER, leader: TrainId(99), gap: seconds(5.0) };
-    assert!(matches!(driver.order(world.now, nobody), Err(Refusal::UnknownTrain { .. })));
+    let unknown = Order::Follow { train: FOLLOWER, leader: TrainId(99), gap: seconds(5.0) };
+    assert!(matches!(driver.order(world.now, unknown), Err(Refusal::UnknownTrain { .. })));
 }
 
 #[test]
-fn a_contact_that_fails_under_the_leader_alone_neither_stops_its_follower_nor_sends_it_after_a_leader_a_round_ahead()
- {
+fn a_sensor_that_misses_only_the_leader_neither_stops_the_follower_nor_adds_a_lap() {
     let (mut world, mut driver) = two_trains();
     run_leader(&world, &mut driver, 7);
     world.run(&mut driver, 2.0);
@@ -98,7 +97,7 @@ fn a_contact_that_fails_under_the_leader_alone_neither_stops_its_follower_nor_se
     let [failing, before] = [SensorId(0), SensorId(6)];
     let mut failed = 0;
     for _ in 0..600 {
-        let leads_to_it = world.passes.iter().rfind(|(_, _, who)| *who == LEADER);
+        let leads_to_it = world.passes.iter().rfind(|(_, _, passer)| *passer == LEADER);
         let fails = leads_to_it.is_some_and(|(_, sensor, _)| *sensor == before);
         failed += usize::from(fails && world.dead.is_empty());
         world.dead = fails.then_some(failing).into_iter().collect();
@@ -136,7 +135,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(16))]
 
     #[test]
-    fn no_follower_touches_its_leader_whatever_that_one_is_told(
+    fn no_follower_touches_its_leader_whatever_the_leader_is_commanded(
         commanded in proptest::collection::vec((0_u8..11, 2.0..9.0_f64), 4..9),
         more in 0.0..1.5_f64,
         dead in proptest::option::of(0_u16..8),
@@ -155,7 +154,7 @@ proptest! {
             let until = world.now + TimeSpan::from_s(lasts);
             while world.now < until {
                 world.run(&mut driver, 0.1);
-                // A leader that has nearly gone round comes upon a follower that was held back from behind.
+                // A leader almost one lap ahead comes up behind a stopped follower.
                 if between(&world) > 1_500.0 {
                     return Ok(());
                 }

@@ -1,4 +1,4 @@
-//! An accelerometer carries the speed through a slide with a deviation that is true and bounds that hold.
+//! An accelerometer carries the speed through a slide, with a true standard deviation and valid bounds.
 
 use core::f64::consts::TAU;
 
@@ -13,10 +13,10 @@ use crate::draw::Draw;
 
 const PERIOD_S: f64 = 0.05;
 
-/// A train on a line with gradients, and what an accelerometer in it reads.
+/// A train on a line with gradients, and the readings of its accelerometer.
 struct Train {
     draw: Draw,
-    /// Gravity along the track as waves over the way: amplitude (m/s²), length (m), phase.
+    /// Gravity along the track as waves over the distance: amplitude (m/s²), length (m), phase.
     gravity: [(f64, f64, f64); 4],
     bias: f64,
     bias_walk: f64,
@@ -41,7 +41,7 @@ impl Train {
             .sum()
     }
 
-    /// Accelerates so for one period and returns what is read in the mean.
+    /// Accelerates for one period and returns the mean reading.
     fn run(&mut self, acceleration: f64) -> Acceleration {
         let acceleration =
             if self.speed + acceleration * PERIOD_S < 0.0 { -self.speed / PERIOD_S } else { acceleration };
@@ -132,12 +132,12 @@ fn a_minute_of_sliding_stays_within_two_metres_per_second_on_a_level_line() {
             }
         }
     }
-    // A bias of 0.05 m/s² that nobody had learnt would be 3 m/s off.
+    // An unknown bias of 0.05 m/s² would give an error of 3 m/s.
     assert!(worst < 2.0, "{worst}");
 }
 
 #[test]
-fn standing_teaches_what_is_read_too_much() {
+fn the_sensor_bias_is_learnt_at_standstill() {
     let mut train = Train::new(1, 0.03);
     train.bias = -0.04;
     let mut filter = InertialFilter::new(InertialNoise::default());
@@ -173,16 +173,16 @@ fn a_common_slide_shows_in_the_innovation() {
 }
 
 #[test]
-fn a_sensor_that_falls_silent_makes_uncertain_and_nothing_worse() {
+fn a_silent_sensor_only_increases_the_uncertainty() {
     let mut train = Train::new(3, 0.0);
     let mut filter = InertialFilter::new(InertialNoise::default());
     let mut bounds = InertialBounds::new(InertialLimits::default());
     for after in 0..2000 {
         let reading = train.run(driven(f64::from(after) * PERIOD_S));
         let silent = (1000..1100).contains(&after);
-        let said = if silent { None } else { Some(reading) };
-        filter.predict(period(), said);
-        bounds.predict(period(), if silent { Some(Acceleration::from_m_per_s2(f64::NAN)) } else { said });
+        let read = if silent { None } else { Some(reading) };
+        filter.predict(period(), read);
+        bounds.predict(period(), if silent { Some(Acceleration::from_m_per_s2(f64::NAN)) } else { read });
         if silent {
             assert_eq!(bounds.speed(), None);
         } else {
@@ -199,7 +199,7 @@ fn a_sensor_that_falls_silent_makes_uncertain_and_nothing_worse() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
-    /// The speed never leaves its bounds while bias and gradients keep theirs, and the bounds of the bias hold the bias.
+    /// The speed stays within its bounds while bias and gradients keep theirs, and the bounds of the bias contain it.
     #[test]
     fn the_bounds_hold(
         seed in 0..1_000_000_u64,
@@ -227,7 +227,7 @@ proptest! {
         prop_assert!((high - low).as_m_per_s() < 2.0 * (0.62 * 60.0 + 0.9 + 0.5));
     }
 
-    /// Whatever is read, however long, the filter stays a filter.
+    /// No readings, however long, break the filter.
     #[test]
     fn no_reading_breaks_the_filter(
         readings in prop::collection::vec(
@@ -250,7 +250,7 @@ proptest! {
 }
 
 #[test]
-fn bounds_that_contradict_say_so_and_begin_anew() {
+fn contradictory_bounds_are_reported_and_restarted() {
     let mut bounds = InertialBounds::new(InertialLimits::default());
     assert!(bounds.hold(m_per_s(20.0), m_per_s(20.5)));
     for _ in 0..100 {
@@ -261,7 +261,7 @@ fn bounds_that_contradict_say_so_and_begin_anew() {
     assert!(low < 12.0 && 12.5 < high && high - low < 2.4, "{low} to {high}");
 }
 
-/// What is read in a car that shakes, and whether it stood at the end of each block.
+/// The readings in a shaking car, and whether it was at rest at the end of each block.
 fn shaken(train: &mut Train, acceleration: f64, readings: u32) -> Vec<(AccelerationBlock, bool)> {
     let mut average = BlockAverage::default();
     let mut blocks = Vec::new();
@@ -278,7 +278,7 @@ fn shaken(train: &mut Train, acceleration: f64, readings: u32) -> Vec<(Accelerat
 }
 
 #[test]
-fn a_sensor_that_reads_steady_acceleration_knows_stops_and_trips() {
+fn a_low_frequency_accelerometer_detects_stops_and_trips() {
     let mut train = Train::new(7, 0.02);
     train.noise = 0.01;
     train.bias = 0.05;
@@ -292,10 +292,10 @@ fn a_sensor_that_reads_steady_acceleration_knows_stops_and_trips() {
         let left = train.time + 20.0;
         for (acceleration, seconds) in [(0.0, 20.0), (0.9, 15.0), (-0.03, 25.0), (-0.9, 20.0), (0.0, 10.0)] {
             for (block, truly) in shaken(&mut train, acceleration, (seconds / PERIOD_S) as u32) {
-                let stands = matches!(detector.take(block), Standing::Since(_));
+                let is_at_rest = matches!(detector.take(block), Standing::Since(_));
                 trips.extend(recorder.take(block));
                 asked += 1.0;
-                right += f64::from(u8::from(stands == truly));
+                right += f64::from(u8::from(is_at_rest == truly));
             }
         }
         truths.push((left, train.place - from));
@@ -304,7 +304,7 @@ fn a_sensor_that_reads_steady_acceleration_knows_stops_and_trips() {
     for (trip, (left, length)) in trips.iter().zip(&truths) {
         assert!((trip.departure.as_s() - left).abs() < 0.5);
         let off = (trip.length - Length::from_m(*length)).as_m();
-        // Gradients of 2 to 6 mm/m that differ from stop to stop are what is left.
+        // The gradients of 2 to 6 mm/m that differ from stop to stop remain.
         assert!(off.abs() < 0.12 * length, "{off} m of {length}");
     }
     assert!(right / asked > 0.95, "{}", right / asked);

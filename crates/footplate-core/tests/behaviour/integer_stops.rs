@@ -1,4 +1,5 @@
-//! A stop in integers decides as the one in floating point does: in a million drawn situations, and at the ends of all ranges.
+//! A stop in integers gives the results of floating point: in a million random situations, and at the ends of all
+//! ranges.
 #![expect(clippy::expect_used, reason = "drawn situations are within all ranges")]
 
 use footplate_core::kinematics::{
@@ -15,14 +16,14 @@ const SITUATIONS: u32 = 1_000_000 / 12 + 1;
 /// Rounding to whole units or ticks alone is half of one.
 const MOST: f64 = 0.51;
 
-/// A stop as floating point knows it.
+/// A stop in floating point.
 #[derive(Debug, Clone, Copy)]
 enum Stop {
     Law(StoppingLaw<FromCommand>),
     Shape { delay: TimeSpan, shape: RampedLag },
 }
 
-/// A stop that a model train or a full-size one may have.
+/// A random stop of a model train or a full-size one.
 type Drawn = fn(&mut Draw) -> Stop;
 
 fn even(draw: &mut Draw) -> Stop {
@@ -64,7 +65,7 @@ impl Stop {
         }
     }
 
-    /// How far it has run (m) so long (s) after the command.
+    /// The distance run (m) at a time (s) after the command.
     fn run(&self, speed: Speed, time: f64) -> f64 {
         let delay = match self {
             Self::Law(law) => law.delay().as_s(),
@@ -99,12 +100,12 @@ impl Worst {
     }
 }
 
-fn decides_as_floating_point_does(drawn: Drawn, tick: TimeSpan, seed: u64) {
+fn agrees_with_floating_point(drawn: Drawn, tick: TimeSpan, seed: u64) {
     let mut draw = Draw::new(seed);
     let mut worst = Worst::default();
     let mut count = 0;
     while count < SITUATIONS {
-        // From a crawl of a model to 80 m/s, where a stop is one that lengths of 32 bits can hold.
+        // From a slow model to 80 m/s, for stops that lengths of 32 bits can hold.
         let speed = Speed::from_m_per_s(draw.magnitude(0.002, 80.0));
         let stop = drawn(&mut draw);
         let (distance, time) = stop.distance_and_time(speed);
@@ -116,7 +117,7 @@ fn decides_as_floating_point_does(drawn: Drawn, tick: TimeSpan, seed: u64) {
         worst.length(whole.stopping_distance(), distance);
         worst.time(whole.stopping_time(), time, tick);
 
-        // A target about where the stop would end, or up to 20 km away, in whole units as a controller has it.
+        // A target near the end of the stop, or up to 20 km away, in whole units as a controller has it.
         let away =
             if draw.one_in(2) { draw.within(0.8, 1.2) * distance } else { draw.magnitude(1e-3, 20_000.0) };
         let target = (away / IntegerStop::UNIT.as_m()) as i32 * if draw.one_in(10) { -1 } else { 1 };
@@ -139,22 +140,22 @@ fn decides_as_floating_point_does(drawn: Drawn, tick: TimeSpan, seed: u64) {
 /// In ticks of 1 µs, 100 µs, 1 ms and 10 ms.
 fn in_all_ticks(drawn: Drawn, seed: u64) {
     for (nth, us) in (0..).zip([1, 100, 1_000, 10_000]) {
-        decides_as_floating_point_does(drawn, TimeSpan::from_us(us), seed + nth);
+        agrees_with_floating_point(drawn, TimeSpan::from_us(us), seed + nth);
     }
 }
 
 #[test]
-fn even_braking_decides_alike() {
+fn constant_braking_agrees() {
     in_all_ticks(even, 20_261_123);
 }
 
 #[test]
-fn exponential_braking_decides_alike() {
+fn exponential_braking_agrees() {
     in_all_ticks(exponential, 20_261_223);
 }
 
 #[test]
-fn a_ramp_with_a_lag_decides_alike() {
+fn a_ramp_with_a_lag_agrees() {
     in_all_ticks(ramp_with_lag, 20_261_323);
 }
 
@@ -174,7 +175,7 @@ fn a_stop_by_hand_arithmetic() {
 }
 
 #[test]
-fn what_integers_cannot_hold_is_refused() {
+fn values_beyond_the_integer_range_are_rejected() {
     let law = |deceleration: f64| {
         let braking = Braking::Constant(Acceleration::from_m_per_s2(deceleration));
         StoppingLaw::<FromCommand>::new(TimeSpan::ZERO, braking).expect("a law")
@@ -191,7 +192,7 @@ fn what_integers_cannot_hold_is_refused() {
     let shape = RampedLag::new(1.0, 0.5);
     let early = IntegerStop::with_shape(Speed::from_m_per_s(0.5), TimeSpan::from_ms(-1), &shape, tick);
     assert!(matches!(early, Err(IntegerStopError::Stop { .. })));
-    // Too many ticks of 1 ns; with ticks of 2 ns half of the stop is as exact as with any other.
+    // Too many ticks of 1 ns; with ticks of 2 ns, half of the stop is as exact as with any other tick.
     assert!(matches!(made(0.544, 0.16, TimeSpan::from_ns(1)), Err(IntegerStopError::Stop { .. })));
     let stop = made(0.544, 0.16, TimeSpan::from_ns(2)).expect("a stop of 3.4 s");
     assert_eq!(stop.run_since_command(850_000_000), 6_936, "924.8 mm less 231.2 mm");
@@ -207,7 +208,7 @@ proptest! {
     #![proptest_config(ProptestConfig { max_global_rejects: 40_000, ..ProptestConfig::with_cases(2_000) })]
 
     #[test]
-    fn no_question_panics_and_later_is_farther(
+    fn no_query_panics_and_the_distance_grows_with_time(
         speed in 0.001..20.0_f64,
         delay in 0.0..5.0_f64,
         ramp in 0.0..10.0_f64,
@@ -227,9 +228,9 @@ proptest! {
         prop_assert_eq!(stop.overrun(distance) > 0, distance < stop.stopping_distance());
     }
 
-    /// Constants come over a cable, or from a memory that wears out.
+    /// Constants are read from a cable or from worn memory.
     #[test]
-    fn constants_that_are_taken_answer_every_question(
+    fn accepted_constants_answer_every_query(
         digits in [1_i64 << 52..1 << 53, 1_i64 << 52..1 << 53],
         points in (38..75_i64, 25..103_i64),
         times in any::<[i64; 5]>(),
@@ -249,7 +250,7 @@ proptest! {
     }
 
     #[test]
-    fn any_constants_are_refused_or_answer(
+    fn any_constants_are_rejected_or_answer(
         nine in any::<[i64; 9]>(),
         ticks: i64,
         distance: i32,

@@ -1,4 +1,4 @@
-//! A model that learns for long stays true: surprises cost what they are worth, and old trips become a prior.
+//! A model that learns for long stays accurate: outliers get their due weight, and old trips become a prior.
 
 use footplate_core::model::MotionFit;
 use footplate_core::model::survey::SectionIndex;
@@ -14,7 +14,7 @@ fn true_stop_mm(number: u8) -> f64 {
     0.18 * v + v * v / (2.0 * 170.0)
 }
 
-/// Runs at one step for some seconds and comes to rest; the command to start is noted so much later than it was sent.
+/// Runs at one step for some seconds and comes to rest; the start command is recorded too late by a time.
 fn trip(world: &mut ToyRailway, fit: &mut MotionFit, number: u8, noted_later: TimeSpan) {
     for (commanded, seconds) in [(step(number), 9.0), (SpeedStep::STAND, 5.0)] {
         world.command(Command::Speed { train: TRAIN, step: commanded });
@@ -38,7 +38,7 @@ fn stops_mm(fit: &MotionFit) -> Vec<(u8, f64, f64)> {
     [4, 6, 8, 10, 12].into_iter().map(of).collect()
 }
 
-/// An evening of stops in which one start at step 10 is so early.
+/// An evening of stops in which one start at step 10 is early by a time.
 fn after_an_evening(early: TimeSpan) -> Vec<(u8, f64, f64)> {
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let sections = SectionIndex::of(&world.layout);
@@ -68,7 +68,7 @@ fn one_start_that_is_45_mm_early_moves_no_stop_by_more_than_a_tenth_of_that() {
 }
 
 #[test]
-fn after_three_hundred_stops_a_model_is_as_true_as_it_says() {
+fn after_three_hundred_stops_a_model_is_as_accurate_as_stated() {
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let sections = SectionIndex::of(&world.layout);
     let mut fit = MotionFit::new(TRAIN, step(14));
@@ -84,23 +84,26 @@ fn after_three_hundred_stops_a_model_is_as_true_as_it_says() {
         }
     }
     fit.refit(&sections);
-    for (number, distance, doubt) in stops_mm(&fit) {
+    for (number, distance, deviation) in stops_mm(&fit) {
         let off = distance - true_stop_mm(number);
-        assert!(off.abs() < 3.0 * doubt + 2.0 && off.abs() < 6.0, "step {number}: off by {off} ± {doubt} mm");
-        assert!(doubt < 6.0, "step {number}: ± {doubt} mm after 300 stops");
+        assert!(
+            off.abs() < 3.0 * deviation + 2.0 && off.abs() < 6.0,
+            "step {number}: off by {off} ± {deviation} mm"
+        );
+        assert!(deviation < 6.0, "step {number}: ± {deviation} mm after 300 stops");
         let speed = fit.model().speed(step(number), Approach::Below);
         let off = speed.value.as_mm_per_s() / (32.0 * f64::from(number)) - 1.0;
         assert!(off.abs() < 0.01, "step {number}: {off}");
-        assert!(speed.count >= 60, "all contacts count: {}", speed.count);
+        assert!(speed.count >= 60, "all sensors count: {}", speed.count);
     }
 }
 
-/// How much further a train rolls that comes to rest on the falling hop (mm).
+/// How much further a train rolls if it comes to rest on the falling hop (mm).
 const DOWNHILL_MM: f64 = 25.0;
 
 #[test]
-fn stops_that_end_downhill_are_learnt_to_be_longer_there_and_nowhere_else() {
-    // Given a circuit of three hops, of which one falls,
+fn stops_downhill_are_learnt_to_be_longer_only_there() {
+    // Given a circuit of three hops, one of them falling,
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let sections = SectionIndex::of(&world.layout);
     let mut fit = MotionFit::new(TRAIN, step(14));
@@ -115,7 +118,7 @@ fn stops_that_end_downhill_are_learnt_to_be_longer_there_and_nowhere_else() {
         }
         fit.refit(&sections);
     }
-    // then the stops that end there are longer by so much than those that end elsewhere.
+    // then stops there are longer than elsewhere by that length.
     let offsets = fit.model().numbers().stop_offsets;
     let downhill = world.layout.hops().find(|hop| hop.edges == [falls]).expect("it is a hop").id.index();
     let (there, elsewhere): (Vec<_>, Vec<_>) = offsets.iter().partition(|(hop, ..)| *hop == downhill);

@@ -1,8 +1,8 @@
-//! What core promises, a file a promise.
+//! What core promises: one file for each promise.
 
 mod arriving;
-mod attribution;
 mod counted_run;
+mod data_association;
 mod dispatching;
 mod dispatching_many_seeds;
 mod draw;
@@ -17,6 +17,7 @@ mod motion_checks;
 mod motion_models;
 mod odometer;
 mod pacing;
+mod paths_on_tracks;
 mod profiles;
 mod short_moves;
 mod speed_change_laws;
@@ -27,5 +28,4 @@ mod toy_railway;
 mod trains_fitted;
 mod two_sensors;
 mod watching;
-mod ways_on_tracks;
 mod wheel_diameters;

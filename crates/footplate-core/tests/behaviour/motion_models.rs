@@ -1,13 +1,13 @@
-//! The adaptive motion model follows a train by the counts of one wheel: what the published recipe makes of the
-//! moment when the train begins to accelerate, and what its repairs make of it.
+//! The adaptive motion model follows a train by the pulses of one wheel: the published filter, and the corrected one,
+//! at the start of an acceleration.
 
 use footplate_core::odometry::paper::{
     ErrorGrowth, Liveliness, LocalFilter, Manoeuvre, ManoeuvreSettings, MeasuredSpeed,
 };
 
 use crate::counted_run::{
-    EMERGENCY_BRAKE, FIRST_SPEED, PERIOD, Run, SEEDS, SERVICE_BRAKE, Score, VARIANCE_OF_A_COUNT,
-    VARIANCE_TOLD, score,
+    EMERGENCY_BRAKE, FILTER_VARIANCE, FIRST_SPEED, PERIOD, Run, SEEDS, SERVICE_BRAKE, Score,
+    VARIANCE_OF_A_COUNT, score,
 };
 
 const ANY_JERK: (f64, f64) = (0.0, f64::INFINITY);
@@ -29,7 +29,7 @@ fn filtered(run: &Run, settings: ManoeuvreSettings, pulses_squared: f64) -> Scor
 }
 
 #[test]
-fn the_published_recipe_loses_a_train_that_begins_to_accelerate_and_its_repairs_keep_it() {
+fn the_published_filter_loses_an_accelerating_train_and_the_corrected_one_follows_it() {
     let recommended = ManoeuvreSettings::recommended();
     let only_window = ManoeuvreSettings { errors: ErrorGrowth::Decays, jerk: ANY_JERK, ..recommended };
     let mut worst_literal: f64 = 0.0;
@@ -49,7 +49,7 @@ fn the_published_recipe_loses_a_train_that_begins_to_accelerate_and_its_repairs_
 }
 
 #[test]
-fn without_an_upper_bound_the_filter_takes_its_own_noise_for_manoeuvres() {
+fn without_an_upper_bound_the_filter_mistakes_noise_for_manoeuvres() {
     let recommended = ManoeuvreSettings::recommended();
     let (floor, _) = recommended.jerk;
     let unbounded = ManoeuvreSettings { jerk: (floor, f64::INFINITY), ..recommended };
@@ -57,18 +57,18 @@ fn without_an_upper_bound_the_filter_takes_its_own_noise_for_manoeuvres() {
     for seed in SEEDS {
         let run = Run::new(80.0, SERVICE_BRAKE, seed);
         let [unbounded, bounded, fixed] =
-            [unbounded, recommended, fixed].map(|settings| filtered(&run, settings, VARIANCE_TOLD));
+            [unbounded, recommended, fixed].map(|settings| filtered(&run, settings, FILTER_VARIANCE));
         assert!(unbounded.rms > 2.5 * bounded.rms, "seed {seed}: {unbounded:?} {bounded:?}");
         assert!(bounded.rms < 1.25 * fixed.rms, "seed {seed}: {bounded:?} {fixed:?}");
     }
 }
 
 #[test]
-fn it_knows_how_good_it_is() {
+fn its_covariance_matches_its_errors() {
     for teeth in [80.0, 100.0, 200.0] {
         for seed in SEEDS {
             let run = Run::new(teeth, SERVICE_BRAKE, seed);
-            let score = filtered(&run, ManoeuvreSettings::recommended(), VARIANCE_TOLD);
+            let score = filtered(&run, ManoeuvreSettings::recommended(), FILTER_VARIANCE);
             assert!((0.3..1.5).contains(&score.nees), "{teeth} teeth, seed {seed}: {score:?}");
             assert!((0.93..0.9995).contains(&score.inside), "{teeth} teeth, seed {seed}: {score:?}");
         }
@@ -80,8 +80,8 @@ fn an_emergency_brake_is_followed() {
     for teeth in [80.0, 200.0] {
         for seed in SEEDS {
             let run = Run::new(teeth, EMERGENCY_BRAKE, seed);
-            let score = filtered(&run, ManoeuvreSettings::recommended(), VARIANCE_TOLD);
-            // With a lag of half a second the error of an onset of 1.3 m/s² would be twice that.
+            let score = filtered(&run, ManoeuvreSettings::recommended(), FILTER_VARIANCE);
+            // A lag of half a second at a change of 1.3 m/s² would give twice this error.
             assert!(score.braking < 0.3, "{teeth} teeth, seed {seed}: {score:?}");
         }
     }

@@ -1,4 +1,4 @@
-//! The odometer takes whatever tachometers say, says so, and recovers from it.
+//! The odometer accepts any tachometer input, reports what is wrong, and recovers.
 
 #![expect(clippy::expect_used, reason = "the vehicle of a test is one")]
 
@@ -21,7 +21,7 @@ fn vehicle() -> Vehicle {
     .expect("a vehicle of the contract")
 }
 
-/// Two wheels that roll, and the clock of their recorder.
+/// Two rolling wheels and the clock of their recorder.
 struct Rolling {
     time: f64,
     place: f64,
@@ -133,7 +133,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(256))]
 
     #[test]
-    fn nothing_poisons_it_and_it_recovers(
+    fn no_input_corrupts_the_odometer_for_good(
         periods in proptest::collection::vec(any_period(), 1..300),
         as_published in any::<bool>(),
     ) {
@@ -153,7 +153,7 @@ proptest! {
             prop_assert!(estimate.over >= amounts[0] && estimate.under >= amounts[1], "amounts never decrease");
             amounts = [estimate.over, estimate.under];
         }
-        // A train that rolls on at 12 m/s, after a pause that ends whatever was before.
+        // A train that continues at 12 m/s, after a pause that ends whatever was before.
         let mut train = Rolling { time: latest as f64 * 1e-9 + 10.0, place: 0.0, counted: [0; 2] };
         let mut last = None;
         for _ in 0..1200 {
@@ -168,7 +168,7 @@ proptest! {
 }
 
 #[test]
-fn a_dead_second_sensor_costs_no_accuracy_and_is_said() {
+fn a_dead_second_sensor_costs_no_accuracy_and_is_reported() {
     let mut odometer = Odometer::new(vehicle(), OdometrySettings::recommended()).expect("a vehicle");
     let mut train = Rolling { time: 0.0, place: 0.0, counted: [0; 2] };
     let mut worst: f64 = 0.0;
@@ -225,7 +225,7 @@ fn slide_of_both(creepage: f64, back_within: f64) -> [f64; 3] {
 }
 
 #[test]
-fn a_slide_of_both_is_seen_and_left_without_a_wheel_that_turns_up_hard() {
+fn a_common_slide_is_detected_and_left_without_a_hard_recovery() {
     // 15 % creepage is 3.4 m/s; adhesion returns within half a second.
     let [sliding, after, _] = slide_of_both(0.15, 0.5);
     assert!(sliding < 0.6, "{sliding} m/s off in the slide");
@@ -233,7 +233,7 @@ fn a_slide_of_both_is_seen_and_left_without_a_wheel_that_turns_up_hard() {
 }
 
 #[test]
-fn a_spike_in_the_first_row_is_not_believed() {
+fn a_spike_in_the_first_row_is_rejected() {
     let mut odometer = Odometer::new(vehicle(), OdometrySettings::recommended()).expect("a vehicle");
     let mut train = Rolling { time: 0.0, place: 0.0, counted: [0; 2] };
     for period in 0..40 {
@@ -255,7 +255,7 @@ fn the_upper_bound_never_exceeds_the_top_speed_of_the_train() {
     let mut odometer = Odometer::new(vehicle(), OdometrySettings::recommended()).expect("a vehicle");
     let mut train = Rolling { time: 0.0, place: 0.0, counted: [0; 2] };
     for period in 0..6000 {
-        // A brake that is applied and released while the train stands.
+        // A brake applied and released while the train is at rest.
         let effort = if period / 20 % 2 == 0 { -0.5 } else { 0.0 };
         let estimate = odometer.step(&train.next(0.0, effort));
         assert!(

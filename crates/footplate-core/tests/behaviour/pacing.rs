@@ -1,4 +1,5 @@
-//! A train runs at any speed between its slowest and its fastest step, as exactly as contacts tell, and with few commands.
+//! A train holds any speed between its slowest and fastest step, as precisely as the sensors allow, with few
+//! commands.
 #![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
 
 use footplate_core::control::{Driver, Notice, Order, PacedLine, Refusal};
@@ -20,7 +21,7 @@ fn line(world: &ToyRailway) -> Option<PacedLine> {
     })
 }
 
-/// Runs until a line has begun.
+/// Runs until a line has started.
 fn begin(world: &mut ToyRailway, driver: &mut Driver) -> PacedLine {
     assert!(world.run_until(driver, 30.0, |world| line(world).is_some()), "{:#?}", world.notices);
     line(world).expect("a line")
@@ -34,8 +35,8 @@ fn commanded(world: &ToyRailway) -> Vec<Timestamp> {
 
 #[test]
 fn a_speed_between_two_steps_is_held_for_as_long_as_asked() {
-    // Steps of the toy train are 32 mm/s apart; 240 is between two of them, 256 is one. Contacts are up to 900 mm apart: a
-    // speed that is known to one per cent is 9 mm off at the next.
+    // Steps of the toy train are 32 mm/s apart; 240 is between two steps, 256 is a step. Sensors are up to 900 mm
+    // apart: a speed known to one per cent gives an error of 9 mm at the next.
     for mm_per_s in [200.0, 240.0, 256.0, 270.0, 390.0] {
         let mut world = ToyRailway::new(24, "D1", 300.0);
         let mut driver = driver_of(&world, "D1", 300.0);
@@ -58,7 +59,7 @@ fn a_speed_between_two_steps_is_held_for_as_long_as_asked() {
 }
 
 #[test]
-fn a_speed_that_no_steps_bracket_is_refused_with_those_that_can_be_held() {
+fn a_speed_outside_the_steps_is_rejected_with_the_possible_range() {
     let world = ToyRailway::new(24, "D1", 300.0);
     let mut driver = driver_of(&world, "D1", 300.0);
     for mm_per_s in [0.0, -100.0, 20.0, 900.0, f64::NAN, f64::INFINITY] {
@@ -70,7 +71,7 @@ fn a_speed_that_no_steps_bracket_is_refused_with_those_that_can_be_held() {
 }
 
 #[test]
-fn another_order_ends_it() {
+fn another_order_ends_pacing() {
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let mut driver = driver_of(&world, "D1", 300.0);
     driver.order(world.now, hold(240.0)).expect("a speed");
@@ -87,7 +88,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
-    fn the_budget_of_commands_is_kept_whatever_is_held(
+    fn the_command_budget_is_kept_at_any_speed(
         speeds in proptest::collection::vec(60.0..440.0_f64, 1..4),
         from_mm in 250.0..850.0_f64,
         dead in proptest::option::of(0_u16..8),
@@ -101,7 +102,7 @@ proptest! {
             }
             let since = world.commands.len();
             world.run(&mut driver, 25.0);
-            // The order's own command comes at once, and one of the order before may still have been on its way.
+            // The order's own command is immediate, and one of the earlier order may still have been waiting.
             let commanded: Vec<Timestamp> = commanded(&world).into_iter().skip(since + 1).collect();
             for pair in commanded.windows(2) {
                 prop_assert!(pair[1] - pair[0] >= TimeSpan::from_ms(195), "{pair:?}");

@@ -1,5 +1,4 @@
-//! Profiles have the shape that their limits give them, keep the limits, and are as quick from their middle as
-//! from their start.
+//! Profiles have the shape that follows from their limits, keep the limits, and are optimal from any of their points.
 
 #![expect(clippy::panic, reason = "a refusal where none was expected ends a test, with all its numbers")]
 
@@ -75,7 +74,7 @@ fn a_train_above_the_limit_slows_down_to_it_first() {
 }
 
 #[test]
-fn a_braking_train_eases_off_only_as_far_as_the_way_allows() {
+fn a_braking_train_eases_off_only_as_far_as_the_distance_allows() {
     let limits = limits(20.0, 1.0, 1.0, 0.5);
     let from = state(0.0, 10.0, -0.6);
     let far = SCurve::between(from, at_rest(200.0), limits).unwrap();
@@ -92,7 +91,7 @@ fn a_braking_train_eases_off_only_as_far_as_the_way_allows() {
 }
 
 #[test]
-fn a_train_that_arrives_with_a_speed_runs_on_with_it() {
+fn a_train_that_arrives_with_a_speed_keeps_it() {
     let limits = limits(10.0, 1.0, 1.0, 0.5);
     let to = MotionState::cruising(Length::from_m(300.0), Speed::from_m_per_s(4.0));
     let profile = SCurve::between(at_rest(0.0), to, limits).unwrap();
@@ -105,7 +104,7 @@ fn a_train_that_arrives_with_a_speed_runs_on_with_it() {
 // ---- where it changes ----------------------------------------------------------------------------------------
 
 #[test]
-fn a_trapezoid_changes_where_the_schoolbook_says() {
+fn a_trapezoid_changes_where_the_textbook_says() {
     // 10 m/s at 1 m/s² takes 10 s and 50 m, at 2 m/s² 5 s and 25 m; 25 m are left to cruise.
     let profile = Trapezoid::between(at_rest(10.0), at_rest(110.0), limits(10.0, 1.0, 2.0, 1.0)).unwrap();
     assert_eq!(ends(profile.stretches()), [10_000.0, 12_500.0, 17_500.0]);
@@ -174,7 +173,7 @@ fn a_profile_towards_smaller_distances_is_the_mirror_image() {
 }
 
 #[test]
-fn a_change_to_a_speed_takes_the_way_that_it_takes() {
+fn a_change_of_speed_has_its_exact_distance() {
     // From 1 to 10 m/s with J 1 and a 2: 2 s, 2.5 s, 2 s at a mean of 5.5 m/s.
     let limits = limits(12.0, 2.0, 1.0, 1.0);
     let profile = SCurve::to_speed(state(5.0, 1.0, 0.0), Speed::from_m_per_s(10.0), limits).unwrap();
@@ -198,10 +197,10 @@ fn playback_gives_the_same_states() {
     }
 }
 
-// ---- what cannot be had --------------------------------------------------------------------------------------
+// ---- impossible profiles --------------------------------------------------------------------------------------
 
 #[test]
-fn what_cannot_be_had_is_refused_with_what_can() {
+fn impossible_profiles_are_rejected_with_possible_values() {
     let wide = limits(10.0, 1.0, 2.0, 1.0);
     let refusal = |from, to, limits| SCurve::between(from, to, limits).unwrap_err();
     let even = Trapezoid::between(state(0.0, 10.0, 0.0), at_rest(20.0), wide).unwrap_err();
@@ -242,7 +241,7 @@ fn random_ends(draw: &mut Draw, limits: &Limits) -> (MotionState, MotionState) {
     (state(origin, speed, acceleration), state(origin + draw.magnitude(1e-3, 1e4), target_speed, 0.0))
 }
 
-/// The profile to the target, or to one as far as the refusal says it has to be, or a little farther.
+/// The profile to the target, or to one as far as the error requires, or a little farther.
 fn feasible<P>(
     draw: &mut Draw,
     (from, to): (MotionState, MotionState),
@@ -255,7 +254,7 @@ fn feasible<P>(
             let to = MotionState { distance: from.distance + shortest * farther, ..to };
             match between(from, to) {
                 Ok(profile) => Some((profile, to)),
-                // The distances of the states cannot express so short a way.
+                // The distances of the states cannot express so short a distance.
                 Err(ProfileError::TooNear { .. }) if shortest * 1e-6 < from.distance.abs() * f64::EPSILON => {
                     None
                 }
@@ -267,13 +266,13 @@ fn feasible<P>(
     }
 }
 
-/// The speed to which a train comes when it lets its acceleration fade at the limit of jerk, in m/s.
+/// The speed that a train reaches if its acceleration fades at the jerk limit (m/s).
 fn leveled_speed(state: MotionState, limits: &Limits) -> f64 {
     let acceleration = state.acceleration.as_m_per_s2();
     state.speed.as_m_per_s() + 0.5 * acceleration * acceleration.abs() / limits.jerk.as_m_per_s3()
 }
 
-/// Speed and acceleration are within the limits at a time, or on the way there from a start beyond them.
+/// Speed and acceleration are within the limits at a time, or approach them from a start beyond.
 fn assert_limits_hold(profile: &impl Motion, time: TimeSpan, from: MotionState, limits: &Limits) {
     let now = profile.state_at(time);
     let highest = limits.speed.max(from.speed).as_m_per_s().max(leveled_speed(from, limits));
@@ -344,7 +343,7 @@ fn three_hundred_thousand_random_s_curves_hold() {
             assert_limits_hold(&profile, time, from, &limits);
             assert_inverse_leads_back(&profile, time);
             assert_no_step(&profile, time);
-            // Acceleration has no step either: within a microsecond the jerk limit changes it by no more.
+            // Acceleration is continuous, too: within a microsecond it changes by no more than the jerk limit.
             let (before, after) = (
                 profile.state_at(time - TimeSpan::from_us(1)),
                 profile.state_at(time + TimeSpan::from_us(1)),
@@ -365,7 +364,7 @@ fn three_hundred_thousand_random_s_curves_hold() {
 }
 
 #[test]
-fn from_anywhere_on_the_quickest_way_the_rest_of_it_is_the_quickest() {
+fn the_rest_of_an_optimal_profile_is_optimal() {
     let mut draw = Draw::new(13);
     for _ in 0..100_000 {
         let limits = random_limits(&mut draw);
@@ -382,7 +381,7 @@ fn from_anywhere_on_the_quickest_way_the_rest_of_it_is_the_quickest() {
         let again = SCurve::between(midway, to, limits)
             .unwrap_or_else(|refused| panic!("{refused} from {midway:?} to {to:?} with {limits:?}"));
         let difference = (again.duration() + time - profile.duration()).as_s();
-        // The grain of the distance is way to be made up for, starting and ending without acceleration.
+        // The precision of the distance must be made up for, starting and ending without acceleration.
         let grain = grain(&profile, midway) / limits.jerk.as_m_per_s3();
         let tolerance = 1e-6 + 8.0 * grain.cbrt();
         assert!(
@@ -395,7 +394,7 @@ fn from_anywhere_on_the_quickest_way_the_rest_of_it_is_the_quickest() {
 
 proptest! {
     #[test]
-    fn any_numbers_are_a_profile_or_refused(numbers in any::<[f64; 10]>(), at in any::<i64>(), place in any::<f64>()) {
+    fn any_numbers_give_a_profile_or_an_error(numbers in any::<[f64; 10]>(), at in any::<i64>(), place in any::<f64>()) {
         let [s, v, a, to, to_v, to_a, speed, up, down, jerk] = numbers;
         for limits in [limits(speed, up, down, jerk), limits(speed.abs(), up.abs(), down.abs(), jerk.abs())] {
             let (from, to) = (state(s, v, a), state(to, to_v, to_a));

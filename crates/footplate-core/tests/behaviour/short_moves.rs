@@ -1,5 +1,5 @@
-//! Short moves: the law has the shape of what trains did, measured moves correct it, and "move 37 mm" gives the
-//! time of the stop command.
+//! Short moves: the law has the shape of measured moves, measured moves correct it, and "move 37 mm" gives the time
+//! of the stop command.
 
 #![expect(clippy::unwrap_used, reason = "the laws of a test are laws")]
 
@@ -9,8 +9,8 @@ use footplate_core::kinematics::{
 use footplate_core::{Acceleration, Length, Speed, TimeSpan};
 use proptest::prelude::*;
 
-/// How far a model train got when it was commanded to go and, after so many quarters of a second, to stop: a team's
-/// tape measure, course CS 452 of the University of Waterloo, autumn 2023, train 58.
+/// The distance of a model train that was commanded to start and, after a number of quarters of a second, to stop:
+/// tape measurements of a team, course CS 452 of the University of Waterloo, autumn 2023, train 58.
 const MEASURED_MM: [f64; 16] = [
     10.0, 25.0, 72.0, 118.0, 192.0, 245.0, 290.0, 330.0, 384.0, 446.0, 477.0, 540.0, 575.0, 639.0, 672.0,
     714.0,
@@ -25,8 +25,8 @@ fn stop(delay_ms: i64, deceleration_mm_per_s2: f64) -> StoppingLaw<FromCommand> 
     StoppingLaw::new(TimeSpan::from_ms(delay_ms), braking).unwrap()
 }
 
-/// Least squares on all sixteen, found outside of this program: speed up to 192 mm/s in 1.268 s, brake at
-/// 230 mm/s².
+/// Least squares on all sixteen, computed outside of this program: speed up to 192 mm/s in 1.268 s, brake at 230
+/// mm/s².
 fn fitted() -> ShortMove<'static> {
     let start = SpeedLaw::ConstantAcceleration.between(
         Speed::ZERO,
@@ -61,7 +61,7 @@ fn it_grows_like_the_square_and_then_like_the_speed() {
 }
 
 #[test]
-fn measured_moves_are_passed_through_and_the_law_fills_in() {
+fn measured_moves_are_interpolated_exactly_and_the_law_fills_in() {
     let every_other: Vec<_> = measured().skip(1).step_by(2).collect();
     let model = fitted().corrected_by(&every_other).unwrap();
     for &(time, distance) in &every_other {
@@ -84,7 +84,7 @@ fn move_37_mm() {
 }
 
 #[test]
-fn what_is_no_short_move_is_refused() {
+fn moves_that_are_not_short_are_rejected() {
     let rolling = SpeedLaw::Smooth.between(
         Speed::from_mm_per_s(50.0),
         Speed::from_mm_per_s(90.0),
@@ -109,7 +109,7 @@ fn starts() -> impl Strategy<Value = SpeedChange<'static>> {
     let numbers = (proptest::sample::select(SpeedLaw::ALL.to_vec()), 20.0..900.0_f64, 50..8000_i64);
     numbers.prop_map(|(law, speed, ms)| {
         match law {
-            // Standing at first and jumping then, a step leaves distances out.
+            // At rest at first and jumping then, a step skips distances.
             SpeedLaw::MidStep | SpeedLaw::ConstantAcceleration => SpeedLaw::ConstantAcceleration,
             other => other,
         }
@@ -137,7 +137,7 @@ proptest! {
         let model = law.corrected_by(&moves).unwrap();
         let time = model.command_time(Length::from_mm(distance)).unwrap();
         let found = model.distance(time).as_mm();
-        // Once on the way there and once on the way back; a sharp start before a long stop gets 0.3 um farther in one.
+        // Once in each direction of the inverse; a sharp start before a long stop differs by 0.3 µm.
         let rounding = TimeSpan::from_ns(2);
         let [soonest, latest] = [time - rounding, time + rounding].map(|time| model.distance(time).as_mm());
         prop_assert!(

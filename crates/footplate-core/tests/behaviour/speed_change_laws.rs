@@ -1,4 +1,4 @@
-//! Every law of speed change leads from the one speed to the other without a step, and back from distance to time.
+//! Every law of speed change leads from one speed to the other without a step, and back from distance to time.
 
 use footplate_core::kinematics::{Lag, Motion, SpeedChange, SpeedLaw, StepRamp, StepTable};
 use footplate_core::{Acceleration, Jerk, Length, Speed, SpeedStep, TimeSpan};
@@ -13,8 +13,8 @@ fn m_per_s(speed: f64) -> Speed {
     Speed::from_m_per_s(speed)
 }
 
-/// What the table in the documentation says of each law, at a quarter, half and three quarters of two seconds
-/// from 1 m/s to 3 m/s: distance in m, speed in m/s, acceleration in m/s², by hand.
+/// The documentation's table of each law, at a quarter, half and three quarters of two seconds from 1 m/s to 3 m/s:
+/// distance in m, speed in m/s, acceleration in m/s², computed by hand.
 #[test]
 fn the_laws_are_those_of_the_table() {
     let expected = [
@@ -111,7 +111,7 @@ fn a_train_that_backs_up_mirrors_one_that_runs_forwards() {
     }
 }
 
-/// Where a law may go over from one formula to another.
+/// Where a law may switch from one formula to another.
 fn borders(change: &SpeedChange<'_>) -> [TimeSpan; 3] {
     [TimeSpan::ZERO, TimeSpan::from_ns(change.duration().as_ns() / 2), change.duration()]
 }
@@ -122,7 +122,7 @@ fn assert_law_holds(change: &SpeedChange<'_>, from: Speed, to: Speed, draw: &mut
     assert!(start.distance.abs().as_m() <= grain * change.duration().as_s(), "{start:?}");
     assert!((start.speed - from).abs().as_m_per_s() <= grain, "{start:?} should have {from:?}");
     let settled = if matches!(change, SpeedChange::Lag(_)) { Lag::SETTLED_WITHIN } else { Speed::ZERO };
-    // A nanosecond that the duration is off changes the speed by the acceleration in it.
+    // An error of one nanosecond in the duration changes the speed by the acceleration in it.
     let rounding = 2e-9 * end.acceleration.abs().as_m_per_s2();
     assert!(
         (end.speed - to).abs().as_m_per_s() <= 1.001 * settled.as_m_per_s() + grain + rounding,
@@ -148,7 +148,7 @@ fn assert_law_holds(change: &SpeedChange<'_>, from: Speed, to: Speed, draw: &mut
     let mut ends = [draw.within(0.0, half), draw.within(0.0, half)];
     ends.sort_by(f64::total_cmp);
     let [start, end] = ends.map(|s| TimeSpan::from_s(offset + s));
-    // Where the rounding of the ends to nanoseconds may carry them over the middle, there is no telling.
+    // Where the rounding of the ends to nanoseconds may carry them over the middle, the result is open.
     if start > TimeSpan::from_s(offset) + SECOND_MILLIONTH
         && end + SECOND_MILLIONTH < TimeSpan::from_s(offset + half)
     {
@@ -181,7 +181,7 @@ fn thirty_thousand_random_ramps_hold() {
         let speeds: Vec<Speed> = (0..steps)
             .map(|_| {
                 let this = speed;
-                // Some steps lie lower than the one before, as they do in tables of real trains.
+                // Some steps are slower than the one before, as in tables of real trains.
                 speed = (speed + Speed::from_mm_per_s(draw.within(-2.0, 10.0))).max(Speed::ZERO);
                 this
             })
@@ -225,7 +225,7 @@ proptest! {
     }
 
     #[test]
-    fn a_table_takes_any_speeds_or_says_why_not(speeds in proptest::collection::vec(any::<f64>(), 0..130)) {
+    fn any_speeds_give_a_table_or_an_error(speeds in proptest::collection::vec(any::<f64>(), 0..130)) {
         let speeds: Vec<Speed> = speeds.into_iter().map(m_per_s).collect();
         if let Ok(table) = StepTable::new(&speeds) {
             prop_assert_eq!(usize::from(table.last().get()) + 1, speeds.len());

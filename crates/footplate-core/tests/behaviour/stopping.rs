@@ -1,4 +1,4 @@
-//! Stopping distances and times follow their laws, name what they are counted from, and lead back to the speed.
+//! Stopping distances and times follow their laws, state what they are measured from, and lead back to the speed.
 
 use footplate_core::kinematics::{
     Braking, FromBraking, FromCommand, Motion, StoppingDistance, StoppingError, StoppingLaw,
@@ -43,7 +43,7 @@ fn an_exponential_stop_runs_its_delay_and_its_time_constant() {
     assert!((law.distance(speed).length().as_mm() - 560.0).abs() < 1e-9);
     // 400 mm/s shrink to 1 mm/s in ln 400 time constants.
     assert!((law.time(speed).as_s() - (0.2 + 1.2 * 400.0_f64.ln())).abs() < 2e-9);
-    // What is left then is 1 mm/s times 1.2 s.
+    // The rest is 1 mm/s times 1.2 s.
     let run = law.change_from(speed).distance().as_mm();
     assert!((run - (480.0 - 1.2)).abs() < 1e-9);
 }
@@ -71,7 +71,7 @@ fn a_delay_of_the_command_moves_into_the_law() {
 }
 
 #[test]
-fn numbers_that_never_stop_a_train_are_refused() {
+fn laws_that_never_stop_a_train_are_rejected() {
     type Law = StoppingLaw<FromBraking>;
     for deceleration in [0.0, -100.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(
@@ -103,7 +103,7 @@ fn a_hundred_thousand_random_stops_lead_back_to_their_speed() {
             (back - speed).abs().as_m_per_s() <= 1e-14 * speed.as_m_per_s(),
             "{law:?} from {speed:?}: {back:?}"
         );
-        // The motion of the braking covers what the law says is left after the delay.
+        // The braking motion covers what remains of the law's distance after the delay.
         let braked = law.change_from(speed).distance() + speed * delay;
         let unfinished = match braking {
             // Braking time is rounded to nanoseconds, in each of which the train runs at half of its speed.
@@ -116,7 +116,7 @@ fn a_hundred_thousand_random_stops_lead_back_to_their_speed() {
 
 proptest! {
     #[test]
-    fn any_numbers_are_a_law_or_refused(ns in any::<i64>(), number in any::<f64>(), speed in any::<f64>()) {
+    fn any_numbers_give_a_law_or_an_error(ns in any::<i64>(), number in any::<f64>(), speed in any::<f64>()) {
         let braking = [
             Braking::Constant(Acceleration::from_m_per_s2(number)),
             Braking::Exponential(TimeSpan::from_s(number)),

@@ -1,18 +1,19 @@
-//! The edges that a toy train's body lies on: over points it is where it went, however they lie afterwards.
+//! The edges under a toy train: over turnouts it is on the leg that it took, wherever they are set afterwards.
 
 #![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
 
 use footplate_core::track::{Layout, Position, TurnoutStates};
 use footplate_core::{EdgeId, Length};
 
-/// Edges in the direction of travel, from behind a train's rear end to its front end.
+/// Edges in the direction of travel, from behind the train's rear to its front.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ToyBody {
     edges: Vec<EdgeId>,
 }
 
 impl ToyBody {
-    /// Follows a train by where the leading end of its pickup is now. It moves by less than an edge between two calls.
+    /// Follows a train by the position of its pickup's leading end, which moves by less than an edge between two
+    /// calls.
     pub(crate) fn follow(
         &mut self,
         layout: &Layout,
@@ -26,7 +27,7 @@ impl ToyBody {
             self.edges = self.edges.iter().rev().map(|edge| edge.twin()).collect();
         }
         if !self.edges.contains(&at.edge) {
-            // It was put here.
+            // The train was placed here.
             self.edges = vec![at.edge];
         }
         while self.reaches(layout, at) < ahead {
@@ -72,7 +73,7 @@ impl ToyBody {
             .collect()
     }
 
-    /// Where an edge begins, from the first on.
+    /// Where an edge begins, measured from the first.
     fn begins(&self, layout: &Layout, edge: EdgeId) -> Length {
         let before = self.edges.iter().take_while(|known| **known != edge);
         before.filter_map(|id| layout.edge(*id)).map(|edge| edge.length).sum()
@@ -102,7 +103,7 @@ impl ToyBody {
     }
 }
 
-/// The edge after an edge as the turnouts lie.
+/// The edge after an edge, with the turnouts as they are.
 fn beyond(layout: &Layout, turnouts: &TurnoutStates, edge: EdgeId) -> Option<EdgeId> {
     let end = Position { edge, offset: layout.edge(edge)?.length };
     let next = layout.advance(end, Length::from_mm(0.01), turnouts).ok()?;

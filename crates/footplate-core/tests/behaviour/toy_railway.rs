@@ -1,4 +1,5 @@
-//! A small railway by hand for tests of what drives trains: constant accelerations, a slow line, polled contacts.
+//! A small hand-made railway for tests of machines that drive trains: constant accelerations, a slow line, polled
+//! sensors.
 //!
 //! ```text
 //!          +-- 500 -- B1 -- 500 --+
@@ -27,11 +28,11 @@ const TICK: TimeSpan = TimeSpan::from_ms(1);
 const LINE: TimeSpan = TimeSpan::from_us(9_167);
 /// From one poll to the next.
 const POLL: TimeSpan = TimeSpan::from_ms(65);
-/// From a command until the train begins to obey.
+/// From a command to its effect on the train.
 const DEAD: TimeSpan = TimeSpan::from_ms(180);
-/// Speed of a step.
+/// Speed per step.
 const MM_PER_S_A_STEP: f64 = 32.0;
-/// Starts and stops alike.
+/// Acceleration of starts and stops.
 const MM_PER_S2: f64 = 170.0;
 
 pub(crate) fn step(step: u8) -> SpeedStep {
@@ -94,7 +95,7 @@ pub(crate) fn straight() -> TurnoutStates {
     [1, 2].map(|turnout| (TurnoutId(turnout), Leg::Straight)).into_iter().collect()
 }
 
-/// A train as it really is.
+/// The true state of a train.
 #[derive(Debug, Clone)]
 pub(crate) struct ToyTrain {
     pub(crate) id: TrainId,
@@ -103,7 +104,7 @@ pub(crate) struct ToyTrain {
     target_mm_per_s: f64,
     obeys: VecDeque<(Timestamp, f64)>,
     pub(crate) travelled_mm: f64,
-    /// How far it gets over how far it would with clean wheels.
+    /// Distance run over that with clean wheels.
     pub(crate) wheels: f64,
     pub(crate) is_off_the_track: bool,
 }
@@ -117,11 +118,11 @@ impl ToyTrain {
         let change = MM_PER_S2 * TICK.as_s();
         let missing = self.target_mm_per_s - self.speed_mm_per_s;
         self.speed_mm_per_s += missing.clamp(-change, change);
-        let way = self.speed_mm_per_s * TICK.as_s() * self.wheels;
+        let distance = self.speed_mm_per_s * TICK.as_s() * self.wheels;
         let edge = layout.edge(self.at.edge).expect("on the layout");
-        match layout.advance(self.at, Length::from_mm(way), turnouts) {
+        match layout.advance(self.at, Length::from_mm(distance), turnouts) {
             Ok(at) => {
-                self.travelled_mm += way;
+                self.travelled_mm += distance;
                 let passed = (at.edge != self.at.edge).then(|| layout.sensor_at(edge.to)).flatten();
                 self.at = at;
                 passed
@@ -138,20 +139,20 @@ impl ToyTrain {
 /// The world and the loop around a driver.
 pub(crate) struct ToyRailway {
     pub(crate) layout: Layout,
-    /// How the turnouts really lie.
+    /// The true turnout positions.
     pub(crate) turnouts: TurnoutStates,
     pub(crate) now: Timestamp,
     pub(crate) trains: Vec<ToyTrain>,
     pub(crate) events: Vec<Event>,
     pub(crate) notices: Vec<Notice>,
     pub(crate) commands: Vec<(Timestamp, Command)>,
-    /// Nothing that is told leaves the line.
+    /// No command is sent.
     pub(crate) is_silent: bool,
-    /// Contacts that do not report.
+    /// Sensors that do not report.
     pub(crate) dead: BTreeSet<SensorId>,
     /// Turnouts that do not move.
     pub(crate) stuck: BTreeSet<TurnoutId>,
-    /// Which train came to which contact, and when.
+    /// The true passages: time, sensor and train.
     pub(crate) passes: Vec<(Timestamp, SensorId, TrainId)>,
     queue: VecDeque<Command>,
     line_free: Timestamp,
@@ -184,7 +185,7 @@ impl ToyRailway {
         });
     }
 
-    /// A contact closes by itself.
+    /// A sensor reports without a train.
     pub(crate) fn close(&mut self, sensor: SensorId) {
         self.closed.insert(sensor);
     }
@@ -242,7 +243,7 @@ impl ToyRailway {
         }
     }
 
-    /// One tick of the world: what was reported or has left.
+    /// One tick of the world: what was reported or sent.
     pub(crate) fn tick(&mut self) -> Vec<Event> {
         self.now += TICK;
         let mut events = Vec::new();
@@ -257,7 +258,7 @@ impl ToyRailway {
             && !self.is_silent
             && let Some(command) = self.queue.pop_front()
         {
-            // The effect counts from when the last bit has left.
+            // A command takes effect once its last bit has been sent.
             self.line_free = self.now + LINE;
             self.commands.push((self.line_free, command));
             let kind = self.obey(command);
@@ -275,7 +276,7 @@ impl ToyRailway {
         events
     }
 
-    /// What the driver asks for is done.
+    /// Carries out the driver's outputs.
     pub(crate) fn listen(&mut self, driver: &mut Driver) {
         while let Some(output) = driver.poll_output() {
             match output {
@@ -291,7 +292,7 @@ impl ToyRailway {
         self.run_until(driver, seconds, |_| false);
     }
 
-    /// The same, until something is so; whether it came to be.
+    /// The same, until a condition holds; returns whether it does.
     pub(crate) fn run_until(
         &mut self,
         driver: &mut Driver,
@@ -325,7 +326,7 @@ impl ToyRailway {
         self.notices.iter().filter_map(done).collect()
     }
 
-    /// How far beyond a place the first train really is, by the shorter way.
+    /// The true distance of the first train beyond a place, along the shorter path.
     pub(crate) fn beyond_mm(&self, place: &str) -> f64 {
         let landmark = self.layout.landmark(place).expect("a place");
         let target = self.layout.locate(landmark, &self.turnouts).expect("a place");
@@ -337,12 +338,12 @@ impl ToyRailway {
     }
 }
 
-/// What is known of a toy train after three minutes of runs and stops at eight steps.
+/// The model of a toy train after three minutes of runs and stops at eight steps.
 pub(crate) fn known_model(train: u16) -> MotionModel {
     known_after(train, &[])
 }
 
-/// The same after some minutes more, in which every step was reached from below and from above.
+/// The same after some more minutes, in which every step was reached from below and from above.
 pub(crate) fn known_model_both_ways(train: u16) -> MotionModel {
     let up_and_down: Vec<u8> = (3..=14).chain((3..14).rev()).collect();
     known_after(train, &up_and_down)
@@ -353,7 +354,7 @@ fn known_after(train: u16, steps: &[u8]) -> MotionModel {
     let id = TrainId(train);
     let mut fit = MotionFit::new(id, step(14));
     let turnouts = straight();
-    // Long runs, and short ones that end before the speed is reached.
+    // Long runs, and short ones that end before the speed has settled.
     let runs =
         [(8, 16.0), (12, 16.0), (5, 16.0), (4, 12.0), (4, 1.0), (6, 0.7), (14, 16.0), (4, 2.0), (10, 16.0)];
     for (speed, runs_for) in runs.into_iter().chain([(6, 10.0), (5, 0.5), (4, 16.0), (8, 0.6), (4, 16.0)]) {
@@ -385,7 +386,7 @@ fn known_after(train: u16, steps: &[u8]) -> MotionModel {
     fit.model().clone()
 }
 
-/// A driver of train 24 as after [`known_model_both_ways`].
+/// A driver of train 24 with the model of [`known_model_both_ways`].
 pub(crate) fn driver_of_both_ways(world: &ToyRailway, node: &str, mm: f64) -> Driver {
     static MODEL: OnceLock<MotionModel> = OnceLock::new();
     let mut driver = driver_of(world, node, mm);
@@ -393,7 +394,7 @@ pub(crate) fn driver_of_both_ways(world: &ToyRailway, node: &str, mm: f64) -> Dr
     driver
 }
 
-/// One more train for a driver, which moves as all toy trains do.
+/// Adds a train with the model of all toy trains to a driver.
 pub(crate) fn add_train(driver: &mut Driver, world: &ToyRailway, train: u16, place: Option<(&str, f64)>) {
     let mut numbers = driver.model(TrainId(24)).expect("the first train").numbers();
     numbers.train = TrainId(train);
@@ -405,7 +406,7 @@ pub(crate) fn add_train(driver: &mut Driver, world: &ToyRailway, train: u16, pla
     }
 }
 
-/// A driver of train 24, which is known and of which is known where it stands.
+/// A driver of train 24 with a known model and position.
 pub(crate) fn driver_of(world: &ToyRailway, node: &str, mm: f64) -> Driver {
     static MODEL: OnceLock<MotionModel> = OnceLock::new();
     let model = MODEL.get_or_init(|| known_model(24)).clone();

@@ -1,4 +1,4 @@
-//! What a fit finds of a train, and a locator makes of it, holds against the toy railway, which knows neither.
+//! A fit and a locator are accurate on the toy railway, which shares no formula with them.
 
 use std::sync::OnceLock;
 
@@ -18,26 +18,26 @@ fn model() -> &'static MotionModel {
 }
 
 /// Steps of 32 mm/s, changes at 170 mm/s² after 180 ms.
-fn true_way_to_rest(speed: Speed) -> Length {
+fn true_stopping_distance(speed: Speed) -> Length {
     let v = speed.as_mm_per_s();
     Length::from_mm(0.18 * v + v * v / (2.0 * 170.0))
 }
 
 #[test]
-fn steps_that_were_run_are_known_to_a_per_cent_and_as_well_as_they_say() {
+fn measured_steps_are_accurate_to_a_per_cent_and_as_stated() {
     for (number, true_mm_per_s) in [(5, 160.0), (8, 256.0), (10, 320.0), (12, 384.0)] {
         let speed = model().speed(step(number), Approach::Below);
         let off = speed.value.as_mm_per_s() - true_mm_per_s;
         assert!(off.abs() < 0.01 * true_mm_per_s, "step {number}: {off} mm/s");
-        // The survey's scale is nobody's to know: half a per cent on this track.
-        let doubt = speed.uncertainty.as_mm_per_s().hypot(0.005 * true_mm_per_s);
-        assert!(off.abs() < 3.0 * doubt, "step {number}: {off} with {doubt} mm/s");
+        // The scale of the survey is not observable: half a per cent on this track.
+        let deviation = speed.uncertainty.as_mm_per_s().hypot(0.005 * true_mm_per_s);
+        assert!(off.abs() < 3.0 * deviation, "step {number}: {off} with {deviation} mm/s");
         assert!(speed.count >= 3);
     }
 }
 
 #[test]
-fn a_step_between_is_known_less_well_and_says_so() {
+fn an_unmeasured_step_has_a_larger_uncertainty() {
     let measured = model().speed(step(8), Approach::Below);
     let between = model().speed(step(9), Approach::Below);
     assert!((between.value.as_mm_per_s() - 288.0).abs() < 3.0 * between.uncertainty.as_mm_per_s() + 3.0);
@@ -49,7 +49,7 @@ fn stops_are_as_long_as_the_railway_makes_them() {
     for number in [4, 5, 8, 10, 12, 14] {
         let speed = model().speed(step(number), Approach::Below).value;
         let stop = model().stop(step(number), Approach::Below);
-        let off = stop.distance - true_way_to_rest(speed);
+        let off = stop.distance - true_stopping_distance(speed);
         assert!(
             off.abs() < 3.0 * stop.doubt + Length::from_mm(3.0),
             "step {number}: {stop:?}, off by {off:?}"
@@ -59,8 +59,8 @@ fn stops_are_as_long_as_the_railway_makes_them() {
 }
 
 #[test]
-fn the_place_of_rest_foreseen_at_the_command_holds_the_train() {
-    // Given a train that runs at step 8,
+fn the_rest_predicted_at_the_command_contains_the_true_one() {
+    // Given a train running at step 8,
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let (sections, turnouts) = (SectionIndex::of(&world.layout), straight());
     let layout = world.layout.clone();
@@ -85,7 +85,7 @@ fn the_place_of_rest_foreseen_at_the_command_holds_the_train() {
                 }
             }
             let located = locator.locate(context, model(), world.now).unwrap();
-            // The toy's contacts are where the layout says, so that its ways are the layout's.
+            // The toy's sensors are where the layout states, so that its path lengths are the layout's.
             let here = footplate_core::tracking::place_of(context, model(), located.at).unwrap();
             let ahead = layout.distance_ahead(here, world.train().at, &turnouts).unwrap_or(Length::ZERO);
             let behind = layout.distance_ahead(world.train().at, here, &turnouts).unwrap_or(Length::ZERO);
@@ -95,7 +95,7 @@ fn the_place_of_rest_foreseen_at_the_command_holds_the_train() {
         }
         f64::from(inside) / f64::from(ticks)
     };
-    // then it is where it is believed to be, speeding up and running,
+    // then its estimated position is correct during acceleration and steady running,
     assert!(follow(&mut world, &mut locator, 14.0) > 0.95);
     // and when it is commanded to stop,
     let before = world.train().travelled_mm;
@@ -103,18 +103,21 @@ fn the_place_of_rest_foreseen_at_the_command_holds_the_train() {
     let here = locator.locate(context, model(), world.now).unwrap();
     world.command(Command::Speed { train: TRAIN, step: step(0) });
     assert!(follow(&mut world, &mut locator, 6.0) > 0.95);
-    // it runs as far as was foreseen, within what was said.
+    // the distance run is within the predicted interval.
     let ran = world.train().travelled_mm - before;
-    let foreseen = (rest.at.way - here.at.way).as_mm();
-    let doubt = rest.doubt.as_mm().hypot(rest.scatter.as_mm());
-    assert!((ran - foreseen).abs() < 3.0 * doubt, "ran {ran}, foreseen {foreseen} with {doubt} mm");
-    assert!(doubt < 25.0);
+    let predicted = (rest.at.way - here.at.way).as_mm();
+    let deviation = rest.doubt.as_mm().hypot(rest.scatter.as_mm());
+    assert!(
+        (ran - predicted).abs() < 3.0 * deviation,
+        "ran {ran}, predicted {predicted} with {deviation} mm"
+    );
+    assert!(deviation < 25.0);
     assert!(locator.locate(context, model(), world.now).unwrap().at_rest);
 }
 
 #[test]
 fn a_report_behind_a_lost_reply_counts_by_its_real_width() {
-    // Given a train at step 8 that is known to 3 mm at every sensor,
+    // Given a train at step 8, located within 3 mm at every sensor,
     let (mut close, mut blind) = (Vec::new(), Vec::new());
     for seed in 0..12 {
         let mut world = ToyRailway::new(24, "D1", 300.0);
@@ -138,7 +141,7 @@ fn a_report_behind_a_lost_reply_counts_by_its_real_width() {
                 reports += 1;
                 let usual =
                     ContactWindow { after: event.time - report.poll_interval.unwrap(), until: event.time };
-                // when the last one comes behind lost replies, late in its window and a usual one beside it,
+                // when the last report follows lost replies, late in its window, or with a usual window,
                 let wide = ContactWindow { after: event.time - TimeSpan::from_ms(730), until: event.time };
                 let windows = if reports == last { [usual, wide] } else { [usual, usual] };
                 for (locator, window) in locators.iter_mut().zip(windows) {
@@ -157,8 +160,8 @@ fn a_report_behind_a_lost_reply_counts_by_its_real_width() {
         close.push(error(&locators[0]));
         blind.push(error(&locators[1]));
     }
-    // then the train is where the forecast had it, 187 mm of window or not, and the interval is no longer than
-    // the forecast was good for.
+    // then the train is where it was predicted, with or without the window of 187 mm, and the interval is no longer
+    // than the prediction's.
     let mean = |errors: &[(f64, f64, bool)]| errors.iter().map(|(error, ..)| error).sum::<f64>() / 12.0;
     assert!(mean(&blind) < mean(&close) + 4.0, "{:.1} against {:.1} mm", mean(&blind), mean(&close));
     assert!(blind.iter().all(|(_, uncertainty, inside)| *inside && *uncertainty < 12.0), "{blind:?}");

@@ -1,4 +1,4 @@
-//! Two sensors find the acceleration that was there, say how well, and say when they cannot tell.
+//! Two sensors recover the true acceleration with its uncertainty, and report when they cannot.
 
 use footplate_core::kinematics::{
     ConstantAcceleration, Motion, TwoSensorError, TwoSensorRun, TwoSensorVerdict,
@@ -12,7 +12,7 @@ fn known<Q>(value: Q, uncertainty: Q) -> Estimate<Q> {
     Estimate { value, uncertainty, count: 1, date: Timestamp::ZERO }
 }
 
-/// A run in mm, s and mm/s, known as well as tape, poll and speed table know it on a good day.
+/// A run in mm, s and mm/s, with typical uncertainties of tape, poll and speed table.
 fn run(distance: f64, time: f64, from: f64, to: f64, command_delay: f64) -> TwoSensorRun {
     TwoSensorRun {
         distance: known(Length::from_mm(distance), Length::from_mm(3.0)),
@@ -24,7 +24,7 @@ fn run(distance: f64, time: f64, from: f64, to: f64, command_delay: f64) -> TwoS
     }
 }
 
-/// The same run as a train sees it that changes its speed evenly after the delay.
+/// The same run of a train with constant acceleration after the delay.
 fn driven(distance: f64, from: f64, to: f64, command_delay: f64, acceleration: f64) -> Option<TwoSensorRun> {
     let change = ConstantAcceleration::with_acceleration(
         Speed::from_mm_per_s(from),
@@ -80,7 +80,7 @@ fn a_delay_of_the_command_is_run_at_the_old_speed() {
 }
 
 #[test]
-fn where_both_could_be_it_says_so() {
+fn an_undecided_scenario_is_reported() {
     // The change ends just at the second sensor.
     let verdict = run(600.0, 2.0, 200.0, 400.0, 0.0).verdict().unwrap();
     let TwoSensorVerdict::Undecided { if_completed, if_unfinished } = verdict else { panic!("{verdict:?}") };
@@ -92,13 +92,13 @@ fn where_both_could_be_it_says_so() {
 fn a_change_too_quick_or_too_slow_to_see_is_not_measured() {
     assert_eq!(run(1000.0, 2.505, 200.0, 400.0, 0.0).verdict(), Ok(TwoSensorVerdict::TooQuick));
     assert_eq!(run(200.0, 0.998, 200.0, 400.0, 0.0).verdict(), Ok(TwoSensorVerdict::NotNoticed));
-    // Quicker than at its final speed all the way: no acceleration explains that.
+    // Shorter than at the final speed all the way: no acceleration explains that.
     assert_eq!(run(1000.0, 2.0, 200.0, 400.0, 0.0).verdict(), Ok(TwoSensorVerdict::TooQuick));
     assert_eq!(run(1000.0, 6.0, 200.0, 400.0, 0.0).verdict(), Ok(TwoSensorVerdict::NotNoticed));
 }
 
-/// How long a train takes from a command over a distance (mm) when it changes its speed evenly (mm/s, mm/s²) after a delay
-/// (s): stepped through in microseconds, with none of the formulas that are tested.
+/// The time of a train from a command over a distance (mm) with constant acceleration (mm/s, mm/s²) after a delay
+/// (s): stepped through in microseconds, with none of the formulas under test.
 fn stepped(distance: f64, from: f64, to: f64, delay: f64, acceleration: f64) -> f64 {
     const STEP_S: f64 = 1e-6;
     let (mut time, mut place, mut speed) = (0.0, 0.0, from);
@@ -113,7 +113,7 @@ fn stepped(distance: f64, from: f64, to: f64, delay: f64, acceleration: f64) -> 
 }
 
 #[test]
-fn a_change_that_has_hardly_begun_is_not_called_too_quick() {
+fn a_change_that_has_hardly_started_is_not_reported_as_too_quick() {
     // 18 mm are run before the command takes effect; 7 mm on, the train is at 205 mm/s of 500 and 0.1 mm ahead.
     let time = stepped(25.0, 200.0, 500.0, 0.09, 150.0);
     let near = TwoSensorRun {
@@ -121,13 +121,13 @@ fn a_change_that_has_hardly_begun_is_not_called_too_quick() {
         ..run(25.0, time, 200.0, 500.0, 0.09)
     };
     assert_eq!(near.verdict(), Ok(TwoSensorVerdict::NotNoticed));
-    // A change that takes no time at all, seen from far enough: 1000 mm in 2.09 s.
+    // An instantaneous change, seen from far enough: 1000 mm in 2.09 s.
     let quick = run(1000.0, stepped(1000.0, 200.0, 500.0, 0.09, 1e9), 200.0, 500.0, 0.09);
     assert_eq!(quick.verdict(), Ok(TwoSensorVerdict::TooQuick));
 }
 
 #[test]
-fn a_command_some_time_after_the_first_sensor_is_found_as_well() {
+fn a_command_after_the_first_sensor_is_handled() {
     // 0.8 s at 200 mm/s from the first sensor to the command, then 700 mm to the second, 100 mm/s² after 0.15 s.
     let at_command = run(700.0, stepped(700.0, 200.0, 400.0, 0.15, 100.0), 200.0, 400.0, 0.15);
     let later = TwoSensorRun {
@@ -146,7 +146,7 @@ fn a_command_some_time_after_the_first_sensor_is_found_as_well() {
 }
 
 #[test]
-fn a_run_that_says_nothing_is_refused() {
+fn a_run_without_information_is_rejected() {
     let refused = run(1000.0, 3.0, 300.0, 303.0, 0.0).verdict().unwrap_err();
     assert_eq!(
         refused.to_string(),
@@ -160,7 +160,7 @@ fn a_run_that_says_nothing_is_refused() {
     assert_eq!(run(f64::NAN, 1.0, 200.0, 400.0, 0.0).verdict(), Err(TwoSensorError::NotFinite));
 }
 
-/// The measured values scattered by their own uncertainties.
+/// The measured values, perturbed by their own uncertainties.
 fn scattered(run: TwoSensorRun, draw: &mut Draw) -> TwoSensorRun {
     let distance = run.distance.value + draw.normal() * run.distance.uncertainty;
     let time = run.time.value + TimeSpan::from_s(draw.normal() * run.time.uncertainty.as_s());
@@ -178,9 +178,9 @@ fn scattered(run: TwoSensorRun, draw: &mut Draw) -> TwoSensorRun {
 }
 
 #[test]
-fn the_stated_uncertainty_is_the_one_that_is_seen() {
+fn the_stated_uncertainty_matches_the_spread() {
     let mut draw = Draw::new(21);
-    // Speeding up and slowing down, over well before the second sensor and far from over at it.
+    // Acceleration and deceleration, completed well before the second sensor and far from completed at it.
     let cases = [
         (1000.0, 200.0, 400.0, 100.0),
         (500.0, 200.0, 400.0, 40.0),
@@ -214,7 +214,7 @@ fn the_stated_uncertainty_is_the_one_that_is_seen() {
 }
 
 #[test]
-fn the_wrong_scenario_is_named_no_more_often_than_its_doubt_allows() {
+fn the_wrong_scenario_is_named_no_more_often_than_stated() {
     let mut draw = Draw::new(22);
     let (mut wrong, mut undecided, mut all) = (0.0, 0.0, 0.0);
     for _ in 0..20_000 {
@@ -230,12 +230,15 @@ fn the_wrong_scenario_is_named_no_more_often_than_its_doubt_allows() {
         all += 1.0;
     }
     assert!(wrong / all < 0.03, "{wrong} wrong of {all}");
-    assert!(undecided / all > 0.3, "so near, the data often cannot tell: {undecided} of {all}");
+    assert!(
+        undecided / all > 0.3,
+        "so close to the border, the data often cannot decide: {undecided} of {all}"
+    );
 }
 
 proptest! {
     #[test]
-    fn whatever_the_train_did_is_found(
+    fn any_change_is_recovered(
         distance in 100.0..5000.0_f64, from in 20.0..600.0_f64, to in 20.0..600.0_f64, delay in 0.0..0.3_f64,
         acceleration in 20.0..1000.0_f64,
     ) {
@@ -245,7 +248,7 @@ proptest! {
         };
         let found = match verdict {
             TwoSensorVerdict::Completed { acceleration, .. } | TwoSensorVerdict::Unfinished { acceleration, .. } => acceleration,
-            // Of the two, the one nearer to the truth.
+            // Of the two, the one closer to the truth.
             TwoSensorVerdict::Undecided { if_completed, if_unfinished } => {
                 let off = |estimate: Estimate<Acceleration>| (estimate.value.as_mm_per_s2() - signed).abs();
                 if off(if_completed) < off(if_unfinished) { if_completed } else { if_unfinished }
@@ -256,7 +259,7 @@ proptest! {
     }
 
     #[test]
-    fn any_numbers_have_a_verdict(values in any::<[f64; 6]>(), spans in any::<[i64; 4]>()) {
+    fn any_numbers_give_a_result(values in any::<[f64; 6]>(), spans in any::<[i64; 4]>()) {
         let [distance, distance_by, from, from_by, to, to_by] = values;
         let [time, time_by, delay, delay_by] = spans.map(TimeSpan::from_ns);
         let _ = TwoSensorRun {

@@ -1,5 +1,6 @@
-//! A watchdog stops a train that is not as it was, and all that could meet it, takes the power if a stop is not confirmed,
-//! and brings trains back by measuring them again; whatever is reported, nobody in danger is told to move meanwhile.
+//! A watchdog stops a train that no longer behaves as modelled, and all trains that could meet it; it switches the
+//! power off if a stop is not confirmed, and recovers trains by measuring them again. Whatever is reported, a train
+//! in danger is not commanded to move.
 #![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
 
 use std::collections::BTreeSet;
@@ -20,11 +21,11 @@ use crate::toy_railway::{ToyRailway, add_train, driver_of, step};
 const FIRST: TrainId = TrainId(24);
 const SECOND: TrainId = TrainId(58);
 
-/// A world under a watchdog, and all that it said and told.
+/// A world with a watchdog, and all its notices and commands.
 struct Watched {
     world: ToyRailway,
     dog: Watchdog,
-    said: Vec<Notice>,
+    notices: Vec<Notice>,
     commanded: Vec<(Timestamp, Command)>,
 }
 
@@ -33,17 +34,17 @@ impl Watched {
         let world = ToyRailway::new(24, "D1", 300.0);
         let driver = driver_of(&world, "D1", 300.0);
         let dog = Watchdog::new(driver, world.now);
-        Self { world, dog, said: Vec::new(), commanded: Vec::new() }
+        Self { world, dog, notices: Vec::new(), commanded: Vec::new() }
     }
 
-    /// The same, and train 58 half a round ahead.
+    /// The same, with train 58 half a lap ahead.
     fn two() -> Self {
         let mut world = ToyRailway::new(24, "D1", 300.0);
         world.put(58, "B1", 100.0);
         let mut driver = driver_of(&world, "D1", 300.0);
         add_train(&mut driver, &world, 58, Some(("B1", 100.0)));
         let dog = Watchdog::new(driver, world.now);
-        Self { world, dog, said: Vec::new(), commanded: Vec::new() }
+        Self { world, dog, notices: Vec::new(), commanded: Vec::new() }
     }
 
     fn listen(&mut self) {
@@ -56,7 +57,7 @@ impl Watched {
                         self.world.command(command);
                     }
                 }
-                Output::Notice(notice) => self.said.push(notice),
+                Output::Notice(notice) => self.notices.push(notice),
                 Output::HoldLine(_) | Output::Watch(_) => {}
             }
         }
@@ -86,7 +87,7 @@ impl Watched {
         self.dog.order(self.world.now, Order::Speed { train, step: step(number) }).expect("free to go");
     }
 
-    /// A person puts the first train down, and says where.
+    /// An operator puts the first train down and enters its position.
     fn put_first_down(&mut self) {
         self.world.put(24, "D1", 100.0);
         let node = self.world.layout.node_named("D1").expect("a node");
@@ -95,14 +96,14 @@ impl Watched {
     }
 
     fn alarm(&self) -> Option<Alarm> {
-        self.said.iter().find_map(|notice| match notice {
+        self.notices.iter().find_map(|notice| match notice {
             Notice::Danger { why, .. } => Some(*why),
             _ => None,
         })
     }
 
     fn recovered(&self) -> Option<Outcome> {
-        self.said.iter().find_map(|notice| match notice {
+        self.notices.iter().find_map(|notice| match notice {
             Notice::Recovered { outcome, .. } => Some(*outcome),
             _ => None,
         })
@@ -114,30 +115,30 @@ impl Watched {
 }
 
 #[test]
-fn a_train_as_it_should_be_raises_no_alarm() {
+fn a_healthy_train_raises_no_alarm() {
     let mut watched = Watched::one();
     watched.go(FIRST, 9);
     watched.run(120.0);
-    assert_eq!(watched.alarm(), None, "{:#?}", watched.said);
+    assert_eq!(watched.alarm(), None, "{:#?}", watched.notices);
 }
 
 #[test]
-fn dirty_wheels_are_noticed_measured_and_made_up_for() {
+fn dirty_wheels_are_detected_measured_and_compensated() {
     let mut watched = Watched::one();
     watched.go(FIRST, 9);
     watched.run(20.0);
-    // When a train gets a fifth slower,
+    // When a train gets slower by a fifth,
     watched.world.trains[0].wheels = 0.8;
-    assert!(watched.run_until(15.0, |watched| watched.alarm().is_some()), "{:#?}", watched.said);
-    // then it is stopped, found, measured,
-    assert!(watched.run_until(200.0, |watched| watched.recovered().is_some()), "{:#?}", watched.said);
-    let Some(Outcome::Rescaled { ratio }) = watched.recovered() else { panic!("{:#?}", watched.said) };
+    assert!(watched.run_until(15.0, |watched| watched.alarm().is_some()), "{:#?}", watched.notices);
+    // then it is stopped, located, measured,
+    assert!(watched.run_until(200.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
+    let Some(Outcome::Rescaled { ratio }) = watched.recovered() else { panic!("{:#?}", watched.notices) };
     assert!((ratio - 0.8).abs() < 0.02, "{ratio}");
-    // goes on with what it was doing,
-    assert!(watched.said.iter().any(|notice| matches!(notice, Notice::Resumed { train: FIRST, .. })));
+    // continues its order,
+    assert!(watched.notices.iter().any(|notice| matches!(notice, Notice::Resumed { train: FIRST, .. })));
     watched.run(20.0);
     assert!(watched.world.trains[0].speed_mm_per_s > 100.0);
-    // and stops where it should.
+    // and stops at its target.
     let target = watched.dog.driver().layout().landmark("A1+150mm").expect("a place");
     watched.dog.order(watched.world.now, Order::Stop(StopOrder::at(FIRST, target))).expect("ahead");
     watched.run(60.0);
@@ -146,33 +147,33 @@ fn dirty_wheels_are_noticed_measured_and_made_up_for() {
 }
 
 #[test]
-fn a_train_that_was_held_up_is_looked_at_even_if_it_runs_on_as_before() {
+fn a_delayed_train_is_checked_even_if_it_runs_as_before() {
     let mut watched = Watched::one();
     watched.go(FIRST, 9);
     watched.run(20.0);
-    // Somebody had it in hand for a moment; another engine may stand there now.
+    // The train was lifted for a moment: it may be another locomotive now.
     watched.world.trains[0].wheels = 0.0;
     watched.run(1.5);
     watched.world.trains[0].wheels = 1.0;
-    assert!(watched.run_until(10.0, |watched| watched.alarm().is_some()), "{:#?}", watched.said);
+    assert!(watched.run_until(10.0, |watched| watched.alarm().is_some()), "{:#?}", watched.notices);
     assert!(matches!(watched.alarm(), Some(Alarm::Untimely(_))), "{:?}", watched.alarm());
-    assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.said);
+    assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
     assert_eq!(watched.recovered(), Some(Outcome::AsBefore));
 }
 
 #[test]
-fn a_late_start_is_no_disaster() {
+fn a_late_start_raises_no_alarm() {
     let mut watched = Watched::one();
     watched.world.trains[0].wheels = 0.0;
     watched.go(FIRST, 9);
     watched.run(1.5);
     watched.world.trains[0].wheels = 1.0;
     watched.run(40.0);
-    assert_eq!(watched.alarm(), None, "{:#?}", watched.said);
+    assert_eq!(watched.alarm(), None, "{:#?}", watched.notices);
 }
 
 #[test]
-fn what_could_meet_a_train_in_danger_is_held_and_goes_on_when_it_is_over() {
+fn trains_that_could_meet_one_in_danger_are_stopped_and_resume_later() {
     let mut watched = Watched::two();
     watched.go(FIRST, 8);
     watched.go(SECOND, 8);
@@ -182,20 +183,20 @@ fn what_could_meet_a_train_in_danger_is_held_and_goes_on_when_it_is_over() {
     assert!(watched.dog.is_held(FIRST));
     let refused = watched.dog.order(watched.world.now, Order::Speed { train: FIRST, step: step(5) });
     assert_eq!(refused, Err(Refusal::InDanger { train: FIRST }));
-    // The other one comes near, and is stopped before.
+    // The other train comes near and is stopped before.
     watched.run(12.0);
     let moves = |watched: &Watched| watched.world.trains[1].speed_mm_per_s > 1.0;
-    assert!(watched.dog.is_held(SECOND) && !moves(&watched), "{:#?}", watched.said);
-    // On a railway as small as this neither finds a way past the other: a person puts it right.
+    assert!(watched.dog.is_held(SECOND) && !moves(&watched), "{:#?}", watched.notices);
+    // On so small a railway neither finds a path past the other: an operator resolves it.
     let asks = |watched: &Watched| {
-        watched.said.iter().any(|notice| matches!(notice, Notice::NeedsOperator { train: FIRST, .. }))
+        watched.notices.iter().any(|notice| matches!(notice, Notice::NeedsOperator { train: FIRST, .. }))
     };
     assert!(watched.run_until(200.0, |watched| asks(watched) || watched.recovered().is_some()));
     assert!(!watched.world.trains.iter().any(|train| train.is_off_the_track));
 }
 
 #[test]
-fn the_power_goes_off_when_a_stop_does_not_leave() {
+fn power_is_switched_off_when_a_stop_is_not_sent() {
     let mut watched = Watched::one();
     watched.go(FIRST, 10);
     watched.run(5.0);
@@ -209,14 +210,14 @@ fn the_power_goes_off_when_a_stop_does_not_leave() {
 }
 
 #[test]
-fn the_power_goes_off_when_a_train_does_not_stop() {
+fn power_is_switched_off_when_a_train_does_not_stop() {
     let mut watched = Watched::one();
     watched.go(FIRST, 10);
     watched.run(5.0);
     watched.go(FIRST, 0);
     watched.run(6.0);
-    // It should stand, and the contact ahead of it closes.
-    let ahead = watched.dog.driver().contact_ahead(FIRST, watched.world.now).expect("a contact");
+    // It should be at rest, and the sensor ahead of it reports.
+    let ahead = watched.dog.driver().sensor_ahead(FIRST, watched.world.now).expect("a sensor");
     watched.world.close(ahead);
     watched.run(0.2);
     assert_eq!(watched.alarm(), Some(Alarm::DoesNotStop(ahead)));
@@ -224,7 +225,7 @@ fn the_power_goes_off_when_a_train_does_not_stop() {
 }
 
 #[test]
-fn a_station_that_falls_silent_and_comes_back_finds_every_train_again() {
+fn after_a_silent_station_every_train_is_located_again() {
     let mut watched = Watched::one();
     watched.go(FIRST, 9);
     watched.run(8.0);
@@ -236,20 +237,20 @@ fn a_station_that_falls_silent_and_comes_back_finds_every_train_again() {
         Err(Refusal::InDanger { train: FIRST })
     );
     watched.dog.handle_link(watched.world.now, LinkNews::Answers);
-    assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.said);
+    assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
     assert_eq!(watched.recovered(), Some(Outcome::AsBefore));
 }
 
 #[test]
-fn a_train_that_is_gone_needs_a_person_and_is_trusted_again_when_one_has_put_it_down() {
+fn a_removed_train_needs_an_operator_and_is_trusted_once_placed() {
     let mut watched = Watched::one();
     watched.go(FIRST, 8);
     watched.run(4.0);
     watched.world.trains.clear();
     let asks = |watched: &Watched| {
-        watched.said.iter().any(|notice| matches!(notice, Notice::NeedsOperator { train: FIRST, .. }))
+        watched.notices.iter().any(|notice| matches!(notice, Notice::NeedsOperator { train: FIRST, .. }))
     };
-    assert!(watched.run_until(150.0, asks), "{:#?}", watched.said);
+    assert!(watched.run_until(150.0, asks), "{:#?}", watched.notices);
     let stop = StopOrder::at(FIRST, Landmark { node: NodeId(0), offset: Length::from_mm(100.0) });
     assert_eq!(
         watched.dog.order(watched.world.now, Order::Stop(stop)),
@@ -262,56 +263,56 @@ fn a_train_that_is_gone_needs_a_person_and_is_trusted_again_when_one_has_put_it_
 }
 
 #[test]
-fn a_train_that_is_alone_and_could_not_be_brought_back_is_found_by_letting_it_run() {
+fn a_single_lost_train_is_located_by_running_it() {
     let mut watched = Watched::one();
     watched.go(FIRST, 8);
     watched.run(4.0);
     watched.world.trains.clear();
     let asks = |watched: &Watched| {
-        watched.said.iter().any(|notice| matches!(notice, Notice::NeedsOperator { train: FIRST, .. }))
+        watched.notices.iter().any(|notice| matches!(notice, Notice::NeedsOperator { train: FIRST, .. }))
     };
-    assert!(watched.run_until(150.0, asks), "{:#?}", watched.said);
-    // A hand puts it down somewhere else, and says nothing.
+    assert!(watched.run_until(150.0, asks), "{:#?}", watched.notices);
+    // The train is moved by hand, and its position is not entered.
     watched.world.put(24, "B1", 50.0);
     watched.go(FIRST, 8);
     watched.run(12.0);
     assert!(!watched.dog.is_held(FIRST));
-    let believed = watched.dog.driver().position(FIRST, watched.world.now).expect("it is located");
+    let estimated = watched.dog.driver().position(FIRST, watched.world.now).expect("it is located");
     let truth = watched.world.train().at;
-    assert_eq!(believed.edge, truth.edge);
-    let off = (believed.offset - truth.offset).as_mm();
+    assert_eq!(estimated.edge, truth.edge);
+    let off = (estimated.offset - truth.offset).as_mm();
     assert!(off.abs() < 15.0, "{off} mm");
 }
 
 #[test]
-fn what_waited_for_a_train_that_a_person_put_down_is_said_to_be_dropped() {
+fn orders_waiting_for_a_placed_train_are_reported_as_cancelled() {
     let mut watched = Watched::two();
     watched.go(FIRST, 8);
     watched.go(SECOND, 8);
     watched.run(4.0);
     watched.world.trains.retain(|train| train.id != FIRST);
     let asks = |watched: &Watched| {
-        watched.said.iter().any(|notice| matches!(notice, Notice::NeedsOperator { train: FIRST, .. }))
+        watched.notices.iter().any(|notice| matches!(notice, Notice::NeedsOperator { train: FIRST, .. }))
     };
-    assert!(watched.run_until(250.0, asks), "{:#?}", watched.said);
-    assert!(watched.dog.is_held(SECOND), "{:#?}", watched.said);
-    let from = watched.said.len();
+    assert!(watched.run_until(250.0, asks), "{:#?}", watched.notices);
+    assert!(watched.dog.is_held(SECOND), "{:#?}", watched.notices);
+    let from = watched.notices.len();
     watched.put_first_down();
     watched.listen();
     assert!(!watched.dog.is_held(SECOND));
     assert!(
-        watched.said.iter().skip(from).any(|notice| matches!(
+        watched.notices.iter().skip(from).any(|notice| matches!(
             notice,
             Notice::Cancelled { train: SECOND, order: Order::Speed { train: SECOND, .. } }
         )),
         "{:#?}",
-        watched.said
+        watched.notices
     );
     watched.go(SECOND, 8);
 }
 
 #[test]
-fn who_is_asked_first_waits_for_the_answer() {
+fn the_first_train_asked_waits_for_the_answer() {
     let mut watched = Watched::one();
     watched.dog.ask_before_crawling();
     watched.go(FIRST, 8);
@@ -319,13 +320,13 @@ fn who_is_asked_first_waits_for_the_answer() {
     watched.dog.distrust(watched.world.now, FIRST);
     watched.run(30.0);
     let asked = |notice: &Notice| matches!(notice, Notice::AsksToCreep { train: FIRST });
-    assert_eq!(watched.said.iter().filter(|notice| asked(notice)).count(), 1);
+    assert_eq!(watched.notices.iter().filter(|notice| asked(notice)).count(), 1);
     assert!(watched.world.trains[0].speed_mm_per_s < 1.0);
     watched.dog.permit(watched.world.now, FIRST);
-    assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.said);
+    assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
 }
 
-/// One thing that happens to a watchdog.
+/// One input of a watchdog.
 #[derive(Debug, Clone)]
 enum Happening {
     Ordered(Order),
@@ -365,12 +366,12 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
-    fn nobody_in_danger_is_told_to_move_but_to_be_found(happenings in vec(any_happening(), 1..80)) {
+    fn a_train_in_danger_is_commanded_to_move_only_to_be_located(happenings in vec(any_happening(), 1..80)) {
         let mut watched = Watched::two();
         let dog = &mut watched.dog;
         let mut now = Timestamp::from_s(1.0);
         let mut waiting = Vec::new();
-        // Trains in danger that have not been allowed to crawl yet.
+        // Trains in danger without clearance to creep.
         let mut must_stand: BTreeSet<TrainId> = BTreeSet::new();
         for happening in happenings {
             now += TimeSpan::from_ms(5);
@@ -410,7 +411,7 @@ proptest! {
                 Happening::Placed(node, mm) => {
                     let at = footplate_core::tracking::WayPoint { node: NodeId(node), way: Length::from_mm(mm) };
                     dog.place(now, FIRST, at, Length::from_mm(5.0));
-                    // With the last danger goes what others were held for.
+                    // The end of the last danger releases the other trains.
                     must_stand.retain(|train| dog.is_held(*train));
                 }
                 Happening::Distrusted(train) => dog.distrust(now, train),
@@ -419,8 +420,8 @@ proptest! {
                 match output {
                     Output::Command(command) => {
                         if let Command::Speed { train, step } = command {
-                            let stands = step == SpeedStep::STAND || !must_stand.contains(&train);
-                            prop_assert!(stands, "{train} is in danger and commanded {step}");
+                            let may_be_commanded = step == SpeedStep::STAND || !must_stand.contains(&train);
+                            prop_assert!(may_be_commanded, "{train} is in danger and commanded {step}");
                         }
                         waiting.push(command);
                     }
@@ -442,7 +443,7 @@ proptest! {
     }
 
     #[test]
-    fn a_stop_that_does_not_leave_is_followed_by_the_power_within_a_second(
+    fn power_is_switched_off_within_a_second_of_an_unsent_stop(
         runs_for in 0.5..20.0_f64,
         throttle in 4_u8..13,
     ) {
@@ -457,7 +458,7 @@ proptest! {
     }
 
     #[test]
-    fn a_train_that_no_contact_reports_is_told_to_stop(throttle in 5_u8..13, runs_for in 1.0..10.0_f64) {
+    fn a_train_that_no_sensor_reports_is_commanded_to_stop(throttle in 5_u8..13, runs_for in 1.0..10.0_f64) {
         let mut watched = Watched::one();
         watched.go(FIRST, throttle);
         watched.run(runs_for);
@@ -468,6 +469,6 @@ proptest! {
                     matches!(command, Command::Speed { train: FIRST, step: SpeedStep::STAND })
                 })
         };
-        prop_assert!(watched.run_until(30.0, stops), "{:#?}", watched.said);
+        prop_assert!(watched.run_until(30.0, stops), "{:#?}", watched.notices);
     }
 }

@@ -1,4 +1,4 @@
-//! Wheel diameters are learnt from balises, the truth never leaves its interval, and a wrong balise harms nothing.
+//! Wheel diameters are learnt from balises, the truth never leaves its interval, and a wrong balise corrupts nothing.
 
 use footplate_core::odometry::diameter::{BaliseAccuracy, PairVerdict, WheelDiameters, WheelScale};
 use footplate_core::odometry::wheels::{Axle, Wheelset};
@@ -23,10 +23,10 @@ fn diameters(tolerance: f64) -> WheelDiameters {
     WheelDiameters::new([wheelset(tolerance); 2], BaliseAccuracy::default())
 }
 
-/// Two wheels on rails: what their counters say of a way, by true scales and creepage.
+/// Two wheels on rails: their counts over a distance, by true scales and creepage.
 struct Rails {
     scales: [f64; 2],
-    /// Of each wheel over the next way, relative.
+    /// Relative creepage of each wheel over the next distance.
     creepage: [f64; 2],
     place_m: f64,
     turned_m: [f64; 2],
@@ -52,19 +52,25 @@ impl Rails {
         [counted(first_turned, first_scale), counted(second_turned, second_scale)]
     }
 
-    /// Rolls a way in periods of a metre.
-    fn roll(&mut self, learner: &mut WheelDiameters, way_m: f64, little_effort: bool) {
-        self.run(learner, way_m, [true; 2], little_effort);
+    /// Rolls a distance in periods of a metre.
+    fn roll(&mut self, learner: &mut WheelDiameters, distance_m: f64, little_effort: bool) {
+        self.run(learner, distance_m, [true; 2], little_effort);
     }
 
-    fn run(&mut self, learner: &mut WheelDiameters, way_m: f64, rolling: [bool; 2], little_effort: bool) {
-        let periods = way_m.abs().ceil().max(1.0);
+    fn run(
+        &mut self,
+        learner: &mut WheelDiameters,
+        distance_m: f64,
+        rolling: [bool; 2],
+        little_effort: bool,
+    ) {
+        let periods = distance_m.abs().ceil().max(1.0);
         for _ in 0..periods as usize {
-            let way = way_m / periods;
-            self.place_m += way;
+            let distance = distance_m / periods;
+            self.place_m += distance;
             self.time_s += 0.05;
             for (turned, creepage) in self.turned_m.iter_mut().zip(self.creepage) {
-                *turned += way * (1.0 + creepage);
+                *turned += distance * (1.0 + creepage);
             }
             learner.roll(self.now(), self.counted(), rolling, little_effort);
         }
@@ -79,8 +85,8 @@ fn errors([first, second]: [WheelScale; 2], [first_truth, second_truth]: [f64; 2
     [first.estimate.value - first_truth, second.estimate.value - second_truth]
 }
 
-/// Three pairs of 1.5 km with balises that are 0.5 m off and this creepage, 300 times: the largest error of a scale, and the
-/// mean square of the errors in standard deviations.
+/// Three pairs of 1.5 km with balises displaced by 0.5 m, with a creepage, 300 times: the largest error of a scale,
+/// and the mean square of the errors in standard deviations.
 fn after_three_pairs(creepage: f64) -> (f64, f64) {
     let mut draw = Draw::new(3);
     let (mut worst, mut squared) = (0.0_f64, 0.0);
@@ -119,7 +125,7 @@ fn the_deviation_of_a_scale_is_true() {
 }
 
 #[test]
-fn what_is_learnt_arrives_in_steps() {
+fn learnt_diameters_are_applied_in_steps() {
     let mut rails = Rails::new([1.015, 1.015]);
     let mut learner = diameters(0.02);
     rails.pass(&mut learner, 0.0);
@@ -129,7 +135,7 @@ fn what_is_learnt_arrives_in_steps() {
         rails.pass(&mut learner, 0.0);
         let [WheelScale { estimate, interval }, _] = learner.scales();
         let next = estimate.value;
-        // Further only where staying behind is impossible.
+        // Further only where keeping the old scale is impossible.
         assert!((next - scale).abs() < 0.0076 || next - interval.low < 1e-12, "from {scale} to {next}");
         scale = next;
     }
@@ -137,7 +143,7 @@ fn what_is_learnt_arrives_in_steps() {
 }
 
 #[test]
-fn a_wrong_balise_is_refused_with_its_numbers_and_poisons_nothing() {
+fn a_wrong_balise_is_rejected_with_its_numbers_and_corrupts_nothing() {
     let truth = [1.008, 1.006];
     let mut rails = Rails::new(truth);
     let mut learner = diameters(0.012);
@@ -205,7 +211,7 @@ fn axles_learn_their_ratio_without_any_balise() {
     let [first, second] = learner.scales();
     let ratio = first.estimate.value / second.estimate.value;
     assert!((ratio - truth[0] / truth[1]).abs() < 2e-4, "{ratio}");
-    // Their common part is as unknown as before: an even distribution over the tolerance, less what the ratio tells.
+    // Their common part is as uncertain as before: uniform over the tolerance, less what the ratio contributes.
     assert!(first.estimate.uncertainty > 0.004);
 
     // One wheelset pairs balises, and both scales are known.
@@ -230,7 +236,7 @@ fn balises_of_one_group_do_not_end_a_pair() {
 }
 
 #[test]
-fn running_back_pairs_as_running_forward() {
+fn pairs_form_in_both_directions() {
     let truth = [1.006, 0.996];
     let mut rails = Rails::new(truth);
     let mut learner = diameters(0.012);
@@ -238,7 +244,7 @@ fn running_back_pairs_as_running_forward() {
     rails.pass(&mut learner, 0.0);
     rails.roll(&mut learner, -1500.0, false);
     assert_eq!(rails.pass(&mut learner, 0.0), PairVerdict::Accepted);
-    // Both were passed at the end of their periods, on the way there and back: a period of a metre in 1500.
+    // Both were passed at the end of their periods, in either direction: a period of a metre in 1500.
     assert!(errors(learner.scales(), truth).iter().all(|error| error.abs() < 1e-3));
 
     // As far away as counted, but on the other side.
@@ -248,7 +254,7 @@ fn running_back_pairs_as_running_forward() {
 }
 
 #[test]
-fn a_later_run_goes_on_where_the_last_ended() {
+fn a_later_run_continues_from_the_last() {
     let mut rails = Rails::new([1.01, 1.008]);
     let mut learner = diameters(0.012);
     for _ in 0..5 {
@@ -274,8 +280,8 @@ fn a_later_run_goes_on_where_the_last_ended() {
 
 #[derive(Debug, Clone)]
 enum Leg {
-    Roll { way: f64, creepage: [f64; 2], little_effort: bool },
-    Slide { way: f64, creepage: f64, wheel: usize },
+    Roll { distance: f64, creepage: [f64; 2], little_effort: bool },
+    Slide { distance: f64, creepage: f64, wheel: usize },
     Balise { error: f64 },
     WrongBalise,
 }
@@ -283,11 +289,11 @@ enum Leg {
 fn legs() -> impl Strategy<Value = Vec<Leg>> {
     let creep = || -0.003..0.003_f64;
     let leg = prop_oneof![
-        3 => (1.0..2000.0_f64, creep(), creep(), any::<bool>()).prop_map(|(way, first, second, little_effort)| {
-            Leg::Roll { way, creepage: [first, second], little_effort }
+        3 => (1.0..2000.0_f64, creep(), creep(), any::<bool>()).prop_map(|(distance, first, second, little_effort)| {
+            Leg::Roll { distance, creepage: [first, second], little_effort }
         }),
         1 => (1.0..300.0_f64, -0.9..0.9_f64, 0..2usize)
-            .prop_map(|(way, creepage, wheel)| Leg::Slide { way, creepage, wheel }),
+            .prop_map(|(distance, creepage, wheel)| Leg::Slide { distance, creepage, wheel }),
         4 => (-2.5..2.5_f64).prop_map(|error| Leg::Balise { error }),
         1 => Just(Leg::WrongBalise),
     ];
@@ -307,21 +313,22 @@ proptest! {
         let mut wrong = 0.0;
         for leg in legs {
             match leg {
-                Leg::Roll { way, creepage, little_effort } => {
+                Leg::Roll { distance, creepage, little_effort } => {
                     rails.creepage = creepage;
-                    rails.roll(&mut learner, way, little_effort);
+                    rails.roll(&mut learner, distance, little_effort);
                 }
-                Leg::Slide { way, creepage, wheel } => {
+                Leg::Slide { distance, creepage, wheel } => {
                     rails.creepage = [0.0; 2];
                     rails.creepage[wheel] = creepage;
                     let rolling = [wheel != 0, wheel != 1];
-                    rails.run(&mut learner, way, rolling, false);
+                    rails.run(&mut learner, distance, rolling, false);
                 }
                 Leg::Balise { error } => {
                     rails.pass(&mut learner, error);
                 }
                 Leg::WrongBalise => {
-                    // So far off, and each further than the one before, that neither truth nor another explains it.
+                    // Displaced so far, each further than the one before, that neither the truth nor another error
+                    // explains it.
                     wrong += 1.0;
                     rails.pass(&mut learner, wrong * 100_000.0);
                 }
@@ -334,9 +341,9 @@ proptest! {
         }
     }
 
-    /// Numbers that no railway has are refused or ignored, and what follows is learnt as before.
+    /// Impossible values are rejected or ignored, and learning continues as before.
     #[test]
-    fn what_is_no_number_does_not_poison(
+    fn non_finite_input_corrupts_nothing(
         places in prop::collection::vec(prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(-1e300), Just(1e300)], 1..5),
     ) {
         let truth = [1.003, 0.998];

@@ -1,25 +1,25 @@
-//! What many runs of one kind come to.
+//! Statistics over many runs with one kind of disturbance.
 
 use serde_json::{Value, json};
 
+use super::disturbed_run::Outcomes;
 use super::kind::Kind;
-use super::scene::Outcomes;
 
-/// Figures of one kind of disaster.
+/// The statistics of one kind.
 pub(super) struct Figures {
     pub(super) kind: Kind,
     pub(super) runs: usize,
-    /// Seconds until it was noticed and the way run until then (mm).
+    /// Seconds until detection, and the distance run until then (mm).
     pub(super) noticed: Vec<[f64; 2]>,
-    /// Seconds until the train was known again.
+    /// Seconds until the train was back in service.
     pub(super) recovered: Vec<f64>,
-    /// As what: as before, rescaled, learnt anew.
+    /// The outcomes of recoveries: as before, rescaled, learnt anew.
     pub(super) outcomes: [usize; 3],
-    pub(super) needed_person: usize,
+    pub(super) needed_operator: usize,
     /// Absolute errors of stops (mm).
     pub(super) before: Vec<f64>,
     pub(super) after: Vec<f64>,
-    pub(super) mishaps: usize,
+    pub(super) faults: usize,
     pub(super) powered_off: usize,
 }
 
@@ -37,10 +37,10 @@ impl Figures {
             noticed: runs.iter().filter_map(|run| run.noticed).collect(),
             recovered: runs.iter().filter_map(|run| run.recovered).map(|(seconds, _)| seconds).collect(),
             outcomes: ["as before", "rescaled", "learnt anew"].map(counted),
-            needed_person: runs.iter().filter(|run| run.needed_person).count(),
+            needed_operator: runs.iter().filter(|run| run.needed_operator).count(),
             before: all(|run| &run.before),
             after: all(|run| &run.after),
-            mishaps: runs.iter().map(|run| run.mishaps).sum(),
+            faults: runs.iter().map(|run| run.faults).sum(),
             powered_off: runs.iter().filter(|run| run.powered_off).count(),
         }
     }
@@ -53,7 +53,7 @@ impl Figures {
             "run_until_then_mm": both(self.noticed.iter().map(|[_, mm]| *mm)),
             "recovered": self.recovered.len(), "recovered_s": both(self.recovered.iter().copied()),
             "as_before": as_before, "rescaled": rescaled, "learnt_anew": anew,
-            "needed_person": self.needed_person, "powered_off": self.powered_off, "mishaps": self.mishaps,
+            "needed_person": self.needed_operator, "powered_off": self.powered_off, "mishaps": self.faults,
             "stops_before": self.before.len(), "before_mm": both(self.before.iter().copied()),
             "stops_after": self.after.len(), "after_mm": both(self.after.iter().copied()),
         })

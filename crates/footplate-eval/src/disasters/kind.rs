@@ -1,32 +1,32 @@
-//! What befalls a train, and how it is done to the simulated world.
+//! The kinds of disturbance, and how they are applied to the simulated world.
 
 use footplate_core::track::Position;
 use footplate_core::{Length, TimeSpan, TrainId};
 use footplate_sim::{End, LawFamily, Train, VirtualStation};
 
-use crate::choice::Choice;
+use crate::seeds::Choice;
 
-/// How long the station is without power.
-const DARK: TimeSpan = TimeSpan::from_s(4.0);
+/// The time that the station is without power.
+const POWER_CUT: TimeSpan = TimeSpan::from_s(4.0);
 /// Speed with dirty wheels over speed with clean ones.
-const DIRTY: f64 = 0.8;
-/// How warm an engine is that comes from the shelf.
-const COLD: f64 = 0.1;
+const DIRTY_SPEED: f64 = 0.8;
+/// The warmth of an engine that was not in use: 0 is cold, 1 is warm.
+const COLD_WARMTH: f64 = 0.1;
 
-/// What is scored.
+/// A kind of disturbance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// Nothing happens: what is said then is a false alarm.
+    /// No disturbance: every alarm is a false alarm.
     Faultless,
-    /// Another engine under the same number.
+    /// Another engine under the same address.
     Swapped,
-    /// Wheels get dirty.
+    /// Dirty wheels.
     Dirty,
     /// The station restarts.
     Restarted,
-    /// Lifted and put on the track elsewhere, facing the same way round.
+    /// The train is lifted and put on the track elsewhere, in the same direction.
     Lifted,
-    /// The same, facing the other way round.
+    /// The same, in the opposite direction.
     Turned,
 }
 
@@ -34,7 +34,7 @@ impl Kind {
     pub(super) const ALL: [Self; 6] =
         [Self::Faultless, Self::Swapped, Self::Dirty, Self::Restarted, Self::Lifted, Self::Turned];
 
-    pub(super) const fn says(self) -> &'static str {
+    pub(super) const fn description(self) -> &'static str {
         match self {
             Self::Faultless => "nothing",
             Self::Swapped => "another engine under the number",
@@ -56,8 +56,8 @@ impl Kind {
         }
     }
 
-    /// Lets it happen. Places are where a train may be put, in true rails.
-    pub(super) fn befall(
+    /// Applies the disturbance; `places` are where a train may be put.
+    pub(super) fn apply(
         self,
         station: &mut VirtualStation<'_>,
         train: TrainId,
@@ -68,17 +68,17 @@ impl Kind {
         match self {
             Self::Faultless => {}
             Self::Swapped => {
-                // No train of this seed's world, and of any law.
+                // An engine that no train of this world has, with any law.
                 let other = seed.wrapping_mul(1000).wrapping_add(777);
                 let law = LawFamily::ALL[(seed % LawFamily::ALL.len() as u64) as usize];
-                station.world_mut().swap(train, Train::draw(other, law), COLD)?;
+                station.world_mut().swap(train, Train::draw(other, law), COLD_WARMTH)?;
             }
-            Self::Dirty => station.world_mut().dirty_wheels(train, DIRTY),
-            Self::Restarted => station.restart(DARK),
+            Self::Dirty => station.world_mut().dirty_wheels(train, DIRTY_SPEED),
+            Self::Restarted => station.restart(POWER_CUT),
             Self::Lifted | Self::Turned => {
                 station.world_mut().lift(train);
                 let layout = station.world().layout();
-                // Wherever there is room.
+                // Try places until the train fits.
                 for _ in 0..100 {
                     let Some(place) = choice.of(places).copied() else { break };
                     let turned = layout.reversed(place).filter(|_| self == Self::Turned);
@@ -93,7 +93,7 @@ impl Kind {
     }
 }
 
-/// Places along a way, a hand's breadth apart from contacts.
+/// The middles of all edges long enough to be clear of sensors.
 pub(super) fn places_along(
     layout: &footplate_core::track::Layout,
     loop_edges: &[footplate_core::EdgeId],

@@ -1,14 +1,14 @@
-//! The table of disasters: for people, for the documentation, and for machines.
+//! The page of the disturbance scores: as text, as documentation, and as JSON.
 
 use std::io::{self, Write};
 
 use serde_json::{Value, json};
 
 use super::Scored;
-use super::attributed::Attributed;
+use super::association::AssociationCounts;
+use super::disturbed_run::Outcomes;
 use super::figures::{Figures, both};
 use super::kind::Kind;
-use super::scene::Outcomes;
 use crate::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
@@ -27,11 +27,11 @@ anew. *Stops* are at random places, from the step with about 280 mm/s, as far fr
 their track.
 ";
 
-/// All that was scored.
+/// The content of the page.
 pub struct Page<'r> {
-    /// What every seed came to.
+    /// The results of all seeds.
     pub scored: &'r [Scored],
-    /// What was asked for, as on the command line.
+    /// The arguments of the command line.
     pub asked: String,
 }
 
@@ -55,20 +55,20 @@ impl WrittenScores for Page<'_> {
             writeln!(
                 output,
                 "| {} | {} | {} | {} | {} | {} | {} | {as_before} | {rescaled} | {anew} | {} | {} | {} | {} | {} | {} | {} |",
-                figures.kind.says(),
+                figures.kind.description(),
                 figures.runs,
                 figures.noticed.len(),
                 shown(both(figures.noticed.iter().map(|[seconds, _]| *seconds))),
                 shown(both(figures.noticed.iter().map(|[_, mm]| *mm))),
                 figures.recovered.len(),
                 shown(both(figures.recovered.iter().copied())),
-                figures.needed_person,
+                figures.needed_operator,
                 figures.powered_off,
                 figures.before.len(),
                 shown(both(figures.before.iter().copied())),
                 figures.after.len(),
                 shown(both(figures.after.iter().copied())),
-                figures.mishaps,
+                figures.faults,
             )?;
         }
         let (alarms, hours) = self.alarms();
@@ -82,8 +82,8 @@ impl WrittenScores for Page<'_> {
             "| trains running | contacts closed by them | laid to the right one | to another | to nobody | closed by \
              themselves | of these laid to a train |\n| ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
         )?;
-        for (trains, counted) in self.attributed() {
-            let Attributed { right, wrong, rejected, taken, spurious } = counted;
+        for (trains, counted) in self.associations() {
+            let AssociationCounts { right, wrong, rejected, taken, spurious } = counted;
             let all = right + wrong + rejected;
             writeln!(
                 output,
@@ -104,12 +104,12 @@ impl WrittenScores for Page<'_> {
         let runs = runs.map(|(seed, (kind, run))| {
             json!({
                 "seed": seed, "kind": kind.key(), "noticed": run.noticed, "recovered": run.recovered,
-                "needed_person": run.needed_person, "false_alarms": run.false_alarms, "mishaps": run.mishaps,
-                "before_mm": run.before, "after_mm": run.after, "said": run.said,
+                "needed_person": run.needed_operator, "false_alarms": run.false_alarms, "mishaps": run.faults,
+                "before_mm": run.before, "after_mm": run.after, "said": run.notices,
             })
         });
-        let attributed: Vec<Value> = self
-            .attributed()
+        let associations: Vec<Value> = self
+            .associations()
             .into_iter()
             .map(|(trains, counted)| {
                 json!({
@@ -120,7 +120,7 @@ impl WrittenScores for Page<'_> {
             .collect();
         let (false_alarms, hours) = self.alarms();
         let all = json!({
-            "kinds": kinds, "false_alarms": false_alarms, "hours": hours, "attributed": attributed,
+            "kinds": kinds, "false_alarms": false_alarms, "hours": hours, "attributed": associations,
             "runs": runs.collect::<Vec<Value>>(),
         });
         writeln!(output, "{all}")
@@ -130,10 +130,10 @@ impl WrittenScores for Page<'_> {
         let runs = || self.scored.iter().flat_map(|scored| &scored.runs);
         let happened = || self.figures();
         let [events, noticed, persons] = happened().fold([0; 3], |[all, noticed, persons], figures| {
-            [all + figures.runs, noticed + figures.noticed.len(), persons + figures.needed_person]
+            [all + figures.runs, noticed + figures.noticed.len(), persons + figures.needed_operator]
         });
         vec![
-            Rate::grief(runs().filter(|(_, run)| run.mishaps > 0).count(), runs().count()),
+            Rate::grief(runs().filter(|(_, run)| run.faults > 0).count(), runs().count()),
             Rate::new("not noticed", events - noticed, events),
             Rate::new("needed a person", persons, events),
         ]
@@ -160,9 +160,9 @@ impl Page<'_> {
         (runs().map(|run| run.false_alarms).sum(), runs().map(|run| run.watched_s).sum::<f64>() / 3600.0)
     }
 
-    fn attributed(&self) -> Vec<(usize, Attributed)> {
-        let mut sums: Vec<(usize, Attributed)> = Vec::new();
-        for (trains, counted) in self.scored.iter().flat_map(|scored| &scored.attributed) {
+    fn associations(&self) -> Vec<(usize, AssociationCounts)> {
+        let mut sums: Vec<(usize, AssociationCounts)> = Vec::new();
+        for (trains, counted) in self.scored.iter().flat_map(|scored| &scored.associations) {
             match sums.iter_mut().find(|(known, _)| known == trains) {
                 Some((_, sum)) => sum.add(*counted),
                 None => sums.push((*trains, *counted)),

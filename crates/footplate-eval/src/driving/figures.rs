@@ -1,4 +1,4 @@
-//! What many trains come to: medians, high percentiles, shares with their intervals.
+//! Statistics over many trains: medians, high percentiles, and shares with their intervals.
 
 use footplate_sim::LawFamily;
 use serde_json::{Value, json};
@@ -6,52 +6,52 @@ use serde_json::{Value, json};
 use super::trial::{NOT_BEYOND_PERCENT, Results};
 use crate::figures::{binomial_interval, quantile};
 
-/// One train driven by everybody.
+/// One train with the results of all drivers.
 pub struct ScoredTrain {
-    /// How it changes its speed.
+    /// Its law of speed change.
     pub law: LawFamily,
     /// The seed.
     pub seed: u64,
-    /// Track time that the calibration took, in s.
+    /// Simulated time of the calibration, in s.
     pub(super) calibration_s: f64,
-    /// Why it ended.
+    /// How the calibration ended.
     pub(super) ending: String,
-    /// In the order of [`Driven::ALL`].
+    /// The results in the order of [`Driven::ALL`].
     pub(super) by: Vec<Results>,
 }
 
 impl ScoredTrain {
-    /// How often it came to grief while we drove it.
+    /// Faults of the simulated world while Footplate drove.
     #[must_use]
-    pub fn mishaps(&self) -> usize {
-        self.by.first().map_or(0, |ours| ours.mishaps)
+    pub fn faults(&self) -> usize {
+        self.by.first().map_or(0, |ours| ours.faults)
     }
 }
 
-/// Who drove.
+/// The driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Driven {
-    /// By what the calibration found.
+    /// Footplate, with the calibrated model.
     Calibrated,
-    /// By the truth.
-    Knowing,
-    /// As the published course projects do.
+    /// Footplate, with the true properties of the train.
+    Oracle,
+    /// The method of course projects.
     CourseProject,
 }
 
 impl Driven {
-    pub(super) const ALL: [Self; 3] = [Self::Calibrated, Self::Knowing, Self::CourseProject];
+    pub(super) const ALL: [Self; 3] = [Self::Calibrated, Self::Oracle, Self::CourseProject];
 
     pub(super) const fn key(self) -> &'static str {
         match self {
             Self::Calibrated => "footplate",
-            Self::Knowing => "oracle",
+            Self::Oracle => "oracle",
             Self::CourseProject => "course project",
         }
     }
 }
 
-/// Figures over several trains by one driver.
+/// The statistics of one driver over several trains.
 pub(super) struct Figures {
     /// Median and 95th percentile of the absolute errors of stops, in mm.
     pub(super) mid: Option<[f64; 2]>,
@@ -62,16 +62,16 @@ pub(super) struct Figures {
     pub(super) good_moves: [usize; 2],
     /// Overruns and stops by allowed probability.
     pub(super) beyond: [[usize; 2]; 2],
-    /// The median of where such stops ended, short of the target if negative, in mm.
-    pub(super) held_short: [Option<f64>; 2],
-    /// Looks at the position, and those within the interval.
-    pub(super) looks: [u64; 2],
+    /// The median place of rest of such stops relative to the target, in mm; negative short of it.
+    pub(super) median_rest: [Option<f64>; 2],
+    /// Position checks, and those inside the interval.
+    pub(super) position_checks: [u64; 2],
     pub(super) stops: [usize; 2],
     pub(super) failed: u32,
-    pub(super) mishaps: usize,
+    pub(super) faults: usize,
 }
 
-/// What a short move may be off: this, or this share of it.
+/// The tolerance of a short move: this, or this share of it.
 const GOOD_MOVE_MM: f64 = 8.0;
 const GOOD_MOVE_SHARE: f64 = 0.05;
 
@@ -83,8 +83,9 @@ impl Figures {
         };
         let moves: Vec<[f64; 2]> =
             results.clone().flat_map(|results| results.moves.iter().copied()).collect();
-        let is_good =
-            |[asked, gone]: &&[f64; 2]| (gone - asked).abs() <= GOOD_MOVE_MM.max(GOOD_MOVE_SHARE * asked);
+        let is_good = |[ordered, moved]: &&[f64; 2]| {
+            (moved - ordered).abs() <= GOOD_MOVE_MM.max(GOOD_MOVE_SHARE * ordered)
+        };
         let beyond = |nth: usize| {
             let ends = results.clone().flat_map(move |results| results.not_beyond[nth].iter().copied());
             ends.collect::<Vec<f64>>()
@@ -97,20 +98,24 @@ impl Figures {
             mid: median_and_high(&mid),
             top: median_and_high(&top),
             moves: median_and_high(
-                &moves.iter().map(|[asked, gone]| (gone - asked).abs()).collect::<Vec<_>>(),
+                &moves.iter().map(|[ordered, moved]| (moved - ordered).abs()).collect::<Vec<_>>(),
             ),
             good_moves: [moves.iter().filter(is_good).count(), moves.len()],
             beyond: [overruns(&beyond(0)), overruns(&beyond(1))],
-            held_short: [quantile(beyond(0).into_iter(), 0.5), quantile(beyond(1).into_iter(), 0.5)],
-            looks: [sum(|results| u64::from(results.looks[0])), sum(|results| u64::from(results.looks[1]))],
+            median_rest: [quantile(beyond(0).into_iter(), 0.5), quantile(beyond(1).into_iter(), 0.5)],
+            position_checks: [
+                sum(|results| u64::from(results.position_checks[0])),
+                sum(|results| u64::from(results.position_checks[1])),
+            ],
             failed: results.clone().map(|results| results.failed).sum(),
-            mishaps: results.clone().map(|results| results.mishaps).sum(),
+            faults: results.clone().map(|results| results.faults).sum(),
         }
     }
 
-    /// The share of looks within the interval, in percent.
+    /// The share of position checks inside the interval, in percent.
     pub(super) fn covered_pct(&self) -> Option<f64> {
-        (self.looks[0] > 0).then(|| 100.0 * self.looks[1] as f64 / self.looks[0] as f64)
+        (self.position_checks[0] > 0)
+            .then(|| 100.0 * self.position_checks[1] as f64 / self.position_checks[0] as f64)
     }
 
     pub(super) fn json(&self) -> Value {
@@ -129,7 +134,7 @@ impl Figures {
             "mid_stop_mm": self.mid, "mid_stops": self.stops[0], "top_stop_mm": self.top,
             "top_stops": self.stops[1], "move_mm": self.moves, "moves": self.good_moves[1],
             "moves_within_8_mm_or_5_pct": self.good_moves[0], "not_beyond": beyond,
-            "position_inside_pct": self.covered_pct(), "failed": self.failed, "mishaps": self.mishaps,
+            "position_inside_pct": self.covered_pct(), "failed": self.failed, "mishaps": self.faults,
         })
     }
 }

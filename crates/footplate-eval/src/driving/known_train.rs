@@ -1,8 +1,8 @@
-//! What the same driver could do that knew the train: a motion model made of the truth.
+//! The oracle of the driving scores: the same driver with a motion model made from the true properties of the train.
 //!
-//! Nothing of it is measured: speeds, delays, laws and lengths are those of the simulated train, with next to no doubt.
-//! What remains are the things that nobody can know: when a poll saw its contact, how this run deviates, where stops
-//! scatter, and what the model's own form leaves over.
+//! Speeds, delays, laws and lengths are those of the simulated train, with almost no uncertainty. The remaining errors
+//! cannot be known in advance: the phase of the poll, the deviation of a run, the scatter of stops, and the
+//! approximations of the model.
 
 use anyhow::{Context, anyhow};
 use footplate_core::model::{MotionModel, StepUse};
@@ -10,11 +10,11 @@ use footplate_core::tracking::{Locator, TrackContext, WayPoint};
 use footplate_core::{Approach, Event, EventKind, Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{Law, Train, Truth};
 
-/// What an oracle doubts of each number (in its SI unit): nothing, but a matrix without any doubt inverts badly.
-const DOUBT: f64 = 1e-6;
-/// The same of a length, in metres.
-const DOUBT_OF_LENGTH_M: f64 = 0.5e-3;
-/// Places of the model's numbers, as in core's `model/parameters.rs`.
+/// The standard deviation of each parameter (in its SI unit): zero would make the covariance singular.
+const DEVIATION: f64 = 1e-6;
+/// The standard deviation of a length, in metres.
+const LENGTH_DEVIATION_M: f64 = 0.5e-3;
+/// Indices of the model's parameters, as in core's `model/parameters.rs`.
 const UP: usize = 1;
 const DOWN: usize = 5;
 const START_DELAY: usize = 9;
@@ -22,19 +22,19 @@ const FRICTION: usize = 10;
 const STOP_NODES: usize = 11;
 const NODES: usize = 8;
 const SPEEDS: usize = STOP_NODES + 2 * NODES;
-/// Speeds of the nodes, in m/s.
+/// The spacing of the nodes over speed, in m/s.
 const NODE_SPACING: f64 = 0.1;
-/// Below this speed hysteresis shrinks in proportion, as in the model, in m/s.
+/// The speed below which hysteresis shrinks in proportion, as in the model, in m/s.
 const FULL_HYSTERESIS_FROM: f64 = 0.12;
-/// A start is over after this.
+/// The time after which a start is over.
 const STARTED: TimeSpan = TimeSpan::from_ms(12_000);
-/// Lags of the simulator's motors behind set speeds that move gently, and behind counters, in s.
+/// The lags of the simulator's motors behind ramped set speeds and behind counters, in s.
 const RAMPED_LAG_S: f64 = 0.04;
 const COUNTED_LAG_S: f64 = 0.12;
-/// Internal steps of a decoder's counter between two throttle steps.
+/// Steps of a decoder's internal counter per throttle step.
 const COUNTS_PER_STEP: f64 = 9.0;
 
-/// The model of a train whose every property is known; `ahead` is the way on which its lengths are wanted.
+/// The model with the true properties of a train; `ahead` are the nodes whose path lengths it needs.
 pub(crate) fn known(
     context: TrackContext<'_>,
     truth: Truth<'_, '_>,
@@ -47,7 +47,7 @@ pub(crate) fn known(
     let blank = MotionModel::unknown(train, engine.speeds.highest());
     let mut numbers = blank.numbers();
     let highest = usize::from(numbers.highest.get());
-    // The test below says whether the places still mean the same.
+    // A change of the parameter order must not go unnoticed.
     anyhow::ensure!(
         numbers.values.len() == SPEEDS + 2 * highest,
         "the places of the model's numbers have moved"
@@ -71,11 +71,12 @@ pub(crate) fn known(
     numbers.values[FRICTION] = engine.friction.as_m_per_s2();
     numbers.values[START_DELAY] = delay + engine.start_dead_time.as_s();
     let side = numbers.values.len();
-    numbers.covariance =
-        (0..side).flat_map(|i| (0..=i).map(move |j| if i == j { DOUBT * DOUBT } else { 0.0 })).collect();
+    numbers.covariance = (0..side)
+        .flat_map(|i| (0..=i).map(move |j| if i == j { DEVIATION * DEVIATION } else { 0.0 }))
+        .collect();
     numbers.uses = (0..=highest).map(|_| StepUse::Moves).collect();
     for (step, found) in numbers.uses.iter_mut().enumerate() {
-        // A start that draws a high breakaway would not get going at such a step.
+        // A train with a high breakaway may not start at such a step.
         let speed = SpeedStep::new(step as u8).map(|step| engine.speeds.speed(step, Approach::Below));
         if speed.is_some_and(|speed| speed < engine.breakaway * 1.8) {
             *found = StepUse::Unreliable;
@@ -84,19 +85,20 @@ pub(crate) fn known(
     numbers.sections = sections(context, truth, train, ahead);
     let plain = MotionModel::from_numbers(&numbers).map_err(|error| anyhow!("{error}"))?;
 
-    // What the laws leave over, from the train itself.
+    // The residuals of the model's laws, from the train itself.
     let stops = steps(numbers.highest).map(|step| {
         let speed = engine.speeds.speed(step, Approach::Below);
-        let really = speed * engine.command_delay + engine.way_to_rest(step, Approach::Below);
-        (speed.as_m_per_s(), (really - plain.stop(step, Approach::Below).distance).as_m())
+        let from_truth = speed * engine.command_delay + engine.stopping_distance(step, Approach::Below);
+        (speed.as_m_per_s(), (from_truth - plain.stop(step, Approach::Below).distance).as_m())
     });
     fill_nodes(&mut numbers.values[STOP_NODES..STOP_NODES + NODES], &stops.collect::<Vec<_>>());
     let starts = steps(numbers.highest).filter_map(|step| {
-        let really =
-            engine.way_after(SpeedStep::STAND, Approach::Below, step, STARTED - engine.command_delay);
-        let foreseen = way_after_start(context, &plain, step)?;
-        (really > Length::ZERO)
-            .then(|| (engine.speeds.speed(step, Approach::Below).as_m_per_s(), (really - foreseen).as_m()))
+        let from_truth =
+            engine.distance_after(SpeedStep::STAND, Approach::Below, step, STARTED - engine.command_delay);
+        let predicted = distance_after_start(context, &plain, step)?;
+        (from_truth > Length::ZERO).then(|| {
+            (engine.speeds.speed(step, Approach::Below).as_m_per_s(), (from_truth - predicted).as_m())
+        })
     });
     let starts = starts.collect::<Vec<_>>();
     fill_nodes(&mut numbers.values[STOP_NODES + NODES..SPEEDS], &starts);
@@ -108,7 +110,7 @@ fn steps(highest: SpeedStep) -> impl Iterator<Item = SpeedStep> {
     (1..=highest.get()).filter_map(SpeedStep::new)
 }
 
-/// Lag, ramp time for a change of speed and ramp time a step, upwards and downwards.
+/// Lag, ramp time per change of speed and ramp time per step, for acceleration and deceleration.
 fn lags_and_ramps(law: &Law) -> [[f64; 3]; 2] {
     let kappa = |rate: footplate_core::Acceleration| 0.5 / rate.as_m_per_s2().max(1e-3);
     match *law {
@@ -130,18 +132,18 @@ fn lags_and_ramps(law: &Law) -> [[f64; 3]; 2] {
     }
 }
 
-/// How far a train gets that is told a step, by a model.
-fn way_after_start(context: TrackContext<'_>, model: &MotionModel, step: SpeedStep) -> Option<Length> {
+/// The distance that a model predicts for a train after a start.
+fn distance_after_start(context: TrackContext<'_>, model: &MotionModel, step: SpeedStep) -> Option<Length> {
     let train = model.train();
     let (_, node) = context.layout.sensors().next()?;
     let mut locator = Locator::new(train);
     locator.place(Timestamp::ZERO, WayPoint { node, way: Length::ZERO }, Length::ZERO);
-    let told = Event { time: Timestamp::ZERO, kind: EventKind::Speed { train, step } };
-    locator.handle_command(context, model, &told);
+    let command = Event { time: Timestamp::ZERO, kind: EventKind::Speed { train, step } };
+    locator.handle_command(context, model, &command);
     Some(locator.locate(context, model, Timestamp::ZERO + STARTED)?.at.way)
 }
 
-/// Lengths of hops as the train feels them, by section.
+/// Path lengths of hops for this train, by section.
 fn sections(
     context: TrackContext<'_>,
     truth: Truth<'_, '_>,
@@ -152,19 +154,19 @@ fn sections(
     for node in ahead {
         for hop in context.layout.hops_from(*node) {
             let (Some(from), Some(to)) = (context.layout.sensor_at(*node), hop.sensor) else { continue };
-            let felt = truth.felt(train, hop.edges, from, to);
-            if let (Some(section), Some(felt)) = (context.sections.section(hop.id), felt)
+            let path_length = truth.felt(train, hop.edges, from, to);
+            if let (Some(section), Some(path_length)) = (context.sections.section(hop.id), path_length)
                 && !found.iter().any(|(known, ..)| *known == section)
             {
-                let longer = (felt - hop.length).as_m();
-                found.push((section, longer, DOUBT_OF_LENGTH_M * DOUBT_OF_LENGTH_M));
+                let longer = (path_length - hop.length).as_m();
+                found.push((section, longer, LENGTH_DEVIATION_M * LENGTH_DEVIATION_M));
             }
         }
     }
     found
 }
 
-/// Numbers at the nodes from pairs of speed and number in order of speed, between them straight, beyond them constant.
+/// Values at the nodes from (speed, value) pairs in order of speed: interpolated between them, constant beyond them.
 fn fill_nodes(nodes: &mut [f64], pairs: &[(f64, f64)]) {
     for (nth, node) in nodes.iter_mut().enumerate() {
         let speed = NODE_SPACING * (nth + 1) as f64;
@@ -180,7 +182,7 @@ fn fill_nodes(nodes: &mut [f64], pairs: &[(f64, f64)]) {
     }
 }
 
-/// How far this train's stops scatter against what the model takes for usual, on average over its steps.
+/// The scatter of this train's stops relative to the prior of the model, averaged over its steps.
 fn scatter_scale(engine: &Train, model: &MotionModel) -> f64 {
     let ratios: Vec<f64> = steps(model.highest())
         .skip(4)
@@ -202,7 +204,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_the_oracle_says_of_a_train_is_true() {
+    fn the_oracle_model_matches_the_train() {
         let layout = footplate_store::layout_named("track-a").unwrap().layout;
         let (sections, turnouts) = (SectionIndex::of(&layout), TurnoutStates::unknown());
         let context = TrackContext { layout: &layout, sections: &sections, turnouts: &turnouts };
@@ -214,13 +216,17 @@ mod tests {
             for step in steps(engine.speeds.highest()).skip(4) {
                 let speed = engine.speeds.speed(step, Approach::Below);
                 let found = model.speed(step, Approach::Below).value;
-                // Half warm: no train is more than 2.5 % slower than warm, nor faster.
+                // Partly warm: a train deviates at most 2.5 % from its warm speed.
                 assert!((0.97..1.01).contains(&(found / speed)), "{law} {step}: {found:?} for {speed:?}");
-                let really = speed * engine.command_delay + engine.way_to_rest(step, Approach::Below);
+                let from_truth =
+                    speed * engine.command_delay + engine.stopping_distance(step, Approach::Below);
                 let said = model.stop(step, Approach::Below).distance;
-                // A counter's stops jump from step to step by more than the model's nodes can follow.
+                // The stops of a counter decoder jump from step to step by more than the model's nodes can follow.
                 let within_mm = if law == LawFamily::Momentum { 60.0 } else { 10.0 };
-                assert!((said - really).abs().as_mm() < within_mm, "{law} {step}: {said:?} for {really:?}");
+                assert!(
+                    (said - from_truth).abs().as_mm() < within_mm,
+                    "{law} {step}: {said:?} for {from_truth:?}"
+                );
             }
         }
     }

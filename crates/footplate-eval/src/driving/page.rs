@@ -1,4 +1,4 @@
-//! The table of how well trains are driven: for people, for the documentation, and for machines.
+//! The page of the driving scores: as text, as documentation, and as JSON.
 
 use std::io::{self, Write};
 
@@ -32,11 +32,11 @@ Stops that should end beyond their target no more often than stated, and how oft
 (Wilson) of the true share. *Held short* is where half of them ended.
 ";
 
-/// All that was scored.
+/// The content of the page.
 pub struct Page<'r> {
-    /// What every train came to.
+    /// The results of all trains.
     pub trains: &'r [ScoredTrain],
-    /// What was asked for, as on the command line.
+    /// The arguments of the command line.
     pub asked: String,
 }
 
@@ -84,9 +84,9 @@ impl WrittenScores for Page<'_> {
     fn rates(&self) -> Vec<Rate> {
         let ours = self.figures(None, Driven::Calibrated);
         let [_, moves] = ours.good_moves;
-        let held: usize = ours.beyond.iter().map(|[_, stops]| *stops).sum();
-        let orders = ours.stops[0] + ours.stops[1] + held + moves + ours.failed as usize;
-        let wrecked = self.trains.iter().filter(|train| train.by.first().is_some_and(|by| by.mishaps > 0));
+        let limited: usize = ours.beyond.iter().map(|[_, stops]| *stops).sum();
+        let orders = ours.stops[0] + ours.stops[1] + limited + moves + ours.failed as usize;
+        let wrecked = self.trains.iter().filter(|train| train.by.first().is_some_and(|by| by.faults > 0));
         let mut rates = vec![
             Rate::grief(wrecked.count(), self.trains.len()),
             Rate::new("orders not carried out", ours.failed as usize, orders),
@@ -151,7 +151,7 @@ impl Page<'_> {
              | ---: | --- | ---: | ---: | ---: | ---: | ---: |"
         )?;
         for (nth, allowed) in NOT_BEYOND_PERCENT.iter().enumerate() {
-            for by in [Driven::Calibrated, Driven::Knowing] {
+            for by in [Driven::Calibrated, Driven::Oracle] {
                 let figures = self.figures(None, by);
                 let [over, stops] = figures.beyond[nth];
                 let [low, high] = binomial_interval(over, stops);
@@ -162,7 +162,7 @@ impl Page<'_> {
                     share(over, stops),
                     100.0 * low,
                     100.0 * high,
-                    figures.held_short[nth].map_or_else(none, |mm| format!("{:.0}", -mm)),
+                    figures.median_rest[nth].map_or_else(none, |mm| format!("{:.0}", -mm)),
                 )?;
             }
         }
@@ -193,7 +193,7 @@ impl Page<'_> {
             Driven::ALL.map(|by| format!("{} {}", by.key(), figure(&self.figures(None, by)))).join(", ")
         };
         writeln!(output, "Orders not carried out: {}.", counted(|figures| figures.failed as usize))?;
-        writeln!(output, "Trains that came to grief: {}.", counted(|figures| figures.mishaps))
+        writeln!(output, "Trains that came to grief: {}.", counted(|figures| figures.faults))
     }
 }
 

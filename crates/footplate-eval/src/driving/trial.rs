@@ -1,81 +1,81 @@
-//! One train from nothing known to stops and moves, each beside the truth.
+//! The tasks of one train: stops and short moves, compared with the truth.
 
 use footplate_core::control::{Aim, Driver, Notice, Order, OrderId, StopOrder};
 use footplate_core::track::{Landmark, Layout, TurnoutStates};
 use footplate_core::{Approach, Length, NodeId, Ratio, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LawFamily, LivingSwitches, TrainTruth, VirtualStation};
 
-use crate::choice::Choice;
-use crate::rehearsal::{Calibrated, VirtualLine};
+use crate::seeds::Choice;
+use crate::testbed::{Calibrated, VirtualLine};
 
 /// The train's address.
 pub const TRAIN: TrainId = TrainId(24);
-/// Steps of the decoders that all figures are about.
+/// The highest step of the simulated decoders.
 const HIGHEST: u8 = 14;
-/// An order that is not carried out by then has failed.
-const ORDER_PATIENCE_S: f64 = 60.0;
-/// A train that was commanded to stop stands after this, in s.
-const STANDS_WITHIN_S: f64 = 8.0;
-/// How often the position is compared with the truth.
-const LOOK: TimeSpan = TimeSpan::from_ms(200);
-/// Mid steps are those with true speeds from here to there, top steps those that are faster, in mm/s: scatter is said
-/// to be 4 mm about 390 and 21 mm about 612 mm/s.
+/// The longest time for an order, in s.
+const ORDER_TIMEOUT_S: f64 = 60.0;
+/// The time within which a train comes to rest, in s.
+const BRAKING_TIMEOUT_S: f64 = 8.0;
+/// The interval of position checks.
+const CHECK_INTERVAL: TimeSpan = TimeSpan::from_ms(200);
+/// The true speeds of mid steps; top steps are faster than `TOP_FROM_MM_PER_S`. Published scatter of stops is 4 mm near
+/// 390 and 21 mm near 612 mm/s.
 const MID_MM_PER_S: std::ops::Range<f64> = 200.0..450.0;
 const TOP_FROM_MM_PER_S: f64 = 500.0;
-/// How far short moves are, in mm.
+/// The distances of short moves, in mm.
 const SHORT_MOVES_MM: std::ops::Range<f64> = 20.0..400.0;
-/// No loop has more contacts (chosen: half of those of Track A).
-const MOST_CONTACTS: usize = 40;
+/// The most sensors of a circuit (chosen: half of those of track A).
+const MAX_SENSORS: usize = 40;
 
-/// How many of each are tried.
+/// The number of each kind of task.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Counts {
     pub(super) mid_stops: usize,
     pub(super) top_stops: usize,
-    /// With each probability.
+    /// For each probability.
     pub(super) not_beyond: usize,
     pub(super) moves: usize,
 }
 
-/// What is counted of one train.
+/// The results of one train.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Results {
-    /// Errors of stops in mm, beyond the target if positive.
+    /// Errors of stops in mm, positive beyond the target.
     pub(super) mid: Vec<f64>,
     pub(super) top: Vec<f64>,
-    /// How far beyond stops ended that should not be beyond, by the probability allowed.
+    /// Errors of stops with a limited probability of overrun, by that probability.
     pub(super) not_beyond: [Vec<f64>; 2],
-    /// Distances ordered and gone, in mm.
+    /// Distances ordered and moved, in mm.
     pub(super) moves: Vec<[f64; 2]>,
-    /// How often the position was compared with the truth, and lay within the interval.
-    pub(super) looks: [u32; 2],
+    /// Position checks, and those inside the interval.
+    pub(super) position_checks: [u32; 2],
     /// Orders that were refused or not carried out.
     pub(super) failed: u32,
-    pub(super) mishaps: usize,
-    /// Why orders failed.
+    pub(super) faults: usize,
+    /// The reasons of failed orders.
     pub(super) failures: Vec<String>,
 }
 
 /// The probabilities of [`Results::not_beyond`], in percent.
 pub(super) const NOT_BEYOND_PERCENT: [f64; 2] = [5.0, 1.0];
 
-/// A world with one train that nothing is known of.
+/// A world with one unknown train.
 pub(super) fn world(layout: &Layout, seed: u64, law: LawFamily) -> anyhow::Result<VirtualLine<'_>> {
     let switches = LivingSwitches { law: Some(law), ..LivingSwitches::well_kept() };
     let station = VirtualStation::draw(layout, seed, &[TRAIN], &switches)?;
     Ok(VirtualLine::open(station)?)
 }
 
-/// What is asked of a train: the same whoever drives, as long as the train stands at the same places.
+/// The tasks of a train: the same for all drivers, as long as the train rests at the same places.
 pub struct Plan {
     choice: Choice,
-    /// Steps by their true speeds: a scorer's choice of what to ask, unknown to the driver.
+    /// Steps by their true speeds: they select the tasks and are unknown to the driver.
     pub(super) mid: Vec<SpeedStep>,
     pub(super) top: Vec<SpeedStep>,
 }
 
 impl Plan {
-    /// What is asked of a train in this world.
+    /// The tasks of a train in this world.
     #[must_use]
     pub fn new(line: &VirtualLine<'_>, seed: u64) -> Self {
         let truth = line.station.world().truth();
@@ -95,7 +95,7 @@ impl Plan {
         }
     }
 
-    /// A contact ahead on the way as the turnouts lie, somewhere between it and the next, and one of several steps.
+    /// A random target: a place on the circuit, and one of several steps to stop from.
     pub fn stop(
         &mut self,
         layout: &Layout,
@@ -109,13 +109,13 @@ impl Plan {
         Some((node, Length::from_mm(offset), *self.choice.of(steps)?))
     }
 
-    /// How far to move, in mm.
+    /// A random distance, in mm.
     pub(super) fn distance(&mut self) -> f64 {
         self.choice.between(SHORT_MOVES_MM.start, SHORT_MOVES_MM.end)
     }
 }
 
-/// Drives a calibrated train and compares what comes of it with the truth.
+/// Carries out the tasks with a calibrated train and compares the results with the truth.
 pub(super) struct Trial<'a, 'l> {
     pub(super) layout: &'l Layout,
     pub(super) line: &'a mut VirtualLine<'l>,
@@ -138,7 +138,7 @@ impl<'a, 'l> Trial<'a, 'l> {
         Self { layout, line, driver, plan, results }
     }
 
-    /// Everything, in turn, as far as the train remains on the rails.
+    /// Carries out all tasks, until the train is wrecked.
     pub(super) fn run(&mut self, counts: Counts) {
         let (mid, top) = (self.plan.mid.clone(), self.plan.top.clone());
         for _ in 0..counts.mid_stops {
@@ -159,14 +159,14 @@ impl<'a, 'l> Trial<'a, 'l> {
         for _ in 0..counts.moves {
             self.short_move();
         }
-        self.results.mishaps = self.line.station.world().mishaps().len();
+        self.results.faults = self.line.station.world().mishaps().len();
     }
 
     fn truth(&self) -> Option<TrainTruth> {
         self.line.station.world().truth().train(TRAIN)
     }
 
-    /// One stop at a random place ahead, from one of several steps: how far beyond it the train came to rest, in mm.
+    /// Stops at a random place ahead; returns how far beyond it the train came to rest, in mm.
     fn stop(&mut self, steps: &[SpeedStep], aim: Aim) -> Option<f64> {
         if !self.is_sound() {
             return None;
@@ -185,13 +185,13 @@ impl<'a, 'l> Trial<'a, 'l> {
         if !self.is_sound() {
             return;
         }
-        let asked = self.plan.distance();
+        let ordered = self.plan.distance();
         let Some(before) = self.truth() else { return };
-        let order = Order::Move { train: TRAIN, distance: Length::from_mm(asked) };
+        let order = Order::Move { train: TRAIN, distance: Length::from_mm(ordered) };
         if self.carry_out(order).is_some()
             && let Some(after) = self.truth()
         {
-            self.results.moves.push([asked, (after.odometer - before.odometer).as_mm()]);
+            self.results.moves.push([ordered, (after.odometer - before.odometer).as_mm()]);
         }
     }
 
@@ -199,7 +199,7 @@ impl<'a, 'l> Trial<'a, 'l> {
         self.truth().is_some_and(|truth| !truth.is_wrecked)
     }
 
-    /// Gives an order and waits until the train stands; nothing if it was refused or failed.
+    /// Gives an order and waits until the train is at rest; `None` if the order was refused or failed.
     fn carry_out(&mut self, order: Order) -> Option<()> {
         let now = self.line.now();
         let id = match self.driver.order(now, order) {
@@ -210,24 +210,24 @@ impl<'a, 'l> Trial<'a, 'l> {
                 return None;
             }
         };
-        let patience = now + TimeSpan::from_s(ORDER_PATIENCE_S);
-        let done = self.until_done(id, patience);
+        let deadline = now + TimeSpan::from_s(ORDER_TIMEOUT_S);
+        let done = self.until_done(id, deadline);
         if done.is_none() {
             self.results.failed += 1;
             self.results.failures.push(format!("not done: {order:?}"));
             self.halt();
         }
-        // Until the train really stands, whatever is believed.
-        let patience = self.line.now() + TimeSpan::from_s(10.0);
-        while self.line.now() < patience && self.truth().is_some_and(|truth| truth.at_rest_since.is_none()) {
-            self.look_on(patience.min(self.line.now() + LOOK));
+        // Wait until the train is truly at rest, whatever the estimate says.
+        let deadline = self.line.now() + TimeSpan::from_s(10.0);
+        while self.line.now() < deadline && self.truth().is_some_and(|truth| truth.at_rest_since.is_none()) {
+            self.drive_and_check(deadline.min(self.line.now() + CHECK_INTERVAL));
         }
         done
     }
 
-    fn until_done(&mut self, id: OrderId, patience: Timestamp) -> Option<()> {
-        while self.line.now() < patience && self.is_sound() {
-            match self.look_on(self.line.now() + LOOK) {
+    fn until_done(&mut self, id: OrderId, deadline: Timestamp) -> Option<()> {
+        while self.line.now() < deadline && self.is_sound() {
+            match self.drive_and_check(self.line.now() + CHECK_INTERVAL) {
                 Some(Notice::Done(finished)) if finished.order == id => return Some(()),
                 Some(Notice::GivenUp { order, why, .. }) if order == id => {
                     self.results.failures.push(format!("failed: {why:?}"));
@@ -239,50 +239,50 @@ impl<'a, 'l> Trial<'a, 'l> {
         None
     }
 
-    /// Drives on, and compares the position whenever nothing is said.
-    fn look_on(&mut self, until: Timestamp) -> Option<Notice> {
+    /// Drives until the next notice; without one, checks the position.
+    fn drive_and_check(&mut self, until: Timestamp) -> Option<Notice> {
         let notice = self.line.drive(&mut self.driver, until);
         if notice.is_none() {
-            self.look();
+            self.check_position();
         }
         notice
     }
 
-    fn look(&mut self) {
+    fn check_position(&mut self) {
         let now = self.line.now();
         let Some(located) = self.driver.locate(TRAIN, now) else { return };
-        // As a person reads it: so many millimetres past a contact.
+        // The position as it is shown: millimetres past a sensor.
         let Some(said) = self.driver.landmark(TRAIN, located.at) else { return };
         let Some(sensor) = self.layout.sensor_at(said.node) else { return };
         let Some(past) = self.line.station.world().truth().past(TRAIN, sensor) else { return };
         let off = (past - said.offset).as_mm();
-        self.results.looks[0] += 1;
-        self.results.looks[1] += u32::from(off.abs() <= 1.96 * located.uncertainty.as_mm());
+        self.results.position_checks[0] += 1;
+        self.results.position_checks[1] += u32::from(off.abs() <= 1.96 * located.uncertainty.as_mm());
     }
 
-    /// Finds a train again that was lost, as a person would: lets it run until it has come by a contact, and stops it.
+    /// Relocates a lost train as an operator would: runs it to a sensor and stops it.
     fn halt(&mut self) {
-        let found_by = self.line.now() + TimeSpan::from_s(ORDER_PATIENCE_S);
+        let found_by = self.line.now() + TimeSpan::from_s(ORDER_TIMEOUT_S);
         if let Some(step) = self.plan.mid.first().copied() {
             let _ = self.driver.order(self.line.now(), Order::Speed { train: TRAIN, step });
         }
         while self.line.now() < found_by && self.driver.locate(TRAIN, self.line.now()).is_none() {
-            let until = found_by.min(self.line.now() + LOOK);
+            let until = found_by.min(self.line.now() + CHECK_INTERVAL);
             let _ = self.line.drive(&mut self.driver, until);
         }
-        let stand = Order::Speed { train: TRAIN, step: SpeedStep::STAND };
-        let _ = self.driver.order(self.line.now(), stand);
-        let until = self.line.now() + TimeSpan::from_s(STANDS_WITHIN_S);
+        let stop = Order::Speed { train: TRAIN, step: SpeedStep::STAND };
+        let _ = self.driver.order(self.line.now(), stop);
+        let until = self.line.now() + TimeSpan::from_s(BRAKING_TIMEOUT_S);
         while self.line.drive(&mut self.driver, until).is_some() {}
     }
 }
 
-/// Contacts of the loop that the train is on, with the surveyed lengths to the next.
+/// The sensors of the circuit that the train is on, with the surveyed lengths to the next.
 pub(super) fn ahead(layout: &Layout, line: &VirtualLine<'_>, turnouts: &TurnoutStates) -> Vec<(NodeId, f64)> {
     let position = line.station.world().truth().train(TRAIN).and_then(|truth| truth.position);
     let mut found: Vec<(NodeId, f64)> = Vec::new();
     let mut node = position.and_then(|at| layout.edge(at.edge)).map(|edge| edge.to);
-    for _ in 0..MOST_CONTACTS {
+    for _ in 0..MAX_SENSORS {
         let hop = node.and_then(|node| layout.hops_from(node).find(|hop| hop.is_open(turnouts)));
         let (Some(hop), Some(from)) = (hop, node) else { break };
         let is_known = found.iter().any(|(known, _)| *known == from);

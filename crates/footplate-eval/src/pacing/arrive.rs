@@ -5,11 +5,11 @@ use footplate_core::control::{Notice, Order, OrderId, Refusal, StopOrder};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use super::counted::Counted;
+use super::counted::{Counted, cut_short};
 use super::hold::{speed, steps, told_the_truth};
 use super::tracked::LOOK;
-use crate::choice::Choice;
-use crate::rehearsal::{Rehearsal, Way};
+use crate::seeds::Choice;
+use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// How often each train is asked.
 const ASKED_EACH: usize = 6;
@@ -94,8 +94,8 @@ pub(super) struct Arrived {
 /// Everything that one train is asked, by everybody.
 pub(super) fn arrive(
     layout: &Layout,
-    stage: &Rehearsal<'_>,
-    way: &Way,
+    stage: &PreparedTrains<'_>,
+    way: &LongestCircuit,
     train: TrainId,
     choice: &mut Choice,
 ) -> anyhow::Result<Vec<Arrived>> {
@@ -115,7 +115,7 @@ pub(super) fn arrive(
             train,
             by,
             choice: Choice::new(seed),
-            counted: Counted::new(stage.driver()),
+            counted: Counted::dispatched(stage.line.now(), stage.driver()),
             stage,
         };
         for nth in 0..ASKED_EACH {
@@ -133,11 +133,11 @@ pub(super) fn arrive(
 /// One train on its way from target to target.
 struct Trip<'a, 'l> {
     layout: &'l Layout,
-    way: &'a Way,
+    way: &'a LongestCircuit,
     train: TrainId,
     by: By,
     choice: Choice,
-    stage: Rehearsal<'l>,
+    stage: PreparedTrains<'l>,
     counted: Counted,
 }
 
@@ -157,7 +157,7 @@ impl Trip<'_, '_> {
     /// A place about so far ahead (mm), and how far exactly it is to where it comes first: further than a round is beyond the
     /// place at which it was a round before.
     fn target(&mut self, far: f64, from_rest: bool) -> Option<(Landmark, f64)> {
-        let located = self.counted.driver.locate(self.train, self.now())?;
+        let located = self.counted.driver().locate(self.train, self.now())?;
         let mut at = self.way.nodes.iter().position(|node| *node == located.at.node)?;
         let mut way = -located.at.way.as_mm();
         loop {
@@ -190,9 +190,9 @@ impl Trip<'_, '_> {
         };
         if !from_rest {
             let run = Order::Speed { train: self.train, step: self.nearest(RUNS_AT) };
-            let _ = self.counted.driver.order(self.now(), run);
+            let _ = self.counted.order(self.now(), run);
             let until = self.now() + TimeSpan::from_s(RUNS_FOR);
-            while self.stage.line.drive(&mut self.counted, until).is_some() {}
+            while self.counted.drive(&mut self.stage.line, until).is_some() {}
         }
         let far = self.choice.between(FAR[0], FAR[1]);
         let mean = self.choice.between(MEAN[0], MEAN[1]);
@@ -223,7 +223,7 @@ impl Trip<'_, '_> {
             Err(why) => arrived.trouble = Some(why.to_string()),
         }
         let until = self.now() + TimeSpan::from_s(STANDS_WITHIN);
-        while self.stage.line.drive(&mut self.counted, until).is_some() {}
+        while self.counted.drive(&mut self.stage.line, until).is_some() {}
         if self.stage.world().mishaps().len() > mishaps {
             arrived.trouble = Some("it came to grief".to_owned());
         }
@@ -243,18 +243,22 @@ impl Trip<'_, '_> {
                 Order::Stop(StopOrder { step, ..StopOrder::at(train, target) })
             }
         };
-        self.counted.driver.order(self.stage.line.now(), order)
+        self.counted.order(self.stage.line.now(), order)
     }
 
     fn until_done(&mut self, order: OrderId, patience: Timestamp) -> Result<(), String> {
         while self.now() < patience {
             let look = patience.min(self.now() + LOOK);
-            match self.stage.line.drive(&mut self.counted, look) {
-                Some(Notice::Done(done)) if done.order == order => return Ok(()),
-                Some(Notice::GivenUp { order: given_up, why, .. }) if given_up == order => {
-                    return Err(why.to_string());
-                }
-                _ => {}
+            let notice = self.counted.drive(&mut self.stage.line, look);
+            if let Some((_, ended, why)) = notice.as_ref().and_then(cut_short)
+                && ended.is_none_or(|ended| ended == order)
+            {
+                return Err(why);
+            }
+            if let Some(Notice::Done(done)) = notice
+                && done.order == order
+            {
+                return Ok(());
             }
         }
         Err("it did not arrive".to_owned())

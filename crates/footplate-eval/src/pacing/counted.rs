@@ -1,24 +1,86 @@
-//! A driver whose commands are counted on their way out.
+//! What drives the trains of a scorer, with its commands counted on their way out.
 
 use std::collections::BTreeMap;
 
-use footplate_core::control::{Driver, Machine, Notice, Output};
+use footplate_core::control::{
+    Dispatcher, Driver, Machine, Notice, Order, OrderId, Output, Refusal, TrainLengths,
+};
 use footplate_core::{Command, Event, Timestamp, TrainId};
+use footplate_wire::LinkNotice;
+
+use crate::testbed::VirtualLine;
+
+/// What passes orders on to the driver.
+enum Control {
+    /// The dispatcher with its watchdog: what people drive.
+    Dispatched(Box<Dispatcher>),
+    /// The driver alone, for simpler ways to drive that are compared with it.
+    Bare(Box<Driver>),
+}
 
 /// Passes everything on, and counts the steps told to each train.
 pub(super) struct Counted {
-    pub(super) driver: Driver,
+    control: Control,
     steps: BTreeMap<TrainId, usize>,
 }
 
 impl Counted {
-    pub(super) const fn new(driver: Driver) -> Self {
-        Self { driver, steps: BTreeMap::new() }
+    /// Drives as people do, through the dispatcher and its watchdog.
+    pub(super) fn dispatched(now: Timestamp, driver: Driver) -> Self {
+        let control = Control::Dispatched(Box::new(Dispatcher::watched(now, driver)));
+        Self { control, steps: BTreeMap::new() }
+    }
+
+    /// Drives without anything above the driver.
+    pub(super) fn bare(driver: Driver) -> Self {
+        Self { control: Control::Bare(Box::new(driver)), steps: BTreeMap::new() }
+    }
+
+    pub(super) const fn driver(&self) -> &Driver {
+        match &self.control {
+            Control::Dispatched(dispatcher) => dispatcher.driver(),
+            Control::Bare(driver) => driver,
+        }
+    }
+
+    /// A person says how long a train is.
+    pub(super) fn set_lengths(&mut self, now: Timestamp, train: TrainId, lengths: TrainLengths) {
+        match &mut self.control {
+            Control::Dispatched(dispatcher) => dispatcher.set_lengths(now, train, lengths),
+            Control::Bare(driver) => driver.set_reach(train, lengths.ahead(), lengths.behind()),
+        }
+    }
+
+    pub(super) fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
+        match &mut self.control {
+            Control::Dispatched(dispatcher) => dispatcher.order(now, order),
+            Control::Bare(driver) => driver.order(now, order),
+        }
     }
 
     /// How many steps a train has been told so far.
     pub(super) fn steps(&self, train: TrainId) -> usize {
         self.steps.get(&train).copied().unwrap_or_default()
+    }
+
+    /// Lets it drive until it has something to say or a time has come.
+    pub(super) fn drive(&mut self, line: &mut VirtualLine<'_>, until: Timestamp) -> Option<Notice> {
+        line.drive_hearing(self, until, |counted, now, notice: &LinkNotice| {
+            if let (Control::Dispatched(dispatcher), Some(news)) = (&mut counted.control, notice.news()) {
+                dispatcher.handle_link(now, news);
+            }
+        })
+    }
+}
+
+/// The train whose order a notice ends before it was carried out, with the order where it has a number, and why.
+pub(super) fn cut_short(notice: &Notice) -> Option<(TrainId, Option<OrderId>, String)> {
+    match notice {
+        Notice::GivenUp { train, order, why } => Some((*train, Some(*order), why.to_string())),
+        Notice::Cancelled { train, .. } => {
+            Some((*train, None, "its order was cancelled while it was located again".to_owned()))
+        }
+        _ => None,
     }
 }
 
@@ -26,15 +88,24 @@ impl Machine for Counted {
     type Notice = Notice;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
-        self.driver.handle_event(now, event);
+        match &mut self.control {
+            Control::Dispatched(dispatcher) => dispatcher.handle_event(now, event),
+            Control::Bare(driver) => driver.handle_event(now, event),
+        }
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
-        self.driver.handle_timeout(now);
+        match &mut self.control {
+            Control::Dispatched(dispatcher) => dispatcher.handle_timeout(now),
+            Control::Bare(driver) => driver.handle_timeout(now),
+        }
     }
 
     fn poll_output(&mut self) -> Option<Output<Notice>> {
-        let output = self.driver.poll_output()?;
+        let output = match &mut self.control {
+            Control::Dispatched(dispatcher) => dispatcher.poll_output()?,
+            Control::Bare(driver) => driver.poll_output()?,
+        };
         if let Output::Command(Command::Speed { train, .. }) = output {
             *self.steps.entry(train).or_default() += 1;
         }
@@ -42,6 +113,9 @@ impl Machine for Counted {
     }
 
     fn next_timeout(&self) -> Option<Timestamp> {
-        self.driver.next_timeout()
+        match &self.control {
+            Control::Dispatched(dispatcher) => dispatcher.next_timeout(),
+            Control::Bare(driver) => driver.next_timeout(),
+        }
     }
 }

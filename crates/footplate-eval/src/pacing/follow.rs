@@ -3,15 +3,15 @@
 use std::collections::BTreeMap;
 
 use anyhow::Context;
-use footplate_core::control::{Gap, Notice, Order, Refusal};
+use footplate_core::control::{Gap, Notice, Order, Refusal, TrainLengths};
 use footplate_core::{Length, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::living::Truth;
 
-use super::counted::Counted;
+use super::counted::{Counted, cut_short};
 use super::hold::{speed, steps};
 use super::tracked::{LOOK, Odometer};
-use crate::choice::Choice;
-use crate::rehearsal::{Rehearsal, Way};
+use crate::seeds::Choice;
+use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// The leader runs at speeds between these (mm/s), each for a time between those (s).
 const LEADS_AT: [f64; 2] = [200.0, 320.0];
@@ -25,9 +25,9 @@ const FINDS_WITHIN: f64 = 60.0;
 /// The other follower runs at the step that is nearest to its leader's speed, and one above or below while it is off by more
 /// (s).
 const STEPS_BEYOND: f64 = 0.1;
-/// A person measures a train with a ruler: as far before and behind the shoe's leading end as any of them reaches (mm).
-const AHEAD: f64 = 25.0;
-const BEHIND: f64 = 145.0;
+/// A person measures the trains with a ruler: the longest overhang and the longest shoe of any of them.
+const LENGTHS: TrainLengths =
+    TrainLengths { overhang: Length::from_mm(100.0), pickup: Length::from_mm(45.0) };
 
 /// What is said of trains that touched, derailed or ran off the track.
 pub(super) const GRIEF: &str = "they came to grief";
@@ -95,8 +95,8 @@ pub(super) struct Followed {
 
 /// All gaps by everybody, for so long (s). Who goes up or down by steps keeps times.
 pub(super) fn follow(
-    stage: &Rehearsal<'_>,
-    way: &Way,
+    stage: &PreparedTrains<'_>,
+    way: &LongestCircuit,
     trains: &[TrainId],
     (gaps, lasts): (&[(Kept, f64)], f64),
     choice: &mut Choice,
@@ -121,7 +121,7 @@ pub(super) fn follow(
 
 /// Trains in a row.
 struct Row<'a, 'l> {
-    stage: Rehearsal<'l>,
+    stage: PreparedTrains<'l>,
     counted: Counted,
     trains: &'a [TrainId],
     kept: Kept,
@@ -138,16 +138,18 @@ struct Row<'a, 'l> {
 
 impl<'a, 'l> Row<'a, 'l> {
     fn new(
-        stage: Rehearsal<'l>,
+        stage: PreparedTrains<'l>,
         trains: &'a [TrainId],
         (kept, gap): (Kept, f64),
         by: By,
         choice: Choice,
     ) -> Self {
-        let mut counted = Counted::new(stage.driver());
-        for train in trains {
-            counted.driver.set_reach(*train, Length::from_mm(AHEAD), Length::from_mm(BEHIND));
-        }
+        let now = stage.line.now();
+        let mut counted = match by {
+            By::Driver => Counted::dispatched(now, stage.driver()),
+            By::Steps => Counted::bare(stage.driver()),
+        };
+        trains.iter().for_each(|train| counted.set_lengths(now, *train, LENGTHS));
         let followed = (1..trains.len()).map(|place| Followed {
             by,
             kept,
@@ -215,16 +217,16 @@ impl<'a, 'l> Row<'a, 'l> {
     fn begin(&mut self, place: usize) {
         let [leader, train] = [self.trains[place - 1], self.trains[place]];
         if self.by == By::Steps {
-            let step = self.counted.driver.commanded(leader);
+            let step = self.counted.driver().commanded(leader);
             let leads_at = self.stage.models.get(&leader).map_or(0.0, |model| speed(model, step));
             let step = self.nearest(train, leads_at);
-            let _ = self.counted.driver.order(self.now(), Order::Speed { train, step });
+            let _ = self.counted.order(self.now(), Order::Speed { train, step });
             return;
         }
         let now = self.now();
         let mut order = |gap: f64| {
             let gap = self.kept.gap(gap);
-            self.counted.driver.order(now, Order::Follow { train, leader, gap })
+            self.counted.order(now, Order::Follow { train, leader, gap })
         };
         let mut taken = order(self.gap);
         if let Err(Refusal::GapTooShort { shortest, .. }) = &taken {
@@ -257,17 +259,18 @@ impl<'a, 'l> Row<'a, 'l> {
                 self.changes = self.now() + TimeSpan::from_s(after);
                 let train = self.trains[0];
                 let order = Order::Speed { train, step: self.nearest(train, speed) };
-                let _ = self.counted.driver.order(self.now(), order);
+                let _ = self.counted.order(self.now(), order);
             }
             let look = until.min(self.now() + LOOK);
-            match self.stage.line.drive(&mut self.counted, look) {
+            let notice = self.counted.drive(&mut self.stage.line, look);
+            if let Some((train, _, why)) = notice.as_ref().and_then(cut_short) {
+                let of = self.followed.iter_mut().find(|followed| followed.train == train);
+                of.into_iter().for_each(|followed| followed.trouble = Some(why.clone()));
+            }
+            match notice {
                 Some(Notice::HeldBack { train, .. }) => {
                     let held = self.followed.iter_mut().find(|followed| followed.train == train);
                     held.into_iter().for_each(|followed| followed.held_back += 1);
-                }
-                Some(Notice::GivenUp { train, why, .. }) => {
-                    let of = self.followed.iter_mut().find(|followed| followed.train == train);
-                    of.into_iter().for_each(|followed| followed.trouble = Some(why.to_string()));
                 }
                 Some(Notice::Passed { train, passed, .. }) if self.by == By::Steps => {
                     self.step_up_or_down(train, passed.sensor, passed.window.middle());
@@ -288,7 +291,7 @@ impl<'a, 'l> Row<'a, 'l> {
         let Some(leader) = place.checked_sub(1).map(|ahead| self.trains[ahead]) else { return };
         let Some(led) = self.reported.get(&(leader, sensor)) else { return };
         let late = (at - *led).as_s() - self.gap;
-        let told = self.counted.driver.commanded(leader);
+        let told = self.counted.driver().commanded(leader);
         let leads_at = self.stage.models.get(&leader).map_or(0.0, |model| speed(model, told));
         let like = self.nearest(train, leads_at).get();
         let step = match late {
@@ -297,7 +300,7 @@ impl<'a, 'l> Row<'a, 'l> {
             _ => like,
         };
         if let Some(step) = SpeedStep::new(step) {
-            let _ = self.counted.driver.order(self.now(), Order::Speed { train, step });
+            let _ = self.counted.order(self.now(), Order::Speed { train, step });
         }
     }
 }
@@ -334,7 +337,7 @@ impl Followed {
             self.nearest = self.nearest.min(way - between);
             if self.kept == Kept::Length {
                 // By the lengths that the driver has been told.
-                self.off.push(way - AHEAD - BEHIND - self.gaps[1]);
+                self.off.push(way - (LENGTHS.ahead() + LENGTHS.behind()).as_mm() - self.gaps[1]);
             }
         }
     }

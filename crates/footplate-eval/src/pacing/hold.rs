@@ -8,11 +8,11 @@ use footplate_core::track::Layout;
 use footplate_core::tracking::TrackContext;
 use footplate_core::{Approach, Length, NodeId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use super::counted::Counted;
+use super::counted::{Counted, cut_short};
 use super::tracked::{LOOK, Odometer, TrueWay};
-use crate::choice::Choice;
 use crate::driving::known;
-use crate::rehearsal::{Rehearsal, Way};
+use crate::seeds::Choice;
+use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// Speeds that are asked for (mm/s).
 const SPEEDS: [f64; 2] = [200.0, 450.0];
@@ -79,8 +79,8 @@ pub(super) struct HoldRecord {
 /// Everything that one train is asked to hold.
 pub(super) fn hold(
     layout: &Layout,
-    stage: &Rehearsal<'_>,
-    way: &Way,
+    stage: &PreparedTrains<'_>,
+    way: &LongestCircuit,
     train: TrainId,
     choice: &mut Choice,
 ) -> anyhow::Result<Vec<Held>> {
@@ -106,8 +106,8 @@ pub(super) fn hold(
 /// A model of a train that knows everything about it, and how long the hops on its way feel.
 pub(super) fn told_the_truth(
     layout: &Layout,
-    stage: &Rehearsal<'_>,
-    way: &Way,
+    stage: &PreparedTrains<'_>,
+    way: &LongestCircuit,
     train: TrainId,
 ) -> anyhow::Result<MotionModel> {
     let sections = SectionIndex::of(layout);
@@ -138,7 +138,7 @@ struct Ideal {
     time: Timestamp,
 }
 
-fn held(layout: &Layout, mut stage: Rehearsal<'_>, train: TrainId, by: By, asked: f64) -> Held {
+fn held(layout: &Layout, mut stage: PreparedTrains<'_>, train: TrainId, by: By, asked: f64) -> Held {
     let mut held = Held {
         by,
         train,
@@ -150,7 +150,10 @@ fn held(layout: &Layout, mut stage: Rehearsal<'_>, train: TrainId, by: By, asked
         trouble: None,
     };
     let began = stage.line.now();
-    let mut counted = Counted::new(stage.driver());
+    let mut counted = match by {
+        By::Driver | By::Told => Counted::dispatched(began, stage.driver()),
+        By::Step => Counted::bare(stage.driver()),
+    };
     let Some(model) = stage.models.get(&train) else { return held };
     let (order, settled) = match by {
         By::Driver | By::Told => (Order::Hold { train, speed: Speed::from_mm_per_s(asked) }, None),
@@ -161,7 +164,7 @@ fn held(layout: &Layout, mut stage: Rehearsal<'_>, train: TrainId, by: By, asked
             (Order::Speed { train, step }, Some(began + model.settles_within(SpeedStep::STAND, step)))
         }
     };
-    if let Err(why) = counted.driver.order(began, order) {
+    if let Err(why) = counted.order(began, order) {
         held.trouble = Some(why.to_string());
         return held;
     }
@@ -172,22 +175,23 @@ fn held(layout: &Layout, mut stage: Rehearsal<'_>, train: TrainId, by: By, asked
     let mut until = began + TimeSpan::from_s(PATIENCE);
     while stage.line.now() < until {
         let look = until.min(stage.line.now() + LOOK);
-        let found = match stage.line.drive(&mut counted, look) {
+        let notice = counted.drive(&mut stage.line, look);
+        if let Some((.., why)) = notice.as_ref().and_then(cut_short) {
+            held.trouble = Some(why);
+            break;
+        }
+        let found = match notice {
             Some(Notice::Paced(PacedLine { node, way, time, .. })) => Some(Ideal { node, way, time }),
             // The first contact at a settled speed begins a line, as the driver's does.
             Some(Notice::Passed { passed, .. }) if settled.is_some_and(|at| at < passed.window.after) => {
-                let node = counted.driver.node_passed(&passed);
+                let node = counted.driver().node_passed(&passed);
                 node.map(|node| Ideal { node, way: Length::ZERO, time: passed.window.middle() })
-            }
-            Some(Notice::GivenUp { why, .. }) => {
-                held.trouble = Some(why.to_string());
-                break;
             }
             Some(_) => None,
             None => {
                 let now = stage.line.now();
                 odometer.look(&stage.line, train);
-                let ahead = counted.driver.ahead_of_line(train, now);
+                let ahead = counted.driver().ahead_of_line(train, now);
                 believed.extend(ahead.map(|ahead| (now, ahead.as_mm())));
                 None
             }

@@ -8,7 +8,7 @@ use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_sim::living::Truth;
 
-use crate::rehearsal::VirtualLine;
+use crate::testbed::VirtualLine;
 
 /// How often it is looked where a train is: a straight line between two looks is off by a tenth of a millimetre.
 pub(super) const LOOK: TimeSpan = TimeSpan::from_ms(50);

@@ -1,4 +1,4 @@
-//! The table of how well layouts are surveyed: for people, for the documentation, and for machines.
+//! The page of the survey scores: as text, as documentation, and as JSON.
 
 use std::io::{self, Write};
 
@@ -24,13 +24,13 @@ not that on the straight, and contacts do not close where a tape would be laid; 
 *Unseen* are distances over which no train ran.
 ";
 
-/// All that was scored.
+/// The content of the page.
 pub struct Page<'r> {
-    /// What every world came to.
+    /// The results of all worlds.
     pub worlds: &'r [Surveyed],
-    /// The names of the sensors of the distance that is known.
+    /// The names of the sensors at the ends of the known distance.
     pub known: [String; 2],
-    /// What was asked for, as on the command line.
+    /// The arguments of the command line.
     pub asked: String,
 }
 
@@ -58,26 +58,26 @@ impl WrittenScores for Page<'_> {
                 "| {} | {} | {} | {:.1} | {:.1} | {:.1} | {:.1} | {:+.1} | {:.1} |",
                 world.seed,
                 figures.count,
-                world.unseen,
+                world.not_run,
                 figures.off,
                 figures.worst,
-                figures.felt,
+                figures.path_length,
                 figures.inside_pct,
                 figures.scale_pct,
                 100.0 * world.scale
             )?;
         }
         let all = Figures::of(self.worlds.iter().flat_map(Surveyed::scored));
-        let unseen: usize = self.worlds.iter().map(|world| world.unseen).sum();
+        let unseen: usize = self.worlds.iter().map(|world| world.not_run).sum();
         writeln!(
             output,
             "| all | {} | {unseen} | {:.1} | {:.1} | {:.1} | {:.1} | | |",
-            all.count, all.off, all.worst, all.felt, all.inside_pct
+            all.count, all.off, all.worst, all.path_length, all.inside_pct
         )
     }
 
     fn rates(&self) -> Vec<Rate> {
-        let wrecked = self.worlds.iter().filter(|world| world.mishaps > 0).count();
+        let wrecked = self.worlds.iter().filter(|world| world.faults > 0).count();
         let distances = || self.worlds.iter().flat_map(Surveyed::scored);
         let outside = distances().filter(|distance| !distance.is_inside()).count();
         vec![
@@ -92,13 +92,13 @@ impl WrittenScores for Page<'_> {
             let distances = world.distances.iter().map(|distance| {
                 json!({
                     "from": distance.from, "to": distance.to, "true_mm": distance.true_mm, "off_mm": distance.off_mm,
-                    "uncertainty_mm": distance.uncertainty_mm, "felt_off_mm": distance.felt_off_mm,
+                    "uncertainty_mm": distance.uncertainty_mm, "felt_off_mm": distance.path_off_mm,
                 })
             });
             json!({
-                "seed": world.seed, "rms_mm": figures.off, "worst_mm": figures.worst, "felt_rms_mm": figures.felt,
+                "seed": world.seed, "rms_mm": figures.off, "worst_mm": figures.worst, "felt_rms_mm": figures.path_length,
                 "inside_pct": figures.inside_pct, "scale_pct": figures.scale_pct, "said_scale_pct": 100.0 * world.scale,
-                "unseen": world.unseen, "mishaps": world.mishaps, "distances": distances.collect::<Vec<Value>>(),
+                "unseen": world.not_run, "mishaps": world.faults, "distances": distances.collect::<Vec<Value>>(),
             })
         });
         let all = Figures::of(self.worlds.iter().flat_map(Surveyed::scored));
@@ -106,24 +106,24 @@ impl WrittenScores for Page<'_> {
         writeln!(
             output,
             "{}",
-            json!({ "rms_mm": off, "felt_rms_mm": all.felt, "inside_pct": inside, "worlds": worlds.collect::<Vec<Value>>() })
+            json!({ "rms_mm": off, "felt_rms_mm": all.path_length, "inside_pct": inside, "worlds": worlds.collect::<Vec<Value>>() })
         )
     }
 }
 
 impl Surveyed {
-    /// All but the known one.
+    /// All distances except the known one.
     fn scored(&self) -> impl Iterator<Item = &Distance> {
         self.distances.iter().filter(|distance| !distance.is_known)
     }
 }
 
-/// What many distances come to.
+/// Statistics over many distances.
 struct Figures {
     count: usize,
     off: f64,
     worst: f64,
-    felt: f64,
+    path_length: f64,
     inside_pct: f64,
     scale_pct: f64,
 }
@@ -137,7 +137,7 @@ impl Figures {
             count: all.len(),
             off: (sum(|distance| distance.off_mm * distance.off_mm) / count).sqrt(),
             worst: all.iter().map(|distance| distance.off_mm.abs()).fold(0.0, f64::max),
-            felt: (sum(|distance| distance.felt_off_mm * distance.felt_off_mm) / count).sqrt(),
+            path_length: (sum(|distance| distance.path_off_mm * distance.path_off_mm) / count).sqrt(),
             inside_pct: 100.0 * sum(|distance| f64::from(u8::from(distance.is_inside()))) / count,
             scale_pct: 100.0 * sum(|distance| distance.off_mm) / sum(|distance| distance.true_mm).max(1.0),
         }

@@ -8,9 +8,10 @@ use footplate_core::track::{Landmark, Layout, Position};
 use footplate_core::tracking::WayPoint;
 use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LivingLayout, LivingSwitches, Mishap};
+use footplate_wire::LinkNotice;
 
-use crate::choice::Choice;
-use crate::rehearsal::Rehearsal;
+use crate::seeds::Choice;
+use crate::testbed::PreparedTrains;
 
 /// How often the truth is compared with what trains hold.
 const LOOK: TimeSpan = TimeSpan::from_ms(50);
@@ -72,6 +73,8 @@ pub struct Tally {
     pub diverged: u32,
     /// Trains whose position became unknown.
     pub lost: u32,
+    /// Times that the watchdog stopped a train because it did not run as it should.
+    pub dangers: u32,
     /// Interventions of a person.
     pub hands: u32,
     /// Trains that touched, derailed or ran off the track.
@@ -95,7 +98,7 @@ pub struct Tally {
 /// Some hours of traffic.
 pub struct Session<'l> {
     layout: &'l Layout,
-    rehearsal: Rehearsal<'l>,
+    rehearsal: PreparedTrains<'l>,
     dispatcher: Dispatcher,
     choice: Choice,
     tally: Tally,
@@ -104,7 +107,8 @@ pub struct Session<'l> {
     /// Since when each train has been on its way to nowhere.
     since: BTreeMap<TrainId, Timestamp>,
     waits: BTreeMap<TrainId, Timestamp>,
-    lost: BTreeMap<TrainId, Timestamp>,
+    /// Since when each train has needed a person.
+    needs_person: BTreeMap<TrainId, Timestamp>,
     talk: bool,
 }
 
@@ -117,7 +121,7 @@ impl<'l> Session<'l> {
         let trains: Vec<TrainId> =
             [24, 58, 1, 43, 54, 35].into_iter().map(TrainId).take(asked.trains).collect();
         let switches = LivingSwitches::well_kept();
-        let mut rehearsal = Rehearsal::prepare(layout, seed, &trains, &switches, asked.budget)?;
+        let mut rehearsal = PreparedTrains::prepare(layout, seed, &trains, &switches, asked.budget)?;
         let mut choice = Choice::new(seed);
         let sensors: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
         for nth in 0..trains.len() {
@@ -158,7 +162,7 @@ impl<'l> Session<'l> {
             since: trains.iter().map(|train| (*train, began)).collect(),
             trains,
             waits: BTreeMap::new(),
-            lost: BTreeMap::new(),
+            needs_person: BTreeMap::new(),
             talk,
         })
     }
@@ -173,7 +177,12 @@ impl<'l> Session<'l> {
         }
         while self.rehearsal.line.now() < end && self.rehearsal.world().mishaps().len() == before {
             let until = end.min(self.rehearsal.line.now() + LOOK);
-            let notice = self.rehearsal.line.drive(&mut self.dispatcher, until);
+            let hear_of_line = |dispatcher: &mut Dispatcher, now, notice: &LinkNotice| {
+                if let Some(news) = notice.news() {
+                    dispatcher.handle_link(now, news);
+                }
+            };
+            let notice = self.rehearsal.line.drive_hearing(&mut self.dispatcher, until, hear_of_line);
             match notice {
                 Some(notice) => self.hear(&notice),
                 None => self.look(),
@@ -226,9 +235,10 @@ impl<'l> Session<'l> {
             Notice::StepsAside { .. } => self.tally.aside += 1,
             Notice::Deadlock { .. } => self.tally.deadlocks += 1,
             Notice::Diverged { .. } => self.tally.diverged += 1,
-            Notice::ReservedAsUnknown { train } => {
-                self.tally.lost += 1;
-                self.lost.insert(*train, now);
+            Notice::ReservedAsUnknown { .. } => self.tally.lost += 1,
+            Notice::Danger { .. } => self.tally.dangers += 1,
+            Notice::NeedsOperator { train, .. } => {
+                self.needs_person.insert(*train, now);
             }
             _ => {}
         }
@@ -273,8 +283,11 @@ impl<'l> Session<'l> {
                     self.tell_truth(train);
                 }
             }
-            if self.lost.get(&train).is_some_and(|since| now - *since >= HELP_AFTER) {
+            if self.needs_person.get(&train).is_some_and(|since| now - *since >= HELP_AFTER) {
                 self.help(train, now);
+            }
+            if self.dispatcher.journey(train).is_none() {
+                self.send(train);
             }
         }
     }
@@ -329,7 +342,7 @@ impl<'l> Session<'l> {
 
     /// A person reads off where a train stands.
     fn help(&mut self, train: TrainId, now: Timestamp) {
-        self.lost.remove(&train);
+        self.needs_person.remove(&train);
         if self.dispatcher.driver().position(train, now).is_some() {
             return;
         }
@@ -372,9 +385,9 @@ pub fn place_by_hand(layout: &Layout, world: &LivingLayout<'_>, train: TrainId) 
     Some(WayPoint { node: edge.from, way: position.offset * scale })
 }
 
-fn dispatcher(rehearsal: &Rehearsal<'_>, by_blocks: bool) -> Dispatcher {
+fn dispatcher(rehearsal: &PreparedTrains<'_>, by_blocks: bool) -> Dispatcher {
     let now = rehearsal.line.now();
-    let mut dispatcher = Dispatcher::new(now, rehearsal.driver());
+    let mut dispatcher = Dispatcher::watched(now, rehearsal.driver());
     if by_blocks {
         dispatcher.reserve_blocks();
     }

@@ -7,8 +7,8 @@ use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Approach, Length, NodeId, Speed, SpeedStep, TimeSpan, TrainId};
 
 use super::passage::{Passage, Watched};
-use crate::choice::Choice;
-use crate::rehearsal::{Rehearsal, Way};
+use crate::seeds::Choice;
+use crate::testbed::{LongestCircuit, PreparedTrains};
 
 /// How often the truth is looked at: a train of 400 mm/s runs 8 mm meanwhile.
 const LOOK: TimeSpan = TimeSpan::from_ms(20);
@@ -78,8 +78,8 @@ pub(super) struct Ridden {
 /// Lets a train ride, or two of which the first follows the second: what came of the first.
 pub(super) fn ride<'l>(
     [plain, restricted]: [&'l Layout; 2],
-    stage: &Rehearsal<'l>,
-    way: &Way,
+    stage: &PreparedTrains<'l>,
+    way: &LongestCircuit,
     [train, leader]: [TrainId; 2],
     told: Told,
     seed: u64,
@@ -106,12 +106,12 @@ pub(super) fn ride<'l>(
 
 struct Ride<'a, 'l> {
     layout: &'l Layout,
-    way: &'a Way,
+    way: &'a LongestCircuit,
     train: TrainId,
     leader: TrainId,
     told: Told,
     driver: Driver,
-    stage: Rehearsal<'l>,
+    stage: PreparedTrains<'l>,
     model: MotionModel,
     speed: f64,
 }

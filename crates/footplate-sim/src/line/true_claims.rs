@@ -51,6 +51,10 @@ pub(crate) fn claim(run: &mut LineRun, level: LineLevel, times: &BrakeTimes) {
             LineBrake { build_up: build_up(known.build_up, times), release: Some(release), ..known }
         }
     };
+    let brake_command = LineBrake {
+        resistance: brake_command.resistance + brakes_beyond(run, &brake_command),
+        ..brake_command
+    };
     let fastest = run.truth.iter().map(|truth| truth.speed.abs().as_m_per_s()).fold(0.0, f64::max);
     let protects = (level == LineLevel::L2).then(|| protection(run)).flatten();
     let vehicle = &mut run.vehicle;
@@ -115,6 +119,26 @@ fn release(run: &LineRun) -> TimeSpan {
         }
     }
     TimeSpan::from_s((longest * MARGIN + MARGIN_S).ceil().min(LONGEST_RELEASE_S))
+}
+
+/// By how much more than claimed the train decelerated at most within a second, with a margin: a converter that takes its
+/// wheels away on its own brakes harder than its command.
+fn brakes_beyond(run: &LineRun, claimed: &LineBrake) -> Acceleration {
+    let period = run.vehicle.period.as_s();
+    let (second, release) = ((1.0 / period).round() as usize, claimed.release.map_or(0.0, TimeSpan::as_s));
+    let may_act = (release / period).ceil() as usize + second;
+    let least = -(claimed.gradient + claimed.resistance).as_m_per_s2();
+    let mut most = 0.0_f64;
+    for (end, (truth, before)) in run.truth.iter().skip(second).zip(&run.truth).enumerate() {
+        let fell = (before.speed - truth.speed).as_m_per_s() / (second as f64 * period);
+        if before.speed.as_m_per_s() < 0.0 || truth.speed.as_m_per_s() < 0.0 || fell + least <= most {
+            continue;
+        }
+        let acted = &run.samples[(end + second).saturating_sub(may_act)..=end + second];
+        let effort = acted.iter().map(|sample| -sample.effort.unwrap_or(-1.0)).fold(0.0, f64::max);
+        most = most.max(fell + least - effort * claimed.full.as_m_per_s2() * (1.0 + claimed.tolerance));
+    }
+    Acceleration::from_m_per_s2((100.0 * MARGIN * most).ceil() / 100.0)
 }
 
 /// For how long both wheelsets crept at once, if protection ends that.

@@ -17,7 +17,8 @@ use footplate_wire::dcc_ex::{
 
 use crate::circuit::CircuitError;
 use crate::draws::{Draws, Purpose};
-use crate::living::board_switches::{BoardSwitches, Delivery};
+use crate::living::board_switches::BoardSwitches;
+use crate::living::delivery::Outgoing;
 use crate::living::s88::Edge;
 use crate::living::switches::LivingSwitches;
 use crate::living::world::LivingLayout;
@@ -37,10 +38,6 @@ const ANSWER_SHAPE: f64 = 1.6;
 const BOOT: TimeSpan = TimeSpan::from_ms(2_000);
 /// From one line to the next when each arrives by itself: what 15 characters take at 115200 baud, and a little.
 const LINE_TIME: TimeSpan = TimeSpan::from_us(1_500);
-/// Messages that are merged wait for others for up to so long.
-const MERGED_EVERY: TimeSpan = TimeSpan::from_ms(20);
-/// The second part of a split message comes so much later (s).
-const SPLIT_S: std::ops::Range<f64> = 0.000_5..0.005;
 /// The world goes on in such steps, so that no sensor is seen later than its message is due: less than the shortest delay.
 const LOOK_EVERY: TimeSpan = TimeSpan::from_ms(3);
 /// What is printed between replies when it chatters.
@@ -76,9 +73,7 @@ pub struct VirtualBoard<'l> {
     /// Replies and messages of sensors that are still to be said.
     replies: VecDeque<(Timestamp, String)>,
     pushes: Vec<(Timestamp, SensorId, bool)>,
-    /// What is on its way to the host.
-    outgoing: VecDeque<(Timestamp, Vec<u8>)>,
-    line_is_free: Timestamp,
+    outgoing: Outgoing,
     slots: Vec<Slot>,
     turnouts: Vec<(TurnoutId, bool)>,
     /// Until when it is without power or starting.
@@ -124,8 +119,7 @@ impl<'l> VirtualBoard<'l> {
             framing: Framing::default(),
             replies: VecDeque::new(),
             pushes: Vec::new(),
-            outgoing: VecDeque::new(),
-            line_is_free: now,
+            outgoing: Outgoing::new(now, switches.delivery, LINE_TIME),
             slots,
             turnouts,
             dark_until: None,
@@ -220,7 +214,7 @@ impl<'l> VirtualBoard<'l> {
             (reads, Next::Reads),
             (self.replies.front().map(|(at, _)| *at), Next::Reply),
             (pushes, Next::Push),
-            (self.outgoing.front().map(|(at, _)| *at), Next::Outgoing),
+            (self.outgoing.due(), Next::Outgoing),
             (self.dark_until, Next::Light),
         ];
         coming.into_iter().filter_map(|(at, next)| Some((at?, next))).min_by_key(|(at, _)| *at)
@@ -266,12 +260,7 @@ impl<'l> VirtualBoard<'l> {
 
     /// What is on its way and due: one portion, less what the line loses of it.
     fn portion(&mut self) -> Option<Vec<u8>> {
-        let (at, mut bytes) = self.outgoing.pop_front()?;
-        while self.switches.delivery == Delivery::Merged
-            && let Some((_, more)) = self.outgoing.pop_front_if(|(other, _)| *other <= at)
-        {
-            bytes.extend(more);
-        }
+        let mut bytes = self.outgoing.take()?;
         if self.switches.lost > Ratio::ZERO {
             bytes.retain(|_| !self.draws.chance(self.switches.lost.as_parts()));
         }
@@ -331,29 +320,7 @@ impl<'l> VirtualBoard<'l> {
     }
 
     fn post(&mut self, bytes: &[u8]) {
-        let last = self.outgoing.back().map_or(self.now, |(last, _)| (*last).max(self.now));
-        match self.switches.delivery {
-            Delivery::Each => {
-                for line in bytes.split_inclusive(|byte| *byte == b'\n') {
-                    let due = self.line_is_free.max(self.now);
-                    self.line_is_free = due + LINE_TIME;
-                    self.outgoing.push_back((due, line.to_vec()));
-                }
-            }
-            Delivery::Merged => {
-                let every = MERGED_EVERY.as_ns();
-                let due = (last - Timestamp::ZERO).as_ns().div_euclid(every) * every + every;
-                let due = Timestamp::ZERO + TimeSpan::from_ns(due);
-                let due = self.outgoing.back().map_or(due, |(last, _)| *last);
-                self.outgoing.push_back((due, bytes.to_vec()));
-            }
-            Delivery::Split => {
-                let (first, second) = bytes.split_at(self.draws.below(bytes.len() + 1));
-                self.outgoing.push_back((last, first.to_vec()));
-                let later = last + TimeSpan::from_s(self.draws.uniform(SPLIT_S));
-                self.outgoing.push_back((later, second.to_vec()));
-            }
-        }
+        self.outgoing.post(self.now, bytes, &mut self.draws);
     }
 }
 

@@ -2,17 +2,7 @@
 
 use footplate_core::Ratio;
 
-/// How what the board says is cut into portions on its way.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Delivery {
-    /// A message arrives by itself.
-    #[default]
-    Each,
-    /// What is said within 20 ms arrives together.
-    Merged,
-    /// A message arrives in two parts.
-    Split,
-}
+use crate::living::delivery::Delivery;
 
 /// How the board and its line behave.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -100,7 +100,8 @@ impl<'l> VirtualCentralStation<'l> {
         world.power(false, now);
         let mut draws = Draws::new(seed, Purpose::Line);
         let CanSwitches { lost, duplicated, overtaken, .. } = switches;
-        let network = Network::new(draws.split(), Disturbances { lost, duplicated, overtaken });
+        let network =
+            Network::new(draws.split(), Disturbances { lost, duplicated, overtaken, is_slow: false });
         let scanning = Scanning::begin(&mut world, now, switches.scan, &mut draws);
         Self {
             world,

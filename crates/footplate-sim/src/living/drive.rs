@@ -47,9 +47,9 @@ impl Drive {
     }
 
     /// The next start from rest comes earlier by a time in s; the second model has no dead time to shorten.
-    pub(crate) fn hasten_next_start(&mut self, by: f64) {
+    pub(crate) fn advance_next_start(&mut self, by: f64) {
         if let Self::Usual(motor) = self {
-            motor.hasten_next_start(by);
+            motor.advance_next_start(by);
         }
     }
 

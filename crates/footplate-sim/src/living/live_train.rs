@@ -217,13 +217,13 @@ impl LiveTrain {
             return stepped;
         }
         let here = body.lead;
-        let grade = 1.0 - self.train.traits.grade_feel * body.grade;
+        let grade = 1.0 - self.train.traits.grade_sensitivity * body.grade;
         let load = self.load.advance(body.factor, here < body.dirty_until, wheel > 0.0);
         let speed = self.wheels
             * if self.motor.feels_the_rail() {
                 wheel
             } else {
-                wheel * load * grade * self.load.of_session(wheel)
+                wheel * load * grade * self.load.session_factor(wheel)
             };
         let gone = 0.5 * (self.speed + speed) * STEP_S;
         let there = here + gone;
@@ -334,8 +334,8 @@ impl LiveTrain {
     }
 
     /// The next start from rest comes earlier by a time.
-    pub(crate) fn hasten_next_start(&mut self, by: TimeSpan) {
-        self.motor.hasten_next_start(by.as_s());
+    pub(crate) fn advance_next_start(&mut self, by: TimeSpan) {
+        self.motor.advance_next_start(by.as_s());
     }
 
     fn fall_asleep(&mut self) {

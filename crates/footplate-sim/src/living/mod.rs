@@ -5,7 +5,9 @@
 //! board  board_switches    the virtual DCC-EX board: requests in, replies and sensors out, with its delays
 //! z21  z21_switches        the virtual Z21: datagrams of many clients in and out, with what a network does to them
 //! central_station  can_switches  the virtual Central Station: frames of Märklin's CAN bus over datagrams, a stream or an adapter
-//! network                  what a network does to datagrams
+//! loconet                  a command station on LocoNet behind a server: lines in and out, at the pace of its bus
+//! network  delivery        what a network does to datagrams; how a stream is cut
+//! decoder                  what the decoders of locomotives make of what a station carries
 //! world  start  hands      several trains, a millisecond at a time; how they got there; what people do to them
 //! live_train  drive  mishap  one of them; what drives it; what can become of it
 //! body  points  s88        where it reaches, how turnouts lie, what contacts report
@@ -18,9 +20,12 @@ mod body;
 mod can_switches;
 mod central_station;
 mod cts;
+mod decoder;
+mod delivery;
 mod drive;
 mod hands;
 mod live_train;
+mod loconet;
 mod mishap;
 mod network;
 mod points;
@@ -35,12 +40,14 @@ mod z21;
 mod z21_switches;
 
 pub use board::VirtualBoard;
-pub use board_switches::{BoardSwitches, Delivery};
+pub use board_switches::BoardSwitches;
 pub use can_switches::{CanSwitches, CanTransport};
 pub use central_station::VirtualCentralStation;
 pub use cts::CtsSwitch;
+pub use delivery::Delivery;
 pub use hands::HandError;
 pub use live_train::End;
+pub use loconet::{LocoNetSwitches, VirtualLocoNet};
 pub use mishap::{Mishap, MishapKind};
 pub use station::{CoilAlarm, FromStation, StationSwitches, VirtualStation};
 pub use switches::LivingSwitches;

@@ -6,6 +6,8 @@ use crate::draws::Draws;
 
 /// What a datagram takes (s; a wired network and a wireless one that is not busy).
 const TAKES_S: std::ops::Range<f64> = 0.000_2..0.002;
+/// The same in a wireless network that others use, too (s; chosen).
+const TAKES_SLOW_S: std::ops::Range<f64> = 0.002..0.06;
 /// What one takes more that is overtaken (s; chosen).
 const OVERTAKEN_S: std::ops::Range<f64> = 0.005..0.04;
 
@@ -15,6 +17,8 @@ pub(crate) struct Disturbances {
     pub(crate) lost: Ratio,
     pub(crate) duplicated: Ratio,
     pub(crate) overtaken: Ratio,
+    /// Whether others use it, too.
+    pub(crate) is_slow: bool,
 }
 
 /// A datagram on its way.
@@ -95,7 +99,8 @@ impl Network {
         let copies = 1 + usize::from(self.happens(self.disturbances.duplicated));
         let mut sent = Vec::with_capacity(copies);
         for _ in 0..copies {
-            let mut due = (leaves + TimeSpan::from_s(self.draws.uniform(TAKES_S))).max(last);
+            let takes_s = if self.disturbances.is_slow { TAKES_SLOW_S } else { TAKES_S };
+            let mut due = (leaves + TimeSpan::from_s(self.draws.uniform(takes_s))).max(last);
             if self.happens(self.disturbances.overtaken) {
                 due += TimeSpan::from_s(self.draws.uniform(OVERTAKEN_S));
             } else {

@@ -49,8 +49,8 @@ impl<'l> Rails<'l> {
         let mut draws = PhysicsRange::draws(seed).split();
         let mut scatter_mm = Vec::new();
         for (sensor, _) in layout.sensors() {
-            let (further_mm, scatter) = range.contact(&mut draws);
-            track.move_contact(sensor, further_mm);
+            let (further_mm, scatter) = range.sensor_offset_and_scatter(&mut draws);
+            track.move_sensor(sensor, further_mm);
             let slot = usize::from(sensor.0);
             scatter_mm.resize(scatter_mm.len().max(slot + 1), 0.0);
             scatter_mm[slot] = scatter;
@@ -71,7 +71,7 @@ impl<'l> Rails<'l> {
             })
             .collect();
         for (sensor, node) in layout.sensors() {
-            let offset_mm = track.contact_offset(sensor).as_mm();
+            let offset_mm = track.sensor_offset(sensor).as_mm();
             let after = if offset_mm >= 0.0 { layout.ways(node).edges().next() } else { None };
             if let Some(rail) = after.and_then(|edge| rails.get_mut(usize::from(edge.0))) {
                 rail.contacts.push((offset_mm.min(rail.length_mm), sensor));

@@ -7,9 +7,9 @@ use footplate_core::track::Layout;
 use footplate_core::{SensorId, TimeSpan, Timestamp, TrainId};
 use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, ModuleState};
 
-use crate::contacts::{Cause, Faults};
 use crate::draws::Draws;
 use crate::living::truth::PassTruth;
+use crate::sensors::{Cause, Faults};
 
 /// A contact closes or opens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

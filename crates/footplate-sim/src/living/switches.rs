@@ -2,9 +2,9 @@
 
 use footplate_core::Ratio;
 
-use crate::contacts::Faults;
 use crate::law::LawFamily;
 use crate::physics_range::PhysicsRange;
+use crate::sensors::Faults;
 
 /// What goes wrong on a living layout, how often, and what its trains are like.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,10 +3,10 @@
 use footplate_core::track::Position;
 use footplate_core::{EdgeId, Length, SensorId, Speed, SpeedStep, Timestamp, TrainId};
 
-use crate::contacts::Cause;
 use crate::living::body::{Body, after};
 use crate::living::live_train::{End, LiveTrain};
 use crate::living::world::LivingLayout;
+use crate::sensors::Cause;
 use crate::track::TrueTrack;
 use crate::train::Train;
 
@@ -147,12 +147,12 @@ impl<'w, 'l> Truth<'w, 'l> {
     /// rails in the same time. `edges` lead from the one to the other.
     #[must_use]
     pub fn felt(&self, train: TrainId, edges: &[EdgeId], from: SensorId, to: SensorId) -> Option<Length> {
-        let feel = self.engine(train)?.curve_feel;
+        let feel = self.engine(train)?.curve_sensitivity;
         let track = self.track();
         let slower = |edge: &EdgeId| 1.0 + feel * (track.speed_factor(*edge).as_parts() - 1.0);
         let way: Length = edges.iter().map(|edge| track.length(*edge) / slower(edge)).sum();
         // Contacts are a few millimetres from their nodes: which rails those lie on makes no difference.
-        let offset = |sensor, edge: Option<&EdgeId>| track.contact_offset(sensor) / edge.map_or(1.0, slower);
+        let offset = |sensor, edge: Option<&EdgeId>| track.sensor_offset(sensor) / edge.map_or(1.0, slower);
         Some(way - offset(from, edges.first()) + offset(to, edges.last()))
     }
 
@@ -162,7 +162,7 @@ impl<'w, 'l> Truth<'w, 'l> {
         let found = self.found(train)?;
         let place = found.body.as_ref()?.place()?;
         let contact = self.contact(sensor)?;
-        let feel = found.train.curve_feel;
+        let feel = found.train.curve_sensitivity;
         let past = self.path_length(feel, contact, place);
         let short = || self.path_length(feel, place, contact).map(|mm| -mm);
         past.or_else(short).map(Length::from_mm)

@@ -116,9 +116,9 @@ impl<'l> LivingLayout<'l> {
 
     /// The next start from rest of a train comes earlier by a time, or later if negative: for tests of what one surprise
     /// does to a model.
-    pub fn hasten_next_start(&mut self, train: TrainId, by: TimeSpan) {
+    pub fn advance_next_start(&mut self, train: TrainId, by: TimeSpan) {
         if let Some(found) = self.trains.iter_mut().find(|found| found.id == train) {
-            found.hasten_next_start(by);
+            found.advance_next_start(by);
         }
     }
 

@@ -117,7 +117,8 @@ impl<'l> VirtualZ21<'l> {
         world.s88.take_edges(now);
         let mut draws = Draws::new(seed, Purpose::Line);
         let Z21Switches { lost, duplicated, overtaken, .. } = switches;
-        let network = Network::new(draws.split(), Disturbances { lost, duplicated, overtaken });
+        let is_slow = switches.is_slow;
+        let network = Network::new(draws.split(), Disturbances { lost, duplicated, overtaken, is_slow });
         let sensors = world.s88.sensors();
         let occupied = sensors.iter().copied().filter(|sensor| world.s88.is_occupied(*sensor) == Some(true));
         let modules = sensors.iter().map(|sensor| sensor.0 / MODULE_INPUTS + 1).max().unwrap_or_default();

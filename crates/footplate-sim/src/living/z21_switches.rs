@@ -12,6 +12,8 @@ pub struct Z21Switches {
     pub duplicated: Ratio,
     /// How often one is overtaken by those that follow it.
     pub overtaken: Ratio,
+    /// Whether datagrams take up to 60 ms, as in a wireless network that others use, too.
+    pub is_slow: bool,
     /// Whether the first request for broadcasts is lost, which left programs without any feedback.
     pub loses_first_subscription: bool,
     /// Whether it refuses what has a wrong XOR byte; most do not look at it.
@@ -36,6 +38,7 @@ impl Default for Z21Switches {
             lost: Ratio::ZERO,
             duplicated: Ratio::ZERO,
             overtaken: Ratio::ZERO,
+            is_slow: false,
             loses_first_subscription: false,
             strict_xor: false,
             wrong_xor: false,

@@ -1,12 +1,12 @@
-//! Trains do not jump: places and speeds are continuous, speeds stay what an engine can do.
+//! Trains do not jump: places and speeds are continuous, and speeds stay possible for a locomotive.
 
 use footplate_core::{Approach, TimeSpan};
 use footplate_sim::{LawFamily, Script, SimulatedRun, Train, What, When};
 
 use crate::oval::{Yard, oval, seconds, step};
 
-/// No law or stiction of the drawn trains gives or takes speed faster than this (wheels of 80 g driven
-/// locomotives slip at about 2 m/s²; a motor let go at its breakaway speed jerks by 14 mm/s within 40 ms).
+/// Largest rate of change of speed under any law or stiction (driven wheels of 80 g locomotives slip at about 2 m/s²;
+/// a motor released at its breakaway speed gains 14 mm/s within 40 ms).
 const MOST_MM_PER_S2: f64 = 1000.0;
 
 fn up_down_and_stop() -> Script {
@@ -62,7 +62,7 @@ fn steady_speeds_are_those_of_the_table_from_both_sides() {
             train.run_deviation = footplate_core::Ratio::ZERO;
             train.wander = footplate_core::Ratio::ZERO;
             train.warm_up = footplate_core::Ratio::ZERO;
-            train.curve_feel = 0.0;
+            train.curve_sensitivity = 0.0;
             let mut yard = Yard::new(&layout, train, seed);
             yard.railway.track = footplate_sim::TrueTrack::as_surveyed(&layout);
             for (first, approach) in [(6, Approach::Below), (12, Approach::Above)] {

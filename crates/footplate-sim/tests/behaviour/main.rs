@@ -1,9 +1,10 @@
-//! What the simulated world promises, a file a promise.
+//! What the simulator promises: one file for each promise.
 
 mod continuity;
 mod line_claims;
 mod line_journeys;
 mod line_same_seed;
+mod line_second_integrator;
 mod line_sensors;
 mod line_services;
 mod line_slides;
@@ -17,5 +18,6 @@ mod speeds;
 mod stops;
 mod virtual_board;
 mod virtual_central_station;
+mod virtual_loconet;
 mod virtual_z21;
 mod yard;

@@ -1,4 +1,4 @@
-//! A small layout to run round: an oval with six contacts and a passing loop on one side.
+//! A small layout with a circuit: an oval with six sensors and a passing loop on one side.
 
 use footplate_core::track::{Layout, LayoutPlan, Leg, Place, RailEnd, Stretch, Survey, TurnoutStates};
 use footplate_core::{Length, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
@@ -55,7 +55,7 @@ pub(crate) struct Yard<'l> {
 }
 
 impl<'l> Yard<'l> {
-    /// Round by the straight track of the passing loop, without faults, on rails drawn from a seed.
+    /// The circuit over the straight track of the passing loop, without faults, on rails drawn from a seed.
     pub(crate) fn new(layout: &'l Layout, train: Train, seed: u64) -> Self {
         let start = layout.node_named("S0").unwrap();
         let circuit = Circuit::from_turnouts(layout, start, &TurnoutStates::unknown()).unwrap();

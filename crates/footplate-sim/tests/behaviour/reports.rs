@@ -1,4 +1,4 @@
-//! Every report comes from a closed contact, late by what the polls and nothing else make of it.
+//! Every report comes from a closed sensor, delayed by the polls only.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ fn steady(yard: &Yard<'_>, seed: u64) -> SimulatedRun {
 }
 
 #[test]
-fn contacts_close_at_times_uniform_between_two_readings() {
+fn sensors_close_at_times_uniform_between_two_readings() {
     let layout = oval();
     let mut parts: Vec<f64> = Vec::new();
     for seed in 0..30 {
@@ -34,17 +34,17 @@ fn contacts_close_at_times_uniform_between_two_readings() {
 }
 
 #[test]
-fn a_contact_is_reported_while_the_shoe_is_on_it_and_where_it_really_lies() {
+fn a_sensor_is_reported_while_the_shoe_is_on_it_at_its_true_place() {
     let layout = oval();
     let yard = Yard::new(&layout, Train::draw(3, LawFamily::Lag), 3);
     let run = steady(&yard, 3);
     let motion = &run.truth.motion;
     for report in run.truth.reports.iter().filter(|report| report.cause == Cause::Train) {
         let closed_at = motion.distance(report.closed).as_mm();
-        let nearest = motion.contacts().filter(|(sensor, _)| *sensor == report.sensor);
+        let nearest = motion.sensors().filter(|(sensor, _)| *sensor == report.sensor);
         let off = nearest.map(|(_, at)| (at.as_mm() - closed_at).abs()).fold(f64::INFINITY, f64::min);
         assert!(off < 1e-3, "{} closed {off} mm from its place", report.sensor);
-        // Still under the shoe at the reading before, or closed since then.
+        // Still under the shoe at the previous reading, or closed since then.
         let held_until = motion.distance(report.reading_before).as_mm() - closed_at;
         assert!(held_until <= yard.train.shoe.as_mm() + 1e-3, "{held_until} mm past the contact");
         let EventKind::Sensor(written) = run.events[report.event].kind else { panic!("no report") };
@@ -52,13 +52,13 @@ fn a_contact_is_reported_while_the_shoe_is_on_it_and_where_it_really_lies() {
         let late = run.events[report.event].time - report.reading;
         assert_eq!(late.as_ns() / 1000, yard.link.reading_to_stamp.as_ns() / 1000);
     }
-    // At 400 mm/s and 65 ms a remembered shoe of 25 to 45 mm is seen by two or three polls.
+    // At 400 mm/s and 65 ms, a latched shoe of 25 to 45 mm is seen by two or three polls.
     let repeats = run.truth.reports.iter().filter(|report| !report.first).count();
     assert!(repeats * 2 > run.truth.reports.len());
 }
 
 #[test]
-fn events_are_in_order_of_time_and_a_program_may_note_only_the_first_report() {
+fn events_are_in_order_of_time_and_repeats_are_optional() {
     let layout = oval();
     let mut yard = Yard::new(&layout, Train::draw(5, LawFamily::Momentum), 5);
     yard.link = Link { intervals: true, ..Link::first_reports() };
@@ -77,7 +77,7 @@ fn events_are_in_order_of_time_and_a_program_may_note_only_the_first_report() {
 }
 
 #[test]
-fn hop_times_scatter_and_contacts_repeat_as_in_the_recordings() {
+fn hop_times_vary_and_sensors_repeat_as_in_the_recordings() {
     let layout = oval();
     let (mut squares, mut count, mut passed, mut reported) = (0.0, 0, 0, 0);
     for seed in 0..12 {
@@ -87,7 +87,7 @@ fn hop_times_scatter_and_contacts_repeat_as_in_the_recordings() {
         let own: Vec<_> = run.truth.reports.iter().filter(|report| report.cause == Cause::Train).collect();
         let first: Vec<_> = own.iter().filter(|report| report.first).collect();
         (passed, reported) = (passed + first.len(), reported + own.len());
-        // The same hop lap after lap: its mean is its own, so that only the scatter is left.
+        // The same hop lap after lap: relative to its own mean, only the variation remains.
         let mut hops: BTreeMap<SensorId, Vec<f64>> = BTreeMap::new();
         for pair in first.windows(2) {
             let took = (run.events[pair[1].event].time - run.events[pair[0].event].time).as_s();
@@ -99,8 +99,8 @@ fn hop_times_scatter_and_contacts_repeat_as_in_the_recordings() {
             count += times.len() - 1;
         }
     }
-    // Real hops scatter by 11 to 15 mm about a constant speed. At step 14 four real trains left 192 reports of
-    // 97 passings, 1.7 to 2.2 a train.
+    // Real hops vary by 11 to 15 mm about a constant speed. At step 14, four real trains caused 192 reports in 97
+    // passages, 1.7 to 2.2 per train.
     let scatter = (squares / count as f64).sqrt();
     assert!((11.0..16.0).contains(&scatter), "{scatter} mm");
     let repeats = reported as f64 / passed as f64;

@@ -1,11 +1,11 @@
-//! A seed means one world, today and later: what it records is pinned here.
+//! A seed means one world, today and later: the recordings of known seeds are pinned here.
 
 use footplate_core::{EventKind, TrainId};
 use footplate_sim::{LawFamily, Railway, Scenario, SimulatedRecording};
 
 use crate::oval::oval;
 
-/// A fingerprint of all events and of where the train really was (FNV-1a, 64 bits).
+/// A fingerprint of all events and of the true motion (FNV-1a, 64 bits).
 fn fingerprint(recording: &SimulatedRecording) -> u64 {
     let mut hash = 0xcbf2_9ce4_8422_2325_u64;
     let mut take = |number: i64| {
@@ -35,7 +35,7 @@ fn fingerprint(recording: &SimulatedRecording) -> u64 {
     hash
 }
 
-/// What seeds 7, 8, 9 … made when this was last changed on purpose.
+/// The fingerprints at the last intended change.
 const PINNED: [(&str, LawFamily, u64); 11] = [
     ("starts", LawFamily::Constant, 0x9c39_d626_6620_99ad),
     ("steady", LawFamily::Smooth, 0xc067_f97d_87d5_4757),

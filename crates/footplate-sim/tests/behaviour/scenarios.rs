@@ -1,4 +1,4 @@
-//! Every scenario can be had with every law and seed, and looks like the recordings it is named after.
+//! Every scenario works with every law and seed, and resembles the recordings it is named after.
 
 use footplate_core::{Acceleration, EventKind, Length, Speed, SpeedStep, TimeSpan, TrainId};
 use footplate_sim::{
@@ -15,7 +15,7 @@ fn recorded(name: &str, law: LawFamily, seed: u64) -> SimulatedRecording {
     SimulatedRecording::draw(&railway, Scenario::named(name).unwrap(), TrainId(1), law, seed)
 }
 
-/// How many reports, speed commands and hand measurements a run recorded.
+/// The numbers of reports, speed commands and manual measurements that a run recorded.
 fn counts(run: &SimulatedRun) -> [usize; 3] {
     let mut counts = [0; 3];
     for event in &run.events {
@@ -49,7 +49,7 @@ proptest! {
     }
 }
 
-/// Any number a person could type, and then some.
+/// Any number that a user could enter, and more.
 fn wild() -> impl Strategy<Value = f64> {
     prop_oneof![-10.0..1000.0, Just(0.0), Just(f64::NAN), Just(f64::INFINITY), Just(-1e300), Just(1e300)]
 }
@@ -73,7 +73,7 @@ proptest! {
         };
         let train = Train {
             speeds: SpeedTable::new(&speeds, &speeds), law, command_delay: span(8), start_dead_time: span(9),
-            friction: rate(10), wander_time: span(11), warm_up_time: span(12), curve_feel: wild[13],
+            friction: rate(10), wander_time: span(11), warm_up_time: span(12), curve_sensitivity: wild[13],
             shoe: Length::from_mm(wild[14]), ..drawn
         };
         let layout = oval();
@@ -91,7 +91,7 @@ proptest! {
 }
 
 #[test]
-fn names_are_unique_and_found() {
+fn names_are_unique_and_lead_to_their_scenario() {
     for scenario in Scenario::all() {
         assert_eq!(Scenario::named(scenario.name()), Some(*scenario));
         assert_eq!(Scenario::all().iter().filter(|other| other.name() == scenario.name()).count(), 1);
@@ -100,7 +100,7 @@ fn names_are_unique_and_found() {
 }
 
 #[test]
-fn a_start_begins_with_the_contact_that_the_station_still_remembers() {
+fn a_start_begins_with_the_sensor_that_the_station_remembers() {
     let recording = recorded("starts", LawFamily::Lag, 5);
     assert_eq!(recording.runs.len(), 22);
     for run in &recording.runs {
@@ -110,7 +110,7 @@ fn a_start_begins_with_the_contact_that_the_station_still_remembers() {
 }
 
 #[test]
-fn steady_runs_begin_running_and_say_so_but_not_from_which_side() {
+fn steady_runs_start_in_motion_and_do_not_record_the_approach() {
     let recording = recorded("steady", LawFamily::Lag, 5);
     for run in &recording.runs {
         assert!(run.running_at > SpeedStep::STAND);
@@ -119,7 +119,7 @@ fn steady_runs_begin_running_and_say_so_but_not_from_which_side() {
 }
 
 #[test]
-fn nearly_every_stop_is_measured_and_low_steps_stall_sometimes() {
+fn nearly_every_stop_is_measured_and_low_steps_sometimes_stall() {
     let measured: usize = (0..10)
         .map(|seed| recorded("stops", LawFamily::ALL[seed % 6], seed as u64))
         .map(|recording| recording.runs.iter().filter(|run| run.truth.stops.len() == 1).count())
@@ -133,7 +133,7 @@ fn nearly_every_stop_is_measured_and_low_steps_stall_sometimes() {
 }
 
 #[test]
-fn faults_show_and_truth_tells_them_apart() {
+fn faults_occur_and_the_truth_distinguishes_them() {
     let recording = recorded("faults", LawFamily::Constant, 2);
     let all = || recording.runs.iter().flat_map(|run| &run.truth.reports);
     assert!(all().any(|report| report.cause == Cause::Spurious));
@@ -143,17 +143,17 @@ fn faults_show_and_truth_tells_them_apart() {
         .iter()
         .map(|run| {
             let end = run.truth.motion.distance(run.truth.motion.ends());
-            run.truth.motion.contacts().filter(|(_, at)| at.as_mm() > 0.0 && *at <= end).count()
+            run.truth.motion.sensors().filter(|(_, at)| at.as_mm() > 0.0 && *at <= end).count()
         })
         .sum();
     let seen = all().filter(|report| report.first && report.cause == Cause::Train).count();
-    // 5 % are missed; a few more hide behind a contact that sticks.
+    // 5 % are missed; a few more are hidden by a stuck sensor.
     let missed = 1.0 - seen as f64 / passed as f64;
     assert!((0.02..0.12).contains(&missed), "{seen} of {passed}");
 }
 
 #[test]
-fn clocks_start_anew_between_some_runs() {
+fn clocks_restart_between_some_runs() {
     let restarts = |seed| {
         let recording = recorded("starts", LawFamily::Constant, seed);
         recording

@@ -1,4 +1,4 @@
-//! What a stopwatch, a light gate and repeated runs find is what the train was given.
+//! A stopwatch, a light gate and repeated runs find the parameters that the train was given.
 
 use footplate_core::{Approach, Length, Ratio, SensorId};
 use footplate_sim::{Cause, LawFamily, Script, SimulatedRun, Train};
@@ -10,7 +10,7 @@ fn even_tempered(seed: u64) -> Train {
     Train { run_deviation: none, wander: none, warm_up: none, ..Train::draw(seed, LawFamily::Constant) }
 }
 
-/// Mean speed between the first and the last time a contact closed.
+/// Mean speed between the first and the last time a sensor closed.
 fn over_whole_laps(run: &SimulatedRun, lap: Length) -> f64 {
     let closed = run.truth.reports.iter().filter(|report| report.first && report.cause == Cause::Train);
     let at_one: Vec<_> = closed.filter(|report| report.sensor == SensorId(0)).collect();
@@ -19,7 +19,7 @@ fn over_whole_laps(run: &SimulatedRun, lap: Length) -> f64 {
 }
 
 #[test]
-fn laps_take_what_curves_and_straights_take() {
+fn a_lap_takes_the_sum_of_its_curves_and_straights() {
     let layout = oval();
     for seed in 0..10 {
         let yard = Yard::new(&layout, even_tempered(seed), seed);
@@ -27,14 +27,14 @@ fn laps_take_what_curves_and_straights_take() {
             let run = yard.run(&Script::running(0, step(12), approach, seconds(120)), seed);
             let found = over_whole_laps(&run, yard.railway.circuit_length());
             let lap = yard.railway.lap_speed(&yard.train, step(12), approach).as_mm_per_s();
-            // Dirty spots slow by 15 % of 15 mm here and there, and nothing in the closed sum knows of them.
+            // Dirty spots slow the train by 15 % over 15 mm each, which the closed sum does not include.
             assert!((found / lap - 1.0).abs() < 0.003, "seed {seed}: {found} instead of {lap} mm/s");
         }
     }
 }
 
 #[test]
-fn runs_differ_by_the_deviation_asked_for() {
+fn runs_differ_by_the_given_deviation() {
     let layout = oval();
     let asked = 0.006;
     let train = Train { run_deviation: Ratio::from_parts(asked), ..even_tempered(2) };
@@ -49,7 +49,7 @@ fn runs_differ_by_the_deviation_asked_for() {
 }
 
 #[test]
-fn light_gates_tell_the_spot_speed_to_a_millisecond() {
+fn light_gates_measure_the_local_speed_to_a_millisecond() {
     let layout = oval();
     let yard = Yard::new(&layout, even_tempered(3), 3);
     let script = Script { has_gates: true, ..Script::running(0, step(9), Approach::Below, seconds(60)) };
@@ -60,7 +60,7 @@ fn light_gates_tell_the_spot_speed_to_a_millisecond() {
         assert_eq!([pair[0].gate, pair[1].gate], [1, 0]);
         assert_eq!(pair[0].time.as_ns() % 1_000_000, 0);
         let took = (pair[1].time - pair[0].time).as_s();
-        // Two times cut to 1 ms, and curves and dirt at the gates.
+        // Two times rounded to 1 ms, and curves and dirt at the gates.
         let (fast, slow) = (20.0 / (level * 1.03) - 1.1e-3, 20.0 / (level * 0.9) + 1.1e-3);
         assert!((fast..slow).contains(&took), "{took} s for 20 mm at {level} mm/s");
     }
@@ -75,7 +75,7 @@ fn a_cold_train_changes_its_speed_as_it_warms() {
     let early = run.truth.motion.distance(run.truth.motion.begins() + seconds(60));
     let late = run.truth.motion.distance(run.truth.motion.ends())
         - run.truth.motion.distance(run.truth.motion.ends() - seconds(60));
-    // Half warm at first, so half of 4 %, of which a minute has already taken up to a fifth.
+    // Half warm at the start, so half of 4 %, of which a minute has already taken up to a fifth.
     let gained = late / early - 1.0;
     assert!((0.008..0.022).contains(&gained), "{gained}");
 }

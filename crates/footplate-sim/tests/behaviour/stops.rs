@@ -1,15 +1,15 @@
-//! Stops scatter as much as asked, and a tape reads them to the centimetre.
+//! Stops vary as given, and a tape reads them to the centimetre.
 
 use footplate_core::{Approach, EventKind, Length, Ratio, Speed, TimeSpan};
 use footplate_sim::{LawFamily, Script, SpeedTable, StopScatter, Train, What, When};
 
 use crate::oval::{Yard, oval, seconds, step};
 
-/// The step of mid speed, and that of top speed, of the trains below.
+/// The steps of mid speed and of top speed of the trains below.
 const MID: u8 = 9;
 const TOP: u8 = 14;
 
-/// A train whose speed rises evenly to mid speed at step 9 and evenly to top speed at step 14.
+/// A train whose speed is linear up to mid speed at step 9, and from there to top speed at step 14.
 fn two_speeds(family: LawFamily, seed: u64) -> Train {
     let (mid, top) = (StopScatter::MID_SPEED, StopScatter::TOP_SPEED);
     let low = (0..=MID).map(|step| mid * (f64::from(step) / f64::from(MID)));
@@ -35,7 +35,7 @@ const RUNS: u64 = 400;
 const MARGIN: f64 = 4.0 / 28.2;
 
 #[test]
-fn the_procedure_itself_scatters_as_asked_under_every_law() {
+fn stops_vary_as_given_under_every_law() {
     let layout = oval();
     for family in LawFamily::ALL {
         let none = Ratio::ZERO;
@@ -53,7 +53,7 @@ fn the_procedure_itself_scatters_as_asked_under_every_law() {
                 })
                 .collect();
             let (mean, sd) = mean_and_sd(&distances);
-            let expected = yard.train.way_to_rest(step(number), Approach::Below).as_mm();
+            let expected = yard.train.stopping_distance(step(number), Approach::Below).as_mm();
             assert!(
                 (mean - expected).abs() < 1.0 + 4.0 * asked / 20.0,
                 "{family}: {mean}, not {expected} mm"
@@ -88,7 +88,7 @@ fn a_stop_commanded_on_time_repeats_to_4_mm_at_mid_and_21_mm_at_top_speed() {
 }
 
 #[test]
-fn the_tape_is_read_to_the_centimetre_after_a_person_saw_the_train_stand() {
+fn the_tape_is_read_to_the_centimetre_once_the_train_is_at_rest() {
     let layout = oval();
     let yard = Yard::new(&layout, two_speeds(LawFamily::Constant, 6), 6);
     let mut errors = Vec::new();
@@ -105,6 +105,6 @@ fn the_tape_is_read_to_the_centimetre_after_a_person_saw_the_train_stand() {
         assert_eq!(run.truth.motion.speed(written.time), Speed::ZERO);
     }
     let (mean, sd) = mean_and_sd(&errors);
-    // A hand of 3 mm and marks 10 mm apart: √(3² + 10²/12).
+    // A tape error of 3 mm and marks 10 mm apart: √(3² + 10²/12).
     assert!(mean.abs() < 4.0 * 4.2 / 20.0 && (sd / 4.16 - 1.0).abs() < MARGIN, "{mean} ± {sd} mm");
 }

@@ -1,4 +1,4 @@
-//! From a batch to its report.
+//! Converts a fitted batch to its report.
 
 use footplate_core::TimeSpan;
 use footplate_core::kinematics::SpeedLaw;
@@ -15,7 +15,7 @@ use crate::motion_file::{MOTION_MODEL_VERSION, MotionFile};
 use crate::quantity::Quantity;
 
 impl Findings {
-    /// What a batch found.
+    /// The report of a batch.
     #[must_use]
     pub fn of(layout: &Layout, batch: &Batch) -> Self {
         Self {
@@ -101,7 +101,7 @@ fn compared(law: &FittedLaw, changes: u32) -> ComparedLawForm {
     }
 }
 
-/// What people call a law.
+/// The name of a law.
 fn name(kind: LawKind) -> String {
     let LawKind::Family(family) = kind else { return "linear in the step (momentum)".to_owned() };
     let shape = match family.law {

@@ -1,4 +1,4 @@
-//! What stands in the report of a batch.
+//! The content of a calibration report.
 
 use footplate_core::model::report::{Direction, LawKind};
 use footplate_core::{SpeedStep, TrainId};
@@ -7,91 +7,91 @@ use serde::Serialize;
 use crate::motion_file::{MotionSectionForm, MotionStepForm};
 use crate::quantity::Quantity;
 
-/// All that recordings say of trains.
+/// The calibration of trains from recordings.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Findings {
-    /// [`MOTION_MODEL_VERSION`](crate::MOTION_MODEL_VERSION) of the program that made it.
+    /// [`MOTION_MODEL_VERSION`](crate::MOTION_MODEL_VERSION) of the program that computed it.
     pub model_version: String,
-    /// The layout it was made on.
+    /// The layout.
     pub layout: String,
-    /// The rhythm of the link of each recording.
+    /// The polling of the link in each recording.
     pub polling: Vec<PollingForm>,
-    /// Its trains.
+    /// The trains.
     pub trains: Vec<TrainFindings>,
 }
 
-/// The rhythm of a link.
+/// The polling of a link.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PollingForm {
     /// The recording.
     pub recording: String,
-    /// From one reading to the next when nothing was reported (ms); `None` where the reports show no rhythm.
+    /// The period between polls without a report (ms); `None` if the reports show no regular polling.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub period: Option<Quantity>,
-    /// From a reading that reported something to the next (ms).
+    /// The time from a poll with a report to the next (ms).
     pub after_report_ms: f64,
-    /// One standard deviation of a poll about its place in the rhythm (ms).
+    /// The jitter of a poll, one standard deviation (ms).
     pub jitter_ms: f64,
 }
 
-/// What recordings say of a train.
+/// The calibration of a train.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TrainFindings {
     /// Its number.
     pub train: TrainId,
     /// The highest step of its decoder.
     pub highest_step: SpeedStep,
-    /// Runs it was in, those of them without a passage, and contacts passed in all.
+    /// Runs of the train; `silent_runs` of them have no passage; `contacts` is the number of detections in all.
     pub runs: u32,
     /// See `runs`.
     pub silent_runs: u32,
     /// See `runs`.
     pub contacts: u32,
-    /// Speed and stop at every step that moved it, from below and from above.
+    /// Speed and stop of every step that moved it, from below and from above.
     pub steps: Vec<MotionStepForm>,
-    /// How far a run as a whole deviates from the speed of its step, one standard deviation (%).
+    /// The deviation of a whole run from the speed of its step, one standard deviation (%).
     pub run_deviation_percent: f64,
-    /// Scatter of its contacts about their usual place (mm).
+    /// The scatter of detections about their mean place (mm).
     pub contact_scatter_mm: f64,
-    /// How much longer than surveyed the paths between contacts are for it.
+    /// Path lengths between sensors, relative to the survey.
     pub sections: Vec<MotionSectionForm>,
-    /// The laws that describe its changes of speed, by direction, where enough changes were seen.
+    /// The laws of its speed changes, by direction, if enough changes were recorded.
     pub laws: Vec<LawForm>,
     /// Stops measured with a tape.
     pub stops: Vec<TapedStopForm>,
-    /// Reports that chance hardly makes; they count little in the fit.
+    /// Unlikely reports; they have little weight in the fit.
     pub suspicious: Vec<SuspicionForm>,
 }
 
 /// The law of one direction.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LawForm {
-    /// Faster or slower.
+    /// Acceleration or deceleration.
     pub direction: Direction,
-    /// Changes of speed behind it.
+    /// The number of speed changes that it was fitted to.
     pub changes: u32,
-    /// Whether the best law explains the data within what poll and scatter allow.
+    /// Whether the best law explains the data within polling and scatter.
     pub fits: bool,
-    /// Whether criterion and held-out error agree on it.
+    /// Whether criterion and held-out error select the same law.
     pub agreed: bool,
-    /// The law that describes the changes best.
+    /// The best law.
     pub best: ComparedLawForm,
     /// All others, best first.
     pub others: Vec<ComparedLawForm>,
 }
 
-/// One law as fitted.
+/// A fitted law.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComparedLawForm {
-    /// Which.
+    /// The kind of law.
     pub law: LawKind,
     /// Its name for people.
     pub name: String,
-    /// Its pace: mm/s² where the mean acceleration is constant, s where the time is, s a step for a ramp.
+    /// Its parameter: mm/s² for a constant mean acceleration, s for a constant time, s per step for a ramp.
     pub pace: Quantity,
-    /// From command to effect (s).
+    /// The delay from command to effect (s).
     pub delay: Quantity,
-    /// Sum of squared residuals over their variances, by degree of freedom.
+    /// Chi-square per degree of freedom.
     pub chi_square_by_freedom: f64,
     /// Akaike's corrected criterion; smaller is better.
     pub criterion: f64,
@@ -99,22 +99,22 @@ pub struct ComparedLawForm {
     pub held_out_mm: f64,
 }
 
-/// A stop that a person measured.
+/// A stop measured with a tape.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TapedStopForm {
-    /// The recording and its run.
+    /// The recording, and the run in it.
     pub recording: String,
     /// See `recording`.
     pub run: u32,
-    /// The step from which it stopped.
+    /// The step it stopped from.
     pub step: SpeedStep,
-    /// Speed when the command was sent (mm/s).
+    /// The speed at the command (mm/s).
     pub speed_mm_per_s: f64,
-    /// Distance from the command to standstill (mm).
+    /// The stopping distance from the command (mm).
     pub distance_mm: f64,
-    /// One standard deviation of it (mm).
+    /// Its standard deviation (mm).
     pub uncertainty_mm: f64,
-    /// Time from the command to standstill (s), where a person watched.
+    /// The stopping time from the command (s), if measured.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time_s: Option<f64>,
 }
@@ -122,21 +122,21 @@ pub struct TapedStopForm {
 /// A measurement that does not fit its neighbours.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SuspicionForm {
-    /// The recording, the run and the line that tell it.
+    /// The recording, run and line of the report.
     pub recording: String,
     /// See `recording`.
     pub run: u32,
     /// See `recording`.
     pub line: u64,
-    /// Its number in the store, where it came from one.
+    /// Its number in the store, if it is in one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stored_as: Option<i64>,
-    /// The contact, by name.
+    /// The sensor, by name.
     pub sensor: String,
-    /// How much later than its neighbours say the report was (ms).
+    /// The delay of the report relative to its neighbours (ms).
     pub late_ms: f64,
-    /// How far the train runs in that time (mm).
+    /// The distance that the train runs in that time (mm).
     pub late_mm: f64,
-    /// How likely chance makes a report at least this late or early.
+    /// The probability of a report at least this late or early by chance.
     pub probability: f64,
 }

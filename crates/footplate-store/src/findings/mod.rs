@@ -1,6 +1,6 @@
-//! What recordings say of trains, as people and programs read it: the motion model of each, and its runs beside it.
+//! Calibrations from recordings, for people and programs: the motion model of each train, and its runs.
 //!
-//! `docs/formats/calibration.md` describes it. The model alone, which is what programs drive with, is a
+//! `docs/formats/calibration.md` describes the format. The model alone, which is enough to drive with, is a
 //! [`MotionFile`](crate::MotionFile).
 
 mod export;

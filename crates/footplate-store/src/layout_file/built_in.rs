@@ -1,4 +1,4 @@
-//! The layouts that come with Footplate, and the one meaning of every `--layout`.
+//! The built-in layouts, and the lookup that every `--layout` uses.
 
 use std::path::Path;
 
@@ -6,8 +6,7 @@ use super::drawing::LayoutFile;
 use super::error::LayoutFileError;
 use super::read::{parse_layout, read_layout};
 
-/// The built-in layouts by name: the two tracks of the course on real-time trains, and the first of them as
-/// it was measured years before.
+/// The built-in layouts by name: the two tracks of the course on real-time trains, and an earlier survey of the first.
 pub const BUILT_IN: [&str; 3] = ["track-a", "track-a-v1", "track-b"];
 
 const TEXTS: [&str; 3] = [
@@ -28,10 +27,10 @@ pub fn built_in(name: &str) -> Result<LayoutFile, LayoutFileError> {
     parse_layout(name, text.as_bytes())
 }
 
-/// A built-in layout if `name` is the name of one, otherwise the layout file at that path.
+/// The built-in layout of that name, otherwise the layout file at that path.
 ///
 /// # Errors
-/// What is wrong with the file, or that there is neither.
+/// The file is invalid, or there is neither.
 pub fn layout_named(name: &str) -> Result<LayoutFile, LayoutFileError> {
     let path = Path::new(name);
     match built_in(name) {

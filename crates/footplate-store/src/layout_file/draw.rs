@@ -1,4 +1,4 @@
-//! Draws a layout as SVG: rails as lines, sensors, turnouts and track ends as marks with their names.
+//! Draws a layout as SVG: edges as lines; sensors, turnouts and track ends as marks with their names.
 
 use std::fmt;
 
@@ -7,21 +7,21 @@ use footplate_core::track::{Layout, NodeKind, StretchLength};
 
 use super::drawing::LayoutFile;
 
-/// A layout without points to draw at.
+/// The layout has no drawing coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("no place of the layout has a point to draw at: add `at = [x, y]` to its sensors, turnouts and ends")]
 pub struct NothingToDraw;
 
-/// Sizes as parts of the drawing's longer side, found by looking at the built-in layouts.
+/// Sizes as parts of the drawing's longer side, chosen by eye with the built-in layouts.
 const MARGIN: f64 = 0.03;
 const RAIL: f64 = 0.002;
 const SENSOR: f64 = 0.004;
 const TURNOUT: f64 = 0.003;
 const LETTER: f64 = 0.011;
-/// The colour of rails on which the speed is restricted: that of a signal's caution.
+/// The colour of edges with a speed restriction: that of a caution signal.
 const RESTRICTED: &str = "#d80";
 
-/// The text of an SVG file. Places without a point, and the rails to them, are left out.
+/// The text of an SVG file. Places without a point are left out, with their edges.
 ///
 /// # Errors
 /// [`NothingToDraw`] if no place has a point.
@@ -64,7 +64,7 @@ pub fn draw_layout(file: &LayoutFile) -> Result<String, NothingToDraw> {
         }
     }
     line(format_args!("</g>"));
-    // A white edge around the letters keeps them readable where they lie over rails.
+    // A white outline keeps names readable over edges.
     line(format_args!(
         "<g font-family=\"sans-serif\" font-size=\"{letter}\" text-anchor=\"middle\" paint-order=\"stroke\" \
          stroke-width=\"{}\">",
@@ -78,7 +78,7 @@ pub fn draw_layout(file: &LayoutFile) -> Result<String, NothingToDraw> {
             NodeKind::Enter | NodeKind::Exit => (TURNOUT, "#555"),
         };
         let radius = side * radius;
-        // The names of places at one point stand one above the other.
+        // Names of places at the same point are stacked.
         let below = drawn.iter().filter(|other| **other == point).count() as f64;
         drawn.push(point);
         let ([x, y], name) = (point, label(layout, id, kind));
@@ -90,7 +90,7 @@ pub fn draw_layout(file: &LayoutFile) -> Result<String, NothingToDraw> {
     Ok(svg)
 }
 
-/// Both names of a contact, the number of a turnout, the way in at an end.
+/// The names of a node: both names of a sensor, the number of a turnout, the inbound name of an end.
 fn label(layout: &Layout, first: NodeId, kind: NodeKind) -> String {
     match kind {
         NodeKind::Sensor(_) => format!("{} {}", layout.node_name(first), layout.node_name(first.reverse())),
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn rails_with_a_speed_restriction_are_drawn_in_another_colour_and_say_so() {
+    fn edges_with_a_speed_restriction_are_coloured_and_labelled() {
         let file = built_in("track-a").unwrap();
         let zone = Zone { name: "C & E".into(), limit: Speed::from_mm_per_s(180.0) };
         let [from, to] = ["C13", "E7"].map(|name| file.layout.node_named(name).unwrap());

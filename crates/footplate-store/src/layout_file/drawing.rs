@@ -1,22 +1,22 @@
-//! A layout with what a file says about it besides: a few words, and where to draw its places.
+//! A layout with its description and drawing coordinates.
 
 use std::collections::BTreeMap;
 
 use footplate_core::NodeId;
 use footplate_core::track::Layout;
 
-/// What a layout file holds.
+/// The content of a layout file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayoutFile {
     /// The layout.
     pub layout: Layout,
-    /// What people should know about it: where it stands, who measured it.
+    /// Its description: where it is, its surveyor.
     pub about: String,
-    /// Where to draw it.
+    /// Its drawing coordinates.
     pub drawing: Drawing,
 }
 
-/// Where the places of a layout stand in a drawing, for those that have been given a point.
+/// Drawing coordinates of places, for those that have any.
 ///
 /// The unit is the file's own, such as pixels of a plan; x grows to the right and y downwards.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -26,13 +26,13 @@ pub struct Drawing {
 }
 
 impl Drawing {
-    /// The point of the place a node belongs to.
+    /// The point of a node's place.
     #[must_use]
     pub fn point(&self, node: NodeId) -> Option<[f64; 2]> {
         self.points.get(&place(node)).copied()
     }
 
-    /// Gives the place of a node a point.
+    /// Sets the point of a node's place.
     pub fn set(&mut self, node: NodeId, point: [f64; 2]) {
         self.points.insert(place(node), point);
     }
@@ -44,7 +44,7 @@ impl Drawing {
     }
 }
 
-/// Both nodes of a place are drawn at one point, kept under the lower of them.
+/// The key of a node's place: the lower of its two nodes.
 fn place(node: NodeId) -> NodeId {
     node.min(node.reverse())
 }

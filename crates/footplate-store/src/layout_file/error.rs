@@ -1,4 +1,4 @@
-//! Why a layout file could not be read: where, what stands there and what would be right.
+//! Errors in layout files: where, what is wrong, and what would be right.
 
 use std::fmt;
 use std::io;
@@ -14,18 +14,18 @@ pub enum LayoutFileError {
     Read {
         /// The file.
         file: String,
-        /// What the system said.
+        /// The error of the system.
         source: io::Error,
     },
-    /// More bytes than any layout has.
+    /// The file is larger than any layout.
     #[error("{file}: the file is longer than {limit} bytes; is it a layout?")]
     TooLarge {
         /// The file.
         file: String,
-        /// The most that is read.
+        /// The limit.
         limit: usize,
     },
-    /// Bytes that are no UTF-8.
+    /// The file is not UTF-8.
     #[error("{file}, line {line}: byte {byte} of the line is not UTF-8; save the file as UTF-8")]
     NotText {
         /// The file.
@@ -35,18 +35,18 @@ pub enum LayoutFileError {
         /// The byte in the line, counted from 1.
         byte: usize,
     },
-    /// Something in the text is wrong.
+    /// The text has an error.
     #[error("{place}: {problem}")]
     Wrong {
-        /// Where.
+        /// The place of the error.
         place: TextPlace,
-        /// What.
+        /// The error.
         problem: LayoutProblem,
     },
     /// Neither a built-in layout nor a file.
     #[error("there is no layout `{name}`: give {built_in}, or the path of a layout file")]
     Unknown {
-        /// What was asked for.
+        /// The name that was given.
         name: String,
         /// The names of the built-in layouts.
         built_in: String,
@@ -83,56 +83,56 @@ impl fmt::Display for TextPlace {
     }
 }
 
-/// What is wrong with the text of a layout.
+/// An error in the text of a layout.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LayoutProblem {
-    /// It is no TOML, or its keys are not those of a layout.
+    /// It is not TOML, or has keys that a layout does not have.
     #[error("{0}")]
     Toml(String),
-    /// A format from the future.
+    /// A newer format.
     #[error("format {found} is not known to this version of Footplate, which reads format {known}")]
     Format {
-        /// What the file says.
+        /// The format of the file.
         found: i64,
-        /// What would be right.
+        /// The format that this version reads.
         known: i64,
     },
-    /// More than a name and a leg at the end of an edge.
+    /// The end of an edge is more than a name and a leg.
     #[error(
         "`{found}` is not an end of an edge: write a name like `C13`, or `BR6 straight` or `BR6 \
              curved`"
     )]
     RailEnd {
-        /// What the file says.
+        /// The text in the file.
         found: String,
     },
-    /// A sensor without a number whose name does not tell it.
-    #[error("`{name}` does not tell the sensor's number: add `numbers = [.., ..]`, or call it A1 to E16")]
+    /// A sensor without a number whose name does not imply one.
+    #[error("`{name}` does not imply the sensor's number: add `numbers = [.., ..]`, or call it A1 to E16")]
     SensorNumber {
         /// The name.
         name: String,
     },
-    /// The uncertainty of a length that is not written.
-    #[error("an uncertainty is given of a length that is not: add `mm`, or leave out `uncertainty_mm`")]
+    /// An uncertainty without a length.
+    #[error("an uncertainty without a length: add `mm`, or leave out `uncertainty_mm`")]
     UncertaintyOfNothing,
-    /// An edge in a zone that is nowhere described.
+    /// An edge in a zone that is not defined.
     #[error("no zone is called `{found}`: add `{{ name = \"{found}\", max_mm_s = .. }}` to `zones`")]
     UnknownZone {
-        /// What the file says.
+        /// The name in the file.
         found: String,
     },
-    /// A point that cannot be drawn.
+    /// Coordinates out of range.
     #[error("[{x}, {y}] is out of range: coordinates are between -{limit} and {limit}")]
     Point {
         /// Its first coordinate.
         x: f64,
         /// Its second coordinate.
         y: f64,
-        /// The largest that is drawn.
+        /// The limit.
         limit: f64,
     },
-    /// It is no layout.
+    /// The layout is inconsistent.
     #[error(transparent)]
     Layout(#[from] LayoutError),
 }

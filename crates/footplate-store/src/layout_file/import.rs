@@ -1,7 +1,7 @@
-//! Imports a layout from tables of nodes and directed edges, as the courses on real-time trains hand out.
+//! Imports a layout from tables of nodes and directed edges, in the format of the courses on real-time trains.
 //!
-//! The tables say everything twice, once for each direction of travel. What they say is paired up, and where
-//! the two do not agree the row is named.
+//! The tables contain everything twice, once for each direction of travel. The import pairs the entries and reports
+//! rows whose twins disagree.
 
 use std::collections::BTreeMap;
 use std::io::BufRead;
@@ -15,14 +15,14 @@ use super::tables::{
     EdgeRow, LayoutTables, NodeRow, NodeType, PointRow, read_edges, read_nodes, read_points,
 };
 
-/// What the tables do not say.
+/// Properties that the tables do not contain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportContext {
-    /// What to call the layout.
+    /// The name of the layout.
     pub name: String,
-    /// What people should know about it.
+    /// Its description.
     pub about: String,
-    /// How well the lengths are known.
+    /// The uncertainty of the lengths.
     pub survey: Survey,
     /// Pairs of turnouts in one place of which at most one may lie curved.
     pub never_both_curved: Vec<[TurnoutId; 2]>,
@@ -31,7 +31,7 @@ pub struct ImportContext {
 /// Imports a layout.
 ///
 /// # Errors
-/// The first thing that is wrong in the nodes, then in the edges, then in the points.
+/// The first error in the nodes, then in the edges, then in the points.
 pub fn import_layout<R: BufRead>(
     tables: LayoutTables<R>,
     context: &ImportContext,
@@ -72,7 +72,7 @@ pub fn import_layout<R: BufRead>(
     Ok(LayoutFile { layout, about: context.about.clone(), drawing })
 }
 
-/// The line at fault and what is wrong with it.
+/// The line of an error, and the error.
 type Fault = (u64, RowProblem);
 
 fn in_file(file: &str) -> impl Fn(Fault) -> ImportError {
@@ -82,7 +82,7 @@ fn in_file(file: &str) -> impl Fn(Fault) -> ImportError {
 /// The reverse of each node by name.
 type Reverses<'n> = BTreeMap<&'n str, &'n str>;
 
-/// The places with the line of their first node: sensors, then turnouts, then ends, as layout files have them.
+/// The places with the line of their first node, in the order of layout files: sensors, turnouts, ends.
 fn pair_nodes(nodes: &[NodeRow]) -> Result<(Vec<(u64, Place)>, Reverses<'_>), Fault> {
     let mut rows: BTreeMap<&str, &NodeRow> = BTreeMap::new();
     for row in nodes {
@@ -117,7 +117,7 @@ fn pair_nodes(nodes: &[NodeRow]) -> Result<(Vec<(u64, Place)>, Reverses<'_>), Fa
     Ok((sensors, reverses))
 }
 
-/// The row of the reverse, if the two agree.
+/// The row of the reverse node, if the two rows agree.
 fn check_reverse<'n>(row: &NodeRow, rows: &BTreeMap<&str, &'n NodeRow>) -> Result<&'n NodeRow, RowProblem> {
     let (name, reverse) = (row.name.clone(), row.reverse.clone());
     let Some(other) = rows.get(row.reverse.as_str()) else {
@@ -144,7 +144,7 @@ fn check_reverse<'n>(row: &NodeRow, rows: &BTreeMap<&str, &'n NodeRow>) -> Resul
 /// The stretches with the line of their first edge, in the order of the table.
 fn pair_edges(edges: &[EdgeRow], reverses: &Reverses<'_>) -> Result<Vec<(u64, Stretch)>, Fault> {
     let mut leaving: BTreeMap<(&str, Option<Leg>), u64> = BTreeMap::new();
-    // The edges that still need a twin, by where they begin and end.
+    // Edges without a twin so far, by their ends.
     let mut alone: BTreeMap<(&str, &str), Vec<usize>> = BTreeMap::new();
     for (number, edge) in edges.iter().enumerate() {
         if let Some(first) = leaving.insert((&edge.from, edge.leg), edge.line) {
@@ -159,7 +159,7 @@ fn pair_edges(edges: &[EdgeRow], reverses: &Reverses<'_>) -> Result<Vec<(u64, St
     let mut stretches = Vec::with_capacity(edges.len() / 2);
     for (number, edge) in edges.iter().enumerate() {
         let (back_to, back_from) = (reverse(edge.line, &edge.from)?, reverse(edge.line, &edge.to)?);
-        // Already the twin of an earlier edge?
+        // Skip edges that are twins of earlier ones.
         let Some(own) = alone.get_mut(&(edge.from.as_str(), edge.to.as_str())) else { continue };
         let Some(place) = own.iter().position(|other| *other == number) else { continue };
         own.remove(place);
@@ -170,7 +170,7 @@ fn pair_edges(edges: &[EdgeRow], reverses: &Reverses<'_>) -> Result<Vec<(u64, St
             let (twin_from, twin_to) = (back_from.to_owned(), back_to.to_owned());
             return Err((edge.line, RowProblem::NoTwin { from, to, twin_from, twin_to }));
         };
-        // Between two turnouts there may be two tracks: the twin is the one of the same length.
+        // Two tracks may connect the same turnouts: the twin has the same length.
         let is_equal =
             |other: &usize| edges.get(*other).is_some_and(|twin| twin.mm.total_cmp(&edge.mm).is_eq());
         let twin = &edges[twins.remove(twins.iter().position(is_equal).unwrap_or(0))];

@@ -1,17 +1,17 @@
-//! Why tables could not be imported: the row at fault, what stands there and what would be right.
+//! Errors of an import: the row, what is wrong, and what would be right.
 
 use footplate_core::track::LayoutError;
 
 use crate::table::TableError;
 
-/// Why tables could not be imported.
+/// Tables that could not be imported.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImportError {
     /// A table could not be read.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// A table without columns it cannot do without.
+    /// A table lacks required columns.
     #[error("{file}: the header lacks these columns: {missing}")]
     MissingColumns {
         /// The file.
@@ -19,58 +19,58 @@ pub enum ImportError {
         /// The columns.
         missing: String,
     },
-    /// The last row breaks off.
-    #[error("{file}, line {line}: the row breaks off; was the file copied whole?")]
+    /// The last row is incomplete.
+    #[error("{file}, line {line}: the row is incomplete; was the whole file copied?")]
     CutOff {
         /// The file.
         file: String,
         /// The line.
         line: u64,
     },
-    /// More rows than a layout has nodes.
+    /// More rows than a layout may have nodes.
     #[error("{file}: more than {limit} rows; is it a table of a layout?")]
     TooManyRows {
         /// The file.
         file: String,
-        /// The most that are read.
+        /// The limit.
         limit: usize,
     },
-    /// A row that does not agree with the others.
+    /// A row disagrees with the others.
     #[error("{file}, line {line}: {problem}")]
     Row {
         /// The file.
         file: String,
         /// The line.
         line: u64,
-        /// What is wrong.
+        /// The error.
         problem: Box<RowProblem>,
     },
-    /// What the tables do not say is wrong.
+    /// A property that the tables do not contain is invalid.
     #[error(transparent)]
     Context(LayoutError),
 }
 
-/// How a row does not agree with the others.
+/// How a row disagrees with the others.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RowProblem {
-    /// A name that another row has.
+    /// Another row has the same name.
     #[error("the node `{name}` is already in line {first}; every node needs its own name")]
     DuplicateNode {
         /// The name.
         name: String,
-        /// The line that has it.
+        /// The line of that row.
         first: u64,
     },
-    /// A reverse that is in no row.
-    #[error("the reverse of `{name}` should be a node of this file, and `{reverse}` is none")]
+    /// The reverse node does not exist.
+    #[error("the reverse of `{name}` should be a node of this file; `{reverse}` is not")]
     UnknownReverse {
         /// The node.
         name: String,
-        /// What it says.
+        /// The name of its reverse.
         reverse: String,
     },
-    /// A reverse that has another reverse.
+    /// The reverse of the reverse is another node.
     #[error(
         "the reverse of `{name}` is `{reverse}`, so the reverse of `{reverse}` should be `{name}`, not `{back}`"
     )]
@@ -82,13 +82,13 @@ pub enum RowProblem {
         /// The reverse of that.
         back: String,
     },
-    /// A node that is its own reverse.
+    /// A node is its own reverse.
     #[error("`{name}` cannot be its own reverse: each direction of travel is a node of its own")]
     OwnReverse {
         /// The node.
         name: String,
     },
-    /// A reverse of a type that does not fit.
+    /// The types of a node and its reverse do not match.
     #[error(
         "`{name}` is of type {kind}, so its reverse `{reverse}` should be of type {expected}, not {found}"
     )]
@@ -99,12 +99,12 @@ pub enum RowProblem {
         kind: &'static str,
         /// Its reverse.
         reverse: String,
-        /// The type of that.
+        /// The type of the reverse.
         found: &'static str,
-        /// The type it should be of.
+        /// The type that the reverse should have.
         expected: &'static str,
     },
-    /// A branch and a merge of different turnouts.
+    /// A branch and its merge belong to different turnouts.
     #[error("`{name}` is turnout {number}, so its reverse `{reverse}` should be, too, and it is {found}")]
     ReverseNumber {
         /// The node.
@@ -113,46 +113,46 @@ pub enum RowProblem {
         number: u16,
         /// Its reverse.
         reverse: String,
-        /// The number of that.
+        /// The number of the reverse.
         found: u16,
     },
-    /// An edge from or to a node that is not in the table of nodes.
+    /// An edge names a node that is not in the table of nodes.
     #[error("no node is called `{name}`")]
     UnknownNode {
         /// The name.
         name: String,
     },
-    /// Two edges that leave a node by the same way.
+    /// Two edges leave a node by the same exit.
     #[error("line {first} already has an edge that leaves `{from}` by the same exit")]
     DuplicateEdge {
         /// The node.
         from: String,
-        /// The line that has it.
+        /// The line of the other edge.
         first: u64,
     },
-    /// An edge whose rails cannot be run over the other way.
+    /// An edge has no twin for the other direction.
     #[error(
         "the edge from `{from}` to `{to}` has no twin: there should be one from `{twin_from}` to `{twin_to}`"
     )]
     NoTwin {
-        /// Where it begins.
+        /// Its start.
         from: String,
-        /// Where it ends.
+        /// Its end.
         to: String,
-        /// Where the twin should begin.
+        /// The start of the missing twin.
         twin_from: String,
-        /// Where the twin should end.
+        /// The end of the missing twin.
         twin_to: String,
     },
-    /// An edge whose twin has another length.
+    /// An edge and its twin differ in length.
     #[error(
         "the edge from `{from}` to `{to}` is {mm} mm long and its twin in line {twin_line} {twin_mm} mm; \
              they are the same rail"
     )]
     UnequalTwin {
-        /// Where it begins.
+        /// Its start.
         from: String,
-        /// Where it ends.
+        /// Its end.
         to: String,
         /// Its length.
         mm: f64,
@@ -161,7 +161,7 @@ pub enum RowProblem {
         /// The length of the twin.
         twin_mm: f64,
     },
-    /// Two points for one place.
+    /// The two nodes of one place have different points.
     #[error("`{name}` and `{reverse}` are one place, but are drawn at different points")]
     TwoPoints {
         /// The node.
@@ -169,7 +169,7 @@ pub enum RowProblem {
         /// The node of the other direction.
         reverse: String,
     },
-    /// It is no layout.
+    /// The layout is inconsistent.
     #[error(transparent)]
     Layout(LayoutError),
 }

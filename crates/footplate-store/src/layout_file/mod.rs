@@ -1,7 +1,7 @@
-//! Layouts on disk: a TOML file that people write by hand, an importer for tables, and the built-in ones.
+//! Layouts on disk: a TOML format written by hand, an importer for tables, and the built-in layouts.
 //!
-//! [`layout_named`] is what every `--layout` means: a built-in name or the path of a file. The grammar is
-//! described in `docs/formats/layout.md`.
+//! [`layout_named`] resolves every `--layout`: a built-in name or the path of a file. `docs/formats/layout.md`
+//! describes the format.
 
 mod built_in;
 mod draw;

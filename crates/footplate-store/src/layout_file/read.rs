@@ -16,19 +16,19 @@ use super::drawing::{Drawing, LayoutFile};
 use super::error::{LayoutFileError, LayoutProblem, TextPlace};
 use crate::sensor_names::{ModuleLetters, SensorNames};
 
-/// The largest file that is read, in bytes: a hundred times a built-in layout.
+/// The largest layout file, in bytes: a hundred times a built-in layout.
 pub const LARGEST_LAYOUT: usize = 1024 * 1024;
 
-/// The version of the grammar.
+/// The version of the format.
 pub(super) const FORMAT: i64 = 1;
 
-/// The largest coordinate that is drawn, in the unit of the file: far beyond any plan, and exact in `f64`.
+/// The largest drawing coordinate: far beyond any plan, and exact in `f64`.
 pub(super) const LARGEST_COORDINATE: f64 = 1e6;
 
 /// Reads the layout file at `path`.
 ///
 /// # Errors
-/// What is wrong with it, with file, line and column.
+/// The first error, with file, line and column.
 pub fn read_layout(path: &Path) -> Result<LayoutFile, LayoutFileError> {
     let file = path.display().to_string();
     let mut bytes = Vec::new();
@@ -38,7 +38,7 @@ pub fn read_layout(path: &Path) -> Result<LayoutFile, LayoutFileError> {
     parse_layout(&file, &bytes)
 }
 
-/// Reads a layout from the bytes of a file. `file` is what messages call it.
+/// Reads a layout from the bytes of a file. `file` is its name in messages.
 ///
 /// # Errors
 /// As [`read_layout`].
@@ -61,7 +61,7 @@ pub fn parse_layout(file: &str, bytes: &[u8]) -> Result<LayoutFile, LayoutFileEr
     })
 }
 
-/// The byte at fault and what is wrong with it.
+/// The byte of an error, and the error.
 type Fault = (usize, LayoutProblem);
 
 fn read_text(text: &str) -> Result<LayoutFile, Fault> {
@@ -79,7 +79,7 @@ fn read_text(text: &str) -> Result<LayoutFile, Fault> {
     for (place, at) in plan.places.iter().zip(written.points()) {
         let Some(at) = at else { continue };
         let [x, y] = *at.get_ref();
-        // NaN is not within the limit either.
+        // The comparison also rejects NaN.
         if !(x.abs() <= LARGEST_COORDINATE && y.abs() <= LARGEST_COORDINATE) {
             return Err((at.span().start, LayoutProblem::Point { x, y, limit: LARGEST_COORDINATE }));
         }
@@ -90,7 +90,7 @@ fn read_text(text: &str) -> Result<LayoutFile, Fault> {
     Ok(LayoutFile { layout, about: written.about.trim().to_owned(), drawing })
 }
 
-/// A message of the TOML reader on one line, with numbers called what people call them.
+/// A message of the TOML reader on one line, without Rust type names.
 fn in_words(message: &str) -> String {
     let line = message.trim_end().replace('\n', "; ");
     line.replace("expected f64", "expected a number")
@@ -98,7 +98,7 @@ fn in_words(message: &str) -> String {
         .replace("expected i64", "expected a whole number")
 }
 
-/// The file as it is written.
+/// The content of the file, as written.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written {
@@ -174,7 +174,7 @@ struct WrittenZone {
 }
 
 impl Written {
-    /// Sensors first, then turnouts, then ends: the order in which they are written.
+    /// The plan of the layout, in the order of the file: sensors, turnouts, ends.
     fn plan(&self) -> Result<LayoutPlan, Fault> {
         let sensors = self.sensors.iter().map(|sensor| sensor.get_ref().place(sensor.span().start));
         let turnouts = self.turnouts.iter().map(|turnout| {
@@ -208,7 +208,7 @@ impl Written {
         })
     }
 
-    /// The speed restrictions, each with the edges that name it.
+    /// The speed restrictions, each with its edges.
     fn zones(&self) -> Result<Vec<PlannedZone>, Fault> {
         let restricted = || {
             let edges = (0_u16..).zip(&self.edges);
@@ -238,7 +238,7 @@ impl Written {
         sensors.chain(turnouts).chain(ends)
     }
 
-    /// The byte at which stands what the layout complains about.
+    /// The byte that an error of the layout refers to.
     fn place_of(&self, error: &LayoutError) -> usize {
         let mut places = (self.sensors.iter().map(|sensor| sensor.span().start))
             .chain(self.turnouts.iter().map(|turnout| turnout.span().start))
@@ -292,7 +292,7 @@ impl WrittenDistance {
 }
 
 impl WrittenEdge {
-    /// What it says of its length.
+    /// The length of the edge, as far as it is stated.
     fn length(&self) -> Result<StretchLength, Fault> {
         let mm = |number: &Spanned<f64>| Length::from_mm(*number.get_ref());
         match (&self.mm, &self.uncertainty_mm) {
@@ -305,7 +305,7 @@ impl WrittenEdge {
         }
     }
 
-    /// The byte at which stands what the layout complains about in this edge.
+    /// The byte that an error in this edge refers to.
     fn place_of(&self, error: &LayoutError) -> usize {
         let start = |number: &Option<Spanned<f64>>| number.as_ref().map_or(0, |number| number.span().start);
         let at_fault = match error {
@@ -322,7 +322,7 @@ impl WrittenEdge {
     }
 }
 
-/// `C13`, `BR6 straight` or `BR6 curved`.
+/// Parses `C13`, `BR6 straight` or `BR6 curved`.
 fn rail_end(text: &Spanned<String>) -> Result<RailEnd, Fault> {
     let mut words = text.get_ref().split_whitespace();
     let node = words.next().map(ToOwned::to_owned);

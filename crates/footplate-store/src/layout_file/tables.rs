@@ -1,4 +1,4 @@
-//! The rows of the tables from which a layout is imported: nodes, directed edges and points to draw at.
+//! The rows of the tables that a layout is imported from: nodes, directed edges and points.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -10,17 +10,17 @@ use super::import_error::ImportError;
 use super::read::LARGEST_COORDINATE;
 use crate::table::{Column, LastLine, Row, Table, TableError};
 
-/// Most rows of a table: as many nodes as a layout can number.
-const MOST_ROWS: usize = 1 << 16;
+/// The most rows of a table: a layout cannot number more nodes.
+const MAX_ROWS: usize = 1 << 16;
 
-/// The tables of one layout, each with the name that messages call it.
+/// The tables of one layout, each with its name in messages.
 #[derive(Debug)]
 pub struct LayoutTables<R> {
     /// Columns `name`, `type`, `number`, `reverse`.
     pub nodes: (String, R),
     /// Columns `src`, `dst`, `direction`, `dist_mm`: every edge and its twin.
     pub edges: (String, R),
-    /// Columns `name`, `x_px`, `y_px`, for those nodes that have a point.
+    /// Columns `name`, `x_px`, `y_px`, for nodes with a point.
     pub schematic: Option<(String, R)>,
 }
 
@@ -28,7 +28,7 @@ impl LayoutTables<BufReader<File>> {
     /// Opens the files.
     ///
     /// # Errors
-    /// The file that cannot be opened.
+    /// A file cannot be opened.
     pub fn open(nodes: &Path, edges: &Path, schematic: Option<&Path>) -> Result<Self, ImportError> {
         let open = |path: &Path| {
             let file = path.display().to_string();
@@ -41,7 +41,7 @@ impl LayoutTables<BufReader<File>> {
     }
 }
 
-/// What is at a node.
+/// The type of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum NodeType {
     Sensor,
@@ -64,7 +64,7 @@ impl NodeType {
         }
     }
 
-    /// What is there for a train that comes the other way.
+    /// The type of the reverse node.
     pub(super) fn reverse(self) -> Self {
         match self {
             Self::Sensor => Self::Sensor,
@@ -80,7 +80,7 @@ pub(super) struct NodeRow {
     pub(super) line: u64,
     pub(super) name: String,
     pub(super) kind: NodeType,
-    /// Of the sensor or turnout; ends have none.
+    /// The number of the sensor or turnout; 0 for ends.
     pub(super) number: u16,
     pub(super) reverse: String,
 }
@@ -156,8 +156,8 @@ fn read_rows<const N: usize, T>(
     };
     let mut rows = Vec::new();
     while let Some(row) = table.next_row()? {
-        if rows.len() == MOST_ROWS {
-            return Err(ImportError::TooManyRows { file: file.to_owned(), limit: MOST_ROWS });
+        if rows.len() == MAX_ROWS {
+            return Err(ImportError::TooManyRows { file: file.to_owned(), limit: MAX_ROWS });
         }
         rows.push(read(row, columns)?);
     }

@@ -1,4 +1,4 @@
-//! Writes a layout as TOML that a person likes to read, and that reads back as the same layout.
+//! Writes a layout as readable TOML that reads back as the same layout.
 
 use footplate_core::track::{Edge, Layout, Leg, Node, NodeKind, StretchLength, SurveyedDistance, Zone};
 use footplate_core::{Length, NodeId};
@@ -8,7 +8,7 @@ use super::read::FORMAT;
 use crate::decimal::unscaled;
 use crate::sensor_names::{ModuleLetters, SensorNames};
 
-/// The text of a layout file. Lengths are written to the nanometre.
+/// The text of a layout file. Lengths are rounded to a nanometre.
 #[must_use]
 pub fn write_layout(file: &LayoutFile) -> String {
     let LayoutFile { layout, about, drawing } = file;
@@ -32,34 +32,34 @@ pub fn write_layout(file: &LayoutFile) -> String {
         );
     }
     let places = Places { layout, drawing };
-    text += "\n# A contact reports under one name or the other, by the direction of the train.\n";
+    text += "\n# A sensor has one name for each direction of travel.\n";
     text += &list("sensors", places.lines(|kind| matches!(kind, NodeKind::Sensor(_))));
-    text += "\n# First the name of the turnout met at its toe, then when met from one of its legs.\n";
+    text += "\n# A turnout has one name for trains from its toe, and one for trains from its legs.\n";
     text += &list("turnouts", places.lines(|kind| matches!(kind, NodeKind::Branch(_))));
     if !layout.never_both_curved().is_empty() {
         let pairs = layout.never_both_curved().iter().map(|[one, other]| format!("[{one}, {other}]"));
         text += "\n# Turnouts in one place, of which at most one may lie curved.\n";
         text += &format!("never_both_curved = [{}]\n", pairs.collect::<Vec<_>>().join(", "));
     }
-    text += "\n# Where the track ends: first the name on the way in, then on the way out.\n";
+    text += "\n# Track ends: first the name of the inbound direction, then of the outbound one.\n";
     text += &list("ends", places.lines(|kind| matches!(kind, NodeKind::Enter)));
     if !layout.zones().is_empty() {
-        text += "\n# Where the speed is restricted: edges say in which zone they are.\n";
+        text += "\n# Speed restrictions: edges name the zone that they are in.\n";
         text += &list("zones", layout.zones().iter().map(zone));
     }
-    text += "\n# Each stretch of rail once, in one of its directions; the way back is the same rail.\n";
+    text += "\n# Each stretch once, in one direction; the other direction is the same track.\n";
     if !layout.is_measured() {
         text += "# Edges without mm were not measured.\n";
     }
     text += &list("edges", stretches(layout));
     if !survey.distances.is_empty() {
-        text += "\n# From sensor to sensor the sum of edges is known better than each of them.\n";
+        text += "\n# Distances between sensors, known better than the sum of their edges.\n";
         text += &list("distances", survey.distances.iter().map(distance));
     }
     text
 }
 
-/// `key = [` and an entry a line.
+/// `key = [` and one entry a line.
 fn list(key: &str, entries: impl Iterator<Item = String>) -> String {
     let mut text = format!("{key} = [");
     let mut end = "]\n";
@@ -89,9 +89,9 @@ impl<'f> Places<'f> {
         }
         line += &format!("names = [{}, {}]", quoted(&node.name), quoted(self.layout.node_name(other)));
         if let (Some(one), Some(two)) = (self.layout.sensor_at(id), self.layout.sensor_at(other)) {
-            let told =
+            let stated =
                 [&node.name, self.layout.node_name(other)].map(|name| ModuleLetters.sensor_named(name));
-            if told != [Some(one), Some(two)] {
+            if stated != [Some(one), Some(two)] {
                 line += &format!(", numbers = [{one}, {two}]");
             }
         }
@@ -102,7 +102,7 @@ impl<'f> Places<'f> {
     }
 }
 
-/// The edges in pairs: the first of each says where it leads, its twin by which leg it gets there.
+/// Each stretch once: its first edge names the end, its twin the leg that it leaves by.
 fn stretches(layout: &Layout) -> impl Iterator<Item = String> {
     let twins = layout.edges().skip(1).step_by(2);
     layout.edges().step_by(2).zip(twins).map(|((id, there), (_, back))| {
@@ -114,7 +114,7 @@ fn stretches(layout: &Layout) -> impl Iterator<Item = String> {
     })
 }
 
-/// What an entry says of the length of its edge.
+/// The keys of an edge's length.
 fn length(known: StretchLength) -> String {
     match known {
         StretchLength::Measured(length) => format!(", mm = {}", millimetres(length)),
@@ -132,12 +132,12 @@ fn distance(distance: &SurveyedDistance) -> String {
 }
 
 fn zone(zone: &Zone) -> String {
-    // To the nanometre a second, as lengths are to the nanometre.
+    // Rounded to a nanometre a second, as lengths are to a nanometre.
     let limit = unscaled((zone.limit.as_mm_per_s() * 1e6).round() as i64, 6);
     format!("name = {}, max_mm_s = {limit}", quoted(&zone.name))
 }
 
-/// A node with the leg by which `leaving` leaves its place.
+/// A node, with the leg by which `leaving` leaves its place.
 fn rail_end(layout: &Layout, node: NodeId, leaving: &Edge) -> String {
     let name = layout.node_name(node);
     match leaving.leg {
@@ -156,7 +156,7 @@ fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
-/// A TOML string that keeps its line ends, so that a paragraph stays one to the eye.
+/// A TOML string with its line breaks.
 fn quoted_lines(text: &str) -> String {
     let is_plain = text.chars().all(|c| c == '\n' || !(c.is_control() || matches!(c, '"' | '\\')));
     if text.contains('\n') && is_plain { format!("\"\"\"\n{text}\n\"\"\"") } else { quoted(text) }

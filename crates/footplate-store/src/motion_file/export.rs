@@ -1,4 +1,4 @@
-//! From a motion model to its file, and back.
+//! Converts a motion model to its file form, and back.
 
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::model::{MotionModel, MotionNumbers, NumbersError, StepUse};
@@ -11,7 +11,7 @@ use super::form::{
 use crate::quantity::Quantity;
 
 impl MotionFile {
-    /// What is known of a train on a layout. `newest`: when the last event behind it was, since the Unix epoch.
+    /// The file form of a model. `newest`: the time of the last event that it was fitted to, since the Unix epoch.
     #[must_use]
     pub fn of(layout: &Layout, model: &MotionModel, newest: Option<Timestamp>) -> Self {
         let sections = SectionIndex::of(layout);
@@ -25,7 +25,7 @@ impl MotionFile {
             train: model.train(),
             highest_step: model.highest(),
             unreliable_steps: steps().filter(|step| model.uses(*step) == StepUse::Unreliable).collect(),
-            steps: known.flat_map(|step| both_ways(model, step, measured_at_s)).collect(),
+            steps: known.flat_map(|step| both_approaches(model, step, measured_at_s)).collect(),
             sections: named(layout, &sections)
                 .filter(|(_, section)| numbers.sections.iter().any(|(known, ..)| known == section))
                 .map(|(hop, _)| section_form(layout, &sections, model, &hop, measured_at_s))
@@ -35,10 +35,10 @@ impl MotionFile {
         }
     }
 
-    /// The model, to drive with. Sections that the layout does not have are left out.
+    /// The model. Sections that the layout does not have are left out.
     ///
     /// # Errors
-    /// The numbers make no model.
+    /// The numbers are not those of a model.
     pub fn model(&self, layout: &Layout) -> Result<MotionModel, NumbersError> {
         let index = SectionIndex::of(layout);
         let hop_between = |from: &str, to: &str| {
@@ -47,7 +47,7 @@ impl MotionFile {
         };
         let sections = self.sections.iter().filter_map(|form| {
             let hop = hop_between(&form.from, &form.to)?;
-            // The layout may have been surveyed anew since.
+            // The layout may have been surveyed again since.
             let longer_mm = form.surveyed_mm + form.add.value - hop.length.as_mm();
             Some((index.section(hop.id)?, 1e-3 * longer_mm, 1e-6 * form.add.uncertainty.powi(2)))
         });
@@ -79,7 +79,7 @@ impl MotionFile {
     }
 }
 
-fn both_ways(
+fn both_approaches(
     model: &MotionModel,
     step: SpeedStep,
     measured_at_s: Option<f64>,
@@ -97,7 +97,7 @@ fn both_ways(
     })
 }
 
-/// Every section with the first hop that runs over it, which names it.
+/// Every section with the first hop over it, which names it.
 fn named<'l>(layout: &'l Layout, sections: &'l SectionIndex) -> impl Iterator<Item = (Hop<'l>, usize)> {
     let mut seen: Vec<usize> = Vec::new();
     layout.hops().filter_map(move |hop| {
@@ -124,7 +124,7 @@ fn section_form(
             value: add.as_mm(),
             uncertainty: uncertainty.as_mm(),
             unit: "mm".to_owned(),
-            // All passages of all trips are fitted together; there are no single measurements of a section.
+            // Sections are fitted together from the passages of all runs: none has measurements of its own.
             measurements: 0,
             measured_at_s,
         },
@@ -140,7 +140,7 @@ fn stop_offset_form(layout: &Layout, numbers: &MotionNumbers, hop: &Hop<'_>) -> 
             value: 1e3 * offset,
             uncertainty: 1e3 * variance.sqrt(),
             unit: "mm".to_owned(),
-            // As of sections.
+            // As for sections.
             measurements: 0,
             measured_at_s: None,
         },

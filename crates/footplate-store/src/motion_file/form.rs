@@ -1,71 +1,72 @@
-//! What stands in the file of a motion model.
+//! The content of a motion model file.
 
 use footplate_core::{Approach, SpeedStep, TrainId};
 use serde::{Deserialize, Serialize};
 
 use crate::quantity::Quantity;
 
-/// Names the formulas that made the numbers. Raise it when the same events come to other numbers: with every change of what
-/// `calibration::motion` of core makes of them, or of what [`MotionReplay`](crate::MotionReplay) tells it. Models and replays
-/// that stores keep are then made anew from the events; a test knows the numbers of every version.
+/// The version of the formulas behind the numbers. Raise it when the same events lead to other numbers: with every
+/// change of the fit in `calibration::motion` of core, or of the events that [`MotionReplay`](crate::MotionReplay)
+/// feeds it. Stored models and replays are then computed again from the events. A test pins the numbers of every
+/// version.
 pub const MOTION_MODEL_VERSION: &str = "4";
 
-/// All that is known of how one train moves on one layout.
+/// The motion model of one train on one layout.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MotionFile {
-    /// [`MOTION_MODEL_VERSION`] of the program that made it.
+    /// [`MOTION_MODEL_VERSION`] of the program that computed it.
     pub model_version: String,
-    /// The layout on which it was learnt.
+    /// The layout on which it was fitted.
     pub layout: String,
     /// The train.
     pub train: TrainId,
     /// The highest step of its decoder.
     pub highest_step: SpeedStep,
-    /// Steps that do not move the train, or not for sure.
+    /// Steps that do not move the train, or not reliably.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unreliable_steps: Vec<SpeedStep>,
-    /// What it does at the steps that move it, lowest first.
+    /// Speed and stop of the steps that move it, lowest first.
     pub steps: Vec<MotionStepForm>,
-    /// How much longer than surveyed the ways between contacts are for it, where it was there.
+    /// Path lengths between sensors, relative to the survey, for sections that the train has run over.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sections: Vec<MotionSectionForm>,
-    /// By how much stops that end between two contacts are longer for it than elsewhere, by direction, where it stopped.
+    /// Stop offsets by direction, for hops on which the train has stopped.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stop_offsets: Vec<StopOffsetForm>,
-    /// What the model is made of, for programs.
+    /// The numbers of the model, for programs.
     pub exact: ExactForm,
 }
 
-/// The numbers of a model to the last bit ([`MotionNumbers`](footplate_core::model::MotionNumbers)); what
-/// stands above follows from them.
+/// The numbers of a model to the last bit ([`MotionNumbers`](footplate_core::model::MotionNumbers)); the other fields
+/// follow from them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ExactForm {
-    /// When the newest event was, in seconds since the Unix epoch, where that is known.
+    /// The time of the newest event in seconds since the Unix epoch, if known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured_at_s: Option<f64>,
-    /// How far stops scatter against what trains usually do.
+    /// The scatter of stops relative to the prior.
     pub scatter_scale: f64,
-    /// What they scatter by besides (m), whatever their speed.
+    /// The part of the scatter that does not depend on speed (m).
     #[serde(default)]
     pub scatter_floor: f64,
-    /// One standard deviation of the offsets of stops from place to place (m).
+    /// The standard deviation of stop offsets (m).
     #[serde(default)]
     pub stop_offset_deviation: f64,
-    /// How late or early starts from rest are against what trains usually do.
+    /// The scatter of start delays relative to the prior.
     pub start_scale: f64,
-    /// What each of `values` is off by for one standard deviation of the scale of the survey.
+    /// The change of each of `values` for one standard deviation of the survey's scale.
     pub scale: Vec<f64>,
-    /// By step from 0 on: contacts passed and stops made from below, and the same from above.
+    /// By step from 0: detections and stops for steps reached from below, and the same from above.
     pub counts: Vec<[u32; 4]>,
-    /// By step from 0 on: `untried`, `moves` or `unreliable`.
+    /// By step from 0: `untried`, `moves` or `unreliable`.
     pub uses: Vec<UseForm>,
-    /// The numbers by which it answers its commands, in SI units and the order of the model.
+    /// The parameters of the model, in SI units and in its order.
     pub values: Vec<f64>,
-    /// Their covariance: the lower triangle, row after row.
+    /// Their covariance: the lower triangle, row by row.
     pub covariance: Vec<f64>,
 }
 
-/// What experience says of a step.
+/// The experience with a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum UseForm {
@@ -73,7 +74,7 @@ pub enum UseForm {
     Untried,
     /// It moves the train.
     Moves,
-    /// Not to be relied upon.
+    /// It does not move the train reliably.
     Unreliable,
 }
 
@@ -82,46 +83,46 @@ pub enum UseForm {
 pub struct MotionStepForm {
     /// The step.
     pub step: SpeedStep,
-    /// From which side it is reached.
+    /// The side from which it is reached.
     pub approach: Approach,
-    /// The steady speed (mm/s); measurements are contacts passed at it.
+    /// The steady speed (mm/s); measurements are detections at it.
     pub speed: Quantity,
-    /// The way from the command to stand until it stands (mm); measurements are stops.
+    /// The stopping distance from the command (mm); measurements are stops.
     pub stop: Quantity,
-    /// How single stops scatter, one standard deviation (mm).
+    /// The scatter of single stops, one standard deviation (mm).
     pub stop_scatter_mm: f64,
-    /// How long a stop takes (s).
+    /// The stopping time (s).
     pub stop_s: f64,
 }
 
 impl MotionStepForm {
-    /// Whether its speed was measured: a single contact tells where a train was, not how fast it ran.
+    /// Whether its speed was measured: two detections at least, as a single one fixes a position but no speed.
     #[must_use]
     pub const fn is_measured(&self) -> bool {
         self.speed.measurements > 1
     }
 }
 
-/// The way between two contacts.
+/// The section between two sensors.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MotionSectionForm {
-    /// The contact at one end, by name.
+    /// The sensor at one end, by name.
     pub from: String,
-    /// The contact at the other.
+    /// The sensor at the other end.
     pub to: String,
     /// Surveyed length (mm).
     pub surveyed_mm: f64,
-    /// What to add to it for this train (mm).
+    /// The path length of this train minus the surveyed length (mm).
     pub add: Quantity,
 }
 
-/// What stops are longer by that end between two contacts, run over in this direction.
+/// The stop offset of a hop, in one direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StopOffsetForm {
-    /// The contact passed last, by name.
+    /// The sensor before it, by name.
     pub from: String,
-    /// The one that would come next.
+    /// The sensor after it.
     pub to: String,
-    /// What to add to a stop from 300 mm/s (mm).
+    /// The offset of a stop from 300 mm/s (mm).
     pub add: Quantity,
 }

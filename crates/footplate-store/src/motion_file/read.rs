@@ -1,18 +1,20 @@
-//! Reading the file of a motion model, and keeping it in a store.
+//! Reads and writes motion model files, and stores models.
 
 use std::fs;
 use std::path::Path;
 
+use footplate_core::model::MotionModel;
+use footplate_core::track::Layout;
 use footplate_core::{Timestamp, TrainId};
 
 use super::form::{MOTION_MODEL_VERSION, MotionFile};
 use crate::store::{NewCalibration, Store, StoreError};
 use crate::whole_file::write_whole;
 
-/// Larger files are no motion model: one of a decoder with 126 steps has about 1 MB.
+/// The largest file: a model of a decoder with 126 steps has about 1 MB.
 const LARGEST: u64 = 16 << 20;
 
-/// Why a motion model could not be read or written.
+/// A motion model that could not be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MotionFileError {
@@ -21,7 +23,7 @@ pub enum MotionFileError {
     System {
         /// The file.
         file: String,
-        /// What the system says.
+        /// The error of the system.
         source: std::io::Error,
     },
     /// The file is too large to be a motion model.
@@ -32,21 +34,21 @@ pub enum MotionFileError {
         /// Its size.
         bytes: u64,
     },
-    /// Its name does not say what is in it.
+    /// The extension is neither .toml nor .json.
     #[error("{file}: a motion model is a .toml or .json file")]
     UnknownEnding {
         /// The file.
         file: String,
     },
-    /// It is no motion model.
+    /// It is not a motion model.
     #[error("{file}: {problem} (docs/formats/motion-model.md describes the format)")]
     Form {
         /// The file, or the place in the store.
         file: String,
-        /// What is wrong, with line and column.
+        /// The error, with line and column.
         problem: String,
     },
-    /// It is a calibration of the form that Footplate wrote before there was one model of a train.
+    /// A calibration in the old format, from before there was one model per train.
     #[error(
         "{file}: a calibration in an old format, computed with other formulas; calibrate again: \
          footplate calibrate --from LOGS --layout LAYOUT --out FILE, or from a store with --store"
@@ -55,10 +57,10 @@ pub enum MotionFileError {
         /// The file.
         file: String,
     },
-    /// It was made by formulas that give other numbers.
+    /// A model of another version of the formulas.
     #[error(
-        "{file}: made by version {found} of the model, this program has version {MOTION_MODEL_VERSION}; learn it anew \
-         from the store in which its events are"
+        "{file}: computed by version {found} of the model, this program has version {MOTION_MODEL_VERSION}; calibrate \
+         again from the store with its events"
     )]
     OtherModel {
         /// The file, or the place in the store.
@@ -80,17 +82,17 @@ fn is_toml(path: &Path) -> Option<bool> {
     }
 }
 
-/// Whether a text has what only calibrations of the old form had: lists of trains and of polling.
+/// Whether a text has the lists of trains and polling that only old calibrations had.
 fn is_old_form(text: &str) -> bool {
     let has = |toml: &str, json: &str| text.contains(toml) || text.contains(json);
     has("[[trains]]", "\"trains\"") && has("[[polling]]", "\"polling\"")
 }
 
 impl MotionFile {
-    /// Reads a file that [`write`](Self::write) wrote, TOML or JSON by its ending.
+    /// Reads a file written by [`write`](Self::write), TOML or JSON by its extension.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// The file is invalid.
     pub fn read(path: &Path) -> Result<Self, MotionFileError> {
         let file = path.display().to_string();
         let system = |source| MotionFileError::System { file: file.clone(), source };
@@ -110,10 +112,10 @@ impl MotionFile {
         Self::checked(file, parsed)
     }
 
-    /// Writes it, TOML or JSON by the ending of the name.
+    /// Writes the file, TOML or JSON by its extension.
     ///
     /// # Errors
-    /// The name has another ending, or the file cannot be written.
+    /// The extension is another one, or the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), MotionFileError> {
         let file = path.display().to_string();
         let form = |problem| MotionFileError::Form { file: file.clone(), problem };
@@ -125,7 +127,7 @@ impl MotionFile {
         write_whole(path, text.as_bytes()).map_err(|source| MotionFileError::System { file, source })
     }
 
-    /// Keeps it in a store, as made `now` of the events that were there at `as_of`.
+    /// Stores the model, as computed at `now` from the events up to `as_of`.
     ///
     /// # Errors
     /// The store cannot be written.
@@ -138,10 +140,10 @@ impl MotionFile {
         Ok(store.keep_calibration(new, now)?)
     }
 
-    /// The model of a train that was in force at a date.
+    /// The model of a train as of a date.
     ///
     /// # Errors
-    /// The store cannot be read, or holds one that another version of the model made.
+    /// The store cannot be read, or the model is of another version of the formulas.
     pub fn of_store(store: &Store, train: TrainId, at: Timestamp) -> Result<Option<Self>, MotionFileError> {
         let Some(kept) = store.calibration(train, at)? else { return Ok(None) };
         let place = format!("{}, motion model of train {train}", store.path().display());
@@ -161,6 +163,42 @@ impl MotionFile {
             return Err(MotionFileError::OtherModel { file, found: form.model_version });
         }
         Ok(form)
+    }
+}
+
+/// A stored motion model.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StoredModel {
+    /// There is none.
+    Nothing,
+    /// A usable model.
+    Model(Box<MotionModel>),
+    /// A model of another version of the formulas. It can be fitted again from the stored events.
+    Outdated,
+}
+
+impl StoredModel {
+    /// The model of a train on a layout as of a date.
+    ///
+    /// # Errors
+    /// The store cannot be read, or its content is not a model.
+    pub fn of_store(
+        layout: &Layout,
+        store: &Store,
+        train: TrainId,
+        at: Timestamp,
+    ) -> Result<Self, MotionFileError> {
+        let file = match MotionFile::of_store(store, train, at) {
+            Ok(file) => file.filter(|file| file.layout == layout.name()),
+            Err(MotionFileError::OtherModel { .. }) => return Ok(Self::Outdated),
+            Err(error) => return Err(error),
+        };
+        Ok(match file.map(|file| file.model(layout)) {
+            None => Self::Nothing,
+            Some(Ok(model)) => Self::Model(Box::new(model)),
+            // Numbers that are not a model today may have been one in their own version.
+            Some(Err(_)) => Self::Outdated,
+        })
     }
 }
 
@@ -192,13 +230,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_model_is_told_apart_from_one_of_another_version() {
+    fn invalid_models_differ_from_models_of_another_version() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
         let other = MotionFile { model_version: "0".to_owned(), ..file() };
         other.write(&path("old.toml")).unwrap();
         let refused = MotionFile::read(&path("old.toml")).unwrap_err().to_string();
-        let says = format!("made by version 0 of the model, this program has version {MOTION_MODEL_VERSION}");
+        let says =
+            format!("computed by version 0 of the model, this program has version {MOTION_MODEL_VERSION}");
         assert!(refused.contains(&says), "{refused}");
         fs::write(path("letter.toml"), "Dear train,\n").unwrap();
         assert!(matches!(MotionFile::read(&path("letter.toml")), Err(MotionFileError::Form { .. })));

@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn the_figures_are_those_worked_out_by_hand() {
+    fn scores_match_a_hand_calculation() {
         let mut scorer = Scorer::default();
         // The odometer starts at 0 where the true distance is 1000 m; errors of the speed: 0, 3, -4 m/s.
         scorer.see(&claim(10.0, 0.0, 1.0), &truth(10.0, 1000.0));

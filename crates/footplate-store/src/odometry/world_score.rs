@@ -1,26 +1,26 @@
-//! How good odometers are on a world that nobody chose, phase by phase.
+//! Scores of odometers on a random world, phase by phase.
 
 use footplate_core::odometry::wheels::VehicleError;
 use footplate_core::odometry::{Mode, MotionEstimate, Odometer};
-use footplate_core::{TimeSpan, Timestamp};
+use footplate_core::{Speed, TimeSpan, Timestamp};
 use footplate_sim::line::{LineEventKind, LineRun, LineTruth, WheelTruth};
 
 use super::counted_way::WayCounter;
-use super::oracle::Oracle;
+use super::oracle::{Oracle, hindsight};
 use super::rival::{Rival, RivalOdometer};
 use super::run::{Preset, claim};
-use super::score::{OdometryScore, Scorer};
+use super::score::{Claim, OdometryScore, Scorer};
 use super::simulated::{simulated_rows, simulated_vehicle};
 use crate::tachometer::Truth;
 
-/// How long after a slip a train rolls *again* (s): as long as the stiffest odometer took to trust its wheels.
+/// How long a train counts as rolling *again* after a slip (s): as long as the slowest odometer took to trust its wheels.
 const AGAIN_S: f64 = 20.0;
-/// An interval is of its normal width when it is no wider than this times the median of normal running.
+/// The width of an interval is normal up to this times the median of normal running.
 const NORMAL_WIDTH: f64 = 1.5;
-/// Slips of both that are shorter than this are not asked how long the interval stayed wide after them (s).
+/// Shorter slips of both do not count for the time until the width is normal again (s).
 const BOTH_FOR_S: f64 = 1.0;
 
-/// What the train and its wheels really do.
+/// What the train and its wheels do in truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
     /// Both wheelsets roll, and have for a while.
@@ -29,9 +29,9 @@ pub enum Phase {
     OneSlips,
     /// Both do.
     BothSlip,
-    /// Both roll, and one did not shortly before.
+    /// Both roll, and one slipped shortly before.
     RollingAgain,
-    /// The train stands.
+    /// The train is at rest.
     Standing,
 }
 
@@ -40,7 +40,7 @@ impl Phase {
     pub const ALL: [Self; 5] =
         [Self::Rolling, Self::OneSlips, Self::BothSlip, Self::RollingAgain, Self::Standing];
 
-    /// What it is called in files.
+    /// Its name in files.
     #[must_use]
     pub const fn key(self) -> &'static str {
         match self {
@@ -52,7 +52,7 @@ impl Phase {
         }
     }
 
-    /// What people call it.
+    /// Its name in tables.
     #[must_use]
     pub const fn title(self) -> &'static str {
         match self {
@@ -78,13 +78,16 @@ pub enum WorldOdometer {
     RawMax,
     /// One that is told which wheelset slips, and when.
     Oracle,
+    /// One that knows the truth but while both slip, and then the mean acceleration, in hindsight.
+    Hindsight,
 }
 
 impl WorldOdometer {
     /// All of them, in the order of tables.
-    pub const ALL: [Self; 5] = [Self::Recommended, Self::Paper, Self::RawMean, Self::RawMax, Self::Oracle];
+    pub const ALL: [Self; 6] =
+        [Self::Recommended, Self::Paper, Self::RawMean, Self::RawMax, Self::Oracle, Self::Hindsight];
 
-    /// What it is called in files.
+    /// Its name in files.
     #[must_use]
     pub const fn key(self) -> &'static str {
         match self {
@@ -93,29 +96,30 @@ impl WorldOdometer {
             Self::RawMean => "raw_mean",
             Self::RawMax => "raw_max",
             Self::Oracle => "oracle",
+            Self::Hindsight => "hindsight",
         }
     }
 }
 
-/// The moment at which the recommended odometer was farthest off.
+/// The moment of the largest speed error of the recommended preset.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WorstMoment {
     /// When.
     pub time: Timestamp,
     /// Its speed less the true one (m/s).
     pub error_m_s: f64,
-    /// What the train and its wheels did.
+    /// The phase.
     pub phase: Phase,
-    /// What it took them to do.
+    /// The mode of the estimate.
     pub mode: Mode,
 }
 
-/// How good every odometer was in every phase, on one world or on many together.
+/// Scores of every odometer in every phase, on one world or on many.
 #[derive(Debug, Clone, Default)]
 pub struct WorldScores {
-    phases: [[Scorer; 5]; 5],
-    whole: [Scorer; 5],
-    /// Widths of our intervals in normal running (m/s): that of the stated confidence, and the guaranteed one.
+    phases: [[Scorer; 6]; 5],
+    whole: [Scorer; 6],
+    /// Widths of the intervals of the recommended preset in normal running (m/s): of the stated confidence, and guaranteed.
     widths: [Vec<f32>; 2],
     normal_after_s: Vec<f32>,
     left_distance: u64,
@@ -140,7 +144,9 @@ impl WorldScores {
         let mut seen = Vec::with_capacity(run.samples.len());
         let mut events = run.events.iter().peekable();
         let mut is_faulty = false;
-        for ((period, known), truth) in simulated_rows(run).zip(&run.truth) {
+        for (((period, known), truth), in_hindsight) in
+            simulated_rows(run).zip(&run.truth).zip(hindsight(run))
+        {
             while let Some(event) = events.next_if(|event| event.time <= period.time) {
                 match event.what {
                     LineEventKind::FaultBegins => is_faulty = true,
@@ -158,6 +164,7 @@ impl WorldScores {
                 rivals[0].step(&counted),
                 rivals[1].step(&counted),
                 oracle.step(&counted, [first, second && !is_faulty]),
+                Claim::plain(Speed::from_m_per_s(in_hindsight), truth.distance),
             ];
             let of_speed = Truth { distance: None, ..known };
             for ((claim, whole), in_phase) in
@@ -191,7 +198,7 @@ impl WorldScores {
         }
     }
 
-    /// Adds those of another world.
+    /// Adds the scores of another world.
     pub fn merge(&mut self, other: &Self) {
         for (mine, others) in self.phases.iter_mut().zip(&other.phases) {
             mine.iter_mut().zip(others).for_each(|(mine, other)| mine.merge(other));
@@ -209,40 +216,39 @@ impl WorldScores {
         }
     }
 
-    /// How good one of them was in a phase; distances are not scored by phase.
+    /// The score of an odometer in a phase; distances are not scored by phase.
     #[must_use]
     pub fn in_phase(&self, phase: Phase, odometer: WorldOdometer) -> OdometryScore {
         self.phases[phase as usize][odometer as usize].score()
     }
 
-    /// How good one of them was all the time.
+    /// The score of an odometer over all phases.
     #[must_use]
     pub fn whole(&self, odometer: WorldOdometer) -> OdometryScore {
         self.whole[odometer as usize].score()
     }
 
-    /// How many worlds there are, and in how many of them the distance left its guaranteed interval.
+    /// Number of worlds, and of those in which the distance left its guaranteed interval.
     #[must_use]
     pub fn runs_and_left(&self) -> [u64; 2] {
         [self.runs, self.left_distance]
     }
 
-    /// The median width of our interval of the speed in normal running (m/s): that of the stated confidence, and the
-    /// guaranteed one.
+    /// Median widths of the speed intervals in normal running (m/s): of the stated confidence, and guaranteed.
     #[must_use]
     pub fn normal_widths(&self) -> [Option<f64>; 2] {
         [median(&self.widths[0]), median(&self.widths[1])]
     }
 
-    /// How long after both slipped and roll again our interval had its normal width: the median (s), and the share of
-    /// times (per cent) that took no longer than `within`. What the run does not show counts as longer.
+    /// Time from the end of a slip of both until the width is normal: the median (s), and the share (%) of times no longer than
+    /// `within`. A time that the run does not show counts as longer.
     #[must_use]
     pub fn normal_again(&self, within: TimeSpan) -> Option<[f64; 2]> {
         let soon = self.normal_after_s.iter().filter(|after| f64::from(**after) <= within.as_s()).count();
         Some([median(&self.normal_after_s)?, 100.0 * soon as f64 / self.normal_after_s.len() as f64])
     }
 
-    /// When the recommended odometer was farthest off.
+    /// The largest speed error of the recommended preset.
     #[must_use]
     pub const fn worst(&self) -> Option<WorstMoment> {
         self.worst
@@ -279,8 +285,7 @@ struct Moment {
     width: f32,
 }
 
-/// How long after each slip of both it took until the interval was normal again; infinite where the next slip or the stop
-/// came first and it was not.
+/// Time from each slip of both until the width is normal; infinite if the next slip or the end of the run comes first.
 fn back_to_normal(seen: &[Moment], normal: Option<f64>) -> Vec<f32> {
     let Some(normal) = normal else { return Vec::new() };
     let (mut both_since, mut waits_since) = (None, None);
@@ -292,7 +297,7 @@ fn back_to_normal(seen: &[Moment], normal: Option<f64>) -> Vec<f32> {
                 waits_since = None;
             }
             Phase::OneSlips => {
-                // One of them rolls: the next time both roll is what counts.
+                // Time counts from when both roll.
             }
             _ => {
                 if let Some(since) = both_since.take()

@@ -1,9 +1,10 @@
-//! How far a calibration agrees with what others measured of trains of the same number.
+//! Compares a calibration with published measurements of trains of the same number.
 //!
-//! Two teams met the same locomotive years apart, on other rails, with other wear. How much that alone moves a figure is
-//! read off the teams themselves: over all pairs of teams that measured the same step, the median of |ln(a/b)| is
-//! 0.6745 √2 s for a scatter s of one team. A median, because some published figures are slips. Ours is one team more, so a
-//! difference is expected to have σ² = 2 s² + u² + u'² with the doubt of both figures, relative to them.
+//! Two teams measured the same locomotive years apart, on other track, with other wear. The spread between teams is
+//! estimated from the teams themselves: over all pairs of teams that measured the same step, the median of |ln(a/b)| is
+//! 0.6745 √2 s for a spread s of one team. The median is robust against misprints in published figures. Our calibration
+//! counts as one more team, so that a difference should have σ² = 2 s² + u² + u'², with the relative uncertainties u
+//! and u' of both figures.
 
 use std::collections::BTreeMap;
 
@@ -13,41 +14,41 @@ use super::read::{CountedFrom, PublishedFigure, PublishedQuantity};
 use crate::findings::{Findings, TrainFindings};
 use crate::motion_file::MotionStepForm;
 
-/// The upper quartile of the standard normal distribution: half of all values lie within.
+/// The upper quartile of the standard normal distribution: half of all values lie within it.
 const QUARTILE: f64 = 0.674_489_750_196_081_7;
-/// Differences up to so many σ count as agreement: 95 of 100 when there is nothing but chance.
+/// The largest difference in σ that counts as agreement: 95 of 100 by chance alone.
 const AGREES_WITHIN: f64 = 2.0;
-/// Between the report of a contact and the command it releases pass up to two polls of 70 ms; a team that does not say
-/// from which of them it counts leaves this much time in doubt, one standard deviation (s).
+/// The uncertainty of a stopping distance whose origin is not stated, one standard deviation (s): up to two polls of 70
+/// ms pass between the report of a sensor and the command that it triggers.
 const NOT_STATED_S: f64 = 0.07;
 
 /// A published figure beside ours.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckedFigure {
-    /// What it is of.
+    /// The quantity.
     pub quantity: PublishedQuantity,
     /// The train.
     pub train: TrainId,
     /// The throttle step.
     pub step: SpeedStep,
-    /// From which side the team reached the step.
+    /// The side from which the team reached the step.
     pub approach: Approach,
-    /// Who published it.
+    /// The team.
     pub team: String,
-    /// When.
+    /// The year or term of publication.
     pub term: String,
-    /// The mean of what the team measured, in mm/s or mm.
+    /// The mean of the team's figures, in mm/s or mm.
     pub theirs: f64,
-    /// How many figures that is the mean of.
+    /// The number of figures in that mean.
     pub readings: usize,
-    /// Ours, and one standard deviation.
+    /// Our value and its standard deviation.
     pub ours: [f64; 2],
-    /// One standard deviation of the difference, relative to the figures.
+    /// The standard deviation of the difference, relative to the figures.
     pub sigma: f64,
 }
 
 impl CheckedFigure {
-    /// How much larger ours is, in percent of theirs.
+    /// Our value minus theirs, in percent of theirs.
     #[must_use]
     pub fn difference_percent(&self) -> f64 {
         100.0 * (self.ours[0] / self.theirs - 1.0)
@@ -66,32 +67,31 @@ impl CheckedFigure {
     }
 }
 
-/// One team as a whole.
+/// The comparison with one team.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TeamSummary {
-    /// Who.
+    /// The team.
     pub team: String,
-    /// Figures that have a counterpart among ours.
+    /// Figures with a counterpart in our calibration.
     pub compared: usize,
-    /// Those that agree.
+    /// Figures that agree.
     pub agree: usize,
-    /// The median of the differences, in percent of theirs.
+    /// The median difference, in percent of theirs.
     pub median_percent: f64,
 }
 
-/// All published figures that have a counterpart among ours.
+/// The comparison with all published figures.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CrossCheck {
     /// Speeds, by train, step and team.
     pub speeds: Vec<CheckedFigure>,
     /// Stopping distances.
     pub stops: Vec<CheckedFigure>,
-    /// How much one team's speeds scatter about what all found, one standard deviation (%); `None` where no two
-    /// teams measured the same.
+    /// The spread of one team's speeds, one standard deviation (%); `None` if no two teams measured the same step.
     pub speed_spread_percent: Option<f64>,
     /// The same for stopping distances.
     pub stop_spread_percent: Option<f64>,
-    /// Published figures, and those of them without a counterpart among ours.
+    /// The number of published figures, and of those without a counterpart in our calibration.
     pub without_counterpart: [usize; 2],
 }
 
@@ -101,19 +101,19 @@ pub struct CrossCheck {
 pub enum NothingToCompare {
     /// No two teams measured the same step of a train.
     #[error(
-        "no two teams have a figure of the same step of a train, so nothing tells how far teams differ; give the \
-         figures of more teams"
+        "no two teams measured the same step of a train, so that the spread between teams is unknown; give the \
+         tables of more teams"
     )]
     OneTeam,
-    /// None of the trains or steps is ours.
+    /// Our calibration has none of the trains or steps.
     #[error("none of the {figures} published figures is of a train and step that the recordings show")]
     NoCounterpart {
-        /// How many there are.
+        /// The number of published figures.
         figures: usize,
     },
 }
 
-/// What one team found of one step: the key of the grouping.
+/// One team's measurements of one step: the key of the grouping.
 type Key<'a> = (PublishedQuantity, TrainId, SpeedStep, Approach, &'a str, &'a str);
 
 impl CrossCheck {
@@ -166,7 +166,7 @@ impl CrossCheck {
         Ok(check)
     }
 
-    /// One line for each team of a selection, in the order of their names.
+    /// The summary of each team, in the order of their names.
     #[must_use]
     pub fn by_team(figures: &[CheckedFigure]) -> Vec<TeamSummary> {
         let mut teams: BTreeMap<&str, Vec<&CheckedFigure>> = BTreeMap::new();
@@ -184,10 +184,10 @@ impl CrossCheck {
     }
 }
 
-/// What each team found, one figure a team.
+/// One figure per team.
 type Found<'a> = Vec<(&'a str, f64)>;
 
-/// The scatter of one team about all, relative: see the head of this file.
+/// The relative spread of one team; see the head of this file.
 fn spread(teams: &BTreeMap<Key<'_>, Vec<f64>>, of: impl Fn(PublishedQuantity) -> bool) -> Option<f64> {
     let mut by_step: BTreeMap<(TrainId, SpeedStep, Approach), Found<'_>> = BTreeMap::new();
     for ((_, train, step, approach, team, _), values) in teams.iter().filter(|(key, _)| of(key.0)) {
@@ -200,7 +200,7 @@ fn spread(teams: &BTreeMap<Key<'_>, Vec<f64>>, of: impl Fn(PublishedQuantity) ->
             ratios.extend(others.map(|(_, other)| libm::log(value / other).abs()));
         }
     }
-    // Two teams that copied one figure would differ by nothing, and everything would be a disagreement.
+    // Two teams that copied one figure would have no spread, and every difference would be significant: ignore it.
     median(ratios).map(|ratio| ratio / (QUARTILE * std::f64::consts::SQRT_2)).filter(|spread| *spread > 0.0)
 }
 
@@ -214,14 +214,15 @@ fn checked(report: &Findings, key: &Key<'_>, values: &[f64], between: f64) -> Op
         }
         PublishedQuantity::Stop(counted) => {
             let own = our_step(form, step, approach, |own| own.stop.measurements > 0)?;
-            let doubt = if counted == CountedFrom::NotStated { NOT_STATED_S * own.speed.value } else { 0.0 };
-            ([own.stop.value, own.stop.uncertainty], doubt)
+            let origin_uncertainty =
+                if counted == CountedFrom::NotStated { NOT_STATED_S * own.speed.value } else { 0.0 };
+            ([own.stop.value, own.stop.uncertainty], origin_uncertainty)
         }
     };
     let theirs = mean(values);
     let squares: f64 = values.iter().map(|value| (value - theirs).powi(2)).sum();
     let count = values.len() as f64;
-    // The uncertainty of their mean, where they read more than once.
+    // The variance of their mean, if they published several figures.
     let their_variance = if values.len() > 1 { squares / (count - 1.0) / count } else { 0.0 };
     let [value, uncertainty] = ours;
     let variance = 2.0 * between * between
@@ -241,7 +242,7 @@ fn checked(report: &Findings, key: &Key<'_>, values: &[f64], between: f64) -> Op
     })
 }
 
-/// Our numbers of a step reached from the side that they reached it from; of one that is not known from either.
+/// Our value of a step reached from the same side; of either side if theirs is not stated.
 fn our_step(
     form: &TrainFindings,
     step: SpeedStep,
@@ -323,7 +324,7 @@ mod tests {
         let figures =
             [speed(8, 200.0, "a"), speed(8, 220.0, "b"), speed(9, 300.0, "a"), speed(9, 330.0, "b")];
         let check = CrossCheck::of(&ours(8, 210.0, 2.1), &figures).unwrap();
-        // then one team scatters by ln 1.1 / (0.6745 √2), and ours by 1 % more.
+        // then one team has a spread of ln 1.1 / (0.6745 √2), and our uncertainty is another 1 %.
         let spread = 1.1_f64.ln() / (0.674_49 * 2.0_f64.sqrt());
         assert!((check.speed_spread_percent.unwrap() - 100.0 * spread).abs() < 1e-3);
         let [first, second] = check.speeds.as_slice() else { panic!("{check:?}") };
@@ -334,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slip_of_the_pen_is_a_difference() {
+    fn a_misprint_is_a_difference() {
         // Given five teams within a few percent, and one that wrote a digit too many,
         let figures = [("a", 200.0), ("b", 210.0), ("c", 2000.0), ("d", 205.0), ("e", 208.0), ("f", 203.0)]
             .map(|(team, value)| speed(8, value, team));
@@ -351,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn without_others_or_a_train_of_ours_there_is_nothing_to_compare() {
+    fn one_team_or_foreign_trains_give_nothing_to_compare() {
         let one = [speed(8, 200.0, "a"), speed(9, 300.0, "a")];
         assert_eq!(CrossCheck::of(&ours(8, 1.0, 0.1), &one), Err(NothingToCompare::OneTeam));
         let two = [speed(8, 200.0, "a"), speed(8, 220.0, "b")];

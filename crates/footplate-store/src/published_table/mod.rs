@@ -1,4 +1,4 @@
-//! What others measured of trains of the same number, and how far we agree with them.
+//! Published measurements of trains of the same number, and the comparison with ours.
 
 mod cross_check;
 mod read;

@@ -1,4 +1,4 @@
-//! Reading a table of speeds or stopping distances that another team published.
+//! Reads a published table of speeds or stopping distances.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -8,21 +8,21 @@ use footplate_core::{Approach, SpeedStep, TrainId};
 
 use crate::table::{Column, Row, Table, TableError};
 
-/// Beyond what any model train does (mm/s, and mm of stopping distance): a unit was mistaken.
+/// The largest plausible figure (mm/s, or mm of stopping distance): beyond it a unit is wrong.
 const LARGEST_FIGURE: f64 = 100_000.0;
 
-/// From where a published stopping distance is counted.
+/// The origin of a published stopping distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum CountedFrom {
-    /// From the command to stop: the team took off the way run on before it.
+    /// The command to stop: the team subtracted the distance before it.
     Command,
-    /// From a light gate at which the command was sent.
+    /// The light gate at which the command was sent.
     Gate,
-    /// The team does not say: the command, or the contact whose report released it.
+    /// Not stated: the command, or the sensor whose report triggered it.
     NotStated,
 }
 
-/// What a published figure is of.
+/// The quantity of a published figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum PublishedQuantity {
     /// A steady speed, in mm/s.
@@ -34,30 +34,30 @@ pub enum PublishedQuantity {
 /// One figure as published.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PublishedFigure {
-    /// What it is of.
+    /// The quantity.
     pub quantity: PublishedQuantity,
     /// The train's number.
     pub train: TrainId,
     /// The throttle step.
     pub step: SpeedStep,
-    /// From which side the step was reached, where the team tells.
+    /// The side from which the step was reached, if stated.
     pub approach: Approach,
     /// The figure: mm/s for a speed, mm for a stop.
     pub value: f64,
-    /// Who published it.
+    /// The team.
     pub team: String,
-    /// When, as the team counts: a year or a term.
+    /// The year or term of publication.
     pub term: String,
 }
 
-/// Why a table of published figures could not be read.
+/// A published table that could not be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PublishedTableError {
-    /// A line or a field is wrong.
+    /// A line or a field is invalid.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// The columns are those of no published table.
+    /// The columns are not those of a published table.
     #[error(
         "{file}, line {line}: a table of speeds has the columns train, step, approach, speed_mm_s, team and term; one \
          of stops has train, step, approach, distance_mm, counted_from, team and term"
@@ -68,7 +68,7 @@ pub enum PublishedTableError {
         /// The line of the header.
         line: u64,
     },
-    /// A table without a row.
+    /// The table has no rows.
     #[error("{file}: the table has no row below its header")]
     NoRow {
         /// The file.
@@ -76,7 +76,7 @@ pub enum PublishedTableError {
     },
 }
 
-/// Reads a table of speeds or one of stops, which its columns tell; other columns may stand beside.
+/// Reads a table of speeds or of stops, recognised by its columns; other columns are ignored.
 ///
 /// # Errors
 /// [`PublishedTableError`] with file, line and column.
@@ -113,7 +113,7 @@ fn figure(
         None => PublishedQuantity::Speed,
         Some(column) => PublishedQuantity::Stop(row.read(
             column,
-            "command, gate, or nothing where the team does not say",
+            "command, gate, or empty if the team does not state it",
             counted,
         )?),
     };
@@ -126,7 +126,7 @@ fn figure(
         step: row.read(step, "a throttle step from 1", |text| {
             text.parse().ok().and_then(SpeedStep::new).filter(|step| *step > SpeedStep::STAND)
         })?,
-        approach: row.read(approach, "below, above, or nothing where the team does not say", |text| {
+        approach: row.read(approach, "below, above, or empty if the team does not state it", |text| {
             match text {
                 "below" => Some(Approach::Below),
                 "above" => Some(Approach::Above),
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn speeds_and_stops_are_told_by_their_columns() {
+    fn tables_are_recognised_by_their_columns() {
         let speeds = read(&format!("{SPEEDS}24,14,above,557.5,someone,2018\n")).unwrap();
         let [speed] = speeds.as_slice() else { panic!("{speeds:?}") };
         assert_eq!((speed.quantity, speed.train), (PublishedQuantity::Speed, TrainId(24)));
@@ -177,8 +177,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_place() {
-        for (text, told) in [
+    fn errors_name_their_place() {
+        for (text, expected) in [
             ("", "is empty"),
             (SPEEDS, "no row"),
             ("train,step,speed\n1,2,3\n", "speed_mm_s"),
@@ -192,7 +192,7 @@ mod tests {
             (&format!("{SPEEDS}1,1,,1\n"), "4 fields"),
         ] {
             let error = read(text).unwrap_err().to_string();
-            assert!(error.contains(told), "{text:?}: {error}");
+            assert!(error.contains(expected), "{text:?}: {error}");
         }
     }
 }

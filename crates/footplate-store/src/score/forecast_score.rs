@@ -1,38 +1,37 @@
-//! The figures of one forecaster over a selection of hits.
+//! The error statistics of one forecaster over a selection of detections.
 
-use footplate_core::TimeSpan;
+use footplate_core::{HALF_95, TimeSpan};
 
-use super::coverage::Coverage;
-use super::rival::Rival;
+use super::comparison::ReferenceForecaster;
 use super::scored_hit::ScoredHit;
 
 /// The levels of the intervals whose coverage is counted.
 pub const LEVELS: [f64; 3] = [0.5, 0.9, 0.99];
 
-/// How far forecasts were off. `None` where nothing was scored.
+/// Error statistics of forecasts. `None` if nothing was scored.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ForecastScore {
-    /// Passages in the selection.
+    /// Detections in the selection.
     pub hits: usize,
-    /// Those that there was a forecast for; the first of a run and steps never met before have none.
+    /// Detections with a forecast; the first of a run and those at new steps have none.
     pub scored: usize,
-    /// Median distance off, in mm.
+    /// Median absolute error, in mm.
     pub median_abs_mm: Option<f64>,
-    /// What nine in ten forecasts are at most off, in mm.
+    /// 90 % quantile of the absolute error, in mm.
     pub p90_abs_mm: Option<f64>,
-    /// Median time off, in ms.
+    /// Median absolute error, in ms.
     pub median_abs_ms: Option<f64>,
-    /// Mean distance off, in mm. Where reports come in steps of a poll, a median can be next to nothing while
-    /// every third forecast is a whole step off; the mean counts those, too.
+    /// Mean absolute error, in mm. Reports are quantised by polls: the median may be near zero while every third
+    /// forecast is wrong by a whole poll. The mean includes those.
     pub mean_abs_mm: Option<f64>,
-    /// Mean distance off with its sign, in mm: positive when trains come later than forecast.
+    /// Mean error, in mm: positive if trains are later than forecast.
     pub bias_mm: Option<f64>,
-    /// How often the stated intervals held, in the order of [`LEVELS`]; `None` for forecasts without intervals.
+    /// Coverage of the stated intervals, in the order of [`LEVELS`]; `None` for forecasts without intervals.
     pub coverage: Option<[Coverage; LEVELS.len()]>,
 }
 
 impl ForecastScore {
-    /// Our figures.
+    /// The score of our estimator.
     #[must_use]
     pub fn of<'a>(hits: impl Iterator<Item = &'a ScoredHit> + Clone) -> Self {
         let levels: Vec<f64> = hits.clone().filter_map(ScoredHit::level).collect();
@@ -47,16 +46,22 @@ impl ForecastScore {
         }
     }
 
-    /// A rival's figures, over the hits that we forecast and it did, too.
+    /// The score of a reference, over the detections that both forecast.
     #[must_use]
-    pub fn of_rival<'a>(hits: impl Iterator<Item = &'a ScoredHit> + Clone, rival: Rival) -> Self {
-        Self::of_errors(hits, |hit| hit.late_by(rival))
+    pub fn of_reference<'a>(
+        hits: impl Iterator<Item = &'a ScoredHit> + Clone,
+        reference: ReferenceForecaster,
+    ) -> Self {
+        Self::of_errors(hits, |hit| hit.late_by(reference))
     }
 
-    /// Our figures over the hits that a rival forecast, too.
+    /// The score of our estimator over the detections that a reference forecast, too.
     #[must_use]
-    pub fn of_us_beside<'a>(hits: impl Iterator<Item = &'a ScoredHit> + Clone, rival: Rival) -> Self {
-        Self::of(hits.filter(move |hit| hit.late_by(rival).is_some()))
+    pub fn of_ours_beside<'a>(
+        hits: impl Iterator<Item = &'a ScoredHit> + Clone,
+        reference: ReferenceForecaster,
+    ) -> Self {
+        Self::of(hits.filter(move |hit| hit.late_by(reference).is_some()))
     }
 
     fn of_errors<'a>(
@@ -64,26 +69,26 @@ impl ForecastScore {
         late: impl Fn(&ScoredHit) -> Option<TimeSpan>,
     ) -> Self {
         let mut count = 0;
-        let (mut way, mut time, mut sum) = (Vec::new(), Vec::new(), 0.0);
+        let (mut distances, mut times, mut sum) = (Vec::new(), Vec::new(), 0.0);
         for hit in hits {
             count += 1;
-            let Some((late, mm)) = late(hit).and_then(|late| Some((late, hit.way_mm(late)?))) else {
+            let Some((late, mm)) = late(hit).and_then(|late| Some((late, hit.distance_mm(late)?))) else {
                 continue;
             };
             sum += mm;
-            way.push(mm.abs());
-            time.push(late.abs().as_ms());
+            distances.push(mm.abs());
+            times.push(late.abs().as_ms());
         }
-        let mean = |sum: f64| (!way.is_empty()).then(|| sum / way.len() as f64);
-        let (bias_mm, mean_abs_mm) = (mean(sum), mean(way.iter().sum()));
-        way.sort_by(f64::total_cmp);
-        time.sort_by(f64::total_cmp);
+        let mean = |sum: f64| (!distances.is_empty()).then(|| sum / distances.len() as f64);
+        let (bias_mm, mean_abs_mm) = (mean(sum), mean(distances.iter().sum()));
+        distances.sort_by(f64::total_cmp);
+        times.sort_by(f64::total_cmp);
         Self {
             hits: count,
-            scored: way.len(),
-            median_abs_mm: quantile(&way, 0.5),
-            p90_abs_mm: quantile(&way, 0.9),
-            median_abs_ms: quantile(&time, 0.5),
+            scored: distances.len(),
+            median_abs_mm: quantile(&distances, 0.5),
+            p90_abs_mm: quantile(&distances, 0.9),
+            median_abs_ms: quantile(&times, 0.5),
             mean_abs_mm,
             bias_mm,
             coverage: None,
@@ -98,6 +103,35 @@ fn quantile(sorted: &[f64], part: f64) -> Option<f64> {
     Some(low + (high - low) * place.fract())
 }
 
+/// A count of reports inside intervals of one level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coverage {
+    /// The stated probability of the intervals, 0 to 1.
+    pub level: f64,
+    /// Reports inside.
+    pub inside: usize,
+    /// All reports, at least one.
+    pub of: usize,
+}
+
+impl Coverage {
+    /// The share inside.
+    #[must_use]
+    pub fn fraction(self) -> f64 {
+        self.inside as f64 / self.of as f64
+    }
+
+    /// The 95 % interval of the true probability: the score interval (Wilson, 1927), which remains valid for small
+    /// counts and near 0 and 1, unlike the normal approximation.
+    #[must_use]
+    pub fn plausible(self) -> (f64, f64) {
+        let (n, p, z) = (self.of as f64, self.fraction(), HALF_95);
+        let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
+        let half = z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
+        ((middle - half).max(0.0), (middle + half).min(1.0))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use footplate_core::link::{ContactWindow, UniformNormal};
@@ -107,8 +141,8 @@ mod tests {
 
     use super::*;
 
-    /// A hit at 10 s that we expected `late_ms` earlier at 400 mm/s, evenly within ±50 ms, and that the last lap
-    /// expected at 9.9 s.
+    /// A detection at 10 s that we forecast `late_ms` earlier at 400 mm/s, uniformly within ±50 ms, and that the last
+    /// lap forecast at 9.9 s.
     fn hit(late_ms: Option<i64>) -> ScoredHit {
         let sensor = SensorId(0);
         let until = Timestamp::from_s(10.0);
@@ -128,19 +162,19 @@ mod tests {
             drive: Drive { step: SpeedStep::STAND, from: SpeedStep::STAND, commanded: None },
             entry: 0,
         };
-        let mut rivals = [None; Rival::ALL.len()];
-        rivals[Rival::LastLap as usize] = Some(until - TimeSpan::from_ms(100));
+        let mut references = [None; ReferenceForecaster::ALL.len()];
+        references[ReferenceForecaster::LastLap as usize] = Some(until - TimeSpan::from_ms(100));
         let forecast = late_ms.map(forecast);
         let hit = Hit { passage, forecast, named: None, verdict: Verdict::Learnt, drift: None };
-        ScoredHit { run: RunId(1), line: 1, train: TrainId(1), hit, rivals }
+        ScoredHit { run: RunId(1), line: 1, train: TrainId(1), hit, references }
     }
 
     #[test]
-    fn the_figures_are_those_worked_out_by_hand() {
-        // Given reports 5 ms early and 10, 20, 30, 60 ms late, and one that nobody expected,
+    fn scores_match_a_hand_calculation() {
+        // Given reports 5 ms early and 10, 20, 30, 60 ms late, and one without a forecast,
         let hits = [Some(-5), Some(10), Some(20), Some(30), Some(60), None].map(hit);
         let score = ForecastScore::of(hits.iter());
-        // then at 400 mm/s they are off by 2, 4, 8, 12 and 24 mm.
+        // then at 400 mm/s the errors are 2, 4, 8, 12 and 24 mm.
         assert_eq!((score.hits, score.scored), (6, 5));
         let close = |found: Option<f64>, right: f64| (found.unwrap() - right).abs() < 1e-9;
         assert!(close(score.median_abs_mm, 8.0) && close(score.median_abs_ms, 20.0));
@@ -153,13 +187,13 @@ mod tests {
     }
 
     #[test]
-    fn a_rival_is_measured_where_we_are_and_at_our_speed() {
+    fn a_reference_is_scored_on_common_detections() {
         let hits = [Some(10), None].map(hit);
-        let rival = ForecastScore::of_rival(hits.iter(), Rival::LastLap);
-        assert_eq!((rival.hits, rival.scored, rival.coverage), (2, 1, None));
-        assert!((rival.median_abs_mm.unwrap() - 40.0).abs() < 1e-9);
-        assert_eq!(ForecastScore::of_us_beside(hits.iter(), Rival::Oracle).scored, 0);
-        assert_eq!(ForecastScore::of_us_beside(hits.iter(), Rival::LastLap).scored, 1);
+        let reference = ForecastScore::of_reference(hits.iter(), ReferenceForecaster::LastLap);
+        assert_eq!((reference.hits, reference.scored, reference.coverage), (2, 1, None));
+        assert!((reference.median_abs_mm.unwrap() - 40.0).abs() < 1e-9);
+        assert_eq!(ForecastScore::of_ours_beside(hits.iter(), ReferenceForecaster::Oracle).scored, 0);
+        assert_eq!(ForecastScore::of_ours_beside(hits.iter(), ReferenceForecaster::LastLap).scored, 1);
     }
 
     #[test]
@@ -177,5 +211,17 @@ mod tests {
         // 0.9 · 10 = place 9 of eleven.
         let eleven: Vec<f64> = (0..11).map(f64::from).collect();
         assert_eq!(quantile(&eleven, 0.9), Some(9.0));
+    }
+
+    #[test]
+    fn the_interval_is_wilsons() {
+        // Newcombe (1998), table I: 81 of 263 gives 0.2553 to 0.3662, 15 of 148 gives 0.0624 to 0.1605,
+        // 0 of 20 gives 0 to 0.1611.
+        for (inside, of, low, high) in
+            [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611)]
+        {
+            let (found_low, found_high) = Coverage { level: 0.5, inside, of }.plausible();
+            assert!((found_low - low).abs() < 5e-5 && (found_high - high).abs() < 5e-5, "{inside} of {of}");
+        }
     }
 }

@@ -1,10 +1,9 @@
-//! Light gates against the estimator: a truth that it never sees.
+//! Compares the estimator with light gates, which it never sees.
 //!
-//! Two gates stand [`GATE_DISTANCE`] apart somewhere on the loop; their clock is tied to nothing, so each pair
-//! of passes gives one speed, and the pairs of a run belong to its laps in their order. Where on the loop they
-//! stand is not recorded, so they are compared with what the estimator held for the speed of the run at the end
-//! of the same lap: what is left holds the gates' own resolution and how much faster or slower than on average
-//! the train is at that place.
+//! Two gates are [`GATE_DISTANCE`] apart somewhere on the loop. Their clock is not synchronised, so each pair of passes
+//! gives one speed, and the pairs of a run belong to its laps in order. Their place on the loop is not recorded; each
+//! speed is therefore compared with the estimated speed of the run at the end of the same lap. The difference includes
+//! the resolution of the gates and the deviation of the local speed from the lap's mean.
 
 use std::collections::BTreeMap;
 
@@ -12,9 +11,9 @@ use footplate_core::{Estimate, Length, NodeId, RunId, Speed, SpeedStep, TimeSpan
 
 use crate::recording::{GatePass, Run};
 
-/// From one gate to the other, as the team that set them up states it.
+/// The distance between the gates, as stated by the team that installed them.
 pub const GATE_DISTANCE: Length = Length::from_mm(20.0);
-/// The unit in which the gates' clock counts.
+/// The resolution of the gates' clock.
 pub const GATE_TICK: TimeSpan = TimeSpan::from_ms(1);
 
 /// A pair of gate passes beside the estimate of its lap.
@@ -26,32 +25,32 @@ pub struct GateCheck {
     pub line: u64,
     /// The train.
     pub train: TrainId,
-    /// The step it ran at.
+    /// Its step.
     pub step: SpeedStep,
     /// The lap, counted from 1.
     pub lap: usize,
     /// Speed between the gates.
     pub spot: Speed,
-    /// One standard deviation of `spot` from the resolution of the gates' clock alone.
+    /// The standard deviation of `spot` from the resolution of the gates' clock alone.
     pub resolution: Speed,
-    /// What the estimator held for the train's speed at the end of the lap.
+    /// The estimated speed of the train at the end of the lap.
     pub estimated: Estimate<Speed>,
 }
 
 impl GateCheck {
-    /// How much faster than the gates say the estimate is.
+    /// The estimated speed minus the speed between the gates.
     #[must_use]
     pub fn excess(&self) -> Speed {
         self.estimated.value - self.spot
     }
 }
 
-/// Many checks in five figures.
+/// The statistics of many checks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GateAgreement {
     /// Pairs.
     pub count: usize,
-    /// Mean excess of the estimates over the gates, in mm/s and as a part of the speed.
+    /// Mean excess of the estimates over the gates, in mm/s.
     pub bias_mm_per_s: f64,
     /// The same, as a part of the speed.
     pub bias: f64,
@@ -59,18 +58,18 @@ pub struct GateAgreement {
     pub spread_mm_per_s: f64,
     /// The same, as a part of the speed.
     pub spread: f64,
-    /// The same about the mean of each train and step, in mm/s; `None` where none has two pairs.
+    /// The same about the mean of each train and step, in mm/s; `None` if none has two pairs.
     pub spread_within_mm_per_s: Option<f64>,
     /// The same, as a part of the speed.
     pub spread_within: Option<f64>,
-    /// The spread that the resolution of the gates' clock alone makes, in mm/s (root mean square).
+    /// The part of the spread that the resolution of the gates' clock explains, in mm/s (root mean square).
     pub resolution_mm_per_s: f64,
     /// The same, as a part of the speed.
     pub resolution: f64,
 }
 
 impl GateAgreement {
-    /// Sums up; `None` without a check.
+    /// The statistics of all checks; `None` without a check.
     #[must_use]
     pub fn of<'a>(checks: impl Iterator<Item = &'a GateCheck>) -> Option<Self> {
         let checks: Vec<&GateCheck> = checks.collect();
@@ -93,7 +92,7 @@ impl GateAgreement {
 }
 
 impl GateAgreement {
-    /// Sums up train by train.
+    /// The statistics of each train.
     #[must_use]
     pub fn by_train<'a>(checks: impl Iterator<Item = &'a GateCheck>) -> BTreeMap<TrainId, Self> {
         let mut trains: BTreeMap<TrainId, Vec<&GateCheck>> = BTreeMap::new();
@@ -132,7 +131,7 @@ fn root_mean_square(values: &[f64]) -> f64 {
     (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// What the estimator held for the speed at the end of each lap of a run.
+/// The estimated speed at the end of each lap of a run.
 #[derive(Debug, Default)]
 pub(super) struct LapSpeeds {
     first: Option<NodeId>,
@@ -141,7 +140,7 @@ pub(super) struct LapSpeeds {
 }
 
 impl LapSpeeds {
-    /// A passage, and the estimate after it.
+    /// Takes in a passage and the estimate after it.
     pub(super) fn take(&mut self, node: NodeId, speed: Option<Estimate<Speed>>) {
         self.latest = speed.or(self.latest);
         match self.first {
@@ -151,14 +150,13 @@ impl LapSpeeds {
         }
     }
 
-    /// The pairs of gate passes of the run beside the estimates of their laps; the last lap, which no return to
-    /// its beginning ends, ends with the run.
+    /// The gate checks of the run; an incomplete last lap ends with the run.
     pub(super) fn checks(&self, run: &Run, train: TrainId, step: SpeedStep) -> Vec<GateCheck> {
         let mut checks = Vec::new();
         for (place, (second, took)) in pairs(&run.gates).enumerate() {
             let Some(estimated) = self.laps.get(place).copied().or(self.latest) else { continue };
             let spot = GATE_DISTANCE / took;
-            // Each stamp is off by up to half a tick, evenly: tick/√12, and √2 times that for a difference.
+            // Each time stamp has a uniform error of ± half a tick: tick/√12, and √2 times that for a difference.
             let resolution = spot * (GATE_TICK.as_s() / took.as_s() / 6.0_f64.sqrt());
             let (run, line, lap) = (run.id, second.line, place + 1);
             checks.push(GateCheck { run, line, train, step, lap, spot, resolution, estimated });
@@ -167,7 +165,7 @@ impl LapSpeeds {
     }
 }
 
-/// The second pass of every pair, and the time between the two.
+/// The second pass of every pair, and the time between both.
 fn pairs(gates: &[GatePass]) -> impl Iterator<Item = (GatePass, TimeSpan)> {
     gates.chunks_exact(2).filter_map(|pair| {
         let [first, second] = pair else { return None };

@@ -1,15 +1,15 @@
-//! Two forecasters that know the whole recording beforehand: what is left to gain by learning faster.
+//! Two forecasters that know the whole recording in advance: the gain that faster learning could still bring.
 //!
-//! The recording is walked once to learn the motion model of each train with the lengths of its sections, the scatter of
-//! sensors and the rhythm of the polls; its end, and the first and the last report of every stretch at a settled speed, give
-//! the mean speed of that stretch. What was found is then taken for certain:
-//! - the *oracle* is our own estimator, walking the recording again with all of that. What it still misses is
-//!   the poll, the scatter of contacts and what one speed a run does not explain;
-//! - the *hindsight table* expects the report at `last report + length / speed`, as tables do, but with the
+//! The recording is walked once to learn the motion model of each train with path lengths, the scatter of sensors and
+//! the polling. The first and the last report of every stretch at steady speed give the mean speed of that stretch.
+//! These values are then treated as exact:
+//! - the *oracle* is our own estimator, which walks the recording again with all of them. Its remaining errors are the
+//!   poll, the scatter of detections and speed changes within a run;
+//! - the *hindsight table* forecasts the report at `last report + length / speed`, as tables do, but with the path
 //!   length of the section and the speed of the run itself.
 //!
-//! Both are fitted to the very hits that they forecast, so short recordings flatter them: a run of ten hits has
-//! one speed and a part of ten lengths of its own.
+//! Both are fitted to the detections that they forecast, so that short recordings flatter them: a run of ten detections
+//! has one speed and a part of ten lengths of its own.
 
 use footplate_core::model::Drive;
 use footplate_core::model::MotionModel;
@@ -21,7 +21,7 @@ use footplate_core::{Length, Speed, SpeedStep, TimeSpan, Timestamp};
 use super::replay::{ReplayContext, ReplayError, replay_run};
 use crate::recording::Run;
 
-/// When a report was to be expected, in hindsight.
+/// The forecasts of a report in hindsight.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Hindsight {
     /// By the oracle.
@@ -30,7 +30,7 @@ pub(super) struct Hindsight {
     pub(super) table: Option<Timestamp>,
 }
 
-/// What each passage of each run was to be expected at, in order. `before` is the estimator as it was.
+/// The forecasts in hindsight for each passage of each run, in order. `before` is the estimator before the recording.
 pub(super) fn hindsight(
     context: ReplayContext<'_>,
     runs: &[&Run],
@@ -49,7 +49,7 @@ pub(super) fn hindsight(
     for (run, hits) in runs.iter().zip(&walks) {
         let model = run.only_train().and_then(|ran| models.iter().find(|model| model.train() == ran.train));
         let mut times = model
-            .map_or_else(Vec::new, |model| tell_speeds(context.layout, &mut predictor, model.clone(), hits));
+            .map_or_else(Vec::new, |model| give_speeds(context.layout, &mut predictor, model.clone(), hits));
         let mut place = times.iter_mut();
         replay_run(context, run, &mut predictor, |_, hit, _| {
             if let Some(time) = place.next() {
@@ -61,8 +61,8 @@ pub(super) fn hindsight(
     Ok(expected)
 }
 
-/// Tells a train the speeds of one run, and says what a table with them expects.
-fn tell_speeds(
+/// Gives a train the true mean speeds of one run; returns the forecasts of a table with them.
+fn give_speeds(
     layout: &Layout,
     predictor: &mut Predictor,
     mut model: MotionModel,
@@ -88,18 +88,18 @@ fn tell_speeds(
     times
 }
 
-/// The passages that follow one another at a settled speed under one command; every passage is in one stretch.
+/// Groups consecutive passages at a steady speed under one command; every passage is in one group.
 fn stretches(hits: &[Hit]) -> impl Iterator<Item = &[Hit]> {
-    hits.chunk_by(|one, next| one.passage.drive == next.passage.drive && runs_on(next))
+    hits.chunk_by(|one, next| one.passage.drive == next.passage.drive && is_steady(next))
 }
 
-/// Whether the train came to a contact from the one before at a settled speed.
-fn runs_on(hit: &Hit) -> bool {
-    let settled = hit.forecast.is_none_or(|forecast| forecast.phase != Phase::Change);
-    settled && hit.passage.way.is_some()
+/// Whether the train ran at a steady speed from the sensor before.
+fn is_steady(hit: &Hit) -> bool {
+    let is_steady = hit.forecast.is_none_or(|forecast| forecast.phase != Phase::Change);
+    is_steady && hit.passage.way.is_some()
 }
 
-/// Distance over time from the first to the last passage of a stretch.
+/// Distance over time from the first to the last passage of a group.
 fn mean_speed(stretch: &[Hit], length: impl Fn(&Hit) -> Length) -> Option<(Drive, Speed)> {
     let [first, rest @ ..] = stretch else { return None };
     let last = rest.last()?;
@@ -110,9 +110,9 @@ fn mean_speed(stretch: &[Hit], length: impl Fn(&Hit) -> Length) -> Option<(Drive
     is_running.then(|| (drive, distance / time))
 }
 
-/// The length of the path that led to a passage as the train knows it in the end.
+/// The path length before a passage, as learnt from the whole recording.
 fn length(layout: &Layout, hit: &Hit, sections: &SectionIndex, model: &MotionModel) -> Length {
-    let Some(way) = hit.passage.way else { return Length::ZERO };
-    let hops = way.hops().iter().filter_map(|hop| layout.hop(*hop));
+    let Some(path) = hit.passage.way else { return Length::ZERO };
+    let hops = path.hops().iter().filter_map(|hop| layout.hop(*hop));
     hops.map(|hop| model.length(sections, &hop)[0]).sum()
 }

@@ -1,4 +1,4 @@
-//! Walking a recorded run through the estimator, entry by entry.
+//! Feeds a recorded run to the estimator, event by event.
 
 use footplate_core::track::{Layout, Leg};
 use footplate_core::tracking::{Hit, Predictor};
@@ -6,22 +6,22 @@ use footplate_core::{Event, EventKind, RunId, Timestamp, TrainId, TurnoutId};
 
 use crate::recording::{RawEvent, Run};
 
-/// What a recording is walked on.
+/// The layout and the turnout positions of a recording.
 #[derive(Debug, Clone, Copy)]
 pub struct ReplayContext<'a> {
     /// Its layout.
     pub layout: &'a Layout,
-    /// How turnouts lay when each run began, as far as that is known; a run may tell more.
+    /// The known turnout positions at the beginning of each run; events of a run may change them.
     pub turnouts: &'a [(TurnoutId, Leg)],
 }
 
-/// Why a run cannot be walked.
+/// A run that cannot be replayed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReplayError {
-    /// Reports do not say which train made them.
+    /// Several trains run, and reports do not name the train.
     #[error(
-        "run {run}: trains {} run at once, and no report says which of them made it; record one train a run",
+        "run {run}: trains {} run at once, and reports do not name the train; record one train per run",
         listed(trains)
     )]
     ManyTrains {
@@ -30,7 +30,7 @@ pub enum ReplayError {
         /// Its trains.
         trains: Vec<TrainId>,
     },
-    /// Nothing in the run says which train ran.
+    /// No row names the train.
     #[error(
         "run {run}: no row names a train; begin it with a `running` row that names the train and its step"
     )]
@@ -44,11 +44,11 @@ fn listed(trains: &[TrainId]) -> String {
     trains.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// Walks one run in the order of time and calls `see` for every passage of a contact, with the entry that
-/// reported it and the estimator as it is then.
+/// Feeds one run to the estimator in the order of time and calls `see` for every passage of a sensor, with the event
+/// that reported it and the estimator after it.
 ///
 /// # Errors
-/// [`ReplayError`] before the first entry; the estimator is as it was.
+/// [`ReplayError`] before the first event; the estimator is unchanged.
 pub fn replay_run(
     context: ReplayContext<'_>,
     run: &Run,

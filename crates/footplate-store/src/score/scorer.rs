@@ -1,4 +1,4 @@
-//! Walks a recording once with everybody side by side.
+//! Scores a recording with all forecasters side by side.
 
 use footplate_core::TrainId;
 use footplate_core::track::Layout;
@@ -12,17 +12,17 @@ use super::replay::{ReplayContext, ReplayError, replay_run};
 use super::scored_hit::ScoredHit;
 use crate::recording::{Recording, Run};
 
-/// What is known before a recording, and after it.
+/// The state of all forecasters before a recording, and after it.
 #[derive(Debug, Clone)]
-pub struct Knowledge {
-    /// By our estimator.
+pub struct Forecasters {
+    /// Our estimator.
     pub predictor: Predictor,
-    /// By the baselines.
+    /// The baselines.
     pub baselines: Baselines,
 }
 
-impl Knowledge {
-    /// Of trains nothing, of the railway its layout.
+impl Forecasters {
+    /// Forecasters that know the layout, but no train.
     #[must_use]
     pub fn of_layout(layout: &Layout) -> Self {
         Self { predictor: Predictor::new(layout), baselines: Baselines::default() }
@@ -32,18 +32,18 @@ impl Knowledge {
 /// A recording with its scores.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScoredRecording {
-    /// What the recording is called.
+    /// The name of the recording.
     pub name: String,
-    /// Runs that were walked.
+    /// Runs that were scored.
     pub runs: usize,
-    /// Every passage of a contact, in order.
+    /// Every passage of a sensor, in order.
     pub hits: Vec<ScoredHit>,
-    /// Every pair of gate passes that an estimate stands beside.
+    /// Every pair of gate passes with an estimate.
     pub gates: Vec<GateCheck>,
 }
 
 impl ScoredRecording {
-    /// The trains that ran, in the order of their numbers.
+    /// The trains that ran, by number.
     #[must_use]
     pub fn trains(&self) -> Vec<TrainId> {
         let mut trains: Vec<TrainId> = self.hits.iter().map(|hit| hit.train).collect();
@@ -52,26 +52,26 @@ impl ScoredRecording {
         trains
     }
 
-    /// The figures over all of it.
+    /// The comparison over all of it.
     #[must_use]
     pub fn comparison(&self) -> Comparison {
         Comparison::of(self.hits.iter())
     }
 }
 
-/// Scores a recording, or the runs of one train in it, and leaves `knowledge` with what it taught.
+/// Scores a recording, or the runs of one train in it; afterwards `forecasters` have learnt from it.
 ///
 /// # Errors
-/// [`ReplayError`] for the first run that cannot be walked; `knowledge` is then as it was after the run before.
+/// [`ReplayError`] for the first run that cannot be replayed; `forecasters` are then as after the run before.
 pub fn score_recording(
     context: ReplayContext<'_>,
     recording: &Recording,
     only: Option<TrainId>,
-    knowledge: &mut Knowledge,
+    forecasters: &mut Forecasters,
 ) -> Result<ScoredRecording, ReplayError> {
     let wanted = |run: &&Run| only.is_none() || run.only_train().is_none_or(|run| Some(run.train) == only);
     let runs: Vec<&Run> = recording.runs.iter().filter(wanted).collect();
-    let expected = hindsight(context, &runs, &knowledge.predictor)?;
+    let expected = hindsight(context, &runs, &forecasters.predictor)?;
     let mut scored = ScoredRecording {
         name: recording.name.clone(),
         runs: runs.len(),
@@ -79,7 +79,7 @@ pub fn score_recording(
         gates: Vec::new(),
     };
     for (run, hindsight) in runs.into_iter().zip(expected) {
-        score_run(context, run, &hindsight, knowledge, &mut scored)?;
+        score_run(context, run, &hindsight, forecasters, &mut scored)?;
     }
     Ok(scored)
 }
@@ -88,10 +88,10 @@ fn score_run(
     context: ReplayContext<'_>,
     run: &Run,
     hindsight: &[Hindsight],
-    knowledge: &mut Knowledge,
+    forecasters: &mut Forecasters,
     scored: &mut ScoredRecording,
 ) -> Result<(), ReplayError> {
-    let Knowledge { predictor, baselines } = knowledge;
+    let Forecasters { predictor, baselines } = forecasters;
     let Some(at_start) = run.only_train() else { return Ok(()) };
     let train = at_start.train;
     let (mut laps, mut hindsight) = (LapSpeeds::default(), hindsight.iter());
@@ -100,8 +100,8 @@ fn score_run(
         let [table, slow, middle, fast, lap] = baselines.take(train, &hit);
         let Hindsight { oracle, table: hindsight_table } = hindsight.next().copied().unwrap_or_default();
         let at_poll = hit.forecast.map(|forecast| forecast.report);
-        let rivals = [at_poll, oracle, hindsight_table, table, slow, middle, fast, lap];
-        scored.hits.push(ScoredHit { run: run.id, line: raw.line, train, hit, rivals });
+        let references = [at_poll, oracle, hindsight_table, table, slow, middle, fast, lap];
+        scored.hits.push(ScoredHit { run: run.id, line: raw.line, train, hit, references });
         let speed = predictor.train(train).and_then(TrainForecaster::running_speed);
         laps.take(hit.passage.node, speed);
     })?;

@@ -1,10 +1,10 @@
 //! An exponentially weighted mean in integers: α = 2⁻ᵏ is a shift.
 //!
-//! mean ← mean + (x − mean)·2⁻ᵏ. The sum carries `k` more binary digits than the values, so nothing is lost to rounding
-//! and the mean reaches a constant input exactly. A small α tunes, a large one learns anew; the motion filter chooses its
-//! gain from stated noise instead, and both are shown side by side.
+//! mean ← mean + (x − mean)·2⁻ᵏ. The sum carries `k` more binary digits than the values: no rounding error accumulates,
+//! and the mean reaches a constant input exactly. A small α smooths, a large one adapts; the motion filter derives its
+//! gain from stated noise instead, and the score shows both.
 
-/// Mean of a stream of integers (say, micrometres per second or microseconds).
+/// The mean of a stream of integers (such as µm/s or µs).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ShiftAverage {
     shift: u32,
@@ -13,12 +13,12 @@ pub(super) struct ShiftAverage {
 }
 
 impl ShiftAverage {
-    /// The largest k: 2⁻¹⁶ forgets over 65 000 values.
+    /// The largest k: 2⁻¹⁶ averages over 65 000 values.
     const LARGEST_SHIFT: u32 = 16;
-    /// Values beyond ±2⁴⁶ are held at it, so that 16 more digits fit 63 bits.
+    /// Values are limited to ±2⁴⁶, so that 16 more digits fit into 63 bits.
     const LARGEST_VALUE: i64 = 1 << 46;
 
-    /// With α = 2⁻ˢʰⁱᶠᵗ; a larger shift than [`LARGEST_SHIFT`](Self::LARGEST_SHIFT) is held at it.
+    /// A mean with α = 2⁻ˢʰⁱᶠᵗ; shifts are limited to [`LARGEST_SHIFT`](Self::LARGEST_SHIFT).
     #[must_use]
     pub(super) const fn new(shift: u32) -> Self {
         let shift = if shift > Self::LARGEST_SHIFT { Self::LARGEST_SHIFT } else { shift };
@@ -27,7 +27,7 @@ impl ShiftAverage {
 
     /// Takes in one value.
     pub(super) const fn take(&mut self, value: i64) {
-        let held = if value > Self::LARGEST_VALUE {
+        let limited = if value > Self::LARGEST_VALUE {
             Self::LARGEST_VALUE
         } else if value < -Self::LARGEST_VALUE {
             -Self::LARGEST_VALUE
@@ -35,9 +35,9 @@ impl ShiftAverage {
             value
         };
         match self.scaled_mean {
-            None => self.scaled_mean = Some(held << self.shift),
+            None => self.scaled_mean = Some(limited << self.shift),
             Some(mean) => {
-                let off = (held << self.shift) - mean;
+                let off = (limited << self.shift) - mean;
                 self.scaled_mean = Some(mean + (off >> self.shift));
             }
         }

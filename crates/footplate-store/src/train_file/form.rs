@@ -1,4 +1,4 @@
-//! What comes out of a train's file, and the forms it can have.
+//! The content of a train file, and its formats.
 
 use std::fmt;
 
@@ -6,32 +6,32 @@ use footplate_sim::line::{Brake, Train, TrainError};
 
 use crate::document::{DocumentProblem, Fault, Place};
 
-/// A train and what people should know about it.
+/// A train with its description.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrainFile {
-    /// The form it was read from.
+    /// The format it was read from.
     pub form: TrainFileForm,
-    /// What people should know about it; may be empty.
+    /// Its description; may be empty.
     pub about: String,
     /// The train.
     pub train: Train,
 }
 
-/// A form of a train's file.
+/// A format of train files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TrainFileForm {
     /// Footplate's own TOML.
     Own,
     /// JSON of TTOBench.
     TtoBench,
-    /// YAML after the rolling-stock schema of railtoolkit, as TrainRuns.jl reads it.
+    /// YAML of the rolling-stock schema of railtoolkit, as read by TrainRuns.jl.
     TrainRuns,
     /// JSON of rolling stock in OSRD.
     Osrd,
 }
 
 impl TrainFileForm {
-    /// What people call the form.
+    /// The name of the format.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -49,7 +49,7 @@ impl fmt::Display for TrainFileForm {
     }
 }
 
-/// The train if it is one; else the value that no train has, at the place that `place_of` knows for it.
+/// The train, if it is valid; otherwise the invalid value, at the place given by `place_of`.
 pub(super) fn checked(train: Train, place_of: impl FnOnce(&TrainError) -> Place) -> Result<Train, Fault> {
     match train.check() {
         Ok(()) => Ok(train),
@@ -57,7 +57,7 @@ pub(super) fn checked(train: Train, place_of: impl FnOnce(&TrainError) -> Place)
     }
 }
 
-/// The full brake force (N) where only the planned deceleration (m/s²) is known.
+/// The full brake force (N) if only the planned deceleration (m/s²) is known.
 pub(super) fn full_brake_n(inertia_kg: f64, service_m_per_s2: f64) -> f64 {
     Brake::FULL_OVER_SERVICE * service_m_per_s2 * inertia_kg
 }

@@ -1,6 +1,6 @@
-//! Full-size trains on disk: a TOML form that people write by hand, and readers for three forms of others.
+//! Full-size trains on disk: a TOML format written by hand, and readers for three other formats.
 //!
-//! [`read_train`] tells the form from the file. The forms are described in `docs/formats/train.md`.
+//! [`read_train`] recognises the format. `docs/formats/train.md` describes them.
 
 mod form;
 mod osrd;

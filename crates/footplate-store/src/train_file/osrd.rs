@@ -1,6 +1,6 @@
-//! Rolling stock of OSRD (JSON): one effort curve for each mode of traction.
+//! Rolling stock of OSRD (JSON), which has one effort curve per traction mode.
 //!
-//! The curve of the default mode is read, without restrictions of power or comfort.
+//! The default curve of the default mode is read; restrictions of power and comfort are ignored.
 
 use footplate_core::{Acceleration, Length, Ratio, Speed};
 use footplate_sim::line::{Brake, Resistance, TractiveEffort, Train};
@@ -51,7 +51,7 @@ pub(super) fn read(node: &Node) -> Result<TrainFile, Fault> {
     Ok(TrainFile { form: TrainFileForm::Osrd, about, train })
 }
 
-/// The deceleration of the form's newer versions, or of `gamma` in its older ones; and where it stands.
+/// The service deceleration, of the newer key or of the older `gamma`, with its place.
 fn deceleration<'a>(table: &Table<'a>) -> Result<(f64, &'a Node), Fault> {
     if let Some(node) = table.get("const_gamma") {
         return Ok((node.number("`const_gamma`")?, node));
@@ -60,7 +60,7 @@ fn deceleration<'a>(table: &Table<'a>) -> Result<(f64, &'a Node), Fault> {
     Ok((Table::of(node, "`gamma`")?.number("value")?, node))
 }
 
-/// The tractive effort of the default mode, and its name.
+/// The tractive effort of the default mode, and the name of the mode.
 fn effort<'a>(curves: &Table<'a>) -> Result<(TractiveEffort, &'a str), Fault> {
     let mode = curves.text("default_mode")?;
     let modes = Table::of(curves.needs("modes")?, "`modes`")?;

@@ -1,4 +1,4 @@
-//! Footplate's own form of a train: TOML in SI units, the units in the names.
+//! Footplate's own format of a train: TOML in SI units, with the units in the names.
 
 use footplate_core::{Acceleration, Length, Ratio, Speed};
 use footplate_sim::line::{Brake, PerMille, Resistance, TractiveEffort, Train};
@@ -6,7 +6,7 @@ use footplate_sim::line::{Brake, PerMille, Resistance, TractiveEffort, Train};
 use super::form::{TrainFile, TrainFileForm, checked, full_brake_n};
 use crate::document::{DocumentProblem, Fault, Node, Table, pairs};
 
-/// The version of the form.
+/// The version of the format.
 pub(super) const FORMAT: i64 = 1;
 
 const KEYS: [&str; 13] = [
@@ -73,7 +73,7 @@ pub(super) fn read(node: &Node) -> Result<TrainFile, Fault> {
     Ok(TrainFile { form: TrainFileForm::Own, about, train })
 }
 
-/// A + B v + C v², or per mille of the weight.
+/// Resistance as A + B v + C v², in N or in per mille of the weight.
 fn resistance(table: &Table<'_>, mass_kg: f64) -> Result<Resistance, Fault> {
     if let (Some(both), Some(_)) = (table.get("resistance_per_mille"), table.get("resistance")) {
         return Err(both.not("`resistance_per_mille`", "absent beside `resistance`; one of the two holds"));
@@ -99,7 +99,7 @@ fn resistance(table: &Table<'_>, mass_kg: f64) -> Result<Resistance, Fault> {
     ))
 }
 
-/// A table over speed, or a force and a power.
+/// Tractive effort as a table over speed, or as a force and a power.
 fn tractive_effort(traction: &Table<'_>) -> Result<TractiveEffort, Fault> {
     traction.only(&["force_n", "power_w", "effort_n_at_m_s"])?;
     let Some(node) = traction.get("effort_n_at_m_s") else {

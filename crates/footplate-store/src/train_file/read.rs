@@ -1,4 +1,4 @@
-//! Reads a train of any form.
+//! Reads a train in any known format.
 
 use std::path::Path;
 
@@ -7,15 +7,15 @@ use super::{osrd, own, trainruns, ttobench};
 use crate::document::{DocumentError, DocumentProblem, Node, Syntax, Table, parse, read_bytes};
 use crate::railtoolkit::listed;
 
-/// Reads the train in the file at `path`; `which` names one of several.
+/// Reads the train in the file at `path`; `which` selects one of several.
 ///
 /// # Errors
-/// What is wrong with it, with file, line and column.
+/// The file is invalid; the error names file, line and column.
 pub fn read_train(path: &Path, which: Option<&str>) -> Result<TrainFile, DocumentError> {
     parse_train(&path.display().to_string(), &read_bytes(path)?, which)
 }
 
-/// Reads a train from the bytes of a file. `file` is what messages call it; its end tells the syntax.
+/// Reads a train from the bytes of a file. `file` is its name in messages; its extension selects the syntax.
 ///
 /// # Errors
 /// As [`read_train`].
@@ -36,7 +36,7 @@ pub fn parse_train(file: &str, bytes: &[u8], which: Option<&str>) -> Result<Trai
         )),
     };
     let read = read.and_then(|file| {
-        // The forms with several in a file know them by their ids, and have chosen; the others have one, by its name.
+        // Formats with several trains have selected one by its id; the others have one train, selected by its name.
         let name = file.train.name.as_str();
         match which.filter(|which| file.form != TrainFileForm::TrainRuns && *which != name) {
             Some(wanted) => {
@@ -49,7 +49,7 @@ pub fn parse_train(file: &str, bytes: &[u8], which: Option<&str>) -> Result<Trai
     read.map_err(|fault| DocumentError::wrong(file, fault))
 }
 
-/// The form of a train's document; `None` if it is no train.
+/// The format of a document; `None` if it is not a train.
 pub(crate) fn form_of(syntax: Syntax, node: &Node) -> Option<TrainFileForm> {
     let table = Table::of(node, "a train").ok()?;
     let forms = [

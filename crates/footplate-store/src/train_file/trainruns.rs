@@ -1,9 +1,9 @@
-//! Trains after the rolling-stock schema of railtoolkit (YAML), put together as TrainRuns.jl does it.
+//! Trains of the rolling-stock schema of railtoolkit (YAML), composed as by TrainRuns.jl.
 //!
-//! A train is a formation of vehicles. Cars are loaded to their limit. The traction unit meets per mille of its own
-//! mass, without a load: the base of its driving axles, the rolling of its carrying axles, air with a head wind of
-//! 15 km/h. Freight cars follow Strahl, without wind, passenger cars Sauthoff, with it. What the rotating masses are
-//! a share of is the mass without load.
+//! A train is a formation of vehicles. Cars are fully loaded. The resistance of the traction unit is in per mille of
+//! its own mass without load: a base value for the driving axles, rolling resistance for the carrying axles, and air
+//! resistance with a head wind of 15 km/h. Freight cars follow Strahl without wind, passenger cars Sauthoff with wind.
+//! Rotating masses are a share of the mass without load.
 
 use footplate_core::{Acceleration, Length, Ratio, Speed};
 use footplate_sim::line::{Brake, PerMille, Resistance, TractiveEffort, Train};
@@ -14,19 +14,19 @@ use crate::railtoolkit::{VERSION, after_schema, chosen, listed};
 
 /// The schema that is read.
 const SCHEMA: &str = "https://railtoolkit.org/schema/rolling-stock.json";
-/// Longer formations than any train has.
+/// The longest formation: more vehicles than any train has.
 const LONGEST_FORMATION: usize = 1000;
 
 const KILOMETRES_PER_HOUR: f64 = 3.6;
 const TONNE_KG: f64 = 1000.0;
-/// Air that comes towards locomotives and passenger trains (Sauthoff).
+/// The head wind of locomotives and passenger trains (Sauthoff).
 const HEAD_WIND: Speed = Speed::from_m_per_s(15.0 / KILOMETRES_PER_HOUR);
-/// Rotating mass where a vehicle says none: of a traction unit and of a car (Hansen and Pachl, Railway Timetabling &
+/// The rotating-mass factor of a traction unit and of a car that state none (Hansen and Pachl, Railway Timetabling &
 /// Operations, 2014, page 71).
 const ROTATING: [f64; 2] = [1.09, 1.06];
-/// Deceleration where a traction unit says none: freight and passenger (m/s²; the defaults of TrainRuns.jl).
+/// The deceleration of a traction unit that states none: freight and passenger (m/s²; the defaults of TrainRuns.jl).
 const BRAKING: [f64; 2] = [0.225, 0.375];
-/// Running fast where no vehicle says how fast (m/s; the default of TrainRuns.jl).
+/// The maximum speed if no vehicle states one (m/s; the default of TrainRuns.jl).
 const FASTEST_M_PER_S: f64 = 140.0;
 
 const POSITIVE: Range = Range(0.0, 1e9);
@@ -39,7 +39,7 @@ struct Vehicle<'a> {
     length_m: f64,
     mass_kg: f64,
     load_kg: f64,
-    /// The factor that turning parts make of the mass.
+    /// The rotating-mass factor.
     rotating: f64,
 }
 
@@ -153,7 +153,7 @@ fn unit_resistance(unit: &Vehicle<'_>) -> Result<Resistance, Fault> {
     Ok(axles(driving, base, air) + axles(unit.mass_kg - driving, rolling, air))
 }
 
-/// The resistance of a car with its load (Strahl or Sauthoff; Wende, page 153).
+/// The resistance of a loaded car (Strahl or Sauthoff; Wende, page 153).
 fn car_resistance(car: &Vehicle<'_>, is_passenger: bool) -> Result<Resistance, Fault> {
     let [base, rolling, air] = coefficients(car)?;
     let per_mille = if is_passenger {

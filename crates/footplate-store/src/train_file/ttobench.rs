@@ -1,6 +1,6 @@
 //! Trains of TTOBench, a benchmark for time-optimal driving: JSON in which each quantity carries its unit.
 //!
-//! The form knows no length: its trains are points, and so they come out.
+//! The format has no length: its trains are points.
 
 use footplate_core::{Acceleration, Length, Ratio, Speed};
 use footplate_sim::line::{Brake, Resistance, TractiveEffort, Train};
@@ -9,7 +9,7 @@ use super::form::{TrainFile, TrainFileForm, checked, full_brake_n};
 use crate::document::{DocumentProblem, Fault, Node, Table};
 use crate::ttobench::about;
 
-/// The units of a kind of quantity, and each one's worth in SI units.
+/// The units of a kind of quantity, each with its value in SI units.
 type Units = &'static [(&'static str, f64)];
 
 const KILOMETRE_PER_HOUR: f64 = 1.0 / 3.6;
@@ -32,8 +32,8 @@ pub(super) fn read(node: &Node) -> Result<TrainFile, Fault> {
     let mass_kg = needs("mass", MASS)?;
     let rotating_mass = Ratio::from_parts(needs("rho", SHARE)?);
     let inertia = mass_kg * (1.0 + rotating_mass.as_parts());
-    // What the forces of both brakes allow is a bound, not a way to brake: with friction brakes of 1220 kN a train
-    // of 122 t would stop at once. So the planned deceleration rules where it is stated.
+    // The sum of both brake forces is a bound, not a braking law: friction brakes of 1220 kN would stop a train of 122
+    // t almost at once. A stated planned deceleration therefore takes precedence.
     let brakes_n =
         needs("max reg braking force", FORCE)? + has("max pn braking force", FORCE)?.unwrap_or(0.0);
     let strongest = brakes_n / inertia;
@@ -76,7 +76,7 @@ pub(super) fn read(node: &Node) -> Result<TrainFile, Fault> {
     Ok(TrainFile { form: TrainFileForm::TtoBench, about, train })
 }
 
-/// The number of a quantity in SI units.
+/// A quantity in SI units.
 fn quantity(node: &Node, key: &str, units: Units) -> Result<f64, Fault> {
     let of = format!("`{key}`");
     let table = Table::of(node, &of)?;

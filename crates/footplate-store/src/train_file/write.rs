@@ -1,4 +1,4 @@
-//! Writes a train in Footplate's own form.
+//! Writes a train in Footplate's own format.
 
 use std::fmt::Write as _;
 
@@ -6,7 +6,7 @@ use footplate_sim::line::{TractiveEffort, Train};
 
 use super::own::FORMAT;
 
-/// The text of a train's file; reading it gives the same train, to the last bit.
+/// The text of a train file; it reads back as the same train, to the last bit.
 #[must_use]
 pub fn write_train(train: &Train, about: &str) -> String {
     let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();

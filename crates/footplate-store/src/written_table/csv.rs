@@ -1,16 +1,16 @@
-//! A table as CSV.
+//! Writes a table as CSV.
 
 use std::borrow::Cow;
 use std::io::{self, Write};
 
-use super::cell::Cell;
+use super::writer::Cell;
 use crate::decimal::push_unscaled;
 
-/// How much is gathered before it is written (bytes).
+/// The size of the write buffer (bytes).
 const GATHERED: usize = 64 * 1024;
 
-/// Writes a table as CSV. Numbers have the fewest digits that read back as the same number, times all that they have
-/// to the nanosecond.
+/// A table as CSV. Numbers have the fewest digits that read back as the same number; times have all digits, to the
+/// nanosecond.
 #[derive(Debug)]
 pub(crate) struct CsvTable<W> {
     output: W,
@@ -48,19 +48,19 @@ impl<W: Write> CsvTable<W> {
         if text.len() >= GATHERED { self.write() } else { Ok(()) }
     }
 
-    /// Hands on everything up to the last row.
+    /// Writes all complete rows.
     ///
     /// # Errors
-    /// What the system said.
+    /// The error of the system.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
         self.write()?;
         self.output.flush()
     }
 
-    /// Ends the table and gives back where it was written to.
+    /// Ends the table and returns its writer.
     ///
     /// # Errors
-    /// What the system said.
+    /// The error of the system.
     pub(crate) fn finish(mut self) -> io::Result<W> {
         self.flush()?;
         Ok(self.output)

@@ -1,4 +1,4 @@
-//! A table as Parquet.
+//! Writes a table as Parquet.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -11,12 +11,12 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::parser::parse_message_type;
 
-use super::cell::{Cell, Kind};
+use super::writer::{Cell, Kind};
 
-/// Rows that are gathered before they are written: the usual size, a few megabytes in memory.
+/// Rows per group: the usual size, a few megabytes in memory.
 const GROUP_ROWS: usize = 128 * 1024;
 
-/// Writes a table as Parquet: doubles, 64-bit whole numbers and texts, compressed with zstd.
+/// A table as Parquet: doubles, 64-bit integers and texts, compressed with zstd.
 pub(super) struct ParquetTable<W: Write + Send> {
     writer: SerializedFileWriter<W>,
     columns: Vec<GatheredColumn>,
@@ -26,7 +26,7 @@ pub(super) struct ParquetTable<W: Write + Send> {
 /// The values of a column that are not written yet.
 struct GatheredColumn {
     kind: Kind,
-    /// 1 where there is a value, 0 where there is none; of columns in which that may be.
+    /// 1 for a value, 0 for an empty field; only in columns that may have empty fields.
     levels: Vec<i16>,
     doubles: Vec<f64>,
     longs: Vec<i64>,
@@ -52,10 +52,10 @@ impl<W: Write + Send> ParquetTable<W> {
         schema.push('}');
         let schema = parse_message_type(&schema).map_err(failed)?;
         let mut properties = WriterProperties::builder()
-            // Numbers hardly repeat; looking for repetitions takes longer than all the rest.
+            // Numbers rarely repeat: a dictionary costs more time than everything else.
             .set_dictionary_enabled(false)
             .set_compression(Compression::ZSTD(ZstdLevel::default()))
-            // Nobody searches a recording for a speed.
+            // Recordings are read as a whole: statistics for searching are not needed.
             .set_statistics_enabled(EnabledStatistics::None);
         for (name, _) in columns.clone().filter(|(_, kind)| matches!(kind, Kind::Text | Kind::Whole)) {
             properties = properties.set_column_dictionary_enabled(name.into(), true);
@@ -98,7 +98,7 @@ impl GatheredColumn {
         Self { kind, levels: Vec::new(), doubles: Vec::new(), longs: Vec::new(), texts: Vec::new() }
     }
 
-    /// Adds a value; one of another kind than the column's is none.
+    /// Adds a value; one of another type counts as empty.
     fn push(&mut self, cell: Cell<'_>) {
         let is_there = match (self.kind, cell) {
             (Kind::Time | Kind::OptionalTime, Cell::Time(time)) => {
@@ -114,7 +114,7 @@ impl GatheredColumn {
                 true
             }
             (Kind::Text, Cell::Text(text)) => {
-                // Texts mostly repeat the one before: a name, a state.
+                // Most texts repeat the one before: a name, a state.
                 let repeated = self.texts.last().filter(|last| last.data() == text.as_bytes()).cloned();
                 self.texts.push(repeated.unwrap_or_else(|| text.into()));
                 true

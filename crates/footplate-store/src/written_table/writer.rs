@@ -1,34 +1,35 @@
-//! A table in the form that its file name asks for.
+//! Writes a table in the format of its file name.
 
 use std::fmt;
 use std::io::{self, Write};
 use std::path::Path;
 
-use super::cell::{Cell, Kind};
+use footplate_core::Timestamp;
+
 use super::csv::CsvTable;
 use super::parquet::ParquetTable;
 
-/// The form of a table.
+/// A format of tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TableForm {
-    /// A text, a row a line.
+    /// CSV text.
     Csv,
-    /// Columns, compressed.
+    /// Compressed columns.
     Parquet,
 }
 
-/// The name of a file does not say which form it should have.
+/// The extension of the file does not name a format.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{file}: the name should end in .csv or .parquet, which says what is written")]
+#[error("{file}: the name should end in .csv or .parquet")]
 pub struct UnknownForm {
     file: String,
 }
 
 impl TableForm {
-    /// The form that the name of a file asks for.
+    /// The format of a file name.
     ///
     /// # Errors
-    /// It ends neither in .csv nor in .parquet.
+    /// The extension is neither .csv nor .parquet.
     pub fn of_path(path: &Path) -> Result<Self, UnknownForm> {
         let ending = path.extension().unwrap_or_default();
         if ending.eq_ignore_ascii_case("csv") {
@@ -71,10 +72,10 @@ impl<W: Write + Send> TableWriter<W> {
         }
     }
 
-    /// Ends the table and gives back where it was written to.
+    /// Ends the table and returns its writer.
     ///
     /// # Errors
-    /// What the system said.
+    /// The error of the system.
     pub(crate) fn finish(self) -> io::Result<W> {
         match self.output {
             Output::Csv(table) => table.finish(),
@@ -86,5 +87,38 @@ impl<W: Write + Send> TableWriter<W> {
 impl<W: Write + Send> fmt::Debug for TableWriter<W> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("TableWriter").finish_non_exhaustive()
+    }
+}
+
+/// The type of a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// Seconds.
+    Time,
+    /// Seconds, or empty.
+    OptionalTime,
+    /// A whole number, or empty.
+    Whole,
+    /// A number in every row.
+    Number,
+    /// A number, or empty.
+    OptionalNumber,
+    /// A text in every row.
+    Text,
+}
+
+/// The value of a field.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Cell<'c> {
+    Missing,
+    Time(Timestamp),
+    Whole(i64),
+    Number(f64),
+    Text(&'c str),
+}
+
+impl Cell<'_> {
+    pub(crate) fn optional_number(value: Option<f64>) -> Self {
+        value.map_or(Self::Missing, Self::Number)
     }
 }

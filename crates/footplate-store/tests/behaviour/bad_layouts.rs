@@ -147,7 +147,7 @@ fn places_are_named_with_what_is_wrong() {
     );
     assert_eq!(
         complaint(", numbers = [40, 41]", ""),
-        "oval.toml, line 7, column 3: `main` does not tell the sensor's number: add `numbers = [.., ..]`, or \
+        "oval.toml, line 7, column 3: `main` does not imply the sensor's number: add `numbers = [.., ..]`, or \
          call it A1 to E16"
     );
     assert_eq!(

@@ -3,7 +3,7 @@
 use footplate_core::tracking::Phase;
 use footplate_store::built_in;
 use footplate_store::score::{
-    Comparison, Knowledge, ReplayContext, Rival, ScoredHit, ScoredRecording, score_recording,
+    Comparison, Forecasters, ReferenceForecaster, ReplayContext, ScoredHit, ScoredRecording, score_recording,
 };
 
 use crate::recordings::{ALL, real};
@@ -12,7 +12,7 @@ fn scored(files: &[&str]) -> Vec<ScoredRecording> {
     let layout = built_in("track-a").unwrap().layout;
     let context = ReplayContext { layout: &layout, turnouts: &[] };
     let score = |file: &&str| {
-        score_recording(context, &real(file), None, &mut Knowledge::of_layout(&layout)).unwrap()
+        score_recording(context, &real(file), None, &mut Forecasters::of_layout(&layout)).unwrap()
     };
     files.iter().map(score).collect()
 }
@@ -31,8 +31,8 @@ fn steady_forecasts_are_as_near_as_the_poll_lets_them_be() {
     assert!(steady.ours.scored >= 450, "{:?}", steady.ours);
     assert!(steady.ours.median_abs_mm.unwrap() <= 7.7, "{:?}", steady.ours);
     // the mean, at a poll, is below that of repeating the last lap,
-    let lap = steady.rival(Rival::LastLap).unwrap();
-    let at_poll = steady.rival(Rival::AtPoll).unwrap();
+    let lap = steady.reference(ReferenceForecaster::LastLap).unwrap();
+    let at_poll = steady.reference(ReferenceForecaster::AtPoll).unwrap();
     assert!(at_poll.score.mean_abs_mm < lap.score.mean_abs_mm, "{:?} {:?}", at_poll.score, lap.score);
     // and intervals hold as often as they say.
     let [half, ninety, all_but_one] = steady.ours.coverage.unwrap();
@@ -51,6 +51,6 @@ fn little_is_left_to_learn_of_a_long_log() {
     let steady = of_phase(&scored(&ALL[8..]), Phase::Steady);
     assert!(steady.ours.scored > 390, "{:?}", steady.ours);
     // then knowing all of it beforehand would help by no more than 15 %.
-    let ratio = steady.rival(Rival::Oracle).unwrap().ratio().unwrap();
+    let ratio = steady.reference(ReferenceForecaster::Oracle).unwrap().ratio().unwrap();
     assert!(ratio <= 1.15, "{ratio}");
 }

@@ -113,7 +113,7 @@ fn a_field_that_is_not_what_it_should_be_is_named() {
     );
     assert_eq!(
         import(NODES, EDGES.strip_suffix(",60.5\n").unwrap(), None).unwrap_err().to_string(),
-        "edges.csv, line 13: the row breaks off; was the file copied whole?"
+        "edges.csv, line 13: the row is incomplete; was the whole file copied?"
     );
     assert_eq!(
         import("", EDGES, None).unwrap_err().to_string(),

@@ -3,7 +3,7 @@
 use footplate_core::TrainId;
 use footplate_core::track::Layout;
 use footplate_store::score::{
-    BASELINES, Knowledge, ReplayContext, ScoredHit, ScoredRecording, score_recording,
+    BASELINES, Forecasters, ReplayContext, ScoredHit, ScoredRecording, score_recording,
 };
 use footplate_store::{Recording, built_in};
 
@@ -18,7 +18,7 @@ fn track_a() -> Layout {
 
 fn score(layout: &Layout, recording: &Recording) -> ScoredRecording {
     let context = ReplayContext { layout, turnouts: &[] };
-    score_recording(context, recording, None, &mut Knowledge::of_layout(layout)).unwrap()
+    score_recording(context, recording, None, &mut Forecasters::of_layout(layout)).unwrap()
 }
 
 /// The recording as it was after so many events.
@@ -85,6 +85,6 @@ fn a_train_can_be_scored_alone() {
     let layout = track_a();
     let context = ReplayContext { layout: &layout, turnouts: &[] };
     let only = Some(TrainId(58));
-    let scored = score_recording(context, &real(ALL[8]), only, &mut Knowledge::of_layout(&layout)).unwrap();
+    let scored = score_recording(context, &real(ALL[8]), only, &mut Forecasters::of_layout(&layout)).unwrap();
     assert_eq!((scored.runs, scored.trains()), (6, vec![TrainId(58)]));
 }

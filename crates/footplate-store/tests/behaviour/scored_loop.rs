@@ -4,7 +4,9 @@ use std::path::Path;
 
 use footplate_core::tracking::Verdict;
 use footplate_core::{TimeSpan, Timestamp, TrainId};
-use footplate_store::score::{Knowledge, ReplayContext, ReplayError, Rival, ScoredHit, score_recording};
+use footplate_store::score::{
+    Forecasters, ReferenceForecaster, ReplayContext, ReplayError, ScoredHit, score_recording,
+};
 use footplate_store::{LogContext, Recording, parse_layout, parse_sensor_log};
 
 /// 2000 mm around: 400, 600 and 1000.
@@ -26,7 +28,7 @@ fn score(log: &str) -> Result<Vec<ScoredHit>, ReplayError> {
     let context = LogContext { sensors: &layout, train: None };
     let recording: Recording = parse_sensor_log(Path::new("log.csv"), log.as_bytes(), context).unwrap();
     let context = ReplayContext { layout: &layout, turnouts: &[] };
-    score_recording(context, &recording, None, &mut Knowledge::of_layout(&layout)).map(|scored| scored.hits)
+    score_recording(context, &recording, None, &mut Forecasters::of_layout(&layout)).map(|scored| scored.hits)
 }
 
 /// A log of train 24 that has been running at step 8 for long.
@@ -35,9 +37,9 @@ fn running(passages: &[(f64, &str)]) -> String {
     format!("t_s,kind,name,train,step\n0,running,,24,8\n{}", rows.collect::<String>())
 }
 
-/// How late a hit was by a rival, in ms.
-fn late(hit: &ScoredHit, rival: Rival) -> Option<f64> {
-    hit.late_by(rival).map(TimeSpan::as_ms)
+/// How late a hit was by a reference, in ms.
+fn late(hit: &ScoredHit, reference: ReferenceForecaster) -> Option<f64> {
+    hit.late_by(reference).map(TimeSpan::as_ms)
 }
 
 #[test]
@@ -49,25 +51,25 @@ fn baselines_learn_from_the_first_lap_on_as_worked_out_by_hand() {
     let [first @ .., second_b, second_c] = hits.as_slice() else { panic!("{hits:?}") };
     // then nobody expects anything of the first lap,
     for hit in first {
-        assert!(footplate_store::score::BASELINES.iter().all(|rival| hit.late_by(*rival).is_none()));
+        assert!(footplate_store::score::BASELINES.iter().all(|reference| hit.late_by(*reference).is_none()));
     }
-    let expect = |hit: &ScoredHit, rival: Rival, ms: f64| {
-        let found = late(hit, rival).unwrap();
-        assert!((found - ms).abs() < 0.01, "{rival}: {found} instead of {ms}");
+    let expect = |hit: &ScoredHit, reference: ReferenceForecaster, ms: f64| {
+        let found = late(hit, reference).unwrap();
+        assert!((found - ms).abs() < 0.01, "{reference}: {found} instead of {ms}");
     };
     // everybody expects 1.0 s of the next hop, by 2000 mm in 5 s or by the hop itself,
-    for rival in footplate_store::score::BASELINES {
-        expect(second_b, rival, 100.0);
+    for reference in footplate_store::score::BASELINES {
+        expect(second_b, reference, 100.0);
     }
     // and has learnt differently from its 363.64 mm/s: table and lap nothing, so 600 mm take 1.5 s from 6.1 s;
-    expect(second_c, Rival::ConstantTable, 0.0);
-    expect(second_c, Rival::LastLap, 0.0);
+    expect(second_c, ReferenceForecaster::ConstantTable, 0.0);
+    expect(second_c, ReferenceForecaster::LastLap, 0.0);
     // 400 − 36.364/256 = 399.858 mm/s: 1.500 53 s (in whole µm/s),
-    expect(second_c, Rival::SlowAverage, -0.53);
+    expect(second_c, ReferenceForecaster::SlowAverage, -0.53);
     // 400 − 3.636 = 396.364 mm/s: 1.513 76 s,
-    expect(second_c, Rival::MiddleAverage, -13.76);
+    expect(second_c, ReferenceForecaster::MiddleAverage, -13.76);
     // 400 − 18.182 = 381.818 mm/s: 1.571 43 s.
-    expect(second_c, Rival::FastAverage, -71.43);
+    expect(second_c, ReferenceForecaster::FastAverage, -71.43);
 }
 
 #[test]
@@ -75,10 +77,10 @@ fn in_hindsight_an_even_run_holds_no_surprise() {
     let passages = [(0.0, "A1"), (1.0, "B1"), (2.5, "C1"), (5.0, "A1"), (6.0, "B1"), (7.5, "C1")];
     let hits = score(&running(&passages)).unwrap();
     for hit in &hits[1..] {
-        assert!(late(hit, Rival::HindsightTable).unwrap().abs() < 3.0, "{hit:?}");
-        assert!(late(hit, Rival::Oracle).unwrap().abs() < 40.0, "half a poll at most: {hit:?}");
+        assert!(late(hit, ReferenceForecaster::HindsightTable).unwrap().abs() < 3.0, "{hit:?}");
+        assert!(late(hit, ReferenceForecaster::Oracle).unwrap().abs() < 40.0, "half a poll at most: {hit:?}");
     }
-    assert_eq!(hits[0].late_by(Rival::HindsightTable), None);
+    assert_eq!(hits[0].late_by(ReferenceForecaster::HindsightTable), None);
 }
 
 #[test]

@@ -57,7 +57,7 @@ fn what_is_wrong_with_a_survey_is_said_with_its_place() {
     };
     assert_eq!(
         refusal("to = \"A3\" }", "to = \"A3\", uncertainty_mm = 3 }"),
-        "loop.toml, line 7, column 46: an uncertainty is given of a length that is not: add `mm`, or leave out \
+        "loop.toml, line 7, column 46: an uncertainty without a length: add `mm`, or leave out \
          `uncertainty_mm`"
     );
     let negative = refusal("mm = 800", "mm = 800, uncertainty_mm = -1");

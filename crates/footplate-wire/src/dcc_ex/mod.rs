@@ -11,7 +11,6 @@ mod opening;
 mod outstanding;
 mod reply;
 mod request;
-mod sensors;
 mod session;
 mod settings;
 mod time_model;
@@ -22,5 +21,5 @@ pub use request::{CABS, Power, Request, SPEED_PER_STEP, Throttle, speed_of};
 pub use session::Client;
 pub use settings::{Settings, TurnoutRequests};
 pub use time_model::{
-    ANSWER_LONGEST, ANSWER_SHORTEST, SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST, TIME_MODEL,
+    ANSWER_LONGEST, ANSWER_SHORTEST, SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST, TIME_MODEL, USUAL_LINE,
 };

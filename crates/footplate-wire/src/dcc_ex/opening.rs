@@ -1,4 +1,4 @@
-//! How far the board has been asked for all that has to be known before trains are driven.
+//! The opening: what is asked of the board before trains may run.
 
 use alloc::collections::VecDeque;
 
@@ -14,7 +14,7 @@ const BANNER_WITHIN: TimeSpan = TimeSpan::from_ms(6_000);
 /// An identity that comes so soon after the opening answers a request that was repeated; a later one follows a reset.
 const LATE_ANSWERS: TimeSpan = TimeSpan::from_ms(2_000);
 
-/// Where the opening is.
+/// The state of the opening.
 #[derive(Debug, Clone)]
 pub(super) enum Opening {
     /// Nothing may be written: the board starts.

@@ -1,4 +1,4 @@
-//! What the board says, as text and back: answers, and what it reports by itself.
+//! Messages from the board, and their texts: answers and reports.
 
 use alloc::borrow::ToOwned;
 use alloc::string::String;
@@ -27,9 +27,9 @@ pub enum Reply {
         cab: u16,
         /// Its place among the board's; -1 if the board does not drive it.
         register: i16,
-        /// How fast.
+        /// Its speed.
         throttle: Throttle,
-        /// Which end leads.
+        /// Whether it runs forward.
         forward: bool,
         /// Functions that are on, F0 in the lowest bit.
         functions: u32,
@@ -38,9 +38,9 @@ pub enum Reply {
     Register {
         /// The number that was sent.
         register: u8,
-        /// How fast.
+        /// Its speed.
         throttle: Throttle,
-        /// Which end leads.
+        /// Whether it runs forward.
         forward: bool,
     },
     /// `<H id 0|1>`: a defined turnout lies so.
@@ -82,12 +82,12 @@ pub enum Reply {
 /// Names of the tracks on which trains run: all of them, by their use, and the first output of a motor shield.
 const MAIN_TRACKS: [&str; 3] = ["", "MAIN", "A"];
 
-/// A message of a known kind whose parameters mean nothing: what came was changed on its way.
+/// A message of a known kind with impossible parameters: it was damaged on its way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Malformed;
 
 impl Reply {
-    /// Reads what stood between the brackets; `None` for a kind of message that is not used here.
+    /// Reads the text between the brackets; `None` for a kind of message that is not used here.
     ///
     /// # Errors
     ///

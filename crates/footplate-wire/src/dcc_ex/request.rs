@@ -1,6 +1,6 @@
-//! What is asked of the board, as text and back.
+//! Requests to the board, and their texts.
 //!
-//! The virtual board reads with the same code what the program writes.
+//! The virtual board reads requests with the same code.
 
 use core::fmt::{Display, Formatter, Result as FmtResult};
 use core::ops::RangeInclusive;
@@ -62,9 +62,9 @@ pub enum Request {
     Drive {
         /// Its address.
         cab: u16,
-        /// How fast.
+        /// Its speed.
         throttle: Throttle,
-        /// Which end leads; absolute.
+        /// Whether it runs forward; absolute.
         forward: bool,
     },
     /// `<t register cab speed direction>`, the form of DCC++ that some programs still write.
@@ -73,9 +73,9 @@ pub enum Request {
         register: u8,
         /// Its address.
         cab: u16,
-        /// How fast.
+        /// Its speed.
         throttle: Throttle,
-        /// Which end leads.
+        /// Whether it runs forward.
         forward: bool,
     },
     /// `<t cab>`: how a locomotive is driven.
@@ -128,7 +128,7 @@ pub const fn speed_of(step: SpeedStep) -> Option<u8> {
 }
 
 impl Request {
-    /// Reads what stood between the brackets; `None` for what the board would answer with `<X>`.
+    /// Reads the text between the brackets; `None` for what the board would answer with `<X>`.
     #[must_use]
     pub fn read(text: &str) -> Option<Self> {
         let (opcode, rest) = text.split_at_checked(1)?;

@@ -2,7 +2,7 @@
 
 use core::ops::RangeInclusive;
 
-/// How turnouts are asked for.
+/// How turnouts are commanded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum TurnoutRequests {
     /// `<a address 0|1>`: by the linear address of the accessory decoder. The board needs no definition and answers nothing, so
@@ -30,7 +30,7 @@ pub struct Settings {
     /// Whether opening the line resets the board, as it does on the serial port of an Arduino. Its banner is awaited then
     /// before anything is written.
     pub resets_on_open: bool,
-    /// How turnouts are asked for.
+    /// How turnouts are commanded.
     pub turnouts: TurnoutRequests,
     /// The board's number of the layout's sensor 0.
     pub first_sensor: u16,

@@ -1,10 +1,12 @@
-//! How long things take between the track, the board and this program.
+//! Delays between the track, the board and this program.
 //!
 //! Measured on firmware 5.6.0 under a cycle-accurate simulator in real time, 8 sensors defined. The source agrees: each sensor
 //! is read every 10 ms at most, and a change counts when the next scan confirms it.
 
-use footplate_core::link::TimeModel;
+use footplate_core::link::{TimeModel, UsualLine};
 use footplate_core::{TimeSpan, Timestamp};
+
+use super::outstanding::REPEATED_AFTER;
 
 /// The shortest time from a sensor being occupied until the host has the message (20 samples; median 16.8 ms).
 pub const SENSOR_DELAY_SHORTEST: TimeSpan = TimeSpan::from_us(3_600);
@@ -18,7 +20,7 @@ pub const ANSWER_SHORTEST: TimeSpan = TimeSpan::from_us(600);
 /// The longest of the same samples.
 pub const ANSWER_LONGEST: TimeSpan = TimeSpan::from_us(9_100);
 
-/// The times that planners need. A command counts as gone when it is written; requests go 50 ms apart at the most crowded,
+/// The times for planners. A command counts as sent when it is written; requests go 50 ms apart at the most crowded,
 /// and a tenth more is allowed; a stop waits for one request of 10 ms only, behind the slowest report.
 pub const TIME_MODEL: TimeModel = TimeModel {
     command: TimeSpan::ZERO,
@@ -28,7 +30,11 @@ pub const TIME_MODEL: TimeModel = TimeModel {
     report_window: TimeSpan::from_ms(20),
 };
 
-/// When a sensor became occupied at the latest, and the width of the span before that in which it may have.
+/// The line that these times hold for: answers come within the longest that was measured.
+pub const USUAL_LINE: UsualLine =
+    UsualLine { answers_within: ANSWER_LONGEST, repeated_after: REPEATED_AFTER };
+
+/// Returns the latest time at which a sensor became occupied, and the width of the span before it.
 ///
 /// The delay is about uniform between its shortest and longest. `not_before` is the time of the last entry of the recording,
 /// whose entries stay in order: where a command went out within the shortest delay the span is a little wider.

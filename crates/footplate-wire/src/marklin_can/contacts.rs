@@ -34,9 +34,9 @@ pub(super) struct Contacts(Vec<Contact>);
 pub(super) enum News {
     /// The contact has become occupied, and when the station saw it.
     Occupied(Span),
-    /// It is occupied, and was before it was first asked for.
+    /// It was occupied before it was first read.
     HeldFromStart,
-    /// Nothing new, or free.
+    /// No change, or free.
     None,
 }
 

@@ -29,5 +29,6 @@ pub use settings::{Settings, Transport};
 pub use speed::{HIGHEST_SPEED, speed_of, step_of};
 pub use time_model::{
     BIT_TIME, CONTACTS_PER_MODULE, NETWORK_LONGEST, NETWORK_SHORTEST, SCAN_EVERY, TICK, TIME_MODEL,
+    USUAL_LINE,
 };
 pub use uid::{AccessoryProtocol, LocomotiveProtocol, Uid};

@@ -1,8 +1,6 @@
-//! How far the station has been asked for all that has to be known before trains are driven.
+//! What the station is asked before trains are driven.
 
-use alloc::collections::VecDeque;
-
-/// What is asked, in this order.
+/// A question.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Question {
     /// Who is there.
@@ -15,25 +13,9 @@ pub(super) enum Question {
     Roster,
 }
 
-/// Where the opening is.
-#[derive(Debug, Clone)]
-pub(super) enum Opening {
-    /// These are still to be asked.
-    Asking(VecDeque<Question>),
-    Open,
-}
-
-impl Opening {
-    pub(super) fn begin() -> Self {
-        Self::Asking([Question::Ping, Question::Modules, Question::Power, Question::Roster].into())
-    }
-
-    /// The station was not heard for a while; its list of locomotives is known.
-    pub(super) fn again() -> Self {
-        Self::Asking([Question::Ping, Question::Modules, Question::Power].into())
-    }
-
-    pub(super) const fn is_open(&self) -> bool {
-        matches!(self, Self::Open)
-    }
+impl Question {
+    /// All questions, in the order in which they are asked.
+    pub(super) const ALL: [Self; 4] = [Self::Ping, Self::Modules, Self::Power, Self::Roster];
+    /// What is asked when the station was not heard for a while and its list of locomotives is known.
+    pub(super) const AGAIN: [Self; 3] = [Self::Ping, Self::Modules, Self::Power];
 }

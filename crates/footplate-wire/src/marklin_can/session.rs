@@ -1,43 +1,41 @@
-//! Speaks with the station: what stops first, one command a train at a time, and everything confirmed.
+//! The session with a station: stops first, one command at a time for each train, and everything confirmed.
 
-mod closing;
 mod commanding;
 mod hearing;
 
-use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
-use footplate_core::{Command, Event, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{Command, TimeSpan, Timestamp, TrainId};
 
 use super::contacts::Contacts;
 use super::frame::hash_of;
 use super::framing::Framing;
 use super::message::Message;
-use super::opening::{Opening, Question};
-use super::outstanding::{AllOutstanding, Awaited};
+use super::opening::Question;
+use super::outstanding::Awaited;
 use super::roster::{ListedLocomotive, Roster};
 use super::settings::{Settings, Transport};
 use super::solenoid::Solenoid;
 use super::speed::{HIGHEST_STEP, speed_of};
 use super::uid::Uid;
-use crate::farewell::Farewell;
-use crate::locomotives::Locomotives;
+use crate::dialogue::Dialogue;
+use crate::opening::Opening;
+use crate::outstanding::Outgoing;
 use crate::pacing::Pacing;
-use crate::queue::{Queue, train_of};
-use crate::session::{Closing, CommandError, LinkNotice, Session, Transmit};
-use crate::silence::{Checks, Silence};
+use crate::session::{Closing, CommandError, Session, Transmit};
+use crate::silence::Checks;
 
-/// A frame needs half a millisecond on the bus, and quick datagrams are lost now and then: 100 a second, four at once, and what stops
-/// something 2 ms after the frame before.
+/// A frame takes half a millisecond on the bus, and datagrams in quick succession get lost: 100 a second, four at once, and a stop
+/// 2 ms after the frame before it.
 const PACING: Pacing = Pacing::new(TimeSpan::from_ms(10), 4, TimeSpan::from_ms(2));
 
-/// How often all contacts are asked for: what changed in a report that was lost is known after that. It is a sign of life, too.
+/// The interval between polls of all contacts, which find changes whose reports were lost and show that the station is alive.
 const POLL_EVERY: TimeSpan = TimeSpan::from_ms(1_000);
 
-/// The rest of a frame comes within this time: it is on its way already.
+/// The rest of a frame arrives within this time.
 const FRAME_WITHIN: TimeSpan = TimeSpan::from_ms(200);
 
-/// What an adapter is written before anything else: end what a line may hold, close, 250 kbit/s, open.
+/// Opens an adapter: end a half-written line, close, 250 kbit/s, open.
 const OPEN_ADAPTER: &[u8] = b"\r\rC\rS5\rO\r";
 
 /// What a person should check on a network.
@@ -55,99 +53,62 @@ const ADAPTER_CHECKS: Checks = Checks {
     noise: "check that the port belongs to a CAN adapter that understands slcan (Lawicel), and that no other program uses it",
 };
 
-/// The program's side of the line to a station.
+/// The client's session with a station.
 #[derive(Debug, Clone)]
 pub struct Client {
     settings: Settings,
     hash: u16,
-    now: Timestamp,
+    dialogue: Dialogue<Awaited>,
     framing: Framing,
-    opening: Opening,
-    pacing: Pacing,
-    silence: Silence,
-    waiting: Queue,
-    outstanding: AllOutstanding,
-    locomotives: Locomotives,
+    opening: Opening<Question>,
     roster: Roster,
     contacts: Contacts,
-    /// Participants that have named themselves.
+    /// Participants that have identified themselves.
     participants: Vec<Uid>,
-    /// How turnouts lie, by what the station has said of them.
-    turnouts: Vec<(TurnoutId, bool)>,
     solenoid: Option<Solenoid>,
-    /// Whether the track is meant to have power, and whether the station has said that it has.
-    power: bool,
-    is_powered: bool,
-    /// Locomotives whose state has to be asked for, and those of which something else was said than was commanded.
+    /// Locomotives whose state must be read, and those whose reported state does not fit the commands.
     unverified: Vec<(TrainId, Query)>,
     suspected: Vec<TrainId>,
-    /// Whether the station answers when it is asked for its modules, and when it was asked last.
+    /// Whether the station answers polls of its modules, and when it was polled last.
     has_modules: bool,
     polled: Timestamp,
-    /// When the last byte and the last frame came, and since when none was heard before the states were asked for again.
+    /// When the last byte arrived.
     arrived: Timestamp,
-    heard: Timestamp,
+    /// Whether the station was silent and its states have not been read since.
     is_blind: bool,
-    /// The time of the last entry of the recording: entries stay in order.
-    last_entry: Timestamp,
-    farewell: Farewell,
-    output: VecDeque<Transmit>,
 }
 
-/// What is asked of a locomotive.
+/// A question about a locomotive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Query {
     Speed,
     Direction,
 }
 
-/// A request that is about to be written.
-#[derive(Clone, Copy)]
-struct Outgoing {
-    message: Message,
-    awaited: Option<Awaited>,
-    command: Option<Command>,
-    tries: u8,
-}
-
-impl Outgoing {
-    const fn asks(message: Message, awaited: Awaited) -> Self {
-        Self { message, awaited: Some(awaited), command: None, tries: 1 }
-    }
-}
-
 impl Client {
     /// A session over a line that has just been opened.
     #[must_use]
     pub fn new(now: Timestamp, settings: Settings) -> Self {
+        let checks = match settings.transport {
+            Transport::Network => NETWORK_CHECKS,
+            Transport::Adapter => ADAPTER_CHECKS,
+        };
         let mut client = Self {
             settings,
             hash: hash_of(settings.uid.0),
-            now,
+            dialogue: Dialogue::new(now, PACING, checks),
             framing: Framing::new(settings.transport),
-            opening: Opening::begin(),
-            pacing: PACING,
-            silence: silence(settings.transport),
-            waiting: Queue::default(),
-            outstanding: AllOutstanding::default(),
-            locomotives: Locomotives::default(),
+            opening: Opening::asking(Question::ALL),
             roster: Roster::default(),
             contacts: Contacts::default(),
             participants: Vec::new(),
-            turnouts: Vec::new(),
             solenoid: None,
-            power: true,
-            is_powered: false,
             unverified: Vec::new(),
             suspected: Vec::new(),
             has_modules: true,
             polled: now,
             arrived: now,
-            heard: now,
             is_blind: false,
-            last_entry: now,
-            farewell: Farewell::default(),
-            output: VecDeque::new(),
         };
         client.open_adapter();
         client.go_on(now);
@@ -166,37 +127,29 @@ impl Client {
         self.roster.list()
     }
 
-    /// An adapter is closed until it is opened, and a track box behind it may wait in its loader.
+    /// Opens an adapter, and starts a track box behind it that may wait in its loader.
     fn open_adapter(&mut self) {
         if self.settings.transport == Transport::Adapter {
-            self.output.push_back(Transmit::Message(OPEN_ADAPTER.to_vec()));
+            self.dialogue.write(OPEN_ADAPTER.to_vec());
             self.write(Message::Start(Uid::ALL), false);
         }
     }
 
-    /// Goes on as far as the clock allows.
+    /// Sends what is due.
     fn go_on(&mut self, now: Timestamp) {
-        self.now = now;
-        if let Some(notice) = self.silence.watch(now) {
-            self.is_blind = true;
-            self.notify(notice);
-        }
+        self.is_blind |= self.dialogue.watch(now);
         while let Some(next) = self.next(now) {
             self.send(now, next);
         }
     }
 
-    /// What is to be written next, if anything may be written now.
-    fn next(&mut self, now: Timestamp) -> Option<Outgoing> {
-        if self.farewell.is_over() || now < self.pacing.urgent_at() {
+    /// Returns the next request, if one may be written now.
+    fn next(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
+        if !self.dialogue.may_write(now) {
             return None;
         }
-        let outstanding = &self.outstanding;
-        let may_stop = |command: &Command| {
-            train_of(command)
-                .is_none_or(|train| outstanding.blocks(train, true).is_none_or(|until| now >= until))
-        };
-        if let Some(command) = self.waiting.next_urgent(may_stop) {
+        // A speed contains no direction, so a train can be stopped before its direction is known.
+        if let Some(command) = self.dialogue.next_stop(now, false) {
             return Some(self.outgoing(now, command));
         }
         if let Some(repeat) = self.next_repeat(now, true) {
@@ -205,18 +158,19 @@ impl Client {
         if let Some(release) = self.next_release(now) {
             return Some(release);
         }
-        if self.farewell.switch_off_is_due(now, &self.locomotives) {
+        if self.dialogue.switch_off_is_due(now) {
             return Some(self.outgoing(now, Command::PowerOff));
         }
-        if now < self.pacing.usual_at() || self.farewell.has_begun() {
+        if now < self.dialogue.pacing.usual_at() || self.dialogue.farewell.has_begun() {
             return None;
         }
         self.next_repeat(now, false).or_else(|| self.next_usual(now))
     }
 
-    fn next_usual(&mut self, now: Timestamp) -> Option<Outgoing> {
+    fn next_usual(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
+        let has_question = self.dialogue.outstanding.any(Awaited::is_question);
         if let Opening::Asking(questions) = &mut self.opening {
-            if self.outstanding.has_question() {
+            if has_question {
                 return None;
             }
             match questions.pop_front() {
@@ -227,62 +181,21 @@ impl Client {
         if let Some((train, query)) = self.unverified.pop() {
             return Some(self.query(train, query));
         }
-        let (locomotives, outstanding) = (&self.locomotives, &self.outstanding);
-        let asks = |train: &TrainId| {
-            !locomotives.has_direction(*train) && !outstanding.has(Awaited::AnyDirection(*train, Uid::ALL))
-        };
-        if let Some(train) = self.waiting.iter().filter_map(train_of).find(asks) {
+        let outstanding = &self.dialogue.outstanding;
+        let is_asked = |train| outstanding.has(&Awaited::AnyDirection(train, Uid::ALL));
+        if let Some(train) = self.dialogue.undirected(is_asked) {
             return Some(self.query(train, Query::Direction));
         }
-        let has_no_pulse = self.solenoid.is_none();
-        let may_go = |command: &Command| match command {
-            Command::Turnout { turnout, .. } => {
-                has_no_pulse && !outstanding.has(Awaited::Accessory(*turnout, Uid::ALL, 0, 0))
-            }
-            _ => train_of(command).is_none_or(|train| {
-                locomotives.has_direction(train) && outstanding.blocks(train, false).is_none()
-            }),
-        };
-        if let Some(command) = self.waiting.next_usual(may_go) {
+        if let Some(command) = self.dialogue.next_command(self.solenoid.is_none()) {
             return Some(self.outgoing(now, command));
         }
         let question = if self.has_modules { Question::Modules } else { Question::Ping };
-        (now >= self.poll_due() && !self.outstanding.has_question()).then(|| self.asking(now, question))
+        (now >= self.poll_due() && !has_question).then(|| self.asking(now, question))
     }
 
     fn poll_due(&self) -> Timestamp {
         self.polled + POLL_EVERY
     }
-
-    /// An entry of the recording.
-    fn enter(&mut self, time: Timestamp, kind: EventKind) {
-        self.last_entry = self.last_entry.max(time);
-        self.output.push_back(Transmit::Event(Event { time, kind }));
-    }
-
-    fn notify(&mut self, notice: LinkNotice) {
-        self.output.push_back(Transmit::Notice(notice));
-    }
-
-    /// When something of what waits may go.
-    fn waiting_due(&self) -> Option<Timestamp> {
-        let of_command = |command: &Command| {
-            let stops = matches!(command, Command::PowerOff | Command::Speed { step: SpeedStep::STAND, .. });
-            let paced = if stops { self.pacing.urgent_at() } else { self.pacing.usual_at() };
-            let free = train_of(command).and_then(|train| self.outstanding.blocks(train, stops));
-            free.map_or(paced, |free| free.max(paced))
-        };
-        let waits = self.waiting.iter().map(of_command).min();
-        let verifies = (!self.unverified.is_empty()).then(|| self.pacing.usual_at());
-        [waits, verifies].into_iter().flatten().min()
-    }
-}
-
-fn silence(transport: Transport) -> Silence {
-    Silence::new(match transport {
-        Transport::Network => NETWORK_CHECKS,
-        Transport::Adapter => ADAPTER_CHECKS,
-    })
 }
 
 /// The position of a turnout on the bus: 0 is round, 1 is straight.
@@ -292,8 +205,8 @@ const fn position_of(curved: bool) -> u8 {
 
 impl Session for Client {
     fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]) {
-        self.now = now;
-        if self.farewell.is_over() {
+        self.dialogue.now = now;
+        if self.dialogue.farewell.is_over() {
             return;
         }
         if now - self.arrived > FRAME_WITHIN {
@@ -308,43 +221,33 @@ impl Session for Client {
 
     fn handle_reopened(&mut self, now: Timestamp) {
         self.framing = Framing::new(self.settings.transport);
-        self.silence = silence(self.settings.transport);
         self.is_blind = true;
-        self.outstanding.clear();
         self.open_adapter();
         self.verify();
-        if self.farewell.has_begun() {
-            self.stop_driven();
-        }
+        self.dialogue.reopened();
         self.go_on(now);
     }
 
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
-        if self.farewell.has_begun() {
-            return Err(CommandError::Closed);
-        }
-        let trains = self.settings.locomotives.addresses();
-        let turnouts = self.settings.turnouts.addresses();
         match command {
             Command::Speed { step, .. } if speed_of(step).is_none() => {
                 return Err(CommandError::Step { step, highest: HIGHEST_STEP });
             }
-            Command::Speed { train, .. } | Command::Reverse { train }
-                if !trains.contains(&train.0) && self.roster.uid(train).is_none() =>
-            {
-                return Err(CommandError::Train { train, addresses: (*trains.start(), *trains.end()) });
+            Command::Speed { train, .. } | Command::Reverse { train } if self.roster.uid(train).is_none() => {
+                CommandError::check_train(train, &self.settings.locomotives.addresses())?;
             }
-            Command::Turnout { turnout, .. } if !turnouts.contains(&turnout.0) => {
-                return Err(CommandError::Turnout {
-                    turnout,
-                    addresses: (*turnouts.start(), *turnouts.end()),
-                });
+            Command::Turnout { turnout, .. } => {
+                CommandError::check_turnout(turnout, &self.settings.turnouts.addresses())?;
             }
             _ => {}
         }
-        self.waiting.push(command).map_err(CommandError::TooManyWaiting)?;
+        self.dialogue.push(command)?;
         self.go_on(now);
         Ok(())
+    }
+
+    fn expect_delays(&mut self, excess: TimeSpan) {
+        self.dialogue.excess = excess;
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
@@ -352,40 +255,28 @@ impl Session for Client {
     }
 
     fn poll_output(&mut self) -> Option<Transmit> {
-        self.output.pop_front()
+        self.dialogue.output.pop_front()
     }
 
     fn next_timeout(&self) -> Option<Timestamp> {
-        if self.farewell.is_over() {
-            return None;
-        }
-        let (urgent, paced) = (self.pacing.urgent_at(), self.pacing.usual_at());
+        let paced = self.dialogue.pacing.usual_at();
         let usual = match &self.opening {
-            _ if self.farewell.has_begun() => None,
-            Opening::Asking(_) => (!self.outstanding.has_question()).then_some(paced),
+            _ if self.dialogue.farewell.has_begun() => None,
+            Opening::Asking(_) => (!self.dialogue.outstanding.any(Awaited::is_question)).then_some(paced),
             Opening::Open => Some(self.poll_due().max(paced)),
         };
-        let stops = self.outstanding.due(true).map(|due| due.max(urgent));
-        let others = self.outstanding.due(false).map(|due| due.max(paced));
-        let release = self.solenoid.map(|powered| powered.release_at.max(urgent));
-        let times =
-            [usual, stops, others, release, self.silence.due(), self.waiting_due(), self.farewell.due()];
-        times.into_iter().flatten().filter(|at| *at > self.now).min()
+        let release = self.solenoid.map(|powered| powered.release_at);
+        self.dialogue.next_timeout(usual, release, !self.unverified.is_empty())
     }
 
     fn close(&mut self, now: Timestamp) {
-        if !self.farewell.has_begun() {
-            self.farewell.begin(now);
-            self.keep_stops();
-            self.waiting.clear();
-            self.outstanding.clear();
+        if self.dialogue.close(now, false) {
             self.solenoid.iter_mut().for_each(|powered| powered.release_at = now);
-            self.stop_driven();
         }
         self.go_on(now);
     }
 
     fn closing(&self) -> Closing {
-        self.farewell.statement(&self.locomotives)
+        self.dialogue.closing()
     }
 }

@@ -1,4 +1,4 @@
-//! How long things take between the track, the station and this program.
+//! Delays between the track, the station and this program.
 //!
 //! A station loads all contacts into the S88 bus at once, a cycle apart, shifts out one after the other and reports what has changed
 //! since the cycle before. A report says for how
@@ -6,8 +6,10 @@
 //! changes of one contact are known to lie so far apart, whatever the network did to the reports: where the delay of one is uncertain,
 //! the other one narrows it.
 
-use footplate_core::link::TimeModel;
+use footplate_core::link::{TimeModel, UsualLine};
 use footplate_core::{TimeSpan, Timestamp};
+
+use super::outstanding::REPEATED_AFTER;
 
 /// Contacts of an S88 module.
 pub const CONTACTS_PER_MODULE: u16 = 16;
@@ -25,7 +27,7 @@ pub const NETWORK_SHORTEST: TimeSpan = TimeSpan::from_us(520);
 /// The longest, on a cable or an idle wireless network (chosen; what a network really does is in the doctor's figures).
 pub const NETWORK_LONGEST: TimeSpan = TimeSpan::from_ms(20);
 
-/// The times that planners need. A command counts as gone when its frame is written; frames go 10 ms apart at the most crowded, and
+/// The times for planners. A command counts as sent when its frame is written; frames go 10 ms apart at the most crowded, and
 /// a tenth more is allowed. A report comes behind a cycle, the bits of thirty modules and the network: 200 ms.
 pub const TIME_MODEL: TimeModel = TimeModel {
     command: TimeSpan::ZERO,
@@ -33,6 +35,12 @@ pub const TIME_MODEL: TimeModel = TimeModel {
     soonest: TimeSpan::from_ms(11),
     reaction: TimeSpan::from_ms(200),
     report_window: SCAN_EVERY,
+};
+
+/// The line that these times hold for: answers come within what a network takes at the longest, and once more for the way there.
+pub const USUAL_LINE: UsualLine = UsualLine {
+    answers_within: TimeSpan::from_ns(2 * NETWORK_LONGEST.as_ns()),
+    repeated_after: REPEATED_AFTER,
 };
 
 /// The unit of the time that a report carries.

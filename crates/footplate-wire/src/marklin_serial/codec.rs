@@ -1,6 +1,6 @@
 //! What is said to the interface, as bytes and back.
 //!
-//! The virtual station reads with the same code what the program writes. Numbers are decimal in Märklin's
+//! The virtual station reads requests with the same code. Numbers are decimal in Märklin's
 //! instructions and so they are here.
 
 use core::fmt::{Display, Formatter, Result as FmtResult};

@@ -28,7 +28,7 @@ const NOT_READY_AFTER: TimeSpan = TimeSpan::from_ms(1_500);
 /// Commands since the last reply that are said again if the next is lost; older ones were long acted on.
 const SAID_AGAIN: usize = 16;
 
-/// The program's side of the line to a 6050 or 6051.
+/// The client's session with a 6050 or 6051.
 ///
 /// It opens with what brings an interface into step that waits for a second byte: power on twice (the first may be
 /// swallowed), solenoid off, reset mode on.
@@ -120,7 +120,7 @@ impl Interface {
         if self.power { Message::Go } else { Message::Stop }
     }
 
-    /// Goes on as far as the clock allows.
+    /// Sends what is due.
     fn go_on(&mut self, now: Timestamp) {
         self.now = now;
         self.nudged = false;

@@ -1,8 +1,8 @@
-//! What a client has asked the station to be told of by itself.
+//! Broadcast flags: what the station reports to a client by itself.
 
 use core::ops::BitOr;
 
-/// Kinds of messages, as the station counts them in bits.
+/// Kinds of messages, one bit each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Broadcasts(pub u32);
 

@@ -10,7 +10,6 @@
 mod broadcasts;
 mod dataset;
 mod detectors;
-mod opening;
 mod outstanding;
 mod reply;
 mod request;
@@ -31,4 +30,4 @@ pub use session::Client;
 pub use settings::Settings;
 pub use speed::{Steps, Throttle};
 pub use states::{CentralState, Firmware, Lock, LocomotiveState, SystemState, TurnoutPosition};
-pub use time_model::{SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST, TIME_MODEL};
+pub use time_model::{SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST, TIME_MODEL, USUAL_LINE};

@@ -21,7 +21,7 @@ pub enum Reply {
     },
     /// Whether driving over the network is locked.
     LockCode(Lock),
-    /// What this client is told.
+    /// The subscription of this client.
     Broadcasts(Broadcasts),
     /// Currents, voltages, temperature.
     SystemState(SystemState),
@@ -49,9 +49,9 @@ pub enum Reply {
     },
     /// Its firmware, asked on the X-BUS.
     Firmware(Firmware),
-    /// How a locomotive is driven.
+    /// The state of a locomotive.
     Locomotive(LocomotiveState),
-    /// How a turnout lies.
+    /// The position of a turnout.
     Turnout {
         /// Its address, from 0.
         address: u16,
@@ -73,7 +73,7 @@ pub enum Reply {
     RailCom(RailCom),
 }
 
-/// A dataset of a known kind whose contents mean nothing: what came was changed on its way.
+/// A dataset of a known kind with impossible contents: it was damaged on its way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Malformed;
 

@@ -1,6 +1,6 @@
-//! What is asked of the station, as datasets and back.
+//! Requests to the station, and their datasets.
 //!
-//! The virtual station reads with the same code what the program writes.
+//! The virtual station reads requests with the same code.
 
 use alloc::vec::Vec;
 use core::ops::RangeInclusive;
@@ -16,9 +16,8 @@ pub const LOCOMOTIVES: RangeInclusive<u16> = 1..=9_999;
 /// Addresses of turnouts on the way: 2048 from 0.
 pub const TURNOUTS: RangeInclusive<u16> = 0..=2_047;
 
-/// One datagram that stops every locomotive and takes the power from the track, for whoever holds the line when the program can
-/// say nothing more. It is needed because a Z21 lets trains run when their client is gone. It needs no state, and may be sent
-/// more than once.
+/// One datagram that stops every locomotive and switches the track power off, for a guardian that holds the line when the program
+/// has died: a Z21 lets trains run when their client is gone. It needs no state and may be sent more than once.
 pub const LAST_WILL: [u8; 13] =
     [0x06, 0x00, 0x40, 0x00, 0x80, 0x80, 0x07, 0x00, 0x40, 0x00, 0x21, 0x80, 0xa1];
 
@@ -49,9 +48,9 @@ pub enum Request {
     LockCode,
     /// This client will not speak any more.
     LogOff,
-    /// What this client wants to be told.
+    /// Sets the subscription of this client.
     SetBroadcasts(Broadcasts),
-    /// What this client is told.
+    /// The subscription of this client.
     Broadcasts,
     /// Currents, voltages, temperature.
     SystemState,
@@ -68,7 +67,7 @@ pub enum Request {
     },
     /// Stop all locomotives at once; the track keeps its power.
     StopAll,
-    /// How a locomotive is driven. Whoever asks is told of its changes from then on.
+    /// The state of a locomotive. Whoever asks is told of its changes from then on.
     Locomotive {
         /// Its address.
         address: u16,
@@ -79,9 +78,9 @@ pub enum Request {
         address: u16,
         /// The steps of its decoder.
         steps: Steps,
-        /// How fast.
+        /// Its speed.
         throttle: Throttle,
-        /// Which end leads; absolute.
+        /// Whether it runs forward; absolute.
         forward: bool,
     },
     /// Switch a function.
@@ -93,7 +92,7 @@ pub enum Request {
         /// What is done to it.
         switch: FunctionSwitch,
     },
-    /// How a turnout lies.
+    /// The position of a turnout.
     Turnout {
         /// Its address, from 0.
         address: u16,

@@ -1,11 +1,11 @@
-//! Which sensors are occupied, and what a message about one of them means when messages may be lost, come twice or too late.
+//! Sensor states on a line that may lose, double or reorder messages.
 
 use alloc::vec::Vec;
 
 use footplate_core::{TimeSpan, Timestamp};
 
-/// A sensor that is occupied again so soon after it was free is not a second train: it bounced, or an older datagram has
-/// overtaken a newer one. Longer than the interval at which states are asked for, which puts such an error right.
+/// A sensor that is occupied again within this time after it was free is no second train: it bounced, or an old datagram arrived
+/// late. Longer than the interval of polls, which correct such an error.
 const BOUNCES: TimeSpan = TimeSpan::from_ms(400);
 
 /// One sensor.
@@ -13,29 +13,29 @@ const BOUNCES: TimeSpan = TimeSpan::from_ms(400);
 struct Sensor {
     number: u16,
     is_occupied: bool,
-    /// When it was last said to have become free.
+    /// When it last became free.
     freed: Option<Timestamp>,
-    /// When it was last said to be free.
+    /// When it was last reported free.
     free_at: Option<Timestamp>,
 }
 
-/// The sensors that the station has spoken of, in the order of their numbers there.
+/// The sensors that the station has reported, in the order of their numbers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sensors(Vec<Sensor>);
 
 /// What a message means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Change {
-    /// It has become occupied; when it was last said to be free.
+    /// It became occupied; when it was last reported free.
     Occupied { free_at: Option<Timestamp> },
-    /// It is occupied, and was before it was first asked for.
+    /// It was occupied before it was first read.
     HeldFromStart,
-    /// Nothing new, or free.
+    /// No change, or free.
     None,
 }
 
 impl Sensors {
-    /// A sensor is occupied or free. `listing`: the states are being asked for, so that the first word about a sensor is no change.
+    /// Notes a sensor's state. `listing`: all states are being read, so the first message about a sensor is no change.
     pub(super) fn heard(&mut self, now: Timestamp, number: u16, is_occupied: bool, listing: bool) -> Change {
         let sensor = match self.0.binary_search_by_key(&number, |sensor| sensor.number) {
             Ok(at) => self.0.get_mut(at),

@@ -1,12 +1,13 @@
 //! What a station, its sensors and its turnouts are like.
 
+use alloc::vec::Vec;
 use core::ops::RangeInclusive;
 
 use footplate_core::{TimeSpan, TurnoutId};
 
 use super::broadcasts::Broadcasts;
 use super::detectors::{Feedback, GROUP_INPUTS, GROUPS};
-use super::request::TURNOUTS;
+use super::request::{Request, TURNOUTS};
 use super::speed::Steps;
 use super::time_model::SENSOR_DELAY_LONGEST;
 
@@ -47,6 +48,24 @@ impl Settings {
     /// What this client has to be told.
     pub(super) fn broadcasts(&self) -> Broadcasts {
         Broadcasts::STATES | Broadcasts::RAIL_COM | Broadcasts::SYSTEM_STATE | self.feedback.broadcasts()
+    }
+
+    /// What the station is asked before trains are driven: what it is, what it tells this client, where trains are, and the power.
+    ///
+    /// `is_subscribed`: whether it was already told what it is to tell this client. Then it is only asked, so that a station that was
+    /// restarted is recognised by what it has forgotten.
+    pub(super) fn questions(&self, wanted: Broadcasts, is_subscribed: bool, power: bool) -> Vec<Request> {
+        let broadcasts = if is_subscribed { Request::Broadcasts } else { Request::SetBroadcasts(wanted) };
+        let first = [Request::SerialNumber, Request::Hardware, Request::LockCode, broadcasts];
+        let groups = self.groups().map(|group| Request::Feedback { group });
+        let detectors = match self.feedback {
+            Feedback::RBus => None,
+            Feedback::Can => Some(Request::ALL_CAN),
+            Feedback::LocoNet => Some(Request::ALL_LOCO_NET),
+        };
+        let groups = groups.filter(|_| detectors.is_none());
+        let last = [Request::Power { on: power }, Request::Status];
+        first.into_iter().chain(groups).chain(detectors).chain(last).collect()
     }
 
     /// The groups of the R-BUS that have to be asked for.

@@ -125,7 +125,7 @@ impl SystemState {
     }
 }
 
-/// How a locomotive is driven.
+/// The state of a locomotive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LocomotiveState {
     /// Its address.
@@ -134,9 +134,9 @@ pub struct LocomotiveState {
     pub busy: bool,
     /// The steps of its decoder.
     pub steps: Steps,
-    /// How fast.
+    /// Its speed.
     pub throttle: Throttle,
-    /// Which end leads.
+    /// Whether it runs forward.
     pub forward: bool,
     /// Functions that are on, F0 in the lowest bit.
     pub functions: u32,
@@ -189,7 +189,7 @@ pub(super) const fn address_bytes(address: u16) -> [u8; 2] {
     if address >= 128 { [high | 0xc0, low] } else { [high, low] }
 }
 
-/// How a turnout lies, as the station has commanded it last.
+/// The position of a turnout, as the station commanded it last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TurnoutPosition {
     /// It was never commanded.

@@ -1,11 +1,13 @@
-//! How long things take between the track, the station and this program.
+//! Delays between the track, the station and this program.
 //!
 //! No source gives figures for a real Z21; these are reasoned, and wide on purpose. A feedback bus of this kind asks all its
 //! modules in a cycle of 33 ms (the RS-bus that the R-BUS resembles), so that a change waits for up to one cycle; then the station
 //! sends a datagram. Over a wired network that takes about a millisecond; 40 ms leave some for a busy station.
 
-use footplate_core::link::TimeModel;
+use footplate_core::link::{TimeModel, UsualLine};
 use footplate_core::{TimeSpan, Timestamp};
+
+use super::outstanding::REPEATED_AFTER;
 
 /// The shortest time from a sensor being occupied until the host has the message: a datagram's way.
 pub const SENSOR_DELAY_SHORTEST: TimeSpan = TimeSpan::from_ms(1);
@@ -13,7 +15,7 @@ pub const SENSOR_DELAY_SHORTEST: TimeSpan = TimeSpan::from_ms(1);
 /// The longest, unless a person says another: one cycle of the feedback bus and what the station needs.
 pub const SENSOR_DELAY_LONGEST: TimeSpan = TimeSpan::from_ms(40);
 
-/// The times that planners need. A command counts as gone when its datagram is written. Datagrams go 20 ms apart at the most
+/// The times for planners. A command counts as sent when its datagram is written. Datagrams go 20 ms apart at the most
 /// crowded, and a tenth more is allowed; a stop waits for 5 ms at most, behind the slowest report.
 pub const TIME_MODEL: TimeModel = TimeModel {
     command: TimeSpan::ZERO,
@@ -23,7 +25,11 @@ pub const TIME_MODEL: TimeModel = TimeModel {
     report_window: SENSOR_DELAY_LONGEST,
 };
 
-/// When a sensor became occupied at the latest, and the width of the span before that in which it may have.
+/// The line that these times hold for: answers come within some milliseconds in the station, and a wired network.
+pub const USUAL_LINE: UsualLine =
+    UsualLine { answers_within: TimeSpan::from_ms(10), repeated_after: REPEATED_AFTER };
+
+/// Returns the latest time at which a sensor became occupied, and the width of the span before it.
 ///
 /// `not_before` is the time of the last entry of the recording, whose entries stay in order. `free_at`: when the station last said
 /// that the sensor is free, where that is known: for what was missed when it happened and is found when asked for.

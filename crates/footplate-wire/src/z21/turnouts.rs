@@ -1,19 +1,17 @@
-//! How turnouts lie, and the one whose output is powered.
+//! The one output of a turnout that is powered.
 //!
-//! Without the queue of later firmware a client has to let go of an output itself, and outputs of two turnouts must not be powered
-//! at once. So it is done here for every station: one turnout after the other.
+//! Older firmware has no queue: a client releases outputs itself and must not power two at once. Footplate does this with every
+//! station, one turnout after the other.
 
-use alloc::vec::Vec;
-
-use footplate_core::{TimeSpan, Timestamp, TurnoutId};
+use footplate_core::{TimeSpan, Timestamp};
 
 use super::request::Request;
 
-/// How long an output is powered: 100 ms at least, and 150 ms are usual.
+/// How long an output is powered: at least 100 ms, usually 150 ms.
 const PULSE: TimeSpan = TimeSpan::from_ms(150);
-/// How often its release is written: a datagram may be lost, and nothing confirms a release.
+/// How often its release is written: a datagram may be lost, and no answer confirms it.
 const RELEASES: u8 = 2;
-/// From one to the next.
+/// Time between two releases.
 const BETWEEN_RELEASES: TimeSpan = TimeSpan::from_ms(30);
 
 /// An output under power.
@@ -21,47 +19,34 @@ const BETWEEN_RELEASES: TimeSpan = TimeSpan::from_ms(30);
 struct Pulse {
     address: u16,
     second: bool,
-    /// When it is let go next, and how often still.
+    /// When to release it next, and how often.
     release_at: Timestamp,
     releases: u8,
 }
 
-/// All that were spoken of.
+/// The outputs of all turnouts, of which at most one is powered.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Turnouts {
-    /// Whether each lies curved.
-    lie: Vec<(TurnoutId, bool)>,
+pub(super) struct Outputs {
     pulse: Option<Pulse>,
 }
 
-impl Turnouts {
-    /// A turnout lies so; returns how it was said to lie before.
-    pub(super) fn heard(&mut self, turnout: TurnoutId, curved: bool) -> Option<bool> {
-        match self.lie.iter_mut().find(|(known, _)| *known == turnout) {
-            Some((_, lies)) => Some(core::mem::replace(lies, curved)),
-            None => {
-                self.lie.push((turnout, curved));
-                None
-            }
-        }
-    }
-
-    /// An output is powered.
+impl Outputs {
+    /// Notes that an output is powered.
     pub(super) fn powered(&mut self, address: u16, second: bool, now: Timestamp) {
         self.pulse = Some(Pulse { address, second, release_at: now + PULSE, releases: RELEASES });
     }
 
     /// Whether no output is powered.
-    pub(super) const fn is_free(&self) -> bool {
+    pub(super) const fn are_free(&self) -> bool {
         self.pulse.is_none()
     }
 
-    /// When an output has to be let go.
+    /// Returns when to release an output.
     pub(super) fn release_due(&self) -> Option<Timestamp> {
         self.pulse.map(|pulse| pulse.release_at)
     }
 
-    /// What lets go of an output, when it is time or at once.
+    /// Returns the request that releases an output, if it is due.
     pub(super) fn take_release(&mut self, now: Timestamp) -> Option<Request> {
         let Pulse { address, second, releases, .. } = self.pulse.filter(|pulse| now >= pulse.release_at)?;
         self.pulse = (releases > 1).then_some(Pulse {

@@ -1,33 +1,30 @@
 //! The session with a DCC-EX board: its order, its pace, and what it does when something is lost.
 
-use footplate_core::{
-    Command, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
-};
+use footplate_core::{Command, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, TrainId, TurnoutId};
 use footplate_wire::dcc_ex::{Client, Settings, TurnoutRequests};
-use footplate_wire::{CommandError, LinkNotice, Session, Transmit};
+use footplate_wire::{CommandError, LinkNotice, Session};
 
-const T24: TrainId = TrainId(24);
-const T58: TrainId = TrainId(58);
+use crate::desk::{Station, T24, T58, ms, speed};
 
-fn ms(ms: i64) -> Timestamp {
-    Timestamp::ZERO + TimeSpan::from_ms(ms)
-}
-
-fn speed(train: TrainId, step: u8) -> Command {
-    Command::Speed { train, step: SpeedStep::new(step).unwrap() }
-}
-
-/// A session and the line it writes to, with a board that answers what a table says.
-struct Desk {
-    client: Client,
-    now: Timestamp,
-    /// What was written, and when.
-    written: Vec<(i64, String)>,
-    events: Vec<Event>,
-    notices: Vec<LinkNotice>,
-    /// Answers by the text of the request; all others are not answered.
+/// A board that answers what a table says, and nothing else.
+struct Board {
     answers: Vec<(&'static str, &'static str)>,
 }
+
+impl Station for Board {
+    type Written = String;
+    /// The median that was measured.
+    const ANSWER: TimeSpan = TimeSpan::from_us(3_400);
+
+    fn hear(&mut self, bytes: Vec<u8>) -> (Vec<String>, Vec<Vec<u8>>) {
+        let text = String::from_utf8(bytes).unwrap();
+        let answer = self.answers.iter().find(|(request, _)| *request == text);
+        let answer = answer.map(|(_, answer)| answer.as_bytes().to_vec());
+        (vec![text], answer.into_iter().collect())
+    }
+}
+
+type Desk = crate::desk::Desk<Client, Board>;
 
 /// As the firmware answers when one locomotive is known to run backwards.
 const ANSWERS: [(&str, &str); 14] = [
@@ -47,14 +44,9 @@ const ANSWERS: [(&str, &str); 14] = [
     ("<t 58 0 1>", "<l 58 1 128 0>\n"),
 ];
 
-/// From a request to the answer: the median that was measured.
-const ANSWER: TimeSpan = TimeSpan::from_us(3_400);
-
 impl Desk {
     fn new(settings: Settings) -> Self {
-        let client = Client::new(ms(0), settings);
-        let answers = ANSWERS.to_vec();
-        Self { client, now: ms(0), written: Vec::new(), events: Vec::new(), notices: Vec::new(), answers }
+        Self::with(Client::new(ms(0), settings), Board { answers: ANSWERS.to_vec() })
     }
 
     fn opened() -> Self {
@@ -62,46 +54,6 @@ impl Desk {
         desk.run_until(ms(1_000));
         desk.written.clear();
         desk
-    }
-
-    /// Runs on; each answer comes 3.4 ms after its request.
-    fn run_until(&mut self, end: Timestamp) {
-        let mut coming: Vec<(Timestamp, String)> = Vec::new();
-        loop {
-            while let Some(output) = self.client.poll_output() {
-                match output {
-                    Transmit::Message(bytes) => {
-                        let text = String::from_utf8(bytes).unwrap();
-                        let answer = self.answers.iter().find(|(request, _)| *request == text);
-                        coming.extend(answer.map(|(_, answer)| (self.now + ANSWER, (*answer).to_owned())));
-                        self.written.push(((self.now - ms(0)).as_ns() / 1_000_000, text));
-                    }
-                    Transmit::Event(event) => self.events.push(event),
-                    Transmit::Notice(notice) => self.notices.push(notice),
-                    Transmit::Byte(byte) => unreachable!("a lone byte {byte}"),
-                }
-            }
-            let next = [coming.first().map(|(at, _)| *at), self.client.next_timeout()];
-            let Some(at) = next.into_iter().flatten().min().filter(|at| *at <= end) else { break };
-            self.now = at;
-            if coming.first().is_some_and(|(due, _)| *due <= at) {
-                let (_, answer) = coming.remove(0);
-                self.client.handle_bytes(at, answer.as_bytes());
-            } else {
-                self.client.handle_timeout(at);
-                let next = self.client.next_timeout();
-                assert!(next.is_none_or(|next| next > at), "a session that is never done");
-            }
-        }
-        self.now = end;
-    }
-
-    fn run_for(&mut self, span_ms: i64) {
-        self.run_until(self.now + TimeSpan::from_ms(span_ms));
-    }
-
-    fn command(&mut self, command: Command) {
-        self.client.handle_command(self.now, command).unwrap();
     }
 
     fn hear(&mut self, text: &str) {
@@ -168,7 +120,7 @@ fn the_newest_speed_wins_and_a_stop_goes_first() {
     desk.command(speed(T24, 8));
     desk.run_for(200);
     desk.written.clear();
-    desk.answers.push(("<t 58 90 1>", "<l 58 1 219 0>\n"));
+    desk.station.answers.push(("<t 58 90 1>", "<l 58 1 219 0>\n"));
     // Twenty more speeds at once, a turnout, and a stop behind them.
     for step in 1..=10 {
         desk.command(speed(T58, step));
@@ -192,7 +144,7 @@ fn what_is_not_answered_is_repeated_and_given_up_if_it_stops_nothing() {
     let mut desk = Desk::opened();
     desk.command(speed(T24, 8));
     desk.run_for(200);
-    desk.answers.retain(|(request, _)| !request.starts_with("<t 24"));
+    desk.station.answers.retain(|(request, _)| !request.starts_with("<t 24"));
     desk.written.clear();
     desk.command(speed(T24, 9));
     desk.run_for(3_000);
@@ -237,8 +189,8 @@ fn a_sensor_is_an_event_with_the_span_that_was_measured() {
 #[test]
 fn turnouts_that_are_defined_are_awaited_only_when_they_move() {
     let mut desk = Desk::new(Settings { turnouts: TurnoutRequests::Defined, ..Settings::default() });
-    desk.answers.push(("<T 7 1>", "<H 7 1>\n"));
-    desk.answers.push(("<T 8 1>", "<X>\n"));
+    desk.station.answers.push(("<T 7 1>", "<H 7 1>\n"));
+    desk.station.answers.push(("<T 8 1>", "<X>\n"));
     desk.run_until(ms(1_000));
     desk.written.clear();
     // 9 lies curved already, 7 answers, 8 is not defined.
@@ -255,19 +207,21 @@ fn silence_is_noticed_and_everything_asked_again_after_it() {
     let mut desk = Desk::opened();
     desk.command(speed(T24, 8));
     desk.run_for(200);
-    let answers = std::mem::take(&mut desk.answers);
+    let answers = std::mem::take(&mut desk.station.answers);
     desk.run_for(2_500);
     let silent = |notice: &LinkNotice| matches!(notice, LinkNotice::Silent { .. });
     assert_eq!(desk.notices.iter().filter(|notice| silent(notice)).count(), 1);
     let text = desk.notices.iter().find(|notice| silent(notice)).unwrap().to_string();
     assert!(text.contains("check its power, the cable and the port"), "{text}");
     // It answers again: states and the locomotive are asked for, and only then it is said to answer.
-    (desk.answers, desk.written) = (answers, Vec::new());
-    desk.answers
+    (desk.station.answers, desk.written) = (answers, Vec::new());
+    desk.station
+        .answers
         .iter_mut()
         .filter(|(request, _)| *request == "<t 24>")
         .for_each(|(_, answer)| *answer = "<l 24 0 73 0>\n");
-    desk.answers
+    desk.station
+        .answers
         .iter_mut()
         .filter(|(request, _)| *request == "<Q>")
         .for_each(|(_, answer)| *answer = "<Q 0><q 5>");
@@ -304,7 +258,8 @@ fn a_board_that_restarted_behind_a_network_is_recognised_by_what_it_forgot() {
     desk.command(speed(T24, 8));
     desk.run_for(500);
     desk.written.clear();
-    desk.answers
+    desk.station
+        .answers
         .iter_mut()
         .filter(|(request, _)| *request == "<t 24>")
         .for_each(|(_, answer)| *answer = "<l 24 -1 128 0>\n");
@@ -366,7 +321,7 @@ fn what_was_not_confirmed_at_the_end_is_named() {
         desk.command(command);
     }
     desk.run_for(500);
-    desk.answers.retain(|(request, _)| *request != "<t 58 0 1>");
+    desk.station.answers.retain(|(request, _)| *request != "<t 58 0 1>");
     desk.client.close(desk.now);
     desk.run_for(5_000);
     let closing = desk.client.closing();

@@ -9,6 +9,10 @@
 mod dcc_ex_round_trip;
 mod dcc_ex_session;
 mod dcc_ex_vectors;
+mod desk;
+mod floods;
+mod loconet_codec;
+mod loconet_session;
 mod marklin_can_round_trip;
 mod marklin_can_session;
 mod marklin_can_vectors;

@@ -1,41 +1,55 @@
 //! The session with a Central Station: its order, its repeats, what it makes of reports, and its end.
 
-use footplate_core::{
-    Command, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
-};
+use footplate_core::{Command, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, TrainId, TurnoutId};
 use footplate_wire::marklin_can::{
     Client, Direction, Frame, Framing, LocomotiveProtocol, Message, Settings, Transport, Uid,
 };
-use footplate_wire::{CommandError, LinkNotice, Session, Transmit};
+use footplate_wire::{CommandError, LinkNotice, Session};
 
-const T24: TrainId = TrainId(24);
-const T58: TrainId = TrainId(58);
+use crate::desk::{Station, T24, T58, ms, speed};
+
 /// The hash of a real track box, which the published formula does not yield.
 const FOREIGN: u16 = 0x9346;
-/// From a request to the answer.
-const ANSWER: TimeSpan = TimeSpan::from_ms(4);
-
-fn ms(ms: i64) -> Timestamp {
-    Timestamp::ZERO + TimeSpan::from_ms(ms)
-}
-
-fn speed(train: TrainId, step: u8) -> Command {
-    Command::Speed { train, step: SpeedStep::new(step).unwrap() }
-}
-
-/// A session and the line it writes to, with a station that answers as real ones do.
-struct Desk {
-    client: Client,
-    now: Timestamp,
-    written: Vec<(i64, Message)>,
+/// A station that answers as real ones do.
+struct Central {
+    transport: Transport,
     /// What was written that is no frame.
     texts: Vec<String>,
-    events: Vec<Event>,
-    notices: Vec<LinkNotice>,
-    transport: Transport,
     /// Whether the station leaves a request without an answer.
     ignores: fn(&Message) -> bool,
 }
+
+impl Central {
+    fn encoded(&self, message: Message, is_response: bool) -> Vec<u8> {
+        let frame = message.frame(is_response, FOREIGN);
+        match self.transport {
+            Transport::Network => frame.encode().to_vec(),
+            Transport::Adapter => (frame.to_text() + "\r").into_bytes(),
+        }
+    }
+}
+
+impl Station for Central {
+    type Written = Message;
+    const ANSWER: TimeSpan = TimeSpan::from_ms(4);
+
+    fn hear(&mut self, bytes: Vec<u8>) -> (Vec<Message>, Vec<Vec<u8>>) {
+        let mut framing = Framing::new(self.transport);
+        let frames: Vec<Frame> = bytes.iter().filter_map(|byte| framing.push(*byte)).collect();
+        let [frame] = frames[..] else {
+            self.texts.push(String::from_utf8(bytes).unwrap());
+            return (Vec::new(), Vec::new());
+        };
+        let message = Message::of(&frame);
+        if frame.is_response || (self.ignores)(&message) {
+            return (vec![message], Vec::new());
+        }
+        let bytes = answers(message).into_iter().flat_map(|answer| self.encoded(answer, true));
+        (vec![message], vec![bytes.collect()])
+    }
+}
+
+type Desk = crate::desk::Desk<Client, Central>;
 
 /// As a station answers on which one locomotive runs backwards and contact 4 is occupied.
 fn answers(message: Message) -> Vec<Message> {
@@ -60,10 +74,8 @@ fn answers(message: Message) -> Vec<Message> {
 
 impl Desk {
     fn new(settings: Settings) -> Self {
-        let transport = settings.transport;
-        let client = Client::new(ms(0), settings);
-        let (written, texts, events, notices) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { client, now: ms(0), written, texts, events, notices, transport, ignores: |_| false }
+        let station = Central { transport: settings.transport, texts: Vec::new(), ignores: |_| false };
+        Self::with(Client::new(ms(0), settings), station)
     }
 
     fn opened() -> Self {
@@ -73,65 +85,8 @@ impl Desk {
         desk
     }
 
-    fn encoded(&self, message: Message, is_response: bool) -> Vec<u8> {
-        let frame = message.frame(is_response, FOREIGN);
-        match self.transport {
-            Transport::Network => frame.encode().to_vec(),
-            Transport::Adapter => (frame.to_text() + "\r").into_bytes(),
-        }
-    }
-
-    fn run_until(&mut self, end: Timestamp) {
-        let mut coming: Vec<(Timestamp, Vec<u8>)> = Vec::new();
-        loop {
-            while let Some(output) = self.client.poll_output() {
-                match output {
-                    Transmit::Message(bytes) => {
-                        let mut framing = Framing::new(self.transport);
-                        let frames: Vec<Frame> =
-                            bytes.iter().filter_map(|byte| framing.push(*byte)).collect();
-                        let [frame] = frames[..] else {
-                            self.texts.push(String::from_utf8(bytes).unwrap());
-                            continue;
-                        };
-                        let message = Message::of(&frame);
-                        self.written.push(((self.now - ms(0)).as_ns() / 1_000_000, message));
-                        if !frame.is_response && !(self.ignores)(&message) {
-                            let bytes =
-                                answers(message).into_iter().flat_map(|answer| self.encoded(answer, true));
-                            coming.push((self.now + ANSWER, bytes.collect()));
-                        }
-                    }
-                    Transmit::Event(event) => self.events.push(event),
-                    Transmit::Notice(notice) => self.notices.push(notice),
-                    Transmit::Byte(byte) => unreachable!("a lone byte {byte}"),
-                }
-            }
-            let next = [coming.first().map(|(at, _)| *at), self.client.next_timeout()];
-            let Some(at) = next.into_iter().flatten().min().filter(|at| *at <= end) else { break };
-            self.now = at;
-            if coming.first().is_some_and(|(due, _)| *due <= at) {
-                let (_, answer) = coming.remove(0);
-                self.client.handle_bytes(at, &answer);
-            } else {
-                self.client.handle_timeout(at);
-                let next = self.client.next_timeout();
-                assert!(next.is_none_or(|next| next > at), "a session that is never done");
-            }
-        }
-        self.now = end;
-    }
-
-    fn run_for(&mut self, span_ms: i64) {
-        self.run_until(self.now + TimeSpan::from_ms(span_ms));
-    }
-
-    fn command(&mut self, command: Command) {
-        self.client.handle_command(self.now, command).unwrap();
-    }
-
     fn hear(&mut self, message: Message, is_response: bool) {
-        let bytes = self.encoded(message, is_response);
+        let bytes = self.station.encoded(message, is_response);
         self.client.handle_bytes(self.now, &bytes);
     }
 
@@ -172,9 +127,9 @@ fn a_station_is_asked_who_is_there_then_for_its_states() {
 #[test]
 fn an_adapter_is_opened_and_the_track_box_behind_it_is_started() {
     let mut desk = Desk::new(Settings { transport: Transport::Adapter, ..Settings::default() });
-    desk.ignores = |message| matches!(message, Message::ModulePoll { .. } | Message::File(_));
+    desk.station.ignores = |message| matches!(message, Message::ModulePoll { .. } | Message::File(_));
     desk.run_until(ms(4_000));
-    assert_eq!(desk.texts, ["\r\rC\rS5\rO\r"]);
+    assert_eq!(desk.station.texts, ["\r\rC\rS5\rO\r"]);
     assert_eq!(desk.messages()[..2], [Message::Start(Uid::ALL), Message::Ping]);
     assert_eq!(desk.notices.last(), Some(&LinkNotice::Answers), "it has no S88 modules and no list to give");
     // From then on it is asked whether it is there.
@@ -207,7 +162,7 @@ fn the_direction_is_read_back_and_then_absolute() {
 #[test]
 fn a_station_that_answers_no_questions_is_commanded_a_direction() {
     let mut desk = Desk::opened();
-    desk.ignores = |message| matches!(message, Message::Direction { .. });
+    desk.station.ignores = |message| matches!(message, Message::Direction { .. });
     desk.command(speed(T24, 8));
     desk.run_for(2_500);
     let forward = Message::Direction { uid: Uid(24), direction: Some(Direction::Forward) };
@@ -223,7 +178,7 @@ fn what_is_not_confirmed_is_repeated_and_given_up_if_it_stops_nothing() {
     let mut desk = Desk::opened();
     desk.command(speed(T24, 8));
     desk.run_for(200);
-    desk.ignores = |message| matches!(message, Message::Speed { .. });
+    desk.station.ignores = |message| matches!(message, Message::Speed { .. });
     desk.written.clear();
     desk.command(speed(T24, 9));
     desk.run_for(3_000);
@@ -245,7 +200,7 @@ fn a_confirmation_that_is_rounded_to_the_steps_of_a_decoder_counts() {
     let mut desk = Desk::opened();
     desk.command(speed(T24, 8));
     desk.run_for(200);
-    desk.ignores = |message| matches!(message, Message::Speed { .. });
+    desk.station.ignores = |message| matches!(message, Message::Speed { .. });
     desk.written.clear();
     desk.command(speed(T24, 9));
     desk.run_for(10);
@@ -257,7 +212,7 @@ fn a_confirmation_that_is_rounded_to_the_steps_of_a_decoder_counts() {
 #[test]
 fn a_report_is_dated_by_the_network_the_cycle_and_the_time_it_carries() {
     let mut desk = Desk::opened();
-    desk.ignores = |message| matches!(message, Message::ModulePoll { .. });
+    desk.station.ignores = |message| matches!(message, Message::ModulePoll { .. });
     let began = desk.now;
     desk.contact(17, false, true, 0);
     // The same datagram again, one without the response bit, one of contact 4 that was occupied from the start.
@@ -284,7 +239,7 @@ fn a_report_is_dated_by_the_network_the_cycle_and_the_time_it_carries() {
 #[test]
 fn a_report_that_was_lost_is_made_up_for_by_asking() {
     let mut desk = Desk::opened();
-    desk.ignores = |message| matches!(message, Message::ModulePoll { .. });
+    desk.station.ignores = |message| matches!(message, Message::ModulePoll { .. });
     desk.hear(Message::ModuleState { uid: Uid::ALL, module: 2, contacts: 1 }, true);
     desk.run_for(1);
     let Event { kind: EventKind::Sensor(report), .. } = desk.events[0] else { panic!("{:?}", desk.events) };
@@ -357,11 +312,11 @@ fn silence_is_noticed_and_everything_asked_again_after_it() {
     let mut desk = Desk::opened();
     desk.command(speed(T58, 8));
     desk.run_for(200);
-    desk.ignores = |_| true;
+    desk.station.ignores = |_| true;
     desk.run_for(4_000);
     let silent = |notice: &LinkNotice| matches!(notice, LinkNotice::Silent { .. });
     assert_eq!(desk.notices.iter().filter(|notice| silent(notice)).count(), 1, "{:?}", desk.notices);
-    desk.ignores = |message| matches!(message, Message::File(_));
+    desk.station.ignores = |message| matches!(message, Message::File(_));
     desk.run_for(3_000);
     // It says that 58 stands, which was commanded to run: it was switched off and on.
     assert!(
@@ -407,7 +362,7 @@ fn what_was_not_confirmed_at_the_end_is_named() {
         desk.command(command);
     }
     desk.run_for(500);
-    desk.ignores = |message| *message == drives(58, 0);
+    desk.station.ignores = |message| *message == drives(58, 0);
     desk.client.close(desk.now);
     desk.run_for(5_000);
     let closing = desk.client.closing();
@@ -423,7 +378,7 @@ fn the_end_on_a_line_from_which_nothing_is_heard_stops_trains_at_once_and_takes_
     }
     desk.run_for(500);
     desk.written.clear();
-    desk.ignores = |_| true;
+    desk.station.ignores = |_| true;
     let began = (desk.now - ms(0)).as_ns() / 1_000_000;
     desk.client.handle_reopened(desk.now);
     desk.client.close(desk.now);

@@ -2,24 +2,19 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::{Command, Event, EventKind, Report, TimeSpan, Timestamp};
+use footplate_core::TimeSpan;
 use footplate_wire::z21::{
     Broadcasts, CentralState, Client, Datasets, Firmware, Lock, LocomotiveState, Reply, Request, Settings,
     Steps, Throttle, TurnoutPosition,
 };
-use footplate_wire::{LinkNotice, Session, Transmit};
+use footplate_wire::{LinkNotice, Session};
 
-pub(crate) fn ms(ms: i64) -> Timestamp {
-    Timestamp::ZERO + TimeSpan::from_ms(ms)
-}
+use crate::desk::ms;
 
 /// As the station says how a locomotive is driven.
 pub(crate) fn state(address: u16, throttle: Throttle, forward: bool) -> LocomotiveState {
     LocomotiveState { address, busy: false, steps: Steps::All, throttle, forward, functions: 0 }
 }
-
-/// From a request to the answer.
-const ANSWER: TimeSpan = TimeSpan::from_ms(3);
 
 /// A station that answers what it is asked, and tells by itself only what a test makes it tell.
 pub(crate) struct Station {
@@ -94,17 +89,17 @@ fn bytes(reply: Reply) -> Vec<u8> {
     bytes
 }
 
-/// A session, the station, and the network between them.
-pub(crate) struct Desk {
-    pub(crate) client: Client,
-    pub(crate) now: Timestamp,
-    pub(crate) station: Station,
-    pub(crate) coming: Vec<(Timestamp, Vec<u8>)>,
-    /// What was written, and when (ms).
-    pub(crate) written: Vec<(i64, Request)>,
-    pub(crate) events: Vec<Event>,
-    pub(crate) notices: Vec<LinkNotice>,
+impl crate::desk::Station for Station {
+    type Written = Request;
+    const ANSWER: TimeSpan = TimeSpan::from_ms(3);
+
+    fn hear(&mut self, datagram: Vec<u8>) -> (Vec<Request>, Vec<Vec<u8>>) {
+        let read = Datasets::of(&datagram).map(|dataset| Request::read(&dataset).expect("a request"));
+        (read.collect(), self.answer(&datagram))
+    }
 }
+
+pub(crate) type Desk = crate::desk::Desk<Client, Station>;
 
 impl Desk {
     pub(crate) fn new(settings: Settings) -> Self {
@@ -120,9 +115,7 @@ impl Desk {
             loses: |_| false,
             count: 0,
         };
-        let client = Client::new(ms(0), settings);
-        let (coming, written, events, notices) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { client, now: ms(0), station, coming, written, events, notices }
+        Self::with(Client::new(ms(0), settings), station)
     }
 
     pub(crate) fn opened() -> Self {
@@ -132,48 +125,6 @@ impl Desk {
         desk.written.clear();
         desk.notices.clear();
         desk
-    }
-
-    pub(crate) fn run_until(&mut self, end: Timestamp) {
-        loop {
-            while let Some(output) = self.client.poll_output() {
-                match output {
-                    Transmit::Message(datagram) => {
-                        let requests = Datasets::of(&datagram)
-                            .map(|dataset| Request::read(&dataset).expect("a request"));
-                        let at = (self.now - ms(0)).as_ns() / 1_000_000;
-                        self.written.extend(requests.map(|request| (at, request)));
-                        let due = self.now + ANSWER;
-                        self.coming
-                            .extend(self.station.answer(&datagram).into_iter().map(|bytes| (due, bytes)));
-                    }
-                    Transmit::Event(event) => self.events.push(event),
-                    Transmit::Notice(notice) => self.notices.push(notice),
-                    Transmit::Byte(byte) => unreachable!("a lone byte {byte}"),
-                }
-            }
-            self.coming.sort_by_key(|(at, _)| *at);
-            let next = [self.coming.first().map(|(at, _)| *at), self.client.next_timeout()];
-            let Some(at) = next.into_iter().flatten().min().filter(|at| *at <= end) else { break };
-            self.now = self.now.max(at);
-            if self.coming.first().is_some_and(|(due, _)| *due <= at) {
-                let (_, datagram) = self.coming.remove(0);
-                self.client.handle_bytes(self.now, &datagram);
-            } else {
-                self.client.handle_timeout(at);
-                let next = self.client.next_timeout();
-                assert!(next.is_none_or(|next| next > at), "a session that is never done");
-            }
-        }
-        self.now = end;
-    }
-
-    pub(crate) fn run_for(&mut self, span_ms: i64) {
-        self.run_until(self.now + TimeSpan::from_ms(span_ms));
-    }
-
-    pub(crate) fn command(&mut self, command: Command) {
-        self.client.handle_command(self.now, command).unwrap();
     }
 
     pub(crate) fn hear(&mut self, reply: Reply) {
@@ -189,16 +140,5 @@ impl Desk {
             )
         };
         self.written.iter().map(|(_, request)| *request).filter(is_command).collect()
-    }
-
-    pub(crate) fn reports(&self) -> Vec<(i64, u16, i64)> {
-        let report = |event: &Event| match event.kind {
-            EventKind::Sensor(Report { sensor, poll_interval }) => {
-                let at = (event.time - ms(0)).as_ns() / 1_000_000;
-                Some((at, sensor.0, poll_interval.unwrap().as_ns() / 1_000_000))
-            }
-            _ => None,
-        };
-        self.events.iter().filter_map(report).collect()
     }
 }

@@ -1,20 +1,14 @@
 //! The session with a Z21: its order, its pace, and what it does when datagrams are lost, come twice or overtake one another.
 
-use footplate_core::{Command, EventKind, SensorId, SpeedStep, TrainId, TurnoutId};
+use footplate_core::{Command, EventKind, SensorId, TrainId, TurnoutId};
 use footplate_wire::z21::{
     Broadcasts, CanDetection, Feedback, Lock, LocoNetDetection, Reply, Request, Settings, Steps, Throttle,
     TurnoutPosition,
 };
 use footplate_wire::{CommandError, LinkNotice, Session};
 
-use crate::z21_desk::{Desk, ms, state};
-
-const T24: TrainId = TrainId(24);
-const T58: TrainId = TrainId(58);
-
-fn speed(train: TrainId, step: u8) -> Command {
-    Command::Speed { train, step: SpeedStep::new(step).unwrap() }
-}
+use crate::desk::{T24, T58, ms, speed};
+use crate::z21_desk::{Desk, state};
 
 fn drive(address: u16, throttle: Throttle, forward: bool) -> Request {
     Request::Drive { address, steps: Steps::All, throttle, forward }

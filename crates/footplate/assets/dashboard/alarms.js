@@ -1,52 +1,52 @@
-// Alarms in the reader's language: one for each cause, on every page, with what can be done, until it is over or somebody ends it.
+// Alarms on every page, in the reader's language: one for each cause, with a remedy, until it is over or the operator ends it.
 
 import { make, put } from "./dom.js";
 import { say } from "./words.js";
 
-/** What went otherwise than it should have is no news after so long (s); danger stays. */
+/** Warnings are hidden after this time (s); dangers stay. */
 const WARNED_S = 30;
-/** A picture so long after an alarm (s) knows of it. */
+/** A picture this long after an alarm (s) shows its effect. */
 const KNOWS_S = 1;
-/** So many alarms stand in the frame, and one on a phone; all are on the page of health. */
+/** The most alarms shown in the frame, and on a phone; the health page has all of them. */
 const SHOWN = 3;
 const phone = matchMedia("(max-width: 40rem)");
 
-/** What is over as soon as a train's position is known again: a person can say where it stands. */
+/** Alarms that end when the position of the train is known again: the operator can enter it. */
 const OF_POSITION = new Set(["lost", "needs-person", "stands-lost", "mishap-lost", "held-as-unknown"]);
-/** Where a person can say where the train stands, though it is believed to be elsewhere. */
+/** Alarms whose train may be elsewhere than estimated: the operator can enter its position. */
 const OF_PLACE = new Set([...OF_POSITION, "stands-elsewhere", "stands-untimely", "mishap-moved"]);
-/** What is over as soon as the train has been commanded to run again. */
+/** Alarms that end when the train is commanded to run again. */
 const OF_RUNNING = new Set(["diverged", "diverged-and-others", "track-ends", "held-back"]);
 
-/** Whether the pages have a sentence for an alarm; what they do not know they show as it was said. */
+/** Whether the pages have a sentence for an alarm; otherwise its English text is shown. */
 const sentence = ({ what, blanks, text }) => {
   const word = `alarm-${what}`;
   const said = say(word, ...blanks);
   return said === word ? text : said;
 };
 
-/** An alarm as a sentence, with the train that it is about. */
-export const told = (alarm) => (alarm.train == null ? sentence(alarm) : `${say("train", alarm.train)}: ${sentence(alarm)}`);
+/** An alarm as a sentence that begins with its train. */
+export const described = (alarm) => (alarm.train == null ? sentence(alarm) : `${say("train", alarm.train)}: ${sentence(alarm)}`);
 
 const isOfLine = ({ what }) => what.startsWith("line-");
 
-/** That a train is lost has several names; of the line and the contacts each says which it is. */
+/** The cause of an alarm. All alarms of a lost train are one cause; alarms of the link and of sensors are one each. */
 function causeOf({ train, what, blanks }) {
   if (OF_POSITION.has(what)) return `${train} position`;
   return `${train} ${what} ${train == null ? blanks.join() : ""}`;
 }
 
-/** What asks for a person is not overwritten by what does not. */
+/** An alarm that needs the operator is not replaced by one that does not. */
 const weight = (alarm) => (alarm ? (alarm.grade === "danger") + (alarm.what === "needs-person") : 0);
 
-/** Whether a picture shows that what an alarm is about is over. */
+/** Whether a picture shows that an alarm is over. */
 function isOver({ what, train, t_s: since }, picture) {
   const own = picture?.trains.find((one) => one.train === train);
   if (!own || picture.t_s < since + KNOWS_S) return false;
   return (OF_POSITION.has(what) && own.at !== null) || (OF_RUNNING.has(what) && own.step > 0 && own.at !== null);
 }
 
-/** The alarms that nothing has ended, the newest of each cause: dangers first. */
+/** The active alarms, the newest of each cause: dangers first. */
 function standing(alarms, picture) {
   const open = new Map();
   for (const alarm of alarms) {
@@ -67,16 +67,16 @@ function standing(alarms, picture) {
   return [...dangers.reverse(), ...news.filter(({ grade, t_s }) => grade === "warning" && now - t_s < WARNED_S).reverse()];
 }
 
-/** What can be done about an alarm, as a link. */
+/** The remedy of an alarm, as a link. */
 function action({ what, train }) {
   if (train != null && OF_PLACE.has(what)) return make("a", { class: "button", href: `#/layout/${train}` }, say("act-place", train));
   if (train != null) return make("a", { class: "button", href: `#/train/${train}` }, say("act-train", train));
   return make("a", { class: "button", href: "#/health" }, say(what.startsWith("line-") ? "act-line" : "act-health"));
 }
 
-/** The alarms in the frame of all pages. It says `alarms` to whoever listens, with how many dangers there are. */
+/** The alarms in the frame of all pages. Dispatches `alarms` with the number of dangers. */
 export class Alarmed extends EventTarget {
-  /** How many dangers nothing and nobody has ended. */
+  /** The number of active dangers. */
   dangers = 0;
   #place; #live; #ended = new Set(); #drawn = "";
 
@@ -96,7 +96,7 @@ export class Alarmed extends EventTarget {
 
   #show() {
     const open = standing(this.#live.alarms, this.#live.picture).filter((alarm) => !this.#ended.has(this.#key(alarm)));
-    // What stays as it is is not said again to those who listen to the page.
+    // Unchanged text is not written again, so that screen readers do not repeat it.
     const drawn = open.map(this.#key).join();
     if (drawn === this.#drawn) return;
     this.#drawn = drawn;
@@ -110,14 +110,14 @@ export class Alarmed extends EventTarget {
   }
 
   #row(alarm) {
-    const end = make("button", { type: "button", class: "small", "aria-label": say("end-alarm-of", told(alarm)) }, say("end-alarm"));
+    const end = make("button", { type: "button", class: "small", "aria-label": say("end-alarm-of", described(alarm)) }, say("end-alarm"));
     end.addEventListener("click", () => {
       this.#ended.add(this.#key(alarm));
       this.#show();
     });
     const acts = action(alarm);
     const row = make("p", { class: `alarm ${alarm.grade}` }, make("span"), ...(acts.hash === location.hash ? [] : [acts]), end);
-    put(row.firstElementChild, told(alarm));
+    put(row.firstElementChild, described(alarm));
     return row;
   }
 }

@@ -1,4 +1,4 @@
-// How a train moves, as it is driven with and as all recordings together say, and why a number is as it is.
+// The calibration page: the current model, the calibration from all recordings, and the measurements behind a value.
 
 import { colour, dots, line, rounded } from "./chart.js";
 import { LiveChart, barsOf } from "./charts.js";
@@ -7,12 +7,12 @@ import { ask, get } from "./server.js";
 import { LANGUAGE, say } from "./words.js";
 
 const SIDES = [["below", "first", -0.12], ["above", "second", 0.12], ["unknown", "third", 0]];
-/** Between two looks at a model that may have become better (ms). */
+/** Interval between two requests for a changed model (ms). */
 const LOOKED_EVERY_MS = 2000;
-/** One standard deviation is this part of half a 95 % interval. */
+/** One standard deviation as a part of half a 95 % interval. */
 const SIGMA = 1 / 1.959964;
 
-/** What a calibration is about, in the reader's language. */
+/** The current experiment, in the reader's language. */
 export function aboutCalibration({ trial, phase }) {
   if (!trial) return say(`phase-${phase || "finding"}`);
   const { what, step, side, run_s: run } = trial;
@@ -32,7 +32,7 @@ export function calibrationPage(root, live, number) {
   };
   const draw = () => charts.forEach(({ chart, data }) => chart.set(data()));
 
-  /** Points of a step, one series for each side from which it was reached. */
+  /** Points of all steps, one series for each approach. */
   function sides(points, bars) {
     return () => {
       const all = points();
@@ -45,7 +45,7 @@ export function calibrationPage(root, live, number) {
     };
   }
   const bySide = (unit) => SIDES.map(([side, name]) => dots(say(`from-${side}`), name, unit, 0));
-  /** From nought to the end of the highest bar. */
+  /** From zero to the end of the highest bar. */
   const upright = (bars) => ({
     y: { range: () => [0, 1.06 * Math.max(100, ...bars.flat().map(({ y, dy }) => y + dy))] }, x: { range: () => [0, (model?.highest ?? 14) + 0.6] },
   });
@@ -121,7 +121,7 @@ export function calibrationPage(root, live, number) {
     $("#changes").hidden = !report?.changes.length;
   }
 
-  /** The measurements behind a number, each with what a person thinks of it. */
+  /** The measurements behind a value, each with its mark. */
   async function why(of) {
     const place = $("#why");
     place.hidden = false;
@@ -235,7 +235,7 @@ export function calibrationPage(root, live, number) {
     },
   };
 
-  /** What a calibration is about, while one is under way. */
+  /** The calibration in progress. */
   function progress(now) {
     $("#progress").hidden = !now;
     if (!now) return;

@@ -1,12 +1,12 @@
-// Charts that go on: drawn with what the reports draw with, and again when colours or widths change.
+// Live charts, drawn with the code of the reports, and drawn again when colours or widths change.
 
 import { chart, colour, rounded } from "./chart.js";
 import { say } from "./words.js";
 
-/** Error bars for a chart: points by series, each in its colour. */
+/** Error bars of a chart: points by series, each in its colour. */
 export const barsOf = (points, series) => series.map(([, name], place) => [points[place], name]);
 
-/** A series of upright bars. */
+/** A series of bars. */
 export const upright = (label, name) => ({
   label, stroke: colour(name), fill: colour(name), width: 0, points: { show: false }, paths: uPlot.paths.bars({ size: [0.9, 60] }),
   value: (_, value) => (value == null ? "–" : rounded(value, 0)),
@@ -17,7 +17,7 @@ const dark = matchMedia("(prefers-color-scheme: dark)");
 export class LiveChart {
   #figure; #options; #u; #data; #watch; #again;
 
-  /** `options` makes the options of a chart, in the colours of the moment; `data` is what it shows at first. */
+  /** `options` makes the options of a chart in the current colours; `data` is the initial data. */
   constructor(figure, options, data) {
     this.#figure = figure;
     this.#options = options;

@@ -1,4 +1,4 @@
-// The frame of the pages: which of them is open, what it is told, and how the connection stands.
+// The frame of the pages: navigation, the data of the open page, and the state of the connection.
 
 import "./halt.js";
 import { Alarmed } from "./alarms.js";
@@ -13,7 +13,7 @@ import { recordingsPage } from "./recordings_page.js";
 import { trainPage } from "./train_page.js";
 import { say, translate } from "./words.js";
 
-/** How soon a server that was not there is asked again (ms). */
+/** Interval between attempts to reach the server (ms). */
 const AGAIN_MS = 3000;
 const PAGES = {
   layout: layoutPage, train: trainPage, calibration: calibrationPage, health: healthPage, recordings: recordingsPage, odometry: odometryPage,
@@ -26,7 +26,7 @@ const live = new Live();
 const alarmed = new Alarmed($("alarmed"), live);
 let open;
 
-/** The page that the address names, and of what. */
+/** The page in the address, and its subject. */
 function wanted() {
   const [name, what] = location.hash.replace(/^#\/?/, "").split("/");
   return Object.hasOwn(PAGES, name) ? [name, what] : ["layout"];
@@ -48,7 +48,7 @@ function turn() {
   }
 }
 
-/** A link for every train that is driven. */
+/** A link for every train of the session. */
 function links({ trains }) {
   const there = [...$("pages").querySelectorAll("[data-train]")].map((link) => link.dataset.train);
   if (there.join() === trains.map(({ train }) => train).join()) return;
@@ -62,7 +62,7 @@ function links({ trains }) {
   }
 }
 
-/** How the connection stands; a railway with an alarm is not shown as one where all is well. */
+/** The state of the connection, with the number of alarms. */
 function state() {
   const shown = $("connection");
   const isAlarmed = live.state === "connected" && alarmed.dangers > 0;

@@ -1,4 +1,4 @@
-// What a train does now, in one sentence.
+// The current activity of a train, as a sentence.
 
 import { shown, signed } from "./dom.js";
 import { kmPerHour } from "./scale.js";

@@ -1,6 +1,6 @@
-// Small words for what a page is made of.
+// Short functions that build pages.
 
-/** An element with its properties and what is in it. */
+/** An element with its properties and children. */
 export function make(name, properties = {}, ...inside) {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(properties)) {
@@ -12,12 +12,12 @@ export function make(name, properties = {}, ...inside) {
   return made;
 }
 
-/** Writes a text where another one stood, and nothing where it stood already. */
+/** Replaces the text of an element, unless it is the same. */
 export function put(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
 /** A number with a true minus. */
 export const shown = (value, digits = 0) => value.toFixed(digits).replace("-", "−").replace(/^−(0(\.0*)?)$/, "$1");
-/** The same with its sign. */
+/** The same with a sign. */
 export const signed = (value, digits = 0) => (value > 0 ? "+" : "") + shown(value, digits);

@@ -1,20 +1,20 @@
-// A layout that is being drawn: pieces that lie end to end, sensors on their joints, and what it is as a layout file.
+// A layout that is being drawn: pieces joined end to end, sensors on joints, and its text as a layout file.
 
 import { arcOf } from "./pieces.js";
 
-/** Ends join when they are this near (mm) and face each other this well (rad): rounded lengths leave no more. */
+/** Ends join within this distance (mm) and angle (rad): the error of rounded lengths. */
 const JOINS_MM = 3;
 const JOINS_RAD = 0.06;
-/** Open ends that are this near but do not join are a gap that nobody meant (mm). */
+/** Open ends within this distance that do not join are an unintended gap (mm). */
 const GAP_MM = 60;
-/** One standard deviation of a catalogue length with its joint (mm). */
+/** Standard deviation of a catalogue length with its joint (mm). */
 const LENGTH_UNCERTAINTY_MM = 1;
 const S88_INPUTS = 16;
 const S88_MODULES = "ABCDE";
 
 const turned = (one, other) => Math.abs(Math.atan2(Math.sin(one - other), Math.cos(one - other)));
 
-/** Where the ends of a piece are and which way they face, seen from its first end. `side`: −1 left, +1 right. */
+/** The ends of a piece and their directions, relative to its first end. `side`: −1 left, +1 right. */
 function endsOf({ kind, mm, radius, angle, side = 1 }) {
   const bend = (angle ?? 0) * Math.PI / 180;
   const first = { x: 0, y: 0, heading: Math.PI };
@@ -30,7 +30,7 @@ function at({ x, y, heading }, local) {
 }
 
 export class Draft {
-  /** `pieces`: what lies where; `sensors`: on which joints, by their point. */
+  /** `pieces`: the pieces with their places; `sensors`: the joints with sensors, by their point. */
   #now = { pieces: [], sensors: [] }; #before = []; #undone = [];
 
   static of(kept) {
@@ -64,7 +64,7 @@ export class Draft {
 
   clear() { this.#change([], []); }
 
-  /** Lays a piece with one of its ends at a place that faces outwards; which of the joints its next open end is. */
+  /** Lays a piece with one of its ends at an outward-facing place; returns the joint of its next open end. */
   lay(piece, side, port, place) {
     const laid = { ...piece, side };
     const local = endsOf(laid)[port];
@@ -84,7 +84,7 @@ export class Draft {
     this.#now.sensors = this.#now.sensors.filter((sensor) => joints.some((joint) => isAt(joint, sensor)));
   }
 
-  /** Puts a sensor on a joint of two pieces, or takes the one that is there away. */
+  /** Puts a sensor on a joint of two pieces, or removes it. */
   toggleSensor(joint) {
     const rest = this.#now.sensors.filter((sensor) => !isAt(joint, sensor));
     this.#change(this.pieces, rest.length < this.#now.sensors.length ? rest : [...rest, { x: joint.x, y: joint.y }]);
@@ -94,7 +94,7 @@ export class Draft {
 
   ends = (piece) => endsOf(piece).map((end) => at(piece.pose, end));
 
-  /** Every place where pieces end: one end that is open, or two that are joined. */
+  /** Every place where pieces end: an open end, or two that are joined. */
   joints() {
     const found = [];
     for (const [piece, laid] of this.pieces.entries()) {
@@ -116,11 +116,11 @@ export class Draft {
       const part = bend * nth / 12;
       return [piece.radius * Math.sin(part), (piece.side ?? 1) * piece.radius * (1 - Math.cos(part))];
     });
-    const ways = { straight: [line], curve: [arc], turnout: [line, arc] }[piece.kind];
-    return ways.map((way) => way.map(([x, y]) => { const point = at(piece.pose, { x, y, heading: 0 }); return [point.x, point.y]; }));
+    const curves = { straight: [line], curve: [arc], turnout: [line, arc] }[piece.kind];
+    return curves.map((curve) => curve.map(([x, y]) => { const point = at(piece.pose, { x, y, heading: 0 }); return [point.x, point.y]; }));
   }
 
-  /** What is not as it has to be: words of the pages with their blanks. `isError` keeps it from being a layout. */
+  /** The mistakes of the draft: keys of sentences with their values. `isError` prevents saving. */
   problems() {
     const joints = this.joints();
     const problems = [];
@@ -139,7 +139,7 @@ export class Draft {
     return problems;
   }
 
-  /** As a layout file; none while there are errors. */
+  /** The layout file; `null` while there are errors. */
   toml(name) {
     return this.problems().some(({ isError }) => isError) ? undefined : new Written(this, name).text();
   }
@@ -149,7 +149,7 @@ const isAt = (joint, { x, y }) => Math.hypot(joint.x - x, joint.y - y) < JOINS_M
 const quoted = (text) => JSON.stringify(text.replace(/[\u0000-\u001f\u007f]/g, " ").trim() || "my layout");
 const point = ({ x, y }) => `[${Math.round(x)}, ${Math.round(y)}]`;
 
-/** A draft as the text of a layout file. Sensors, turnouts and open ends are its places; pieces between them add up to its edges. */
+/** The text of a layout file. Sensors, turnouts and open ends are its nodes; the pieces between them form its edges. */
 class Written {
   #draft; #name; #joints; #jointOf = new Map(); #sensors = []; #turnouts = []; #ends = [];
 
@@ -171,7 +171,7 @@ class Written {
     }
   }
 
-  /** Out through an end of a piece, `mm` behind already: what is reached, how far it is, and its name for who comes from there. */
+  /** Leaves a piece through an end, after `mm` so far: the node that is reached, the distance, and its name from this side. */
   #reach(piece, port, mm) {
     const joint = this.#jointOf.get(`${piece} ${port}`);
     if (joint.end) return { name: `EX${joint.end}`, mm };
@@ -181,7 +181,7 @@ class Written {
     return this.#through(next.piece, next.port, mm);
   }
 
-  /** Into an end of a piece. */
+  /** Enters a piece through an end. */
   #through(piece, port, mm) {
     const laid = this.#draft.pieces[piece];
     if (laid.kind !== "turnout") return this.#reach(piece, 1 - port, mm + (laid.kind === "straight" ? laid.mm : arcOf(laid)));
@@ -190,35 +190,35 @@ class Written {
     return port === 1 ? { name: `MR${number} straight`, mm: mm + laid.mm } : { name: `MR${number} curved`, mm: mm + arcOf(laid) };
   }
 
-  /** Every way out of a place, by the name that a train has passed; and what it is called when it comes in there. */
-  #ways() {
-    const ways = [];
+  /** Every path out of a node, by the name of the node in this direction, and its name in the other direction. */
+  #paths() {
+    const paths = [];
     for (const joint of this.#sensors) {
       const [one, other] = joint.ends;
-      ways.push({ from: joint.sensor[0], back: joint.sensor[1], ...this.#through(other.piece, other.port, 0) });
-      ways.push({ from: joint.sensor[1], back: joint.sensor[0], ...this.#through(one.piece, one.port, 0) });
+      paths.push({ from: joint.sensor[0], back: joint.sensor[1], ...this.#through(other.piece, other.port, 0) });
+      paths.push({ from: joint.sensor[1], back: joint.sensor[0], ...this.#through(one.piece, one.port, 0) });
     }
     for (const { piece, number } of this.#turnouts) {
       const laid = this.#draft.pieces[piece];
-      ways.push({ from: `MR${number}`, back: `BR${number}`, ...this.#reach(piece, 0, 0) });
-      ways.push({ from: `BR${number} straight`, back: `MR${number} straight`, ...this.#reach(piece, 1, laid.mm) });
-      ways.push({ from: `BR${number} curved`, back: `MR${number} curved`, ...this.#reach(piece, 2, arcOf(laid)) });
+      paths.push({ from: `MR${number}`, back: `BR${number}`, ...this.#reach(piece, 0, 0) });
+      paths.push({ from: `BR${number} straight`, back: `MR${number} straight`, ...this.#reach(piece, 1, laid.mm) });
+      paths.push({ from: `BR${number} curved`, back: `MR${number} curved`, ...this.#reach(piece, 2, arcOf(laid)) });
     }
     for (const joint of this.#ends) {
       const [{ piece, port }] = joint.ends;
-      ways.push({ from: `EN${joint.end}`, back: `EX${joint.end}`, ...this.#through(piece, port, 0) });
+      paths.push({ from: `EN${joint.end}`, back: `EX${joint.end}`, ...this.#through(piece, port, 0) });
     }
-    return ways;
+    return paths;
   }
 
   text() {
     const written = new Set();
     const edges = [];
-    for (const { from, back, name, mm } of this.#ways()) {
-      // Each rail is found from both of its ends.
+    for (const { from, back, name, mm } of this.#paths()) {
+      // Each edge is found from both of its ends.
       if (written.has(`${from} ${name}`)) continue;
       written.add(`${from} ${name}`);
-      const other = this.#ways().find((way) => way.back === name && way.name === back);
+      const other = this.#paths().find((path) => path.back === name && path.name === back);
       if (other) written.add(`${other.from} ${other.name}`);
       edges.push(`  { from = "${from}", to = "${name}", mm = ${mm.toFixed(1)} },`);
     }

@@ -1,4 +1,4 @@
-// Drawing a layout from the pieces of a track system, end to end, and saving it as a layout file.
+// The editor: draws a layout from the pieces of a track system, and saves it as a layout file.
 
 import { make, put } from "./dom.js";
 import { Draft } from "./draft.js";
@@ -9,7 +9,7 @@ import { say } from "./words.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 const KEPT_AS = "draft";
-/** What is shown at least (mm), and how near a press is to what it means. */
+/** The least area shown (mm), and the reach of a click. */
 const LEAST_SHOWN = 1200;
 const TOUCH = 40;
 const START = { x: 0, y: 0, heading: 0, ends: [] };
@@ -27,7 +27,7 @@ export function editorPage(root) {
   const before = kept();
   const draft = Draft.of(before.draft);
   let side = -1;
-  /** Where the next piece goes, or the joint that was pressed last. */
+  /** The place of the next piece, or the selected joint. */
   let chosen = draft.joints().find(({ ends }) => ends.length === 1) ?? START;
   const svg = $("#draft");
   const whole = [0, 0, 0, 0];
@@ -85,7 +85,7 @@ export function editorPage(root) {
     try {
       localStorage.setItem(KEPT_AS, JSON.stringify({ draft: draft.kept, name: $("#draft-name").value, library: $("#library").value }));
     } catch {
-      // A browser that keeps nothing begins anew next time.
+      // A browser without storage starts with an empty draft next time.
     }
   }
 

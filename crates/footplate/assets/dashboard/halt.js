@@ -1,12 +1,12 @@
-// The emergency stop: always there, one key, and never shown as more certain than it is.
+// The emergency stop: on all pages, by one key, and never shown as more certain than it is.
 
 import { ask, get } from "./server.js";
 import { say } from "./words.js";
 
-/** Between two looks at what the station was told (ms). */
+/** Interval between two requests for the power state (ms). */
 const LOOKED_EVERY_MS = 1000;
 const banner = document.getElementById("halted");
-/** An emergency stop of this page that the line has not been seen to carry yet. */
+/** An emergency stop of this page that the link has not confirmed yet. */
 let asked = false;
 
 function tell(word, ...blanks) {
@@ -27,13 +27,13 @@ export async function halt() {
   setTimeout(look, LOOKED_EVERY_MS / 2);
 }
 
-/** Whoever took the power: as long as it is off, every page says so, and how sure that is. */
+/** While the track power is off, every page shows it and how certain that is, whatever switched it off. */
 async function look() {
   let power;
   try {
     ({ power } = await get("/api/line"));
   } catch {
-    // The state of the connection says so; what the banner says stays.
+    // The state of the connection shows the failure; the banner keeps its text.
     return;
   }
   if (power && !power.is_on) {
@@ -46,7 +46,7 @@ async function look() {
 
 document.getElementById("halt").addEventListener("click", halt);
 document.addEventListener("keydown", (event) => {
-  // Where somebody writes or presses a button, the space bar is theirs.
+  // In a text field or on a button, the space bar has its usual function.
   const writes = event.target.closest?.("input:not([type=range]), textarea, select, button, summary");
   if (event.code === "Space" && !writes && !event.repeat) {
     event.preventDefault();

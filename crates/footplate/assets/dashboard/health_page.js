@@ -1,6 +1,6 @@
-// Whether all is as it should be: prediction errors, drift, alarms, and how the line keeps time.
+// The health page: prediction errors, drift, alarms, and the timing of link and control loop.
 
-import { told } from "./alarms.js";
+import { described } from "./alarms.js";
 import { colour, dots } from "./chart.js";
 import { LiveChart, upright } from "./charts.js";
 import { make, put, shown, signed } from "./dom.js";
@@ -8,16 +8,16 @@ import { get } from "./server.js";
 import { say } from "./words.js";
 import { COLOURS } from "./track.js";
 
-/** Between two looks at the line (ms). */
+/** Interval between two requests for the timing (ms). */
 const LOOKED_EVERY_MS = 2000;
-/** Bars of a histogram, at most. */
+/** The most bars of a histogram. */
 const BARS = 40;
-/** Alarms that are listed. */
+/** The most alarms listed. */
 const LISTED = 100;
-/** Nothing is said of a share of fewer predictions. */
+/** No share is shown for fewer predictions. */
 const FEW = 20;
 
-/** So many times of all lie in each of a few bars of even width, between the first and the 99.5th percentile. */
+/** Counts in bars of equal width, between the least value and the 99.5th percentile. */
 function histogram({ bins, count }) {
   let seen = 0;
   const most = bins.find(([, , n]) => (seen += n) >= 0.995 * count)?.[1] ?? 1;
@@ -25,7 +25,7 @@ function histogram({ bins, count }) {
   const width = (most - least) / BARS || 1;
   const counts = new Array(BARS).fill(0);
   for (const [from, to, n] of bins) {
-    // A bin may lie across two bars: its times are taken to be spread evenly.
+    // A bin may overlap two bars: its counts are divided evenly.
     for (let bar = 0; bar < BARS; bar++) {
       const [low, high] = [Math.max(from, least + bar * width), Math.min(to, least + (bar + 1) * width)];
       if (high > low) counts[bar] += n * (high - low) / (to - from);
@@ -103,7 +103,7 @@ export function healthPage(root, live) {
 
   function alarms() {
     const rows = live.alarms.slice(-LISTED).reverse().map((alarm) => make("li", { class: alarm.grade },
-      make("span", { class: "quiet" }, `${shown(alarm.t_s, 1)} s `), told(alarm)));
+      make("span", { class: "quiet" }, `${shown(alarm.t_s, 1)} s `), described(alarm)));
     $("#alarms").replaceChildren(...rows);
     $("#no-alarm").hidden = rows.length > 0;
   }
@@ -115,7 +115,7 @@ export function healthPage(root, live) {
     try {
       line = await get("/api/line");
     } catch {
-      // The state of the connection says so already.
+      // The state of the connection shows the failure already.
       return;
     }
     for (const [place, of] of [["poll", "poll_period"], ["first-byte", "first_byte"], ["turn", "loop_turn"]]) put($(`#${place}`), quantiles(line[of]));

@@ -1,4 +1,4 @@
-// The layout with all trains, what is said, and a line to write orders in.
+// The layout page: track and trains, messages, and a command line.
 
 import { make, put, signed } from "./dom.js";
 import { order } from "./server.js";
@@ -7,19 +7,19 @@ import { SCALES, chooseScale, kmPerHour, scale } from "./scale.js";
 import { colourOf } from "./track.js";
 import { say } from "./words.js";
 
-/** Lines that are shown. */
+/** The most lines shown. */
 const LINES_SHOWN = 400;
 
-/** `about`: the train that somebody is asked to find. */
+/** `about`: the train whose position the operator is asked for. */
 export function layoutPage(root, live, about) {
   const $ = (selector) => root.querySelector(selector);
   const cards = new Map();
   const picked = $("#picked");
   const here = $("#here");
-  /** The train that presses on the track are about. */
+  /** The train that clicks on the track apply to. */
   let taken;
   const sought = about === undefined ? undefined : Number(about);
-  /** The turnout that is asked about, or was thrown last. */
+  /** The turnout that was clicked last. */
   let thrown;
   const track = new PickTrack($("#track"), live.layout, showPlace, ({ train, turnout }) => (train === undefined ? pressed(turnout) : take(train)));
 
@@ -44,7 +44,7 @@ export function layoutPage(root, live, about) {
     put(picked, say(taken === sought ? "place-hint" : "taken", train));
   }
 
-  /** What can be done at a place. */
+  /** The commands that are possible at a place. */
   function showPlace(place) {
     thrown = undefined;
     put($("#here-answer"), "");
@@ -65,7 +65,7 @@ export function layoutPage(root, live, about) {
   const stands = (turnout, lies) => (lies ? say("turnout-is", turnout, leg(lies)) : say("turnout-unknown", turnout));
   const other = (lies) => (lies === "straight" ? "curved" : "straight");
 
-  /** A turnout that is known to be set one way is thrown; of any other it is asked which way. */
+  /** Throws a turnout whose position is known; asks for the position of any other. */
   function pressed(turnout) {
     thrown = turnout;
     const lies = live.picture?.turnouts[turnout];
@@ -77,7 +77,7 @@ export function layoutPage(root, live, about) {
     if (lies) give(`turnout ${turnout} ${other(lies)}`, $("#here-answer"));
   }
 
-  /** The turnouts by name, for those who do not press on the drawing. */
+  /** The turnouts as a list, for keyboard and screen reader. */
   const turnouts = new Map();
   function listTurnouts(picture) {
     for (const [number, lies] of Object.entries(picture.turnouts)) {
@@ -108,7 +108,7 @@ export function layoutPage(root, live, about) {
   $("#zoom-out").addEventListener("click", () => track.view.zoom(1.4));
   $("#zoom-all").addEventListener("click", () => track.view.all());
 
-  /** Gives an order; what comes of it is said beside what was pressed. */
+  /** Sends a command; the result is shown beside the control. */
   async function give(line, answer) {
     answer.className = "answer";
     put(answer, say("sent", line));
@@ -183,7 +183,7 @@ export function layoutPage(root, live, about) {
     if (atEnd) list.scrollTop = list.scrollHeight;
   }
 
-  /** Contacts that are said to fail are crossed out until they are passed again. */
+  /** Sensors that missed a detection are crossed out until their next one. */
   function fails({ what, blanks }) {
     if (what === "contact-stuck") track.fails(blanks[0]);
   }

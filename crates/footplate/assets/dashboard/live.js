@@ -1,19 +1,19 @@
-// All that is heard of the running system: pictures as they come, and what has happened, for whichever page is open.
+// The live data of the session for all pages: pictures and events.
 
 import { get, withToken } from "./server.js";
 
-/** Lines, contacts and orders that are kept: as many as the server keeps. */
+/** The most lines, detections and orders kept: as many as the server keeps. */
 const KEPT = 4000;
 
-/** Adds to a list that has an end. */
+/** Appends to a list of limited length. */
 function keep(list, item) {
   list.push(item);
   if (list.length > KEPT) list.splice(0, list.length - KEPT);
 }
 
 /**
- * Says `state` (with `connecting`, `connected` or `lost`), `picture`, `line`, `passed`, `ended`, `alarm`, `gap`, and `anew` when
- * another session has begun and nothing of before counts.
+ * Dispatches `state` (with `connecting`, `connected` or `lost`), `picture`, `line`, `passed`, `ended`, `alarm`, `gap`, and `anew`
+ * when another session has begun and earlier data is void.
  */
 export class Live extends EventTarget {
   layout; picture; state = "connecting"; lines = []; passed = []; ended = []; alarms = [];
@@ -33,7 +33,7 @@ export class Live extends EventTarget {
     this.#say("state", state);
   }
 
-  /** What happened has a name of its session and its number: `1700000000-12`. */
+  /** The id of an event contains its session and its number: `1700000000-12`. */
   #isOf({ lastEventId }) {
     const session = lastEventId.slice(0, lastEventId.lastIndexOf("-"));
     if (this.#session !== undefined && session !== this.#session) {
@@ -49,7 +49,7 @@ export class Live extends EventTarget {
     events.addEventListener("error", () => this.#stands("lost"));
     events.addEventListener("picture", (event) => {
       this.picture = JSON.parse(event.data);
-      // One drawing a frame, of the newest picture.
+      // One drawing per frame, of the newest picture.
       if (!this.picture || this.#drawing) return;
       this.#drawing = true;
       requestAnimationFrame(() => {

@@ -1,18 +1,18 @@
-// A recording of a tachometer, dropped here: the same walk and the same charts as on the command line.
+// The odometry page: a dropped tachometer recording gets the same computation and charts as on the command line.
 
 import { put } from "./dom.js";
 import { SlideView } from "./slide_view.js";
 import { send, withToken } from "./server.js";
 import { LANGUAGE, say } from "./words.js";
 
-/** The largest recording that the server takes. */
+/** The largest recording that the server accepts. */
 const LARGEST = 64 * 1024 * 1024;
 
 export function odometryPage(root) {
   const $ = (selector) => root.querySelector(selector);
   const place = $("#drop");
   const slide = new SlideView(root);
-  /** The vehicle that was given last, as its file says it, and the recording. */
+  /** The last vehicle file and the recording. */
   let [vehicle, recording] = [];
 
   async function take(files) {

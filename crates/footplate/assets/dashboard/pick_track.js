@@ -1,13 +1,13 @@
-// A drawn track on which trains, turnouts and places can be picked, with zoom and pan.
+// A track drawing with zoom and pan on which trains, turnouts and places can be clicked.
 
 import { Track } from "./track.js";
 import { View } from "./view.js";
 
 export class PickTrack {
-  /** The place that was picked last, as the prompt names it, and how it is called in the other direction. */
+  /** The selected place, as the prompt names it, and its name in the other direction. */
   place; other; view; #track;
 
-  /** `onPick` hears of places; `onMeant` of trains and turnouts, if it is given. */
+  /** `onPick` receives places; `onMeant` receives trains and turnouts, if given. */
   constructor(svg, layout, onPick, onMeant) {
     this.#track = new Track(svg, layout);
     this.view = new View(svg, this.#track.whole, (point) => {
@@ -19,7 +19,7 @@ export class PickTrack {
     });
   }
 
-  /** The same place for a train that passes it in the other direction. */
+  /** The selected place, named in the other direction. */
   turn() {
     if (this.other) [this.place, this.other] = [this.other, this.place];
   }

@@ -1,10 +1,10 @@
-// Pieces of common track systems, by the lengths of their makers' public catalogues.
+// Pieces of common track systems, from the makers' public catalogues.
 
 const straight = (name, mm) => ({ name, kind: "straight", mm });
 const curve = (name, radius, angle) => ({ name, kind: "curve", radius, angle });
 const turnout = (name, mm, radius, angle) => ({ name, kind: "turnout", mm, radius, angle });
 
-/** Lengths and radii in mm, angles in degrees. Curves and turnouts are laid to either hand. */
+/** Lengths and radii in mm, angles in degrees. Curves and turnouts exist for both hands. */
 export const LIBRARIES = {
   "Märklin C (H0)": [
     straight("24188", 188.3), straight("24172", 171.7), straight("24229", 229.3), straight("24094", 94.2), straight("24077", 77.5),
@@ -33,5 +33,5 @@ export const LIBRARIES = {
   ],
 };
 
-/** The length of a piece's way from its first end to its second, or of a turnout's curved leg. */
+/** The length of a piece from its first end to its second, or of a turnout's curved leg. */
 export const arcOf = ({ radius, angle }) => radius * angle * Math.PI / 180;

@@ -1,4 +1,4 @@
-// How nodes of a layout belong to places: each place is two nodes, one for each direction of travel.
+// The nodes of a layout belong to places: each place has two nodes, one for each direction of travel.
 
 /** The place of a node. */
 export const placeOf = (node) => node >> 1;

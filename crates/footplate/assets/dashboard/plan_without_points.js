@@ -1,23 +1,23 @@
-// A drawing of a layout whose file has no points: the longest way round as an oval, or from end to end as a line, and every other
+// Draws a layout whose file has no points: its longest circuit as an oval, or its longest line as a straight, and every other
 // track beside it.
 
 import { bezier } from "./plan_curve.js";
 import { placeOf, senseOf } from "./places.js";
 
-/** A rail is drawn at least so long, as a part of all rails, so that it can be seen. */
+/** The least drawn length of an edge, as a part of all edges. */
 const LEAST_PART = 0.02;
-/** Tracks lie so far beside each other, as a part of the main line. */
+/** The distance between parallel tracks, as a part of the main line. */
 const GAP_PART = 0.03;
-/** Each straight of the oval, as a part of its way round. */
+/** Each straight of the oval, as a part of its circumference. */
 const STRAIGHT_PART = 0.32;
-/** A way over a curved leg counts as so much shorter: the main line is the one that goes straight on. */
+/** The weight of a curved leg's length in the search for the main line, which prefers straight legs. */
 const CURVED_COUNTS = 0.8;
-/** Ways that are tried for the main line: enough for any layout whose turnouts a person can draw by hand. */
+/** The most paths tried for the main line: enough for any layout drawn by hand. */
 const MOST_TRIED = 60_000;
-/** Points of a rail: 25 at least, and 160 for a whole way round. */
+/** Points per edge: at least 25, and 160 for the whole circuit. */
 const POINTS = 25;
 const POINTS_ROUND = 160;
-/** A track that ends is drawn so many gaps long at least: beside its turnout, not on it. */
+/** The least drawn length of a dead end, in track distances, so that it lies beside its turnout and not on it. */
 const LEAST_GAPS = 5;
 
 export function planWithoutPoints(layout) {
@@ -32,19 +32,19 @@ class Drawing {
     this.#least = LEAST_PART * layout.edges.reduce((sum, { length_mm: mm }) => sum + mm, 0) / 2 || 1;
     for (const edge of layout.edges) {
       const leaving = this.#leaving.get(edge.from) ?? [];
-      // The straight leg first: the main line follows it where both are as long.
+      // The straight leg first: the main line follows it if both are equally long.
       this.#leaving.set(edge.from, edge.leg === "curved" ? [...leaving, edge] : [edge, ...leaving]);
     }
   }
 
   plan() {
     let top = 0;
-    // What is not joined to the rest is drawn below it.
+    // Track that is not connected is drawn below.
     for (let start = this.#unplaced(); start !== undefined; start = this.#unplaced()) {
       const main = this.#mainLine(start);
-      if (main.way.length === 0) { this.#points.set(placeOf(start), [0, top]); continue; }
+      if (main.path.length === 0) { this.#points.set(placeOf(start), [0, top]); continue; }
       this.#lanes = new Map();
-      this.#base = new Base(main.way.map((edge) => this.#long(edge)), main.isRound);
+      this.#base = new Base(main.path.map((edge) => this.#long(edge)), main.isRound);
       this.#base.top = top;
       this.#placeMain(main);
       for (let track = this.#nextTrack(); track; track = this.#nextTrack()) this.#placeTrack(track);
@@ -60,28 +60,28 @@ class Drawing {
     return edge?.from;
   }
 
-  /** The longest way that passes no place twice: round if one is, and half as long as any at least. */
+  /** The longest path that passes no place twice: a circuit, if one is at least half as long as the longest line. */
   #mainLine(start) {
-    const [round, line] = [{ long: 0, way: [], isRound: true }, { long: 0, way: [], isRound: false }];
+    const [round, line] = [{ long: 0, path: [], isRound: true }, { long: 0, path: [], isRound: false }];
     let tried = 0;
     const most = () => tried > MOST_TRIED;
-    const walk = (first, node, seen, way, long) => {
+    const walk = (first, node, seen, path, long) => {
       tried += 1;
-      if (long > line.long + 1e-6) Object.assign(line, { long, way: [...way] });
+      if (long > line.long + 1e-6) Object.assign(line, { long, path: [...path] });
       for (const edge of this.#leaving.get(node) ?? []) {
         if (most()) return;
         const further = long + this.#long(edge) * (this.#isCurved(edge) ? CURVED_COUNTS : 1);
-        if (edge.to === first && further > round.long + 1e-6) Object.assign(round, { long: further, way: [...way, edge] });
+        if (edge.to === first && further > round.long + 1e-6) Object.assign(round, { long: further, path: [...path, edge] });
         if (seen.has(placeOf(edge.to))) continue;
         seen.add(placeOf(edge.to));
-        way.push(edge);
-        walk(first, edge.to, seen, way, further);
-        way.pop();
+        path.push(edge);
+        walk(first, edge.to, seen, path, further);
+        path.pop();
         seen.delete(placeOf(edge.to));
       }
     };
     const joined = this.#joined(start);
-    // Ends first: a line leads from one to another.
+    // Ends first: a line runs from one end to another.
     const starts = [...joined].sort((one, other) => this.#arriving(one) - this.#arriving(other));
     for (const node of starts) {
       if (most()) break;
@@ -90,7 +90,7 @@ class Drawing {
     return round.long > line.long / 2 ? round : line;
   }
 
-  /** Whether it leads from or to the curved leg of a turnout. */
+  /** Whether an edge begins or ends at the curved leg of a turnout. */
   #isCurved = (edge) => edge.leg === "curved" || this.#edges[edge.id ^ 1]?.leg === "curved";
 
   #arriving = (node) => (this.#leaving.get(node ^ 1) ?? []).length;
@@ -103,9 +103,9 @@ class Drawing {
     return found;
   }
 
-  #placeMain({ way, isRound }) {
+  #placeMain({ path, isRound }) {
     let at = 0;
-    for (const edge of way) {
+    for (const edge of path) {
       this.#spot(edge.from, at, 0, 1);
       this.#draw(edge, this.#base.curve(at, at + this.#long(edge), () => 0));
       at += this.#long(edge);
@@ -113,18 +113,18 @@ class Drawing {
     }
   }
 
-  /** Puts a place beside the main line, where a train that passes this node runs along it (`way` +1) or against it. */
-  #spot(node, at, lane, way) {
+  /** Puts a place on a lane, where a train that passes this node runs along the main line (`sense` +1) or against it. */
+  #spot(node, at, lane, sense) {
     const [x, y] = this.#base.point(at, lane);
     this.#points.set(placeOf(node), [x, y]);
-    this.#spots.set(placeOf(node), { at, lane, way: way * senseOf(node) });
+    this.#spots.set(placeOf(node), { at, lane, sense: sense * senseOf(node) });
   }
 
   #draw(edge, points) {
     this.#rails.set(edge.id >> 1, edge.id % 2 ? points.toReversed() : points);
   }
 
-  /** The next track that begins where something is drawn: the shortest, so that what is between two tracks lies between them. */
+  /** The next track that begins at a drawn place: the shortest first, so that inner tracks lie inside. */
   #nextTrack() {
     let best;
     for (const edge of this.#edges) {
@@ -135,7 +135,7 @@ class Drawing {
     return best;
   }
 
-  /** From an edge on, as the turnouts lie straight, to what is drawn already or to an end. */
+  /** Follows the straight legs from an edge to a drawn place or to an end. */
   #track(first) {
     const edges = [first];
     const seen = new Set([placeOf(first.from)]);
@@ -148,10 +148,10 @@ class Drawing {
     }
     const [from, last] = [this.#spots.get(placeOf(first.from)), edges.at(-1).to];
     const to = this.#spots.get(placeOf(last));
-    const leaves = from.way * senseOf(first.from);
+    const leaves = from.sense * senseOf(first.from);
     const long = edges.reduce((sum, edge) => sum + this.#long(edge), 0);
     const span = to ? this.#base.ahead(from.at, to.at, leaves) : Math.max(long, LEAST_GAPS * this.#base.gap);
-    const isBeside = !to || (leaves === to.way * senseOf(last) && span > 0 && span < 0.8 * this.#base.long);
+    const isBeside = !to || (leaves === to.sense * senseOf(last) && span > 0 && span < 0.8 * this.#base.long);
     return { edges, from, to, leaves, long, span, isBeside, order: (isBeside ? 0 : 1e9) + span + (to ? 0 : this.#base.long) };
   }
 
@@ -167,35 +167,35 @@ class Drawing {
       const out = from.lane + (lane - from.lane) * soft(part / ramp);
       return to && !isCrossover ? out + (to.lane - lane) * soft((part - 1 + ramp) / ramp) : out;
     };
-    let way = 0;
+    let distance = 0;
     for (const edge of edges) {
-      const [start, end] = [way, way + this.#long(edge)].map((mm) => from.at + leaves * span * mm / long);
+      const [start, end] = [distance, distance + this.#long(edge)].map((mm) => from.at + leaves * span * mm / long);
       this.#draw(edge, this.#base.curve(start, end, laneAt));
       if (!this.#spots.has(placeOf(edge.to))) this.#spot(edge.to, end, laneAt(end), leaves);
-      way += this.#long(edge);
+      distance += this.#long(edge);
     }
   }
 
-  /** A track that leads back, or across: one curve, and its places along it. */
+  /** A track that leads back or across: one curve with its places along it. */
   #placeAcross({ edges, from, to, leaves, long }) {
     const [start, end] = [this.#base.point(from.at, from.lane), this.#base.point(to.at, to.lane)];
-    const facing = (spot, way) => this.#base.heading(spot.at) + (way < 0 ? Math.PI : 0);
-    const curve = bezier(start, facing(from, leaves), end, facing(to, to.way * senseOf(edges.at(-1).to)));
-    let way = 0;
+    const facing = (spot, sense) => this.#base.heading(spot.at) + (sense < 0 ? Math.PI : 0);
+    const curve = bezier(start, facing(from, leaves), end, facing(to, to.sense * senseOf(edges.at(-1).to)));
+    let distance = 0;
     for (const edge of edges) {
-      const parts = [way / long, (way + this.#long(edge)) / long];
+      const parts = [distance / long, (distance + this.#long(edge)) / long];
       const points = Array.from({ length: POINTS }, (_, nth) => pointOf(curve, parts[0] + (parts[1] - parts[0]) * nth / (POINTS - 1)));
       this.#draw(edge, points);
       if (!this.#spots.has(placeOf(edge.to))) {
         this.#points.set(placeOf(edge.to), points.at(-1));
         // Tracks that begin here lie beside the main line as if this place did.
-        this.#spots.set(placeOf(edge.to), { at: from.at + leaves * (way + this.#long(edge)), lane: from.lane, way: leaves * senseOf(edge.to) });
+        this.#spots.set(placeOf(edge.to), { at: from.at + leaves * (distance + this.#long(edge)), lane: from.lane, sense: leaves * senseOf(edge.to) });
       }
-      way += this.#long(edge);
+      distance += this.#long(edge);
     }
   }
 
-  /** The nearest lane that nothing lies in from one place to another. */
+  /** The nearest lane that is free from one place to another. */
   #freeLane(lane, from, to) {
     const [low, high] = [Math.min(from, to), Math.max(from, to)];
     const out = Math.sign(lane) || 1;
@@ -218,7 +218,7 @@ const pointOf = (curve, part) => {
   return [0, 1].map((axis) => curve[nth][axis] + (curve[nth + 1][axis] - curve[nth][axis]) * (at - nth));
 };
 
-/** The main line: an oval that is run through clockwise, or a straight line; lanes beside it are counted to its right. */
+/** The main line: an oval, run clockwise, or a straight line. Lanes are counted to its right. */
 class Base {
   top = 0; long; gap; #isRound; #straight; #radius; #shift = 0;
 
@@ -231,14 +231,14 @@ class Base {
     if (isRound) this.#turnTo(lengths);
   }
 
-  /** Turns the oval so that as many of its places as can be lie on the straights. */
+  /** Rotates the oval so that most of its places lie on the straights. */
   #turnTo(lengths) {
     let at = 0;
     const places = lengths.map((mm) => { const here = at; at += mm; return here; });
     let best = -1;
     for (let nth = 0; nth < 48; nth += 1) {
       const shift = this.long * nth / 48;
-      // A place well inside a straight counts more than one at its end.
+      // A place in the middle of a straight counts more than one at its end.
       const score = places.reduce((sum, place) => {
         const on = (place + shift) % (this.long / 2) / this.#straight;
         return sum + (on <= 1 ? 1 - 0.5 * Math.abs(on - 0.5) : 0);
@@ -249,9 +249,9 @@ class Base {
 
   hasRoom = (lane) => !this.#isRound || lane * this.gap < 0.75 * this.#radius;
 
-  /** How far it is from one place to another in a direction. */
-  ahead(from, to, way) {
-    const span = way * (to - from);
+  /** The distance from one place to another in a direction. */
+  ahead(from, to, sense) {
+    const span = sense * (to - from);
     return this.#isRound ? ((span % this.long) + this.long) % this.long : span;
   }
 
@@ -260,9 +260,9 @@ class Base {
     return turns.some((turn) => from + turn * this.long < high && to + turn * this.long > low);
   }
 
-  #at(way) {
-    if (!this.#isRound) return { point: [way, 0], heading: 0 };
-    const at = (((way + this.#shift) % this.long) + this.long) % this.long;
+  #at(distance) {
+    if (!this.#isRound) return { point: [distance, 0], heading: 0 };
+    const at = (((distance + this.#shift) % this.long) + this.long) % this.long;
     const [straight, radius, half] = [this.#straight, this.#radius, this.long / 2];
     const isBack = at >= half;
     const on = isBack ? at - half : at;
@@ -274,10 +274,10 @@ class Base {
     return isBack ? { point: [straight - x, 2 * radius - y], heading: heading + Math.PI } : { point: [x, y], heading };
   }
 
-  heading = (way) => this.#at(way).heading;
+  heading = (distance) => this.#at(distance).heading;
 
-  point(way, lane) {
-    const { point: [x, y], heading } = this.#at(way);
+  point(distance, lane) {
+    const { point: [x, y], heading } = this.#at(distance);
     const aside = lane * this.gap;
     return [x - aside * Math.sin(heading), this.top + y + aside * Math.cos(heading)];
   }

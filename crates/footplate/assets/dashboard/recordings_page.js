@@ -1,4 +1,4 @@
-// Sessions that were written down: listed, walked again with a slider, and beside each other.
+// The recordings page: lists sessions, replays one with a slider, and compares two.
 
 import { aboutCalibration } from "./calibration_page.js";
 import { colour, dots } from "./chart.js";
@@ -9,12 +9,12 @@ import { Track } from "./track.js";
 import { View } from "./view.js";
 import { say } from "./words.js";
 
-/** Lines around the shown moment. */
+/** Lines shown around the selected time. */
 const LINES = 8;
-/** Times real time at which a session is played. */
+/** Replay speed over real time. */
 const PLAYED = 4;
 
-/** One session on the page: its track, and what it was at a time. */
+/** One session on the page: its track, and its state at a time. */
 class Walked {
   #root; #track; #pictures; #lines; passed;
 
@@ -39,7 +39,7 @@ class Walked {
     return this.#pictures.at(-1).t_s - this.#pictures[0].t_s;
   }
 
-  /** Shows a moment, so long after the first picture. */
+  /** Shows the time `at` after the first picture. */
   show(time) {
     const at = this.#pictures[0].t_s + time;
     let [low, high] = [0, this.#pictures.length - 1];
@@ -57,7 +57,7 @@ class Walked {
     this.#root.querySelector(".said").replaceChildren(...said);
   }
 
-  /** Contacts by time since the first picture, with how far off each prediction was. */
+  /** Detections by time since the first picture, with their prediction errors. */
   errors() {
     const begins = this.#pictures[0].t_s;
     return this.passed.filter(({ short_mm }) => short_mm != null).map(({ t_s, short_mm, late_ms, late_half_ms }) => ({ at: t_s - begins, mm: -short_mm, inside: Math.abs(late_ms) <= late_half_ms }));
@@ -81,7 +81,7 @@ export function recordingsPage(root, live, number) {
     chart = undefined;
     const all = [...shownSessions.entries()].map(([name, walked]) => [name, walked.errors()]);
     $("#walked").hidden = all.length === 0;
-    // Whoever calibrates a train predicts no contacts.
+    // A calibration predicts no detections.
     const predicts = all.some(([, own]) => own.length > 0);
     $("figure").hidden = $("#compared").hidden = !predicts;
     if (!predicts) return;
@@ -165,7 +165,7 @@ export function recordingsPage(root, live, number) {
       const box = make("input", { type: "checkbox", value: String(one.recording), disabled: one.machines.length === 0, checked: String(one.recording) === number });
       box.addEventListener("change", () => {
         const checked = [...root.querySelectorAll("#recordings input:checked")];
-        // Two can be compared; a third takes the place of the one before.
+        // Two sessions can be compared; a third replaces the earlier one.
         if (checked.length > 2) checked.find((other) => other !== box).checked = false;
         open();
       });

@@ -1,10 +1,10 @@
-// What is asked of the server.
+// Requests to the server.
 
-// A plus that a person pasted means a plus: no token has spaces.
+// A pasted `+` is a plus sign: tokens have no spaces.
 const token = new URLSearchParams(location.search).get("token")?.replaceAll(" ", "+");
 const headers = token ? { Authorization: `Bearer ${token}` } : {};
 
-/** An address that cannot be sent headers of its own. */
+/** The address of a request without headers. */
 export const withToken = (path) => (token ? `${path}${path.includes("?") ? "&" : "?"}token=${encodeURIComponent(token)}` : path);
 
 async function answer(response) {
@@ -13,27 +13,27 @@ async function answer(response) {
   return said;
 }
 
-/** What stands at a path; throws what the server says against it. */
+/** Fetches a path; throws the server's error message. */
 export async function get(path) {
   return answer(await fetch(path, { headers }));
 }
 
-/** Asks for something to be done; throws what the server says against it. */
+/** Posts a request; throws the server's error message. */
 export async function ask(path, body) {
   return answer(await fetch(path, {
     method: "POST", headers: { "Content-Type": "application/json", ...headers }, body: JSON.stringify(body),
   }));
 }
 
-/** Sends a file; throws what the server says against it. */
+/** Sends a file; throws the server's error message. */
 export async function send(path, file) {
   return answer(await fetch(path, { method: "POST", headers: { "Content-Type": "application/octet-stream", ...headers }, body: file }));
 }
 
-/** Gives an order as the prompt understands it. */
+/** Sends a line in the syntax of the prompt. */
 export const order = (line) => ask("/api/orders", { line });
 
-/** The same when the page may be gone before there is an answer. */
+/** The same for a page that may close before the answer arrives. */
 export function orderAtOnce(line) {
   fetch("/api/orders", {
     method: "POST", keepalive: true, headers: { "Content-Type": "application/json", ...headers }, body: JSON.stringify({ line }),

@@ -1,4 +1,4 @@
-// A simulated slide, live: what both wheels say, what the odometer makes of it, and what is true.
+// A simulated slide, live: both wheel speeds, the estimate of the odometer, and the truth.
 
 import { colour, line } from "./chart.js";
 import { LiveChart } from "./charts.js";
@@ -6,9 +6,9 @@ import { put, shown, signed } from "./dom.js";
 import { get, withToken } from "./server.js";
 import { say } from "./words.js";
 
-/** The slides that the pages have words for; both wheels slide, touch and lock in the first. */
+/** The scenarios that the pages have words for. In the first, both wheels slide, touch and lock. */
 const OFFERED = ["S2", "S3", "S5", "S8", "S1", "S1b", "S4", "S6", "S7"];
-/** Height of the strips that say what each wheel does, as a part of the chart. */
+/** Height of the strips with the state of each wheel, as a part of the chart. */
 const STRIP = 0.035;
 const STATES = { spin: "second", slide: "red", excluded: "amber" };
 
@@ -54,7 +54,7 @@ export class SlideView {
     put(this.#root.querySelector(selector), text);
   }
 
-  /** Where wheels slip, slide or are not believed: the first at the top of the chart, the second below it. */
+  /** Intervals in which wheels slip, slide or are excluded: the first wheelset at the top of the chart, the second below it. */
   #strips() {
     return (u) => {
       const { ctx, bbox } = u;
@@ -81,7 +81,7 @@ export class SlideView {
     heard("train", this.#opens);
     heard("rows", this.#goesOn);
     heard("score", this.#ends);
-    // A stream that is refused says why only to who asks for it as a text.
+    // A rejected stream does not contain its reason: fetch it as text.
     events.addEventListener("error", () => {
       if (events.readyState !== EventSource.CLOSED) return;
       this.#end();
@@ -89,7 +89,7 @@ export class SlideView {
     });
   }
 
-  /** The run begins, or begins anew after the connection was lost. */
+  /** The run begins, or restarts after the connection was lost. */
   #opens(train) {
     this.#train = train;
     [this.#rows, this.#marks, this.#inside] = [[], [[], []], 0];
@@ -138,7 +138,7 @@ export class SlideView {
     this.#root.querySelector("#slide-end").hidden = true;
   }
 
-  /** Nobody looks any more. */
+  /** The view was closed. */
   close() {
     this.#end();
     this.#charts.forEach(({ chart }) => chart.close());

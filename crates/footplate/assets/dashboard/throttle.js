@@ -1,21 +1,21 @@
-// The throttle of a train: its step, stop and reverse, large enough for a thumb, and locked to this train if a person wants that.
+// The throttle of a train: step, stop and reverse, large enough for a thumb, and lockable to this train.
 
 import { put } from "./dom.js";
 import { orderAtOnce } from "./server.js";
 import { say } from "./words.js";
 
 export class Throttle {
-  /** The slider is being pulled. */
-  held = false;
-  #slider; #told; #train; #lock; #give; #step = 0;
+  /** Whether the slider is being moved. */
+  isDragged = false;
+  #slider; #shown; #train; #lock; #give; #step = 0;
 
-  /** `give` carries out an order and says what comes of it beside the throttle. */
+  /** `give` sends a command and shows its result beside the throttle. */
   constructor(root, train, give) {
     const $ = (selector) => root.querySelector(selector);
-    [this.#slider, this.#told, this.#train, this.#lock, this.#give] = [$("#step"), $("#step-told"), train, $("#lock"), give];
+    [this.#slider, this.#shown, this.#train, this.#lock, this.#give] = [$("#step"), $("#step-told"), train, $("#lock"), give];
     const slider = this.#slider;
-    slider.addEventListener("input", () => { this.held = true; put(this.#told, slider.value); });
-    slider.addEventListener("change", () => { this.held = false; this.#runAt(Number(slider.value)); });
+    slider.addEventListener("input", () => { this.isDragged = true; put(this.#shown, slider.value); });
+    slider.addEventListener("change", () => { this.isDragged = false; this.#runAt(Number(slider.value)); });
     $("#slower").addEventListener("click", () => this.#runAt(Number(slider.value) - 1));
     $("#faster").addEventListener("click", () => this.#runAt(Number(slider.value) + 1));
     $("#stop").addEventListener("click", () => give(`stop ${train}`));
@@ -35,14 +35,14 @@ export class Throttle {
     this.#give(`speed ${this.#train} ${within}`);
   }
 
-  /** Nothing but this throttle and the emergency stop, and the train does not run on when nobody looks. */
+  /** Shows only this throttle and the emergency stop, and stops the train when the page is hidden. */
   #lockTo(isLocked) {
     document.body.classList.toggle("locked", isLocked);
     this.#lock.setAttribute("aria-pressed", String(isLocked));
     put(this.#lock, say(isLocked ? "unlock" : "lock"));
   }
 
-  /** A locked throttle that is put away stops its train. */
+  /** A locked throttle that is hidden stops its train. */
   #left = () => {
     if (document.hidden && this.isLocked && this.#step > 0) orderAtOnce(`stop ${this.#train}`);
   };
@@ -50,9 +50,9 @@ export class Throttle {
   show({ step }, highest) {
     this.#step = step;
     if (highest) this.#slider.max = String(highest);
-    if (this.held) return;
+    if (this.isDragged) return;
     if (document.activeElement !== this.#slider) this.#slider.value = String(step);
-    put(this.#told, String(step));
+    put(this.#shown, String(step));
   }
 
   close() {

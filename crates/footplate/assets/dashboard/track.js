@@ -1,4 +1,4 @@
-// The track as it is drawn: rails, contacts, turnouts as they lie, and trains on them.
+// Draws the track: edges, sensors, turnout positions and trains.
 
 import { cut, between, nearest, written } from "./plan_curve.js";
 import { planOf } from "./plan.js";
@@ -6,16 +6,16 @@ import { placeOf } from "./places.js";
 import { say } from "./words.js";
 
 const SVG = "http://www.w3.org/2000/svg";
-/** How wide a letter of a name is, in units of the drawing. */
+/** Width of a letter in a name, in units of the drawing. */
 const LETTER = 1.12;
-/** How near a press is to what it means (units of the drawing), and how long the drawn blade of a turnout is. */
+/** The reach of a click (units of the drawing), and the drawn length of a turnout's blade. */
 const REACH = 8;
 const TOUCH = 2.6;
 const BLADE = 5;
-/** The longer side of a drawing has so many units, as it is small or large on the screen. */
+/** Units of the longer side of a drawing, on a small and on a large screen. */
 const LEAST_WIDE = 105;
 const MOST_WIDE = 160;
-/** Trains have so many colours. */
+/** The number of train colours. */
 export const COLOURS = 6;
 
 function element(name, attributes, parent) {
@@ -38,7 +38,7 @@ export class Track {
     const all = [...this.#plan.points.values(), ...[...this.#plan.rails.values()].flat()];
     const [left, right, top, foot] = [0, 0, 1, 1].map((axis, nth) => Math[nth % 2 ? "max" : "min"](...all.map((point) => point[axis])));
     const side = Math.max(right - left, foot - top) || 1;
-    // On a phone names are larger in the drawing, so that they can be read.
+    // On a phone, names are larger so that they can be read.
     this.#unit = side / Math.min(Math.max((svg.clientWidth || MOST_WIDE) / 4, LEAST_WIDE), MOST_WIDE);
     const margin = side * 0.05;
     this.whole = [left - margin, top - margin, right - left + 2 * margin, foot - top + 2 * margin];
@@ -54,7 +54,7 @@ export class Track {
     this.#bladesOf(layout, element("g", {}, svg));
     this.#layer = element("g", {}, svg);
     this.#mark(layout.nodes, element("g", {}, svg));
-    // Which train it is has to be read whatever lies there.
+    // The train number must be readable over anything.
     this.#numbers = element("g", {}, svg);
     this.#picked = element("path", { class: "picked", "stroke-width": this.#unit * 0.5 }, svg);
     this.#picked.style.display = "none";
@@ -66,7 +66,7 @@ export class Track {
     return id % 2 ? rail.toReversed() : rail;
   }
 
-  /** Each turnout shows which of its legs is set. */
+  /** Each turnout shows the leg that is set. */
   #bladesOf(layout, layer) {
     for (const edge of layout.edges) {
       const from = this.#nodes.get(edge.from);
@@ -100,7 +100,7 @@ export class Track {
       const text = node.kind === "contact" ? node.name : `⟨${node.number}⟩`;
       named.set(key, { x, y, kind: node.kind, texts: [...(named.get(key)?.texts ?? []), text] });
     }
-    // Contacts first: they are what people name places by.
+    // Sensors first: places are named after them.
     const [contacts, others] = [[], []];
     for (const name of named.values()) (name.kind === "contact" ? contacts : others).push(name);
     const taken = [];
@@ -114,7 +114,7 @@ export class Track {
     }
   }
 
-  /** Where a name so wide goes beside its point: above it, or where no other name is in the way. */
+  /** The place for a name of this width: above its point, or where it covers no other name. */
   #room(x, y, half, taken) {
     const aside = half + this.#unit * 1.2;
     const places = [[0, -1.4], [0, 2.7], [aside, 0.6], [-aside, 0.6], [0, -3.2], [0, 4.5]]
@@ -142,7 +142,7 @@ export class Track {
     return path || "M0 0";
   }
 
-  /** Shows one moment. */
+  /** Shows a picture. */
   show(picture) {
     for (const blade of this.#blades) {
       const lies = picture.turnouts[blade.turnout];
@@ -166,7 +166,7 @@ export class Track {
     }
   }
 
-  /** A contact that was said to fail: shown so until it is passed again. */
+  /** Marks a sensor that missed a detection, until its next one. */
   fails(name) {
     this.#contacts.get(`named ${name}`)?.classList.add("failed");
   }
@@ -190,7 +190,7 @@ export class Track {
 
   #train(train, place) {
     const { parts, drawn } = this.#trains.get(train.train) ?? this.#partsOf(train, place);
-    // Most of it stays as it is from one picture to the next.
+    // Most elements do not change from one picture to the next.
     for (const name of ["held", "haze", "body", "rests"]) {
       const spans = JSON.stringify(train[name]);
       if (drawn[name] === spans) continue;
@@ -213,7 +213,7 @@ export class Track {
     }
   }
 
-  /** Marks the place that was picked; none if there is none. */
+  /** Marks the selected place; `null` removes the mark. */
   pick(place) {
     const [, name, mm] = /^(.+?)(?:\+(\d+)mm)?$/.exec(place ?? "") ?? [];
     const from = [...this.#edges.values()].find((edge) => this.#nodes.get(edge.from).name === name);
@@ -222,7 +222,7 @@ export class Track {
     if (at) this.#picked.setAttribute("d", `M${at[0] - this.#unit * 1.6} ${at[1]}h${this.#unit * 3.2}M${at[0]} ${at[1] - this.#unit * 1.6}v${this.#unit * 3.2}`);
   }
 
-  /** What a point of the drawing means: a train that is there, a turnout, or else a place in both directions. */
+  /** The object at a point of the drawing: a train, a turnout, or a place in both directions. */
   meant(point) {
     const touches = (other) => other && Math.hypot(point[0] - other[0], point[1] - other[1]) < this.#unit * TOUCH;
     for (const [train, { drawn }] of this.#trains) {
@@ -235,12 +235,12 @@ export class Track {
       if (away < this.#unit * TOUCH && (!turnout || away < turnout.away)) turnout = { number, away };
     }
     const places = this.nearest(point);
-    // A contact right beside a turnout is pressed as well as the turnout is.
+    // A sensor beside a turnout has the same reach as the turnout.
     if (turnout && !(places && places.away < this.#unit && places.mm[0] === 0)) return { turnout: turnout.number };
     return places ? { places: places.names } : {};
   }
 
-  /** The place nearest to a point of the drawing, as the prompt names it in either direction: from the last contact before it. */
+  /** The place nearest to a point of the drawing, named in both directions: after the last sensor before it. */
   nearest(point) {
     const found = [];
     for (const edge of this.#edges.values()) {

@@ -1,23 +1,23 @@
-// The charts of one train: speed, way, how sure, how far predictions were off, and how far it is to a stop.
+// The charts of one train: speed, distance, position uncertainty, prediction errors and stopping distance.
 
 import { colour, dots, line } from "./chart.js";
 import { LiveChart } from "./charts.js";
 import { get } from "./server.js";
 import { say } from "./words.js";
 
-/** Moments that are kept: as many as the server keeps, five minutes at ten a second. */
+/** Samples kept: as many as the server keeps, five minutes at 10 Hz. */
 const KEPT = 3000;
-/** Between two moments that are kept (s). */
+/** Interval between samples (s). */
 const EVERY_S = 0.1;
-/** A hole this long (s) is asked for once more. */
+/** A gap this long (s) is requested again. */
 const HOLE_S = 1;
-/** Between two drawings (ms): a chart that is read need not flow. */
+/** Interval between two drawings of a chart (ms). */
 const DRAWN_EVERY_MS = 200;
 const STRIP = 180;
 
 const COLUMNS = ["t_s", "step", "speed_mm_per_s", "speed_half_mm_per_s", "way_mm", "half_mm"];
 
-/** Marks along the time at which another step was told. */
+/** Marks the times at which a step was commanded. */
 function steps(history) {
   return (u) => {
     const { ctx, bbox } = u;
@@ -38,7 +38,7 @@ function steps(history) {
       ctx.moveTo(x, bbox.top);
       ctx.lineTo(x, bbox.top + bbox.height);
       ctx.stroke();
-      // Where steps follow each other closely, the last number finds room.
+      // Where steps follow closely, only the last number is shown.
       if (x + 34 * devicePixelRatio > taken) continue;
       ctx.fillText(`→ ${step[i]}`, x + 3 * devicePixelRatio, bbox.top + 12 * devicePixelRatio);
       taken = x;
@@ -66,7 +66,7 @@ export class TrainCharts {
     this.#fresh = true;
   }
 
-  /** One more moment. */
+  /** Adds a sample. */
   goesOn(time, { step, speed_mm_per_s, speed_half_mm_per_s, way_mm, half_mm, at }) {
     this.#speed = at ? speed_mm_per_s : undefined;
     const last = this.#history.t_s.at(-1);
@@ -104,7 +104,7 @@ export class TrainCharts {
       Object.assign(this.#history, await get(`/api/trains/${this.#train}/history`));
       await this.#knows();
     } catch {
-      // A train that is not driven here has no history; the page says so.
+      // A train that is not part of the session has no history; the page says so.
     }
     this.#asked = false;
     this.#fresh = true;
@@ -117,7 +117,7 @@ export class TrainCharts {
     this.#fresh = true;
   }
 
-  /** Where the shown stretch of time begins and ends. */
+  /** The ends of the period shown. */
   #ends() {
     const { t_s: times } = this.#history;
     const [first, last] = [times[0] ?? 0, times.at(-1) ?? 0];
@@ -125,14 +125,14 @@ export class TrainCharts {
     return [from, Math.max(last, from + this.#window)];
   }
 
-  /** As far as 97 of 100 values of the shown time reach: a single wild one must not flatten all others. */
+  /** The 97th percentile of the values shown: outliers must not flatten the rest. */
   #most(times, sizes, least) {
     const [from, to] = this.#ends();
     const seen = sizes.filter((size, i) => size != null && times[i] >= from && times[i] <= to).sort((one, other) => one - other);
     return 1.2 * Math.max(least, seen[Math.floor(0.97 * (seen.length - 1))] ?? 0);
   }
 
-  /** The ends of an upright axis about nought. */
+  /** The ends of an axis that is symmetric about zero. */
   #reach(times, sizes, least) {
     const most = this.#most(times, sizes, least);
     return [-most, most];
@@ -180,9 +180,9 @@ export class TrainCharts {
       name: say("chart-way"), x, y: say("axis-way"), sync, height: STRIP, range, zooms: false, below: marks,
       series: [line(say("estimated"), "first", "m", 2), dots(say("contact"), "second", "m", 2)],
     }), () => {
-      const { t_s: t, way_mm: way } = this.#history;
+      const { t_s: t, way_mm: distance } = this.#history;
       const m = (mm) => (mm == null ? null : mm / 1000);
-      return uPlot.join([[t, way.map(m)], [this.#passed.map(({ t_s }) => t_s), this.#passed.map(({ way_mm }) => m(way_mm))]]);
+      return uPlot.join([[t, distance.map(m)], [this.#passed.map(({ t_s }) => t_s), this.#passed.map(({ way_mm }) => m(way_mm))]]);
     });
     const late = [];
     add("late", () => ({
@@ -212,7 +212,7 @@ export class TrainCharts {
     });
   }
 
-  /** Marks the present speed in the chart of stops. */
+  /** Marks the current speed in the chart of stops. */
   #now(u) {
     if (!this.#speed) return;
     const x = Math.round(u.valToPos(this.#speed, "x", true));

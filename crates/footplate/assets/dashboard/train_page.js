@@ -1,4 +1,4 @@
-// One train: how it has moved against what contacts reported, where it would stop, and what it can be told.
+// The page of one train: motion and detections, predicted stop, and commands.
 
 import { TrainCharts } from "./train_charts.js";
 import { make, put, shown, signed } from "./dom.js";
@@ -9,7 +9,7 @@ import { order } from "./server.js";
 import { Throttle } from "./throttle.js";
 import { say } from "./words.js";
 
-/** Contacts in the list; the charts show more. */
+/** Detections in the list; the charts show more. */
 const LISTED = 40;
 
 export function trainPage(root, live, number) {
@@ -17,7 +17,7 @@ export function trainPage(root, live, number) {
   const $ = (selector) => root.querySelector(selector);
   $("h2").textContent = say("train", train);
   const charts = new TrainCharts(root, live, train);
-  /** Where it is said what comes of the last order: beside what was pressed. */
+  /** Where the result of the last command is shown: beside its control. */
   let answer = $("#answer");
 
   async function give(line, beside = $("#answer")) {

@@ -1,12 +1,12 @@
-// Zoom and pan of a drawing, with mouse, wheel, fingers and keys.
+// Zoom and pan of a drawing, by mouse, wheel, touch and keys.
 
-/** Nearer than this (parts of the whole) nothing more is to be seen. */
+/** The largest zoom, as a part of the whole drawing. */
 const NEAREST = 1 / 40;
 
 export class View {
   #svg; #whole; #box; #fingers = new Map(); #moved = 0; #onPress;
 
-  /** `whole`: x, y, width and height of everything. `onPress` hears of presses that were no pulls, in the drawing's units. */
+  /** `whole`: x, y, width and height of the whole drawing. `onPress` receives clicks, in the drawing's units. */
   constructor(svg, whole, onPress) {
     this.#svg = svg;
     this.#whole = whole;
@@ -27,13 +27,13 @@ export class View {
     svg.addEventListener("keydown", (event) => this.#key(event));
   }
 
-  /** Everything. */
+  /** Shows the whole drawing. */
   all() {
     this.#box = [...this.#whole];
     this.#show();
   }
 
-  /** Makes everything `times` as far away, about a point. */
+  /** Scales the visible area by `times` about a point. */
   zoom(times, about = this.#middle()) {
     const [x, y, width, height] = this.#box;
     const least = this.#whole[2] * NEAREST;
@@ -42,7 +42,7 @@ export class View {
     this.#show();
   }
 
-  /** Where an event happened, in the drawing's units. */
+  /** The place of an event, in the drawing's units. */
   point(event) {
     const matrix = this.#svg.getScreenCTM();
     if (!matrix) return this.#middle();

@@ -1,19 +1,19 @@
-// What the pages say, in the reader's language.
+// The texts of the pages, in the reader's language.
 
 import { ENGLISH } from "./english.js";
 import { GERMAN } from "./german.js";
 
 const isGerman = navigator.language.toLowerCase().startsWith("de");
 const WORDS = isGerman ? GERMAN : ENGLISH;
-/** The reader's language, as pages of the server are asked for in it. */
+/** The reader's language, as requested from the server. */
 export const LANGUAGE = isGerman ? "de" : "en";
 
-/** A text with its blanks filled in. */
+/** A text with its values filled in. */
 export function say(word, ...blanks) {
   return (WORDS[word] ?? word).replace(/\{(\d)\}/g, (_, place) => String(blanks[Number(place)] ?? ""));
 }
 
-/** Puts every text of a part of the page in place. */
+/** Fills in all texts of a part of the page. */
 export function translate(root) {
   document.documentElement.lang = LANGUAGE;
   for (const element of root.querySelectorAll("[data-word]")) element.textContent = say(element.dataset.word);

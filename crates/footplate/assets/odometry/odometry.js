@@ -1,12 +1,12 @@
-// Draws the charts of a run of odometry from the data inside the page, with what chart.js offers.
+// Draws the charts of an odometry run from the data in the page, with the functions of chart.js.
 
 const report = JSON.parse(document.getElementById("report").textContent);
 /** The run shown. */
 let run = report.runs[0];
 const SYNC = "odometry";
-/** Most rows of the table of marks: it is there to be read. */
+/** The most rows of the table of intervals: it is meant to be read. */
 const LISTED = 200;
-/** Height of the strip of modes, as a part of the axis that shows 100 %. */
+/** Height of the strip of states, as a part of the axis that shows 100 %. */
 const STRIP_OF = 0.09;
 
 const WORDS = pick({
@@ -20,7 +20,7 @@ const PLACES = pick(
   { wheel_1: "wheelset 1", wheel_2: "wheelset 2", mode: "mode" },
   { wheel_1: "Radsatz 1", wheel_2: "Radsatz 2", mode: "Betriebsart" },
 );
-/** What stands on axes and beside lines. */
+/** Labels of axes and lines. */
 const [TIME, SPEED, ESTIMATE, AT_MOST, AT_LEAST, GUARANTEED] = pick(
   ["time since the first period (s)", "speed (m/s)", "estimate", "at most", "at least", "guaranteed"],
   ["Zeit seit der ersten Periode (s)", "Tempo (m/s)", "Schätzung", "höchstens", "mindestens", "garantiert"],
@@ -34,10 +34,10 @@ const time = () => ({
   },
 });
 
-/** What is marked at a time, if anything. */
+/** The intervals marked at a time. */
 const markedAt = (place, at) => run.marks[place].find(([from, to]) => from < at && at <= to)?.[2];
 
-/** Shades stretches between two heights of a chart, 0 at its top and 1 at its foot, with a firm bar at their upper edge. */
+/** Shades intervals between two heights of a chart, 0 at its top and 1 at its bottom, with a solid bar at their upper edge. */
 function shade(stretches, top, foot, alpha = 0.2) {
   return (u) => {
     const { ctx, bbox } = u;
@@ -49,7 +49,7 @@ function shade(stretches, top, foot, alpha = 0.2) {
     ctx.clip();
     for (const [from, to, what] of stretches) {
       const left = u.valToPos(from, "x", true);
-      // However short it is, it can be seen.
+      // Even the shortest interval is visible.
       const width = Math.max(u.valToPos(to, "x", true) - left, 2 * devicePixelRatio);
       ctx.fillStyle = colour(what);
       ctx.globalAlpha = alpha;
@@ -61,13 +61,13 @@ function shade(stretches, top, foot, alpha = 0.2) {
   };
 }
 
-/** The key to the marks that there are. */
+/** The legend of the marks that occur. */
 function key(figure, places) {
   const there = new Set(places.flatMap((place) => run.marks[place].map(([, , what]) => what)));
   if (there.size === 0) return;
   const list = document.createElement("ul");
   list.className = "key";
-  list.setAttribute("aria-label", pick("Key to the marks", "Schlüssel zu den Marken"));
+  list.setAttribute("aria-label", pick("Legend of the marks", "Legende der Marken"));
   for (const what of Object.keys(WORDS).filter((word) => there.has(word))) {
     const swatch = document.createElement("span");
     swatch.className = "swatch";
@@ -79,7 +79,7 @@ function key(figure, places) {
   figure.append(list);
 }
 
-/** Says below a chart what it shows, for those who do not see it. */
+/** Describes a chart in words below it, for screen readers. */
 function say(figure, text) {
   const said = document.createElement("p");
   said.className = "said";
@@ -109,7 +109,7 @@ function speed(figure, lines) {
   });
   const widest = greatest(confidence_speed_high_m_s.map((high, place) => high - confidence_speed_low_m_s[place]));
   const [goes, apart] = [span(speed_m_s, "m/s", 2), rounded(widest, 2)];
-  say(figure, pick(`The estimate goes from ${goes}; its 99.99 % interval is at most ${apart} m/s wide.`, `Die Schätzung geht von ${goes}; ihr 99,99-%-Intervall ist höchstens ${apart} m/s breit.`));
+  say(figure, pick(`The estimate ranges from ${goes}; its 99.99 % interval is at most ${apart} m/s wide.`, `Die Schätzung reicht von ${goes}; ihr 99,99-%-Intervall ist höchstens ${apart} m/s breit.`));
 }
 
 function wheels(figure, { speed_m_s, wheel_1_m_s, wheel_2_m_s }) {
@@ -133,7 +133,7 @@ function wheels(figure, { speed_m_s, wheel_1_m_s, wheel_2_m_s }) {
   say(figure, `${pick("Marks", "Marken")}: ${told.join("; ")}.`);
 }
 
-/** How often and how long something is marked, in words. */
+/** How often and how long a state is marked, in words. */
 function stretchesOf(place) {
   const marks = run.marks[place];
   if (marks.length === 0) return place === "mode" ? pick("always normal", "immer normal") : pick("always rolls", "rollt immer");
@@ -158,12 +158,12 @@ function shares(figure, { share_1, share_1_and_2 }) {
   });
   const mode = (u, _, __, index) => WORDS[markedAt("mode", u.data[0][index ?? 0])] ?? "normal";
   chart(figure, {
-    name: pick("Shares of the wheels and of the virtual sensor, and the mode", "Anteile der Räder und des gedachten Sensors, und die Betriebsart"), x: time(), y: pick("share (%)", "Anteil (%)"), sync: SYNC, height: STRIP + 30,
+    name: pick("Shares of the wheels and of the virtual sensor, and the mode", "Anteile der Räder und des virtuellen Sensors, und die Betriebsart"), x: time(), y: pick("share (%)", "Anteil (%)"), sync: SYNC, height: STRIP + 30,
     range: { y: { range: [0, 100 / (1 - STRIP_OF)] } },
     below: [shade(run.marks.mode, 0, STRIP_OF - 0.02, 1)],
     data: [run.time_s, run.time_s.map(() => 100), both, first, run.time_s.map(() => null)],
     series: [
-      part(pick("virtual sensor", "gedachter Sensor"), "first", (index) => 100 - both[index]),
+      part(pick("virtual sensor", "virtueller Sensor"), "first", (index) => 100 - both[index]),
       part(PLACES.wheel_2, "third", (index) => both[index] - first[index]),
       { ...part(PLACES.wheel_1, "second", (index) => first[index]), fill: `color-mix(in srgb, ${colour("second")} 25%, transparent)` },
       { ...line(PLACES.mode, "quiet", "", 0), value: mode },
@@ -180,7 +180,7 @@ function distance(figure, lines) {
   const { error_m, confidence_error_low_m, confidence_error_high_m, width_m, over_m, under_m } = lines;
   if (error_m) {
     chart(figure, {
-      name: pick("Distance less the true distance, with its 99.99 % interval (shaded) and its guaranteed bounds (dashed)", "Weg weniger dem wahren Weg, mit seinem 99,99-%-Intervall (getönt) und seinen garantierten Grenzen (gestrichelt)"), x: time(), y: pick("beyond the truth (m)", "jenseits der Wahrheit (m)"), sync: SYNC, zero: true,
+      name: pick("Distance error, with its 99.99 % interval (shaded) and its guaranteed bounds (dashed)", "Fehler des Weges, mit seinem 99,99-%-Intervall (getönt) und seinen garantierten Grenzen (gestrichelt)"), x: time(), y: pick("distance error (m)", "Fehler des Weges (m)"), sync: SYNC, zero: true,
       data: [run.time_s, confidence_error_high_m, confidence_error_low_m, error_m, lines.guaranteed_error_high_m, lines.guaranteed_error_low_m],
       series: [
         bound(AT_MOST, "m", 2), bound(AT_LEAST, "m", 2), line(ESTIMATE, "first", "m", 2),
@@ -189,11 +189,11 @@ function distance(figure, lines) {
       bands: [{ series: [1, 2], fill: colour("band") }],
     });
     const [goes, bounds] = [span(error_m, "m", 2), `${rounded(least(confidence_error_low_m), 2)} ${pick("to", "bis")} ${rounded(greatest(confidence_error_high_m), 2)} m`];
-    say(figure, pick(`The error goes from ${goes}; its 99.99 % interval from ${bounds}.`, `Der Fehler geht von ${goes}; sein 99,99-%-Intervall von ${bounds}.`));
+    say(figure, pick(`The error ranges from ${goes}; its 99.99 % interval from ${bounds}.`, `Der Fehler reicht von ${goes}; sein 99,99-%-Intervall von ${bounds}.`));
     return;
   }
   chart(figure, {
-    name: pick("Width of the 99.99 % interval of the distance, and guaranteed amounts of over- and under-reading", "Breite des 99,99-%-Intervalls des Weges, und wie viel er garantiert höchstens zu lang und zu kurz gelesen wird"), x: time(), y: pick("distance (m)", "Weg (m)"), sync: SYNC,
+    name: pick("Width of the 99.99 % interval of the distance, and guaranteed amounts of over- and under-reading", "Breite des 99,99-%-Intervalls des Weges, und garantierte Beträge von Über- und Unterlesen"), x: time(), y: pick("distance (m)", "Weg (m)"), sync: SYNC,
     data: [run.time_s, width_m, over_m, under_m],
     series: [line(pick("width of the interval", "Breite des Intervalls"), "first", "m", 2), line(pick("over-read by at most", "zu lang um höchstens"), "second", "m", 2), line(pick("under-read by at most", "zu kurz um höchstens"), "third", "m", 2)],
   });
@@ -223,12 +223,12 @@ function acceleration(figure, { accel_m_s2, measured_accel_m_s2, effort }) {
   const recorded = [measured && pick("an accelerometer", "ein Beschleunigungsmesser"), effort && pick("the command", "der Befehl")].filter(Boolean).join(pick(" and ", " und "));
   const goes = span(accel_m_s2, "m/s²", 2);
   say(figure, pick(
-    `The estimate goes from ${goes}. ${recorded ? `Recorded beside it: ${recorded}.` : "Neither an accelerometer nor the command was recorded."}`,
-    `Die Schätzung geht von ${goes}. ${recorded ? `Daneben aufgezeichnet: ${recorded}.` : "Weder ein Beschleunigungsmesser noch der Befehl ist aufgezeichnet."}`,
+    `The estimate ranges from ${goes}. ${recorded ? `Recorded beside it: ${recorded}.` : "Neither an accelerometer nor the command was recorded."}`,
+    `Die Schätzung reicht von ${goes}. ${recorded ? `Daneben aufgezeichnet: ${recorded}.` : "Weder ein Beschleunigungsmesser noch der Befehl ist aufgezeichnet."}`,
   ));
 }
 
-/** Every stretch that is marked, as a table. */
+/** The table of all marked intervals. */
 function listMarks() {
   const marks = Object.keys(PLACES).flatMap((place) => run.marks[place].map((mark) => [place, ...mark]));
   marks.sort(([, one], [, other]) => one - other);

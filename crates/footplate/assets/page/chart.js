@@ -1,15 +1,15 @@
-// What charts of all pages have in common: colours, axes, keys, and drawing again when the page changes. uPlot draws
+// Common code of all charts: colours, axes, legends, and redrawing when the page changes. uPlot draws
 // lines; error bars are drawn here.
 
-/** Pixels of a chart's height; strips below a chart are lower. */
+/** Height of a chart in pixels; strips below a chart are lower. */
 const HEIGHT = 280;
 const STRIP = 190;
-/** Pixels between two ticks of an upright axis, in a strip and in a chart. */
+/** Pixels between two ticks of a vertical axis, in a strip and in a chart. */
 const [TIGHT, ROOMY] = [18, 30];
-/** Charts drawn so far, by figure, to be taken down when colours change. */
+/** The charts drawn so far, by figure, to be removed when colours change. */
 const drawn = new Map();
 
-/** The one of two texts that is in the page's language. */
+/** The text in the page's language. */
 const pick = (english, german) => (document.documentElement.lang === "de" ? german : english);
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 const rounded = (value, digits) => value.toFixed(digits).replace("-", "−").replace(/^−(0(\.0*)?)$/, "$1");
@@ -47,7 +47,7 @@ function errorBars(points, name) {
   };
 }
 
-/** A level line at nought. */
+/** A horizontal line at zero. */
 function zeroLine(u) {
   const y = Math.round(u.valToPos(0, "y", true));
   if (y < u.bbox.top || y > u.bbox.top + u.bbox.height) return;
@@ -64,7 +64,7 @@ function zeroLine(u) {
 const line = (label, name, unit, digits) => ({
   label, stroke: colour(name), width: 2, pxAlign: 0, spanGaps: true, points: { show: false }, value: withUnit(unit, digits),
 });
-/** Points without a line; `told` says by x what a reader should know of a point. */
+/** Points without a line; `told` gives the text of a point by its x. */
 const dots = (label, name, unit, digits, told = new Map()) => ({
   label, stroke: colour(name), paths: () => null, snaps: true,
   points: { show: true, size: 7, fill: colour(name), stroke: colour("card"), width: 1 },
@@ -75,7 +75,7 @@ const dots = (label, name, unit, digits, told = new Map()) => ({
   },
 });
 
-/** The index of the nearest value that a series has: points stand far between the samples of a curve. */
+/** The index of the nearest value of a series: points lie far between the samples of a curve. */
 function nearest(u, series, index) {
   const values = u.data[series];
   if (!u.series[series].snaps || values[index] != null) return index;
@@ -96,16 +96,16 @@ function axis(label, more) {
   };
 }
 
-/** The charts that show the same stretch as this one. */
+/** The charts that share the x axis of this one. */
 const together = (u) => (u.cursor.sync.key == null ? [u] : uPlot.sync(u.cursor.sync.key).plots);
 
-/** Moves the cursor to a value, and those of the charts beside it. */
+/** Moves the cursor of this chart, and of those that share its x axis, to a value. */
 function pointAt(u, index) {
   const top = u.bbox.height / 2 / devicePixelRatio;
   for (const one of together(u)) one.setCursor({ left: one.valToPos(u.data[0][index], "x"), top });
 }
 
-/** Shows a part of what is shown, around the cursor, on this chart and those beside it; 2 is twice as much. */
+/** Zooms this chart, and those that share its x axis, about the cursor; 2 shows twice the range. */
 function zoom(u, part) {
   const { min, max } = u.scales.x;
   const at = u.cursor.idx == null ? (min + max) / 2 : u.data[0][u.cursor.idx];
@@ -136,13 +136,13 @@ function onKey(u, event, zooms) {
   event.preventDefault();
 }
 
-/** Puts a chart into a figure; `below` draws between grid and lines. What it shows is zoomed unless something else decides it. */
+/** Puts a chart into a figure; `below` draws between grid and lines. The chart can be zoomed unless its range is fixed. */
 function chart(figure, {
   name, x, y, series, data, height = HEIGHT, bars = [], zero = false, sync, range, bands, ticks, below = [], zooms = true, keys = keysSaid(),
 }) {
   const draw = bars.map(([points, colourName]) => errorBars(points, colourName));
   const u = new uPlot({
-    // Whole pixels would make stairs of a gentle slope.
+    // Whole pixels would turn a gentle slope into stairs.
     pxAlign: 0,
     width: figure.clientWidth - 2 * parseFloat(getComputedStyle(figure).paddingLeft), height,
     cursor: {
@@ -164,7 +164,7 @@ function chart(figure, {
   return u;
 }
 
-/** What puts the charts into a figure of this page. */
+/** The function that draws the charts of a figure. */
 let drawFigure;
 
 function redraw(figure) {
@@ -184,7 +184,7 @@ const watch = new ResizeObserver((entries) => {
   }
 });
 
-/** Draws all figures now, and again when their width, the reader's choice of colours or the medium changes. */
+/** Draws all figures, and again when width, colours or medium change. */
 function drawFigures(draw) {
   drawFigure = draw;
   for (const figure of figures) {

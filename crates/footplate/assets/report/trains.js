@@ -1,4 +1,4 @@
-// Draws the charts of what is known of trains from the data inside the page, with what chart.js offers.
+// Draws the charts of a train report from the data in the page, with the functions of chart.js.
 
 const report = JSON.parse(document.getElementById("report").textContent);
 const trains = new Map(report.trains.map((train) => [String(train.calibration.train), train]));
@@ -6,16 +6,16 @@ const trains = new Map(report.trains.map((train) => [String(train.calibration.tr
 const APPROACHES = [
   ["below", pick("reached from below", "von unten erreicht"), "first", -0.12],
   ["above", pick("reached from above", "von oben erreicht"), "second", 0.12],
-  ["unknown", pick("side not recorded", "Seite nicht festgehalten"), "third", 0],
+  ["unknown", pick("side not recorded", "Seite nicht aufgezeichnet"), "third", 0],
 ];
-/** What a train did while a forecast was made of it. */
+/** What the train was doing when the forecast was made. */
 const PHASES = pick({
-  steady: "steady running", first_lap: "first time over this way or at this step", change: "changing speed",
+  steady: "steady running", first_lap: "first run over this hop or at this step", change: "changing speed",
 }, {
-  steady: "gleichmäßige Fahrt", first_lap: "zum ersten Mal auf diesem Weg oder bei dieser Stufe", change: "Tempowechsel",
+  steady: "gleichmäßige Fahrt", first_lap: "erste Fahrt über diesen Abschnitt oder bei dieser Stufe", change: "Tempowechsel",
 });
-/** What stands on axes and beside lines. */
-const [LAW, CONTACT, SPEED] = pick(["law", "contact", "speed (mm/s)"], ["Gesetz", "Kontakt", "Tempo (mm/s)"]);
+/** Labels of axes and lines. */
+const [LAW, SENSOR, SPEED] = pick(["law", "sensor", "speed (mm/s)"], ["Gesetz", "Rückmelder", "Tempo (mm/s)"]);
 
 function speeds(figure, train) {
   const all = train.calibration.steps.filter(({ speed }) => speed.measurements > 1);
@@ -23,7 +23,7 @@ function speeds(figure, train) {
     const own = all.filter((speed) => speed.approach.toLowerCase() === approach);
     const points = own.map(({ step, speed }) => ({ x: step + shift, y: speed.value, dy: speed.uncertainty }));
     const told = new Map(points.map(({ x, dy }, place) =>
-      [x, `± ${rounded(dy, 1)}, ${own[place].speed.measurements} ${pick("contacts", "Kontakte")}`]));
+      [x, `± ${rounded(dy, 1)}, ${own[place].speed.measurements} ${pick("detections", "Meldungen")}`]));
     return { label, name, points, told };
   }).filter(({ points }) => points.length > 0);
   const data = uPlot.join(parts.map(({ points }) => [points.map(({ x }) => x), points.map(({ y }) => y)]));
@@ -62,21 +62,21 @@ function change(figure, train) {
   const times = contacts.map(({ time_s }) => time_s);
   const told = new Map(contacts.map(({ time_s, told_by }) => [time_s, told_by]));
   const x = { label: pick("since the command (s)", "seit dem Befehl (s)"), unit: "s", digits: 2 };
-  // All four charts begin and end together, whatever each of them holds; a zoomed range is taken as it is.
+  // All four charts share one x range; a zoomed range is taken as it is.
   const [begins, ends] = [shown.time_s[0], shown.time_s.at(-1)];
   const whole = [begins - 0.02 * (ends - begins), ends + 0.02 * (ends - begins)];
   const range = { x: { range: (u, low, high) => (low <= u.data[0][0] && high >= u.data[0].at(-1) ? whole : [low, high]) } };
   const curve = (values) => [shown.time_s, values];
   chart(figure, {
-    name: pick("Way since the command", "Weg seit dem Befehl"), x, y: pick("way (mm)", "Weg (mm)"), sync: key, range,
+    name: pick("Distance since the command", "Weg seit dem Befehl"), x, y: pick("distance (mm)", "Weg (mm)"), sync: key, range,
     data: uPlot.join([curve(shown.way_mm), [times, contacts.map(({ way_mm }) => way_mm)]]),
-    series: [line(LAW, "first", "mm", 0), dots(CONTACT, "second", "mm", 0, told)],
+    series: [line(LAW, "first", "mm", 0), dots(SENSOR, "second", "mm", 0, told)],
     bars: [[contacts.map(({ time_s, way_mm, doubt_s }) => ({ x: time_s, y: way_mm, dx: doubt_s })), "second"]],
   });
   const beyond = pick("beyond the law", "jenseits des Gesetzes");
   const reach = 1.15 * Math.max(5, ...contacts.map(({ residual_mm, doubt_mm }) => Math.abs(residual_mm) + doubt_mm));
   chart(figure, {
-    name: pick("How far contacts lie beyond the law", "Wie weit Kontakte jenseits des Gesetzes liegen"), x, y: pick("beyond the law (mm)", "daneben (mm)"), sync: key, height: STRIP, zero: true,
+    name: pick("Residuals of the sensors", "Restabweichungen der Rückmelder"), x, y: pick("residual (mm)", "Restabweichung (mm)"), sync: key, height: STRIP, zero: true,
     range: { ...range, y: { range: [-reach, reach] } },
     data: [times, contacts.map(({ residual_mm }) => residual_mm)],
     series: [dots(beyond, "second", "mm", 1, told)],
@@ -86,7 +86,7 @@ function change(figure, train) {
   chart(figure, {
     name: pick("Speed since the command", "Tempo seit dem Befehl"), x, y: SPEED, sync: key, height: STRIP, range,
     data: uPlot.join([curve(shown.speed_mm_s), [means.map(({ mean_speed }) => mean_speed[0]), means.map(({ mean_speed }) => mean_speed[1])]]),
-    series: [line(LAW, "first", "mm/s", 0), dots(pick("mean between two contacts", "Mittel zwischen zwei Kontakten"), "second", "mm/s", 0)],
+    series: [line(LAW, "first", "mm/s", 0), dots(pick("mean between two sensors", "Mittel zwischen zwei Rückmeldern"), "second", "mm/s", 0)],
   });
   chart(figure, {
     name: pick("Acceleration since the command", "Beschleunigung seit dem Befehl"), x, y: pick("acceleration (mm/s²)", "Beschleunigung (mm/s²)"), sync: key, height: STRIP, range, zero: true,
@@ -97,7 +97,7 @@ function change(figure, train) {
 function forecasts(figure, train) {
   const points = train.forecasts.filter(({ late_ms }) => late_ms != null);
   if (points.length === 0) {
-    figure.append(pick("Nothing could be forecast yet.", "Noch konnte nichts vorhergesagt werden."));
+    figure.append(pick("There are no forecasts yet.", "Es gibt noch keine Vorhersagen."));
     return;
   }
   const numbers = points.map((_, place) => place + 1);
@@ -106,7 +106,7 @@ function forecasts(figure, train) {
   for (const [late, half, unit] of [["late_mm", "half_90_mm", "mm"], ["late_ms", "half_90_ms", "ms"]]) {
     const values = points.map((point) => point[late]);
     const widths = points.map((point) => point[half]);
-    // A single wild forecast must not flatten all others: the axis holds 98 in 100.
+    // An outlier must not flatten the rest: the axis contains 98 of 100.
     const sizes = points.map((point) => Math.max(Math.abs(point[late]), point[half])).sort((a, b) => a - b);
     const reach = 1.2 * sizes[Math.floor(0.98 * (sizes.length - 1))];
     const digits = unit === "mm" ? 1 : 0;

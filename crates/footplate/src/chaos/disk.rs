@@ -11,7 +11,7 @@ use std::rc::Rc;
 
 use anyhow::{Context, bail, ensure};
 use footplate_core::{Event, TimeSpan, Timestamp, TrainId};
-use footplate_eval::choice::Choice;
+use footplate_eval::seeds::Choice;
 use footplate_store::{Journal, JournalEntry, NewMachine, Side, Store, Traced};
 
 use super::life::Life;

@@ -6,7 +6,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use footplate_core::{TimeSpan, Timestamp, TrainId};
-use footplate_eval::choice::Choice;
+use footplate_eval::seeds::Choice;
 
 use super::life::{Death, Life, Spell};
 use super::plan::{Planned, Trouble};
@@ -157,6 +157,7 @@ impl<'l> FaultyLine<'l> {
             SimulatedStation::DccEx(board) => board.restart(),
             SimulatedStation::Z21(station) => station.restart(),
             SimulatedStation::Can(station) => station.restart(),
+            SimulatedStation::LocoNet(station) => station.restart(),
         }
     }
 

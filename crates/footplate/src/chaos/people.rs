@@ -7,7 +7,7 @@ use std::rc::Rc;
 use footplate_core::control::{Dispatcher, Journey, LinkNews, Notice};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Command, Length, NodeId, TimeSpan, Timestamp, TrainId};
-use footplate_eval::choice::Choice;
+use footplate_eval::seeds::Choice;
 use footplate_eval::traffic::{HAND, is_on_reserved_track, place_by_hand};
 use footplate_wire::{CommandError, LinkNotice};
 

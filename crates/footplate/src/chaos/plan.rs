@@ -1,7 +1,7 @@
 //! What a seed draws: a station, trains, what fails when, and how each life of the program ends.
 
 use footplate_core::{TimeSpan, Timestamp};
-use footplate_eval::choice::Choice;
+use footplate_eval::seeds::Choice;
 
 use super::life::{Death, Spell};
 use crate::link::StationKind;

@@ -10,12 +10,12 @@ use footplate_core::control::{Dispatcher, Driver};
 use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg, TurnoutStates};
 use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
-use footplate_eval::choice::Choice;
-use footplate_eval::rehearsal::Rehearsal;
+use footplate_eval::seeds::Choice;
+use footplate_eval::testbed::PreparedTrains;
 use footplate_eval::traffic::{HAND, LENGTHS, place_by_hand};
 use footplate_sim::{
-    BoardSwitches, CanSwitches, LivingLayout, LivingSwitches, StationSwitches, VirtualBoard,
-    VirtualCentralStation, VirtualStation, VirtualZ21, Z21Switches,
+    BoardSwitches, CanSwitches, LivingLayout, LivingSwitches, LocoNetSwitches, StationSwitches, VirtualBoard,
+    VirtualCentralStation, VirtualLocoNet, VirtualStation, VirtualZ21, Z21Switches,
 };
 use footplate_store::Store;
 
@@ -66,7 +66,7 @@ impl<'l> Stage<'l> {
     /// When there is no room for the trains on the layout.
     pub(crate) fn set(layout: &'l Layout, number: u64) -> anyhow::Result<Self> {
         let switches = LivingSwitches::well_kept();
-        let rehearsal = Rehearsal::prepare(layout, number, &TRAINS, &switches, BUDGET)?;
+        let rehearsal = PreparedTrains::prepare(layout, number, &TRAINS, &switches, BUDGET)?;
         let (world, models) = (rehearsal.world().clone(), rehearsal.models.clone());
         Ok(Self { number, layout, world, models })
     }
@@ -132,6 +132,7 @@ const fn name_of(kind: StationKind) -> &'static str {
         StationKind::DccEx => "dcc-ex",
         StationKind::Z21 => "z21",
         StationKind::MarklinCan => "marklin-can",
+        StationKind::LocoNet => "loconet",
     }
 }
 
@@ -141,6 +142,7 @@ fn station_of(kind: StationKind, world: LivingLayout<'_>, seed: u64) -> Simulate
         StationKind::DccEx => VirtualBoard::new(world, seed, BoardSwitches::default()).into(),
         StationKind::Z21 => VirtualZ21::new(world, seed, Z21Switches::default()).into(),
         StationKind::MarklinCan => VirtualCentralStation::new(world, seed, CanSwitches::default()).into(),
+        StationKind::LocoNet => VirtualLocoNet::new(world, seed, LocoNetSwitches::default()).into(),
     }
 }
 

@@ -1,6 +1,6 @@
 //! `footplate clerk`: one answer to a browser, worked out from files within limits of memory and time.
 //!
-//! The dashboard starts it (`serve/desk.rs`). It reads a question, a line of JSON, and what belongs to it, and writes the
+//! The dashboard starts it (`serve/answer_queue.rs`). It reads a question, a line of JSON, and what belongs to it, and writes the
 //! answer. A recording that was made to be large ends this program and nothing else.
 
 use std::io::{BufRead, Read, Write};
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Outcome;
 use super::odometry::uploaded_page;
-use super::serve::{StoreQuery, Wished};
+use super::serve::{AnswerForm, StoreQuery};
 use super::written_layout::WrittenLayout;
 
 /// What it is called.
@@ -60,7 +60,7 @@ impl Arguments {
         (&mut input).take(LONGEST_QUESTION).read_line(&mut line)?;
         let answer = match serde_json::from_str(&line)? {
             Question::Recording { name, vehicle, language } => {
-                uploaded_page(&name, &mut input, vehicle.as_deref(), Wished::named(language).language())?
+                uploaded_page(&name, &mut input, vehicle.as_deref(), AnswerForm::named(language).language())?
             }
             Question::Store { path, layout, query } => {
                 let layout = WrittenLayout::of("the session's layout", layout)?.layout;

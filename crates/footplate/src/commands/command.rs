@@ -1,4 +1,4 @@
-//! The list of verbs, and how each of them may end.
+//! The list of verbs, and how a verb may end.
 
 use std::io::Write;
 
@@ -9,20 +9,20 @@ use super::{
 
 use crate::link::Cable;
 
-/// Makes the list of verbs from the names of their files.
+/// Declares the enum of verbs from the names of their files.
 macro_rules! verbs {
     ($($Verb:ident: $file:ident,)+) => {
-        /// What the program is asked to do.
+        /// A verb with its arguments.
         #[derive(clap::Subcommand)]
         pub(crate) enum Command {
             $($Verb($file::Arguments),)+
         }
 
         impl Command {
-            /// Does it, and writes the result to `output`.
+            /// Runs the verb and writes its result to `output`.
             ///
             /// # Errors
-            /// What was wrong with the usage or the input, and what would be right.
+            /// The usage or the input is wrong; the message says what would be right.
             pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
                 match self {
                     $(Self::$Verb(arguments) => arguments.run(output),)+
@@ -52,16 +52,16 @@ verbs! {
     Store: store,
 }
 
-/// A line outside this program over which trains are driven.
+/// A link to a real command station that drives trains.
 pub(crate) struct GuardedLine {
     pub(crate) cable: Cable,
-    /// Whether a program that dies is started again.
+    /// Whether to start a program again that died.
     pub(crate) restarts: bool,
 }
 
 impl Command {
-    /// The line that trains are driven over, where somebody has to stop them if this program dies. A simulated railway ends
-    /// with its program, and `doctor` moves no train.
+    /// The link that the guardian watches, to stop all trains if this program dies. `None` for a simulated railway,
+    /// which ends with its program, and for `doctor`, which moves no train.
     pub(crate) fn guarded_line(&self) -> Option<GuardedLine> {
         let (link, restarts) = match self {
             Self::Calibrate(arguments) => (arguments.link()?, false),
@@ -74,17 +74,17 @@ impl Command {
 }
 
 impl Default for Command {
-    /// What somebody sees who asks for nothing.
+    /// The verb that runs without arguments.
     fn default() -> Self {
         Self::Demo(demo::Arguments::default())
     }
 }
 
-/// How a verb ended that was asked rightly.
+/// How a verb ended that was used correctly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Outcome {
-    /// As wanted.
+    /// As requested.
     Done,
-    /// It worked, but the result is not good enough: a check failed, a target was missed.
+    /// It ran, but the result is insufficient: a check failed or a target was missed.
     FallsShort,
 }

@@ -1,4 +1,4 @@
-//! `footplate completions`: what the Tab key offers in a shell.
+//! `footplate completions`: shell completion.
 
 use std::io::Write;
 

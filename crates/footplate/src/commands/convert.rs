@@ -1,4 +1,4 @@
-//! `footplate convert`: a sensor log, a train or a line of any form to Footplate's own.
+//! `footplate convert`: converts a sensor log, a train or a line from any known format to Footplate's own.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -16,12 +16,11 @@ use super::Outcome;
 use super::log_file::LogFile;
 use crate::counted::counted;
 
-/// Convert a sensor log, a train or a line of any form to Footplate's own.
+/// Convert a sensor log, a train or a line to Footplate's own format.
 ///
-/// The end of the file's name tells what it is: a log ends in .csv, a full-size train or line in .json, .yaml or .toml.
-/// Of a log nothing is lost but what was odd, which is said on standard error: repeats, stale contacts and runs without
-/// a report are measurements like any other. docs/formats/sensor-log.md, docs/formats/train.md and
-/// docs/formats/line.md describe the forms.
+/// The extension selects the kind: .csv is a sensor log; .json, .yaml and .toml are a full-size train or line. Repeated
+/// reports, stale reports and runs without a report are kept like all others; oddities are reported on standard error.
+/// docs/formats/sensor-log.md, docs/formats/train.md and docs/formats/line.md describe the formats.
 #[derive(Args)]
 #[command(
     after_help = "Examples: footplate convert testdata/sensor-logs/eadanila_2020_track_a.csv --out laps.csv
@@ -34,13 +33,13 @@ pub(crate) struct Arguments {
     /// The file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Whose sensors a log names: a built-in layout (track-a, track-b) or a layout file.
+    /// The layout of a log's sensors: a built-in layout (track-a, track-b) or a layout file.
     #[arg(long, default_value = "track-a")]
     layout: String,
     /// The train of a log that names none.
     #[arg(long, value_name = "N")]
     train: Option<u16>,
-    /// Which of several trains or lines in a file.
+    /// Which of several trains or lines in the file.
     #[arg(long, value_name = "ID")]
     name: Option<String>,
     /// Report as JSON.
@@ -75,7 +74,7 @@ impl Arguments {
         if self.json {
             writeln!(output, "{}", json!({ "file": self.out, "form": form, kind: name }))?;
         } else {
-            writeln!(output, "{}: {kind} {name}, from the form {form}", self.out.display())?;
+            writeln!(output, "{}: {kind} {name}, from format {form}", self.out.display())?;
         }
         Ok(Outcome::Done)
     }
@@ -101,7 +100,7 @@ impl Arguments {
         } else {
             let (runs, events) = (counted(recording.runs.len(), "run"), counted(events, "event"));
             let (out, form) = (self.out.display(), recording.form);
-            writeln!(output, "{out}: {runs} with {events}, from the form {form}")?;
+            writeln!(output, "{out}: {runs} with {events}, from format {form}")?;
         }
         Ok(Outcome::Done)
     }

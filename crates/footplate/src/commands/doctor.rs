@@ -1,28 +1,36 @@
 //! `footplate doctor`: whether the line to a station is in order, and how fast it is.
 
+mod answers;
 mod board_figures;
 mod can_figures;
 mod figures;
+mod loconet_figures;
 mod z21_figures;
 
 use std::collections::BTreeMap;
 use std::io::Write;
+use std::path::PathBuf;
 
 use anyhow::{anyhow, bail};
 use clap::Args;
 use footplate_core::control::{Machine, Output};
+use footplate_core::link::RoundTrips;
 use footplate_core::{Command, Event, TimeSpan, Timestamp};
 use footplate_store::layout_named;
 use footplate_wire::marklin_serial::{Interface, ModuleReads};
-use footplate_wire::{CommandError, LinkNotice, marklin_can, z21};
+use footplate_wire::{CommandError, LinkNotice};
 
 use self::board_figures::BoardFigures;
 use self::can_figures::CanFigures;
-use self::figures::Figures;
+use self::figures::{Figures, StationFigures};
+use self::loconet_figures::LocoNetFigures;
 use self::z21_figures::Z21Figures;
 use super::Outcome;
 use super::plot::PictureFile;
-use crate::link::{Address, Link, Passed, Speed, StationSession, TappedLink, open, open_session};
+use crate::clock::now;
+use crate::link::{
+    Address, Link, MeasuredLine, Passed, Speed, StationSession, TappedLink, open, open_session,
+};
 use crate::runtime::{Attendant, Ended, Runtime, StopFlag, Wish};
 
 /// A command now and then, to see what one costs; as rare as commands are when trains are driven.
@@ -33,17 +41,18 @@ const LOST_SHARE: f64 = 0.01;
 /// Listen to a line: how often sensors are read, and what is lost.
 ///
 /// No train is moved. Power is put on the track; trains that stand stay, and at the end the power is taken off.
-/// The exit status is 1 when more than one reply in a hundred was lost.
+/// The exit status is 1 when more than one reply in a hundred was lost, or the line itself.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   footplate doctor --link marklin-serial:/dev/ttyUSB0
   footplate doctor --link dcc-ex:tcp://192.168.4.1:2560
   footplate doctor --link z21:192.168.0.111
-  footplate doctor --link marklin-can:192.168.0.5")]
+  footplate doctor --link marklin-can:192.168.0.5
+  footplate doctor --link loconet:192.168.0.20")]
 pub(crate) struct Arguments {
     /// The station: sim:track-a, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, z21:192.168.0.111,
-    /// marklin-can:192.168.0.5, or tcp://host:port in place of a device.
+    /// marklin-can:192.168.0.5, loconet:192.168.0.20, or tcp://host:port in place of a device.
     #[arg(long)]
     link: Address,
     /// The layout, whose contacts say how many sensor modules there are; a simulated link names its own.
@@ -52,6 +61,9 @@ pub(crate) struct Arguments {
     /// For how long to listen, in seconds of the station's time.
     #[arg(long, default_value_t = 10.0)]
     seconds: f64,
+    /// Keep what was measured of the line beside this store, so that `calibrate` and `drive` with the same --store count with it.
+    #[arg(long, value_name = "FILE")]
+    store: Option<PathBuf>,
     /// Draw how latencies are spread to this file, SVG or PNG by its ending.
     #[arg(long, value_name = "FILE")]
     plot: Option<PictureFile>,
@@ -70,22 +82,37 @@ impl Arguments {
         let link = open(&self.link, &layout, Speed::Unpaced)?;
         let session = open_session(&self.link, &link, &layout)?;
         let mut patient = Patient { next: link.now() + COMMAND_EVERY, due: false };
-        let mut ear =
-            Ear { until: link.now() + TimeSpan::from_s(self.seconds), noticed: BTreeMap::new(), lost: 0 };
+        let mut ear = Ear {
+            until: link.now() + TimeSpan::from_s(self.seconds),
+            noticed: BTreeMap::new(),
+            lost: 0,
+            noise: None,
+        };
         let mut runtime = Runtime::new(TappedLink::new(link), session, None, Some(StopFlag::install()));
         let ended = runtime.run(&mut patient, &mut ear)?;
         runtime.close();
         match ended {
             Ended::Finished | Ended::Interrupted => {}
-            Ended::LineLost(_) | Ended::NoAnswer(_) => return Err(anyhow!("{ended}")),
+            Ended::LineLost(lost) => {
+                writeln!(output, "line          lost: {lost}")?;
+                return Ok(Outcome::FallsShort);
+            }
+            Ended::NoAnswer(_) => return Err(anyhow!("{ended}")),
         }
         let heard =
             Heard { passed: runtime.link().passed(), ear: &ear, has_cts: runtime.link().cts().is_some() };
         let lost_share = match runtime.session() {
             StationSession::Marklin(interface) => self.report_interface(interface, &heard, output)?,
-            StationSession::DccEx(_) => self.report_board(&heard, output)?,
-            StationSession::Z21(session) => self.report_z21(session.settings(), &heard, output)?,
-            StationSession::Can(session) => self.report_bus(session, &heard, output)?,
+            StationSession::DccEx(_) => self.report(&BoardFigures::of(heard.passed), &heard, output)?,
+            StationSession::Z21(session) => {
+                self.report(&Z21Figures::of(heard.passed, session.settings()), &heard, output)?
+            }
+            StationSession::Can(session) => {
+                self.report(&CanFigures::of(heard.passed, session), &heard, output)?
+            }
+            StationSession::LocoNet(session) => {
+                self.report(&LocoNetFigures::of(heard.passed, session.settings()), &heard, output)?
+            }
         };
         Ok(if lost_share > LOST_SHARE { Outcome::FallsShort } else { Outcome::Done })
     }
@@ -99,6 +126,13 @@ impl Arguments {
     ) -> anyhow::Result<f64> {
         let (reads, lateness) = (interface.module_reads(), interface.reply_lateness());
         let figures = Figures::of(heard.passed, heard.ear.lost);
+        if !figures.has_replies() {
+            let noise = heard.ear.noise.as_ref().map_or_else(String::new, |noise| format!(" ({noise})"));
+            bail!(
+                "no reply to any poll was read{noise}: check that the port belongs to a 6050 or 6051, its speed (2400 baud) and that \
+                 no other program writes to it"
+            );
+        }
         if let Some(plot) = &self.plot {
             plot.write(&figures.picture())?;
         }
@@ -130,73 +164,69 @@ impl Arguments {
         Ok(figures.lost_share())
     }
 
-    /// Reports on a DCC-EX board; returns the share of requests that were not answered.
-    fn report_board(&self, heard: &Heard<'_>, output: &mut dyn Write) -> anyhow::Result<f64> {
-        let figures = BoardFigures::of(heard.passed);
-        if figures.identity().is_none() {
-            bail!(
-                "no DCC-EX board has said what it is; check the port, and listen longer with --seconds 20 if the board \
-                 is slow to start"
-            );
-        }
-        if let Some(plot) = &self.plot {
-            plot.write(&figures.picture())?;
-        }
-        if self.json {
-            writeln!(output, "{}", figures.json())?;
-        } else {
-            figures.write(output)?;
-            heard.ear.write(output)?;
-        }
-        Ok(figures.lost_share())
-    }
-
-    /// Reports on a Z21; returns the share of requests that were not answered.
-    fn report_z21(
+    /// Reports on a station that reports by itself; returns the share of requests that were not answered.
+    fn report(
         &self,
-        settings: &z21::Settings,
+        figures: &dyn StationFigures,
         heard: &Heard<'_>,
         output: &mut dyn Write,
     ) -> anyhow::Result<f64> {
-        let figures = Z21Figures::of(heard.passed, settings.feedback);
-        if !figures.is_known() {
-            bail!("no Z21 has said its serial number; check its address and the network");
-        }
+        // Noise is the best explanation of a station that was not found.
+        figures.check().map_err(|check| {
+            heard.ear.noise.clone().map_or_else(|| anyhow!(check), |noise| anyhow!(noise))
+        })?;
+        let answers = figures.answers();
+        let line = answers.round_trips();
         if let Some(plot) = &self.plot {
-            plot.write(&figures.picture())?;
+            plot.write(&answers.picture())?;
         }
         if self.json {
-            writeln!(output, "{}", figures.json())?;
+            let mut json = figures.json();
+            answers.add_to(&mut json);
+            writeln!(output, "{json}")?;
         } else {
-            figures.write(settings.sensor_delay, output)?;
+            figures.write_station(output)?;
+            answers.write(output)?;
+            figures.write_reports(output)?;
+            self.advise(line.as_ref(), output)?;
             heard.ear.write(output)?;
         }
-        Ok(figures.lost_share())
+        if let Some(store) = &self.store {
+            let Some(round_trips) = line else {
+                bail!("too few answers to measure the line: listen longer, such as --seconds 60");
+            };
+            let line = MeasuredLine {
+                measured_at_s: (now() - Timestamp::ZERO).as_ns() / 1_000_000_000,
+                round_trips,
+            };
+            let file = line.keep(&self.link, store)?;
+            eprintln!("kept in {}; `calibrate` and `drive` with this --store count with it", file.display());
+        }
+        Ok(answers.lost_share())
     }
 
-    /// Reports on a Märklin CAN bus; returns the share of requests that were not answered.
-    fn report_bus(
-        &self,
-        session: &marklin_can::Client,
-        heard: &Heard<'_>,
-        output: &mut dyn Write,
-    ) -> anyhow::Result<f64> {
-        let figures = CanFigures::of(heard.passed, session.settings());
-        if !figures.is_known() {
-            bail!(
-                "nobody on the CAN bus has named themselves; check the station's address, or the adapter and its cable"
-            );
+    /// Prints how the line changes the time model.
+    fn advise(&self, line: Option<&RoundTrips>, output: &mut dyn Write) -> anyhow::Result<()> {
+        let Some((line, usual)) = line.zip(self.link.station_kind().usual_line()) else { return Ok(()) };
+        let (excess, repeats) = (line.excess(usual), line.repeats());
+        let within = usual.answers_within.as_ms();
+        if excess == TimeSpan::ZERO && repeats == 0 {
+            writeln!(output, "line          as fast as usual: 99 of 100 answers within {within:.0} ms")?;
+            return Ok(());
         }
-        if let Some(plot) = &self.plot {
-            plot.write(&figures.picture())?;
+        writeln!(
+            output,
+            "line          {:.0} ms slower than usual ({within:.0} ms), {:.1} % lost: up to {repeats} repeats of a command",
+            excess.as_ms(),
+            100.0 * line.lost_share()
+        )?;
+        if self.store.is_none() {
+            writeln!(
+                output,
+                "              measure it with --store railway.db, so that trains are driven by it; a cable is better"
+            )?;
         }
-        if self.json {
-            writeln!(output, "{}", figures.json(session.listed_locomotives()))?;
-        } else {
-            figures.write(session.listed_locomotives(), session.settings().scan, output)?;
-            heard.ear.write(output)?;
-        }
-        Ok(figures.lost_share())
+        Ok(())
     }
 }
 
@@ -240,6 +270,8 @@ struct Ear {
     until: Timestamp,
     noticed: BTreeMap<String, usize>,
     lost: usize,
+    /// The notice about unreadable bytes.
+    noise: Option<String>,
 }
 
 impl Ear {
@@ -256,13 +288,16 @@ impl<M: Machine> Attendant<M> for Ear {
 
     fn hear_of_line(&mut self, _: Timestamp, notice: &LinkNotice) {
         match notice {
-            // Which reads are answered is a line of its own, and finding it out loses some.
+            // The kind of reads has its own line in the report, and finding it out loses some replies.
             LinkNotice::Answers | LinkNotice::Identified { .. } => return,
             LinkNotice::Reads(_) => {
                 self.lost = self.lost.saturating_sub(ModuleReads::READS_TRIED);
                 return;
             }
             LinkNotice::ReplyLost { .. } => self.lost += 1,
+            LinkNotice::Unreadable { .. } | LinkNotice::UnexpectedBytes { .. } => {
+                self.noise = Some(notice.to_string())
+            }
             _ => {}
         }
         *self.noticed.entry(notice.to_string()).or_default() += 1;

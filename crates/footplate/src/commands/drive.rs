@@ -1,16 +1,15 @@
-//! `footplate drive`: trains told what to do, line by line, and what comes of it.
+//! `footplate drive`: drives trains by commands from a script, a prompt or a browser, and reports the result of each.
 
 mod beginning;
+mod console;
 mod formatter;
 mod instruction;
 mod learning;
 mod parse;
 mod reader;
-mod result_line;
 mod script;
 mod script_runner;
-mod spoken;
-mod stage;
+mod session_message;
 mod terminal;
 mod trains;
 mod truth;
@@ -26,20 +25,21 @@ use clap::Args;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{Timestamp, TrainId, TurnoutId};
 use footplate_store::{Journal, NewMachine, Store, layout_named, parse_layout};
+use footplate_wire::Session as _;
 
 pub(crate) use self::beginning::DriveBeginning;
+use self::console::{Console, ended, lines_of_stdin};
 pub(super) use self::formatter::NoticeFormatter;
 use self::instruction::HELP;
 use self::reader::Known;
-use self::result_line::ResultLine;
 use self::script::read_script;
-use self::script_runner::Giver;
+use self::script_runner::CommandSource;
 pub(crate) use self::script_runner::ScriptRunner;
-pub(crate) use self::spoken::Spoken;
-use self::stage::{Stage, ended, lines_of_stdin};
+use self::session_message::ResultLine;
+pub(crate) use self::session_message::SessionMessage;
 use self::terminal::Terminal;
 use self::trains::{KnownTrains, Sources};
-use self::truth::{Beginnings, Referee};
+use self::truth::{GroundTruth, StartOdometers};
 use super::Outcome;
 use super::left_running::stop_left_running;
 use super::predict::turnout_state;
@@ -48,17 +48,17 @@ use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
 use crate::dashboard::{Board, Dashboard, LayoutPicture, ServedAt};
 use crate::layout_check::LayoutWatch;
-use crate::link::{Address, Link, ObservedLink, Speed, open, open_session, open_simulated};
+use crate::link::{Address, Link, MeasuredLine, ObservedLink, Speed, open, open_session, open_simulated};
 use crate::recorded::Recorded;
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
 
-/// Drive trains: speeds, turnouts, stops at a place, moves by a distance.
+/// Drive trains: set speeds and turnouts, stop at a place, move by a distance, follow another train.
 ///
-/// Without `--script` lines are read from standard input, at a prompt if that is a terminal, where a new order takes the
-/// place of the one before; `help` lists what can be
-/// said. Each contact that a train passes is printed with what had been predicted; each stop with what was promised.
-/// However the program ends, all trains are commanded to stop and the power is taken from the track first.
+/// Without `--script`, commands are read from standard input, one a line; at a terminal there is a prompt, and a new
+/// command replaces the train's previous one. `help` lists the commands. The program prints each detection beside its
+/// prediction, and each stop beside its predicted interval. However the program ends, it first commands all trains to
+/// stop and switches the track power off.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -67,49 +67,49 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     railway: Railway,
-    /// Lines to carry out, one after the other; a train ends one order before it begins the next.
+    /// Run the commands in this file, one after the other; a train finishes one command before it begins the next.
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
-    /// How long a script waits for a train that has to arrive or to be brought back, before it goes on without; 600 s unless
-    /// named.
+    /// How long a script waits for a train to arrive or to be recovered before it continues without it; 600 s by
+    /// default.
     #[arg(long, value_name = "SECONDS", requires = "script", value_parser = wait_limit)]
     wait_limit: Option<f64>,
-    /// Print a line of JSON for every finished order; all else goes to standard error.
+    /// Print one line of JSON for each finished command; all other output goes to standard error.
     #[arg(long)]
     json: bool,
-    /// Show trains live in a browser, and take orders from there: at a port of this machine (8417 unless named, 0 for any
-    /// that is free), or at an address. Beyond this machine a token is needed: the one in the environment as FOOTPLATE_TOKEN
-    /// (at least 16 characters), or one that is generated and printed.
+    /// Serve the live dashboard, which also accepts commands: on a port of this machine (default 8417; 0 for any free
+    /// port), or on an address. Access from other machines needs a token: the one in the environment variable
+    /// FOOTPLATE_TOKEN (at least 16 characters), or one that is generated and printed.
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "")]
     serve: Option<ServedAt>,
-    /// Lines of text instead of the live view, at a terminal, too.
+    /// Print plain lines of text, even at a terminal.
     #[arg(long)]
     plain: bool,
-    /// Nobody sits here, whatever standard input is.
+    /// No operator at this console, whatever standard input is.
     #[arg(skip)]
     is_headless: bool,
 }
 
-/// What is driven: a station, a layout, and what is known of trains.
+/// The railway to drive: command station, layout and trains.
 #[derive(Args)]
 pub(crate) struct Railway {
-    /// The command station: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5, or
-    /// tcp://host:port in place of a device.
+    /// The command station: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5,
+    /// loconet:192.168.0.20, or tcp://host:port in place of a device.
     #[arg(long, value_name = "URL")]
     link: Address,
-    /// The layout: the name of a built-in one or a layout file; a simulated link brings its own.
+    /// The layout: the name of a built-in layout, or a layout file; not needed for a simulated link.
     #[arg(long)]
     layout: Option<String>,
-    /// The store that knows the trains; what they do is written down there.
+    /// The store with the motion models of the trains; the session is recorded in it.
     #[arg(long, value_name = "FILE")]
     store: Option<PathBuf>,
-    /// What is known of a train, as a file of its own; may be repeated.
+    /// A motion model as a file; may be repeated.
     #[arg(long = "model", value_name = "FILE")]
     models: Vec<PathBuf>,
-    /// Drive this train, too, even if nothing is known of it; may be repeated.
+    /// Also drive this train, even without a motion model; may be repeated.
     #[arg(long = "train", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=80))]
     trains: Vec<u16>,
-    /// How a turnout lies when the session begins, such as 6=straight; may be repeated.
+    /// The position of a turnout when the session begins, such as 6=straight; may be repeated.
     #[arg(long = "turnout", value_name = "N=LEG", value_parser = turnout_state)]
     turnouts: Vec<(TurnoutId, Leg)>,
 }
@@ -118,6 +118,11 @@ impl Railway {
     pub(super) const fn link(&self) -> &Address {
         &self.link
     }
+
+    /// What the doctor measured of the line.
+    fn line(&self) -> anyhow::Result<Option<MeasuredLine>> {
+        MeasuredLine::of(&self.link, self.store.as_deref())
+    }
 }
 
 impl Arguments {
@@ -125,7 +130,7 @@ impl Arguments {
         &self.railway.link
     }
 
-    /// Drives for browsers and programs alone.
+    /// A session that only browsers and API clients operate (`footplate serve`).
     pub(super) const fn served(railway: Railway, at: ServedAt) -> Self {
         Self {
             railway,
@@ -141,13 +146,13 @@ impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let written = self.layout()?;
         let layout = &written.layout;
-        // A person at the prompt lives in real time; a script need not.
+        // With an operator the session runs in real time; a simulated script need not.
         let is_watched = self.script.is_none() || self.serve.is_some();
         let pace = if is_watched { Speed::Times(1.0) } else { Speed::Unpaced };
         let mut store = self.railway.store.as_deref().map(Store::open_or_create).transpose()?;
         let stop = |store: &Store| stop_left_running(&self.railway.link, layout, store, pace);
         let opened = store.as_ref().map(stop).transpose()?.flatten();
-        // Nothing is written to a damaged store: it would bury what can still be salvaged.
+        // A damaged store is not written to: that could overwrite what can still be salvaged.
         store.as_ref().map_or(Ok(()), Store::check)?;
         let mut named: BTreeSet<TrainId> = self.railway.trains.iter().copied().map(TrainId).collect();
         if let Some(simulated) = self.railway.link.simulated() {
@@ -162,19 +167,23 @@ impl Arguments {
         let dashboard = self.dashboard(&written)?;
         match &self.railway.link {
             Address::Simulated(simulated) => {
-                // A simulated railway is what its address says, whatever people believe it to be.
+                // The simulator uses the built-in layout; `--layout` may differ from it to study a wrong survey.
                 let real = layout_named(&simulated.layout)?.layout;
                 let link = open_simulated(simulated, &real, pace)?;
                 self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }
-            Address::Serial(_) | Address::Board(_) | Address::Z21(_) | Address::Can(_) => {
+            Address::Serial(_)
+            | Address::Board(_)
+            | Address::Z21(_)
+            | Address::Can(_)
+            | Address::LocoNet(_) => {
                 let link = opened.map_or_else(|| open(&self.railway.link, layout, pace), Ok)?;
                 self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }
         }
     }
 
-    /// The layout: the one that was named, or the simulated one.
+    /// The named layout, or that of the simulated link.
     fn layout(&self) -> anyhow::Result<WrittenLayout> {
         let named = match (&self.railway.layout, self.railway.link.simulated()) {
             (Some(named), _) => named,
@@ -203,25 +212,27 @@ impl Arguments {
         }
         let highest: BTreeMap<_, _> =
             known.models.iter().map(|(train, model)| (*train, model.highest())).collect();
-        let (giver, steps) = match &self.script {
-            Some(path) => (Giver::Script, read_script(path, Known { layout, trains: &highest })?),
-            None if std::io::stdin().is_terminal() || self.is_headless() => (Giver::Person, Vec::new()),
-            None => (Giver::Script, Vec::new()),
+        let (source, steps) = match &self.script {
+            Some(path) => (CommandSource::Script, read_script(path, Known { layout, trains: &highest })?),
+            None if std::io::stdin().is_terminal() || self.is_headless() => {
+                (CommandSource::Person, Vec::new())
+            }
+            None => (CommandSource::Script, Vec::new()),
         };
         Ok(DriveBeginning {
             layout: written.text.clone(),
             turnouts: written.legs(&turnouts),
             models: known.models.into_values().collect(),
             fits: known.fits,
-            giver,
+            source,
             script: steps.into_iter().map(|step| step.text).collect(),
             is_complete: self.script.is_some(),
             wait_limit_s: self.wait_limit,
-            link: self.railway.link.time_model(),
+            link: self.railway.link.time_model(self.railway.line()?.as_ref()),
         })
     }
 
-    /// Whether somebody sits at a terminal that can be drawn on.
+    /// Whether to draw the live view: an operator at a terminal that supports it.
     fn is_drawn(&self) -> bool {
         let can = std::io::stdin().is_terminal()
             && std::io::stdout().is_terminal()
@@ -229,7 +240,7 @@ impl Arguments {
         can && !self.plain && !self.json && self.script.is_none() && !self.is_headless()
     }
 
-    /// Whether nobody sits here, and people are elsewhere.
+    /// Whether all operators are at browsers or API clients.
     fn is_headless(&self) -> bool {
         self.is_headless || self.serve.is_some() && !std::io::stdin().is_terminal()
     }
@@ -239,7 +250,7 @@ impl Arguments {
         self.serve.as_ref().map(|at| open_dashboard(at, written, store())).transpose()
     }
 
-    /// What writes the session down; the line's clock stands at `at`.
+    /// The journal that records the session in the store; the clock of the link reads `at` now.
     fn journal(
         &self,
         layout: &Layout,
@@ -255,13 +266,13 @@ impl Arguments {
         let body = serde_json::to_string(beginning)?;
         journal
             .begin_machine(NewMachine { kind: DriveBeginning::KIND, program: PROGRAM, body: &body }, now)?;
-        // Only a simulated clock can wait for a disk.
+        // A simulated clock can wait for a slow disk; a real railway cannot.
         let is_simulated = self.railway.link.simulated().is_some();
         let when_full = if is_simulated { WhenFull::Wait } else { WhenFull::Lose };
         Ok(Some(SessionJournal::start(journal, began_at, when_full, IfUnkept::Stop)?))
     }
 
-    fn drive<L: Link + Referee>(
+    fn drive<L: Link + GroundTruth>(
         &self,
         layout: &Layout,
         link: L,
@@ -270,19 +281,20 @@ impl Arguments {
         output: &mut dyn Write,
     ) -> anyhow::Result<Outcome> {
         let link = ObservedLink::new(link, dashboard.map(|dashboard| Arc::clone(&dashboard.line)));
-        let session = open_session(&self.railway.link, &link, layout)?;
+        let mut session = open_session(&self.railway.link, &link, layout)?;
+        session.expect_delays(self.railway.link.excess(self.railway.line()?.as_ref()));
         let sits_at_terminal = self.is_drawn();
         let drawn = || Board::new(now().as_ns());
         let board = dashboard.map(|dashboard| Arc::clone(&dashboard.board));
         let board = board.or_else(|| sits_at_terminal.then(drawn));
         let asks = self.script.is_none() && !self.is_headless() && !sits_at_terminal;
-        let mut stage = Stage::new(asks.then(lines_of_stdin), self.json, board.as_ref());
+        let mut console = Console::new(asks.then(lines_of_stdin), self.json, board.as_ref());
         let mut terminal = None;
         if let Some(board) = board.filter(|_| sits_at_terminal) {
             if let Some(dashboard) = dashboard {
                 board.say(0.0, &format!("the dashboard is at {}", dashboard.url));
             }
-            stage.be_silent();
+            console.silence();
             let file = parse_layout(layout.name(), beginning.layout().as_bytes())?;
             terminal = Some(Terminal::open(&board, &LayoutPicture::of(&file))?);
         }
@@ -293,25 +305,25 @@ impl Arguments {
         let scribe = journal.as_ref().and_then(SessionJournal::scribe);
         let trains = beginning.models.len();
         let script_runner = beginning.script_runner()?;
-        if script_runner.listens_to_a_person() && !self.json {
-            stage.say(HELP, "");
+        if script_runner.is_interactive() && !self.json {
+            console.say(HELP, "");
         }
         let mut script_runner = Recorded::new(script_runner, scribe);
         let recorder = journal.as_mut().map(|journal| journal as &mut dyn Recorder);
         let mut watch = LayoutWatch::new(layout, trains, recorder);
         let mut runtime = Runtime::new(link, session, Some(&mut watch), Some(StopFlag::install()));
-        let mut beginnings = Beginnings::default();
+        let mut start_odometers = StartOdometers::default();
         let ending = loop {
-            let ending = runtime.run(&mut script_runner, &mut stage)?;
-            for spoken in std::mem::take(&mut stage.for_referee) {
-                if let Spoken::Begun(train) = spoken {
-                    beginnings.note(runtime.link(), train);
+            let ending = runtime.run(&mut script_runner, &mut console)?;
+            for message in std::mem::take(&mut console.for_scoring) {
+                if let SessionMessage::Begun(train) = message {
+                    start_odometers.note(runtime.link(), train);
                 }
-                if let Some(ended) = ended(&spoken) {
-                    let truth = beginnings.error(runtime.link(), layout, ended);
+                if let Some(ended) = ended(&message) {
+                    let truth = start_odometers.error(runtime.link(), layout, ended);
                     let result = ResultLine::of(layout, ended, truth);
                     if let Some(dashboard) = dashboard {
-                        dashboard.board.tell("ended", &result);
+                        dashboard.board.publish("ended", &result);
                     }
                     if self.json {
                         writeln!(output, "{}", serde_json::to_string(&result)?)?;
@@ -319,7 +331,7 @@ impl Arguments {
                     }
                 }
             }
-            if stage.is_over || !matches!(ending, Ended::Finished) {
+            if console.is_over || !matches!(ending, Ended::Finished) {
                 break ending;
             }
         };
@@ -339,7 +351,7 @@ impl Arguments {
             eprintln!("{closing}");
         }
         if let Some(store) = &self.railway.store {
-            // What still waits is written down before what follows from it.
+            // The journal is written out before the models that were fitted to it.
             drop(journal);
             KnownTrains::keep(store, layout, &script_runner.learnt())?;
         }
@@ -355,7 +367,7 @@ impl Arguments {
     }
 }
 
-/// Seconds for which something may be waited: more than none, and no more than a day.
+/// Parses a waiting time in seconds: above 0, at most one day.
 fn wait_limit(text: &str) -> Result<f64, String> {
     let seconds = text.parse::<f64>().ok().filter(|seconds| *seconds > 0.0 && *seconds <= 86_400.0);
     seconds.ok_or_else(|| format!("`{text}` is not a number of seconds above 0 and up to 86400"))

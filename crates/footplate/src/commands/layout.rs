@@ -1,4 +1,4 @@
-//! `footplate layout`: looking at layouts, checking, importing and surveying them.
+//! `footplate layout`: shows, checks, imports and surveys layouts.
 
 mod check;
 mod import;

@@ -1,4 +1,4 @@
-//! A sensor log that a verb was given, read once for what it says and for its fingerprint.
+//! Reads a sensor log once, for its events and its fingerprint.
 
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ pub(crate) struct LogFile {
 }
 
 impl LogFile {
-    /// Reads a log, shows how far it is if that takes long, and says on standard error what was odd in it.
+    /// Reads a log, with a progress display if that takes long, and reports oddities on standard error.
     pub(crate) fn read(path: &Path, context: LogContext<'_>) -> anyhow::Result<Self> {
         let reading = || format!("reading {}", path.display());
         let file = ProgressReader::open(path).with_context(reading)?;
@@ -28,7 +28,7 @@ impl LogFile {
         }
         Ok(Self { recording, content })
     }
-    /// Reads all logs; `train` is that of logs that name none.
+    /// Reads all logs; `train` applies to logs that name no train.
     pub(crate) fn read_all(
         paths: &[PathBuf],
         sensors: &dyn SensorNames,
@@ -37,7 +37,7 @@ impl LogFile {
         paths.iter().map(|path| Self::read(path, LogContext { sensors, train })).collect()
     }
 
-    /// What all logs say; `train` is that of logs that name none.
+    /// The recordings of all logs; `train` applies to logs that name no train.
     pub(crate) fn recordings(
         paths: &[PathBuf],
         sensors: &dyn SensorNames,

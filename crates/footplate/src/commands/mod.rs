@@ -1,8 +1,8 @@
 //! The verbs of the program, a file each.
 //!
-//! To add one: write `commands/VERB.rs` with a `pub(crate) struct Arguments` (its documentation is the help) that
-//! has `fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome>`, name the file below and in the list of
-//! `command.rs`. A verb writes its result to `output` and what it has to say about itself to standard error.
+//! To add one: write `commands/VERB.rs` with a `pub(crate) struct Arguments` (its documentation is the help) that has
+//! `fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome>`, and name the file below and in the list of
+//! `command.rs`. A verb writes its result to `output` and messages about itself to standard error.
 
 mod calibrate;
 mod clerk;
@@ -31,6 +31,6 @@ mod written_layout;
 pub(crate) use command::{Command, Outcome};
 pub(crate) use left_running::stop_all;
 #[cfg(test)]
-pub(crate) use serve::{Desk, archive_routes, odometry_routes, slide_routes};
+pub(crate) use serve::{AnswerQueue, archive_routes, odometry_routes, slide_routes};
 #[cfg(test)]
 pub(crate) use written_layout::WrittenLayout;

@@ -1,10 +1,8 @@
-//! Pictures of curves for `--plot`: what they show, drawn the same as SVG and PNG.
+//! The pictures of `--plot`, drawn alike as SVG and PNG.
 
 mod drawing;
 mod file;
 mod picture;
-mod shares;
 
 pub(super) use file::PictureFile;
-pub(super) use picture::{Ink, Layer, Panel, Picture, Shape};
-pub(super) use shares::{SHOWN, shares};
+pub(super) use picture::{Ink, Layer, Panel, Picture, SHOWN, Shape, shares};

@@ -15,7 +15,7 @@ use anyhow::{Context, anyhow};
 use clap::Args;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{TrainId, TurnoutId};
-use footplate_store::score::{Knowledge, ReplayContext, ScoredRecording, score_recording};
+use footplate_store::score::{Forecasters, ReplayContext, ScoredRecording, score_recording};
 use footplate_store::{MotionFile, Recording, layout_named};
 
 use super::Outcome;
@@ -109,18 +109,18 @@ impl Arguments {
         let context = ReplayContext { layout, turnouts: &self.turnouts };
         let events = |recording: &Recording| recording.runs.iter().map(|run| run.events.len()).sum::<usize>();
         with_progress("scoring", recordings.iter().map(events).sum(), |done| {
-            let mut before = Knowledge::of_layout(layout);
+            let mut before = Forecasters::of_layout(layout);
             if let Some(calibration) = calibration {
                 before.predictor.know(calibration.model(layout)?);
             }
-            let mut knowledge = before.clone();
+            let mut forecasters = before.clone();
             let mut scored = Vec::new();
             for (path, recording) in self.logs.iter().zip(recordings) {
                 if !self.carry_on {
-                    knowledge = before.clone();
+                    forecasters = before.clone();
                 }
                 let only = self.train.map(TrainId);
-                let score = score_recording(context, recording, only, &mut knowledge)
+                let score = score_recording(context, recording, only, &mut forecasters)
                     .with_context(|| path.display().to_string())?;
                 if score.runs == 0 {
                     return Err(anyhow!(

@@ -1,8 +1,8 @@
-//! `footplate serve`: drives trains without a prompt, for browsers and programs.
+//! `footplate serve`: drives trains for browsers and API clients, without a prompt.
 
+mod answer_queue;
 mod archive;
-mod desk;
-mod odometry_desk;
+mod odometry_pages;
 mod slides;
 
 use std::io::Write;
@@ -17,37 +17,37 @@ use super::written_layout::WrittenLayout;
 use crate::dashboard::{Dashboard, ServedAt, Token};
 use crate::link::Address;
 
+pub(crate) use answer_queue::{AnswerForm, AnswerQueue};
 pub(crate) use archive::{StoreQuery, archive_routes};
-pub(crate) use desk::{Desk, Wished};
-pub(crate) use odometry_desk::odometry_routes;
+pub(crate) use odometry_pages::odometry_routes;
 pub(crate) use slides::slide_routes;
 
-/// Drive trains from browsers and programs, without a prompt.
+/// Drive trains from browsers and API clients, without a prompt.
 ///
-/// The dashboard and its HTTP interface, the same as `footplate drive --serve` with nobody at the prompt: prints where to look, and drives until it is told to
-/// `quit` or interrupted. Then all trains are commanded to stop and the power is taken from the track.
+/// Serves the dashboard and its HTTP interface like `footplate drive --serve`, prints the address, and runs until it
+/// receives `quit` or is interrupted. It then commands all trains to stop and switches the track power off.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
   footplate serve --link sim:track-a?seed=7 --train 24 --store railway.db
   footplate serve 0.0.0.0:8417 --link marklin-serial:/dev/ttyUSB0 --layout track-a --store railway.db")]
 pub(crate) struct Arguments {
-    /// A port of this machine (0 for any that is free), or an address. Beyond this machine a token is needed: the one
-    /// in the environment as FOOTPLATE_TOKEN (at least 16 characters), or one that is generated and printed.
+    /// A port of this machine (0 for any free port), or an address. Access from other machines needs a token: the one
+    /// in the environment variable FOOTPLATE_TOKEN (at least 16 characters), or one that is generated and printed.
     #[arg(value_name = "ADDRESS", default_value = "")]
     at: ServedAt,
-    /// If the program dies, start it again once its trains are stopped. It knows what the store knows, and looks for its trains
-    /// anew.
+    /// If the program dies, stop its trains and start it again. It then knows what the store contains, and locates its
+    /// trains again.
     #[arg(long)]
     restart: bool,
     #[command(flatten)]
     railway: drive::Railway,
 }
 
-/// Opens a dashboard for a session on a layout, and says where.
+/// Opens the dashboard of a session and prints its address.
 ///
 /// # Errors
-/// It cannot be served there.
+/// The address cannot be used.
 pub(super) fn open_dashboard(
     at: &ServedAt,
     written: &WrittenLayout,
@@ -56,8 +56,9 @@ pub(super) fn open_dashboard(
     let chosen = std::env::var("FOOTPLATE_TOKEN").ok().filter(|text| !text.is_empty());
     let token = chosen.as_deref().map(Token::chosen).transpose()?;
     let layout = parse_layout(written.layout.name(), written.text.as_bytes())?;
-    let desk = Desk::new();
-    let more = archive_routes(store, written, &desk).and(odometry_routes(&desk)).and(slide_routes());
+    let answer_queue = AnswerQueue::new();
+    let more =
+        archive_routes(store, written, &answer_queue).and(odometry_routes(&answer_queue)).and(slide_routes());
     let dashboard = Dashboard::open(at, token, &layout, more)?;
     eprintln!("the dashboard is at {}", dashboard.url);
     Ok(dashboard)

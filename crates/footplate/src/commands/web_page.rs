@@ -1,4 +1,4 @@
-//! A page that opens in any browser without a network: one file with its styles, scripts and data inside.
+//! A web page in one file, with its styles, scripts and data, that any browser opens without a network.
 
 mod language;
 pub(super) mod markup;
@@ -13,22 +13,22 @@ const CHART: &str = include_str!("../../assets/page/chart.js");
 const UPLOT_STYLE: &str = include_str!("../../assets/vendor/uplot/uPlot.min.css");
 const UPLOT: &str = include_str!("../../assets/vendor/uplot/uPlot.iife.min.js");
 
-/// What a browser may do for the page: nothing that leaves it.
+/// The content security policy: the page loads nothing.
 const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 
-/// What one page has of its own.
+/// The content of one page.
 pub(super) struct WebPage<'a> {
     pub(super) language: Language,
-    /// Plain text, for the window and as the heading.
+    /// The title, as plain text.
     pub(super) title: &'a str,
     /// Markup below the heading.
     pub(super) introduction: &'a str,
     /// The markup of everything else.
     pub(super) main: &'a str,
-    /// Styles beside those of all pages.
+    /// Styles in addition to those of all pages.
     pub(super) style: &'a str,
-    /// What draws the page's charts with what `assets/page/chart.js` offers.
+    /// The script that draws the page's charts with the functions of `assets/page/chart.js`.
     pub(super) script: &'a str,
 }
 

@@ -1,4 +1,4 @@
-//! What is not as it should be, with which of the sentences of the pages says it.
+//! Alarms, each with the key of its sentence in the pages.
 
 use footplate_core::control::learn::Mishap;
 use footplate_core::control::{Alarm as Noticed, Notice};
@@ -8,33 +8,33 @@ use footplate_core::{HALF_95, Length, TrainId};
 use footplate_wire::LinkNotice;
 use serde::Serialize;
 
-/// The sentence of a train that breaks its promises.
-const BROKEN_PROMISES: &str = "promises-broken";
+/// The key of the alarm about missed stop intervals.
+const MISSED_INTERVALS: &str = "promises-broken";
 
-/// How bad it is.
+/// The severity of an alarm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Grade {
-    /// Trains may meet, or do what nobody told them.
+    /// Trains may collide, or do something that was not commanded.
     Danger,
-    /// Something went otherwise than it should have.
+    /// Something deviates from the plan.
     Warning,
-    /// What was said of the train before, or of the line if it is of none, is over.
+    /// The alarms of this train are over; without a train, those of the link.
     Over,
 }
 
-/// Something that people should know of whichever page they look at.
+/// A message that every page shows.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Alarm {
-    /// Which of the sentences of the pages it is.
+    /// The key of the sentence in the pages.
     what: &'static str,
     pub(super) grade: Grade,
     pub(super) train: Option<TrainId>,
-    /// What the sentence has blanks for.
+    /// The values that the sentence is filled with.
     blanks: Vec<String>,
-    /// The sentence in English, for programs.
+    /// The sentence in English, for API clients.
     text: String,
-    /// Whether it is said as a line, too.
+    /// Whether a line of text says the same.
     is_said: bool,
 }
 
@@ -43,12 +43,12 @@ impl Alarm {
         Self { what, grade, train: train.into(), blanks, text: String::new(), is_said: false }
     }
 
-    /// In English, as it was said.
+    /// Adds the English text that was also printed as a line.
     pub(crate) fn said(self, text: &str) -> Self {
         Self { text: text.to_owned(), is_said: true, ..self }
     }
 
-    /// A train drifts.
+    /// The detections of a train drift from their predictions.
     pub(super) fn drifts(train: TrainId, drift: Drift) -> Self {
         let (what, text) = match drift {
             Drift::Slower => (
@@ -65,24 +65,25 @@ impl Alarm {
         Self { text: text.to_owned(), ..Self::new(Grade::Warning, what, train, Vec::new()) }
     }
 
-    /// A train came to rest elsewhere than promised too often: what its promises are wider by, one standard deviation.
+    /// A train missed its stop intervals too often; `by` is the standard deviation that was added to them.
     pub(crate) fn promises_broken(train: TrainId, by: Length) -> Self {
         let by = format!("{:.0}", HALF_95 * by.as_mm());
-        Self::new(Grade::Warning, BROKEN_PROMISES, train, vec![by])
+        Self::new(Grade::Warning, MISSED_INTERVALS, train, vec![by])
     }
 
-    /// Whether it says that a train came to rest elsewhere than promised too often.
+    /// Whether this alarm is about missed stop intervals.
     pub(crate) fn is_of_promises(&self) -> bool {
-        self.what == BROKEN_PROMISES
+        self.what == MISSED_INTERVALS
     }
 
-    /// A command that the session did not take.
+    /// A command that the session rejected.
     pub(crate) fn not_sent(text: &str) -> Self {
         let alarm = Self::new(Grade::Danger, "not-sent", None, vec![text.to_owned()]);
         Self { text: format!("not sent: {text}"), ..alarm }
     }
 
-    /// What a line has to say, if it concerns people. That a station answers matters to who has heard that it did not.
+    /// The alarm of a notice of the link; `None` if it needs no attention. That the station answers again ends earlier
+    /// alarms.
     pub(crate) fn of_line(notice: &LinkNotice) -> Option<Self> {
         let (grade, what, train, blanks) = match notice {
             LinkNotice::Closed(_) | LinkNotice::Identified { .. } => return None,
@@ -148,7 +149,7 @@ impl Alarm {
             Notice::Unconfirmed { command } => {
                 (Grade::Danger, "unconfirmed", None, vec![command.to_string()])
             }
-            Notice::Danger { train, why, .. } => (Grade::Danger, commanded_to_stop(*why), Some(*train), none),
+            Notice::Danger { train, why, .. } => (Grade::Danger, stop_reason(*why), Some(*train), none),
             Notice::PowerOff { train } => (Grade::Danger, "power-off", Some(*train), none),
             Notice::NeedsOperator { train, .. } => (Grade::Danger, "needs-person", Some(*train), none),
             Notice::Cancelled { train, .. } => (Grade::Warning, "dropped", Some(*train), none),
@@ -168,10 +169,10 @@ impl Alarm {
         Some(Self::new(grade, what, train, blanks))
     }
 
-    /// What goes wrong while a train is calibrated.
-    pub(super) fn of_mishap(layout: &Layout, train: TrainId, mishap: &Mishap) -> Self {
+    /// The alarm of a fault during a calibration.
+    pub(super) fn of_fault(layout: &Layout, train: TrainId, fault: &Mishap) -> Self {
         let name = |sensor| layout.sensor_name(sensor).to_owned();
-        let (grade, what, blanks) = match mishap {
+        let (grade, what, blanks) = match fault {
             Mishap::Stalled { step } => (Grade::Warning, "mishap-stalled", vec![step.to_string()]),
             Mishap::Missed { count, before } => {
                 (Grade::Warning, "mishap-missed", vec![count.to_string(), name(*before)])
@@ -192,8 +193,8 @@ impl Alarm {
     }
 }
 
-/// Why a watchdog tells a train to stand.
-const fn commanded_to_stop(why: Noticed) -> &'static str {
+/// The key of the reason why the watchdog stopped a train.
+const fn stop_reason(why: Noticed) -> &'static str {
     match why {
         Noticed::Drift(Drift::Slower) => "stands-slower",
         Noticed::Drift(Drift::Faster) => "stands-faster",

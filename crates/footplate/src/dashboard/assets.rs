@@ -1,9 +1,9 @@
-//! The pages, inside the program: plain modules that a browser loads as they are.
+//! The pages, inside the program: plain modules that browsers load as they are.
 
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 
-/// What a browser may do for the pages: ask this server, and nothing else.
+/// The content security policy of the pages: they load from this server only.
 const POLICY: &str = "default-src 'none'; connect-src 'self'; img-src 'self' data:; script-src 'self'; style-src 'self'; frame-src 'self'; \
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
@@ -29,7 +29,7 @@ pub(super) fn asset(path: &str) -> Option<Asset> {
     let text = match path {
         "uplot.js" => include_str!("../../assets/vendor/uplot/uPlot.iife.min.js"),
         "uplot.css" => include_str!("../../assets/vendor/uplot/uPlot.min.css"),
-        // Reports have the same text inside a module of their own, where nothing has to leave it.
+        // Reports embed the same text in a module of their own.
         "chart.js" => concat!(
             include_str!("../../assets/page/chart.js"),
             "\nexport { chart, colour, dots, line, rounded };\n"

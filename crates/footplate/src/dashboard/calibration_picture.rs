@@ -1,4 +1,4 @@
-//! What a calibration is about: the experiment and why it, the time that is left, and how well stops are known by now.
+//! The state of a calibration: experiment, reason, remaining time and achieved accuracy.
 
 use footplate_core::Approach;
 use footplate_core::control::learn::{CalibrationNotice, Experiment, Phase, Progress, StepAccuracy, Why};
@@ -6,17 +6,17 @@ use serde::Serialize;
 
 use super::picture::tenths;
 
-/// A calibration that is under way.
+/// A calibration in progress.
 #[derive(Debug, Clone, Default, Serialize)]
 pub(super) struct CalibrationPicture {
     /// `finding`, `joining`, `experiment`, `paused`, `ending` or `finished`.
     phase: &'static str,
-    /// The experiment in words, while there is one.
+    /// The experiment in words.
     experiment: Option<String>,
-    /// The same for who has words of their own.
+    /// The experiment as data, for translation.
     trial: Option<TrialPicture>,
-    /// What it was expected to gain (variances relative to the scatter of stops) and to take; none where a step was
-    /// never tried.
+    /// Its expected information gain (variance reduction relative to the scatter of stops) and its expected time;
+    /// `None` if the step was never tried.
     gain: Option<f64>,
     takes_s: Option<f64>,
     elapsed_s: f64,
@@ -24,13 +24,13 @@ pub(super) struct CalibrationPicture {
     expected: Option<ExpectedPicture>,
 }
 
-/// What is tried.
+/// An experiment.
 #[derive(Debug, Clone, Copy, Serialize)]
 struct TrialPicture {
     /// `speed`, `stop-past`, `stop-short` or `move`.
     what: &'static str,
     step: u8,
-    /// The side from which the step is reached: `below` or `above`; from rest where that is all.
+    /// The approach to the step: `below` or `above`; `None` from rest.
     side: Option<&'static str>,
     /// How long the train runs.
     run_s: Option<f64>,
@@ -52,7 +52,7 @@ impl TrialPicture {
     }
 }
 
-/// How well the middle one of the steps is known, 95 %.
+/// The median accuracy over all steps, 95 %.
 #[derive(Debug, Clone, Serialize)]
 struct ExpectedPicture {
     step: u8,
@@ -61,11 +61,11 @@ struct ExpectedPicture {
 }
 
 impl CalibrationPicture {
-    /// Takes in what is said of it.
+    /// Takes in a notice of the calibrator.
     pub(super) fn hear(&mut self, notice: &CalibrationNotice) {
         match notice {
             CalibrationNotice::Begins { experiment, why } => self.begins(*experiment, *why),
-            CalibrationNotice::Progress(progress) => self.goes_on(progress),
+            CalibrationNotice::Progress(progress) => self.advance_to(progress),
             _ => {}
         }
     }
@@ -79,7 +79,7 @@ impl CalibrationPicture {
         };
     }
 
-    fn goes_on(&mut self, progress: &Progress) {
+    fn advance_to(&mut self, progress: &Progress) {
         self.phase = match progress.phase {
             Phase::Finding => "finding",
             Phase::Joining => "joining",

@@ -1,8 +1,9 @@
-//! The connections that the server keeps. Whoever comes newly is let in: a person who stops all trains is the newest.
+//! Limits the connections of the server. A new connection is always accepted: the operator that stops all trains may be
+//! the newest.
 //!
-//! A connection costs a descriptor, and a program may hold few of them: 1 100 that said nothing made an emergency stop time out
-//! once. Who says nothing for a while is cut off, and where there are too many, the one that has been silent for longest makes
-//! room, of the same address first, so that nobody fills the places of others.
+//! Each connection needs a file descriptor, and a process has few: 1100 idle connections once made an emergency stop
+//! time out. Idle connections are therefore closed after a while; beyond the limit the longest idle one is closed,
+//! first among those of the same address, so that one client cannot displace others.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
@@ -19,7 +20,7 @@ use tokio::task::{AbortHandle, Id, JoinSet};
 
 use crate::clock::Stopwatch;
 
-/// How many connections are kept, and for how long those that say nothing.
+/// Limits on the number of connections and on their idle time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limits {
     pub(super) in_all: usize,
@@ -29,19 +30,19 @@ pub(super) struct Limits {
 }
 
 impl Limits {
-    /// Half of the 1 024 descriptors that a program has on most systems leaves enough for the link, the store, and files.
+    /// Half of the usual limit of 1024 descriptors; the rest is for link, store and files.
     pub(super) const USUAL: Self =
         Self { in_all: 512, of_an_address: 384, header_within: Duration::from_secs(10) };
 }
 
-/// After a connection could not be taken, which costs no time, for want of descriptors.
-const TRIED_AGAIN_AFTER: Duration = Duration::from_millis(5);
+/// The pause after a connection failed for lack of descriptors.
+const RETRY_PAUSE: Duration = Duration::from_millis(5);
 
-/// When a connection sent its last request that was let through; requests hold it as an extension.
+/// The time of a connection's last request that passed the guard; requests carry it as an extension.
 #[derive(Debug, Clone)]
 pub(super) struct LastRequest {
     served: Stopwatch,
-    /// In nanoseconds, and 0 until there was one.
+    /// In nanoseconds; 0 before the first one.
     at: Arc<AtomicU64>,
 }
 
@@ -50,7 +51,7 @@ impl LastRequest {
         Self { served, at: Arc::default() }
     }
 
-    /// It is now.
+    /// Sets the time to now.
     pub(super) fn is_now(&self) {
         let now = u64::try_from(self.served.elapsed().as_nanos()).unwrap_or(u64::MAX);
         self.at.store(now.max(1), Ordering::Relaxed);
@@ -59,17 +60,17 @@ impl LastRequest {
 
 struct Connection {
     address: IpAddr,
-    /// Counts connections.
+    /// A consecutive number.
     number: u64,
     last: LastRequest,
     task: AbortHandle,
 }
 
-/// Those that are open now.
+/// The open connections.
 #[derive(Default)]
 struct Connections {
     open: BTreeMap<Id, Connection>,
-    /// The number of the next.
+    /// The number of the next connection.
     next: u64,
 }
 
@@ -79,7 +80,7 @@ impl Connections {
         self.next += 1;
     }
 
-    /// Makes room for one more.
+    /// Closes connections until one more fits.
     fn make_room(&mut self, address: IpAddr, limits: Limits) {
         let own = self.open.values().filter(|connection| connection.address == address).count();
         if own >= limits.of_an_address {
@@ -89,7 +90,7 @@ impl Connections {
         }
     }
 
-    /// Closes the one that has been silent for longest: those that never asked for anything first, in the order they came.
+    /// Closes the longest idle connection; those without any request first, in the order in which they came.
     fn close_one(&mut self, may_be: impl Fn(&Connection) -> bool) {
         let silent =
             self.open.iter().filter(|(_, connection)| may_be(connection)).min_by_key(|(_, connection)| {
@@ -115,10 +116,10 @@ pub(super) async fn serve(listener: TcpListener, router: Router, limits: Limits)
                     let answers = connection(stream, router.clone(), last.clone(), limits.header_within);
                     connections.add(from.ip(), last, tasks.spawn(answers));
                 }
-                // It was gone again, or there is no descriptor left.
+                // The client has gone, or there is no descriptor left.
                 Err(_) => {
                     connections.close_one(|_| true);
-                    tokio::time::sleep(TRIED_AGAIN_AFTER).await;
+                    tokio::time::sleep(RETRY_PAUSE).await;
                 }
             },
             Some(ended) = tasks.join_next_with_id() => {
@@ -129,12 +130,12 @@ pub(super) async fn serve(listener: TcpListener, router: Router, limits: Limits)
     }
 }
 
-/// One connection, until either end has had enough.
+/// Serves one connection until either end closes it.
 async fn connection(stream: TcpStream, router: Router, last: LastRequest, header_within: Duration) {
-    // An answer of one segment is not held back for more to come.
+    // Short answers are sent at once instead of waiting for more data.
     let _ = stream.set_nodelay(true);
     let service = TowerToHyperService::new(router.layer(Extension(last)));
-    // What goes wrong with a connection concerns whoever opened it.
+    // Errors of a connection concern its client only.
     let _ = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(header_within)
@@ -151,7 +152,7 @@ mod tests {
 
     const FEW: Limits = Limits { in_all: 8, of_an_address: 8, header_within: Duration::from_secs(60) };
 
-    /// Does something with a server of its own.
+    /// Runs `work` with a server of its own.
     fn served(limits: Limits, work: impl AsyncFnOnce(std::net::SocketAddr)) {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
         runtime.block_on(async {
@@ -179,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn who_comes_newly_is_answered_and_who_has_asked_is_kept_before_the_silent() {
+    fn new_connections_are_accepted_and_idle_ones_closed_first() {
         served(FEW, async |at| {
             let mut asking = TcpStream::connect(at).await.expect("a connection");
             assert!(ask(&mut asking).await);
@@ -215,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn who_sends_no_whole_header_in_time_is_cut_off() {
+    fn incomplete_headers_time_out() {
         served(Limits { header_within: Duration::from_millis(100), ..FEW }, async |at| {
             let mut slow = TcpStream::connect(at).await.expect("a connection");
             slow.write_all(b"GET / HTTP/1.1\r\nHo").await.expect("a part of a header");

@@ -1,8 +1,8 @@
-//! Who may ask the server for anything.
+//! Access control.
 //!
-//! A page from elsewhere that a browser has open must not drive trains. It cannot read answers, but it can send requests:
-//! straight to loopback (so the origin is checked), or under a name of its own that it lets point here later (so the name in
-//! `Host` is checked: DNS rebinding). Beyond loopback everybody needs the token besides.
+//! A foreign page that a browser has open must not drive trains. It cannot read answers, but it can send requests:
+//! directly to loopback (hence the check of the origin), or under a name of its own that it later resolves to this
+//! server (DNS rebinding; hence the check of the name in `Host`). Clients on other machines also need the token.
 
 use std::net::SocketAddr;
 
@@ -10,26 +10,26 @@ use axum::http::{HeaderMap, Method, StatusCode, header};
 
 use super::token::Token;
 
-/// Where the page that asks comes from, as the browser says.
+/// The origin of a request relative to this server, as the browser states it.
 const FETCH_SITE: header::HeaderName = header::HeaderName::from_static("sec-fetch-site");
 
-/// What is checked of every request.
+/// The access rules of a server.
 #[derive(Debug, Clone)]
 pub(super) struct Guard {
     bound: SocketAddr,
     token: Option<Token>,
 }
 
-/// Why a request is turned away.
+/// Why a request is rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Denied {
-    /// The name in `Host` is none of this server's.
+    /// The name in `Host` is not a name of this server.
     Host,
-    /// The page that asks comes from elsewhere.
+    /// The request comes from a foreign page.
     Origin,
-    /// No token, or another one.
+    /// The token is missing or wrong.
     Token,
-    /// What is sent has to come as JSON or as plain bytes, which no form of a foreign page can send unasked.
+    /// The body is neither JSON nor plain bytes, which a form of a foreign page cannot send without permission.
     NotJson,
 }
 
@@ -58,13 +58,13 @@ impl Denied {
 }
 
 impl Guard {
-    /// A guard of a server bound to an address.
+    /// The guard of a server bound to an address.
     pub(super) const fn new(bound: SocketAddr, token: Option<Token>) -> Self {
         Self { bound, token }
     }
 
-    /// Whether a request may pass. The pages themselves tell nobody anything: a browser that opens one with the token in its
-    /// address fetches its scripts without.
+    /// Whether a request may pass. The files of the pages need no token: they contain nothing secret, and a browser
+    /// that opens a page with the token in its address loads its scripts without it.
     pub(super) fn check(
         &self,
         method: &Method,
@@ -74,7 +74,7 @@ impl Guard {
     ) -> Result<(), Denied> {
         let text = |name: header::HeaderName| headers.get(name).map(|value| value.to_str().unwrap_or("?"));
         let host = text(header::HOST).unwrap_or_default();
-        // Who shows the token is meant to be here, under whatever name the machine has in its network.
+        // With a valid token any host name is accepted: the server cannot know its names in the network.
         if self.token.is_none() && !self.is_own(host) {
             return Err(Denied::Host);
         }
@@ -83,7 +83,7 @@ impl Guard {
         {
             return Err(Denied::Origin);
         }
-        // A link from elsewhere may open a page, which asks for the rest by itself. Programs send no such header.
+        // A link on a foreign page may open a page of the dashboard. Programs do not send this header.
         let site = text(FETCH_SITE);
         if !is_page && site.is_some_and(|site| !matches!(site, "same-origin" | "none")) {
             return Err(Denied::Origin);
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn beyond_loopback_the_token_is_asked_for() {
+    fn other_machines_need_the_token() {
         let token = Token::chosen("0123456789abcdef").expect("16 characters");
         let guard = Guard::new("0.0.0.0:8417".parse().expect("an address"), Some(token));
         let get = |bearer: &str| {

@@ -1,4 +1,4 @@
-//! What was of a train in the last minutes, for charts over time.
+//! The last minutes of each train, for charts over time.
 
 use std::collections::VecDeque;
 
@@ -8,44 +8,49 @@ use serde::Serialize;
 
 use super::picture::{millis, tenths};
 
-/// Five minutes at ten times a second. Older ones are dropped.
-const MOST_SAMPLES: usize = 3_000;
+/// Five minutes at 10 Hz; older samples are dropped.
+const MAX_SAMPLES: usize = 3_000;
 
-/// One moment of a train. Intervals are 95 %.
+/// One sample of a train. Intervals are 95 %.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sample {
     t_s: f64,
     step: u8,
-    at: Option<Where>,
+    at: Option<MotionAt>,
 }
 
-/// Where it was, if anybody knew.
+/// The motion of a located train (mm/s, mm).
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Where {
+struct MotionAt {
     speed: f64,
     speed_half: f64,
-    way: f64,
+    distance: f64,
     half: f64,
 }
 
 impl Sample {
-    /// A train that was told a step, and where it is and how far it has come, if that is known.
-    pub(super) fn of(t_s: f64, told: SpeedStep, located: Option<&Located>, way: Option<Length>) -> Self {
-        let at = located.zip(way).map(|(located, way)| Where {
+    /// A sample at a time; without a position only the commanded step is kept.
+    pub(super) fn of(
+        t_s: f64,
+        commanded: SpeedStep,
+        located: Option<&Located>,
+        travelled: Option<Length>,
+    ) -> Self {
+        let at = located.zip(travelled).map(|(located, distance)| MotionAt {
             speed: tenths(located.speed.as_mm_per_s()),
             speed_half: tenths(HALF_95 * located.speed_uncertainty.as_mm_per_s()),
-            way: tenths(way.as_mm()),
+            distance: tenths(distance.as_mm()),
             half: tenths(HALF_95 * located.uncertainty.as_mm()),
         });
-        Self { t_s: millis(t_s), step: told.get(), at }
+        Self { t_s: millis(t_s), step: commanded.get(), at }
     }
 }
 
-/// The last minutes, oldest first.
+/// The samples of the last minutes, oldest first.
 #[derive(Debug, Clone, Default)]
 pub(super) struct History(VecDeque<Sample>);
 
-/// The same, column by column.
+/// The samples, column by column.
 #[derive(Debug, Default, Serialize)]
 pub(super) struct Columns {
     t_s: Vec<f64>,
@@ -58,7 +63,7 @@ pub(super) struct Columns {
 
 impl History {
     pub(super) fn add(&mut self, sample: Sample) {
-        if self.0.len() == MOST_SAMPLES {
+        if self.0.len() == MAX_SAMPLES {
             self.0.pop_front();
         }
         self.0.push_back(sample);
@@ -71,7 +76,7 @@ impl History {
             columns.step.push(*step);
             columns.speed_mm_per_s.push(at.map(|at| at.speed));
             columns.speed_half_mm_per_s.push(at.map(|at| at.speed_half));
-            columns.way_mm.push(at.map(|at| at.way));
+            columns.way_mm.push(at.map(|at| at.distance));
             columns.half_mm.push(at.map(|at| at.half));
         }
         columns
@@ -85,11 +90,11 @@ mod tests {
     #[test]
     fn the_oldest_moments_are_dropped_and_the_newest_kept() {
         let mut history = History::default();
-        for number in 0..MOST_SAMPLES + 10 {
+        for number in 0..MAX_SAMPLES + 10 {
             history.add(Sample::of(number as f64, SpeedStep::STAND, None, None));
         }
         let columns = history.columns();
-        assert_eq!((columns.t_s.len(), columns.t_s[0]), (MOST_SAMPLES, 10.0));
-        assert_eq!(columns.t_s.last(), Some(&(MOST_SAMPLES as f64 + 9.0)));
+        assert_eq!((columns.t_s.len(), columns.t_s[0]), (MAX_SAMPLES, 10.0));
+        assert_eq!(columns.t_s.last(), Some(&(MAX_SAMPLES as f64 + 9.0)));
     }
 }

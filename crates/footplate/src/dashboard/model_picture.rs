@@ -1,4 +1,4 @@
-//! How a train moves, as far as is known, for a chart of its speeds and one of its stops.
+//! The motion model of a train, for charts of speeds and stopping distances.
 
 use footplate_core::model::{MotionModel, StepUse, StopForecast};
 use footplate_core::{Approach, HALF_95, SpeedStep};
@@ -14,7 +14,7 @@ pub(super) struct ModelPicture {
     steps: Vec<StepPicture>,
 }
 
-/// A step as it is reached from one side. Intervals are 95 %.
+/// A step reached from one side. Intervals are 95 %.
 #[derive(Debug, Serialize)]
 struct StepPicture {
     step: u8,
@@ -23,15 +23,15 @@ struct StepPicture {
     uses: StepUse,
     speed_mm_per_s: f64,
     speed_half_mm_per_s: f64,
-    /// Contacts passed at it.
+    /// Detections at this step.
     contacts: u32,
     stop_mm: f64,
-    /// Of what is not known of the way to rest.
+    /// Half the interval of the mean stopping distance.
     stop_doubt_half_mm: f64,
-    /// Of single stops: what is not known, and how they scatter.
+    /// Half the interval of a single stop: uncertainty of the mean and scatter together.
     stop_half_mm: f64,
     stop_s: f64,
-    /// Stops measured from it.
+    /// Stops measured from this step.
     stops: u32,
 }
 
@@ -44,7 +44,7 @@ impl ModelPicture {
         Self {
             train: model.train().0,
             highest: model.highest().get(),
-            // Nothing is faster than the highest step, so nobody comes to it from above.
+            // The highest step cannot be reached from above.
             steps: steps.flat_map(step).filter(|step| !step.is_above(model.highest())).collect(),
         }
     }
@@ -53,8 +53,8 @@ impl ModelPicture {
 impl StepPicture {
     fn of(model: &MotionModel, step: SpeedStep, approach: Approach, name: &'static str) -> Self {
         let speed = model.speed(step, approach);
-        let StopForecast { distance, doubt, scatter, time, count } = model.stop(step, approach);
-        let both = libm::hypot(doubt.as_mm(), scatter.as_mm());
+        let StopForecast { distance, doubt: uncertainty, scatter, time, count } = model.stop(step, approach);
+        let both = libm::hypot(uncertainty.as_mm(), scatter.as_mm());
         Self {
             step: step.get(),
             approach: name,
@@ -63,7 +63,7 @@ impl StepPicture {
             speed_half_mm_per_s: tenths(HALF_95 * speed.uncertainty.as_mm_per_s()),
             contacts: speed.count,
             stop_mm: tenths(distance.as_mm()),
-            stop_doubt_half_mm: tenths(HALF_95 * doubt.as_mm()),
+            stop_doubt_half_mm: tenths(HALF_95 * uncertainty.as_mm()),
             stop_half_mm: tenths(HALF_95 * both),
             stop_s: tenths(time.as_s()),
             stops: count,

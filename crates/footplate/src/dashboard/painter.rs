@@ -1,4 +1,4 @@
-//! Paints what a driver knows: the picture of now, what was along the way, and the contacts that trains passed.
+//! Composes the picture of the current state, the histories and the detections from the state of a driver.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -17,50 +17,50 @@ use super::board::Board;
 use super::calibration_picture::CalibrationPicture;
 use super::history::Sample;
 use super::picture::{Picture, TrainTask, millis, paint_train, tenths};
-use super::spans::{Span, held_spans};
-use super::way_travelled::WayTravelled;
+use super::spans::{Span, reserved_spans};
+use super::travelled_distance::TravelledDistance;
 
-/// A contact is shown as just passed for so long (s).
-const FLASHES_S: f64 = 1.5;
-/// How often it is kept where trains are: ten times a second.
-const BETWEEN_SAMPLES: TimeSpan = TimeSpan::from_ms(100);
-/// How often it is looked whether a train is known better.
-const BETWEEN_MODELS: TimeSpan = TimeSpan::from_ms(1_000);
+/// How long a detection is highlighted (s).
+const FLASH_S: f64 = 1.5;
+/// The sampling interval of the histories: 10 Hz.
+const SAMPLE_INTERVAL: TimeSpan = TimeSpan::from_ms(100);
+/// How often changed motion models are published.
+const MODEL_INTERVAL: TimeSpan = TimeSpan::from_ms(1_000);
 
-/// A train passed a contact.
+/// A detection of a train.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct TrainPassed {
     pub(crate) train: TrainId,
-    /// Beside what had been expected.
+    /// The detection, beside its prediction.
     pub(crate) passed: PassedContact,
-    /// What comes next.
+    /// The detection that is due next.
     pub(crate) next: Option<DueContact>,
 }
 
-/// Leaves on a board what a driver knows.
+/// Publishes the state of a driver on a board.
 #[derive(Debug)]
 pub(crate) struct Painter {
     board: Arc<Board>,
-    /// When each contact was passed last.
+    /// The last detection of each sensor.
     flashes: BTreeMap<SensorId, Timestamp>,
-    /// What has not been told yet.
-    fresh: Vec<TrainPassed>,
-    ways: BTreeMap<TrainId, WayTravelled>,
+    /// Detections that are not published yet.
+    unpublished: Vec<TrainPassed>,
+    distances: BTreeMap<TrainId, TravelledDistance>,
     samples: Vec<(TrainId, Sample)>,
     sampled: Option<Timestamp>,
     drifts: BTreeMap<TrainId, DriftTest>,
-    /// Of which trains something was said that is not over, or of the line (`None`).
+    /// Trains with active alarms; `None` for the link.
     alarmed: BTreeSet<Option<TrainId>>,
-    /// The line's clock when the session began, once that is known.
+    /// When the session began, by the clock of the link.
     began: Option<Timestamp>,
     models: BTreeMap<TrainId, MotionModel>,
-    looked_at_models: Option<Timestamp>,
-    /// Somebody else tells the trains what to do: what a train was told is what has left for it.
-    follows: bool,
+    models_published: Option<Timestamp>,
+    /// Whether the driver only displays trains: the commanded step is then the one that was sent to the train.
+    display_only: bool,
     calibration: Option<CalibrationPicture>,
 }
 
-/// An alarm as the browser gets it.
+/// An alarm, as sent to browsers.
 #[derive(Debug, Serialize)]
 struct TimedAlarm<'a> {
     t_s: f64,
@@ -68,30 +68,30 @@ struct TimedAlarm<'a> {
     alarm: &'a Alarm,
 }
 
-/// A passed contact as the browser gets it.
+/// A detection, as sent to browsers.
 #[derive(Debug, Serialize)]
 struct PassedPicture<'l> {
     train: u16,
     contact: &'l str,
-    /// The middle of the time in which it closed, and the width of that.
+    /// The middle and the width of the time window of the detection.
     t_s: f64,
     window_ms: f64,
-    /// Later than predicted, and half the 95 % interval of that.
+    /// Delay against the prediction, and half its 95 % interval.
     late_ms: Option<f64>,
     late_half_ms: Option<f64>,
-    /// Short of the contact when it was predicted there.
+    /// How far before the sensor the train was predicted to be at the detection.
     short_mm: Option<f64>,
     missed: usize,
-    /// How far the train has come.
+    /// Distance travelled so far.
     way_mm: f64,
-    /// How far the errors are on their way to a drift alarm, 0 to 1.
+    /// The drift statistic relative to its alarm threshold, 0 to 1.
     drift: f64,
-    /// The mean speed since the contact before, by the surveyed length alone: when, and how much.
+    /// The mean speed since the sensor before, from the surveyed length alone: (time, mm/s).
     mean: Option<[f64; 2]>,
     next: Option<DuePicture<'l>>,
 }
 
-/// The contact that is due.
+/// The detection that is due next.
 #[derive(Debug, Serialize)]
 struct DuePicture<'l> {
     contact: &'l str,
@@ -104,27 +104,27 @@ impl Painter {
         Self {
             board: Arc::clone(board),
             flashes: BTreeMap::new(),
-            fresh: Vec::new(),
-            ways: BTreeMap::new(),
+            unpublished: Vec::new(),
+            distances: BTreeMap::new(),
             samples: Vec::new(),
             sampled: None,
             drifts: BTreeMap::new(),
             alarmed: BTreeSet::new(),
             began: None,
             models: BTreeMap::new(),
-            looked_at_models: None,
-            follows: false,
+            models_published: None,
+            display_only: false,
             calibration: None,
         }
     }
 
-    /// Of trains that somebody else drives.
+    /// A painter for trains that another machine drives.
     pub(crate) fn following(board: &Arc<Board>) -> Self {
-        Self { follows: true, ..Self::new(board) }
+        Self { display_only: true, ..Self::new(board) }
     }
 
-    /// Takes in what the calibration of a train says, and in which words that is said elsewhere.
-    pub(crate) fn hear_calibration(
+    /// Takes in a notice of a calibration; `said` is the line that was printed for it.
+    pub(crate) fn handle_calibration(
         &mut self,
         layout: &Layout,
         now: Timestamp,
@@ -132,24 +132,24 @@ impl Painter {
         notice: &CalibrationNotice,
         said: &str,
     ) {
-        if let CalibrationNotice::Mishap(mishap) = notice {
-            self.alarm(now, &Alarm::of_mishap(layout, train, mishap).said(said));
+        if let CalibrationNotice::Mishap(fault) = notice {
+            self.alarm(now, &Alarm::of_fault(layout, train, fault).said(said));
         }
         self.calibration.get_or_insert_default().hear(notice);
     }
 
-    /// The calibration is over.
-    pub(super) fn calibrates_no_more(&mut self) {
+    /// Ends the display of a calibration.
+    pub(super) fn end_calibration(&mut self) {
         self.calibration = None;
     }
 
-    /// A train passed a contact.
+    /// Takes in a detection.
     pub(crate) fn passed(&mut self, passed: TrainPassed) {
         self.flashes.insert(passed.passed.sensor, passed.passed.window.middle());
-        self.fresh.push(passed);
+        self.unpublished.push(passed);
     }
 
-    /// Something is not as it should be, with a train or with the line, or is so again.
+    /// Publishes an alarm, or the end of one.
     pub(crate) fn alarm(&mut self, now: Timestamp, alarm: &Alarm) {
         let is_news = match alarm.grade {
             Grade::Over => self.alarmed.remove(&alarm.train),
@@ -158,14 +158,14 @@ impl Painter {
                 true
             }
         };
-        // That something is over matters to those who have heard of it.
+        // The end of an alarm is published only if the alarm was.
         if is_news {
             let t_s = millis((now - self.began.unwrap_or(now)).as_s());
-            self.board.tell("alarm", &TimedAlarm { t_s, alarm });
+            self.board.publish("alarm", &TimedAlarm { t_s, alarm });
         }
     }
 
-    /// Leaves the picture of a moment that is not before the last entry, and what has become of it since.
+    /// Publishes the state at `now`, which must not precede the last detection.
     pub(crate) fn paint(
         &mut self,
         dispatcher: &Dispatcher,
@@ -173,12 +173,12 @@ impl Painter {
         now: Timestamp,
         began: Timestamp,
     ) {
-        let held = |train| dispatcher.holds(train).map_or_else(Vec::new, held_spans);
-        self.paint_driven(dispatcher.driver(), held, tasks, now, began);
+        let reserved = |train| dispatcher.holds(train).map_or_else(Vec::new, reserved_spans);
+        self.paint_driven(dispatcher.driver(), reserved, tasks, now, began);
     }
 
-    /// The same of trains that nobody dispatches: they hold nothing.
-    pub(crate) fn paint_alone(
+    /// Publishes trains without a dispatcher, which have no reservations.
+    pub(crate) fn paint_undispatched(
         &mut self,
         driver: &Driver,
         tasks: &BTreeMap<TrainId, TrainTask>,
@@ -191,25 +191,34 @@ impl Painter {
     fn paint_driven(
         &mut self,
         driver: &Driver,
-        held: impl Fn(TrainId) -> Vec<Span>,
+        reserved: impl Fn(TrainId) -> Vec<Span>,
         tasks: &BTreeMap<TrainId, TrainTask>,
         now: Timestamp,
         began: Timestamp,
     ) {
         self.began = Some(began);
-        for passed in std::mem::take(&mut self.fresh) {
-            self.tell_passed(driver, &passed, began);
+        for passed in std::mem::take(&mut self.unpublished) {
+            self.publish_detection(driver, &passed, began);
         }
         let is_due = |last: Option<Timestamp>, between| last.is_none_or(|last| now - last >= between);
-        let is_sampled = is_due(self.sampled, BETWEEN_SAMPLES);
+        let is_sampled = is_due(self.sampled, SAMPLE_INTERVAL);
         let mut trains = Vec::new();
         for train in driver.trains() {
             let located = driver.locate(train, now);
-            let way = located.map(|located| self.way(driver, train, located.at));
-            let told = located.filter(|_| self.follows).map_or_else(|| driver.commanded(train), |at| at.step);
-            trains.push(paint_train(driver, train, tasks.get(&train), now, told, way, held(train)));
+            let travelled = located.map(|located| self.travelled(driver, train, located.at));
+            let commanded =
+                located.filter(|_| self.display_only).map_or_else(|| driver.commanded(train), |at| at.step);
+            trains.push(paint_train(
+                driver,
+                train,
+                tasks.get(&train),
+                now,
+                commanded,
+                travelled,
+                reserved(train),
+            ));
             if is_sampled {
-                let sample = Sample::of((now - began).as_s(), told, located.as_ref(), way);
+                let sample = Sample::of((now - began).as_s(), commanded, located.as_ref(), travelled);
                 self.samples.push((train, sample));
             }
         }
@@ -217,12 +226,12 @@ impl Painter {
             self.sampled = Some(now);
             self.board.remember(&mut self.samples);
         }
-        if is_due(self.looked_at_models, BETWEEN_MODELS) {
-            self.looked_at_models = Some(now);
-            self.look_at_models(driver);
+        if is_due(self.models_published, MODEL_INTERVAL) {
+            self.models_published = Some(now);
+            self.publish_models(driver);
         }
         let seconds_since = |at: Timestamp| (now - at).as_s();
-        self.flashes.retain(|_, at| seconds_since(*at) < FLASHES_S);
+        self.flashes.retain(|_, at| seconds_since(*at) < FLASH_S);
         self.board.show(&Picture {
             t_s: millis((now - began).as_s()),
             written_until_s: self.board.written_until(now).map(|at| millis((at - began).as_s())),
@@ -240,29 +249,29 @@ impl Painter {
         });
     }
 
-    /// How far a train has come.
-    fn way(&mut self, driver: &Driver, train: TrainId, at: WayPoint) -> Length {
-        let way = self.ways.entry(train).or_insert_with(|| WayTravelled::from(at));
-        way.goes_on(driver.layout(), at)
+    /// The distance that a train has travelled.
+    fn travelled(&mut self, driver: &Driver, train: TrainId, at: WayPoint) -> Length {
+        let travelled = self.distances.entry(train).or_insert_with(|| TravelledDistance::from(at));
+        travelled.advance_to(driver.layout(), at)
     }
 
-    fn tell_passed(&mut self, driver: &Driver, passed: &TrainPassed, began: Timestamp) {
+    fn publish_detection(&mut self, driver: &Driver, passed: &TrainPassed, began: Timestamp) {
         let TrainPassed { train, passed, next } = passed;
         let layout = driver.layout();
         let time = passed.window.middle();
         let since = |time: Timestamp| millis((time - began).as_s());
         let Some(node) = layout.sensor_node(passed.sensor) else { return };
         let at = WayPoint { node, way: Length::ZERO };
-        let way = self.ways.entry(*train).or_insert_with(|| WayTravelled::from(at));
-        let mean = way.passes(layout, node, time);
-        let at_contact = way.at_contact();
+        let travelled = self.distances.entry(*train).or_insert_with(|| TravelledDistance::from(at));
+        let mean = travelled.pass_sensor(layout, node, time);
+        let at_sensor = travelled.at_sensor();
         let drift = self.drifts.entry(*train).or_default();
-        let alarm = passed.late.and_then(|[late, doubt]| drift.take(late.as_s() / doubt.as_s()));
+        let alarm = passed.late.and_then(|[late, uncertainty]| drift.take(late.as_s() / uncertainty.as_s()));
         let level = drift.level();
         if let Some(drift) = alarm {
             self.alarm(time, &Alarm::drifts(*train, drift));
         }
-        self.board.tell(
+        self.board.publish(
             "passed",
             &PassedPicture {
                 train: train.0,
@@ -270,11 +279,11 @@ impl Painter {
                 t_s: since(time),
                 window_ms: tenths(passed.window.width().as_ms()),
                 late_ms: passed.late.map(|[late, _]| tenths(late.as_ms())),
-                late_half_ms: passed.late.map(|[_, doubt]| tenths(HALF_95 * doubt.as_ms())),
+                late_half_ms: passed.late.map(|[_, uncertainty]| tenths(HALF_95 * uncertainty.as_ms())),
                 short_mm: passed.short.map(|short| tenths(short.as_mm())),
                 missed: passed.missed,
                 drift: millis(level),
-                way_mm: tenths(at_contact.as_mm()),
+                way_mm: tenths(at_sensor.as_mm()),
                 mean: mean.map(|(at, speed)| [since(at), tenths(speed.as_mm_per_s())]),
                 next: next.map(|next| DuePicture {
                     contact: layout.sensor_name(next.sensor),
@@ -285,7 +294,7 @@ impl Painter {
         );
     }
 
-    fn look_at_models(&mut self, driver: &Driver) {
+    fn publish_models(&mut self, driver: &Driver) {
         for model in driver.trains().filter_map(|train| driver.model(train)) {
             if self.models.get(&model.train()) != Some(model) {
                 self.models.insert(model.train(), model.clone());

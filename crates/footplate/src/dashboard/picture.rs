@@ -1,4 +1,4 @@
-//! What there is to see at one moment, as the browser gets it.
+//! The current state, as sent to browsers.
 
 use std::collections::BTreeMap;
 
@@ -12,22 +12,23 @@ use serde::Serialize;
 use super::calibration_picture::CalibrationPicture;
 use super::spans::{Span, spans};
 
-/// What trains look like whose length nobody said: a short locomotive of the gauge (mm from the pickup's leading end).
+/// The drawn size of a train of unknown length: a short locomotive of this gauge (mm from the leading end of its
+/// pickup).
 const NOSE: Length = Length::from_mm(20.0);
 const TAIL: Length = Length::from_mm(130.0);
 
-/// What a train is busy with, as far as a picture shows it.
+/// What a train is doing.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TrainTask {
-    /// The order in its own words.
+    /// The order as it was written.
     pub(crate) text: String,
-    /// The place that it leads to.
+    /// Its target.
     pub(crate) target: Option<Landmark>,
-    /// Where it will come to rest against that: the middle, and the ends of the 95 % interval.
+    /// The predicted place of rest relative to the target: median, and ends of the 95 % interval.
     pub(crate) promise: Option<[Length; 3]>,
 }
 
-/// One moment.
+/// The state of the railway at one time.
 #[derive(Debug, Serialize)]
 pub(super) struct Picture {
     pub(super) t_s: f64,
@@ -36,14 +37,14 @@ pub(super) struct Picture {
     pub(super) written_until_s: Option<f64>,
     pub(super) trains: Vec<TrainPicture>,
     pub(super) turnouts: BTreeMap<u16, Option<&'static str>>,
-    /// Contacts passed a moment ago, by the seconds since.
+    /// Recent detections: sensor, and seconds since.
     pub(super) passed: BTreeMap<u16, f64>,
-    /// What a calibration is about, while one is under way.
+    /// A calibration in progress.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) calibration: Option<CalibrationPicture>,
 }
 
-/// One train at that moment.
+/// The state of one train.
 #[derive(Debug, Serialize)]
 pub(super) struct TrainPicture {
     train: u16,
@@ -53,11 +54,11 @@ pub(super) struct TrainPicture {
     at: Option<String>,
     half_mm: Option<f64>,
     at_rest: bool,
-    /// How far it has come since it was found.
+    /// Distance travelled since it was located.
     way_mm: Option<f64>,
     body: Vec<Span>,
     haze: Vec<Span>,
-    /// Track that it holds, and nobody else may enter.
+    /// The track reserved for it.
     held: Vec<Span>,
     doing: Option<String>,
     target: Option<Spot>,
@@ -66,32 +67,32 @@ pub(super) struct TrainPicture {
     if_stopped: Option<RestPicture>,
 }
 
-/// Where a train comes to rest if it is commanded to stop now.
+/// MotionAt a train would come to rest if it were commanded to stop now.
 #[derive(Debug, Serialize)]
 struct RestPicture {
     at: Option<String>,
-    /// From where it is now, and half the 95 % interval of single stops.
+    /// Distance from its present position, and half the 95 % interval of a single stop.
     way_mm: f64,
     half_mm: f64,
-    /// From now.
+    /// Seconds from now.
     in_s: f64,
 }
 
-/// A point on the rails.
+/// A point on the track.
 #[derive(Debug, Serialize)]
 struct Spot {
     edge: u16,
     offset_mm: f64,
 }
 
-/// The picture of a train that was told a step; `way` is how far it has come, `held` the track that it holds.
+/// The picture of a train; `commanded` is its step, `travelled` the distance since it was located.
 pub(super) fn paint_train(
     driver: &Driver,
     train: TrainId,
     task: Option<&TrainTask>,
     now: Timestamp,
-    told: SpeedStep,
-    way: Option<Length>,
+    commanded: SpeedStep,
+    travelled: Option<Length>,
     held: Vec<Span>,
 ) -> TrainPicture {
     let (layout, turnouts) = (driver.layout(), driver.turnouts());
@@ -109,14 +110,14 @@ pub(super) fn paint_train(
     });
     TrainPicture {
         train: train.0,
-        step: told.get(),
+        step: commanded.get(),
         speed_mm_per_s: located.map_or(0.0, |located| tenths(located.speed.as_mm_per_s())),
         speed_half_mm_per_s: located
             .map_or(0.0, |located| tenths(HALF_95 * located.speed_uncertainty.as_mm_per_s())),
         at: located.and_then(|located| name(driver, train, located.at)),
         half_mm: half.map(|half| tenths(half.as_mm())),
         at_rest: located.is_some_and(|located| located.at_rest),
-        way_mm: way.map(|way| tenths(way.as_mm())),
+        way_mm: travelled.map(|length| tenths(length.as_mm())),
         body: around(TAIL, NOSE),
         haze: half.map_or_else(Vec::new, |half| around(TAIL + half, NOSE + half)),
         held,
@@ -132,7 +133,7 @@ pub(super) fn paint_train(
 
 fn if_stopped(driver: &Driver, train: TrainId, from: WayPoint, now: Timestamp) -> Option<RestPicture> {
     let rest = driver.stopped_at(train, now)?;
-    // A way that is counted from another contact is none that can be subtracted.
+    // Offsets from different nodes cannot be subtracted.
     (rest.at.node == from.node).then(|| RestPicture {
         at: name(driver, train, rest.at),
         way_mm: tenths((rest.at.way - from.way).as_mm()),
@@ -141,7 +142,7 @@ fn if_stopped(driver: &Driver, train: TrainId, from: WayPoint, now: Timestamp) -
     })
 }
 
-/// A place to the millimetre.
+/// A place as sensor and offset, rounded to a millimetre.
 fn name(driver: &Driver, train: TrainId, at: WayPoint) -> Option<String> {
     let landmark = driver.landmark(train, at)?;
     let mm = landmark.offset.as_mm().round();
@@ -149,7 +150,7 @@ fn name(driver: &Driver, train: TrainId, at: WayPoint) -> Option<String> {
     Some(if mm == 0.0 { name.to_owned() } else { format!("{name}{mm:+}mm") })
 }
 
-/// The layout as the browser draws it, once.
+/// The layout, as sent to browsers.
 #[derive(Debug, Serialize)]
 pub(crate) struct LayoutPicture {
     name: String,
@@ -162,7 +163,7 @@ struct NodePicture {
     id: u16,
     name: String,
     kind: &'static str,
-    /// The number of its contact or turnout.
+    /// The number of its sensor or turnout.
     number: Option<u16>,
     point: Option<[f64; 2]>,
 }
@@ -174,7 +175,7 @@ struct EdgePicture {
     to: u16,
     leg: Option<&'static str>,
     length_mm: f64,
-    /// The speed restriction there.
+    /// Its speed restriction.
     zone: Option<ZonePicture>,
 }
 
@@ -215,7 +216,7 @@ impl LayoutPicture {
     }
 }
 
-/// Nothing that is drawn is known better.
+/// Rounds to a tenth: finer than any displayed estimate.
 pub(super) fn tenths(number: f64) -> f64 {
     (number * 10.0).round() / 10.0
 }

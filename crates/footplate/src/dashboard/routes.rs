@@ -1,9 +1,9 @@
-//! Routes that know their paths, so that a test can see that the description of the interface has all of them.
+//! Routes that know their paths, so that a test can compare them with the OpenAPI description.
 
 use axum::Router;
 use axum::routing::MethodRouter;
 
-/// Routes with what they need.
+/// Routes and their paths.
 #[derive(Debug, Default)]
 pub(crate) struct Routes {
     router: Router,
@@ -24,14 +24,14 @@ impl Routes {
         Self { router: router.with_state(state), paths }
     }
 
-    /// Both.
+    /// Joins two sets of routes.
     pub(crate) fn and(mut self, other: Self) -> Self {
         self.router = self.router.merge(other.router);
         self.paths.extend(other.paths);
         self
     }
 
-    /// The paths, in no order.
+    /// The paths, unsorted.
     #[cfg(test)]
     pub(crate) fn paths(&self) -> &[&'static str] {
         &self.paths

@@ -1,16 +1,17 @@
-//! HTTP on a thread of its own.
+//! The HTTP server, on a thread of its own.
 //!
 //! ```text
 //! GET  /                     the pages
-//! GET  /api/openapi.json     all that can be asked for, as programs read it
-//! GET  /api/layout           the layout, with where to draw it
-//! GET  /api/picture          what there is to see now
-//! GET  /api/events           server-sent events: `picture`, `line`, `passed`, `ended`, `alarm`, `gap`; `Last-Event-ID` goes on
+//! GET  /api/openapi.json     the description of the interface
+//! GET  /api/layout           the layout, with drawing coordinates
+//! GET  /api/picture          the current state
+//! GET  /api/events           server-sent events: `picture`, `line`, `passed`, `ended`, `alarm`, `gap`; resumes at
+//! `Last-Event-ID`
 //! GET  /api/trains/24/history   the last five minutes of a train
-//! GET  /api/trains/24/model     how it moves
-//! GET  /api/line             how the line and the loop keep time
-//! POST /api/orders           {"line": "stop 24 at C13+120mm"}: what the prompt understands
-//! POST /api/emergency-stop   {}: all trains stop, power off
+//! GET  /api/trains/24/model     its motion model
+//! GET  /api/line             timing of the link and of the control loop
+//! POST /api/orders           {"line": "stop 24 at C13+120mm"}: a line in the syntax of the prompt
+//! POST /api/emergency-stop   {}: stop all trains, switch the track power off
 //! ```
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -45,29 +46,29 @@ use super::token::Token;
 use crate::clock::now;
 use crate::link::{LineTallies, SharedTallies};
 
-/// An order is a line; none that means anything is longer.
-const LONGEST_BODY: usize = 4 << 10;
-/// The control loop looks for orders every few hundredths of a second; who gets no answer by then is told so.
-const ANSWERED_WITHIN: Duration = Duration::from_secs(2);
-/// What was answered last is on its way to a browser by then, however busy the machine is.
-const ANSWERS_LEAVE: Duration = Duration::from_millis(300);
-/// The port that is asked for unless another is named.
+/// The largest request body, in bytes: longer than any command.
+const MAX_BODY: usize = 4 << 10;
+/// The longest wait for the control loop, which reads requests every few hundredths of a second.
+const LOOP_TIMEOUT: Duration = Duration::from_secs(2);
+/// The time in which the last answer reaches the browser, even on a busy machine.
+const LAST_ANSWER_TIME: Duration = Duration::from_millis(300);
+/// The default port.
 const USUAL_PORT: u16 = 8417;
 
-/// What can be asked for, as programs read it.
+/// The OpenAPI description.
 const OPENAPI: &str = include_str!("../../assets/dashboard/openapi.json");
 
-/// Who guesses tokens makes two attempts a second on a connection.
-const WRONG_TOKEN_WAITS: Duration = Duration::from_millis(500);
+/// The delay of a rejected token: a connection can try two a second.
+const WRONG_TOKEN_DELAY: Duration = Duration::from_millis(500);
 
-/// Where to serve.
+/// The address to serve at.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ServedAt(SocketAddr);
 
 impl ServedAt {
-    /// The usual port of this machine.
+    /// The default port of this machine.
     pub(crate) const USUAL: Self = Self(SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), USUAL_PORT));
-    /// Any port of this machine that is free.
+    /// Any free port of this machine.
     pub(crate) const ANY: Self = Self(SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 0));
 }
 
@@ -96,9 +97,9 @@ impl FromStr for ServedAt {
 #[derive(Debug)]
 pub(crate) struct Dashboard {
     pub(crate) board: Arc<Board>,
-    /// How the line keeps time, as its link counts it.
+    /// Timing statistics of the link.
     pub(crate) line: SharedTallies,
-    /// What to open in a browser.
+    /// The address to open in a browser.
     pub(crate) url: String,
 }
 
@@ -111,24 +112,24 @@ struct Shared {
 }
 
 impl Dashboard {
-    /// Begins to serve, with more routes than those of driving.
+    /// Starts the server; `more` are routes beside those of driving.
     ///
     /// # Errors
-    /// The address is taken, or the token is too short.
+    /// The address is in use, or the token is too short.
     pub(crate) fn open(
         at: &ServedAt,
         token: Option<Token>,
         layout: &LayoutFile,
         more: Routes,
     ) -> anyhow::Result<Self> {
-        // One that somebody chose is known already, and stays out of what is printed.
+        // A chosen token is known to its owner and is not printed.
         let generated = (token.is_none() && !at.0.ip().is_loopback()).then(Token::generated).transpose()?;
         let listener = std::net::TcpListener::bind(at.0)
             .with_context(|| format!("{} cannot be served at: name another port, or 0 for any", at.0))?;
         listener.set_nonblocking(true)?;
         let bound = listener.local_addr()?;
         let layout = serde_json::to_string(&LayoutPicture::of(layout))?.into();
-        // Nobody else has begun at the same moment at the same port.
+        // The start time in nanoseconds identifies the session.
         let board = Board::new(now().as_ns());
         let shown = generated.as_ref().map(|token| format!("?token={}", token.text()));
         let url = format!("http://{bound}/{}", shown.unwrap_or_default());
@@ -150,10 +151,10 @@ impl Dashboard {
     }
 }
 
-/// The program may end because of what somebody asked, such as an emergency stop: the answer leaves before it does.
+/// Waits for the last answer: an emergency stop may end the program before its answer is sent.
 impl Drop for Dashboard {
     fn drop(&mut self) {
-        thread::sleep(ANSWERS_LEAVE);
+        thread::sleep(LAST_ANSWER_TIME);
     }
 }
 
@@ -163,11 +164,11 @@ fn router(shared: Shared, more: Routes) -> Router {
         .route("/", get(|| page(Path(String::new()))))
         .route("/{file}", get(page))
         .merge(own_routes(shared).and(more).into_router())
-        .layer(DefaultBodyLimit::max(LONGEST_BODY))
+        .layer(DefaultBodyLimit::max(MAX_BODY))
         .layer(from_fn_with_state(guard, guarded))
 }
 
-/// What can be asked of those who drive.
+/// The routes of a driving session.
 fn own_routes(shared: Shared) -> Routes {
     Routes::new(
         shared,
@@ -186,7 +187,7 @@ fn own_routes(shared: Shared) -> Routes {
 }
 
 async fn guarded(State(guard): State<Guard>, request: Request, next: Next) -> Response {
-    // Streams of events cannot send headers of their own: they show the token in the address.
+    // Event streams of browsers cannot send headers: they carry the token in the address.
     let query = request.uri().query().unwrap_or_default();
     let token = query.split('&').find_map(|pair| pair.strip_prefix("token="));
     let is_page = !request.uri().path().starts_with("/api/");
@@ -199,12 +200,12 @@ async fn guarded(State(guard): State<Guard>, request: Request, next: Next) -> Re
         }
         Err(denied) => {
             if denied == Denied::Token {
-                tokio::time::sleep(WRONG_TOKEN_WAITS).await;
+                tokio::time::sleep(WRONG_TOKEN_DELAY).await;
             }
             (denied.status(), Json(json!({ "error": denied.says() }))).into_response()
         }
     };
-    // An answer is what it says it is, and addresses with a token are told to nobody.
+    // Browsers must not sniff content types, nor pass on addresses, which may contain the token.
     let headers = response.headers_mut();
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
     headers.insert(header::REFERRER_POLICY, HeaderValue::from_static("no-referrer"));
@@ -242,7 +243,7 @@ async fn watch(State(shared): State<Shared>, headers: HeaderMap) -> Response {
     Sse::new(events(shared.board, watching, from)).keep_alive(KeepAlive::default()).into_response()
 }
 
-/// How the line and the loop keep time, as counted until a moment ago.
+/// Timing of the link and of the control loop.
 async fn line(State(shared): State<Shared>) -> Response {
     let tallies = shared.line.lock().unwrap_or_else(PoisonError::into_inner).clone();
     let LineTallies { periods, first_bytes, turns, power } = tallies;
@@ -255,8 +256,8 @@ async fn line(State(shared): State<Shared>) -> Response {
     .into_response()
 }
 
-/// A number in a path that is none of a train is none of a train that is driven.
-fn of_train<T: Serialize>(train: &str, found: impl FnOnce(TrainId) -> Option<T>) -> Response {
+/// The JSON of a train, or the error that the session has no such train.
+fn json_of_train<T: Serialize>(train: &str, found: impl FnOnce(TrainId) -> Option<T>) -> Response {
     match train.parse().ok().and_then(|number| found(TrainId(number))) {
         Some(found) => ([(header::CACHE_CONTROL, "no-store")], Json(found)).into_response(),
         None => {
@@ -267,11 +268,11 @@ fn of_train<T: Serialize>(train: &str, found: impl FnOnce(TrainId) -> Option<T>)
 }
 
 async fn history(State(shared): State<Shared>, Path(train): Path<String>) -> Response {
-    of_train(&train, |train| shared.board.history(train).map(|history| history.columns()))
+    json_of_train(&train, |train| shared.board.history(train).map(|history| history.columns()))
 }
 
 async fn model(State(shared): State<Shared>, Path(train): Path<String>) -> Response {
-    of_train(&train, |train| shared.board.model(train).map(|model| ModelPicture::of(&model)))
+    json_of_train(&train, |train| shared.board.model(train).map(|model| ModelPicture::of(&model)))
 }
 
 #[derive(Debug, Deserialize)]
@@ -302,7 +303,7 @@ async fn ask(board: &Board, request: board::Request) -> Response {
     let Ok(answered) = board.ask(request) else {
         return answer(StatusCode::TOO_MANY_REQUESTS, "too many orders wait: ask again in a moment");
     };
-    match tokio::time::timeout(ANSWERED_WITHIN, answered).await {
+    match tokio::time::timeout(LOOP_TIMEOUT, answered).await {
         Ok(Ok(Answer::Taken)) => (StatusCode::ACCEPTED, Json(json!({ "taken": true }))).into_response(),
         Ok(Ok(Answer::Refused(why))) => answer(StatusCode::UNPROCESSABLE_ENTITY, &why),
         _ => answer(StatusCode::GATEWAY_TIMEOUT, "the control loop did not answer: is the link in order?"),
@@ -314,7 +315,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::commands::{Desk, WrittenLayout, archive_routes, odometry_routes, slide_routes};
+    use crate::commands::{AnswerQueue, WrittenLayout, archive_routes, odometry_routes, slide_routes};
 
     #[test]
     fn the_description_of_the_interface_has_every_route_and_no_other() {
@@ -322,8 +323,8 @@ mod tests {
         let shared =
             Shared { board: Board::new(0), layout: "".into(), line: SharedTallies::default(), guard };
         let layout = WrittenLayout::named("track-a").expect("built in");
-        let desk = Desk::new();
-        let of_files = archive_routes(None, &layout, &desk).and(odometry_routes(&desk));
+        let answer_queue = AnswerQueue::new();
+        let of_files = archive_routes(None, &layout, &answer_queue).and(odometry_routes(&answer_queue));
         let routes = own_routes(shared).and(of_files).and(slide_routes());
         let there: BTreeSet<&str> = routes.paths().iter().copied().collect();
         let described: serde_json::Value = serde_json::from_str(OPENAPI).expect("JSON");

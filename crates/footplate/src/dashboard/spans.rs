@@ -1,4 +1,4 @@
-//! Which rails a stretch of way covers, for a body, a haze or a reservation to be drawn on them.
+//! The parts of edges that a train, its uncertainty or a reservation covers.
 
 use footplate_core::control::Reservation;
 use footplate_core::track::{Layout, Position, TurnoutStates};
@@ -14,24 +14,24 @@ pub(crate) struct Span {
 }
 
 impl Span {
-    /// From one offset on an edge to another.
+    /// From one offset to another.
     pub(crate) fn new(edge: EdgeId, from: Length, to: Length) -> Self {
         let tenth = |length: Length| (length.as_mm() * 10.0).round() / 10.0;
         Self { edge: edge.0, from_mm: tenth(from), to_mm: tenth(to) }
     }
 }
 
-/// No drawing covers more edges: a lap of any layout in use.
-const MOST_EDGES: usize = 200;
+/// The most edges that are drawn for one item: more than a lap of any layout in use.
+const MAX_EDGES: usize = 200;
 
-/// The rails that somebody holds.
-pub(super) fn held_spans(held: &Reservation) -> Vec<Span> {
-    // The first of the two edges of a stretch, from whose start its intervals are counted.
+/// The spans of a reservation.
+pub(super) fn reserved_spans(reservation: &Reservation) -> Vec<Span> {
+    // A stretch counts its offsets from the start of its first edge.
     let first = |stretch: StretchId| EdgeId(2 * stretch.0);
-    held.spans().map(|(stretch, span)| Span::new(first(stretch), span.from, span.to)).collect()
+    reservation.spans().map(|(stretch, span)| Span::new(first(stretch), span.from, span.to)).collect()
 }
 
-/// What is covered from so far behind a place to so far ahead of it, as the turnouts lie; as much as there is track.
+/// The track from `behind` before a place to `ahead` beyond it, by the turnout positions; it ends with the track.
 pub(super) fn spans(
     layout: &Layout,
     turnouts: &TurnoutStates,
@@ -40,7 +40,7 @@ pub(super) fn spans(
     ahead: Length,
 ) -> Vec<Span> {
     let mut found = Vec::new();
-    // Backwards is forwards seen the other way.
+    // Backwards is forwards from the reversed position.
     if let Some(back) = layout.reversed(at) {
         for (edge, [from, to]) in covered(layout, turnouts, back, behind) {
             if let Some(whole) = layout.edge(edge) {
@@ -59,15 +59,15 @@ fn covered(
     layout: &Layout,
     turnouts: &TurnoutStates,
     at: Position,
-    way: Length,
+    length: Length,
 ) -> Vec<(EdgeId, [Length; 2])> {
-    let (mut at, mut left) = (at, way);
+    let (mut at, mut left) = (at, length);
     let mut found = Vec::new();
-    while left > Length::ZERO && found.len() < MOST_EDGES {
+    while left > Length::ZERO && found.len() < MAX_EDGES {
         let Some(edge) = layout.edge(at.edge) else { break };
         let to = (at.offset + left).min(edge.length);
         found.push((at.edge, [at.offset, to]));
-        // What is left when an edge is not covered to its end is what was lost in rounding.
+        // Beyond this edge only a rounding error would be left.
         if to < edge.length {
             break;
         }
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_stretch_of_way_covers_as_much_rail_as_it_is_long() {
+    fn the_spans_of_a_length_are_as_long() {
         let layout = layout_named("track-a").expect("built in").layout;
         let turnouts: TurnoutStates =
             layout.turnouts().map(|(turnout, _)| (turnout, Leg::Straight)).collect();
@@ -100,7 +100,7 @@ mod tests {
         let sum: f64 = found.iter().map(|span| span.to_mm - span.from_mm).sum();
         assert!((sum - 780.0).abs() < 1.0, "{sum}");
         assert!(found.iter().any(|span| span.edge == id.0));
-        // However lengths are rounded, nothing is covered beyond: the last part is not an empty one of another edge.
+        // The last span is never an empty one on another edge, whatever the rounding.
         for mm in 0..400 {
             let at = Position { edge: id, offset: Length::from_mm(0.1 * f64::from(mm)) };
             let found = spans(&layout, &turnouts, at, behind, Length::from_mm(20.3));

@@ -1,4 +1,4 @@
-//! What one watcher is sent: the newest picture whenever it is ready for one, and everything that happens.
+//! The event stream of one watcher: the newest picture when it is due, and all other events.
 
 use std::collections::VecDeque;
 use std::convert::Infallible;
@@ -9,26 +9,26 @@ use futures_util::stream::{Stream, unfold};
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep_until};
 
-use super::board::{Board, Watching};
+use super::board::{Board, WatcherSlot};
 
-/// One who watches.
+/// The state of one stream.
 struct Watcher {
     board: Arc<Board>,
-    watching: Watching,
+    watching: WatcherSlot,
     pictures: watch::Receiver<Arc<str>>,
     written: watch::Receiver<u64>,
-    /// The number of the happening that it is sent next.
+    /// The number of the next event.
     next: u64,
-    /// What waits to be sent.
+    /// Events to send.
     ready: VecDeque<Event>,
-    /// When it was sent a picture, or should have been if that was a little late.
+    /// When the last picture was due.
     sent: Option<Instant>,
 }
 
-/// Events for one watcher, from a number on. A slow one gets fewer pictures; happenings that are gone are counted in `gap`.
+/// The stream from an event number on. A slow watcher gets fewer pictures; dropped events are counted in `gap`.
 pub(super) fn events(
     board: Arc<Board>,
-    watching: Watching,
+    watching: WatcherSlot,
     from: u64,
 ) -> impl Stream<Item = Result<Event, Infallible>> {
     let mut pictures = board.pictures();
@@ -59,7 +59,7 @@ pub(super) fn events(
                 changed = next_picture => {
                     changed.ok()?;
                     let now = Instant::now();
-                    // Counted from when it was due: one that is late does not make all others late.
+                    // Counted from when the picture was due, so that a late one does not delay all others.
                     watcher.sent = now.checked_sub(pace).max(due).or(Some(now));
                     let picture = watcher.pictures.borrow_and_update().clone();
                     watcher.ready.push_back(Event::default().event("picture").data(&*picture));
@@ -72,7 +72,7 @@ pub(super) fn events(
 impl Watcher {
     fn gather(&mut self) {
         self.written.mark_unchanged();
-        let (happened, lost) = self.board.happened_from(self.next);
+        let (happened, lost) = self.board.events_from(self.next);
         if lost > 0 {
             self.ready.push_back(Event::default().event("gap").data(lost.to_string()));
         }

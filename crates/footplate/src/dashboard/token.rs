@@ -1,4 +1,4 @@
-//! What somebody beyond this machine shows in order to drive trains.
+//! The token that clients on other machines need.
 
 use std::fmt::Write;
 
@@ -6,12 +6,12 @@ use anyhow::{anyhow, bail};
 use percent_encoding::percent_decode_str;
 use subtle::ConstantTimeEq;
 
-/// Letters, digits and signs of the shortest token: 64 bits even if all of them are hexadecimal digits.
-const SHORTEST: usize = 16;
-/// Bytes of one that is generated: nobody guesses 128 bits.
+/// The least number of characters: 64 bits even if all are hexadecimal digits.
+const MIN_LENGTH: usize = 16;
+/// Random bytes of a generated token: 128 bits.
 const GENERATED_BYTES: usize = 16;
 
-/// A secret that whoever may drive knows.
+/// A secret shared with all clients that may drive.
 #[derive(Clone)]
 pub(crate) struct Token(String);
 
@@ -22,7 +22,7 @@ impl std::fmt::Debug for Token {
 }
 
 impl Token {
-    /// One that was chosen.
+    /// A token that was chosen by the operator.
     ///
     /// # Errors
     /// It is too short, or cannot be sent in a header.
@@ -32,9 +32,9 @@ impl Token {
                 "FOOTPLATE_TOKEN has other signs than the letters, digits and signs of ASCII: use those only"
             );
         }
-        if text.len() < SHORTEST {
+        if text.len() < MIN_LENGTH {
             bail!(
-                "FOOTPLATE_TOKEN has {} characters: use at least {SHORTEST}, or unset it, and beyond this machine one \
+                "FOOTPLATE_TOKEN has {} characters: use at least {MIN_LENGTH}, or unset it, and beyond this machine one \
                  is generated",
                 text.len()
             );
@@ -42,7 +42,7 @@ impl Token {
         Ok(Self(text.to_owned()))
     }
 
-    /// A new one that nobody knows.
+    /// A random token.
     ///
     /// # Errors
     /// The system has no random numbers.
@@ -59,17 +59,17 @@ impl Token {
         Ok(Self(text))
     }
 
-    /// As it is shown in an address; one that was generated needs no encoding.
+    /// The token as part of an address; a generated one needs no encoding.
     pub(crate) fn text(&self) -> &str {
         &self.0
     }
 
-    /// Whether it is what was shown in a header. How long that takes depends on nothing but the length.
+    /// Compares with the token of a header, in time that depends only on the length.
     pub(super) fn is(&self, shown: &str) -> bool {
         self.0.as_bytes().ct_eq(shown.as_bytes()).into()
     }
 
-    /// Whether it is what was shown in an address, where some signs are written as `%2B`.
+    /// Compares with the token of an address, where some characters are encoded like `%2B`.
     pub(super) fn is_decoded(&self, shown: &str) -> bool {
         let decoded: Vec<u8> = percent_decode_str(shown).collect();
         self.0.as_bytes().ct_eq(&decoded).into()

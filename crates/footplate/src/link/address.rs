@@ -8,11 +8,14 @@
 use std::str::FromStr;
 
 use footplate_core::{Ratio, TrainId};
-use footplate_sim::{BoardSwitches, CanSwitches, Delivery, LawFamily, PhysicsRange, Z21Switches};
+use footplate_sim::{
+    BoardSwitches, CanSwitches, Delivery, LawFamily, LocoNetSwitches, PhysicsRange, Z21Switches,
+};
 
 use super::board_address::BoardAddress;
 use super::cable::Cable;
 use super::can_address::{self, CanAddress};
+use super::loconet_address::{self, LocoNetAddress};
 use super::port::Port;
 use super::z21_address::{QUIRKS, Z21Address, set_quirk};
 
@@ -21,6 +24,7 @@ const SERIAL: &str = "marklin-serial:";
 const BOARD: &str = "dcc-ex:";
 const Z21: &str = "z21:";
 const CAN: &str = "marklin-can:";
+const LOCONET: &str = "loconet:";
 /// The port that a served simulated 6051 is written with in examples.
 const EXAMPLE_PORT: u16 = 2400;
 
@@ -31,7 +35,7 @@ const FASTEST: f64 = 1e6;
 /// Which station is meant.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Address {
-    /// A simulated one in this process.
+    /// A simulated station in this process.
     Simulated(SimulatedAddress),
     /// A 6050 or 6051 behind a line of bytes.
     Serial(SerialAddress),
@@ -41,20 +45,22 @@ pub(crate) enum Address {
     Z21(Z21Address),
     /// A station on Märklin's CAN bus.
     Can(CanAddress),
+    /// A LocoNet server in a network.
+    LocoNet(LocoNetAddress),
 }
 
 impl Address {
-    /// The world that is simulated, if one is.
+    /// Returns the simulated world, if the station is simulated.
     pub(crate) const fn simulated(&self) -> Option<&SimulatedAddress> {
         match self {
             Self::Simulated(simulated) => Some(simulated),
-            Self::Serial(_) | Self::Board(_) | Self::Z21(_) | Self::Can(_) => None,
+            Self::Serial(_) | Self::Board(_) | Self::Z21(_) | Self::Can(_) | Self::LocoNet(_) => None,
         }
     }
 }
 
 impl Address {
-    /// The line to a station outside this program.
+    /// Returns the line to a station outside this program.
     pub(crate) fn cable(&self) -> Option<Cable> {
         match self {
             Self::Simulated(_) => None,
@@ -62,6 +68,7 @@ impl Address {
             Self::Board(board) => Some(board.into()),
             Self::Z21(z21) => Some(z21.into()),
             Self::Can(can) => Some(can.into()),
+            Self::LocoNet(server) => Some(server.into()),
         }
     }
 }
@@ -78,21 +85,24 @@ pub(crate) enum StationKind {
     Z21,
     /// A Central Station on Märklin's CAN bus.
     MarklinCan,
+    /// A command station on LocoNet, behind a server.
+    LocoNet,
 }
 
 impl StationKind {
-    /// The station of a name.
+    /// Returns the station with this name.
     ///
     /// # Errors
-    /// There is none; those that there are.
+    /// The names that exist, if there is no such name.
     pub(crate) fn named(value: &str) -> Result<Self, String> {
         match value {
             "marklin" => Ok(Self::Marklin),
             "dcc-ex" => Ok(Self::DccEx),
             "z21" => Ok(Self::Z21),
             "marklin-can" => Ok(Self::MarklinCan),
+            "loconet" => Ok(Self::LocoNet),
             _ => Err(format!(
-                "there is no simulated station `{value}`; there are marklin, dcc-ex, z21 and marklin-can"
+                "there is no simulated station `{value}`; there are marklin, dcc-ex, z21, marklin-can and loconet"
             )),
         }
     }
@@ -107,29 +117,31 @@ pub(crate) struct SimulatedAddress {
     pub(crate) seed: u64,
     /// The trains that stand on it.
     pub(crate) trains: Vec<TrainId>,
-    /// How they change speed; left out, each has the next law.
+    /// Their law of speed change; if left out, each train has the next one.
     pub(crate) law: Option<LawFamily>,
-    /// Whether contacts and turnouts fail now and then.
+    /// Whether sensors and turnouts fail at times.
     pub(crate) faults: bool,
-    /// What is drawn from wider ranges than usual.
+    /// The physics that is drawn from wider ranges than usual.
     pub(crate) physics: PhysicsRange,
-    /// How fast its clock runs, if it was said.
+    /// The speed of its clock, if given.
     pub(crate) speed: Option<Speed>,
-    /// The station that it is behind.
+    /// The station in front of it.
     pub(crate) station: StationKind,
-    /// How it behaves.
+    /// The station's quirks.
     pub(crate) quirks: Quirks,
 }
 
 /// How a simulated station behaves, by its kind.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Quirks {
-    /// If it is a DCC-EX board.
+    /// Quirks of a DCC-EX board.
     pub(crate) board: BoardSwitches,
-    /// If it is a Z21.
+    /// Quirks of a Z21.
     pub(crate) z21: Z21Switches,
-    /// If it is a Central Station.
+    /// Quirks of a Central Station.
     pub(crate) can: CanSwitches,
+    /// Quirks of a LocoNet server.
+    pub(crate) loconet: LocoNetSwitches,
 }
 
 /// How fast a simulated clock runs.
@@ -137,7 +149,7 @@ pub(crate) struct Quirks {
 pub(crate) enum Speed {
     /// As fast as it goes.
     Unpaced,
-    /// So many times as fast as real time.
+    /// This many times as fast as real time.
     Times(f64),
 }
 
@@ -146,22 +158,22 @@ pub(crate) enum Speed {
 pub(crate) struct SerialAddress {
     /// Where it is.
     pub(crate) port: Port,
-    /// How fast it is spoken to without its hand-shake line; left out, by that line where there is one.
+    /// The pace without its hand-shake line; if left out, the hand-shake line sets it where there is one.
     pub(crate) pace: Option<PaceChoice>,
-    /// Whether its hand-shake line is used; left out, if it can be read.
+    /// Whether to use its hand-shake line; if left out, where it can be read.
     pub(crate) cts: Option<bool>,
-    /// S88 modules on its bus; left out, those that the layout's contacts are on.
+    /// S88 modules on its bus; if left out, as many as the layout's sensors need.
     pub(crate) modules: Option<u8>,
-    /// How many times faster than real time it runs: 1, unless it is a simulated one.
+    /// How many times faster than real time it runs; 1 for a real station.
     pub(crate) speed: f64,
 }
 
 /// The gaps that are left without a hand-shake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PaceChoice {
-    /// Long ones, which every interface keeps up with.
+    /// Long gaps, which suit every interface.
     Careful,
-    /// Short ones, for an interface or an adapter that keeps up.
+    /// Short gaps, for a fast interface or adapter.
     Fast,
 }
 
@@ -191,10 +203,14 @@ impl FromStr for Address {
             let mut address = CanAddress::of(place)?;
             pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
             Ok(Self::Can(address))
+        } else if let Some(place) = place.strip_prefix(LOCONET) {
+            let mut address = LocoNetAddress::of(place)?;
+            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
+            Ok(Self::LocoNet(address))
         } else {
             Err(format!(
                 "`{text}` is not a link: use sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, \
-                 dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5, or tcp://host:port in place of a port"
+                 dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5, loconet:192.168.0.20, or tcp://host:port in place of a port"
             ))
         }
     }
@@ -217,7 +233,7 @@ pub(super) fn times(value: &str) -> Result<f64, String> {
 }
 
 impl SimulatedAddress {
-    /// A layout as it is if nothing more is said.
+    /// Returns the default world of a layout.
     ///
     /// # Errors
     /// When no layout is named.
@@ -295,13 +311,15 @@ const LOSSY: Ratio = Ratio::from_percent(0.2);
 
 /// Reads quirks of a DCC-EX board, a Z21 or a Central Station as `chatter,split`.
 pub(crate) fn quirks(value: &str) -> Result<Quirks, String> {
-    let Quirks { mut board, mut z21, mut can } = Quirks::default();
+    let Quirks { mut board, mut z21, mut can, mut loconet } = Quirks::default();
     for one in value.split(',') {
-        let is_of_another = set_quirk(&mut z21, one) | can_address::set_quirk(&mut can, one);
+        let is_of_another = set_quirk(&mut z21, one)
+            | can_address::set_quirk(&mut can, one)
+            | loconet_address::set_quirk(&mut loconet, one);
         match one {
             "chatter" => board.chatter = CHATTER,
-            "merged" => board.delivery = Delivery::Merged,
-            "split" => board.delivery = Delivery::Split,
+            "merged" => (board.delivery, loconet.delivery) = (Delivery::Merged, Delivery::Merged),
+            "split" => (board.delivery, loconet.delivery) = (Delivery::Split, Delivery::Split),
             "lossy" => board.lost = LOSSY,
             "silent" => board.has_banner = false,
             _ if is_of_another => {}
@@ -309,19 +327,20 @@ pub(crate) fn quirks(value: &str) -> Result<Quirks, String> {
                 return Err(format!(
                     "there is no quirk `{one}`; there are chatter (other text between messages), merged and split \
                      (messages arrive together or in parts), lossy (bytes are lost), silent (no banner after a reset) of a \
-                     DCC-EX board, of a Z21 {QUIRKS}, and of a Central Station {}",
-                    can_address::QUIRKS
+                     DCC-EX board, of a Z21 {QUIRKS}, of a Central Station {}, and of a LocoNet server {}",
+                    can_address::QUIRKS,
+                    loconet_address::QUIRKS
                 ));
             }
         }
     }
-    Ok(Quirks { board, z21, can })
+    Ok(Quirks { board, z21, can, loconet })
 }
 
 /// The law of a name.
 ///
 /// # Errors
-/// There is none; those that there are.
+/// The names that exist, if there is no such name.
 pub(crate) fn law_named(value: &str) -> Result<LawFamily, String> {
     let names = || LawFamily::ALL.map(LawFamily::name).join(", ");
     let named = LawFamily::ALL.into_iter().find(|law| law.name() == value);
@@ -331,7 +350,7 @@ pub(crate) fn law_named(value: &str) -> Result<LawFamily, String> {
 /// The range of physics of a name.
 ///
 /// # Errors
-/// There is none; those that there are.
+/// The names that exist, if there is no such name.
 pub(crate) fn physics_named(value: &str) -> Result<PhysicsRange, String> {
     let names = || PhysicsRange::EVERY.map(PhysicsRange::name).join(", ");
     PhysicsRange::named(value).ok_or_else(|| format!("there is no world `{value}`; there are {}", names()))
@@ -430,7 +449,7 @@ mod tests {
             ("sim:track-a?faults=all", "faults=some"),
             ("sim:track-a?sped=20", "seed, speed, trains, law, faults, world, station and quirks"),
             ("sim:track-a?world=mars", "there are usual, "),
-            ("sim:track-a?station=intellibox", "marklin, dcc-ex, z21 and marklin-can"),
+            ("sim:track-a?station=intellibox", "marklin, dcc-ex, z21, marklin-can and loconet"),
             ("sim:track-a?quirks=none", "wrong-xor"),
             ("marklin-serial:", "marklin-serial:/dev/ttyUSB0"),
             ("marklin-serial:tcp://host", "tcp://host:port"),

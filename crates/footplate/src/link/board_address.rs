@@ -14,14 +14,14 @@ const NETWORK_PORT: u16 = 2560;
 pub(crate) struct BoardAddress {
     /// Where it is.
     pub(crate) port: Port,
-    /// What it is like.
+    /// Its settings.
     pub(crate) settings: Settings,
-    /// How many times faster than real time it runs: 1, unless it is a simulated one.
+    /// How many times faster than real time it runs; 1 for a real station.
     pub(crate) speed: f64,
 }
 
 impl BoardAddress {
-    /// A board at a port. Opening a serial port resets most of them; a network connection resets none.
+    /// Returns a board at a port. Opening a serial port resets most boards; a network connection resets none.
     ///
     /// # Errors
     /// When no port is named.

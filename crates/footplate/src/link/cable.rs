@@ -16,6 +16,7 @@ use super::board_address::BoardAddress;
 use super::can_address::{CanAddress, CanPlace};
 use super::datagrams::{Correspondent, exchange_datagrams};
 use super::line::PERSON_MS;
+use super::loconet_address::LocoNetAddress;
 use super::port::Port;
 use super::stream::{SerialFormat, connect, open_device};
 use super::z21_address::Z21Address;
@@ -79,6 +80,15 @@ impl From<&CanAddress> for Cable {
             }
         };
         Self { place, speed: address.speed }
+    }
+}
+
+impl From<&LocoNetAddress> for Cable {
+    fn from(address: &LocoNetAddress) -> Self {
+        let LocoNetAddress { port, speed, .. } = address.clone();
+        // Servers are reached over TCP, where no format matters.
+        let format = SerialFormat { baud: ADAPTER_BAUD, stop_bits: StopBits::One, cts: Some(false) };
+        Self { place: Place::Stream(port, format), speed }
     }
 }
 

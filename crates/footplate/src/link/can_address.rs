@@ -26,10 +26,10 @@ pub(crate) enum CanPlace {
         host: String,
         /// Its port.
         port: u16,
-        /// The port at which it is listened to; 0 for any.
+        /// The port at which Footplate listens; 0 for any.
         receive_at: u16,
     },
-    /// At a station that takes connections, or an adapter at a serial port.
+    /// At a station that accepts connections, or an adapter at a serial port.
     Line(Port),
 }
 
@@ -38,16 +38,16 @@ pub(crate) enum CanPlace {
 pub(crate) struct CanAddress {
     /// Where it is.
     pub(crate) place: CanPlace,
-    /// What it is like.
+    /// Its settings.
     pub(crate) settings: Settings,
-    /// S88 modules behind it; left out, those that the layout's contacts are on.
+    /// S88 modules behind it; if left out, as many as the layout's sensors need.
     pub(crate) modules: Option<u8>,
-    /// How many times faster than real time it runs: 1, unless it is a simulated one.
+    /// How many times faster than real time it runs; 1 for a real station.
     pub(crate) speed: f64,
 }
 
 impl CanAddress {
-    /// A station at a place.
+    /// Returns a station at a place.
     ///
     /// # Errors
     /// When no place is named.
@@ -72,7 +72,7 @@ impl CanAddress {
             CanPlace::Line(Port::Device(_)) => Transport::Adapter,
             CanPlace::Line(Port::Tcp { .. }) | CanPlace::Datagrams { .. } => Transport::Network,
         };
-        // A number of its own for each program that runs, so that it knows its own frames.
+        // Each process has its own number, to recognise its own frames.
         let uid = Uid(Settings::default().uid.0 & 0xFFFF_0000 | std::process::id() & 0xFFFF);
         let settings = Settings { transport, uid, ..Settings::default() };
         Ok(Self { place, settings, modules: None, speed: 1.0 })

@@ -2,12 +2,11 @@
 //!
 //! ```text
 //! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`; board_address  port
-//! can_address  a station on Märklin's CAN bus
-//! z21_address  a Z21
+//! can_address  loconet_address  z21_address   a station on Märklin's CAN bus; a LocoNet server; a Z21
 //! station_session   the session of any station, as one type
 //! line        what every link can do, and what is heard of it
 //! news        what of that a watchdog wants to know
-//! open        an address becomes a link
+//! open  measured  an address becomes a link; what the doctor measured of its line
 //! simulated_station  a simulated layout behind either kind of station
 //! simulated   a virtual station in this process, as fast as it goes or paced
 //! served      a virtual station for other programs, at a network port or a pseudo-terminal
@@ -24,6 +23,8 @@ mod cable;
 mod can_address;
 mod datagrams;
 mod line;
+mod loconet_address;
+mod measured;
 mod observed;
 mod open;
 mod port;
@@ -40,6 +41,7 @@ mod z21_address;
 pub(crate) use address::{Address, Quirks, SimulatedAddress, Speed, StationKind, law_named, quirks, trains};
 pub(crate) use cable::{Arrival, Cable, CableLink};
 pub(crate) use line::{Bequest, Guardian, Heard, Link, Lost, PERSON_MS};
+pub(crate) use measured::MeasuredLine;
 pub(crate) use observed::{LineTallies, ObservedLink, SharedTallies};
 pub(crate) use open::{module_count, open, open_session, open_simulated, station};
 pub(crate) use rhythm::Rhythm;

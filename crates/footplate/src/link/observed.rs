@@ -16,13 +16,13 @@ const HANDED_OVER_EVERY: Duration = Duration::from_millis(500);
 /// What was counted.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LineTallies {
-    /// From one request for the sensors to the next with nothing between them.
+    /// Time between two polls with nothing between them.
     pub(crate) periods: Tally,
-    /// From the last bit of a request to the first byte of its answer.
+    /// Time from the last bit of a poll to the first byte of the reply.
     pub(crate) first_bytes: Tally,
-    /// For how long the loop was busy between two waits, by the clock on the wall.
+    /// Real time that the loop was busy between two waits.
     pub(crate) turns: Tally,
-    /// What the station was told of the power.
+    /// The last power command, and whether the station has confirmed it.
     pub(crate) power: Option<PowerCommand>,
 }
 
@@ -74,7 +74,7 @@ impl Observed {
             shared.clone_from(&self.own);
             self.handed_over = Stopwatch::start();
         } else if is_news {
-            // Whoever looks at this moment is not waited for: it is news again at the next turn.
+            // A reader holds the lock: publish it at the next turn instead.
             self.own.power = None;
         }
     }
@@ -86,19 +86,20 @@ impl<L: Link> Link for ObservedLink<L> {
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
-        // What is written byte by byte is a 6051's; a DCC-EX board is written messages, and is not polled.
+        // Single bytes go to a 6051; other stations get whole messages and are not polled.
         if let (Some(observed), [_, _, ..]) = (&mut self.observed, bytes) {
-            // A DCC-EX board's begin with a bracket; a Z21's with their length, which is never 60.
+            // Messages to a DCC-EX board begin with a bracket, to a LocoNet server with a word, to a Z21 with their length, which is neither.
             match bytes {
                 [b'<', ..] => observed.rhythm.wrote_message(bytes),
-                // A frame of Märklin's CAN bus with 0, or as a line of an adapter; no length of a Z21's is one of these.
+                [b'S', b'E', ..] => observed.rhythm.wrote_line(bytes),
+                // A frame of Märklin's CAN bus begins with 0, or as a line of an adapter; no length of a Z21's dataset does.
                 [0 | b'T' | b'\r', ..] => observed.rhythm.wrote_frame(bytes),
                 _ => observed.rhythm.wrote_datagram(bytes),
             }
         }
         if let (Some(observed), [byte]) = (&mut self.observed, bytes) {
             let request = observed.rhythm.written(self.link.now(), *byte);
-            // What has a command between it is no period of the polls alone.
+            // Two polls with a command between them are no period of polls alone.
             if let Some((span, 0)) = request.and_then(|request| request.after) {
                 observed.own.periods.add(span.as_ms());
             }
@@ -118,6 +119,7 @@ impl<L: Link> Link for ObservedLink<L> {
         if let Heard::Byte(byte) = heard {
             observed.rhythm.heard_of_board(byte);
             observed.rhythm.heard_of_bus(byte);
+            observed.rhythm.heard_of_server(byte);
             if let Some(span) = observed.rhythm.heard(self.link.now()) {
                 observed.own.first_bytes.add(span.as_ms());
             }

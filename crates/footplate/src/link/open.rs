@@ -3,10 +3,10 @@
 use footplate_core::track::Layout;
 use footplate_core::{Ratio, TimeSpan};
 use footplate_sim::living::{
-    LivingSwitches, VirtualBoard, VirtualCentralStation, VirtualStation, VirtualZ21,
+    LivingSwitches, VirtualBoard, VirtualCentralStation, VirtualLocoNet, VirtualStation, VirtualZ21,
 };
 use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, Interface, Pace, Settings};
-use footplate_wire::{dcc_ex, marklin_can, z21};
+use footplate_wire::{dcc_ex, loconet, marklin_can, z21};
 
 use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed, StationKind};
 use super::can_address::CanAddress;
@@ -33,6 +33,7 @@ pub(crate) fn open<'l>(
         Address::Board(board) => open_cable(board.into())?,
         Address::Z21(z21) => open_cable(z21.into())?,
         Address::Can(can) => open_cable(can.into())?,
+        Address::LocoNet(server) => open_cable(server.into())?,
     })
 }
 
@@ -82,6 +83,9 @@ pub(crate) fn station<'l>(
         StationKind::MarklinCan => {
             VirtualCentralStation::draw(layout, *seed, trains, &switches, address.quirks.can)?.into()
         }
+        StationKind::LocoNet => {
+            VirtualLocoNet::draw(layout, *seed, trains, &switches, address.quirks.loconet)?.into()
+        }
     })
 }
 
@@ -115,6 +119,7 @@ pub(crate) fn open_session(
                 let settings = marklin_can::Settings { modules, scan, ..marklin_can::Settings::default() };
                 marklin_can::Client::new(now, settings).into()
             }
+            StationKind::LocoNet => loconet::Client::new(now, loconet::Settings::default()).into(),
         },
         Address::Serial(serial) => {
             Interface::new(now, serial_settings(serial, link.cts().is_some(), modules))?.into()
@@ -122,6 +127,7 @@ pub(crate) fn open_session(
         Address::Board(board) => dcc_ex::Client::new(now, board.settings).into(),
         Address::Z21(z21) => z21::Client::new(now, z21_settings(z21.settings, layout)).into(),
         Address::Can(can) => marklin_can::Client::new(now, can_settings(can, layout)).into(),
+        Address::LocoNet(server) => loconet::Client::new(now, server.settings).into(),
     })
 }
 

@@ -3,23 +3,25 @@
 use footplate_core::{TimeSpan, Timestamp};
 use footplate_wire::dcc_ex::{self, Framing, Reply};
 use footplate_wire::marklin_serial::{BYTE_TIME, Message};
-use footplate_wire::{marklin_can, z21};
+use footplate_wire::{loconet, marklin_can, z21};
 use serde::Serialize;
 
 /// Reads a line's bytes as they pass.
 #[derive(Debug, Default)]
 pub(crate) struct Rhythm {
     said: Vec<u8>,
-    /// The last request, and how many other messages went since.
+    /// The last poll, and how many other messages were written since.
     request: Option<(Timestamp, usize)>,
     is_awaited: bool,
     power: Option<PowerCommand>,
-    /// Sensors were asked for after that.
+    /// Whether sensors were polled after that.
     asked_since: bool,
-    /// What a DCC-EX board says, once something was written to one.
+    /// Messages from a DCC-EX board, once something was written to one.
     replies: Option<Framing>,
-    /// What a station on Märklin's CAN bus says, once something was written to one.
+    /// Frames from Märklin's CAN bus, once something was written to it.
     frames: Option<marklin_can::Framing>,
+    /// Lines from a LocoNet server, once something was written to one.
+    lines: Option<loconet::Lines>,
 }
 
 /// What the station was commanded last of the power, and whether anything was heard of it since.
@@ -27,19 +29,19 @@ pub(crate) struct Rhythm {
 pub(crate) struct PowerCommand {
     /// On, or off.
     is_on: bool,
-    /// The station has answered a request since, so that it hears; whether it did what it was told no 6051 says.
+    /// Whether the station has answered a poll since; a 6051 never confirms the command itself.
     has_answered: bool,
 }
 
 /// Sensors were asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Request {
-    /// How long after the request before, and how many other messages went between them.
+    /// Time since the poll before, and how many other messages were written between them.
     pub(crate) after: Option<(TimeSpan, usize)>,
 }
 
 impl Rhythm {
-    /// A byte was put on the line; the request that it completes.
+    /// Takes a byte that was written; returns the poll that it completes.
     pub(crate) fn written(&mut self, at: Timestamp, byte: u8) -> Option<Request> {
         self.said.push(byte);
         let (message, _) = Message::decode(&self.said)?;
@@ -120,12 +122,35 @@ impl Rhythm {
         }
     }
 
-    /// What the station was told of the power.
+    /// A line was written to a LocoNet server.
+    pub(crate) fn wrote_line(&mut self, text: &[u8]) {
+        self.lines.get_or_insert_default();
+        let mut lines = loconet::Lines::default();
+        let line = text.iter().find_map(|byte| lines.push(*byte).map(loconet::Line::read));
+        let is_on = match line {
+            Some(Ok(loconet::Line::Send(loconet::Message::PowerOn))) => true,
+            Some(Ok(loconet::Line::Send(loconet::Message::PowerOff))) => false,
+            _ => return,
+        };
+        self.power = Some(PowerCommand { is_on, has_answered: false });
+    }
+
+    /// A byte was heard; if a command station on LocoNet says in a slot that the power is as commanded, that counts.
+    pub(crate) fn heard_of_server(&mut self, byte: u8) {
+        let line = self.lines.as_mut().and_then(|lines| lines.push(byte)).map(loconet::Line::read);
+        if let Some(Ok(loconet::Line::Receive(loconet::Message::Slot(slot)))) = line
+            && let Some(power) = self.power.as_mut().filter(|power| slot.is_powered() == power.is_on)
+        {
+            power.has_answered = true;
+        }
+    }
+
+    /// The last power command, and whether the station has confirmed it.
     pub(crate) const fn power(&self) -> Option<PowerCommand> {
         self.power
     }
 
-    /// A byte was heard; if it is the first of an answer, how long after the last bit of its request.
+    /// Takes a byte from the station; if it is the first of a reply, returns the time since the last bit of its poll.
     pub(crate) fn heard(&mut self, at: Timestamp) -> Option<TimeSpan> {
         let (asked, _) = self.request.filter(|_| std::mem::take(&mut self.is_awaited))?;
         if let Some(power) = &mut self.power
@@ -162,6 +187,21 @@ mod tests {
     }
 
     #[test]
+    fn a_command_station_on_loconet_confirms_the_power_in_a_slot() {
+        let mut rhythm = Rhythm::default();
+        rhythm.wrote_line(b"SEND 83 7C\r\n");
+        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
+        for (line, has_answered) in [
+            (&b"RECEIVE 83 7C\r\n"[..], false),
+            (b"RECEIVE E7 0E 05 13 06 00 20 06 00 18 00 00 00 38\r\n", false),
+            (b"RECEIVE E7 0E 05 33 18 3F 10 07 00 00 00 00 00 10\r\n", true),
+        ] {
+            line.iter().for_each(|byte| rhythm.heard_of_server(*byte));
+            assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered }));
+        }
+    }
+
+    #[test]
     fn a_central_station_confirms_the_power_itself() {
         let mut rhythm = Rhythm::default();
         rhythm.wrote_frame(&[0, 0, 3, 0, 5, 0, 0, 0, 0, 1, 0, 0, 0]);
@@ -194,7 +234,7 @@ mod tests {
         assert_eq!(rhythm.written(at(0), 133), Some(Request { after: None }));
         assert_eq!(rhythm.written(at(5), 97), None);
         assert_eq!(rhythm.power(), Some(PowerCommand { is_on: false, has_answered: false }));
-        // The answer to what was asked before says nothing of it.
+        // The reply to an earlier poll confirms nothing.
         assert!(rhythm.heard(at(12)).is_some());
         assert_eq!(rhythm.power(), Some(PowerCommand { is_on: false, has_answered: false }));
         let request = rhythm.written(at(70), 133).expect("a request");

@@ -26,15 +26,15 @@ const GUARD: TimeSpan = TimeSpan::from_ms(10);
 
 /// What comes to the server, from whichever client.
 pub(crate) enum Incoming {
-    /// Somebody has connected; what is to be said to them goes there.
+    /// A client has connected; bytes for it go there.
     Client(usize, Box<dyn Write + Send>),
-    /// They say a byte.
+    /// A client sends a byte.
     Byte(usize, u8),
-    /// They are gone.
+    /// A client has disconnected.
     Gone(usize),
-    /// Somebody sends datagrams, beside others; what is to be said to them goes there.
+    /// A client sends datagrams, beside others; datagrams for it go there.
     Peer(usize, Box<dyn Write + Send>),
-    /// They send one.
+    /// A client sends a datagram.
     Datagram(usize, Vec<u8>),
 }
 
@@ -47,7 +47,7 @@ pub(crate) struct Server<'l> {
     incoming: Receiver<Incoming>,
     client: Option<(usize, Box<dyn Write + Send>)>,
     peers: BTreeMap<usize, Box<dyn Write + Send>>,
-    /// Bytes that wait for the station to be ready.
+    /// Bytes that wait until the station is ready.
     waiting: VecDeque<u8>,
     /// When the last byte was passed on, and whether CTS has gone down since.
     passed: Option<(Timestamp, bool)>,
@@ -75,7 +75,7 @@ impl<'l> Server<'l> {
         }
     }
 
-    /// Serves until somebody wants it to stop.
+    /// Serves until `wants_to_stop`.
     pub(crate) fn serve(&mut self, wants_to_stop: impl Fn() -> bool) {
         let tick = Duration::from_secs_f64((TICK_MS * 1e-3 / self.times).max(SHORTEST_TICK_S));
         let mut said = Vec::new();
@@ -105,7 +105,7 @@ impl<'l> Server<'l> {
 
     fn take(&mut self, incoming: Incoming) {
         match incoming {
-            // A newer connection is the person's latest wish; the older one may be dead and not know it.
+            // A newer connection replaces the older one, which may be dead without notice.
             Incoming::Client(id, client) => {
                 self.waiting.clear();
                 self.client = Some((id, client));
@@ -122,7 +122,7 @@ impl<'l> Server<'l> {
         self.client.as_ref().is_some_and(|(client, _)| *client == id)
     }
 
-    /// Lets the station go on to now.
+    /// Advances the station to now.
     fn catch_up(&mut self, said: &mut Vec<Vec<u8>>) {
         let now = self.began + TimeSpan::from_s(self.stopwatch.elapsed().as_secs_f64() * self.times);
         loop {
@@ -148,7 +148,7 @@ impl<'l> Server<'l> {
         }
     }
 
-    /// Gives the station the next byte if it is ready.
+    /// Passes the next byte to the station if it is ready.
     fn pass_on(&mut self) {
         let now = self.station.now();
         let Some(cts) = self.station.cts() else {
@@ -283,7 +283,7 @@ pub(crate) fn open_pseudo_terminal() -> std::io::Result<(String, Receiver<Incomi
     let mut modes = tcgetattr(&master)?;
     modes.make_raw();
     tcsetattr(&master, OptionalActions::Now, &modes)?;
-    // Held open, so that reading does not fail while nobody is connected.
+    // Held open, so that reading does not fail while no client is connected.
     let held = std::fs::OpenOptions::new().read(true).write(true).open(&path)?;
     let master = std::fs::File::from(master);
     let (sender, incoming) = channel();

@@ -17,7 +17,7 @@ const VIRTUAL_PATIENCE: TimeSpan = TimeSpan::from_ms(1_000);
 /// A link into a simulated world.
 pub(crate) struct SimulatedLink<'l> {
     station: SimulatedStation<'l>,
-    /// What has reached the host with the last portion and was not handed over yet.
+    /// Bytes of the last portion that were not handed over yet.
     heard: VecDeque<u8>,
     speed: Speed,
     began: Timestamp,
@@ -41,7 +41,7 @@ impl<'l> SimulatedLink<'l> {
         &mut self.station
     }
 
-    /// Lets real time catch up with the station's.
+    /// Waits until real time catches up with the station's.
     fn keep_pace(&self) {
         if let Speed::Times(times) = self.speed {
             let due = Duration::from_secs_f64(((self.station.now() - self.began).as_s() / times).max(0.0));

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 
 use footplate_core::Timestamp;
 use footplate_sim::living::{
-    CanTransport, CoilAlarm, FromStation, LivingLayout, VirtualBoard, VirtualCentralStation, VirtualStation,
-    VirtualZ21,
+    CanTransport, CoilAlarm, FromStation, LivingLayout, VirtualBoard, VirtualCentralStation, VirtualLocoNet,
+    VirtualStation, VirtualZ21,
 };
 
 /// A simulated station and the world behind it.
@@ -19,6 +19,8 @@ pub(crate) enum SimulatedStation<'l> {
     Z21(Box<VirtualZ21<'l>>),
     /// A Central Station.
     Can(Box<VirtualCentralStation<'l>>),
+    /// A command station on LocoNet.
+    LocoNet(Box<VirtualLocoNet<'l>>),
 }
 
 impl<'l> From<VirtualStation<'l>> for SimulatedStation<'l> {
@@ -45,6 +47,12 @@ impl<'l> From<VirtualCentralStation<'l>> for SimulatedStation<'l> {
     }
 }
 
+impl<'l> From<VirtualLocoNet<'l>> for SimulatedStation<'l> {
+    fn from(station: VirtualLocoNet<'l>) -> Self {
+        Self::LocoNet(Box::new(station))
+    }
+}
+
 /// What reaches the host from any.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum FromSimulated {
@@ -64,10 +72,11 @@ impl<'l> SimulatedStation<'l> {
             Self::DccEx(board) => board.now(),
             Self::Z21(station) => station.now(),
             Self::Can(station) => station.now(),
+            Self::LocoNet(station) => station.now(),
         }
     }
 
-    /// Goes on until a time, or until something reaches the host before it.
+    /// Advances until a time, or until something reaches the host before it.
     pub(crate) fn advance(&mut self, until: Timestamp) -> Option<FromSimulated> {
         match self {
             Self::Marklin(station) => station.advance(until).map(|heard| match heard {
@@ -78,6 +87,7 @@ impl<'l> SimulatedStation<'l> {
             Self::Z21(station) => {
                 station.advance(until).map(|(client, datagram)| FromSimulated::Datagram(client, datagram))
             }
+            Self::LocoNet(station) => station.advance(until).map(|bytes| FromSimulated::Bytes(bytes.into())),
             Self::Can(station) => station.advance(until).map(|(client, bytes)| match station.transport() {
                 CanTransport::Datagrams => FromSimulated::Datagram(client, bytes),
                 CanTransport::Stream | CanTransport::Adapter => FromSimulated::Bytes(bytes.into()),
@@ -85,26 +95,27 @@ impl<'l> SimulatedStation<'l> {
         }
     }
 
-    /// The host puts bytes on the line.
+    /// Puts the host's bytes on the line.
     pub(crate) fn write(&mut self, bytes: &[u8]) {
         self.write_of(0, bytes);
     }
 
-    /// One of several clients puts bytes on the line, of which each has its own where the station knows more than one.
+    /// Puts a client's bytes on its line; a station that knows one client only has one line.
     pub(crate) fn write_of(&mut self, client: usize, bytes: &[u8]) {
         match self {
             Self::Marklin(station) => bytes.iter().for_each(|byte| station.write(*byte)),
             Self::DccEx(board) => board.write(bytes),
             Self::Z21(station) => station.write(client, bytes),
             Self::Can(station) => station.write(client, bytes),
+            Self::LocoNet(station) => station.write(bytes),
         }
     }
 
-    /// Whether the station is ready for a byte; `None` if it has no line that says so.
+    /// Whether the station is ready for a byte; `None` without a hand-shake line.
     pub(crate) const fn cts(&self) -> Option<bool> {
         match self {
             Self::Marklin(station) => Some(station.cts()),
-            Self::DccEx(_) | Self::Z21(_) | Self::Can(_) => None,
+            Self::DccEx(_) | Self::Z21(_) | Self::Can(_) | Self::LocoNet(_) => None,
         }
     }
 
@@ -115,6 +126,7 @@ impl<'l> SimulatedStation<'l> {
             Self::DccEx(board) => board.world(),
             Self::Z21(station) => station.world(),
             Self::Can(station) => station.world(),
+            Self::LocoNet(station) => station.world(),
         }
     }
 
@@ -125,14 +137,15 @@ impl<'l> SimulatedStation<'l> {
             Self::DccEx(board) => board.world_mut(),
             Self::Z21(station) => station.world_mut(),
             Self::Can(station) => station.world_mut(),
+            Self::LocoNet(station) => station.world_mut(),
         }
     }
 
-    /// Solenoids that were left powered for too long; others leave that to the decoders of turnouts.
+    /// Solenoids that were powered for too long; with other stations the decoders of turnouts prevent that.
     pub(crate) fn alarms(&self) -> &[CoilAlarm] {
         match self {
             Self::Marklin(station) => station.alarms(),
-            Self::DccEx(_) | Self::Z21(_) | Self::Can(_) => &[],
+            Self::DccEx(_) | Self::Z21(_) | Self::Can(_) | Self::LocoNet(_) => &[],
         }
     }
 }

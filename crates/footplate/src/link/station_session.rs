@@ -2,7 +2,7 @@
 
 use footplate_core::{Command, SensorId, Timestamp};
 use footplate_wire::marklin_serial::Interface;
-use footplate_wire::{Closing, CommandError, Session, Transmit, dcc_ex, marklin_can, z21};
+use footplate_wire::{Closing, CommandError, Session, Transmit, dcc_ex, loconet, marklin_can, z21};
 
 /// A session with any station that there is.
 #[derive(Debug, Clone)]
@@ -15,6 +15,8 @@ pub(crate) enum StationSession {
     Z21(z21::Client),
     /// A station on Märklin's CAN bus.
     Can(Box<marklin_can::Client>),
+    /// A command station on LocoNet.
+    LocoNet(Box<loconet::Client>),
 }
 
 impl From<Interface> for StationSession {
@@ -41,6 +43,12 @@ impl From<marklin_can::Client> for StationSession {
     }
 }
 
+impl From<loconet::Client> for StationSession {
+    fn from(session: loconet::Client) -> Self {
+        Self::LocoNet(Box::new(session))
+    }
+}
+
 impl StationSession {
     fn any(&self) -> &dyn Session {
         match self {
@@ -48,6 +56,7 @@ impl StationSession {
             Self::DccEx(session) => session,
             Self::Z21(session) => session,
             Self::Can(session) => session.as_ref(),
+            Self::LocoNet(session) => session.as_ref(),
         }
     }
 
@@ -57,6 +66,7 @@ impl StationSession {
             Self::DccEx(session) => session,
             Self::Z21(session) => session,
             Self::Can(session) => session.as_mut(),
+            Self::LocoNet(session) => session.as_mut(),
         }
     }
 }
@@ -79,6 +89,9 @@ impl Session for StationSession {
     }
     fn watch(&mut self, sensor: Option<SensorId>) {
         self.any_mut().watch(sensor);
+    }
+    fn expect_delays(&mut self, excess: footplate_core::TimeSpan) {
+        self.any_mut().expect_delays(excess);
     }
     fn handle_timeout(&mut self, now: Timestamp) {
         self.any_mut().handle_timeout(now);

@@ -15,6 +15,9 @@ pub(crate) enum Passed {
     Heard(Timestamp, u8),
 }
 
+/// More is not noted: an hour of the fastest line in use, or some seconds of a flood, in about 100 MB.
+const MOST_BYTES: usize = 4_000_000;
+
 /// A link whose bytes are noted.
 pub(crate) struct TappedLink<L> {
     link: L,
@@ -26,7 +29,12 @@ impl<L: Link> TappedLink<L> {
         Self { link, passed: Vec::new() }
     }
 
-    /// What passed, in order.
+    fn note(&mut self, passed: impl IntoIterator<Item = Passed>) {
+        let room = MOST_BYTES.saturating_sub(self.passed.len());
+        self.passed.extend(passed.into_iter().take(room));
+    }
+
+    /// What passed, in order, up to the first four million bytes.
     pub(crate) fn passed(&self) -> &[Passed] {
         &self.passed
     }
@@ -39,17 +47,17 @@ impl<L: Link> Link for TappedLink<L> {
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
         let now = self.link.now();
-        self.passed.extend(bytes.iter().map(|byte| Passed::Written(now, *byte)));
+        self.note(bytes.iter().map(|byte| Passed::Written(now, *byte)));
         self.link.write(bytes)
     }
 
     fn wait(&mut self, until: Timestamp) -> Heard {
         let heard = self.link.wait(until);
         match &heard {
-            Heard::Byte(byte) => self.passed.push(Passed::Heard(self.link.now(), *byte)),
+            Heard::Byte(byte) => self.note([Passed::Heard(self.link.now(), *byte)]),
             Heard::Datagram(datagram) => {
                 let now = self.link.now();
-                self.passed.extend(datagram.iter().map(|byte| Passed::Heard(now, *byte)));
+                self.note(datagram.iter().map(|byte| Passed::Heard(now, *byte)));
             }
             Heard::Cts(_) | Heard::Nothing | Heard::Lost(_) => {}
         }

@@ -1,30 +1,44 @@
 //! How long the link to each kind of station takes.
 
-use footplate_core::link::TimeModel;
-use footplate_wire::{dcc_ex, marklin_can, marklin_serial, z21};
+use footplate_core::link::{TimeModel, UsualLine};
+use footplate_wire::{dcc_ex, loconet, marklin_can, marklin_serial, z21};
 
 use super::address::{Address, StationKind};
 
 impl Address {
-    /// The times of the link behind it, as its station's session has them.
-    pub(crate) const fn time_model(&self) -> TimeModel {
+    /// The station behind it.
+    pub(crate) const fn station_kind(&self) -> StationKind {
         match self {
-            Self::Simulated(simulated) => simulated.station.time_model(),
-            Self::Serial(_) => StationKind::Marklin.time_model(),
-            Self::Board(_) => StationKind::DccEx.time_model(),
-            Self::Z21(_) => StationKind::Z21.time_model(),
-            Self::Can(_) => StationKind::MarklinCan.time_model(),
+            Self::Simulated(simulated) => simulated.station,
+            Self::Serial(_) => StationKind::Marklin,
+            Self::Board(_) => StationKind::DccEx,
+            Self::Z21(_) => StationKind::Z21,
+            Self::Can(_) => StationKind::MarklinCan,
+            Self::LocoNet(_) => StationKind::LocoNet,
         }
     }
 }
 
 impl StationKind {
-    const fn time_model(self) -> TimeModel {
+    /// Returns the station's time model, which holds over a usual line.
+    pub(crate) const fn time_model(self) -> TimeModel {
         match self {
             Self::Marklin => marklin_serial::TIME_MODEL,
             Self::DccEx => dcc_ex::TIME_MODEL,
             Self::Z21 => z21::TIME_MODEL,
             Self::MarklinCan => marklin_can::TIME_MODEL,
+            Self::LocoNet => loconet::TIME_MODEL,
+        }
+    }
+
+    /// Returns the line for which the time model holds; `None` for a 6051, which is alone on its line and polled.
+    pub(crate) const fn usual_line(self) -> Option<UsualLine> {
+        match self {
+            Self::Marklin => None,
+            Self::DccEx => Some(dcc_ex::USUAL_LINE),
+            Self::Z21 => Some(z21::USUAL_LINE),
+            Self::MarklinCan => Some(marklin_can::USUAL_LINE),
+            Self::LocoNet => Some(loconet::USUAL_LINE),
         }
     }
 }

@@ -20,14 +20,14 @@ pub(crate) struct Z21Address {
     pub(crate) host: String,
     /// Its port.
     pub(crate) port: u16,
-    /// What it, its sensors and its turnouts are like.
+    /// Settings of the station, its sensors and its turnouts.
     pub(crate) settings: Settings,
-    /// How many times faster than real time it runs: 1, unless it is a simulated one.
+    /// How many times faster than real time it runs; 1 for a real station.
     pub(crate) speed: f64,
 }
 
 impl Z21Address {
-    /// A station at a place of the network.
+    /// Returns a station at a place in the network.
     ///
     /// # Errors
     /// When no place is named.
@@ -92,7 +92,7 @@ fn feedback_named(value: &str) -> Result<Feedback, String> {
 const BAD: Ratio = Ratio::from_percent(5.0);
 
 /// The quirks of a simulated Z21, as they are listed for people.
-pub(super) const QUIRKS: &str = "lossy, twice and overtaken (datagrams are lost, come twice or are overtaken), unsubscribed (the first \
+pub(super) const QUIRKS: &str = "lossy, twice and overtaken (datagrams are lost, come twice or are overtaken), slow (they take up to 60 ms), unsubscribed (the first \
                                  request for broadcasts is lost), strict (wrong XOR bytes are refused), wrong-xor (its own are wrong), \
                                  short (no functions from F29), first-only (only the first dataset of a datagram is read), locked (a \
                                  z21start without its code), can and loconet (detectors there in the place of the R-BUS)";
@@ -103,6 +103,7 @@ pub(super) fn set_quirk(switches: &mut Z21Switches, name: &str) -> bool {
         "lossy" => switches.lost = BAD,
         "twice" => switches.duplicated = BAD,
         "overtaken" => switches.overtaken = BAD,
+        "slow" => switches.is_slow = true,
         "unsubscribed" => switches.loses_first_subscription = true,
         "strict" => switches.strict_xor = true,
         "wrong-xor" => switches.wrong_xor = true,

@@ -19,6 +19,10 @@ const NEXT_WAKING: TimeSpan = TimeSpan::from_ms(5);
 /// Between two attempts to open a line again.
 const REOPEN_EVERY: Duration = Duration::from_millis(250);
 
+/// A line that opens so often and is lost again each time before the station has answered is given up: the server accepts
+/// connections and closes them, as one does that allows a single client.
+const REOPENED_IN_VAIN: u32 = 4;
+
 /// A line, a session over it and the recorder.
 ///
 /// When it is dropped, at its end, after an error or in a panic, it commands all trains to stop first.
@@ -31,6 +35,8 @@ pub(crate) struct Runtime<'r, L: Link> {
     fresh: Vec<Event>,
     notices: Vec<LinkNotice>,
     will: LastWill,
+    /// How often the line was opened again since the station answered last.
+    reopened: u32,
     is_closed: bool,
 }
 
@@ -53,7 +59,17 @@ impl<'r, L: Link> Runtime<'r, L> {
             session.handle_cts(link.now(), up);
         }
         let (fresh, notices) = (Vec::new(), Vec::new());
-        Self { link, session, recorder, stop, fresh, notices, will: LastWill::new(), is_closed: false }
+        Self {
+            link,
+            session,
+            recorder,
+            stop,
+            fresh,
+            notices,
+            will: LastWill::new(),
+            reopened: 0,
+            is_closed: false,
+        }
     }
 
     /// The line.
@@ -195,7 +211,12 @@ impl<'r, L: Link> Runtime<'r, L> {
                     self.will.left(&event);
                     self.fresh.push(event);
                 }
-                Transmit::Notice(notice) => self.notices.push(notice),
+                Transmit::Notice(notice) => {
+                    if notice == LinkNotice::Answers {
+                        self.reopened = 0;
+                    }
+                    self.notices.push(notice);
+                }
             }
         }
         self.will.keep(&self.session, &mut self.link)
@@ -219,6 +240,14 @@ impl<'r, L: Link> Runtime<'r, L> {
 
     /// Tries to reopen a lost line: a plug may be pushed in again, a server restarted.
     fn open_again<M: Machine>(&mut self, lost: Lost, attendant: &mut dyn Attendant<M>) -> Result<(), Lost> {
+        if self.reopened >= REOPENED_IN_VAIN {
+            return Err(Lost(format!(
+                "{lost}, {} times in a row without an answer: another program may be connected to the station already, or \
+                 the port belongs to something else; check address and port",
+                self.reopened + 1
+            )));
+        }
+        self.reopened += 1;
         attendant.read(&format!("{lost}; trying to open it again for {} s", REOPEN_WITHIN.as_secs()));
         let began = self.link.real_time();
         while self.link.real_time() - began < REOPEN_WITHIN && !self.stop.is_some_and(StopFlag::is_up) {

@@ -54,7 +54,7 @@ fn speeds_and_stops_are_true_within_their_uncertainty() {
                     speeds.push((speed.value - true_speed) / speed.uncertainty);
                 }
                 if stop.count > 0 {
-                    let true_stop = recording.train.way_to_rest(step, approach) + true_speed * lag;
+                    let true_stop = recording.train.stopping_distance(step, approach) + true_speed * lag;
                     stops.push((stop.distance - true_stop) / stop.doubt);
                 }
             }

@@ -18,6 +18,7 @@ mod inertial_slides;
 mod killed;
 mod layout;
 mod left_running;
+mod loconet;
 mod measure;
 mod odometer_on_scenarios;
 mod odometry;

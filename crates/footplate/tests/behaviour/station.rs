@@ -84,3 +84,54 @@ fn a_station_that_says_nothing_ends_a_verb_with_status_2_within_seconds() {
     assert_eq!(output.status, 2, "{}", output.errors);
     assert!(output.errors.contains("check its power, the cable and the port"), "{}", output.errors);
 }
+
+#[test]
+fn a_port_that_takes_connections_and_closes_them_ends_the_doctor_with_status_1_and_why() {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let place = listener.local_addr().expect("an address");
+    std::thread::spawn(move || listener.incoming().for_each(drop));
+    for link in
+        [format!("marklin-serial:tcp://{place}"), format!("dcc-ex:tcp://{place}"), format!("loconet:{place}")]
+    {
+        let doctor = footplate(&["doctor", "--link", &link, "--seconds", "1000"]);
+        assert_eq!(doctor.status, 1, "{link}: {}{}", doctor.output, doctor.errors);
+        assert!(doctor.output.contains("another program may be connected"), "{link}: {}", doctor.output);
+    }
+}
+
+#[test]
+fn a_line_of_garbage_is_called_that_with_what_to_check() {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let place = listener.local_addr().expect("an address");
+    std::thread::spawn(move || {
+        for mut client in listener.incoming().flatten() {
+            std::thread::spawn(move || {
+                // Any bytes: a generator of Marsaglia's (xorshift), about 100 000 a second.
+                let mut state = 0x9E37_79B9_u32;
+                loop {
+                    let bytes: Vec<u8> = (0..1_000)
+                        .map(|_| {
+                            state ^= state << 13;
+                            state ^= state >> 17;
+                            state ^= state << 5;
+                            state as u8
+                        })
+                        .collect();
+                    if std::io::Write::write_all(&mut client, &bytes).is_err() {
+                        return;
+                    }
+                    std::thread::sleep(std::time::Duration::from_millis(10));
+                }
+            });
+        }
+    });
+    for (link, check) in [
+        (format!("marklin-serial:tcp://{place}"), "belongs to a 6050 or 6051"),
+        (format!("dcc-ex:tcp://{place}"), "115200 baud"),
+        (format!("loconet:{place}"), "LocoNet-over-TCP server"),
+    ] {
+        let doctor = footplate(&["doctor", "--link", &link, "--seconds", "5"]);
+        assert_eq!(doctor.status, 2, "{link}: {}{}", doctor.output, doctor.errors);
+        assert!(doctor.errors.contains(check), "{link}: {}", doctor.errors);
+    }
+}

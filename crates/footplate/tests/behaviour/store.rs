@@ -131,8 +131,8 @@ fn a_train_and_a_line_convert_to_the_own_form_and_that_to_itself() {
     let folder = folder("convert-described");
     let testdata = format!("{}/../../testdata", env!("CARGO_MANIFEST_DIR"));
     for (file, says) in [
-        ("trains/trainruns_local.yaml", "train Regional Train, from the form railtoolkit-rolling-stock\n"),
-        ("lines/ttobench_CH_Fribourg_Bern.json", "line CH_Fribourg_Bern, from the form ttobench-track\n"),
+        ("trains/trainruns_local.yaml", "train Regional Train, from format railtoolkit-rolling-stock\n"),
+        ("lines/ttobench_CH_Fribourg_Bern.json", "line CH_Fribourg_Bern, from format ttobench-track\n"),
     ] {
         let [own, again] =
             ["own.toml", "again.toml"].map(|name| folder.join(name).to_str().unwrap().to_owned());
@@ -156,10 +156,7 @@ fn a_log_converts_to_the_own_form_and_that_to_itself() {
     let [own, again] = ["own.csv", "again.csv"].map(|name| folder.join(name).to_str().unwrap().to_owned());
     let run = footplate(&["convert", &log("choochoos_2020_track_a_train78_stop.csv"), "--out", &own]);
     assert_eq!(run.status, 0, "{run:?}");
-    assert!(
-        run.output.ends_with("own.csv: 4 runs with 167 events, from the form since-command\n"),
-        "{run:?}"
-    );
+    assert!(run.output.ends_with("own.csv: 4 runs with 167 events, from format since-command\n"), "{run:?}");
     assert_eq!(footplate(&["convert", &own, "--out", &again]).status, 0);
     assert_eq!(fs::read(&own).unwrap(), fs::read(&again).unwrap());
 

@@ -124,3 +124,20 @@ fn an_address_where_no_station_answers_is_said_so_with_status_2() {
         assert_eq!(request, Some(Request::SerialNumber));
     }
 }
+
+#[test]
+fn a_slow_network_is_measured_and_trains_are_driven_by_it() {
+    const SLOW: &str = "sim:track-a?faults=none&trains=24&station=z21&quirks=slow&seed=";
+    let folder = calibrated_over(LINK, "z21-slow", 7);
+    let store = folder.join("railway.db").display().to_string();
+    let link = format!("{SLOW}7");
+    let doctor = footplate(&["doctor", "--link", &link, "--seconds", "60", "--store", &store]);
+    assert_eq!(doctor.status, 0, "{}{}", doctor.output, doctor.errors);
+    assert!(doctor.output.contains("ms slower than usual (10 ms)"), "{}", doctor.output);
+    let kept = std::fs::read_to_string(folder.join("railway.links.json")).expect("what was measured");
+    let kept: Value = serde_json::from_str(&kept).expect("JSON");
+    assert!(kept["lines"]["sim:track-a Z21"]["round_trips"]["longest_usual"].is_number(), "{kept}");
+    let (stops, _) = errors(&driven(&folder, &link, SCRIPT).1);
+    println!("{stops:.1?}");
+    assert!(stops.len() >= 5 && stops.iter().all(|error| *error < 60.0), "{stops:?}");
+}

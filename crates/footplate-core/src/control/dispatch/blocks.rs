@@ -1,4 +1,4 @@
-//! Track in blocks, as block systems know it: what lies between contacts is taken as a whole, with all its turnouts.
+//! Blocks, as block systems have them: the track between sensors is reserved as a whole, with all its turnouts.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
@@ -9,7 +9,7 @@ use crate::units::Length;
 
 use super::reservation::Reservation;
 
-/// Who takes less of a block than this only touches it.
+/// A reservation of less of a block than this does not take the block.
 const TOUCHES: Length = Length::from_mm(1.0);
 
 /// The blocks of a layout.
@@ -30,7 +30,7 @@ impl Blocks {
         blocks
     }
 
-    /// Adds the block of an edge: all rails that can be come to without passing a contact.
+    /// Adds the block of an edge: all rails that can be reached without passing a sensor.
     fn add(&mut self, layout: &Layout, first: EdgeId) {
         let mut whole = Reservation::empty();
         let mut open = alloc::vec![first];
@@ -40,10 +40,10 @@ impl Blocks {
                 continue;
             }
             whole.take(layout, id, Length::ZERO, edge.length);
-            let is_contact = |node: NodeId| {
+            let is_sensor = |node: NodeId| {
                 [node, node.reverse()].into_iter().any(|node| layout.sensor_at(node).is_some())
             };
-            for node in [edge.from, edge.to].into_iter().filter(|node| !is_contact(*node)) {
+            for node in [edge.from, edge.to].into_iter().filter(|node| !is_sensor(*node)) {
                 let edges = [node, node.reverse()].into_iter().flat_map(|node| layout.ways(node).edges());
                 open.extend(edges.filter(|next| !self.of.contains_key(&next.stretch())));
             }
@@ -51,7 +51,7 @@ impl Blocks {
         self.whole.push(whole);
     }
 
-    /// What is taken if a block can only be taken as a whole.
+    /// The reservation extended to whole blocks.
     pub(super) fn around(&self, layout: &Layout, taken: &Reservation) -> Reservation {
         let mut around = taken.clone();
         for (stretch, span) in taken.spans() {

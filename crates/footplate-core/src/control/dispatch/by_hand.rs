@@ -1,4 +1,4 @@
-//! Trains that somebody drives by plain orders: they hold the track ahead of them as far as it is free.
+//! Trains driven by plain orders: the track ahead of them is reserved as far as it is free.
 
 use crate::control::drive::Refusal;
 use crate::ids::TrainId;
@@ -7,18 +7,18 @@ use crate::units::Length;
 
 use super::dispatched_train::State;
 use super::dispatcher::Dispatcher;
-use super::way::Way;
+use super::path::Path;
 
-/// How far ahead a train that is driven by hand takes the track at least and at most: a locomotive's length, and more than
-/// any train needs to stop from its highest step (1.2 m) and the next contact.
+/// How far ahead of a train driven by hand the track is reserved, at least and at most: the length of a locomotive, and more
+/// than any train needs to stop from its highest step (1.2 m) and the next sensor.
 const AHEAD: [Length; 2] = [Length::from_mm(300.0), Length::from_mm(2_500.0)];
-/// It takes what it needs to come to rest if it is told to after this: until then nobody looks again but a few times.
+/// It reserves what it needs to stop on a command after this: in that time it is examined only a few times.
 const TOLD_AFTER: TimeSpan = TimeSpan::from_ms(1_000);
-/// Steps in which it is tried whether less of it is free.
+/// The steps in which less track is tried.
 const EVERY: Length = Length::from_mm(50.0);
 
 impl Dispatcher {
-    /// Somebody gives a train plain orders: its journey ends, and it takes what is ahead of it.
+    /// A person gives a train plain orders: its journey ends, and the track ahead of it is reserved.
     pub(super) fn take_over(&mut self, now: Timestamp, id: TrainId) -> Result<(), Refusal> {
         let train = self.trains.get_mut(&id).ok_or(Refusal::UnknownTrain { train: id })?;
         train.asked = None;
@@ -31,7 +31,7 @@ impl Dispatcher {
         Ok(())
     }
 
-    /// A train that was driven by hand is to be sent somewhere: it comes to rest first.
+    /// A train driven by hand gets a journey: it comes to rest first.
     pub(super) fn give_back(&mut self, now: Timestamp, id: TrainId) {
         if self.trains.get(&id).is_some_and(|train| train.state == State::ByHand)
             && !self.rest_by_hand(now, id)
@@ -40,10 +40,10 @@ impl Dispatcher {
         }
     }
 
-    /// A train that was driven by hand and stands, with nothing more to do, holds no more than where it stands; whether it
+    /// A train driven by hand that is at rest without an order reserves no more than the track under it. Returns whether it
     /// does.
     pub(super) fn rest_by_hand(&mut self, now: Timestamp, id: TrainId) -> bool {
-        let is_done = self.watchdog.driver().stands(id, now) && self.watchdog.driver().busy(id).is_none();
+        let is_done = self.watchdog.driver().is_at_rest(id, now) && self.watchdog.driver().busy(id).is_none();
         let is_known = self.watchdog.driver().locate(id, now).is_some();
         if is_done && is_known {
             self.halted(now, id, true);
@@ -51,13 +51,13 @@ impl Dispatcher {
         is_done && is_known
     }
 
-    /// A train that nobody knew to be anywhere has passed a contact while it runs.
+    /// A lost train has passed a sensor while it runs.
     pub(super) fn found_by_hand(&mut self, now: Timestamp, id: TrainId) {
         self.set_state(id, State::ByHand);
         self.drive_by_hand(now, id);
     }
 
-    /// Takes more of the track ahead, and lets go of what is behind.
+    /// Reserves more of the track ahead, and releases what is behind.
     pub(super) fn drive_by_hand(&mut self, now: Timestamp, id: TrainId) {
         let Some(train) = self.trains.get(&id) else { return };
         let (Some(place), Some(located)) =
@@ -71,7 +71,7 @@ impl Dispatcher {
             let runs_on = rest.way - located.at.way + self.overrun(id, located.uncertainty);
             runs_on.max(AHEAD[0]).min(AHEAD[1])
         });
-        let (way, at) = Way::around(
+        let (path, at) = Path::around(
             layout,
             self.watchdog.driver().turnouts(),
             place,
@@ -79,7 +79,8 @@ impl Dispatcher {
             room.behind,
             ahead + room.ahead,
         );
-        // Who follows another train shares its track, and that of whom it follows in turn: the driver keeps gaps safe.
+        // A train that follows another may run over its track, and so on along the row: the driver keeps gaps safe. It reserves
+        // none of it, or its leader would be stopped before its own follower.
         let mut row = alloc::vec![id];
         while let Some(leader) = row
             .last()
@@ -88,34 +89,39 @@ impl Dispatcher {
         {
             row.push(leader);
         }
-        let is_free = |end: Length| {
-            let taken = self.reserved(way.reservation(layout, at - room.behind, end + room.ahead));
-            self.trains.values().all(|other| row.contains(&other.id) || !other.held.meets(&taken))
+        let is_free = |end: Length, shared: &[TrainId]| {
+            let taken = self.reserved(path.reservation(layout, at - room.behind, end + room.ahead));
+            self.trains.values().all(|other| shared.contains(&other.id) || !other.held.meets(&taken))
         };
-        let reach = (way.length() - room.ahead).min(at + ahead);
-        let mut end = reach;
-        while end > at && !is_free(end) {
-            end -= EVERY;
-        }
-        let end = end.max(at);
-        if !is_free(end) {
-            // Not even where it stands: it keeps what it held, and stays.
-            self.watchdog.set_limit(now, id, Some(located.at));
+        let free_until = |from: Length, shared: &[TrainId]| {
+            let mut end = from;
+            while end > at && !is_free(end, shared) {
+                end -= EVERY;
+            }
+            end.max(at)
+        };
+        let reach = (path.length() - room.ahead).min(at + ahead);
+        let end = free_until(reach, &row);
+        if !is_free(end, &row) {
+            // Not even the track under it is free: it keeps its reservation, and stays.
+            self.watchdog.set_end_of_authority(now, id, Some(located.at));
             return;
         }
-        let mut held = self.reserved(way.reservation(layout, at - room.behind, end + room.ahead));
+        let own_end = free_until(end, &[id]);
+        let mut held = self.reserved(path.reservation(layout, at - room.behind, own_end + room.ahead));
         self.take_anchors(now, id, place, &mut held);
-        if self.watchdog.driver().is_in_doubt(id) {
+        if self.watchdog.driver().is_position_ambiguous(id) {
             held.add(layout, &train.held);
         }
-        // What is free as far as anybody looks is no limit, and neither is a turnout of which nobody knows how it lies:
-        // whoever drives by hand sees it.
+        // Free track up to the horizon is no limit, and neither is a turnout of unknown position: the person who drives sees
+        // it.
         let limit = (end < reach).then(|| {
-            let limit =
-                way.place(end).and_then(|place| self.watchdog.driver().way_point(id, located.at.node, place));
+            let limit = path
+                .place(end)
+                .and_then(|place| self.watchdog.driver().way_point(id, located.at.node, place));
             limit.filter(|limit| limit.way >= located.at.way).unwrap_or(located.at)
         });
-        self.watchdog.set_limit(now, id, limit);
+        self.watchdog.set_end_of_authority(now, id, limit);
         if let Some(train) = self.trains.get_mut(&id)
             && train.held != held
         {

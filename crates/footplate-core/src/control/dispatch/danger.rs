@@ -1,7 +1,8 @@
-//! While a train is in danger nobody sets out, and it is let crawl once all others stand.
+//! While a train is in danger no other sets out, and it gets clearance to creep once all others are at rest.
 
 use alloc::vec::Vec;
 
+use crate::control::supervise::Alarm;
 use crate::ids::TrainId;
 use crate::time::Timestamp;
 use crate::units::Length;
@@ -11,14 +12,17 @@ use super::dispatcher::Dispatcher;
 use super::reservation::{Reservation, Span};
 use crate::control::Notice;
 
-/// Track of two trains that touches is track of both: so much is left between them.
+/// The gap between two reservations: those that touch overlap.
 const APART: Length = Length::from_mm(1.0);
 
 impl Dispatcher {
     /// Reacts to a notice of the watchdog.
     pub(super) fn hear_of_danger(&mut self, now: Timestamp, notice: &Notice) {
         match notice {
-            Notice::Danger { train, stopped, .. } => {
+            Notice::Danger { train, stopped, why, .. } => {
+                if matches!(why, Alarm::Lost | Alarm::Elsewhere(_)) {
+                    self.doubt_turnouts();
+                }
                 for stopped in stopped {
                     self.gives_up(*stopped);
                 }
@@ -31,7 +35,7 @@ impl Dispatcher {
             Notice::Recovered { train, .. } => {
                 self.crawlers.remove(train);
                 if let Some(known) = self.trains.get_mut(train) {
-                    // What it was granted is long behind it.
+                    // It has left the track of its authority.
                     known.held = Reservation::empty();
                     known.kept = Reservation::empty();
                     known.seen_since_start = true;
@@ -55,14 +59,20 @@ impl Dispatcher {
         self.is_stirred = true;
     }
 
-    /// Lets a train in danger crawl once all others stand: from then on nobody but it moves. Whether one was let.
+    /// A train was not where it should have been: turnouts may lie otherwise than they were commanded, several at once. Each
+    /// is commanded again before another train relies on it.
+    fn doubt_turnouts(&mut self) {
+        self.commanded.values_mut().for_each(|commanded| commanded.times = 0);
+    }
+
+    /// Clears a train in danger to creep once all others are at rest: from then on no other moves. Returns whether one was.
     pub(super) fn let_crawl(&mut self, now: Timestamp) -> bool {
         let mut is_let = false;
         let crawlers: Vec<TrainId> = self.crawlers.iter().copied().collect();
         for id in crawlers {
             let others = self.trains.keys().filter(|other| **other != id);
             let moves = |other: &TrainId| {
-                !self.watchdog.is_in_danger(*other) && !self.watchdog.driver().stands(*other, now)
+                !self.watchdog.is_in_danger(*other) && !self.watchdog.driver().is_at_rest(*other, now)
             };
             if !others.copied().any(|other| moves(&other)) {
                 self.crawlers.remove(&id);
@@ -77,7 +87,7 @@ impl Dispatcher {
         is_let
     }
 
-    /// All that nobody else holds: a train that is let crawl may come onto any of it, and nobody else sets out.
+    /// All track that no other train has reserved: a creeping train may enter any of it, and no other sets out.
     fn all_that_is_free(&self, id: TrainId) -> Reservation {
         let layout = self.watchdog.driver().layout();
         let others = || self.trains.values().filter(|other| other.id != id);

@@ -1,9 +1,8 @@
-//! Trains at rest in each other's way: who steps aside, and where to.
+//! Deadlocks: which train steps aside, and where to.
 //!
-//! Everybody who runs has all the track to its destination and will come to rest. So trains can only wait for ever for
-//! trains at rest, and those can be sent somewhere else. Looked for is a short sequence of such moves, each possible
-//! after the ones before it, after which the train that waits has a free way; breadth first, the quickest of the
-//! shortest.
+//! A running train has reserved all the track to its destination and comes to rest there. So a train can only wait for ever
+//! for trains at rest, and those can be moved. The search looks for a short sequence of moves, each possible after those
+//! before it, that leaves a free path for the waiting train: breadth first, the quickest of the shortest.
 
 use alloc::vec::Vec;
 
@@ -22,36 +21,38 @@ use super::parking::{OFF, PARKED};
 use super::reservation::Reservation;
 use crate::control::Notice;
 
-/// How much is tried before a search gives up until something else has changed.
+/// The limits of a search; beyond them it gives up until something has changed.
 #[derive(Debug, Clone, Copy)]
 struct Effort {
-    /// Ways looked for.
+    /// Path searches.
     tried: usize,
-    /// Moves that one sequence may take.
+    /// Moves in one sequence.
     moves: usize,
-    /// Of all places for a train to step aside to, so many are tried, the soonest reached.
+    /// Places tried for one train to step aside to, the quickest to reach first.
     places: usize,
-    /// Whether a train may step aside to where it partly stands or may stand already: to come by a contact, after which it
-    /// holds less.
+    /// Whether a train may step aside to a place that overlaps its reservation: a sensor on the way makes that smaller.
     near: bool,
-    /// Of all scenes after a move that does not help by itself, so many are looked at further.
+    /// Scenes kept for the next move, of those in which the last move alone did not help.
     kept: usize,
 }
 
-/// While others run: a few milliseconds.
+/// While other trains run: a few milliseconds.
 const USUAL: Effort = Effort { tried: 150, moves: 2, places: 6, near: false, kept: 4 };
-/// When nobody runs, and nobody would for ever: a tenth of a second does not matter.
+/// When no train runs, and none would: a tenth of a second does not matter.
 const THOROUGH: Effort = Effort { tried: 1_500, moves: 4, places: 12, near: true, kept: 16 };
-/// What was tried in vain is not tried again for so long.
+/// After a search in vain for one train, the next one waits this long.
 const IN_VAIN: TimeSpan = TimeSpan::from_s(6.0);
 
-/// When others have stepped aside so often for a train that still waits, it is somebody else's turn.
+/// When others have stepped aside this often for a train that still waits, it goes to the end of the queue.
 const ROOMS_IN_A_ROW: u32 = 4;
 
-/// When that was in vain, it is not tried again for so long.
-const THINKS_AGAIN: TimeSpan = TimeSpan::from_s(15.0);
+/// After so many thorough searches in vain a train that no sensor has confirmed is located again.
+const SEARCHES_IN_VAIN: u8 = 4;
 
-/// A train at rest, here or there.
+/// After a thorough search in vain, the next one waits this long.
+const SEARCHES_AGAIN: TimeSpan = TimeSpan::from_s(15.0);
+
+/// A train at rest at a real or a hypothetical place.
 #[derive(Debug, Clone)]
 struct Stander {
     id: TrainId,
@@ -59,10 +60,10 @@ struct Stander {
     held: Reservation,
 }
 
-/// What it counts in seconds that a train stands on a turnout.
+/// The penalty for a place on a turnout, in seconds.
 const ON_TURNOUT_S: f64 = 30.0;
 
-/// Trains at rest somewhere, and the moves that brought them there.
+/// Places of all trains at rest, and the moves that lead there.
 #[derive(Debug, Clone)]
 struct Scene {
     standers: Vec<Stander>,
@@ -71,15 +72,15 @@ struct Scene {
 }
 
 impl Dispatcher {
-    /// Sends trains at rest out of the way of one, if only such are in its way.
+    /// Moves trains at rest off the path of one, if only trains at rest block it.
     pub(super) fn make_room(&mut self, now: Timestamp, id: TrainId, targets: &[Position], wish: &Proposal) {
-        let mut in_the_way = self.trains.values().filter(|other| other.id != id && wish.meets(&other.held));
-        let all_rest = in_the_way.all(|other| other.is_ready(now));
-        let somebody_makes_room = self
+        let mut blocking = self.trains.values().filter(|other| other.id != id && wish.meets(&other.held));
+        let all_rest = blocking.all(|other| other.is_ready(now));
+        let another_makes_room = self
             .trains
             .values()
             .any(|train| matches!(train.purpose, Purpose::Aside(_)) && !train.course.is_empty());
-        if !all_rest || somebody_makes_room {
+        if !all_rest || another_makes_room {
             return;
         }
         if self.trains.get(&id).is_none_or(|train| now < train.no_room_until) {
@@ -92,7 +93,7 @@ impl Dispatcher {
         }
     }
 
-    /// Looks for moves after which a train has a free way, and begins with the first; whether there are any.
+    /// Looks for moves that leave a free path for a train, and begins the first. Returns whether there are any.
     fn resolve_deadlock(
         &mut self,
         now: Timestamp,
@@ -104,7 +105,8 @@ impl Dispatcher {
         let found = self.resolved_deadlock(now, id, targets, wish, effort).and_then(|moves| {
             let (first, place) = moves.first().copied()?;
             let start = self.start(now, first)?;
-            let proposal = self.propose(&start, &self.both_ways(place), &self.obstacles_of_others(first))?;
+            let proposal =
+                self.propose(&start, &self.both_directions(place), &self.obstacles_of_others(first))?;
             self.is_free(first, &proposal).then_some((moves, place, proposal))
         });
         let Some((moves, place, proposal)) = found else { return false };
@@ -123,15 +125,15 @@ impl Dispatcher {
         true
     }
 
-    /// Nobody runs and no sequence of moves was found that helps: more is tried for each of those that wait in turn; and if
-    /// that is in vain, too, trains take turns in going somewhere else, so that the next search begins from other places.
+    /// No train runs and no sequence of moves was found. A thorough search is made for one waiting train after the other; if
+    /// it fails too, one train goes anywhere else, so that the next search begins from other places.
     pub(super) fn shuffle(&mut self, now: Timestamp, waiting: &[TrainId]) {
         if self.trains.values().any(|train| !train.course.is_empty()) {
             return;
         }
         let turn = self.shuffled.checked_rem(waiting.len()).and_then(|turn| waiting.get(turn));
         let Some(id) = turn.copied() else { return };
-        let is_due = self.thought.is_none_or(|last| now - last >= THINKS_AGAIN);
+        let is_due = self.thought.is_none_or(|last| now - last >= SEARCHES_AGAIN);
         if is_due
             && let Some((targets, start)) = self.targets(id).zip(self.start(now, id))
             && let Some(wish) = self.wish(id, &start, &targets)
@@ -141,7 +143,10 @@ impl Dispatcher {
                 return;
             }
             self.thought = Some(now);
-            // More room than usual to come to rest in is not worth standing for ever.
+            if self.doubts_a_place(now) {
+                return;
+            }
+            // Extra room for stops is not worth a deadlock.
             self.trains.values_mut().for_each(|train| train.caution = 1.0);
         }
         let ready: Vec<TrainId> =
@@ -158,14 +163,37 @@ impl Dispatcher {
         }
     }
 
-    /// A place that a train at rest can go to now: each time another one of those that are soonest reached.
+    /// No move helps: what blocks the others may be a train that is not where it is believed to be. A train that a sensor did
+    /// not report, or that may not have left at all, may look back; after [`SEARCHES_IN_VAIN`] searches the first of them is
+    /// located again. Whether there is one.
+    fn doubts_a_place(&mut self, now: Timestamp) -> bool {
+        self.searches_in_vain += 1;
+        let is_unseen = |train: &&DispatchedTrain| {
+            let unseen = self.watchdog.driver().missed_sensor(train.id, now).is_some();
+            train.is_ready(now) && (unseen || !train.seen_since_start)
+        };
+        let unseen: Vec<TrainId> = self.trains.values().filter(is_unseen).map(|train| train.id).collect();
+        if unseen.iter().any(|id| self.begins_to_look_back(*id)) {
+            return true;
+        }
+        let Some(first) = unseen.first().copied().filter(|_| self.searches_in_vain >= SEARCHES_IN_VAIN)
+        else {
+            return false;
+        };
+        self.searches_in_vain = 0;
+        self.lose(now, first);
+        true
+    }
+
+    /// A place that a train at rest can go to now: a different one of the quickest to reach each time.
     fn elsewhere(&self, now: Timestamp, id: TrainId) -> Option<(Position, Proposal)> {
         let start = self.start(now, id)?;
         let obstacles = self.obstacles_of_others(id);
         let reached = self.search(&start, &obstacles).from(Some(start.place), self.turned(&start));
         let train = self.trains.get(&id)?;
         let places = train.parking.iter().filter_map(|(place, is_clear)| {
-            let itinerary = reached.to(&self.both_ways(*place)).into_iter().next().filter(|_| *is_clear)?;
+            let itinerary =
+                reached.to(&self.both_directions(*place)).into_iter().next().filter(|_| *is_clear)?;
             let proposal = self.proposal(&start, itinerary)?;
             self.is_free(id, &proposal).then_some((*place, proposal))
         });
@@ -199,7 +227,7 @@ impl Dispatcher {
         proposal.runs.iter().all(|run| self.is_free_for(id, &run.taken))
     }
 
-    fn both_ways(&self, place: Position) -> Vec<Position> {
+    fn both_directions(&self, place: Position) -> Vec<Position> {
         [Some(place), self.watchdog.driver().layout().reversed(place)].into_iter().flatten().collect()
     }
 
@@ -207,7 +235,7 @@ impl Dispatcher {
         self.watchdog.driver().layout().edge(place.edge).map_or(crate::ids::NodeId(0), |edge| edge.from)
     }
 
-    /// Moves after which a train has a free way.
+    /// Moves that leave a free path for a train.
     fn resolved_deadlock(
         &self,
         now: Timestamp,
@@ -233,8 +261,8 @@ impl Dispatcher {
             let mut best: Option<Scene> = None;
             for scene in &scenes {
                 for (nth, mover) in scene.standers.iter().enumerate() {
-                    let is_in_the_way = mover.id == id || wish.meets(&mover.held) || !scene.moves.is_empty();
-                    if !is_in_the_way && scenes.len() == 1 && best.is_some() {
+                    let is_blocking = mover.id == id || wish.meets(&mover.held) || !scene.moves.is_empty();
+                    if !is_blocking && scenes.len() == 1 && best.is_some() {
                         continue;
                     }
                     for (place, held, seconds) in self.asides(now, scene, nth, &fixed, wish, effort) {
@@ -273,7 +301,7 @@ impl Dispatcher {
         None
     }
 
-    /// Places that one of the trains in a scene can go to: out of the way of the wish first, the soonest first.
+    /// Places that a train of a scene can go to: off the wished path first, then the quickest to reach.
     fn asides(
         &self,
         now: Timestamp,
@@ -293,11 +321,11 @@ impl Dispatcher {
         let Some(train) = self.trains.get(&mover.id) else { return Vec::new() };
         let room = ClearanceEnvelope::of(train.lengths, PARKED, start.room.overrun);
         let room = ClearanceEnvelope { ahead: room.ahead + OFF, behind: room.behind + OFF, ..room };
-        // Out of the way first, then off the turnouts, then the soonest.
+        // Off the wished path first, then clear of turnouts, then the quickest.
         let mut places: Vec<(bool, Position, Reservation, f64)> = Vec::new();
         for (place, is_clear) in train.parking.iter().copied() {
-            let ways = self.both_ways(place);
-            let soonest = ways.iter().filter_map(|place| reached.seconds_to(*place)).reduce(f64::min);
+            let directions = self.both_directions(place);
+            let soonest = directions.iter().filter_map(|place| reached.seconds_to(*place)).reduce(f64::min);
             let Some(seconds) = soonest else { continue };
             let held = self.reserved(standing(
                 layout,
@@ -306,17 +334,17 @@ impl Dispatcher {
                 &OccupiedPath::default(),
                 room,
             ));
-            // A little further on may be out of the way already, at the end of a siding; otherwise it would be no move.
-            let gets_out = wish.meets(&mover.held) && !wish.meets(&held);
-            if gets_out || effort.near || !held.meets(&mover.held) {
+            // A place that overlaps the reservation counts only if it frees the path, as at the end of a siding.
+            let frees_path = wish.meets(&mover.held) && !wish.meets(&held);
+            if frees_path || effort.near || !held.meets(&mover.held) {
                 let seconds = if is_clear { seconds } else { seconds + ON_TURNOUT_S };
                 places.push((wish.meets(&held), place, held, seconds));
             }
         }
         places.sort_by(|one, other| one.0.cmp(&other.0).then(one.3.total_cmp(&other.3)));
-        // Where it comes to stand it needs the turnout whose leg that is on: its place is counted over that.
+        // On a leg it needs the turnout, too: its place is counted over that.
         let can_go = |(_, place, mut held, seconds): (bool, Position, Reservation, f64)| {
-            let itinerary = reached.to(&self.both_ways(place)).into_iter().next()?;
+            let itinerary = reached.to(&self.both_directions(place)).into_iter().next()?;
             let proposal = self.proposal(&start, itinerary)?;
             let stop = proposal.itinerary.runs.last()?.stop;
             let own = layout.needs_of(stop.edge).filter(|need| need.facing);
@@ -326,7 +354,7 @@ impl Dispatcher {
         places.into_iter().filter_map(can_go).take(effort.places).collect()
     }
 
-    /// How long a train takes to its destination in a scene; `None` if it cannot go there.
+    /// The running time to its destination in a scene; `None` if the path is blocked.
     fn goes(
         &self,
         now: Timestamp,
@@ -351,7 +379,7 @@ impl Dispatcher {
         }
         let lengths = self.trains.get(&stander.id)?.lengths;
         let room = ClearanceEnvelope::of(lengths, PARKED, start.room.overrun);
-        let turned = self.watchdog.driver().turned_place_at(stander.place);
+        let turned = self.watchdog.driver().reversed_position_at(stander.place);
         Some(Start {
             place: stander.place,
             room,

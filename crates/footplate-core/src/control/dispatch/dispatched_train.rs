@@ -1,4 +1,4 @@
-//! One train as its dispatcher sees it: what it shall do, what it has been granted and what it holds.
+//! A dispatched train: its journey, its authorities and its reservation.
 
 use alloc::collections::{BTreeSet, VecDeque};
 use alloc::vec::Vec;
@@ -14,14 +14,14 @@ use super::movement_authority::MovementAuthority;
 use super::occupied_path::OccupiedPath;
 use super::reservation::Reservation;
 
-/// A journey that was asked for and has not ended.
+/// A journey that has not ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Asked {
     pub(super) order: OrderId,
     pub(super) journey: Journey,
     pub(super) place: Position,
     pub(super) since: Timestamp,
-    /// Since when it has been waiting for its turn: others that came to wait later are looked at later.
+    /// When it joined the queue: trains are examined in this order.
     pub(super) queues: Timestamp,
 }
 
@@ -29,29 +29,29 @@ pub(super) struct Asked {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
     Journey,
-    /// To make room for another, or itself.
+    /// To make room for another train, or for itself.
     Aside(TrainId),
 }
 
-/// How far a train is.
+/// What a train is doing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum State {
-    /// It stands, and nothing has been granted to it.
+    /// At rest, without authority.
     Resting,
-    /// Turnouts are being thrown for its next run; when they will have moved, once all have been told.
+    /// Its route is being set; `ready` is when the points have moved, once all commands have left.
     Setting { ready: Option<Timestamp>, since: Timestamp },
-    /// It turns around.
+    /// It reverses.
     Turning { order: OrderId },
-    /// It runs. Its rear end has certainly come as far as this on the way, and whether a contact has said so.
+    /// It runs. Its rear end has certainly come as far as `rear` on the path; `confirmed`: a sensor has said so.
     Running { order: OrderId, rear: Length, confirmed: bool },
-    /// It was commanded to stop, and nothing is known of where it will go then; whether a contact said where it is, and whether
-    /// that was on track that it had not been granted.
+    /// It was commanded to stop, without a plan for afterwards. `confirmed`: a sensor reported it; `strayed`: on track that was
+    /// not reserved for it.
     Halting { confirmed: bool, strayed: bool },
-    /// Somebody drives it by hand.
+    /// A person drives it.
     ByHand,
-    /// Nobody knows where it is.
+    /// Its place is unknown.
     Lost,
-    /// It is not as it was: its watchdog brings it back.
+    /// Its watchdog stopped it, and locates and measures it again.
     InDanger,
 }
 
@@ -62,44 +62,46 @@ pub(super) struct DispatchedTrain {
     pub(super) lengths: TrainLengths,
     pub(super) asked: Option<Asked>,
     pub(super) purpose: Purpose,
-    /// The journey that its runs were granted for; another may have been asked for since.
+    /// The journey that its runs were authorised for; another may have been ordered since.
     pub(super) granted_for: Option<OrderId>,
-    /// The last run to its destination, of a train that comes to rest before the end of it.
+    /// The last run to its destination, of a train that was stopped before its end.
     pub(super) last_run: Option<MovementAuthority>,
-    /// The runs granted, the present one first.
+    /// The authorised runs, the present one first.
     pub(super) course: VecDeque<MovementAuthority>,
     pub(super) state: State,
-    /// All that it holds.
+    /// Its reservation.
     pub(super) held: Reservation,
-    /// What it held before and still might be on.
+    /// What it had reserved before and may still be on.
     pub(super) kept: Reservation,
-    /// Turnouts that cannot be thrown for its present run because it stands on them.
+    /// Turnouts that cannot be thrown for its present run because it is on them.
     pub(super) skipped: BTreeSet<TurnoutId>,
-    /// Where it can stand, and whether clear of all turnouts.
+    /// Places where it can be at rest, each with whether it is clear of all turnouts.
     pub(super) parking: Vec<(Position, bool)>,
-    /// Where it came from.
+    /// The path by which it came.
     pub(super) came: OccupiedPath,
-    /// How often others stepped aside for it since it set out last, or went to the end of the queue.
+    /// How often others have stepped aside for it since it last left, or went to the end of the queue.
     pub(super) rooms_made: u32,
-    /// Nobody is sent out of its way before this: it was tried in vain.
+    /// No train is moved for it before this: a search failed.
     pub(super) no_room_until: Timestamp,
-    /// Whether a contact has reported it since it turned around, or since a person put it there.
+    /// Whether a sensor has reported it since it reversed, or since a person placed it.
     pub(super) seen_since_turn: bool,
-    /// Whether a contact has reported it since it set out last. Until then it may not have left at all: starts get stuck on dirt.
+    /// Whether a sensor has reported it since it last left. Until then it may still be there: trains get stuck on dirt.
     pub(super) seen_since_start: bool,
-    /// It was not seen where it should have been, and ahead of it there is nowhere to be seen: it is looked for behind.
+    /// A sensor did not report it, and no path leads ahead: it looks back.
     pub(super) looks_back: bool,
-    /// How long it would take from where it stands if nobody were in its way, in seconds; `None` until it was looked for.
+    /// It has run a short distance ahead for the same reason since a sensor reported it last.
+    pub(super) has_looked_ahead: bool,
+    /// The running time from here without other trains, in seconds; `None` until it was calculated.
     pub(super) unobstructed_s: Option<f64>,
-    /// How many times as much it is given to come to rest in as usual: it was stopped for its limit.
+    /// The factor on its overrun: above 1 after it was stopped at its end of authority.
     pub(super) caution: f64,
-    /// When it was last looked at while it waited.
+    /// When it was last examined while it waited.
     pub(super) looked_at: Timestamp,
-    /// Nothing is granted to it before this.
+    /// It gets no authority before this.
     pub(super) not_before: Timestamp,
-    /// How many times in a row what was granted to it could not be begun.
+    /// How many times in a row its authority was withdrawn.
     pub(super) withdrawn: u8,
-    /// Whether it was said that it waits.
+    /// Whether a notice has said that it waits.
     pub(super) waits_said: bool,
 }
 
@@ -124,6 +126,7 @@ impl DispatchedTrain {
             seen_since_turn: false,
             seen_since_start: true,
             looks_back: false,
+            has_looked_ahead: false,
             unobstructed_s: None,
             caution: 1.0,
             looked_at: Timestamp::ZERO,
@@ -133,17 +136,17 @@ impl DispatchedTrain {
         }
     }
 
-    /// Whether it stands and can be given something to do.
+    /// Whether it is at rest without authority.
     pub(super) fn rests(&self) -> bool {
         self.state == State::Resting
     }
 
-    /// Whether nobody else may throw a turnout because it was granted this, or stands there.
+    /// Whether a turnout is reserved for it.
     pub(super) fn keeps(&self, turnout: TurnoutId) -> bool {
         self.state != State::ByHand && self.held.takes(turnout)
     }
 
-    /// Whether that can be now.
+    /// Whether it can be given an authority now.
     pub(super) fn is_ready(&self, now: Timestamp) -> bool {
         self.rests() && self.not_before <= now
     }

@@ -1,4 +1,4 @@
-//! Sends trains to where they are asked to go, and grants each the track that it needs before it goes there.
+//! The dispatcher: sends trains to their destinations, each on track that is reserved for it alone.
 
 use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
 use alloc::vec::Vec;
@@ -23,49 +23,51 @@ use super::reservation::Reservation;
 use super::turnout_command::TurnoutCommand;
 use crate::control::Notice;
 
-/// How often it looks what can be done while something waits to be.
+/// How often the dispatcher acts while a train waits or runs.
 pub(super) const LOOK: TimeSpan = TimeSpan::from_ms(200);
 
-/// Trains at rest that wait are looked at again after this long even if nothing has changed.
+/// Waiting trains are examined again after this, even if nothing has changed.
 const AGAIN: TimeSpan = TimeSpan::from_s(1.0);
 
-/// What follows from what at one moment is followed so far; the rest waits until the next look.
+/// The most rounds of consequences at one moment; the rest waits for the next look.
 const MOST_ROUNDS: usize = 50;
 
-/// Keeps trains apart, and sends them on their ways.
+/// Keeps trains apart and sends them to their destinations.
 #[derive(Debug, Clone)]
 pub struct Dispatcher {
     pub(super) watchdog: Watchdog,
-    /// Trains that were in danger and wait to be let crawl.
+    /// Trains in danger that wait for clearance to creep.
     pub(super) crawlers: BTreeSet<TrainId>,
     pub(super) trains: BTreeMap<TrainId, DispatchedTrain>,
-    /// How turnouts were set, and how often and when last since anything said that they lay otherwise.
+    /// How each turnout was set, how often, and when last, since a train showed that it lay otherwise.
     pub(super) commanded: BTreeMap<TurnoutId, TurnoutCommand>,
-    /// Turnouts that were asked for and not told yet, for whom and since when.
+    /// Turnouts whose command has not left yet, with the train and the time of the request.
     pub(super) throwing: BTreeMap<TurnoutId, (TrainId, Timestamp)>,
     pub(super) outputs: VecDeque<Output<Notice>>,
-    /// Whether anything has changed since trains at rest were last looked at.
+    /// Whether anything has changed since trains at rest were last examined.
     pub(super) is_stirred: bool,
-    /// How often trains were moved only to have other places to begin from.
+    /// How often a train was moved only to change the places that a search begins from.
     pub(super) shuffled: usize,
-    /// When it last thought hard, and in vain, about who could make room for whom.
+    /// When the last thorough search for moves failed.
     pub(super) thought: Option<Timestamp>,
-    /// What is taken of a block is all of it; `None` where track is taken to the millimetre.
+    /// How many thorough searches in a row found no move that helps.
+    pub(super) searches_in_vain: u8,
+    /// The blocks that are reserved as a whole; `None` where track is reserved to the millimetre.
     blocks: Option<Blocks>,
     looks_at: Option<Timestamp>,
-    /// When it last looked at trains at rest.
+    /// When trains at rest were last examined.
     arranged: Option<Timestamp>,
 }
 
 impl Dispatcher {
-    /// Dispatches the trains of a driver. Turnouts that it knows lie as it says.
+    /// Dispatches the trains of a driver. Turnouts are taken to lie as it says, and commanded again before they are used.
     #[must_use]
     pub fn new(now: Timestamp, driver: Driver) -> Self {
         Self::over(now, Watchdog::unwatched(driver, now))
     }
 
-    /// The same with a [`Watchdog`] over the driver: while a train is in danger nobody sets out, and it is found and
-    /// measured again once all others stand.
+    /// The same with a [`Watchdog`] over the driver: while a train is in danger no other sets out, and it is located and
+    /// measured again once all others are at rest.
     #[must_use]
     pub fn watched(now: Timestamp, driver: Driver) -> Self {
         let mut watchdog = Watchdog::new(driver, now);
@@ -75,8 +77,9 @@ impl Dispatcher {
 
     fn over(now: Timestamp, watchdog: Watchdog) -> Self {
         let layout = watchdog.driver().layout();
-        let lies =
-            |turnout| Some((turnout, TurnoutCommand::sure(now, watchdog.driver().turnouts().get(turnout)?)));
+        let lies = |turnout| {
+            Some((turnout, TurnoutCommand::remembered(now, watchdog.driver().turnouts().get(turnout)?)))
+        };
         let commanded = layout.turnouts().filter_map(|(turnout, _)| lies(turnout)).collect();
         let ids: Vec<TrainId> = watchdog.driver().trains().collect();
         let mut dispatcher = Self {
@@ -89,6 +92,7 @@ impl Dispatcher {
             is_stirred: true,
             shuffled: 0,
             thought: None,
+            searches_in_vain: 0,
             blocks: None,
             looks_at: None,
             arranged: None,
@@ -99,7 +103,7 @@ impl Dispatcher {
         dispatcher
     }
 
-    /// Says how long a train is. Until then it is taken for a long locomotive.
+    /// Sets the lengths of a train; without them it counts as a long locomotive.
     pub fn set_lengths(&mut self, now: Timestamp, train: TrainId, lengths: TrainLengths) {
         self.watchdog.driver_mut().set_reach(train, lengths.ahead(), lengths.behind());
         let known = self.trains.entry(train).or_insert_with(|| DispatchedTrain::new(train, lengths));
@@ -114,18 +118,18 @@ impl Dispatcher {
         }
     }
 
-    /// Takes the track between contacts as a whole from now on, with all turnouts there, as block systems do. Without this,
-    /// and better, trains take what they need to the millimetre.
+    /// Reserves the track between sensors as a whole from now on, with all turnouts there, as block systems do. Without this
+    /// trains reserve what they need to the millimetre, which is better.
     pub fn reserve_blocks(&mut self) {
         self.blocks = Some(Blocks::of(self.watchdog.driver().layout()));
     }
 
-    /// Whether no other train holds any of what a train would take.
+    /// Whether no other train has reserved any of this.
     pub(super) fn is_free_for(&self, id: TrainId, taken: &Reservation) -> bool {
         self.trains.values().all(|other| other.id == id || !other.held.meets(taken))
     }
 
-    /// What is taken for a train that needs this.
+    /// The reservation for a train that needs this: whole blocks, where blocks are reserved.
     pub(super) fn reserved(&self, needed: Reservation) -> Reservation {
         match &self.blocks {
             Some(blocks) => blocks.around(self.watchdog.driver().layout(), &needed),
@@ -133,7 +137,7 @@ impl Dispatcher {
         }
     }
 
-    /// What drives the trains.
+    /// The driver of the trains.
     #[must_use]
     pub const fn driver(&self) -> &Driver {
         self.watchdog.driver()
@@ -145,13 +149,13 @@ impl Dispatcher {
         self.watchdog.is_interrupted(now, train)
     }
 
-    /// What a train holds: nobody else is let onto it.
+    /// The reservation of a train: no other train may enter it.
     #[must_use]
     pub fn holds(&self, train: TrainId) -> Option<&Reservation> {
         self.trains.get(&train).map(|train| &train.held)
     }
 
-    /// The destination of a train, as long as it has not come there.
+    /// The journey of a train that has not ended, with its order.
     #[must_use]
     pub fn journey(&self, train: TrainId) -> Option<(OrderId, Journey)> {
         self.trains.get(&train)?.asked.map(|asked| (asked.order, asked.journey))
@@ -162,7 +166,7 @@ impl Dispatcher {
         self.watchdog.set_model(model);
     }
 
-    /// A person put a train there, or read off where it stands.
+    /// A person put a train there, or read its place off.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
         self.watchdog.place(now, train, at, uncertainty);
         if let Some(known) = self.trains.get_mut(&train) {
@@ -176,10 +180,10 @@ impl Dispatcher {
         self.stand(now, train);
     }
 
-    /// Sends a train somewhere, as soon as there is a way. What it was asked for before ends.
+    /// Sends a train to a place as soon as a path is free. Its journey so far ends.
     ///
     /// # Errors
-    /// Why it can never go there.
+    /// Why it cannot go there.
     pub fn go(&mut self, now: Timestamp, train: TrainId, journey: Journey) -> Result<OrderId, Refusal> {
         let layout = self.watchdog.driver().layout();
         let place =
@@ -194,6 +198,7 @@ impl Dispatcher {
         if let Some(other) = self.trains.values().find(|other| is_nowhere(other)) {
             return Err(Refusal::OtherNowhere { train, other: other.id });
         }
+        self.set_unknown_turnouts(now)?;
         self.give_back(now, train);
         let order = self.watchdog.driver_mut().number();
         if let Some(known) = self.trains.get_mut(&train) {
@@ -206,19 +211,19 @@ impl Dispatcher {
         Ok(order)
     }
 
-    /// A person takes the power from the track, or gives it back; see [`Watchdog::switch_power`].
+    /// A person switches the track power off or on; see [`Watchdog::switch_power`].
     pub fn switch_power(&mut self, now: Timestamp, on: bool) {
         self.watchdog.switch_power(now, on);
         self.settle(now);
     }
 
-    /// What is heard of the station's line; see [`Watchdog::handle_link`].
+    /// Takes news of the link; see [`Watchdog::handle_link`].
     pub fn handle_link(&mut self, now: Timestamp, news: LinkNews) {
         self.watchdog.handle_link(now, news);
         self.settle(now);
     }
 
-    /// A train is not wanted at its destination any more. What it is granted it still runs.
+    /// Cancels the journey of a train. It still runs to its end of authority.
     pub fn call_off(&mut self, now: Timestamp, train: TrainId) {
         if let Some(known) = self.trains.get_mut(&train) {
             known.asked = None;
@@ -226,12 +231,11 @@ impl Dispatcher {
         self.settle(now);
     }
 
-    /// Passes an order on to the driver. A turnout that a train was granted is thrown for nobody else; ahead of one that is
-    /// driven by hand people throw them. No train is driven beyond what it holds: what lies ahead of it is taken as far as
-    /// it is free, as the turnouts lie.
+    /// Passes an order on to the driver. A turnout reserved for a train is refused, except ahead of one that is driven by hand.
+    /// No train runs beyond its reservation: the track ahead of it is reserved as far as it is free, as the turnouts lie.
     ///
     /// # Errors
-    /// As [`Driver::order`], and if the turnout is held.
+    /// As [`Driver::order`], and if the turnout is reserved.
     pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
         if let Order::Turnout { turnout, .. } = order
             && let Some(holder) = self.trains.values().find(|train| train.keeps(turnout))
@@ -249,14 +253,14 @@ impl Dispatcher {
         taken
     }
 
-    /// The room that a train needs, with what is not known of its place now.
+    /// The track that a train needs around it, with the present uncertainty of its place.
     pub(super) fn room(&self, now: Timestamp, train: &DispatchedTrain) -> ClearanceEnvelope {
         let located = self.watchdog.driver().locate(train.id, now);
         let uncertainty = located.map_or(Length::ZERO, |located| located.uncertainty);
         ClearanceEnvelope::of(train.lengths, uncertainty, self.overrun(train.id, uncertainty))
     }
 
-    /// What a train takes that has just come to rest at a known place: itself, and turnouts that decide where it is.
+    /// Reserves the track under a train at rest at a known place, and the turnouts over which that is counted.
     pub(super) fn stand(&mut self, now: Timestamp, id: TrainId) {
         self.free_anchors(now, id);
         let Some(train) = self.trains.get(&id) else { return };
@@ -266,7 +270,7 @@ impl Dispatcher {
         let mut held =
             self.reserved(standing(layout, self.watchdog.driver().turnouts(), place, &train.came, room));
         self.take_anchors(now, id, place, &mut held);
-        // What is another's is not taken for a doubt that has grown: the train is within what it held.
+        // A grown uncertainty takes no track of another train: this one is within what it had reserved.
         let is_free = self.is_free_for(id, &held);
         if let Some(train) = self.trains.get_mut(&id).filter(|train| is_free || train.held.is_empty()) {
             train.held = held;
@@ -275,11 +279,10 @@ impl Dispatcher {
         self.is_stirred = true;
     }
 
-    /// A train is counted from a contact behind it: turnouts in between decide where it is, as far as is known, and are
-    /// not thrown.
+    /// The place of a train is counted from a node behind it: turnouts in between decide where it is, and are not thrown.
     pub(super) fn take_anchors(&self, now: Timestamp, id: TrainId, place: Position, held: &mut Reservation) {
         let layout = self.watchdog.driver().layout();
-        // What was asked for it will be told, whatever it is asked to do since.
+        // Turnouts already requested for it will be thrown, whatever its orders are since.
         let asked_for =
             self.throwing.iter().filter(|(_, (train, _))| *train == id).map(|(turnout, _)| *turnout);
         let asked_for = asked_for.filter(|turnout| self.is_being_thrown(now, *turnout));
@@ -287,16 +290,17 @@ impl Dispatcher {
         anchors.chain(asked_for).for_each(|turnout| held.take_turnout(layout, turnout));
     }
 
-    /// A train at rest that was seen needs no turnouts behind it but the one whose leg it stands on.
+    /// Releases the turnouts behind a train at rest that was seen, but for the one whose leg it is on.
     pub(super) fn free_anchors(&mut self, now: Timestamp, id: TrainId) {
         let Some(place) = self.watchdog.driver().position(id, now) else { return };
         let own = self.watchdog.driver().layout().needs_of(place.edge).filter(|need| need.facing).count();
-        if self.watchdog.driver().unseen(id, now).is_none() && self.anchors(now, id, place).len() > own {
+        if self.watchdog.driver().missed_sensor(id, now).is_none() && self.anchors(now, id, place).len() > own
+        {
             self.watchdog.count_from_behind(now, id);
         }
     }
 
-    /// The turnouts from whose toes the way leads on to a train at a place, from where it is counted.
+    /// The turnouts met at their toes on the path to a place, from the node that the train is counted from.
     pub(super) fn anchors(&self, now: Timestamp, id: TrainId, place: Position) -> BTreeSet<TurnoutId> {
         let layout = self.watchdog.driver().layout();
         let mut anchors = BTreeSet::new();
@@ -304,7 +308,7 @@ impl Dispatcher {
             return anchors;
         };
         for _ in 0..layout.edges().len() {
-            let ahead = super::way::edge_from(layout, self.watchdog.driver().turnouts(), node);
+            let ahead = super::path::edge_from(layout, self.watchdog.driver().turnouts(), node);
             let Some((edge, known)) = ahead.and_then(|edge| Some((edge, layout.edge(edge)?))) else { break };
             anchors.extend(layout.needs_of(edge).filter(|need| need.facing).map(|need| need.turnout));
             if edge == place.edge {
@@ -319,7 +323,7 @@ impl Dispatcher {
         self.outputs.push_back(Output::Notice(notice));
     }
 
-    /// Hears what the driver has to say, and does what follows, until there is nothing more.
+    /// Takes all notices of the watchdog, and acts on them until nothing changes any more.
     pub(super) fn settle(&mut self, now: Timestamp) {
         if self.arranged.is_none_or(|last| now - last >= AGAIN) {
             self.is_stirred |= self.trains.values().any(|train| train.rests() && train.asked.is_some());
@@ -357,7 +361,7 @@ impl Dispatcher {
         self.looks_at = waits.then_some(now + LOOK);
     }
 
-    /// Takes note of how trains came to where they are.
+    /// Records the path by which trains came to where they are.
     fn follow(&mut self, now: Timestamp) {
         let layout = self.watchdog.driver().layout();
         for train in self.trains.values_mut() {
@@ -367,13 +371,13 @@ impl Dispatcher {
         }
     }
 
-    /// Tells a train to stop at once.
+    /// Commands a train to stop at once.
     pub(super) fn halt(&mut self, now: Timestamp, id: TrainId) {
         let _ = self.watchdog.order(now, Order::Speed { train: id, step: SpeedStep::STAND });
         self.gives_up(id);
     }
 
-    /// A train has been commanded to stop: what it holds it keeps until it stands.
+    /// A train has been commanded to stop: it keeps its reservation until it is at rest.
     pub(super) fn gives_up(&mut self, id: TrainId) {
         if let Some(train) = self.trains.get_mut(&id) {
             let confirmed = matches!(train.state, State::Running { confirmed: true, .. });

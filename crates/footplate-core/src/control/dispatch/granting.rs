@@ -1,8 +1,9 @@
-//! Granting trains the track to their destinations: all of it at once, so that nobody who has set out has to wait.
+//! Movement authorities: the dispatcher reserves all the track to a destination at once, so that no train waits on the way.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
+use crate::control::Notice;
 use crate::control::drive::Refusal;
 use crate::event::Approach;
 use crate::ids::{SpeedStep, TrainId};
@@ -17,41 +18,40 @@ use super::itinerary::{Itinerary, Pace, Search};
 use super::movement_authority::{MovementAuthority, Start, granted};
 use super::obstacles::Obstacles;
 use super::occupied_path::OccupiedPath;
+use super::path::Path;
 use super::reservation::Reservation;
-use super::way::Way;
-use crate::control::Notice;
 
-/// What waiting for a train at rest is likely to cost, and for one that runs, in seconds: somebody has to send the one
-/// away, and the other will be gone soon.
+/// Expected wait for a train at rest and for a running one, in seconds: the first has to be sent away, the second leaves by
+/// itself.
 const RESTING_S: f64 = 20.0;
 const RUNNING_S: f64 = 8.0;
-/// A way round others is taken if it takes no longer than this many times the way through them, and this much more.
+/// A detour around other trains is accepted up to this multiple of the unobstructed running time, plus `LONGER_BY_S`.
 const LONGER: f64 = 1.5;
 const LONGER_BY_S: f64 = 10.0;
-/// Who has waited so long is next: nobody else is granted what is on its way.
+/// A train that has waited this long is next: its route is kept free of new reservations.
 const PATIENCE: TimeSpan = TimeSpan::from_s(45.0);
-/// When all trains at rest have waited so long and nobody runs, nothing that was looked for will be found.
+/// When every train is at rest and has waited this long, the usual search has failed and a thorough one begins.
 const STALLED: TimeSpan = TimeSpan::from_s(20.0);
-/// Who waits is looked at again after this long, whatever happens: much does that is nothing to it.
+/// A waiting train is examined no more often than this: most events on the layout do not concern it.
 const LOOK_AGAIN: TimeSpan = TimeSpan::from_ms(800);
-/// From the end of a run until its train is taken to stand, and turning around: commands and margins of time.
+/// Reversing takes this long beyond the run itself: until standstill is certain, and the commands, in seconds.
 const TURN_S: f64 = 1.5;
-/// Stops from faster than this scatter too much to be worth it (20 mm at 600 mm/s).
+/// Stops from higher speeds are too uncertain (20 mm at 600 mm/s).
 const FASTEST: Speed = Speed::from_mm_per_s(450.0);
-/// Slower trains stall on dirty rails, and are where nobody knows; and they keep everybody waiting.
+/// Slower trains stall on dirty rails between sensors, and hold up the others.
 const CRAWL: Speed = Speed::from_mm_per_s(120.0);
-/// No model train is taken to run slower than this on the way.
+/// The lowest cruising speed that a running time is calculated with.
 const SLOWEST: Speed = Speed::from_mm_per_s(60.0);
-/// How often a stop may end beyond what is held, as standard deviations: one in a thousand, and a little room so that
-/// the guard, which looks at the same, seldom cuts a stop short.
+/// A stop may end beyond the reservation once in a thousand times; in standard deviations, with a margin so that the guard
+/// at the end of authority, which has the same limit, seldom cuts a stop short.
 const OVERRUN: f64 = 3.09 + 0.5;
-/// What is not known of the place at which a stop begins: contacts, survey and speed, one standard deviation.
+/// Uncertainty of the place where a stop begins, from sensors, survey and speed: one standard deviation.
 const PLACE: Length = Length::from_mm(10.0);
-/// An overrun is not taken for less, nor more: nothing is known so well, and a train that needs more is one of which
-/// nobody knows how it stops (its limit would stop it again and again if it were granted less than it needs).
+/// The least and the greatest overrun that is reserved: no stop is known better than the first, and a train that needs more
+/// than the second has unknown stops (with less, its limit would stop it again and again).
 const OVERRUNS: [Length; 2] = [Length::from_mm(40.0), Length::from_mm(1_200.0)];
 
-/// A way to somewhere with the track that it takes.
+/// A path to a destination, with the authorities that it needs.
 #[derive(Debug, Clone)]
 pub(super) struct Proposal {
     pub(super) itinerary: Itinerary,
@@ -65,9 +65,12 @@ impl Proposal {
 }
 
 impl Dispatcher {
-    /// Looks at all trains at rest that want to go somewhere, those that have waited longest first, unless room was made for
-    /// them again and again in vain.
+    /// Examines all trains at rest with a journey, the longest waiting first. A train for which others have stepped aside
+    /// again and again in vain goes to the end of the queue.
     pub(super) fn arrange(&mut self, now: Timestamp) {
+        if self.has_unplaced_train(now) {
+            return;
+        }
         let mut waiting: Vec<(Timestamp, Timestamp, TrainId)> = self
             .trains
             .values()
@@ -78,7 +81,7 @@ impl Dispatcher {
         let mut kept_free: Option<Proposal> = None;
         let mut all_wait = !waiting.is_empty();
         for (queues, since, id) in waiting.iter().copied() {
-            // It may have been sent out of another's way meanwhile.
+            // It may have been sent aside meanwhile.
             if !self.trains.get(&id).is_some_and(|train| train.is_ready(now)) {
                 continue;
             }
@@ -92,16 +95,16 @@ impl Dispatcher {
             let (Some(targets), Some(start)) = (self.targets(id), self.start(now, id)) else { continue };
             let unobstructed = self.unobstructed(now, id, &start, &targets);
             let Some(unobstructed) = unobstructed else {
-                if self.watchdog.driver().unseen(id, now).is_none() {
-                    self.cannot_go(now, id, self.no_way(id));
-                } else if !self.begins_to_look_back(id) {
+                if self.watchdog.driver().missed_sensor(id, now).is_none() {
+                    self.cannot_go(now, id, self.unreachable(id));
+                } else if !self.begins_to_look_back(id) && !self.looks_ahead(now, id, &start) {
                     self.lose(now, id);
                 }
                 continue;
             };
-            let free = self.free_way(id, &start, &targets).filter(|free| {
+            let free = self.free_path(id, &start, &targets).filter(|free| {
                 let allowed = unobstructed * LONGER + LONGER_BY_S + (now - since).as_s();
-                // Who stands in the way of the one that is next does best to go.
+                // A train that blocks the next one does best to go.
                 let is_in_the_way =
                     |wish: &Proposal| self.trains.get(&id).is_some_and(|train| wish.meets(&train.held));
                 let spares = kept_free.as_ref().is_none_or(|wish| {
@@ -118,9 +121,9 @@ impl Dispatcher {
             self.make_room(now, id, &targets, &wish);
             let mut running = self.trains.values().filter(|train| !train.course.is_empty());
             let room_is_made = running.clone().any(|train| train.purpose == Purpose::Aside(id));
-            // Nothing is kept free for who waits for trains at rest: they might stand there for ever.
-            let somebody_passes = running.any(|train| wish.meets(&train.held));
-            if kept_free.is_none() && (room_is_made || somebody_passes && now - queues >= PATIENCE) {
+            // For a train that waits for trains at rest nothing is kept free: they may stay for ever.
+            let another_passes = running.any(|train| wish.meets(&train.held));
+            if kept_free.is_none() && (room_is_made || another_passes && now - queues >= PATIENCE) {
                 kept_free = Some(wish);
             }
         }
@@ -133,7 +136,18 @@ impl Dispatcher {
         }
     }
 
-    /// How long a train would take if it were alone, in seconds; `None` if it could never come there.
+    /// Whether a train at rest has no place yet, as a turnout ahead of it is still being set.
+    fn has_unplaced_train(&mut self, now: Timestamp) -> bool {
+        let holds_nothing = |train: &&DispatchedTrain| train.rests() && train.held.is_empty();
+        let unplaced: Vec<TrainId> =
+            self.trains.values().filter(holds_nothing).map(|train| train.id).collect();
+        unplaced.iter().for_each(|id| self.stand(now, *id));
+        // What got lost on the line is commanded again; a train that may be on such a turnout was refused before.
+        let _ = self.set_unknown_turnouts(now);
+        self.trains.values().any(|train| train.rests() && self.unknown_turnout_ahead(now, train.id).is_some())
+    }
+
+    /// The running time without other trains, in seconds; `None` where no path leads to the destination.
     fn unobstructed(
         &mut self,
         now: Timestamp,
@@ -151,14 +165,14 @@ impl Dispatcher {
         seconds
     }
 
-    /// The places at which a train would have arrived.
+    /// The places at which the journey ends: facing as asked, or either way.
     pub(super) fn targets(&self, id: TrainId) -> Option<Vec<Position>> {
         let asked = self.trains.get(&id)?.asked?;
         let other = self.watchdog.driver().layout().reversed(asked.place).filter(|_| !asked.journey.faces);
         Some([Some(asked.place), other].into_iter().flatten().collect())
     }
 
-    /// Where a train at rest begins.
+    /// Where a train at rest begins, and what it needs from there.
     pub(super) fn start(&self, now: Timestamp, id: TrainId) -> Option<Start> {
         let train = self.trains.get(&id)?;
         let place = self.watchdog.driver().position(id, now)?;
@@ -174,15 +188,15 @@ impl Dispatcher {
             near.extend(train.held.turnouts());
         }
         let frozen = near.into_iter().filter_map(as_it_lies).collect();
-        let is_sure = self.watchdog.driver().unseen(id, now).is_none() || looks_back;
+        let is_sure = self.watchdog.driver().missed_sensor(id, now).is_none() || looks_back;
         let may_turn = is_sure && !self.is_on_points_that_gave_way(now, id);
-        let turned = self.watchdog.driver().turned_place(id, now).filter(|_| may_turn);
+        let turned = self.watchdog.driver().reversed_position(id, now).filter(|_| may_turn);
         let came = train.came.clone();
         let may_back_away = train.seen_since_turn;
         Some(Start { place, came, room, pace: self.pace(id), frozen, turned, may_back_away })
     }
 
-    /// The soonest way past obstacles, with what it takes.
+    /// The quickest path past obstacles, with its authorities.
     pub(super) fn propose(
         &self,
         start: &Start,
@@ -193,11 +207,11 @@ impl Dispatcher {
         let turned = self.turned(start);
         let proposed = |search: Search<'_>, ahead: Option<Position>| {
             let reached = search.from(ahead, turned);
-            // The soonest may need a turnout both ways at once where another does not.
+            // The quickest may need a turnout in both positions at once where another does not.
             reached.to(targets).into_iter().find_map(|itinerary| self.proposal(start, itinerary))
         };
         let ahead = Some(start.place);
-        // Where turnouts just ahead lie otherwise and cannot be thrown, it backs away from them first.
+        // Where turnouts just ahead lie wrong and cannot be thrown, the train backs away from them first.
         proposed(search, ahead)
             .or_else(|| proposed(Search { points_give_way: false, ..search }, ahead))
             .or_else(|| start.may_back_away.then(|| proposed(search, None))?)
@@ -226,12 +240,12 @@ impl Dispatcher {
         }
     }
 
-    /// Where the leading end of the pickup would be if the train turned around; `None` where it would back over points
-    /// that lie for the other leg. They gave way when it came, and would not when it goes.
+    /// Where the leading end of the pickup is once the train has reversed; `None` where it would back over points that lie
+    /// for the other leg: it trailed them on arrival and would be derailed by them on departure.
     pub(super) fn turned(&self, start: &Start) -> Option<Position> {
         let layout = self.watchdog.driver().layout();
         let turned = start.turned?;
-        let (way, at) = Way::around(
+        let (path, at) = Path::around(
             layout,
             self.watchdog.driver().turnouts(),
             turned,
@@ -242,13 +256,13 @@ impl Dispatcher {
         let lies_otherwise = |need: TurnoutNeed| {
             start.frozen.iter().any(|known| known.turnout == need.turnout && known.leg != need.leg)
         };
-        // Its place is counted from the node behind it: the turnout there has to lie as it does, too.
+        // Its place is counted from the node behind it: a turnout there has to lie for it, too.
         let own = layout.needs_of(turned.edge);
-        let needs = way.needs(layout, at - start.room.behind, at);
+        let needs = path.needs(layout, at - start.room.behind, at);
         (!needs.into_iter().chain(own).any(|need| need.facing && lies_otherwise(need))).then_some(turned)
     }
 
-    /// The way that a train would take if others made room for it in time; those that nobody can find do not.
+    /// The path that a train would take if others made room in time; lost trains do not.
     pub(super) fn wish(&self, id: TrainId, start: &Start, targets: &[Position]) -> Option<Proposal> {
         let mut obstacles = Obstacles::default();
         for other in self.trains.values().filter(|other| other.id != id) {
@@ -260,16 +274,16 @@ impl Dispatcher {
             obstacles.add(&other.held, seconds);
         }
         let wish = self.propose(start, targets, &obstacles);
-        // What is closed for good now may not be for ever.
+        // A lost train is located again some day.
         wish.or_else(|| self.propose(start, targets, &Obstacles::default()))
     }
 
-    /// A way on which nobody is.
-    fn free_way(&self, id: TrainId, start: &Start, targets: &[Position]) -> Option<Proposal> {
+    /// The quickest path that no other train has reserved.
+    fn free_path(&self, id: TrainId, start: &Start, targets: &[Position]) -> Option<Proposal> {
         self.propose(start, targets, &self.obstacles_of_others(id)).filter(|found| self.is_free(id, found))
     }
 
-    /// Sends a train on its way.
+    /// Reserves a proposal for a train, whose turnouts are set next.
     pub(super) fn grant(&mut self, now: Timestamp, id: TrainId, purpose: Purpose, proposal: Proposal) {
         let turns = proposal.runs.iter().filter(|run| run.turns).count();
         let takes = TimeSpan::from_s(proposal.itinerary.seconds);
@@ -283,6 +297,7 @@ impl Dispatcher {
         train.looks_back = false;
         if purpose == Purpose::Journey {
             train.rooms_made = 0;
+            self.searches_in_vain = 0;
         }
         train.last_run = None;
         train.state = State::Setting { ready: None, since: now };
@@ -301,15 +316,15 @@ impl Dispatcher {
         }
     }
 
-    pub(super) fn no_way(&self, id: TrainId) -> Refusal {
+    pub(super) fn unreachable(&self, id: TrainId) -> Refusal {
         let layout = self.watchdog.driver().layout();
         let display = |landmark: Landmark| alloc::format!("{}", layout.display(landmark));
         let target = self.journey(id).map_or_else(Default::default, |(_, journey)| display(journey.target));
         Refusal::Unreachable { train: id, target }
     }
 
-    /// How far a train may come to rest beyond where it should, but for one time in a thousand.
-    /// The place is no surer then than now if no contact comes on the way.
+    /// How far a train may come to rest beyond its stop, exceeded once in a thousand times. Without a sensor on the way its
+    /// place is as uncertain then as now.
     pub(super) fn overrun(&self, id: TrainId, uncertainty: Length) -> Length {
         let place = PLACE.max(uncertainty).as_m();
         let widest = self.watchdog.driver().widest_stop(id);
@@ -318,17 +333,17 @@ impl Dispatcher {
         usual * self.trains.get(&id).map_or(1.0, |train| train.caution)
     }
 
-    /// The step for a run: the fastest at which a train can have settled, and from which it stops surely enough; on ways
-    /// that are too short for any the slowest that does not crawl.
+    /// The step for a run: the fastest that settles within the distance and stops with enough certainty; for a distance too
+    /// short for any, the slowest step above a creep.
     pub(super) fn step_for(
         &self,
         id: TrainId,
-        way: Length,
+        distance: Length,
         is_sure: impl Fn(Length) -> bool,
     ) -> Option<SpeedStep> {
         let model = self.watchdog.driver().model(id)?;
         let speed = |step: SpeedStep| model.speed(step, Approach::Below).value;
-        let lively = || steps(model).filter(|step| speed(*step) >= CRAWL && speed(*step) <= FASTEST);
+        let usable = || steps(model).filter(|step| speed(*step) >= CRAWL && speed(*step) <= FASTEST);
         let spread = |step: SpeedStep| {
             let stop = model.stop(step, Approach::Below);
             Length::from_m(libm::hypot(stop.doubt.as_m(), stop.scatter.as_m()))
@@ -336,17 +351,17 @@ impl Dispatcher {
         let fits = |step: SpeedStep| {
             let stop = model.stop(step, Approach::Below).distance;
             let starts = speed(step) * model.settles_within(SpeedStep::STAND, step);
-            starts + stop + PLACE <= way
+            starts + stop + PLACE <= distance
         };
-        lively().filter(|step| fits(*step) && is_sure(spread(*step))).last().or_else(|| lively().next())
+        usable().filter(|step| fits(*step) && is_sure(spread(*step))).last().or_else(|| usable().next())
     }
 
-    /// How long a train takes for what.
+    /// The speed and the times that running times are calculated with.
     fn pace(&self, id: TrainId) -> Pace {
         let Some(model) = self.watchdog.driver().model(id) else {
             return Pace { cruise: SLOWEST, start_s: 1.0, stop_s: 1.0, turn_s: TURN_S };
         };
-        // Stops are surest from the middle of the steps.
+        // Stops are most certain from the middle steps.
         let usable: Vec<SpeedStep> = steps(model).collect();
         let step = usable.get(usable.len() * 2 / 3).copied().unwrap_or(model.highest());
         let cruise = model.speed(step, Approach::Below).value;
@@ -358,7 +373,7 @@ impl Dispatcher {
     }
 }
 
-/// The steps that move a train, from below.
+/// The steps that move a train, ascending.
 fn steps(model: &MotionModel) -> impl Iterator<Item = SpeedStep> {
     let all = (1..=model.highest().get()).filter_map(SpeedStep::new);
     all.filter(|step| model.uses(*step) == StepUse::Moves)

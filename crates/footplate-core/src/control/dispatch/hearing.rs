@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 
+use crate::control::Notice;
 use crate::control::drive::Refusal;
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
@@ -9,13 +10,12 @@ use crate::units::Length;
 
 use super::dispatched_train::State;
 use super::dispatcher::Dispatcher;
-use super::way::Way;
-use crate::control::Notice;
+use super::path::Path;
 
-/// A train that was stopped for its limit is given so many times as much room the next time, up to this many times.
+/// A train that was stopped at its end of authority gets this many times the room at its next stop, up to `MOST_CAUTION`.
 const MORE_CAUTION: f64 = 1.5;
 const MOST_CAUTION: f64 = 4.0;
-/// What a train on the wrong track is given to come to rest, beyond what is foreseen.
+/// Added to the predicted stop of a train that is on the wrong track.
 const MORE: Length = Length::from_mm(60.0);
 
 impl Dispatcher {
@@ -33,12 +33,13 @@ impl Dispatcher {
                 if let Some(train) = self.trains.get_mut(train) {
                     train.seen_since_turn = true;
                     train.seen_since_start = true;
+                    train.has_looked_ahead = false;
                 }
                 let node = self.watchdog.driver().layout().sensor_node(passed.sensor);
-                let is_on_its_way = node.is_some_and(|node| self.confirmed_at(now, *train, node));
+                let is_on_its_path = node.is_some_and(|node| self.confirmed_at(now, *train, node));
                 let state = self.trains.get(train).map(|train| train.state);
                 let has_strayed = matches!(state, Some(State::Halting { strayed: true, .. }));
-                if !is_on_its_way || has_strayed {
+                if !is_on_its_path || has_strayed {
                     self.diverged(now, *train);
                 }
             }
@@ -63,6 +64,15 @@ impl Dispatcher {
                     _ => {}
                 }
             }
+            // The watchdog has cut the power, or stopped the train for another reason.
+            Notice::Replaced { order, train } => match self.trains.get(train).map(|known| known.state) {
+                Some(State::Running { order: running, .. } | State::Turning { order: running })
+                    if running == *order =>
+                {
+                    self.gives_up(*train);
+                }
+                _ => {}
+            },
             Notice::Lost { train } => {
                 self.gives_up(*train);
                 self.set_state(*train, State::Lost);
@@ -72,7 +82,7 @@ impl Dispatcher {
         }
     }
 
-    /// The driver gave up a run. Near the destination that is as good as having arrived, once it stands.
+    /// The driver gave up a run. Near the destination the train has arrived, once it is at rest.
     fn stopped_on_the_way(&mut self, now: Timestamp, id: TrainId, why: &Refusal) {
         let is_last = self.trains.get(&id).is_some_and(|train| train.course.len() == 1);
         if is_last && matches!(why, Refusal::AtLimit { .. }) {
@@ -84,24 +94,23 @@ impl Dispatcher {
         self.gives_up(id);
     }
 
-    /// Whether a train that was commanded to stop comes to rest near its destination is seen when it stands.
+    /// Remembers the last run: whether the train comes to rest near its destination shows once it is at rest.
     fn ends_near(&mut self, now: Timestamp, id: TrainId) {
-        // It may not even have set out.
-        if self.watchdog.driver().unseen(id, now).is_none()
+        // It may not even have left.
+        if self.watchdog.driver().missed_sensor(id, now).is_none()
             && let Some(train) = self.trains.get_mut(&id)
         {
             train.last_run = train.course.front().cloned();
         }
     }
 
-    /// A train will never come to its destination.
+    /// A train cannot come to its destination: ends the journey.
     pub(super) fn cannot_go(&mut self, now: Timestamp, id: TrainId, why: Refusal) {
         self.give_up_journey(id, why.clone());
         self.withdraw(now, id, Some(why));
     }
 
-    /// A train is not on the track that it was granted: it is stopped, and so is everybody whom it could meet until it
-    /// stands.
+    /// A train is not on its reserved track: it is stopped, and so is every train that it could meet before it is at rest.
     fn diverged(&mut self, now: Timestamp, id: TrainId) {
         self.halt(now, id);
         let Some(train) = self.trains.get(&id) else { return };
@@ -112,9 +121,9 @@ impl Dispatcher {
         let located = self.watchdog.driver().locate(id, now);
         let runs_on = rest.zip(located).map_or(Length::ZERO, |(rest, located)| rest.way - located.at.way);
         let ahead = room.ahead + runs_on.max(Length::ZERO) + MORE;
-        let (way, at) =
-            Way::around(layout, self.watchdog.driver().turnouts(), place, &train.came, room.behind, ahead);
-        let taken = self.reserved(way.reservation(layout, at - room.behind, at + ahead));
+        let (path, at) =
+            Path::around(layout, self.watchdog.driver().turnouts(), place, &train.came, room.behind, ahead);
+        let taken = self.reserved(path.reservation(layout, at - room.behind, at + ahead));
         let others = self.trains.values().filter(|other| other.id != id && other.held.meets(&taken));
         let meets: Vec<TrainId> = others.map(|other| other.id).collect();
         let mut held = taken;

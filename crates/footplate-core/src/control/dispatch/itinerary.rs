@@ -1,4 +1,4 @@
-//! Ways that take the least time, with the reversals that they need.
+//! Itineraries: the quickest paths to a place, with the reversals that they need (Dijkstra, 1959).
 
 use alloc::collections::BinaryHeap;
 use alloc::vec;
@@ -10,84 +10,85 @@ use crate::track::{Layout, NodeKind, Position, TurnoutNeed, TurnoutStates};
 use crate::units::{Length, Speed};
 
 use super::obstacles::Obstacles;
-use super::way::edge_from;
+use super::path::edge_from;
 
-/// Shorter moves are hard to make and say nothing of where a train is: it goes round or comes from the other side.
+/// The shortest run. Shorter moves are hard to make and tell nothing about the place of a train: it goes round, or comes from
+/// the other side.
 pub(super) const SHORTEST_RUN: Length = Length::from_mm(200.0);
-/// Ways looked at beyond one turnout on which a train could turn around.
-const MOST_NECKS: usize = 8;
+/// Edges that are tried beyond one turnout for a place to reverse: to the first sensor there are at most three turnouts.
+const MOST_TRIED: usize = 16;
 
-/// How long a train takes for what.
+/// The speed and the times that running times are calculated with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pace {
-    /// Its speed on the way.
+    /// The cruising speed.
     pub(super) cruise: Speed,
-    /// What a start and a stop take beyond the time that the way would, in seconds.
+    /// What a start and a stop add to the time at cruising speed, in seconds.
     pub(super) start_s: f64,
     pub(super) stop_s: f64,
-    /// Turning around at rest, in seconds.
+    /// Reversing at rest, in seconds.
     pub(super) turn_s: f64,
 }
 
-/// How far beyond a contact a train stops that has only gone there to be seen.
-const PAST_CONTACT: Length = Length::from_mm(60.0);
+/// How far beyond a sensor a train stops that runs there only to be detected.
+const PAST_SENSOR: Length = Length::from_mm(60.0);
 
-/// A run without turning around: edges from the one it begins on to the one it ends on.
+/// A run in one direction: its edges, from the one it begins on to the one it ends on.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Run {
-    /// Whether the train turns around before.
+    /// Whether the train reverses before it.
     pub(super) turns: bool,
     pub(super) edges: Vec<EdgeId>,
     pub(super) start: Position,
     pub(super) stop: Position,
 }
 
-/// Runs one after the other, and how long they take.
+/// Consecutive runs, and their running time.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Itinerary {
     pub(super) runs: Vec<Run>,
     pub(super) seconds: f64,
 }
 
-/// Everything that bears on a search but where it begins.
+/// A search, but for where it begins.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Search<'a> {
     pub(super) layout: &'a Layout,
     pub(super) pace: Pace,
-    /// How far a train has to run beyond a turnout so that it can be thrown behind it.
+    /// How far a train runs beyond a turnout that is thrown behind it.
     pub(super) clears: Length,
-    /// How far beyond its stop a train may be in the end: over that the way goes on as the turnouts lie.
+    /// How far beyond its stop a train may come to rest: so far the path goes on as the turnouts lie.
     pub(super) beyond: Length,
     pub(super) turnouts: &'a TurnoutStates,
     pub(super) obstacles: &'a Obstacles,
-    /// Turnouts that cannot be thrown for the first run, because the train stands on them or too near.
+    /// Turnouts that cannot be thrown for the first run, as the train is on them or too near.
     pub(super) frozen: &'a [TurnoutNeed],
-    /// Whether the first run may come from a leg to a turnout that is frozen for the other one.
+    /// Whether the first run may trail a turnout that is frozen for the other leg.
     pub(super) points_give_way: bool,
 }
 
-/// How a node was come to.
+/// How a node is reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum By {
-    /// From the start, over the edge that it is on; turned around or not.
+    /// From the start, over the edge that it is on; reversed or not.
     Start {
         turned: bool,
     },
     Edge(NodeId, EdgeId),
-    /// Back to a turnout, after running beyond it.
+    /// Back to a turnout after running beyond it.
     Shunt(usize),
 }
 
-/// A way beyond a node on which the train turns around.
+/// A run beyond a node, at whose end the train reverses.
 #[derive(Debug, Clone)]
 struct Shunt {
-    /// The turnout, met from a leg, or the node behind which the train backs away.
+    /// The turnout, trailed, or the node behind which the train backs away.
     merge: NodeId,
     out: Vec<EdgeId>,
     stop: Position,
 }
 
-/// All that can be reached from somewhere, and how.
+/// All nodes that can be reached from a start, and how.
 #[derive(Debug, Clone)]
 pub(super) struct Reached<'a> {
     search: Search<'a>,
@@ -118,16 +119,15 @@ impl PartialOrd for Open {
 }
 
 impl Ord for Open {
-    /// The soonest is the greatest, for the heap; of two, the one with the lower node.
+    /// The quickest is the greatest, for the heap; of two, the one with the lower node.
     fn cmp(&self, other: &Self) -> Ordering {
         other.seconds.total_cmp(&self.seconds).then_with(|| other.node.cmp(&self.node))
     }
 }
 
 impl<'a> Search<'a> {
-    /// Everything that a train at rest can reach: from its place as it faces, and from the place that it has when it has
-    /// turned around (Dijkstra, 1959). One that does not go ahead may back away on plain track, from turnouts that cannot be
-    /// thrown under it, and come back.
+    /// All that a train at rest can reach, from its place as it faces and from its place once reversed. A train that does not
+    /// go ahead may back away on plain track, from turnouts that cannot be thrown under it, and come back.
     pub(super) fn from(self, ahead: Option<Position>, turned: Option<Position>) -> Reached<'a> {
         let nodes = vec![None; self.layout.nodes().len()];
         let mut reached = Reached { search: self, starts: [ahead, turned], nodes, shunts: Vec::new() };
@@ -147,7 +147,7 @@ impl<'a> Search<'a> {
                 Some(slot @ None) => *slot = Some((next.seconds, next.by)),
                 _ => continue,
             }
-            // What the run needs so far matters only where it needs more.
+            // The needs of the run so far matter only where it needs more.
             let asks = |edge| self.layout.needs_of(edge).next().is_some();
             let is_merge = self.is_merge(next.node);
             let needs = if is_merge || ahead.is_none() || self.layout.ways(next.node).edges().any(asks) {
@@ -172,40 +172,43 @@ impl<'a> Search<'a> {
         reached
     }
 
-    /// Whether an edge is no leg of a turnout.
+    /// Whether an edge is not a leg of a turnout.
     fn is_plain(&self, edge: EdgeId) -> bool {
         self.layout.needs_of(edge).next().is_none()
     }
 
-    /// Whether a turnout is met from one of its legs at a node.
+    /// Whether a turnout is trailed at a node.
     fn is_merge(&self, node: NodeId) -> bool {
         self.layout.node(node).is_some_and(|node| matches!(node.kind, NodeKind::Merge(_)))
     }
 
-    fn is_contact(&self, node: NodeId) -> bool {
+    fn is_sensor(&self, node: NodeId) -> bool {
         self.layout.node(node).is_some_and(|node| matches!(node.kind, NodeKind::Sensor(_)))
     }
 
-    /// Ways beyond a node, as a turnout that was met from a leg, each long enough to come back.
+    /// Runs beyond a node, such as a trailed turnout, each long enough to come back.
     fn shunt(&self, reached: &mut Reached<'_>, at: Open, needs: &[TurnoutNeed], open: &mut BinaryHeap<Open>) {
         let mut paths: Vec<(Vec<EdgeId>, NodeId, Length, f64)> =
             vec![(Vec::new(), at.node, self.clears, 0.0)];
-        let is_sure = self.is_contact(at.node) || self.is_merge(at.node);
-        // Without a contact on the way nobody knows whether it has left at all, and nothing is thrown behind it.
+        let is_merge = self.is_merge(at.node);
+        let is_sure = self.is_sensor(at.node) || is_merge;
+        // A turnout is thrown behind the train only after a sensor beyond it has reported the train: one that got stuck on
+        // dirt between the last sensor and the turnout comes to rest on it without anybody noticing. To back away, any sensor
+        // on the run does: it says that the train has left.
         let is_seen = |path: &[EdgeId]| {
-            path.iter().filter_map(|id| self.layout.edge(*id)).any(|edge| self.is_contact(edge.to))
+            path.iter().filter_map(|id| self.layout.edge(*id)).any(|edge| self.is_sensor(edge.to))
         };
-        let is_seen_before = reached.run_to(at.node).is_some_and(|(edges, _)| is_seen(&edges));
-        let mut looked_at = 0;
+        let is_seen_before = !is_merge && reached.run_to(at.node).is_some_and(|(edges, _)| is_seen(&edges));
+        let mut tried = 0;
         while let Some((path, node, left, cost)) = paths.pop() {
-            looked_at += 1;
-            if looked_at > MOST_NECKS {
+            tried += 1;
+            if tried > MOST_TRIED {
                 break;
             }
             let seen = is_seen_before || is_seen(&path);
             for id in self.layout.ways(node).edges() {
                 let Some(edge) = self.layout.edge(id).filter(|_| self.agrees(needs, id)) else { continue };
-                // Where it only backs away it comes over turnouts only behind a contact, which says where it is.
+                // Backing away, it runs over turnouts only beyond a sensor, which reports where it is.
                 if !is_sure && !seen && !self.is_plain(id) {
                     continue;
                 }
@@ -215,7 +218,7 @@ impl<'a> Search<'a> {
                 let mut longer = path.clone();
                 longer.push(id);
                 if goes_on {
-                    paths.push((longer, edge.to, (left - edge.length).max(PAST_CONTACT), cost + more));
+                    paths.push((longer, edge.to, (left - edge.length).max(PAST_SENSOR), cost + more));
                     continue;
                 }
                 let stop = Position { edge: id, offset: left };
@@ -230,7 +233,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether nobody keeps a train for ever from coming to rest beyond a stop.
+    /// Whether the track beyond a stop, where a train may come to rest, is not closed.
     fn has_room_beyond(&self, stop: Position) -> bool {
         let (mut id, mut from, mut left) = (stop.edge, stop.offset, self.beyond);
         for _ in 0..self.layout.edges().len() {
@@ -248,19 +251,19 @@ impl<'a> Search<'a> {
         false
     }
 
-    /// How long part of an edge takes, waiting for others included.
+    /// The time for part of an edge, with the wait for other trains; `None` where it is closed.
     fn seconds(&self, edge: EdgeId, from: Length, to: Length) -> Option<f64> {
         let waits = self.obstacles.cost(self.layout, edge, from, to)?;
         let limit = self.layout.zone(edge).map_or(self.pace.cruise, |zone| zone.limit);
         Some(((to - from).max(Length::ZERO) / self.pace.cruise.min(limit)).as_s() + waits)
     }
 
-    /// Whether a run with such needs can go on over an edge: no turnout lies both ways at once.
+    /// Whether a run with these needs can go on over an edge: no turnout in both positions at once.
     fn agrees(&self, needs: &[TurnoutNeed], id: EdgeId) -> bool {
         self.layout.needs_of(id).all(|need| {
             let partner = self.layout.never_curved_with(need.turnout).filter(|_| need.leg.is_curved());
             needs.iter().all(|known| {
-                // Who comes from a leg gets through whatever way a turnout lies that cannot be thrown.
+                // A train trails a turnout that cannot be thrown, however it lies.
                 let gives_way = self.points_give_way && !need.facing && self.frozen.contains(known);
                 (known.turnout != need.turnout || known.leg == need.leg || gives_way)
                     && !(Some(known.turnout) == partner && known.leg.is_curved())
@@ -270,7 +273,7 @@ impl<'a> Search<'a> {
 }
 
 impl Reached<'_> {
-    /// The edges of the run that comes to a node, in the order of travel, and where and how it began.
+    /// The edges of the run to a node, in the order of travel, and how it began.
     fn run_to(&self, node: NodeId) -> Option<(Vec<EdgeId>, By)> {
         let mut edges = Vec::new();
         let mut node = node;
@@ -299,18 +302,18 @@ impl Reached<'_> {
         let Some((edges, by)) = self.run_to(node) else { return Vec::new() };
         let frozen = if matches!(by, By::Start { .. }) { self.search.frozen } else { &[] };
         let needs = edges.into_iter().flat_map(|edge| self.search.layout.needs_of(edge));
-        // What the train stands on counts first, and its own edges are as they lie.
+        // The turnouts under the train come first: they stay as they are.
         frozen.iter().copied().chain(needs).collect()
     }
 
-    /// How long it takes at least to come to rest at a place, as far as can be told without looking at the runs.
+    /// A lower bound of the time to rest at a place, without looking at the runs.
     pub(super) fn seconds_to(&self, target: Position) -> Option<f64> {
         let edge = self.search.layout.edge(target.edge)?;
         let (until, _) = (*self.nodes.get(usize::from(edge.from.0))?)?;
         Some(until + self.search.seconds(target.edge, Length::ZERO, target.offset)? + self.search.pace.stop_s)
     }
 
-    /// The soonest way to rest at each of several places, the soonest of them first.
+    /// The quickest itinerary to each of several places, the quickest of them first.
     pub(super) fn to(&self, targets: &[Position]) -> Vec<Itinerary> {
         let mut found: Vec<Itinerary> = targets.iter().filter_map(|target| self.itinerary(*target)).collect();
         found.sort_by(|one, other| one.seconds.total_cmp(&other.seconds));
@@ -323,7 +326,7 @@ impl Reached<'_> {
         if !self.search.has_room_beyond(target) {
             return None;
         }
-        // On the edge that the train stands on it may be ahead of it.
+        // The target may be ahead on the edge that the train is on.
         let direct = [false, true].into_iter().filter_map(|turned| {
             let start = (*self.starts.get(usize::from(turned))?)?;
             let is_ahead = start.edge == target.edge && target.offset - start.offset >= SHORTEST_RUN;
@@ -352,7 +355,7 @@ impl Reached<'_> {
         }
     }
 
-    /// The runs that come to a node, the last of which goes on to a target on an edge from there.
+    /// The runs to a node, the last of which goes on to a target on an edge from there.
     fn runs(&self, node: NodeId, target: Position) -> Option<Vec<Run>> {
         let (mut edges, mut by) = self.run_to(node)?;
         edges.push(target.edge);
@@ -382,7 +385,7 @@ impl Reached<'_> {
     }
 }
 
-/// The way from start to stop.
+/// The distance from start to stop.
 fn length(layout: &Layout, run: &Run) -> Length {
     let whole: Length = run.edges.iter().filter_map(|edge| layout.edge(*edge)).map(|edge| edge.length).sum();
     let last = run.edges.last().and_then(|edge| layout.edge(*edge)).map_or(Length::ZERO, |edge| edge.length);

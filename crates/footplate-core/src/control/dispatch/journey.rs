@@ -1,32 +1,32 @@
-//! What a train is asked for that shall go somewhere.
+//! Journeys: where a train is sent.
 
 use crate::control::drive::Aim;
 use crate::track::Landmark;
 use crate::units::Length;
 
-/// Go to a place, by whatever way, and with as many reversals as that takes.
+/// A destination, by any path and with any number of reversals.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Journey {
-    /// The place, where the leading end of the pickup shall be.
+    /// The place for the leading end of the pickup.
     pub target: Landmark,
-    /// Which part of all rests that may come of the last stop shall be there.
+    /// Which part of the distribution of the last stop is to be there.
     pub aim: Aim,
-    /// Whether the train has to face as the landmark does. Otherwise it comes from whichever side is sooner.
+    /// Whether the train has to face as the landmark does. Otherwise it comes from whichever side is quicker.
     pub faces: bool,
 }
 
 impl Journey {
-    /// The middle of all rests at a place, from whichever side.
+    /// The median of the stop at a place, from whichever side.
     #[must_use]
     pub const fn to(target: Landmark) -> Self {
         Self { target, aim: Aim::Median, faces: false }
     }
 }
 
-/// The parts of a train along the track, so that nobody comes too near.
+/// The lengths of a train along the track, which reservations cover.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrainLengths {
-    /// From the pickup to the end of the train, at that end where it is further.
+    /// From the pickup to the farther end of the train.
     pub overhang: Length,
     /// The pickup itself.
     pub pickup: Length,

@@ -1,8 +1,8 @@
-//! Dispatching: many trains on one layout, each with the track that it needs and nobody else on it.
+//! Dispatching: many trains on one layout, each on track that is reserved for it alone.
 //!
-//! A [`Dispatcher`] owns a [`Driver`](super::Driver). It finds the soonest way for a train to its destination, grants it
-//! all the track of that way at once, throws the turnouts, runs it from one reversal to the next, and frees what is
-//! behind it. No train is let beyond what it holds; trains at rest in the way of others step aside.
+//! A [`Dispatcher`] owns a [`Driver`](super::Driver). It finds the quickest path for a train to its destination, reserves
+//! all the track of that path at once, sets the turnouts, runs the train from one reversal to the next, and releases the
+//! track behind it. No train runs beyond its reservation; trains at rest that block others step aside.
 
 mod blocks;
 mod by_hand;
@@ -19,11 +19,11 @@ mod movement_authority;
 mod obstacles;
 mod occupied_path;
 mod parking;
+mod path;
 mod reservation;
 mod route_setting;
 mod running;
 mod turnout_command;
-mod way;
 
 pub use dispatcher::Dispatcher;
 pub use journey::{Journey, TrainLengths};

@@ -1,4 +1,4 @@
-//! The runs that a train has been granted, with the track that they take.
+//! Movement authorities: the runs of a train, with the track that they reserve.
 
 use alloc::vec::Vec;
 
@@ -9,46 +9,46 @@ use super::itinerary::Pace;
 use super::itinerary::{Itinerary, Run};
 use super::journey::TrainLengths;
 use super::occupied_path::OccupiedPath;
+use super::path::Path;
 use super::reservation::Reservation;
-use super::way::Way;
 
-/// Where a train begins to look for a way, and what it needs.
+/// Where a path search begins, and what the train needs.
 #[derive(Debug, Clone)]
 pub(super) struct Start {
     pub(super) place: Position,
     pub(super) came: OccupiedPath,
     pub(super) room: ClearanceEnvelope,
     pub(super) pace: Pace,
-    /// Turnouts that are not thrown for its first run, as they lie: it is too near, or its place is counted over them.
+    /// Turnouts that are not thrown for its first run, as they lie: the train is too near, or its place is counted over them.
     pub(super) frozen: Vec<TurnoutNeed>,
-    /// Where it is once it has turned around, if it may. Who was not seen where it should have been is looked for ahead,
-    /// and behind only if that leads nowhere: it may have come less far, and nothing is thrown then of all that it holds.
-    /// Who stands on points that gave way to it goes on: they would not give way to it when it comes back.
+    /// Its place once reversed, if it may reverse. A train that a sensor did not report is looked for ahead, and behind only
+    /// if no path leads ahead: it may have come less far, and none of its reserved turnouts is thrown then. A train on a
+    /// turnout that it trailed goes on: the turnout would derail it on the way back.
     pub(super) turned: Option<Position>,
-    /// Whether it may back away from turnouts that it stands too near to throw: not twice without a contact between, or its
-    /// place would become ever less sure.
+    /// Whether it may back away from turnouts that it is too near to throw: not twice without a sensor between, as its place
+    /// would become ever more uncertain.
     pub(super) may_back_away: bool,
 }
 
-/// How much more of the track is taken than a train is believed to need: contacts are off their places by 5 mm, edges
-/// by 10 mm, and trains were measured to a centimetre or two.
+/// Margin of every reservation: sensors are off their places by 5 mm, edges by 10 mm, and trains were measured to a
+/// centimetre or two.
 pub(super) const SLACK: Length = Length::from_mm(20.0);
 
-/// What a train needs around the leading end of its pickup.
+/// The track that a train needs around the leading end of its pickup.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ClearanceEnvelope {
-    /// With what is not known of its place now.
+    /// With the uncertainty of its place now.
     pub(super) ahead: Length,
     pub(super) behind: Length,
-    /// Of its own.
+    /// Without it.
     pub(super) front: Length,
     pub(super) rear: Length,
-    /// By how much it may come to rest off the place where it should.
+    /// How far it may come to rest beyond its stop.
     pub(super) overrun: Length,
 }
 
 impl ClearanceEnvelope {
-    /// A train with these lengths, of which one standard deviation of the place is this.
+    /// For a train with these lengths; `uncertainty` is one standard deviation of its place.
     pub(super) fn of(lengths: TrainLengths, uncertainty: Length, overrun: Length) -> Self {
         let (front, rear) = (lengths.ahead() + SLACK, lengths.behind() + SLACK);
         let doubt = uncertainty * CERTAIN;
@@ -56,24 +56,23 @@ impl ClearanceEnvelope {
     }
 }
 
-/// A train is no further than so many standard deviations behind, or beyond, where it is believed to be, but for one
-/// time in 2000 each.
+/// Standard deviations to either side of the estimated place that a reservation covers: a train is beyond once in 2000.
 const CERTAIN: f64 = 3.3;
 
-/// One run of a course.
+/// The authority for one run.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct MovementAuthority {
     pub(super) turns: bool,
     /// From behind the train's rear end to beyond its front end when it has come to rest.
-    pub(super) way: Way,
-    /// Where its pickup is on that way, and where it shall be.
+    pub(super) path: Path,
+    /// Where its pickup is on the path, and where it is to stop.
     pub(super) start: Length,
     pub(super) stop: Length,
-    /// Where its rear end may be in the beginning.
+    /// Where its rear end may be at the start.
     pub(super) begin: Length,
-    /// From where on its way was looked at for others: what is before that the train holds as it stands on it.
+    /// From here on the path was checked for other trains; the train has reserved what is before, as it is on it.
     pub(super) taken_from: Length,
-    /// Its pickup shall not pass this, and nothing of the train what is taken.
+    /// The end of authority of its pickup, and of its front end.
     pub(super) limit: Length,
     pub(super) end: Length,
     pub(super) needs: Vec<TurnoutNeed>,
@@ -81,13 +80,13 @@ pub(super) struct MovementAuthority {
 }
 
 impl MovementAuthority {
-    /// What it takes from a point on, where its rear end is.
+    /// The reservation from a point on, where its rear end is.
     pub(super) fn takes_beyond(&self, layout: &Layout, from: Length) -> Reservation {
-        self.way.reservation(layout, from, self.end)
+        self.path.reservation(layout, from, self.end)
     }
 }
 
-/// The runs of an itinerary on the track; `None` where the track ends too soon for one of them.
+/// The authorities of an itinerary; `None` where the track ends too soon for one of its runs.
 pub(super) fn granted(
     layout: &Layout,
     turnouts: &TurnoutStates,
@@ -98,22 +97,22 @@ pub(super) fn granted(
     let mut runs: Vec<MovementAuthority> = Vec::new();
     for run in &itinerary.runs {
         let before = runs.last();
-        let (way, start) = way_of(layout, turnouts, run, before, begins)?;
+        let (path, start) = path_of(layout, turnouts, run, before, begins)?;
         let stop = stop_on(layout, run, start)?;
         let limit = stop + room.overrun;
         let end = limit + room.front;
-        if way.length() < end {
+        if path.length() < end {
             return None;
         }
         let begin = start - room.behind;
-        // What it came over matters again only when it goes back.
-        let needs = way.needs(layout, if run.turns { begin } else { start }, end);
-        // What it stands on it holds already; another may hold what a doubt that has grown since would add to that.
+        // The turnouts behind it matter only when it goes back.
+        let needs = path.needs(layout, if run.turns { begin } else { start }, end);
+        // It has reserved what it is on; what a grown uncertainty adds to that may be reserved for another train.
         let taken_from = if runs.is_empty() { start } else { begin };
-        let taken = way.reservation(layout, taken_from, end);
+        let taken = path.reservation(layout, taken_from, end);
         let mut granted = MovementAuthority {
             turns: run.turns,
-            way,
+            path,
             start,
             stop,
             begin,
@@ -123,7 +122,7 @@ pub(super) fn granted(
             needs,
             taken,
         };
-        // Its place is counted from the node behind it once it has turned around.
+        // Its place is counted from the node behind it once it has reversed.
         if run.turns {
             let edge = run.start.edge;
             let own = layout.needs_of(edge).find(|need| need.facing);
@@ -134,17 +133,17 @@ pub(super) fn granted(
                 }
             }
         }
-        // What it takes beyond its stop may need a turnout otherwise than its way does: it would be thrown to and fro.
+        // The track beyond its stop may need a turnout in the other position than its path: it would be thrown to and fro.
         if contradicts(layout, &granted.needs) {
             return None;
         }
-        // Where points give way to it it does not stop: it could not go back.
+        // It does not stop on a turnout that it trails: it could not go back.
         let frozen: &[_] = if runs.is_empty() { &begins.frozen } else { &[] };
         let known = || frozen.iter().chain(&granted.needs);
         let lies_otherwise =
             |need: &TurnoutNeed| known().any(|known| known.turnout == need.turnout && known.leg != need.leg);
         if granted
-            .way
+            .path
             .trailed(layout, stop - room.behind - room.overrun, end)
             .any(|need| lies_otherwise(&need))
         {
@@ -155,7 +154,7 @@ pub(super) fn granted(
     Some(runs)
 }
 
-/// Whether a turnout is needed both ways, or both of a pair in one place curved.
+/// Whether a turnout is needed in both positions, or both turnouts of one place curved.
 fn contradicts(layout: &Layout, needs: &[TurnoutNeed]) -> bool {
     needs.iter().any(|need| {
         let partner = layout.never_curved_with(need.turnout).filter(|_| need.leg.is_curved());
@@ -166,42 +165,41 @@ fn contradicts(layout: &Layout, needs: &[TurnoutNeed]) -> bool {
     })
 }
 
-/// The whole way of a run and where on it the run begins. What is behind the train is what was ahead of it before it
-/// turned around.
-fn way_of(
+/// The path of a run and where on it the run begins. Behind the train is what was ahead of it before it reversed.
+fn path_of(
     layout: &Layout,
     turnouts: &TurnoutStates,
     run: &Run,
     before: Option<&MovementAuthority>,
     begins: &Start,
-) -> Option<(Way, Length)> {
+) -> Option<(Path, Length)> {
     let room = begins.room;
-    let (mut way, start) = match before {
+    let (mut path, start) = match before {
         None => {
             let behind = room.behind + run.start.offset;
-            Way::around(layout, turnouts, run.start, &begins.came, behind, Length::ZERO)
+            Path::around(layout, turnouts, run.start, &begins.came, behind, Length::ZERO)
         }
         Some(before) => {
-            let mut way = Way::default();
+            let mut path = Path::default();
             let stops_on = run.start.edge.twin();
-            let beyond: Vec<_> = before.way.edges().rev().take_while(|edge| *edge != stops_on).collect();
-            beyond.iter().for_each(|edge| way.push(layout, edge.twin()));
-            let start = way.length() + run.start.offset;
-            way.push(layout, run.start.edge);
-            (way, start)
+            let beyond: Vec<_> = before.path.edges().rev().take_while(|edge| *edge != stops_on).collect();
+            beyond.iter().for_each(|edge| path.push(layout, edge.twin()));
+            let start = path.length() + run.start.offset;
+            path.push(layout, run.start.edge);
+            (path, start)
         }
     };
-    let way = {
-        way.cut_after(run.start.edge);
-        run.edges.iter().skip(1).for_each(|edge| way.push(layout, *edge));
+    let path = {
+        path.cut_after(run.start.edge);
+        run.edges.iter().skip(1).for_each(|edge| path.push(layout, *edge));
         let stop = stop_on(layout, run, start)?;
-        way.reach(layout, turnouts, stop + room.overrun + room.front);
-        way
+        path.reach(layout, turnouts, stop + room.overrun + room.front);
+        path
     };
-    Some((way, start))
+    Some((path, start))
 }
 
-/// Where a run ends on the way on which it begins at a point.
+/// Where a run ends on the path on which it begins at `start`.
 fn stop_on(layout: &Layout, run: &Run, start: Length) -> Option<Length> {
     let (last, before) = run.edges.split_last()?;
     debug_assert_eq!(*last, run.stop.edge, "a run ends on its last edge");
@@ -209,7 +207,7 @@ fn stop_on(layout: &Layout, run: &Run, start: Length) -> Option<Length> {
     Some(start - run.start.offset + before + run.stop.offset)
 }
 
-/// What a train at rest takes.
+/// The reservation of a train at rest.
 pub(super) fn standing(
     layout: &Layout,
     turnouts: &TurnoutStates,
@@ -217,6 +215,6 @@ pub(super) fn standing(
     came: &OccupiedPath,
     room: ClearanceEnvelope,
 ) -> Reservation {
-    let (way, at) = Way::around(layout, turnouts, place, came, room.behind, room.ahead);
-    way.reservation(layout, at - room.behind, at + room.ahead)
+    let (path, at) = Path::around(layout, turnouts, place, came, room.behind, room.ahead);
+    path.reservation(layout, at - room.behind, at + room.ahead)
 }

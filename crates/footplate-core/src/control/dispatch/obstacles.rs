@@ -1,4 +1,4 @@
-//! What others hold, as somebody sees it who looks for a way.
+//! Reservations of other trains, as a path search sees them.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
@@ -9,16 +9,16 @@ use crate::units::Length;
 
 use super::reservation::{Reservation, Span, turnouts_near};
 
-/// Track that is closed, or costs time to wait for.
+/// Track that is closed, or costs time to wait.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Obstacles {
-    /// Intervals, each with the seconds it costs; infinite where it is closed.
+    /// Intervals, each with its cost in seconds; infinite where it is closed.
     spans: BTreeMap<StretchId, Vec<(Span, f64)>>,
     turnouts: BTreeMap<TurnoutId, f64>,
 }
 
 impl Obstacles {
-    /// Adds what somebody holds, at a price in seconds for each stretch and turnout.
+    /// Adds a reservation, with a cost in seconds for each stretch and turnout.
     pub(super) fn add(&mut self, held: &Reservation, seconds: f64) {
         for (stretch, span) in held.spans() {
             self.spans.entry(stretch).or_default().push((span, seconds));
@@ -29,7 +29,7 @@ impl Obstacles {
         }
     }
 
-    /// What it costs to run over part of an edge, in seconds; `None` where that is closed.
+    /// The cost of running over part of an edge, in seconds; `None` where it is closed.
     pub(super) fn cost(&self, layout: &Layout, id: EdgeId, from: Length, to: Length) -> Option<f64> {
         let mut cost = 0.0;
         if let Some(spans) = self.spans.get(&id.stretch()) {

@@ -1,11 +1,11 @@
-//! The edges that a train came over: behind its pickup it is where it went, however points lie there by now.
+//! The edges that a train came over: behind its pickup it is on them, however the points lie there by now.
 
 use alloc::vec::Vec;
 
 use crate::ids::EdgeId;
 use crate::track::{Layout, Position};
 
-/// More edges are under no train, nor between two looks at it.
+/// No train is on more edges, or runs over more between two looks at it.
 const MOST_EDGES: usize = 16;
 
 /// Edges in the order of travel; the leading end of the pickup is on the last one.
@@ -15,7 +15,7 @@ pub(super) struct OccupiedPath {
 }
 
 impl OccupiedPath {
-    /// Takes note of where the leading end of the pickup is now: further on, on its way back, or somewhere else.
+    /// Records where the leading end of the pickup is now: further on, on the way back, or elsewhere.
     pub(super) fn follow(&mut self, layout: &Layout, place: Position) {
         let Some(last) = self.edges.last().copied() else {
             self.edges.push(place.edge);
@@ -37,14 +37,14 @@ impl OccupiedPath {
         self.edges.drain(..spare);
     }
 
-    /// The edges before the one that it is on, the latest first; none if it is not there.
+    /// The edges before the one that the train is on, the latest first; none if it is not on that edge.
     pub(super) fn before(&self, edge: EdgeId) -> impl Iterator<Item = EdgeId> {
         let is_there = self.edges.last() == Some(&edge);
         self.edges.iter().rev().skip(1).filter(move |_| is_there).copied()
     }
 }
 
-/// The shortest way from one edge on to another over any legs, without the first.
+/// The path with the fewest edges from one edge to another over any legs, without the first edge.
 fn path(layout: &Layout, from: EdgeId, to: EdgeId) -> Option<Vec<EdgeId>> {
     let mut open = alloc::vec![alloc::vec![from]];
     for _ in 0..MOST_EDGES {

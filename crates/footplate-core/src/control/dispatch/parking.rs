@@ -1,4 +1,4 @@
-//! Places where a train can stand, and whether it stands in nobody's way there: clear of all turnouts.
+//! Places where a train can be at rest, and whether it is clear of all turnouts there.
 
 use alloc::vec::Vec;
 
@@ -8,14 +8,14 @@ use crate::units::Length;
 use super::movement_authority::{ClearanceEnvelope, standing};
 use super::occupied_path::OccupiedPath;
 
-/// From one place looked at to the next: less than what two trains differ by.
+/// The distance between two places that are tried: less than trains differ by.
 const EVERY: Length = Length::from_mm(100.0);
-/// What is not known of the place of a train that will have stopped somewhere, one standard deviation.
+/// The uncertainty of the place of a train after a future stop, one standard deviation.
 pub(super) const PARKED: Length = Length::from_mm(15.0);
-/// What a train is likely to stop off its place by.
+/// How far from its place a train is likely to stop.
 pub(super) const OFF: Length = Length::from_mm(40.0);
 
-/// All places on a layout where there is room for a train, each once, and whether it is clear of all turnouts there.
+/// All places on a layout with room for a train, each once, and whether it is clear of all turnouts there.
 pub(super) fn parking_places(layout: &Layout, room: ClearanceEnvelope) -> Vec<(Position, bool)> {
     let turnouts = TurnoutStates::unknown();
     let room = ClearanceEnvelope { ahead: room.ahead + OFF, behind: room.behind + OFF, ..room };

@@ -1,4 +1,4 @@
-//! Track taken by somebody: stretches of rail by intervals of length, and turnouts as wholes.
+//! Reservations: intervals of stretches, and whole turnouts.
 
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
@@ -7,9 +7,9 @@ use crate::ids::{EdgeId, StretchId, TurnoutId};
 use crate::track::{Layout, NodeKind};
 use crate::units::Length;
 
-/// Nearer to a turnout's toe than this, a train on one leg leaves no room for one on the other. Märklin's K track puts
-/// the fouling point of its 22.5 degree turnouts 180 mm from the toe; a centimetre or two more for the width of long
-/// vehicles, whose ends hang out in curves.
+/// The fouling point of a turnout, from its toe: nearer, a train on one leg leaves no room for one on the other. On
+/// Märklin's K track it is 180 mm from the toe of a 22.5 degree turnout; a centimetre or two more is for the ends of long
+/// vehicles, which hang out in curves.
 pub const CLEARANCE: Length = Length::from_mm(200.0);
 
 /// An interval of a stretch, counted from the start of the first of its two edges.
@@ -32,7 +32,7 @@ impl Span {
     }
 }
 
-/// Rails and turnouts that somebody holds, or wants.
+/// Rails and turnouts that are reserved, or are to be.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Reservation {
     spans: BTreeMap<StretchId, Vec<Span>>,
@@ -40,48 +40,48 @@ pub struct Reservation {
 }
 
 impl Reservation {
-    /// Nothing is taken.
+    /// No track.
     #[must_use]
     pub const fn empty() -> Self {
         Self { spans: BTreeMap::new(), turnouts: BTreeSet::new() }
     }
 
-    /// Whether nothing is taken.
+    /// Whether it has no track.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.spans.is_empty() && self.turnouts.is_empty()
     }
 
-    /// The rails taken, stretch by stretch.
+    /// The reserved rails, stretch by stretch.
     pub fn spans(&self) -> impl Iterator<Item = (StretchId, Span)> {
         self.spans.iter().flat_map(|(stretch, spans)| spans.iter().map(|span| (*stretch, *span)))
     }
 
-    /// The turnouts taken, with those that share their place.
+    /// The reserved turnouts, with those that share their place.
     pub fn turnouts(&self) -> impl Iterator<Item = TurnoutId> {
         self.turnouts.iter().copied()
     }
 
-    /// Whether a turnout is taken.
+    /// Whether a turnout is reserved.
     #[must_use]
     pub fn takes(&self, turnout: TurnoutId) -> bool {
         self.turnouts.contains(&turnout)
     }
 
-    /// Takes a turnout, and the one in the same place with it.
+    /// Adds a turnout, and the one in the same place.
     pub fn take_turnout(&mut self, layout: &Layout, turnout: TurnoutId) {
         self.turnouts.insert(turnout);
         self.turnouts.extend(layout.never_curved_with(turnout));
     }
 
-    /// Takes part of an edge, counted from its start, and no turnout with it.
+    /// Adds part of an edge, counted from its start, without turnouts.
     pub(super) fn take_rails(&mut self, layout: &Layout, id: EdgeId, from: Length, to: Length) {
         if let Some(span) = Span::on(layout, id, from, to) {
             self.spans.entry(id.stretch()).or_default().push(span);
         }
     }
 
-    /// Takes part of an edge, counted from its start, and the turnouts of which it is a leg if that comes near their toes.
+    /// Adds part of an edge, counted from its start, and the turnouts of which it is a leg if it fouls them.
     pub fn take(&mut self, layout: &Layout, id: EdgeId, from: Length, to: Length) {
         let Some(span) = Span::on(layout, id, from, to) else { return };
         let spans = self.spans.entry(id.stretch()).or_default();
@@ -98,7 +98,7 @@ impl Reservation {
         self.turnouts.extend(turnouts_near(layout, id, from, to));
     }
 
-    /// Takes what another takes, too.
+    /// Adds another reservation.
     pub fn add(&mut self, layout: &Layout, other: &Self) {
         for (stretch, span) in other.spans() {
             self.take(layout, EdgeId(2 * stretch.0), span.from, span.to);
@@ -106,21 +106,21 @@ impl Reservation {
         self.turnouts.extend(&other.turnouts);
     }
 
-    /// Whether two take anything in common.
+    /// Whether two reservations share any track.
     #[must_use]
     pub fn meets(&self, other: &Self) -> bool {
         let shares = |(stretch, span): (StretchId, Span)| other.overlaps(stretch, span);
         !self.turnouts.is_disjoint(&other.turnouts) || self.spans().any(shares)
     }
 
-    /// Whether any part of an interval is taken.
+    /// Whether any part of an interval is reserved.
     #[must_use]
     pub fn overlaps(&self, stretch: StretchId, span: Span) -> bool {
         let spans = self.spans.get(&stretch);
         spans.is_some_and(|spans| spans.iter().any(|own| own.from <= span.to && span.from <= own.to))
     }
 
-    /// Whether all of an interval is taken, but for less than `tolerance` at its ends.
+    /// Whether all of an interval is reserved, but for less than `tolerance` at its ends.
     #[must_use]
     pub fn covers(&self, stretch: StretchId, span: Span, tolerance: Length) -> bool {
         let spans = self.spans.get(&stretch);
@@ -130,7 +130,7 @@ impl Reservation {
     }
 }
 
-/// The turnouts of which an edge is a leg and near whose toes a part of it comes, with those in the same places.
+/// The turnouts that part of an edge fouls as one of their legs, with those in the same places.
 pub(super) fn turnouts_near(
     layout: &Layout,
     id: EdgeId,
@@ -144,7 +144,7 @@ pub(super) fn turnouts_near(
     both.flat_map(|turnout| [Some(turnout), layout.never_curved_with(turnout)].into_iter().flatten())
 }
 
-/// The turnout that an edge leaves by one of its legs.
+/// The turnout of which an edge is a leg, leading away from it.
 fn leg_of(layout: &Layout, id: EdgeId) -> Option<TurnoutId> {
     let edge = layout.edge(id)?;
     edge.leg?;

@@ -1,4 +1,4 @@
-//! Setting turnouts for a run, so surely that one that fails now and then does not matter.
+//! Route setting: each turnout of a run is commanded twice, so that one that fails now and then does not matter.
 
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
@@ -6,21 +6,31 @@ use alloc::vec::Vec;
 use crate::control::drive::{Order, Refusal};
 use crate::ids::{TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Leg, TurnoutNeed};
+use crate::track::{Leg, NodeKind, TurnoutNeed};
+use crate::units::Length;
 
 use super::dispatched_train::{DispatchedTrain, State};
 use super::dispatcher::Dispatcher;
+use super::path::edge_from;
 use super::turnout_command::{SURE, TurnoutCommand};
 
-/// From when a turnout has been told until its points have moved: solenoids take 0.1 to 0.3 s.
+/// From the command until the points have moved: solenoids take 0.1 to 0.3 s.
 const MOVES: TimeSpan = TimeSpan::from_ms(350);
-/// A line that works tells a turnout within this: two polls, and the solenoids of a dozen others before it.
+/// A command to a turnout leaves within this: two polls, and the solenoids of a dozen others before it.
 const TOLD_WITHIN: TimeSpan = TimeSpan::from_s(5.0);
-/// A turnout that cannot be thrown for so long is not thrown: somebody is nearer to it than was believed.
+/// The authority is withdrawn when a turnout cannot be thrown for this long: a train is nearer to it than was estimated.
 const PATIENCE: TimeSpan = TimeSpan::from_s(8.0);
 
+/// A turnout whose unknown position leaves open where the train before it, or on it, is.
+pub(super) struct UnknownTurnout {
+    turnout: TurnoutId,
+    train: TrainId,
+    /// Whether the train is at rest before it, clear of it.
+    pub(super) is_clear: bool,
+}
+
 impl Dispatcher {
-    /// Throws what the present run of a train needs; whether all of it lies right by now.
+    /// Throws the turnouts of the present run of a train. Returns whether all of them lie right by now.
     pub(super) fn set(&mut self, now: Timestamp, id: TrainId) -> bool {
         let Some(train) = self.trains.get(&id) else { return false };
         let (Some(run), State::Setting { ready, since }) = (train.course.front(), train.state) else {
@@ -31,7 +41,17 @@ impl Dispatcher {
         let needs: Vec<TurnoutNeed> =
             run.needs.iter().filter(|need| !self.gives_way(now, train, need, &anchors)).copied().collect();
         let wanted = self.with_partners(&needs);
-        let missing: Vec<TurnoutNeed> = wanted.into_iter().filter(|need| !self.is_sure(*need)).collect();
+        let mut frozen = anchors;
+        if !train.seen_since_start {
+            frozen.extend(train.kept.turnouts());
+        }
+        let mut held_down = self.watchdog.driver().turnouts_under(id, now);
+        held_down.extend(&frozen);
+        let lies = |need: &TurnoutNeed| self.watchdog.driver().turnouts().get(need.turnout) == Some(need.leg);
+        // A turnout under the train stays as it is, however sure that is.
+        let stays = |need: &TurnoutNeed| held_down.contains(&need.turnout) && lies(need);
+        let is_missing = |need: &TurnoutNeed| !self.is_sure(*need) && !stays(need);
+        let missing: Vec<TurnoutNeed> = wanted.into_iter().filter(is_missing).collect();
         if missing.is_empty() {
             let ready = ready.unwrap_or(if now == since { now } else { now + MOVES });
             if ready > now {
@@ -39,17 +59,11 @@ impl Dispatcher {
             }
             return ready <= now;
         }
-        let mut frozen = anchors;
-        if !train.seen_since_start {
-            frozen.extend(train.kept.turnouts());
-        }
-        let mut held_down = self.watchdog.driver().turnouts_under(id, now);
-        held_down.extend(&frozen);
         if self.is_in_its_own_way(now, id, &missing, &held_down) {
             return false;
         }
         for need in missing {
-            // Points that are still moving might be left half way by a second word that fails.
+            // A second command that fails could leave moving points halfway.
             let moves =
                 |commanded: &TurnoutCommand| commanded.leg == need.leg && now - commanded.last < MOVES;
             if self.is_being_thrown(now, need.turnout) || self.commanded.get(&need.turnout).is_some_and(moves)
@@ -66,7 +80,7 @@ impl Dispatcher {
                 Ok(_) => {
                     self.throwing.insert(need.turnout, (id, now));
                 }
-                // It stands on the points, and they give way to it.
+                // The train is on the points and trails them.
                 Err(_) if !need.facing && held_down.contains(&need.turnout) => {
                     if let Some(train) = self.trains.get_mut(&id) {
                         train.skipped.insert(need.turnout);
@@ -82,8 +96,8 @@ impl Dispatcher {
         false
     }
 
-    /// Takes back what was granted to a train that stands too near to a turnout of its run: no waiting helps, but another
-    /// way may. Not while a turnout is on its way to being thrown, which nobody would hold.
+    /// Withdraws the authority of a train that is too near to a turnout of its run: waiting does not help, another path may.
+    /// Not while a command to a turnout is under way, which no train would have reserved then.
     fn is_in_its_own_way(
         &mut self,
         now: Timestamp,
@@ -102,13 +116,12 @@ impl Dispatcher {
         true
     }
 
-    /// Whether a turnout was asked for and may still be told. What got lost on the line is asked for again.
+    /// Whether a command to a turnout may still be under way. One that was lost on the line is given again.
     pub(super) fn is_being_thrown(&self, now: Timestamp, turnout: TurnoutId) -> bool {
         self.throwing.get(&turnout).is_some_and(|(_, since)| now - *since < TOLD_WITHIN)
     }
 
-    /// Whether a train comes from a leg to points that have to give way to it: it stands on them, or on those in the same
-    /// place.
+    /// Whether a train trails points that cannot be thrown, as it is on them, or on those in the same place.
     fn gives_way(
         &self,
         now: Timestamp,
@@ -127,7 +140,7 @@ impl Dispatcher {
         train.skipped.contains(&need.turnout) || partner.is_some_and(|partner| is_held_down(partner.turnout))
     }
 
-    /// How the turnout in the same place has to lie.
+    /// The need of the turnout in the same place.
     fn partner(&self, need: &TurnoutNeed) -> Option<TurnoutNeed> {
         let turnout = self
             .watchdog
@@ -149,7 +162,59 @@ impl Dispatcher {
             .is_some_and(|commanded| commanded.leg == need.leg && commanded.times >= SURE)
     }
 
-    /// A turnout has been told how to lie.
+    /// Sets turnouts of unknown position that keep trains at rest from having a place: one on the hop that a train is on
+    /// leaves open which track that leads to. Straight does as well as curved.
+    ///
+    /// # Errors
+    /// A train may be on such a turnout.
+    pub(super) fn set_unknown_turnouts(&mut self, now: Timestamp) -> Result<(), Refusal> {
+        let rests = self.trains.values().filter(|train| train.rests());
+        let unknown: Vec<UnknownTurnout> =
+            rests.filter_map(|train| self.unknown_turnout_ahead(now, train.id)).collect();
+        if let Some(UnknownTurnout { turnout, train, .. }) = unknown.iter().find(|unknown| !unknown.is_clear)
+        {
+            return Err(Refusal::TurnoutUnknown { turnout: *turnout, train: *train });
+        }
+        for UnknownTurnout { turnout, train, .. } in unknown {
+            if self.is_being_thrown(now, turnout) {
+                continue;
+            }
+            self.watchdog.order(now, Order::Turnout { turnout, curved: false })?;
+            self.throwing.insert(turnout, (train, now));
+            let layout = self.watchdog.driver().layout();
+            if let Some(train) = self.trains.get_mut(&train) {
+                train.held.take_turnout(layout, turnout);
+            }
+        }
+        Ok(())
+    }
+
+    /// The first turnout of unknown position on the hop that a train is on; `None` where the train has a place, or none is
+    /// the reason that it has not.
+    pub(super) fn unknown_turnout_ahead(&self, now: Timestamp, train: TrainId) -> Option<UnknownTurnout> {
+        let driver = self.watchdog.driver();
+        let located = driver.locate(train, now).filter(|_| driver.position(train, now).is_none())?;
+        let front = located.at.way + self.room(now, self.trains.get(&train)?).ahead;
+        let (layout, turnouts) = (driver.layout(), driver.turnouts());
+        let (mut node, mut distance) = (located.at.node, Length::ZERO);
+        for _ in 0..layout.edges().len() {
+            if let NodeKind::Branch(turnout) = layout.node(node)?.kind
+                && turnouts.get(turnout).is_none()
+            {
+                return Some(UnknownTurnout {
+                    turnout,
+                    train,
+                    is_clear: located.at_rest && front < distance,
+                });
+            }
+            let edge = layout.edge(edge_from(layout, turnouts, node)?)?;
+            distance += edge.length;
+            node = edge.to;
+        }
+        None
+    }
+
+    /// A command to a turnout has left.
     pub(super) fn turnout_told(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) {
         let asked_for = self.throwing.remove(&turnout);
         if let Some((id, _)) =

@@ -1,49 +1,51 @@
-//! Running a course, run by run: turnouts, turning around, the run itself, and rest.
+//! The runs of a train, one after the other: set the turnouts, reverse, run, come to rest.
 
-use crate::control::drive::THERE;
+use crate::control::Notice;
+use crate::control::drive::AT_TARGET;
 use crate::control::drive::{Aim, Order, Refusal, StopOrder};
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Landmark, TurnoutNeed};
+use crate::track::{Landmark, Position, TurnoutNeed};
 use crate::units::Length;
 
 use super::dispatched_train::{Purpose, State};
 use super::dispatcher::{Dispatcher, LOOK};
 use super::itinerary::SHORTEST_RUN;
-use super::movement_authority::{MovementAuthority, SLACK};
+use super::movement_authority::{MovementAuthority, SLACK, Start};
+use super::path::Path;
 use super::reservation::Reservation;
-use super::way::Way;
-use crate::control::Notice;
 
-/// What could not be done is not tried again for so long.
+/// What could not be done is tried again after this.
 const PAUSE: TimeSpan = TimeSpan::from_s(2.0);
 
-/// A journey that could not be begun so many times in a row is given up.
+/// A journey that could not be begun this many times in a row is given up.
 const MOST_WITHDRAWN: u8 = 5;
 
-/// One standard deviation of stops that are sure enough for a destination: two thirds of them end within a centimetre.
+/// The largest standard deviation of a stop at a destination: two thirds of the stops end within a centimetre.
 const SURE: Length = Length::from_mm(10.0);
+
+/// How far a train runs ahead so that a sensor reports it: a little more than the shortest run.
+const AHEAD_TO_BE_SEEN: Length = Length::from_mm(220.0);
 
 /// A train that was stopped on the way goes on after this.
 const AFTER_HALT: TimeSpan = TimeSpan::from_s(1.0);
 
-/// A train that was stopped no further than this from its destination has arrived: to come nearer it would have to go
-/// away first.
+/// A train stopped no further than this from its destination has arrived: to come nearer it would have to leave first.
 const NEAR_ENOUGH: Length = Length::from_mm(80.0);
 
 impl Dispatcher {
-    /// Does what is due for every train.
+    /// Takes the next step of every train.
     pub(super) fn go_on(&mut self, now: Timestamp) {
         let ids: alloc::vec::Vec<TrainId> = self.trains.keys().copied().collect();
         for id in ids {
             let Some(state) = self.trains.get(&id).map(|train| train.state) else { continue };
             match state {
                 State::Setting { .. } if self.set(now, id) => self.depart(now, id),
-                State::Halting { confirmed, .. } if self.watchdog.driver().stands(id, now) => {
+                State::Halting { confirmed, .. } if self.watchdog.driver().is_at_rest(id, now) => {
                     self.halted(now, id, confirmed);
                 }
                 State::Lost
-                    if self.watchdog.driver().stands(id, now)
+                    if self.watchdog.driver().is_at_rest(id, now)
                         && self.watchdog.driver().position(id, now).is_some() =>
                 {
                     self.halted(now, id, true);
@@ -51,9 +53,12 @@ impl Dispatcher {
                 State::Lost if self.watchdog.driver().position(id, now).is_some() => {
                     self.found_by_hand(now, id);
                 }
+                State::Lost if self.is_forgotten(now, id) => self.watchdog.lose(now, id),
                 State::ByHand if !self.rest_by_hand(now, id) => self.drive_by_hand(now, id),
                 State::Resting
-                    if self.is_somewhere(id) && self.watchdog.driver().position(id, now).is_none() =>
+                    if self.is_somewhere(id)
+                        && self.watchdog.driver().position(id, now).is_none()
+                        && !self.unknown_turnout_ahead(now, id).is_some_and(|unknown| unknown.is_clear) =>
                 {
                     self.set_state(id, State::Lost);
                     self.say(Notice::ReservedAsUnknown { train: id });
@@ -63,24 +68,31 @@ impl Dispatcher {
         }
     }
 
-    /// A train was not seen where it should have been, and there is no way on which it could be found: a person has to say
-    /// where it stands.
+    /// Whether a train is lost and nothing looks for it.
+    fn is_forgotten(&self, now: Timestamp, id: TrainId) -> bool {
+        self.watchdog.is_watching()
+            && !self.watchdog.is_in_danger(id)
+            && self.watchdog.driver().locate(id, now).is_none()
+    }
+
+    /// A sensor did not report a train where it should have, and no path leads to where one could: the watchdog locates it
+    /// again; without one, a person has to say where it is.
     pub(super) fn lose(&mut self, now: Timestamp, id: TrainId) {
         self.watchdog.lose(now, id);
         self.set_state(id, State::Lost);
         self.say(Notice::ReservedAsUnknown { train: id });
     }
 
-    /// A train is turned around: nothing has reported it since.
+    /// A train reverses: no sensor has reported it since.
     pub(super) fn note_turned(&mut self, id: TrainId) {
         if let Some(train) = self.trains.get_mut(&id) {
             train.seen_since_turn = false;
         }
     }
 
-    /// A train was not seen where it should have been, and ahead of it there is no way: whether it is only now that it is
-    /// looked for behind. The contact that reported it last will report it again then, wherever it stands in between. One
-    /// that nothing has reported since it turned around may not have left at all: behind it, and not far, the track may end.
+    /// A sensor did not report a train where it should have, and ahead of it there is no path. Returns whether the train looks
+    /// back from now on: the sensor that reported it last reports it again, wherever it is in between. A train that no
+    /// sensor has reported since it reversed may not have left at all, and the track behind it may end soon.
     pub(super) fn begins_to_look_back(&mut self, id: TrainId) -> bool {
         let Some(train) = self.trains.get_mut(&id).filter(|train| train.seen_since_turn) else {
             return false;
@@ -90,11 +102,27 @@ impl Dispatcher {
         !core::mem::replace(&mut train.looks_back, true)
     }
 
+    /// Sends a train that a sensor did not report a short distance ahead on its edge, where the track allows it: one that
+    /// came to rest short of the sensor is reported then. Returns whether it goes; once until a sensor reports it.
+    pub(super) fn looks_ahead(&mut self, now: Timestamp, id: TrainId, start: &Start) -> bool {
+        let has_looked = self
+            .trains
+            .get_mut(&id)
+            .is_none_or(|train| core::mem::replace(&mut train.has_looked_ahead, true));
+        let target = Position { offset: start.place.offset + AHEAD_TO_BE_SEEN, ..start.place };
+        let proposal = self.propose(start, &[target], &self.obstacles_of_others(id));
+        let Some(proposal) = proposal.filter(|found| !has_looked && self.is_free(id, found)) else {
+            return false;
+        };
+        self.grant(now, id, Purpose::Aside(id), proposal);
+        true
+    }
+
     fn is_somewhere(&self, id: TrainId) -> bool {
         self.trains.get(&id).is_some_and(|train| !train.held.is_empty())
     }
 
-    /// The turnouts lie for the next run.
+    /// The turnouts lie for the next run: reverses, or runs.
     fn depart(&mut self, now: Timestamp, id: TrainId) {
         let Some(run) = self.trains.get(&id).and_then(|train| train.course.front()) else { return };
         if run.turns {
@@ -114,15 +142,15 @@ impl Dispatcher {
         }
     }
 
-    /// How the turnout behind a train has to lie so that it can be counted from there once it has turned around. It may
-    /// stand on another edge than was planned.
+    /// How the turnout behind a train has to lie so that its place can be counted from there once it has reversed. It may be
+    /// on another edge than planned.
     fn missing_to_turn(&self, now: Timestamp, id: TrainId) -> Option<TurnoutNeed> {
-        let turned = self.watchdog.driver().turned_place(id, now)?;
+        let turned = self.watchdog.driver().reversed_position(id, now)?;
         let lies = |need: &TurnoutNeed| self.watchdog.driver().turnouts().get(need.turnout) == Some(need.leg);
         self.watchdog.driver().layout().needs_of(turned.edge).find(|need| need.facing && !lies(need))
     }
 
-    /// A run needs one more turnout, if nobody else holds that.
+    /// Adds a turnout to a run, unless another train has reserved it.
     fn need_more(&mut self, now: Timestamp, id: TrainId, need: TurnoutNeed) {
         let is_held = self.trains.values().any(|other| other.id != id && other.held.takes(need.turnout));
         let layout = self.watchdog.driver().layout();
@@ -146,13 +174,13 @@ impl Dispatcher {
         let place = self.watchdog.driver().position(id, now);
         let from = run.start - room.behind;
         let found = located.zip(place).and_then(|(located, place)| {
-            let at = run.way.find(place, from)?;
-            let limit = run.way.place(run.limit)?;
+            let at = run.path.find(place, from)?;
+            let limit = run.path.place(run.limit)?;
             let limit = self.watchdog.driver().way_point_ahead(id, located.at, limit)?;
-            let stop = run.way.place(run.stop)?;
+            let stop = run.path.place(run.stop)?;
             let direct = self.watchdog.driver().way_point(id, located.at.node, stop)?.way - located.at.way;
-            // The way may go round to a place at which it stands already.
-            let next_round = direct > -THERE && run.stop - at > direct + SHORTEST_RUN;
+            // The path may lead round to where it is already.
+            let next_round = direct > -AT_TARGET && run.stop - at > direct + SHORTEST_RUN;
             (limit.way > located.at.way).then_some((at, limit, (stop, next_round)))
         });
         let run_begin = run.begin;
@@ -162,15 +190,15 @@ impl Dispatcher {
         let target = Landmark { node: edge.from, offset: stop.offset };
         let is_last = train.course.len() == 1 && train.purpose == Purpose::Journey;
         let aim = train.asked.filter(|_| is_last).map_or(Aim::Median, |asked| asked.journey.aim);
-        // Where a train only turns around or waits, time counts more than millimetres.
+        // Where a train only reverses or waits, time counts more than millimetres.
         let step = self.step_for(id, run.stop - at, |spread| !is_last || spread <= SURE);
         let stop = StopOrder { train: id, target, aim, step, next_round };
-        self.watchdog.set_limit(now, id, Some(limit));
+        self.watchdog.set_end_of_authority(now, id, Some(limit));
         let taken = self.watchdog.order(now, Order::Stop(stop));
         let retried = |_| self.watchdog.order(now, Order::Stop(StopOrder { step: None, ..stop }));
         match if step.is_some() { taken.or_else(retried) } else { taken } {
             Ok(order) => {
-                // It has not moved since, whatever turning around makes of what is known of its place.
+                // It has not moved since, however uncertain reversing makes its place.
                 let rear = (at - room.behind).max(run_begin);
                 self.set_state(id, State::Running { order, rear, confirmed: false });
                 if let Some(train) = self.trains.get_mut(&id) {
@@ -189,10 +217,10 @@ impl Dispatcher {
         let State::Running { rear, confirmed, .. } = train.state else { return };
         let gave_way = self.is_on_points_that_gave_way(now, id);
         let Some(train) = self.trains.get_mut(&id) else { return };
-        let confirmed = confirmed && !unseen && !self.watchdog.driver().is_in_doubt(id);
+        let confirmed = confirmed && !unseen && !self.watchdog.driver().is_position_ambiguous(id);
         let ended = train.course.pop_front();
         if unseen && !train.course.is_empty() {
-            // It is not where it should be: nothing that was planned from there holds.
+            // It is not where it should be, so the runs planned from there do not hold.
             return self.halted(now, id, false);
         }
         let turns_next = train.course.front().is_some_and(|run| run.turns);
@@ -201,13 +229,13 @@ impl Dispatcher {
         }
         if train.course.is_empty() {
             train.state = State::Resting;
-            self.watchdog.set_limit(now, id, None);
+            self.watchdog.set_end_of_authority(now, id, None);
             self.rest(now, id, rear, confirmed.then_some(ended).flatten());
             self.arrived(now, id, error);
         } else {
             train.state = State::Setting { ready: None, since: now };
             train.skipped.clear();
-            // What it came over it might still be on, if no contact said otherwise.
+            // It may still be on the path of this run, unless a sensor said otherwise.
             if let (false, Some(run)) = (confirmed, ended) {
                 let layout = self.watchdog.driver().layout();
                 train.kept.add(layout, &run.taken);
@@ -228,7 +256,7 @@ impl Dispatcher {
             train.not_before = now + AFTER_HALT;
             train.unobstructed_s = None;
         }
-        self.watchdog.set_limit(now, id, None);
+        self.watchdog.set_end_of_authority(now, id, None);
         if !is_sure {
             self.say(Notice::ReservedAsUnknown { train: id });
         } else if confirmed {
@@ -242,25 +270,25 @@ impl Dispatcher {
     fn forgive(&mut self, now: Timestamp, id: TrainId) {
         let Some(run) = self.trains.get_mut(&id).and_then(|train| train.last_run.take()) else { return };
         let Some(rest) = self.watchdog.driver().position(id, now) else { return };
-        let error = run.way.find(rest, run.start).map(|at| at - run.stop);
+        let error = run.path.find(rest, run.start).map(|at| at - run.stop);
         if let Some(error) = error.filter(|error| error.abs() <= NEAR_ENOUGH) {
             self.arrived(now, id, Some(error));
         }
     }
 
-    /// Whether a train at rest is on points that lie for another leg than it came from: they gave way to it.
+    /// Whether a train at rest is on a turnout that lies for another leg than it came from: it trailed the points.
     pub(super) fn is_on_points_that_gave_way(&self, now: Timestamp, id: TrainId) -> bool {
         let place = self.watchdog.driver().position(id, now);
         let Some((train, place)) = self.trains.get(&id).zip(place) else { return false };
         let room = self.room(now, train);
         let (layout, turnouts) = (self.watchdog.driver().layout(), self.watchdog.driver().turnouts());
-        let (way, at) = Way::around(layout, turnouts, place, &train.came, room.behind, room.ahead);
-        let mut trailed = way.trailed(layout, at - room.behind, at + room.ahead);
+        let (path, at) = Path::around(layout, turnouts, place, &train.came, room.behind, room.ahead);
+        let mut trailed = path.trailed(layout, at - room.behind, at + room.ahead);
         trailed.any(|need| turnouts.get(need.turnout) != Some(need.leg))
     }
 
-    /// Lets go of what a train at rest is certainly not on: it stands where its run was to end. Without a run that a
-    /// contact has confirmed it keeps what it had, all of it.
+    /// Releases the track that a train at rest at the end of its run is certainly not on. Without a run that a sensor has
+    /// confirmed it keeps its whole reservation.
     fn rest(&mut self, now: Timestamp, id: TrainId, rear: Length, ended: Option<MovementAuthority>) {
         if ended.is_some() {
             self.free_anchors(now, id);
@@ -268,12 +296,12 @@ impl Dispatcher {
         let Some((train, run)) = self.trains.get(&id).zip(ended) else { return };
         let Some(place) = self.watchdog.driver().position(id, now) else { return };
         let room = self.room(now, train);
-        // The way may come round to where it began.
-        let Some(at) = run.way.find(place, rear) else { return };
+        // The path may lead round to where it began.
+        let Some(at) = run.path.find(place, rear) else { return };
         let layout = self.watchdog.driver().layout();
-        // What was let go is somebody else's by now.
+        // Released track may be reserved for another train by now.
         let from = (at - room.behind).max(rear);
-        let mut held = self.reserved(run.way.reservation(layout, from, (at + room.ahead).min(run.end)));
+        let mut held = self.reserved(run.path.reservation(layout, from, (at + room.ahead).min(run.end)));
         self.take_anchors(now, id, place, &mut held);
         let is_free = self.is_free_for(id, &held);
         if let Some(train) = self.trains.get_mut(&id).filter(|_| is_free) {
@@ -282,9 +310,9 @@ impl Dispatcher {
         }
     }
 
-    /// Takes back what was granted to a train at rest.
+    /// Withdraws the authority of a train at rest.
     pub(super) fn withdraw(&mut self, now: Timestamp, id: TrainId, why: Option<Refusal>) {
-        // The next way begins with the turnouts as they lie under it.
+        // The next path begins with the turnouts as they lie under it.
         let is_in_its_own_way = why.as_ref().and_then(Refusal::occupier) == Some(id);
         if let Some(train) = self.trains.get_mut(&id) {
             train.course.clear();
@@ -293,16 +321,15 @@ impl Dispatcher {
             train.withdrawn = train.withdrawn.saturating_add(1);
             train.not_before = now + if is_in_its_own_way { LOOK } else { PAUSE };
         }
-        self.watchdog.set_limit(now, id, None);
+        self.watchdog.set_end_of_authority(now, id, None);
         self.hold_again(now, id);
         self.say(Notice::Withdrawn { train: id, why });
-        // Whoever asked for it has to know.
         if self.trains.get_mut(&id).is_some_and(|train| train.withdrawn >= MOST_WITHDRAWN) {
-            self.give_up_journey(id, self.no_way(id));
+            self.give_up_journey(id, self.unreachable(id));
         }
     }
 
-    /// A train will never come to its destination.
+    /// Ends a journey that cannot be carried out.
     pub(super) fn give_up_journey(&mut self, id: TrainId, why: Refusal) {
         let Some(train) = self.trains.get_mut(&id) else { return };
         train.withdrawn = 0;
@@ -311,8 +338,7 @@ impl Dispatcher {
         }
     }
 
-    /// A train at rest that does not go holds what it held before, and what it stands on now that it may have turned
-    /// around.
+    /// Restores the reservation of a train at rest that does not go, with the track under it, as it may have reversed.
     fn hold_again(&mut self, now: Timestamp, id: TrainId) {
         let kept = self.trains.get_mut(&id).map(|train| core::mem::take(&mut train.kept));
         self.stand(now, id);
@@ -322,7 +348,7 @@ impl Dispatcher {
         }
     }
 
-    /// Says that a train has come to where it was sent.
+    /// Reports that a train has come to its destination.
     pub(super) fn arrived(&mut self, now: Timestamp, id: TrainId, error: Option<Length>) {
         let Some(train) = self.trains.get_mut(&id) else { return };
         train.purpose = Purpose::Journey;
@@ -334,7 +360,7 @@ impl Dispatcher {
         }
     }
 
-    /// Holds what the runs of a train take from where its rear end certainly is, and nothing else.
+    /// Reserves the track of the runs of a train, from where its rear end certainly is.
     pub(super) fn hold(&mut self, now: Timestamp, id: TrainId) {
         let Some(train) = self.trains.get(&id) else { return };
         let layout = self.watchdog.driver().layout();
@@ -359,19 +385,19 @@ impl Dispatcher {
         }
     }
 
-    /// A contact has reported a train that runs: what is behind it is free.
+    /// A sensor has reported a running train: releases the track behind it. Returns whether the sensor is on its path.
     pub(super) fn confirmed_at(&mut self, now: Timestamp, id: TrainId, contact: crate::ids::NodeId) -> bool {
         let Some(train) = self.trains.get(&id) else { return true };
         let State::Running { order, rear, .. } = train.state else { return true };
         let Some(run) = train.course.front() else { return true };
         let layout = self.watchdog.driver().layout();
-        let Some(at) = run.way.find_node(layout, contact, rear) else { return false };
-        // It may have been somebody else, or nobody.
-        if self.watchdog.driver().is_in_doubt(id) {
+        let Some(at) = run.path.find_node(layout, contact, rear) else { return false };
+        // Another train may have caused the detection, or none.
+        if self.watchdog.driver().is_position_ambiguous(id) {
             return true;
         }
         let rear = rear.max(at - train.lengths.behind() - SLACK);
-        // Near to where it began it keeps what it stood on.
+        // Near its start it keeps the track that it stood on.
         let body = self.reserved(run.takes_beyond(layout, rear));
         if rear < run.taken_from && !self.is_free_for(id, &body) {
             return true;

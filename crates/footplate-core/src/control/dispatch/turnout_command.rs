@@ -3,8 +3,8 @@
 use crate::time::Timestamp;
 use crate::track::Leg;
 
-/// A turnout is told so many times how to lie. One that fails once in 300 fails twice in 90 000, if its failures do not
-/// hang together; those that do show when a train takes the other leg.
+/// How many times a turnout is commanded. One that fails once in 300 fails twice in a row once in 90 000, if its failures are
+/// independent; others show when a train takes the other leg.
 pub(super) const SURE: u8 = 2;
 
 /// How a turnout was set.
@@ -17,7 +17,13 @@ pub(super) struct TurnoutCommand {
 }
 
 impl TurnoutCommand {
-    /// A turnout of which somebody knows how it lies.
+    /// A turnout that is remembered to lie so, or did before a train came elsewhere: it is commanded again before it is
+    /// relied on.
+    pub(super) const fn remembered(now: Timestamp, leg: Leg) -> Self {
+        Self { leg, times: 0, last: now }
+    }
+
+    /// A turnout of which a train has shown how it lies.
     pub(super) const fn sure(now: Timestamp, leg: Leg) -> Self {
         Self { leg, times: SURE, last: now }
     }

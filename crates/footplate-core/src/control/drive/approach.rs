@@ -1,4 +1,4 @@
-//! From which step a train at rest should come to a stop elsewhere.
+//! The step from which a train at rest approaches a target.
 
 use alloc::vec::Vec;
 
@@ -11,26 +11,25 @@ use crate::units::{Length, Speed};
 
 use super::command_time::{CommandTime, command_time, spread};
 use super::driven_train::DrivenTrain;
-use super::path_length::contacts_until;
+use super::path::sensors_within;
 use super::refusal::Refusal;
 use super::task::Destination;
 
-/// A stop follows a start by at least this: two commands and the poll between them.
+/// Shortest time from a start to its stop: two commands and the poll between them.
 const SHORTEST_RUN: TimeSpan = TimeSpan::from_ms(80);
-/// A move that takes longer than this is not worth its last millimetre.
+/// Longest duration of a short run that is chosen for its precision.
 const MOVE_LIMIT: TimeSpan = TimeSpan::from_s(30.0);
-/// A train that is looked for runs about as fast as this, slow enough to be stopped anywhere.
+/// Speed at which a lost train is run over a sensor: slow enough to stop anywhere.
 const FINDING_SPEED: Speed = Speed::from_mm_per_s(150.0);
-/// A stop that scatters by so many times as much as the surest one is worth the time that a faster step saves ...
-const AS_SURE: f64 = 1.5;
-/// ... and so is one that scatters by no more than this: what stops from medium steps repeat to (4 mm), and as much
-/// doubt.
-const SURE: Length = Length::from_mm(8.0);
-/// Stops before this many standard deviations of the stopping distance leave a margin for the settled stretch.
+/// A faster step is worth its time if its stops spread at most this many times as much as the most precise ones ...
+const SPREAD_RATIO: f64 = 1.5;
+/// ... or at most this: the repeatability of stops from medium steps (4 mm), and an equal uncertainty.
+const GOOD_SPREAD: Length = Length::from_mm(8.0);
+/// Margin before a stop, in standard deviations of the stopping distance, that remains for the settled run.
 const STOP_MARGIN: f64 = 3.0;
 
 impl DrivenTrain {
-    /// The steps that move the train; all that were not found wanting where none is known to.
+    /// The steps known to move the train; if none is known, all that are not known to be unreliable.
     pub(super) fn usable_steps(&self) -> Vec<SpeedStep> {
         let steps = || (1..=self.model.highest().get()).filter_map(SpeedStep::new);
         let known: Vec<SpeedStep> = steps().filter(|step| self.model.uses(*step) == StepUse::Moves).collect();
@@ -41,7 +40,7 @@ impl DrivenTrain {
         }
     }
 
-    /// The step at which a lost train looks for a contact.
+    /// The step at which a lost train runs to a sensor.
     pub(super) fn finding_step(&self) -> SpeedStep {
         let steps = self.usable_steps();
         let fast_enough =
@@ -49,9 +48,9 @@ impl DrivenTrain {
         fast_enough.or(steps.last()).copied().unwrap_or(self.model.highest())
     }
 
-    /// The step from which a train at rest comes to rest at a place. Where it can be settled before a contact that is
-    /// passed in time before the command: the fastest from which it stops about as surely as from any. On shorter ways
-    /// the one whose rest is surest.
+    /// The step from which a train at rest approaches a target. If its speed can settle before a sensor that it
+    /// passes in time before the command: the fastest step with about the smallest spread of stops. On shorter paths:
+    /// the step whose predicted rest has the smallest spread.
     pub(super) fn approach_step(
         &self,
         context: TrackContext<'_>,
@@ -65,7 +64,7 @@ impl DrivenTrain {
             return match self.short_run(context, now, at, step, destination) {
                 CommandTime::At(..) => Ok(step),
                 CommandTime::TooLate(_, beyond) => Err(self.too_near(context, at, beyond, destination)),
-                CommandTime::Never => Err(self.no_way(context, at.node, destination)),
+                CommandTime::Never => Err(self.no_path(context, at.node, destination)),
             };
         }
         let steps = self.usable_steps();
@@ -74,33 +73,34 @@ impl DrivenTrain {
             .filter(|step| self.settles_before(context, located, at, **step))
             .map(|step| (*step, self.stop_spread(*step)))
             .collect();
-        let surest_stop = settled.iter().map(|(_, spread)| *spread).reduce(Length::min);
-        if let Some(surest) = surest_stop {
-            let sure_enough = (surest * AS_SURE).max(SURE);
-            let is_lively = |step: SpeedStep| self.model.speed(step, Approach::Below).value >= FINDING_SPEED;
-            let sure = || settled.iter().filter(|(_, spread)| *spread <= sure_enough);
-            let fastest = sure().next_back().filter(|(step, _)| is_lively(*step));
-            // No train crawls all the way for a few millimetres; it might also stall.
+        let least_spread = settled.iter().map(|(_, spread)| *spread).reduce(Length::min);
+        if let Some(most_precise) = least_spread {
+            let good_spread = (most_precise * SPREAD_RATIO).max(GOOD_SPREAD);
+            let is_fast_enough =
+                |step: SpeedStep| self.model.speed(step, Approach::Below).value >= FINDING_SPEED;
+            let precise = || settled.iter().filter(|(_, spread)| *spread <= good_spread);
+            let fastest = precise().next_back().filter(|(step, _)| is_fast_enough(*step));
+            // A train does not creep all the way for a few millimetres; it might also stall.
             let fastest =
-                fastest.or(settled.iter().find(|(step, _)| is_lively(*step))).or(sure().next_back());
+                fastest.or(settled.iter().find(|(step, _)| is_fast_enough(*step))).or(precise().next_back());
             return fastest.map(|(step, _)| *step).ok_or_else(out_of_reach);
         }
-        let mut surest: Option<(SpeedStep, Length)> = None;
-        let mut slowest: Option<(SpeedStep, TimeSpan)> = None;
+        let mut most_precise: Option<(SpeedStep, Length)> = None;
+        let mut quickest: Option<(SpeedStep, TimeSpan)> = None;
         let mut nearest: Option<Length> = None;
-        // A short run is over before a zone has been left.
+        // A short run ends before the train leaves a zone.
         let fastest = self.fastest_allowed(context, now);
         for step in steps.into_iter().filter(|step| fastest.is_none_or(|fastest| *step <= fastest)) {
             match self.short_run(context, now, at, step, destination) {
                 CommandTime::At(_, rest) if rest.time - now <= MOVE_LIMIT => {
-                    if surest.is_none_or(|(_, least)| spread(&rest) < least) {
-                        surest = Some((step, spread(&rest)));
+                    if most_precise.is_none_or(|(_, least)| spread(&rest) < least) {
+                        most_precise = Some((step, spread(&rest)));
                     }
                 }
                 CommandTime::At(_, rest) => {
                     let takes = rest.time - now;
-                    if slowest.is_none_or(|(_, least)| takes < least) {
-                        slowest = Some((step, takes));
+                    if quickest.is_none_or(|(_, least)| takes < least) {
+                        quickest = Some((step, takes));
                     }
                 }
                 CommandTime::TooLate(_, beyond) => {
@@ -109,31 +109,32 @@ impl DrivenTrain {
                 CommandTime::Never => {}
             }
         }
-        if let Some((step, _)) = surest {
+        if let Some((step, _)) = most_precise {
             return Ok(step);
         }
-        if let Some((step, _)) = slowest {
+        if let Some((step, _)) = quickest {
             return Ok(step);
         }
         Err(match nearest {
             Some(beyond) => self.too_near(context, at, beyond, destination),
-            None => self.no_way(context, at.node, destination),
+            None => self.no_path(context, at.node, destination),
         })
     }
 
-    /// Of some steps, those from which it stops about as surely as from any and which nobody would call a crawl; all of
-    /// them if there is none.
-    pub(super) fn sure_steps(&self, steps: &[SpeedStep]) -> Vec<SpeedStep> {
-        let surest = steps.iter().map(|step| self.stop_spread(*step)).reduce(Length::min);
-        let sure_enough = (surest.unwrap_or(Length::ZERO) * AS_SURE).max(SURE);
-        let is_lively = |step: SpeedStep| self.model.steady_speed(step, Approach::Below) >= FINDING_SPEED;
-        let sure = steps.iter().copied().filter(|step| self.stop_spread(*step) <= sure_enough);
-        let lively: Vec<SpeedStep> = sure.filter(|step| is_lively(*step)).collect();
-        if !lively.is_empty() {
-            return lively;
+    /// Of some steps, those with about the smallest spread of stops that do not creep; all of them if there is none.
+    pub(super) fn precise_steps(&self, steps: &[SpeedStep]) -> Vec<SpeedStep> {
+        let most_precise = steps.iter().map(|step| self.stop_spread(*step)).reduce(Length::min);
+        let good_spread = (most_precise.unwrap_or(Length::ZERO) * SPREAD_RATIO).max(GOOD_SPREAD);
+        let is_fast_enough =
+            |step: SpeedStep| self.model.steady_speed(step, Approach::Below) >= FINDING_SPEED;
+        let precise = steps.iter().copied().filter(|step| self.stop_spread(*step) <= good_spread);
+        let fast: Vec<SpeedStep> = precise.filter(|step| is_fast_enough(*step)).collect();
+        if !fast.is_empty() {
+            return fast;
         }
-        let lively: Vec<SpeedStep> = steps.iter().copied().filter(|step| is_lively(*step)).take(1).collect();
-        if lively.is_empty() { steps.to_vec() } else { lively }
+        let fast: Vec<SpeedStep> =
+            steps.iter().copied().filter(|step| is_fast_enough(*step)).take(1).collect();
+        if fast.is_empty() { steps.to_vec() } else { fast }
     }
 
     /// One standard deviation of stops from a settled step.
@@ -142,7 +143,7 @@ impl DrivenTrain {
         Length::from_m(libm::hypot(stop.doubt.as_m(), stop.scatter.as_m()))
     }
 
-    /// Whether a contact is passed at a settled speed, in time before the command to stop.
+    /// Whether the train passes a sensor at a settled speed, in time before the stop command.
     pub(super) fn settles_before(
         &self,
         context: TrackContext<'_>,
@@ -152,11 +153,11 @@ impl DrivenTrain {
     ) -> bool {
         let speed = self.model.speed(step, Approach::Below).value;
         let stop = self.model.stop(step, Approach::Below);
-        // No start is faster than its final speed.
+        // A start never runs faster than its final speed.
         let settled = located.at.way + speed * self.model.settles_within(SpeedStep::STAND, step);
         let last = at.way - stop.distance - stop.doubt * STOP_MARGIN - speed * self.link.reaction;
         at.node == located.at.node
-            && contacts_until(context, &self.model, at.node, last).any(|(_, way)| way > settled)
+            && sensors_within(context, &self.model, at.node, last).any(|(_, distance)| distance > settled)
     }
 
     pub(super) fn short_run(

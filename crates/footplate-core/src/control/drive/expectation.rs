@@ -1,133 +1,164 @@
-//! What should happen next to a train that runs, and what follows when it does not.
+//! The next detection of a running train and the end of its authority, and what follows if the detection does not come.
 
-use crate::ids::{NodeId, SensorId, SpeedStep};
+use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{TrackContext, WayPoint};
 use crate::units::{Length, Ratio};
 
 use super::command_time::{CommandTime, command_time};
-use super::driven_train::{DrivenTrain, Expectation};
+use super::driven_train::DrivenTrain;
+use super::driver::Driver;
 use super::order::Aim;
 use super::outputs::Outputs;
-use super::path_length::track_end;
+use super::path::{recount_from, track_end};
 use super::refusal::Refusal;
-use super::task::Phase;
+use super::task::{Expectation, TaskPhase};
 use crate::control::Notice;
 
-/// A contact is overdue this long after the last of 99.7 % of cases.
+/// A detection is overdue this long after its 99.7 % bound.
 const OVERDUE: TimeSpan = TimeSpan::from_ms(500);
-/// The contact behind one that was silent is late this long after the last of 99.7 % of cases: two polls of all modules. Who
-/// follows the train waits no longer.
+/// After one missed detection, the next is late this long after its 99.7 % bound: two polls of all modules. A
+/// follower is not kept waiting longer.
 const LATE: TimeSpan = TimeSpan::from_ms(250);
-/// Contacts that stay silent in a row until the train is lost: two are missed one after the other once in 100 000 times,
-/// and trains are stuck, derailed or lifted ten times as often.
-const MOST_SILENT: u8 = 2;
-/// And however far the next one is, when at least this long has passed, or twice the way there.
+/// The number of missed detections in a row after which a train is lost: sensors miss two in a row once in 100 000
+/// times; trains stall, derail or are lifted ten times as often.
+const LOST_AFTER_MISSED: u8 = 2;
+/// After a missed detection, the train is lost after this time, or twice the predicted travel time to the next sensor
+/// if that is longer.
 const LOST: TimeSpan = TimeSpan::from_s(10.0);
-/// Where nobody knows which contact comes next, it is lost after this long: the longest way of the known tracks between
-/// two contacts, 1.5 m, at a crawl.
+/// Where the next sensor is unknown, the train is lost after this time: the longest hop of the known layouts, 1.5 m,
+/// at creep speed.
 const LOST_WITHOUT: TimeSpan = TimeSpan::from_s(40.0);
-/// What of a train is ahead of its pickup, and a little: this much of the track is left before its end.
+/// The length kept free before the end of the track: the front of a train, ahead of its pickup, and a margin.
 const BEFORE_END: Length = Length::from_mm(200.0);
-/// How often a train that is stopped for the end of the track may come nearer than that, or pass its limit.
+/// The probability that a train stopped before the end of the track, or its end of authority, comes closer than
+/// intended.
 const NEARER: Ratio = Ratio::from_percent(0.1);
 
-impl DrivenTrain {
-    /// A contact that should have reported it long ago: it may never have come there.
-    pub(super) const fn unseen(&self) -> Option<SensorId> {
-        self.expected.unseen
+impl Driver {
+    /// Sets the end of a train's movement authority. Whatever is ordered or reported, the driver commands a stop in
+    /// time, by the clock if no sensor reports, so that the train comes to rest before it with probability 0.999.
+    /// Planned stops end before it, too. After a train is placed or reversed, it may not move until another end is
+    /// set. `None` removes the limit.
+    pub fn set_end_of_authority(&mut self, now: Timestamp, train: TrainId, end: Option<WayPoint>) {
+        let context = self.track.context();
+        if let Some(train) = self.trains.get_mut(&train) {
+            train.set_end_of_authority(context, now, end);
+        }
+        self.update_line_requests(now);
     }
 
-    /// Whether one contact was silent, and the next is not late.
+    /// The end of a train's movement authority.
+    #[must_use]
+    pub fn end_of_authority(&self, train: TrainId) -> Option<WayPoint> {
+        self.trains.get(&train)?.end_of_authority
+    }
+}
+
+impl DrivenTrain {
+    /// A sensor that should have reported it: it may not have got there.
+    pub(super) const fn missed_sensor(&self) -> Option<SensorId> {
+        self.expected.missed_sensor
+    }
+
+    /// Whether at most one detection was missed and the next is not late.
     pub(super) fn missed_just_one(&self, now: Timestamp) -> bool {
-        let Expectation { due, overdue_said, silent, .. } = self.expected;
+        let Expectation { due, overdue_reported, missed_in_a_row, .. } = self.expected;
         let by = due.map(|due| due.time + TimeSpan::from_s(3.0 * due.uncertainty.as_s()) + LATE);
-        match silent {
-            // Passed for certain, and not overdue yet.
+        match missed_in_a_row {
+            // The train has passed it, and the next is not overdue yet.
             0 => true,
-            1 => !overdue_said && by.is_some_and(|by| now < by),
+            1 => !overdue_reported && by.is_some_and(|by| now < by),
             _ => false,
         }
     }
 
-    /// The next contact and when it is due.
+    /// The next sensor and the predicted time of its detection.
     pub(super) fn due(&self) -> Option<(SensorId, Timestamp)> {
         self.expected.due.map(|due| (due.sensor, due.time))
     }
 
-    /// Looks ahead to the next contact, to the end of the track and to the limit.
+    /// Predicts the next detection and the latest stops before the end of the track and the end of authority.
     pub(super) fn expect_next(&mut self, context: TrackContext<'_>, now: Timestamp) {
         let due = self.locator.next_contact(context, &self.model, now);
-        let end = self.end_of_track(context, now);
-        let limit = self.limit.and_then(|limit| self.last_stop_before(context, now, limit));
-        self.look_at_zones(context, now);
-        // What was missed is not forgotten because something was commanded.
-        self.expected = Expectation { due, since: now, overdue_said: false, end, limit, ..self.expected };
+        let track_end_stop = self.track_end_stop(context, now);
+        let authority_stop = self.end_of_authority.and_then(|end| self.last_stop_before(context, now, end));
+        self.schedule_zone_check(context, now);
+        // A command does not clear the record of missed detections.
+        self.expected = Expectation {
+            due,
+            since: now,
+            overdue_reported: false,
+            track_end_stop,
+            authority_stop,
+            ..self.expected
+        };
     }
 
-    /// Looks at another limit, and at nothing else.
-    pub(super) fn expect_limit(&mut self, context: TrackContext<'_>, now: Timestamp) {
-        self.expected.limit = self.limit.and_then(|limit| self.last_stop_before(context, now, limit));
+    /// Predicts only the latest stop before the end of authority.
+    pub(super) fn update_authority_stop(&mut self, context: TrackContext<'_>, now: Timestamp) {
+        self.expected.authority_stop =
+            self.end_of_authority.and_then(|end| self.last_stop_before(context, now, end));
     }
 
-    /// The same after a command to it. A contact that it should have come by already stays due: who is told something
-    /// else every other second must not be lost for that without anybody noticing.
-    pub(super) fn expect_on(&mut self, context: TrackContext<'_>, now: Timestamp) {
+    /// Predicts again after a command. A detection that is already due remains due: otherwise a train commanded every
+    /// other second would never be reported lost.
+    pub(super) fn expect_after_command(&mut self, context: TrackContext<'_>, now: Timestamp) {
         let before = self.expected;
         self.expect_next(context, now);
         if self.commanded == SpeedStep::STAND {
-            // Each run is judged by its own contacts; that one was silent stays known.
-            self.expected.silent = 0;
+            // Each run counts its own missed detections; `missed_sensor` remains.
+            self.expected.missed_in_a_row = 0;
             self.expected.lost_by = None;
         } else if let (Some(due), Some(next)) = (before.due, self.expected.due)
-            && (due.sensor != next.sensor || before.overdue_said)
+            && (due.sensor != next.sensor || before.overdue_reported)
         {
-            let Expectation { due, since, overdue_said, .. } = before;
-            self.expected = Expectation { due, since, overdue_said, ..self.expected };
+            let Expectation { due, since, overdue_reported, .. } = before;
+            self.expected = Expectation { due, since, overdue_reported, ..self.expected };
         }
     }
 
-    /// It was seen where it can be.
-    pub(super) const fn seen(&mut self) {
-        self.expected.unseen = None;
-        self.expected.silent = 0;
+    /// A sensor reported it where it can be.
+    pub(super) const fn clear_missed(&mut self) {
+        self.expected.missed_sensor = None;
+        self.expected.missed_in_a_row = 0;
         self.expected.lost_by = None;
     }
 
-    /// When a contact that does not come is overdue, and after that when the train is lost.
-    pub(super) fn next_doubt(&self) -> Option<Timestamp> {
-        // Nothing is expected of a train that has not heard yet that it should move.
-        if self.commanded == SpeedStep::STAND || !self.is_told() {
+    /// When the next detection is overdue, or the train is lost.
+    pub(super) fn next_overdue(&self) -> Option<Timestamp> {
+        // A train whose start command has not been sent yet is not expected anywhere.
+        if self.commanded == SpeedStep::STAND || !self.is_all_sent() {
             return None;
         }
-        let Expectation { due, since, overdue_said, .. } = self.expected;
+        let Expectation { due, since, overdue_reported, .. } = self.expected;
         let Some(due) = due else {
             return self.locator.is_located().then_some(since + LOST_WITHOUT);
         };
         let latest = due.time + TimeSpan::from_s(3.0 * due.uncertainty.as_s());
-        let overdue = (!overdue_said).then_some(latest + OVERDUE);
+        let overdue = (!overdue_reported).then_some(latest + OVERDUE);
         overdue.into_iter().chain(self.expected.lost_by).min()
     }
 
-    pub(super) fn doubt(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
-        if self.next_doubt().is_none_or(|at| now < at) {
+    pub(super) fn check_overdue(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
+        if self.next_overdue().is_none_or(|at| now < at) {
             return;
         }
         let is_over = self.expected.lost_by.is_some_and(|by| by <= now);
         match self.expected.due {
-            Some(due) if !self.expected.overdue_said && !is_over => {
-                out.say(Notice::Overdue { train: self.id(), sensor: due.sensor, by: now - due.time });
-                let way = due.time - self.expected.since;
-                self.expected.lost_by.get_or_insert(now + LOST.max(way + way));
-                self.expected.unseen.get_or_insert(due.sensor);
-                self.expected.silent = self.expected.silent.saturating_add(1);
-                if self.expected.silent >= MOST_SILENT {
+            Some(due) if !self.expected.overdue_reported && !is_over => {
+                out.notify(Notice::Overdue { train: self.id(), sensor: due.sensor, by: now - due.time });
+                let travel = due.time - self.expected.since;
+                self.expected.lost_by.get_or_insert(now + LOST.max(travel + travel));
+                self.expected.missed_sensor.get_or_insert(due.sensor);
+                self.expected.missed_in_a_row = self.expected.missed_in_a_row.saturating_add(1);
+                if self.expected.missed_in_a_row >= LOST_AFTER_MISSED {
                     return self.lose(now, out);
                 }
                 let next = self.locator.next_contact(context, &self.model, now);
-                // The one behind it is waited for now; where none is known only the clock ends the wait.
+                // From now on the sensor behind the missed one is due; if none is known, only the time limit applies.
                 let next = next.filter(|next| next.sensor != due.sensor);
-                self.expected.overdue_said = next.is_none();
+                self.expected.overdue_reported = next.is_none();
                 self.expected.since = now;
                 self.expected.due = next.or(self.expected.due);
             }
@@ -135,63 +166,69 @@ impl DrivenTrain {
         }
     }
 
-    /// Nobody knows any more where the train is.
+    /// Gives up the position and the task.
     fn lose(&mut self, now: Timestamp, out: &mut Outputs) {
         self.locator.lose();
         self.passages.forget();
         self.expected = Expectation { since: now, ..Expectation::default() };
         let train = self.id();
-        out.say(Notice::Lost { train });
+        out.notify(Notice::Lost { train });
         self.give_up(now, Refusal::Lost { train }, out);
     }
 
-    /// When the train has to be commanded to stop so that it stays on the track and within its limit, whatever is reported
-    /// until then.
-    pub(super) fn guard(&self) -> Option<Timestamp> {
-        [self.end_guard(), self.limit_guard()].into_iter().flatten().min()
+    /// The latest time at which a stop has to be commanded, whatever is reported until then, to stay on the track and
+    /// within the authority.
+    pub(super) fn latest_safe_stop(&self) -> Option<Timestamp> {
+        [self.track_end_stop_time(), self.authority_stop_time()].into_iter().flatten().min()
     }
 
-    /// Whoever has a plan stops before the end of the track.
-    fn end_guard(&self) -> Option<Timestamp> {
-        let has_plan = matches!(self.task.map(|task| task.phase), Some(Phase::Running { plan: Some(_) }));
-        let (leaves, _) = self.expected.end.filter(|_| self.commanded > SpeedStep::STAND && !has_plan)?;
+    /// A planned stop already ends before the end of the track.
+    fn track_end_stop_time(&self) -> Option<Timestamp> {
+        let has_plan = matches!(self.task.map(|task| task.phase), Some(TaskPhase::Running { plan: Some(_) }));
+        let (leaves, _) =
+            self.expected.track_end_stop.filter(|_| self.commanded > SpeedStep::STAND && !has_plan)?;
         Some(leaves - self.link.command)
     }
 
-    /// A limit is kept whatever is planned: plans aim at the middle of what may be, and limits at its edge.
-    fn limit_guard(&self) -> Option<Timestamp> {
-        let leaves = self.expected.limit.filter(|_| self.commanded > SpeedStep::STAND)?;
+    /// The end of authority applies to planned stops, too: a plan aims at the median, the authority at the bound.
+    fn authority_stop_time(&self) -> Option<Timestamp> {
+        let leaves = self.expected.authority_stop.filter(|_| self.commanded > SpeedStep::STAND)?;
         Some(leaves - self.link.command)
     }
 
-    /// Stops the train where the track ends ahead of it, or what it may enter.
-    pub(super) fn keep_on_track(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
+    /// Stops a train before the end of its track or of its authority.
+    pub(super) fn enforce_track_limits(
+        &mut self,
+        context: TrackContext<'_>,
+        now: Timestamp,
+        out: &mut Outputs,
+    ) {
         let train = self.id();
-        if self.limit_guard().is_some_and(|at| at <= now) {
-            self.expected.limit = None;
-            out.say(Notice::AuthorityEnds { train });
+        if self.authority_stop_time().is_some_and(|at| at <= now) {
+            self.expected.authority_stop = None;
+            out.notify(Notice::AuthorityEnds { train });
             self.give_up(now, Refusal::AtLimit { train }, out);
         }
-        if let (Some(at), Some((_, end))) = (self.end_guard(), self.expected.end)
+        if let (Some(at), Some((_, end))) = (self.track_end_stop_time(), self.expected.track_end_stop)
             && at <= now
         {
-            self.expected.end = None;
+            self.expected.track_end_stop = None;
             let name = context.layout.node_name(end).into();
-            out.say(Notice::TrackEnds { train, end });
+            out.notify(Notice::TrackEnds { train, end });
             self.give_up(now, Refusal::TrackEnds { train, end: name }, out);
         }
     }
 
-    fn end_of_track(&self, context: TrackContext<'_>, now: Timestamp) -> Option<(Timestamp, NodeId)> {
+    fn track_end_stop(&self, context: TrackContext<'_>, now: Timestamp) -> Option<(Timestamp, NodeId)> {
         let located = self.located(context, now).filter(|_| self.commanded > SpeedStep::STAND)?;
         let (end, way) = track_end(context, &self.model, located.at.node)?;
         let at = WayPoint { node: located.at.node, way: way - BEFORE_END };
         Some((self.last_stop_before(context, now, at)?, end))
     }
 
-    /// The latest time at which a command to stop may leave so that the train comes to rest before a point, but for one
-    /// time in [`NEARER`]; the earliest that can still be kept where even that is too late; `None` while it does not
-    /// come so far.
+    /// The latest time at which a stop command may be sent for a rest before a point, with probability 1 −
+    /// [`NEARER`]. Returns the earliest possible time if even that is too late, and `None` if the train does not get
+    /// so far.
     pub(super) fn last_stop_before(
         &self,
         context: TrackContext<'_>,
@@ -210,6 +247,33 @@ impl DrivenTrain {
             CommandTime::At(leaves, _) => Some(leaves),
             CommandTime::TooLate(..) => Some(earliest),
             CommandTime::Never => None,
+        }
+    }
+
+    /// Sets the end of authority, or removes it.
+    pub(super) fn set_end_of_authority(
+        &mut self,
+        context: TrackContext<'_>,
+        now: Timestamp,
+        end: Option<WayPoint>,
+    ) {
+        self.end_of_authority = end;
+        self.update_authority_stop(context, now);
+    }
+
+    /// Ends the authority where the train is: it was placed or reversed, and the authority no longer applies.
+    pub(super) fn end_authority_here(&mut self, context: TrackContext<'_>, now: Timestamp) {
+        if self.end_of_authority.is_some() {
+            self.end_of_authority = self.located(context, now).map(|located| located.at);
+        }
+    }
+
+    /// Measures the end of authority from a sensor that the train has passed. If no path leads there from this
+    /// sensor, the train has left its route, and its authority ends here.
+    pub(super) fn recount_end_of_authority(&mut self, context: TrackContext<'_>, node: NodeId) {
+        if let Some(end) = self.end_of_authority {
+            let counted = recount_from(context, &self.model, end, node);
+            self.end_of_authority = Some(counted.unwrap_or(WayPoint { node, way: Length::ZERO }));
         }
     }
 }

@@ -1,5 +1,5 @@
-//! What may have closed a contact: each train that can be there, by the turnouts as they lie or by one that did not
-//! move; a train that is lost, or has strayed; or nothing.
+//! What may have caused a detection: each train that can be there, with the turnouts as known or with one that
+//! failed; a lost or displaced train; or no train.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
@@ -13,41 +13,42 @@ use crate::tracking::TrackContext;
 
 use super::driven_train::DrivenTrain;
 
-/// Hops ahead of a train within which a turnout may have been taken the other way: the one it is on and the next.
-const HOPS_LOOKED_AT: usize = 2;
-/// A turnout does not lie as it was told in 0.3 % of cases (chosen as [`LOG_CHANCE_OF_SILENCE`] is).
+/// How many hops ahead of a train a turnout failure is considered: the present hop and the next.
+const HOPS_AHEAD: usize = 2;
+/// ln of the probability that a turnout does not move when commanded, 0.3 % (chosen as [`LOG_CHANCE_OF_SILENCE`] is).
 ///
 /// [`LOG_CHANCE_OF_SILENCE`]: crate::tracking::Locator::claim
 const LOG_TURNOUT_FAILS: f64 = -5.809;
-/// Where a way by the turnouts as they lie is as likely as this (ln 1/s), no other is looked for: half a second's doubt.
-const CONVINCING: f64 = 0.0;
-/// A train that is not seen where it should be was missed by the contact (0.3 %), has changed (0.1 %, as in its claim),
-/// or is not there at all (0.01 %, chosen: lifted, derailed, stuck). ln of the sum, and of the share of the last.
-const LOG_UNSEEN: f64 = -5.5;
-/// See [`LOG_UNSEEN`].
+/// Turnout failures are considered only if the density (ln 1/s) with the known positions is below this: an
+/// uncertainty of about half a second.
+const LIKELY: f64 = 0.0;
+/// A train that a sensor should have reported was missed by the sensor (0.3 %), has changed (0.1 %, as in its claim),
+/// or is not there (0.01 %, chosen: lifted, derailed, stalled). ln of the sum, and of the share of the last.
+const LOG_MISSED: f64 = -5.5;
+/// See [`LOG_MISSED`].
 const LOG_STRAYED: f64 = -3.7;
-/// A train of which nothing strange is known is elsewhere with this chance, as ln (chosen).
+/// ln of the probability that a train without any missed sensor is elsewhere (chosen).
 const LOG_LIFTED: f64 = -9.2;
-/// Forecasts of when a train stands are wrong by less than this; for so long it may still close a contact.
-const STILL: TimeSpan = TimeSpan::from_ms(1_500);
-/// The length of way that a lost train may be anywhere on, where a layout says nothing (m).
-const SOMEWHERE_M: f64 = 20.0;
+/// Largest error of a predicted time of rest: until then a train may still cause a detection.
+const REST_TIME_ERROR: TimeSpan = TimeSpan::from_ms(1_500);
+/// Total track length (m) assumed for a lost train if the layout states no lengths.
+const UNKNOWN_TRACK_M: f64 = 20.0;
 
-/// A contact was seen closed.
+/// One detection: a sensor, and the time window in which it was reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Closure {
+pub(super) struct Detection {
     pub(super) sensor: SensorId,
     pub(super) window: ContactWindow,
 }
 
-/// What explains a closure.
+/// What explains a detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Explanation {
-    /// This train, which was expected somewhere there, or of which nobody knew where it was.
+    /// This train, near its predicted time, or a lost train.
     Train(TrainId),
-    /// This train, if the turnout lay otherwise than it was told.
+    /// This train, if the turnout is not in its commanded position.
     Turnout { train: TrainId, turnout: TurnoutId, leg: Leg },
-    /// This train, which is not where it was believed to be.
+    /// This train, if it is not at its estimated position.
     Strayed(TrainId),
 }
 
@@ -59,24 +60,24 @@ impl Explanation {
     }
 }
 
-/// An explanation and ln of the density (1/s) with which it makes the contact close at that time.
+/// An explanation, and ln of the density (1/s) of the detection under it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Hypothesis {
     pub(super) explanation: Explanation,
     pub(super) log_density: f64,
 }
 
-/// Everything that trains have to do with a closure.
+/// All hypotheses in which a train caused a detection.
 pub(super) fn hypotheses(
     trains: &BTreeMap<TrainId, DrivenTrain>,
     context: TrackContext<'_>,
     now: Timestamp,
-    closure: Closure,
+    detection: Detection,
 ) -> Vec<Hypothesis> {
     let mut found = Vec::new();
-    for train in trains.values().filter(|train| may_have_moved(train, context, now, closure.window)) {
+    for train in trains.values().filter(|train| may_have_moved(train, context, now, detection.window)) {
         let id = train.id();
-        let anywhere = log_anywhere(train, context);
+        let anywhere = log_density_if_lost(train, context);
         let mut add = |explanation, log_density: f64| {
             if log_density.is_finite() {
                 found.push(Hypothesis { explanation, log_density });
@@ -86,18 +87,18 @@ pub(super) fn hypotheses(
             add(Explanation::Train(id), anywhere);
             continue;
         }
-        let is_unseen = train.unseen().is_some();
-        // That it was not seen has happened already, whichever way it is explained.
-        let given = if is_unseen { -LOG_UNSEEN } else { 0.0 };
+        let is_missed = train.missed_sensor().is_some();
+        // The missed sensor has already happened under every hypothesis: condition on it.
+        let conditioned = if is_missed { -LOG_MISSED } else { 0.0 };
         let claim = |context: TrackContext<'_>| {
-            let claim = train.locator.claim(context, &train.model, closure.sensor, closure.window)?;
-            Some(claim + given)
+            let claim = train.locator.claim(context, &train.model, detection.sensor, detection.window)?;
+            Some(claim + conditioned)
         };
-        let as_it_lies = claim(context);
-        if let Some(log_density) = as_it_lies {
+        let current = claim(context);
+        if let Some(log_density) = current {
             add(Explanation::Train(id), log_density);
         }
-        if as_it_lies.is_none_or(|log_density| log_density < CONVINCING) {
+        if current.is_none_or(|log_density| log_density < LIKELY) {
             for (turnout, leg) in other_legs(train, context, now) {
                 let mut turnouts: TurnoutStates = context.turnouts.clone();
                 turnouts.set(turnout, leg);
@@ -107,13 +108,13 @@ pub(super) fn hypotheses(
                 }
             }
         }
-        let strayed = if is_unseen { LOG_STRAYED } else { LOG_LIFTED };
+        let strayed = if is_missed { LOG_STRAYED } else { LOG_LIFTED };
         add(Explanation::Strayed(id), anywhere + strayed);
     }
     found
 }
 
-/// A train that stands closes no contact.
+/// Whether a train moved in the window or just before it; a train at rest causes no detection.
 fn may_have_moved(
     train: &DrivenTrain,
     context: TrackContext<'_>,
@@ -123,20 +124,20 @@ fn may_have_moved(
     if train.may_move(context, now) {
         return true;
     }
-    let before = train.located(context, window.after - STILL);
+    let before = train.located(context, window.after - REST_TIME_ERROR);
     before.is_some_and(|before| !before.at_rest)
 }
 
-/// ln of the density (1/s) with which a train that may be anywhere comes to one contact: its speed over all ways there
-/// are, in either direction.
-fn log_anywhere(train: &DrivenTrain, context: TrackContext<'_>) -> f64 {
+/// ln of the density (1/s) with which a train of unknown position reaches one sensor: its speed over the length of
+/// all track, both directions.
+fn log_density_if_lost(train: &DrivenTrain, context: TrackContext<'_>) -> f64 {
     let speed = train.model.speed(train.commanded, Approach::Below).value.as_m_per_s();
-    let ways: f64 = context.layout.edges().map(|(_, edge)| edge.length.as_m()).sum();
-    let ways = if ways > 0.0 { ways } else { SOMEWHERE_M };
-    libm::log(speed.max(f64::MIN_POSITIVE) / ways)
+    let track: f64 = context.layout.edges().map(|(_, edge)| edge.length.as_m()).sum();
+    let track = if track > 0.0 { track } else { UNKNOWN_TRACK_M };
+    libm::log(speed.max(f64::MIN_POSITIVE) / track)
 }
 
-/// The turnouts that a train meets at their toes before long, with the leg for which they are not believed to lie.
+/// The turnouts that a train will soon pass from the toe, each with the leg that it is not set for.
 fn other_legs<'g>(
     train: &DrivenTrain,
     context: TrackContext<'g>,
@@ -144,7 +145,7 @@ fn other_legs<'g>(
 ) -> impl Iterator<Item = (TurnoutId, Leg)> + use<'g> {
     let node = train.located(context, now).map(|located| located.at.node);
     node.into_iter()
-        .flat_map(move |node| context.hops_ahead(node).take(HOPS_LOOKED_AT))
+        .flat_map(move |node| context.hops_ahead(node).take(HOPS_AHEAD))
         .flat_map(|hop| hop.needs.iter().filter(|need| need.facing))
         .map(|need| {
             let other = if need.leg.is_curved() { Leg::Straight } else { Leg::Curved };

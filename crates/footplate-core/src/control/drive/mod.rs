@@ -1,35 +1,31 @@
-//! Driving: from an order to a train at rest within millimetres of where it should be.
+//! Driving: from an order to a train at rest within millimetres of its target.
 //!
-//! A [`Driver`] takes [`Order`]s and says with [`Notice`]s what comes of them. It follows every train between
-//! contacts, plans each stop anew at every report, and commands it at the planned time by the clock, whatever is or is
-//! not reported until then.
+//! A [`Driver`] accepts [`Order`]s and reports their progress in [`Notice`](super::Notice)s. It estimates every
+//! train's position between sensors, plans each stop again after every detection, and sends the stop command at the
+//! planned time by the clock, even if no further sensor reports.
 
+mod ambiguity;
 mod approach;
-mod attribution;
 mod command_time;
-mod contact_conduct;
-mod doubt;
+mod data_association;
 mod driven_train;
 mod driver;
 mod expectation;
 mod hypotheses;
-mod known_track;
-mod limit;
 mod order;
 mod outputs;
 mod pacing;
-mod path_length;
+mod path;
+mod queries;
 mod refusal;
-mod restricted_stretch;
+mod sensor_faults;
 mod speed_supervision;
 mod stop_planning;
 mod task;
-mod turning;
 mod turnout_guard;
-mod watched;
 
 pub use driver::Driver;
 pub use order::{Aim, Gap, Order, OrderId, StopOrder};
 pub use pacing::ArrivalProfile;
 pub use refusal::Refusal;
-pub(in crate::control) use stop_planning::THERE;
+pub(in crate::control) use stop_planning::AT_TARGET;

@@ -1,4 +1,4 @@
-//! What a person or a program can ask of a train, in its own words.
+//! What an operator or a program can order a train to do.
 
 use core::fmt;
 
@@ -7,22 +7,22 @@ use crate::time::TimeSpan;
 use crate::track::Landmark;
 use crate::units::{Length, Ratio, Speed};
 
-/// Something to be done.
+/// An order to a train or a turnout.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Order {
-    /// Run at a step, from now on. Step 0 brings the train to rest wherever that is.
+    /// Run at a step from now on; step 0 stops the train.
     Speed {
         /// The train.
         train: TrainId,
         /// The step.
         step: SpeedStep,
     },
-    /// Come to rest, turn around, and go on at a step; step 0 stays.
+    /// Stop, reverse, then run at a step; step 0 stays at rest.
     Reverse {
         /// The train.
         train: TrainId,
-        /// What to do then.
+        /// The step after reversing.
         then: SpeedStep,
     },
     /// Throw a turnout.
@@ -32,88 +32,88 @@ pub enum Order {
         /// `true` for the diverging leg.
         curved: bool,
     },
-    /// Come to rest with the leading end of the pickup at a place.
+    /// Stop with the leading end of the pickup at a place.
     Stop(StopOrder),
-    /// From rest, move on by a distance.
+    /// From rest, move ahead by a distance.
     Move {
         /// The train.
         train: TrainId,
-        /// How far, ahead.
+        /// The distance.
         distance: Length,
     },
-    /// Run at a mean speed, whatever steps that takes.
+    /// Run at a mean speed, which may lie between those of two steps.
     Hold {
         /// The train.
         train: TrainId,
         /// The speed.
         speed: Speed,
     },
-    /// Run behind another train and keep the gap to it.
+    /// Follow another train at a gap.
     Follow {
         /// The train.
         train: TrainId,
-        /// The one ahead.
+        /// The train ahead.
         leader: TrainId,
         /// The gap.
         gap: Gap,
     },
-    /// Come to rest with the leading end of the pickup at a place, and do so in a time.
+    /// Stop with the leading end of the pickup at a place, at a given time.
     Arrive {
         /// The train.
         train: TrainId,
-        /// The place, counted from where this train's pickup closes the contact.
+        /// The place, measured from where this train's pickup closes the sensor.
         target: Landmark,
-        /// How long from now it shall take until the train stands.
+        /// The time from now until the train is at rest there.
         within: TimeSpan,
     },
 }
 
-/// How far one train keeps behind another.
+/// The gap between two trains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Gap {
-    /// From a contact's being closed by the train ahead until the follower closes it.
+    /// From a detection of the train ahead to the follower's at the same sensor.
     Time(TimeSpan),
-    /// From the rear end of the train ahead to the front of the follower.
+    /// From the rear of the train ahead to the front of the follower.
     Way(Length),
 }
 
-/// Come to rest at a place.
+/// An order to stop at a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct StopOrder {
     /// The train.
     pub train: TrainId,
-    /// The place, counted from where this train's pickup closes the contact.
+    /// The place, measured from where this train's pickup closes the sensor.
     pub target: Landmark,
-    /// Which part of all rests that may come of it shall be there.
+    /// Which quantile of the predicted rest shall be there.
     pub aim: Aim,
-    /// The step from which to stop; `None` leaves the choice.
+    /// The step to stop from; `None` to let the driver choose.
     pub step: Option<SpeedStep>,
     /// On a circuit: pass the place once before.
     pub next_round: bool,
 }
 
 impl StopOrder {
-    /// The plain order: the middle of all rests at a place, as soon as it is reached.
+    /// A stop with its median at a place, the first time the train can.
     #[must_use]
     pub const fn at(train: TrainId, target: Landmark) -> Self {
         Self { train, target, aim: Aim::Median, step: None, next_round: false }
     }
 }
 
-/// Stops scatter; which of them shall meet the target.
+/// Which quantile of the rest shall meet the target; stops vary.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Aim {
-    /// As many short of it as beyond it.
+    /// The median.
     Median,
-    /// Beyond it at most in this share of stops, for what must not be entered.
+    /// The train shall come to rest beyond the target with at most this probability.
     NotBeyond(Ratio),
 }
 
 impl Order {
-    /// The train it is for.
+    /// The train that the order is for.
     #[must_use]
     pub const fn train(&self) -> Option<TrainId> {
         match self {
@@ -129,7 +129,7 @@ impl Order {
     }
 }
 
-/// An order that was taken, by its number.
+/// The number of an accepted order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct OrderId(pub(super) u32);
 

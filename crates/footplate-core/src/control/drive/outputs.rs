@@ -1,19 +1,17 @@
-//! What is to be done and said next, in order.
+//! The outputs of a driver, in order.
 
 use alloc::collections::VecDeque;
 
-use crate::control::Output;
+use crate::control::{Notice, Output};
 use crate::event::Command;
 use crate::ids::SensorId;
 use crate::time::Timestamp;
 
-use crate::control::Notice;
-
-/// A queue of outputs, which says of the line only what changed.
+/// A queue of outputs. Requests to the line are queued only when they change.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Outputs {
     queue: VecDeque<Output<Notice>>,
-    held: Option<Timestamp>,
+    line_free_by: Option<Timestamp>,
     watched: Option<SensorId>,
 }
 
@@ -22,13 +20,13 @@ impl Outputs {
         self.queue.push_back(Output::Command(command));
     }
 
-    pub(super) fn say(&mut self, notice: Notice) {
+    pub(super) fn notify(&mut self, notice: Notice) {
         self.queue.push_back(Output::Notice(notice));
     }
 
     pub(super) fn hold_line(&mut self, until: Option<Timestamp>) {
-        if self.held != until {
-            self.held = until;
+        if self.line_free_by != until {
+            self.line_free_by = until;
             self.queue.push_back(Output::HoldLine(until));
         }
     }

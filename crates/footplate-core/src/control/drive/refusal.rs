@@ -1,4 +1,4 @@
-//! Why an order is not carried out, and what could be asked instead.
+//! Why an order is not carried out, and what to order instead.
 
 use alloc::string::String;
 use core::fmt;
@@ -10,11 +10,11 @@ use crate::units::{Length, Ratio, Speed};
 
 use super::order::Gap;
 
-/// Why an order was refused, or given up on the way. Places are named so that `Layout::landmark` reads them.
+/// Why an order was rejected, or given up later. Places are named so that `Layout::landmark` can read them.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// No such train is driven here.
+    /// The train is not part of this session.
     UnknownTrain {
         /// The train.
         train: TrainId,
@@ -26,174 +26,181 @@ pub enum Refusal {
     },
     /// The decoder has no such step.
     StepTooHigh {
-        /// The step asked for.
+        /// The step ordered.
         step: SpeedStep,
-        /// The highest of this train.
+        /// The highest step of this train.
         highest: SpeedStep,
     },
     /// The train does not move at this step, or not reliably.
     StepDoesNotMove {
-        /// The step asked for.
+        /// The step ordered.
         step: SpeedStep,
     },
-    /// A probability that is none, or that no stop can keep.
+    /// The probability is out of range.
     IllegalProbability {
-        /// What was asked for.
+        /// The probability ordered.
         found: Ratio,
     },
-    /// A distance to move that is not ahead.
+    /// The distance is out of range.
     IllegalDistance {
-        /// What was asked for.
+        /// The distance ordered.
         found: Length,
     },
-    /// The place cannot be found on the track as the turnouts lie.
+    /// The place cannot be located with the turnouts as they are.
     Place(WayError),
-    /// No way leads there as the turnouts lie.
+    /// No path leads there with the turnouts as they are.
     NoWay {
         /// The target.
         target: String,
-        /// The contact from which a way was looked for.
+        /// The sensor from which the path starts.
         from: String,
-        /// A turnout ahead of which nobody knows how it lies.
+        /// A turnout ahead whose position is unknown.
         unknown: Option<TurnoutId>,
     },
-    /// No way leads there from where the train stands, however turnouts are thrown and wherever it turns around.
+    /// No path leads there from the train's position, with any turnout positions and reversals.
     Unreachable {
         /// The train.
         train: TrainId,
         /// The target.
         target: String,
     },
-    /// The train cannot come to rest so soon.
+    /// The train cannot stop that soon.
     TooNear {
         /// The target.
         target: String,
-        /// The first place at which it can.
+        /// The nearest place at which it can stop.
         nearest: String,
-        /// How far beyond the target that is.
+        /// How far that is beyond the target.
         beyond: Length,
-        /// The way round: the same place can be reached on the next round.
+        /// The length of the circuit, if the train passes the target again.
         round: Option<Length>,
     },
-    /// So short a move cannot be made.
+    /// The move is shorter than this train can move.
     MoveTooShort {
-        /// The shortest that can.
+        /// The shortest possible move.
         shortest: Length,
     },
-    /// The train would have to run before it can be told how far it is.
+    /// The train does not get as far as the target.
     OutOfReach {
         /// The target.
         target: String,
     },
-    /// The train is in danger, or could meet one that is: it is held until that is over.
+    /// The train is in danger, or could meet one that is: it is kept at rest until that is resolved.
     InDanger {
-        /// The train that was asked to move.
+        /// The train that was ordered to move.
         train: TrainId,
     },
-    /// The station does not answer: nothing can be told.
+    /// The station does not answer: no command can be sent.
     NoAnswer,
-    /// The power is off the track.
+    /// Track power is off.
     NoPower,
-    /// Nobody knows where the train is.
+    /// The position of the train is unknown.
     Lost {
         /// The train.
         train: TrainId,
     },
-    /// Nobody knows where another train is, so that nothing can be kept clear of it.
+    /// The position of another train is unknown: no train can be kept clear of it.
     OtherNowhere {
-        /// The train that was to be sent somewhere.
+        /// The train that was ordered to move.
         train: TrainId,
-        /// The train that nobody has seen yet.
+        /// The train of unknown position.
         other: TrainId,
+    },
+    /// The position of a turnout is unknown, and with it on which track a train is that may be on it.
+    TurnoutUnknown {
+        /// The turnout.
+        turnout: TurnoutId,
+        /// The train.
+        train: TrainId,
     },
     /// It has not come to its destination for so long.
     NotArrived {
         /// The train.
         train: TrainId,
-        /// How long it was waited for.
+        /// That time.
         within: TimeSpan,
     },
-    /// The track ends ahead of the train, which has been stopped for that.
+    /// The train was stopped before the end of the track.
     TrackEnds {
         /// The train.
         train: TrainId,
-        /// Where.
+        /// The name of the end.
         end: String,
     },
-    /// The train would have passed its limit, and has been stopped for that.
+    /// The train was stopped before its end of authority.
     AtLimit {
         /// The train.
         train: TrainId,
     },
-    /// The train still moves, and this is for a train at rest.
+    /// The order is for a train at rest, and the train moves.
     StillMoves {
         /// The train.
         train: TrainId,
     },
-    /// A train is on the turnout, or will be before it has been thrown.
+    /// A train is on the turnout, or will be before it is thrown.
     TurnoutOccupied {
         /// The turnout.
         turnout: TurnoutId,
         /// The train.
         train: TrainId,
     },
-    /// The other turnout in the same place lies curved, and a train is on it.
+    /// A train is on the other turnout in the same place, which is curved and would have to be set straight first.
     PartnerOccupied {
         /// The turnout.
         turnout: TurnoutId,
-        /// The one that would have to lie straight first.
+        /// The other turnout.
         partner: TurnoutId,
-        /// The train on that.
+        /// The train on it.
         train: TrainId,
     },
-    /// The train cannot stand there so soon.
+    /// The train cannot be at rest there that soon.
     TooSoon {
         /// The target.
         target: String,
-        /// The shortest time in which it can.
+        /// The shortest possible time.
         earliest: TimeSpan,
     },
-    /// The train cannot be as slow as that.
+    /// The train cannot take that long.
     TooSlow {
         /// The target.
         target: String,
-        /// The longest time that it can take.
+        /// The longest possible time.
         latest: TimeSpan,
     },
     /// The leader follows this train, directly or behind others.
     FollowsInCircle {
-        /// The train that was asked to follow.
+        /// The train that was ordered to follow.
         train: TrainId,
-        /// The one that it should follow.
+        /// The train ahead.
         leader: TrainId,
     },
-    /// The train could not stop in time behind its leader.
+    /// The gap is too short for the train to stop behind its leader.
     GapTooShort {
-        /// The leader.
+        /// The train ahead.
         leader: TrainId,
-        /// The shortest gap that can be kept safely, in the same form.
+        /// The shortest safe gap, in the same unit.
         shortest: Gap,
     },
-    /// No steps of the train bracket the speed.
+    /// The speed is not between those of two steps of the train.
     SpeedOutOfRange {
-        /// What was asked for.
+        /// The speed ordered.
         found: Speed,
-        /// The slowest that can be held ...
+        /// The lowest speed that can be held.
         lowest: Speed,
-        /// ... and the fastest.
+        /// The highest.
         highest: Speed,
     },
-    /// No contact reported the train within the time in which one should have.
+    /// No sensor reported the train within the time in which one should have.
     NotFound {
         /// The train.
         train: TrainId,
-        /// How long it was looked for.
+        /// That time.
         within: TimeSpan,
     },
 }
 
 impl Refusal {
-    /// The train that is on a turnout that cannot be thrown for it.
+    /// The train that occupies a turnout, if that is the reason.
     pub(in crate::control) const fn occupier(&self) -> Option<TrainId> {
         match self {
             Self::TurnoutOccupied { train, .. } | Self::PartnerOccupied { train, .. } => Some(*train),
@@ -270,6 +277,11 @@ impl fmt::Display for Refusal {
                 "train {train} cannot be kept clear of train {other}, whose position is unknown: run \
                  that train over a sensor, for example with `speed {other} 6`, or enter its position, \
                  for example `place {other} at C13`"
+            ),
+            Self::TurnoutUnknown { turnout, train } => write!(
+                f,
+                "the position of turnout {turnout} is unknown and train {train} may be on it: enter how it lies, for \
+                 example `turnout {turnout} straight`, or run the train over the next sensor"
             ),
             Self::NotArrived { train, within } => write!(
                 f,

@@ -1,4 +1,4 @@
-//! Stops at a place: whether one can be made, from which step, and when the command has to leave.
+//! Plans stops at a place: whether the train can stop there, from which step, and when to send the command.
 
 use alloc::string::{String, ToString};
 
@@ -12,20 +12,20 @@ use super::command_time::{CommandTime, command_time, spread};
 use super::driven_train::DrivenTrain;
 use super::order::{Aim, OrderId, StopOrder};
 use super::outputs::Outputs;
-use super::path_length::{contacts_until, counted_from, lap, unknown_turnout, way_between};
+use super::path::{circuit_length, distance_between, recount_from, sensors_within, unknown_turnout};
 use super::refusal::Refusal;
-use super::task::{Destination, Goal, Phase, Plan, Task};
+use super::task::{Destination, Goal, StopPlan, Task, TaskPhase};
 use crate::control::{Notice, PlannedStop, Promise};
 
-/// A plan that moved by less is no news.
-const NEWS: TimeSpan = TimeSpan::from_ms(1);
-/// An overshoot that is less than any stop scatters is no news either.
-const OVERSHOOT: Length = Length::from_mm(5.0);
-/// A train that stands this near to where it should is there.
-pub(in crate::control) const THERE: Length = Length::from_mm(1.0);
+/// Smallest change of a plan that is reported.
+const REPORTABLE_CHANGE: TimeSpan = TimeSpan::from_ms(1);
+/// Smallest overshoot that is reported: less than the spread of any stop.
+const REPORTABLE_OVERSHOOT: Length = Length::from_mm(5.0);
+/// A train at rest this close to its target has arrived.
+pub(in crate::control) const AT_TARGET: Length = Length::from_mm(1.0);
 
 impl DrivenTrain {
-    /// Takes an order to stop somewhere.
+    /// Starts an order to stop at a place.
     pub(super) fn stop_at(
         &mut self,
         context: TrackContext<'_>,
@@ -43,29 +43,29 @@ impl DrivenTrain {
             in_time: None,
         };
         context.layout.locate(stop.target, context.turnouts).map_err(Refusal::Place)?;
-        let stands = self.stands(context, now);
-        if !stands && self.commanded == SpeedStep::STAND {
+        let at_rest = self.is_at_rest(context, now);
+        if !at_rest && self.commanded == SpeedStep::STAND {
             return Err(Refusal::StillMoves { train: self.id() });
         }
-        // Who was not seen where it should have been is looked for first.
-        let located = self.located(context, now).filter(|_| self.unseen().is_none() || !stands);
+        // A train that a sensor should have reported and did not is located first.
+        let located = self.located(context, now).filter(|_| self.missed_sensor().is_none() || !at_rest);
         let Some(located) = located else {
-            self.take(
-                Task { order, goal: Goal::RestAt(destination), phase: Phase::Finding { since: now } },
+            self.start_task(
+                Task { order, goal: Goal::RestAt(destination), phase: TaskPhase::Locating { since: now } },
                 out,
             );
-            if stands {
+            if at_rest {
                 let step = stop.step.unwrap_or_else(|| self.finding_step());
-                self.issue_step(context, now, step, out);
+                self.command_step(context, now, step, out);
             }
             return Ok(());
         };
-        destination.at = Some(self.waypoint(context, now, &located, &destination, stands)?);
-        self.head_for(context, now, order, &located, destination, stands, out)
+        destination.at = Some(self.locate_target(context, now, &located, &destination, at_rest)?);
+        self.start_towards(context, now, order, &located, destination, at_rest, out)
     }
 
-    /// A train that was looked for is located again: goes on to where it should. What is too near is passed once more.
-    pub(super) fn set_out(
+    /// Continues to the target once the train has been located. A target that is too near is passed once first.
+    pub(super) fn resume_to_target(
         &mut self,
         context: TrackContext<'_>,
         now: Timestamp,
@@ -74,25 +74,28 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) {
         let Some(located) = self.located(context, now) else { return };
-        let mut at = self.waypoint(context, now, &located, &destination, false);
+        let mut at = self.locate_target(context, now, &located, &destination, false);
         if let Err(Refusal::TooNear { round: Some(_), .. }) = at {
             destination.next_round = true;
-            at = self.waypoint(context, now, &located, &destination, false);
+            at = self.locate_target(context, now, &located, &destination, false);
         }
         let headed = at.and_then(|at| {
             destination.at = Some(at);
             self.task = None;
-            self.head_for(context, now, order, &located, destination, false, out)
+            self.start_towards(context, now, order, &located, destination, false, out)
         });
         if let Err(why) = headed {
-            self.task =
-                Some(Task { order, goal: Goal::RestAt(destination), phase: Phase::Running { plan: None } });
+            self.task = Some(Task {
+                order,
+                goal: Goal::RestAt(destination),
+                phase: TaskPhase::Running { plan: None },
+            });
             self.give_up(now, why, out);
         }
     }
 
-    /// Takes an order to move on.
-    pub(super) fn move_on(
+    /// Starts an order to move ahead.
+    pub(super) fn start_move(
         &mut self,
         context: TrackContext<'_>,
         now: Timestamp,
@@ -100,10 +103,11 @@ impl DrivenTrain {
         distance: Length,
         out: &mut Outputs,
     ) -> Result<(), Refusal> {
-        // Who was not seen where it should have been is not where it is believed to be: no contact would fit the move.
-        let located = self.located(context, now).filter(|_| self.unseen().is_none());
+        // A train that a sensor should have reported and did not is not where it is estimated: no later detection
+        // would fit the move.
+        let located = self.located(context, now).filter(|_| self.missed_sensor().is_none());
         let located = located.ok_or(Refusal::Lost { train: self.id() })?;
-        if !self.stands(context, now) {
+        if !self.is_at_rest(context, now) {
             return Err(Refusal::StillMoves { train: self.id() });
         }
         let at = WayPoint { way: located.at.way + distance, ..located.at };
@@ -115,67 +119,68 @@ impl DrivenTrain {
             next_round: false,
             in_time: None,
         };
-        self.head_for(context, now, order, &located, destination, true, out)
+        self.start_towards(context, now, order, &located, destination, true, out)
     }
 
     #[expect(clippy::too_many_arguments, reason = "the last step of two orders, which know all of it")]
-    fn head_for(
+    fn start_towards(
         &mut self,
         context: TrackContext<'_>,
         now: Timestamp,
         order: OrderId,
         located: &Located,
         destination: Destination,
-        stands: bool,
+        at_rest: bool,
         out: &mut Outputs,
     ) -> Result<(), Refusal> {
-        let task = Task { order, goal: Goal::RestAt(destination), phase: Phase::Running { plan: None } };
-        if stands {
-            let there = destination.at.is_some_and(|at| {
-                self.beyond(context, located.at, at).is_some_and(|beyond| beyond.abs() <= THERE)
+        let task = Task { order, goal: Goal::RestAt(destination), phase: TaskPhase::Running { plan: None } };
+        if at_rest {
+            let is_at_target = destination.at.is_some_and(|at| {
+                self.beyond(context, located.at, at).is_some_and(|beyond| beyond.abs() <= AT_TARGET)
             });
-            if there {
-                self.take(task, out);
+            if is_at_target {
+                self.start_task(task, out);
                 self.finish(context, now, order, destination.at, None, out);
                 return Ok(());
             }
             let step = self.approach_step(context, now, located, &destination)?;
-            self.take(task, out);
-            self.issue_step(context, now, step, out);
+            self.start_task(task, out);
+            self.command_step(context, now, step, out);
         } else {
-            self.take(task, out);
+            self.start_task(task, out);
             match destination.step.filter(|step| *step != self.commanded) {
-                Some(step) => self.issue_step(context, now, step, out),
+                Some(step) => self.command_step(context, now, step, out),
                 None => self.plan(context, now, out),
             }
         }
         Ok(())
     }
 
-    /// The target on the way of a train, the first time it comes there and can rest there.
-    pub(super) fn waypoint(
+    /// The target as a point of the path: the first passage at which the train can stop there.
+    pub(super) fn locate_target(
         &self,
         context: TrackContext<'_>,
         now: Timestamp,
         located: &Located,
         destination: &Destination,
-        stands: bool,
+        at_rest: bool,
     ) -> Result<WayPoint, Refusal> {
         let node = located.at.node;
-        let no_way = || self.no_way(context, node, destination);
-        let named = destination.named.ok_or_else(no_way)?;
+        let no_path = || self.no_path(context, node, destination);
+        let named = destination.named.ok_or_else(no_path)?;
         context.layout.locate(named, context.turnouts).map_err(Refusal::Place)?;
-        let mut way = way_to_landmark(context, &self.model, node, named).ok_or_else(no_way)?;
-        let lap = lap(context, &self.model, node);
-        let behind = |way: Length| way < located.at.way - THERE;
+        let mut way = way_to_landmark(context, &self.model, node, named).ok_or_else(no_path)?;
+        let circuit_length = circuit_length(context, &self.model, node);
+        let behind = |way: Length| way < located.at.way - AT_TARGET;
         if behind(way) {
-            way += lap.filter(|lap| !behind(way + *lap)).ok_or_else(no_way)?;
+            way +=
+                circuit_length.filter(|circuit_length| !behind(way + *circuit_length)).ok_or_else(no_path)?;
         }
         if destination.next_round {
-            way += lap.ok_or_else(no_way)?;
+            way += circuit_length.ok_or_else(no_path)?;
         }
         let at = WayPoint { node, way };
-        if !stands {
+        if !at_rest {
             let soonest = self.locator.rest_if_stopped(context, &self.model, now + self.link.soonest);
             let reached = soonest
                 .and_then(|rest| Some((rest, self.aimed_beyond(context, &rest, at, destination.aim)?)));
@@ -205,11 +210,11 @@ impl DrivenTrain {
             target: name(context, destination),
             nearest: context.layout.display(nearest).to_string(),
             beyond,
-            round: lap(context, &self.model, at.node),
+            round: circuit_length(context, &self.model, at.node),
         }
     }
 
-    pub(super) fn no_way(
+    pub(super) fn no_path(
         &self,
         context: TrackContext<'_>,
         from: NodeId,
@@ -222,8 +227,8 @@ impl DrivenTrain {
         }
     }
 
-    /// The target counted from a contact that the way as it was known did not lead to.
-    pub(super) fn waypoint_again(
+    /// The target measured from a node that the earlier path did not lead to.
+    pub(super) fn target_from(
         &self,
         context: TrackContext<'_>,
         node: NodeId,
@@ -232,50 +237,49 @@ impl DrivenTrain {
         Some(WayPoint { node, way: way_to_landmark(context, &self.model, node, destination.named?)? })
     }
 
-    /// A target that has a name, found again from the node that it is counted from: lengths are learnt on the way, and
-    /// turnouts thrown. As many rounds from now as before; `None` if no way leads there any more.
-    fn named_again(
+    /// A named target, measured again from the same node: path lengths are learnt and turnouts thrown on the run.
+    /// Keeps the number of laps; `None` if no path leads there any more.
+    fn relocate_named_target(
         &self,
         context: TrackContext<'_>,
         at: WayPoint,
         destination: &Destination,
     ) -> Option<WayPoint> {
-        let again = self.waypoint_again(context, at.node, destination)?;
-        let Some(round) = lap(context, &self.model, at.node) else { return Some(again) };
-        let rounds = libm::round((at.way - again.way) / round).max(0.0);
-        Some(WayPoint { way: again.way + round * rounds, ..at })
+        let again = self.target_from(context, at.node, destination)?;
+        let Some(lap) = circuit_length(context, &self.model, at.node) else { return Some(again) };
+        let laps = libm::round((at.way - again.way) / lap).max(0.0);
+        Some(WayPoint { way: again.way + lap * laps, ..at })
     }
 
-    /// The target counted from a contact that the train came to since, as its way is known now; `None` if no way leads
-    /// there any more.
-    pub(super) fn counted_again(
+    /// The target measured from a sensor that the train has passed since; `None` if no path leads there any more.
+    pub(super) fn recount_target(
         &self,
         context: TrackContext<'_>,
         at: WayPoint,
         node: NodeId,
         destination: &Destination,
     ) -> Option<WayPoint> {
-        let Some(counted) = counted_from(context, &self.model, at, node) else {
-            return self.waypoint_again(context, node, destination);
+        let Some(counted) = recount_from(context, &self.model, at, node) else {
+            return self.target_from(context, node, destination);
         };
         if destination.in_time.is_some() {
-            self.named_again(context, counted, destination)
+            self.relocate_named_target(context, counted, destination)
         } else {
             Some(counted)
         }
     }
 
-    /// The turnouts lie otherwise: is the target still where it was?
-    pub(super) fn way_changed(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
+    /// Measures the target again after a turnout was thrown.
+    pub(super) fn turnouts_changed(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
         self.expect_next(context, now);
-        let Some(Task { goal: Goal::RestAt(destination), phase: Phase::Running { .. }, .. }) = self.task
+        let Some(Task { goal: Goal::RestAt(destination), phase: TaskPhase::Running { .. }, .. }) = self.task
         else {
             return;
         };
         let Some(at) = destination.at else { return };
         if destination.named.is_some() {
-            let Some(at) = self.named_again(context, at, &destination) else {
-                return self.give_up(now, self.no_way(context, at.node, &destination), out);
+            let Some(at) = self.relocate_named_target(context, at, &destination) else {
+                return self.give_up(now, self.no_path(context, at.node, &destination), out);
             };
             if let Some(task) = &mut self.task {
                 task.goal = Goal::RestAt(Destination { at: Some(at), ..destination });
@@ -284,10 +288,10 @@ impl DrivenTrain {
         self.plan(context, now, out);
     }
 
-    /// Plans the stop anew with what is known now. A stop for which it is too late is made at once.
+    /// Plans the stop again. If it is too late, the train stops at once.
     pub(super) fn plan(&mut self, context: TrackContext<'_>, now: Timestamp, out: &mut Outputs) {
-        let Some(task) = self.task.filter(|_| self.is_told()) else { return };
-        let (Goal::RestAt(Destination { at: Some(at), aim, .. }), Phase::Running { plan: before }) =
+        let Some(task) = self.task.filter(|_| self.is_all_sent()) else { return };
+        let (Goal::RestAt(Destination { at: Some(at), aim, .. }), TaskPhase::Running { plan: before }) =
             (task.goal, task.phase)
         else {
             return;
@@ -300,22 +304,22 @@ impl DrivenTrain {
             CommandTime::At(leaves, rest) => {
                 let Some(promise) = self.promise(context, &rest, at) else { return };
                 let triggers = self.triggers(context, now, leaves);
-                let plan = Plan { leaves, triggers, promise };
-                self.task = Some(Task { phase: Phase::Running { plan: Some(plan) }, ..task });
-                let is_news = before.is_none_or(|before| {
-                    (before.leaves - leaves).abs() >= NEWS || before.triggers[0] != triggers[0]
+                let plan = StopPlan { leaves, triggers, promise };
+                self.task = Some(Task { phase: TaskPhase::Running { plan: Some(plan) }, ..task });
+                let is_reportable = before.is_none_or(|before| {
+                    (before.leaves - leaves).abs() >= REPORTABLE_CHANGE || before.triggers[0] != triggers[0]
                 });
-                if is_news {
-                    out.say(Notice::Planned(self.planned(context, task.order, plan)));
+                if is_reportable {
+                    out.notify(Notice::Planned(self.planned(context, task.order, plan)));
                 }
             }
             CommandTime::TooLate(rest, beyond) => {
-                if beyond > OVERSHOOT {
-                    out.say(Notice::Overshoots { order: task.order, train: self.id(), by: beyond });
+                if beyond > REPORTABLE_OVERSHOOT {
+                    out.notify(Notice::Overshoots { order: task.order, train: self.id(), by: beyond });
                 }
                 self.stop_now(now, task, self.promise(context, &rest, at), out);
             }
-            // What was planned before is kept by the clock.
+            // The clock carries out the earlier plan.
             CommandTime::Never if before.is_some() => {}
             CommandTime::Never => {
                 let target = match task.goal {
@@ -327,12 +331,12 @@ impl DrivenTrain {
         }
     }
 
-    fn planned(&self, context: TrackContext<'_>, order: OrderId, plan: Plan) -> PlannedStop {
+    fn planned(&self, context: TrackContext<'_>, order: OrderId, plan: StopPlan) -> PlannedStop {
         let [trigger, _] = plan.triggers;
         let passes = trigger.and_then(|sensor| {
             let node = context.node_of(sensor)?;
             let located = self.located(context, plan.leaves)?;
-            let since = located.at.way - way_between(context, &self.model, located.at.node, node)?;
+            let since = located.at.way - distance_between(context, &self.model, located.at.node, node)?;
             (located.speed.as_m_per_s() > 0.0).then(|| since / located.speed)
         });
         PlannedStop {
@@ -345,7 +349,7 @@ impl DrivenTrain {
         }
     }
 
-    /// The last two contacts whose reports come in time to move a command that leaves then.
+    /// The last two sensors whose reports can still change a command sent at a time, the later one first.
     fn triggers(
         &self,
         context: TrackContext<'_>,
@@ -357,22 +361,22 @@ impl DrivenTrain {
         };
         let last = there.at.way - there.speed * self.link.reaction;
         let mut triggers = [None; 2];
-        for (sensor, way) in contacts_until(context, &self.model, here.at.node, last) {
-            if way > here.at.way {
+        for (sensor, distance) in sensors_within(context, &self.model, here.at.node, last) {
+            if distance > here.at.way {
                 triggers = [Some(sensor), triggers[0]];
             }
         }
         triggers
     }
 
-    /// Where a rest lies against the target.
+    /// The rest relative to the target, with its 95 % interval.
     pub(super) fn promise(&self, context: TrackContext<'_>, rest: &Rest, at: WayPoint) -> Option<Promise> {
         let median = self.beyond(context, rest.at, at)?;
         let half = spread(rest) * HALF_95;
         Some(Promise { median, low: median - half, high: median + half })
     }
 
-    /// How far beyond the target the part of a rest lies that is aimed with.
+    /// How far the aimed quantile of a rest lies beyond the target.
     pub(super) fn aimed_beyond(
         &self,
         context: TrackContext<'_>,
@@ -383,22 +387,22 @@ impl DrivenTrain {
         Some(self.beyond(context, rest.at, at)? + spread(rest) * aim.margin())
     }
 
-    /// How far one point of the way lies beyond another.
+    /// How far one point of the path lies beyond another.
     pub(super) fn beyond(
         &self,
         context: TrackContext<'_>,
         point: WayPoint,
         target: WayPoint,
     ) -> Option<Length> {
-        if let Some(between) = way_between(context, &self.model, target.node, point.node) {
+        if let Some(between) = distance_between(context, &self.model, target.node, point.node) {
             return Some(between + point.way - target.way);
         }
-        let between = way_between(context, &self.model, point.node, target.node)?;
+        let between = distance_between(context, &self.model, point.node, target.node)?;
         Some(point.way - between - target.way)
     }
 }
 
-/// What people call a target.
+/// The name of a target, as operators know it.
 pub(super) fn name(context: TrackContext<'_>, destination: &Destination) -> String {
     destination
         .named

@@ -1,4 +1,4 @@
-//! No turnout is thrown under a train.
+//! Prevents turnouts from being thrown under a train.
 
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
@@ -10,16 +10,16 @@ use crate::tracking::{TrackContext, place_of};
 use crate::units::Length;
 
 use super::driven_train::DrivenTrain;
-use super::path_length::nodes_of_turnout;
+use super::path::nodes_of_turnout;
 
-/// A train is within this many standard deviations of where it is believed to be, but for one time in 15 000.
+/// Bound on the error of a train's estimated position, in standard deviations: exceeded once in 15 000 times.
 const CERTAIN: f64 = 4.0;
-/// From the order until the points lie: a poll and the command on the line, and the solenoid.
+/// From the order to the turnout's new position: a poll, the command on the line, and the solenoid.
 const THROWING: TimeSpan = TimeSpan::from_ms(500);
-/// A place this near to the start of its edge is at the node there: sums of lengths are rounded.
+/// A position this close to the start of its edge is at the node: sums of lengths are rounded.
 const AT_NODE: Length = Length::from_mm(1e-6);
 
-/// A train that is on a turnout as far as is known, or will be before it has been thrown.
+/// A train that is on a turnout, or will be before it has been thrown.
 pub(super) fn train_on(
     trains: &BTreeMap<TrainId, DrivenTrain>,
     context: TrackContext<'_>,
@@ -46,7 +46,7 @@ pub(super) fn turnouts_under(
     nodes_under(context, train, now).into_iter().filter_map(|(node, _)| turnout_at(node)).collect()
 }
 
-/// The nodes that a train is on, or will be soon, seen in either direction: it may come from the toe or from a leg.
+/// The nodes that a train is on or will reach soon, in both directions: it may come from the toe or from a leg.
 fn nodes_under(context: TrackContext<'_>, train: &DrivenTrain, now: Timestamp) -> Vec<(NodeId, Length)> {
     let mut under = Vec::new();
     let located = train.located(context, now);
@@ -60,8 +60,8 @@ fn nodes_under(context: TrackContext<'_>, train: &DrivenTrain, now: Timestamp) -
     under
 }
 
-/// Adds the nodes ahead of a place that are no further than a limit, over turnouts that lie right or are unknown, each
-/// with how far it is from there.
+/// Adds the nodes ahead of a position up to a distance, through turnouts that are set for the path or unknown, each
+/// with its distance.
 fn nodes_within(context: TrackContext<'_>, from: Position, limit: Length, found: &mut Vec<(NodeId, Length)>) {
     let Some(edge) = context.layout.edge(from.edge) else { return };
     let begin = found.len();
@@ -69,17 +69,17 @@ fn nodes_within(context: TrackContext<'_>, from: Position, limit: Length, found:
     if from.offset <= AT_NODE {
         open.push((edge.from, Length::ZERO));
     }
-    while let Some((node, way)) = open.pop() {
-        let nearer = |(known, before): &(NodeId, Length)| *known == node && *before <= way;
-        if way > limit || found.iter().skip(begin).any(nearer) {
+    while let Some((node, distance)) = open.pop() {
+        let nearer = |(known, before): &(NodeId, Length)| *known == node && *before <= distance;
+        if distance > limit || found.iter().skip(begin).any(nearer) {
             continue;
         }
-        found.push((node, way));
+        found.push((node, distance));
         for id in context.layout.ways(node).edges() {
             if let Some(next) = context.layout.edge(id)
                 && context.layout.needs_of(id).all(|need| context.turnouts.allow(need))
             {
-                open.push((next.to, way + next.length));
+                open.push((next.to, distance + next.length));
             }
         }
     }

@@ -1,4 +1,4 @@
-//! What to do when a train stalls, is lifted or lost, and when a turnout did not move.
+//! Faults during a calibration: a train that stalls, is lifted or lost, and a turnout that did not move.
 
 use alloc::vec::Vec;
 
@@ -14,29 +14,33 @@ use crate::track::{Hop, HopId, Leg};
 use crate::tracking::PassedContact;
 use crate::units::{Length, Speed};
 
-/// A contact is late when it is this much later than expected ...
+/// A detection is overdue this long after its predicted time ...
 const LATE: TimeSpan = TimeSpan::from_ms(1_500);
 
-/// ... and half of the time again that it was expected to take.
+/// ... plus this part of the predicted time itself.
 const LATE_PART: f64 = 0.5;
 
-/// Doubt of when a contact is due that is worth waiting for.
+/// A larger uncertainty of the predicted time is not waited for.
 const LONGEST_DOUBT: TimeSpan = TimeSpan::from_ms(4_000);
 
-/// A train that was pushed up should get to the next contact within this, at the slowest.
+/// A train that was pushed up a step reaches the next sensor at this speed at least.
 const PUSHED_SPEED: Speed = Speed::from_mm_per_s(100.0);
 
-/// Pushed up this often without a contact, the train is not on the track any more.
+/// At a step that is faster than this a train stalls on dirt, not because the step is too low for it: model trains that move
+/// at all stall below some 50 mm/s, and a late report of a faster one says nothing of the step.
+const SLOW_STEP: Speed = Speed::from_mm_per_s(100.0);
+
+/// After this many pushes without a detection the train counts as lost.
 const MOST_PUSHES: u8 = 2;
 
-/// Before a lost train is looked for, it stands; whoever lifted it may put it down meanwhile.
+/// A lost train stands this long before the search: it may have been lifted and is put down meanwhile.
 const WAIT_FOR_LOST: TimeSpan = TimeSpan::from_ms(6_000);
 
-/// One such hop may be a mistake of the survey.
+/// One hop with another length may be an error of the survey.
 const FEWEST_ODD: usize = 2;
 
 impl Calibrator<'_> {
-    /// Works out by when the next contact has to come.
+    /// Sets the time by which the next detection must have come.
     pub(super) fn expect_contact(&mut self, now: Timestamp) {
         self.due_by = None;
         let runs = match &self.activity {
@@ -59,7 +63,7 @@ impl Calibrator<'_> {
                 due.time + doubt + part + LATE
             }
             None => {
-                // No forecast: the longest that the hop would take at half the speed, from rest.
+                // Without a prediction: the time that the hop takes from rest at half the speed.
                 let hop = self.tracker.last().and_then(|node| self.context().hop_from(node));
                 let length = hop.map_or(super::gain::TYPICAL_HOP, |hop| self.longest(&hop));
                 let speed = self.model().speed(self.stance.step, Approach::Below).value;
@@ -73,7 +77,7 @@ impl Calibrator<'_> {
             Some(if self.pushes > 0 { pushed.unwrap_or(due_by).min(due_by) } else { due_by }.max(now));
     }
 
-    /// A length that a hop hardly exceeds.
+    /// An upper bound of a hop's length (95 %).
     fn longest(&self, hop: &Hop<'_>) -> Length {
         if self.sections.is_measured(hop.id) {
             return hop.length;
@@ -82,7 +86,7 @@ impl Calibrator<'_> {
         length + 2.0 * uncertainty
     }
 
-    /// No contact by the time it was due at the latest.
+    /// No detection came by the time it was due at the latest.
     pub(super) fn miss_contact(&mut self, now: Timestamp) {
         self.due_by = None;
         let step = self.stance.step;
@@ -92,14 +96,14 @@ impl Calibrator<'_> {
         }
         self.pushed_from = self.pushed_from.or(Some(step));
         self.pushes += 1;
-        // The experiment is spoilt: what follows the next contact is planned anew.
+        // The experiment is lost: the planner continues after the next detection.
         self.activity = Activity::Joining;
         if let Some(next) = SpeedStep::new(step.get() + 1) {
             self.issue(now, next);
         }
     }
 
-    /// Nobody knows where the train is: it is commanded to stop, and looked for after a while.
+    /// The train is lost: it is commanded to stop, and searched for after a while.
     pub(super) fn lose(&mut self, now: Timestamp) {
         self.report_mishap(Mishap::Lost { last: self.tracker.last() });
         self.fit.interrupt();
@@ -113,19 +117,27 @@ impl Calibrator<'_> {
         self.say_progress(now);
     }
 
-    /// A contact after the train was pushed up: the one that had been due means it had stalled, a later one that the due
-    /// one was missed.
+    /// A detection after the train was pushed up: of the sensor that was due, it shows that the train had stalled; of a later
+    /// one, that the detection was missed.
     pub(super) fn note_pushes(&mut self, passed: &PassedContact) {
         let Some(step) = self.pushed_from.take() else { return };
         self.pushes = 0;
         if passed.missed == 0 {
-            self.fit.note_use(step, StepUse::Unreliable);
+            if self.may_be_slow(step) {
+                self.fit.note_use(step, StepUse::Unreliable);
+            }
             self.fit.interrupt();
             self.report_mishap(Mishap::Stalled { step });
         }
     }
 
-    /// The step at which the train passed a contact moves it, if it had been told long enough ago.
+    /// Whether a step may be so slow that the train stalls for it: within one standard deviation.
+    fn may_be_slow(&self, step: SpeedStep) -> bool {
+        let speed = self.model().speed(step, Approach::Below);
+        speed.value - speed.uncertainty < SLOW_STEP
+    }
+
+    /// A step moves the train if the train passed a sensor once it was steady at that step.
     pub(super) fn note_that_it_moves(&mut self, now: Timestamp) {
         let step = self.stance.step;
         let is_steady = now >= self.steady_at && step > SpeedStep::STAND;
@@ -134,7 +146,7 @@ impl Calibrator<'_> {
         }
     }
 
-    /// A turnout lies otherwise than it was told.
+    /// A turnout does not lie as commanded.
     pub(super) fn took_other_leg(&mut self, turnout: TurnoutId, leg: Leg) {
         self.turnouts.set(turnout, leg);
         self.asked_turnouts.remove(&turnout);
@@ -143,8 +155,8 @@ impl Calibrator<'_> {
         self.report_mishap(Mishap::WrongLeg { turnout, wanted: Leg::from_curved(!leg.is_curved()) });
     }
 
-    /// Fits anew, and compares the lengths of the layout with what the train makes of them: where they contradict each other
-    /// the layout's count for less, and it is said, again when there are more.
+    /// Fits again and compares the layout's lengths with path lengths. Lengths that contradict each other count for less, and a
+    /// notice names them whenever there are more than before.
     pub(super) fn refit(&mut self) {
         self.fit.refit(&self.sections);
         let test = SurveyTest::of(&self.surveyed, self.model().sections());
@@ -161,13 +173,13 @@ impl Calibrator<'_> {
         }
     }
 
-    /// A hop over a section that is not as long as the layout says, the length there, and what the train makes of it.
+    /// A hop over a section whose length contradicts the layout, the layout's length, and the path length.
     fn odd_hop(&self, odd: &OddSection) -> Option<(HopId, Length, Length)> {
         let mut hops = self.layout.hops().filter(|hop| self.sections.section(hop.id) == Some(odd.section));
         Some((hops.next()?.id, Length::from_m(odd.surveyed), Length::from_m(odd.felt)))
     }
 
-    /// The train stops for good.
+    /// Ends the calibration: the train stops.
     pub(super) fn end(&mut self, now: Timestamp, ending: Ending) {
         if self.finished.is_some() || matches!(self.activity, Activity::Ending { .. }) {
             return;
@@ -181,7 +193,7 @@ impl Calibrator<'_> {
         self.say_progress(now);
     }
 
-    /// The train stands: the last fit, and the table.
+    /// The train is at rest: the last fit, and the result.
     pub(super) fn finish(&mut self) {
         self.refit();
         let ending = self.ending.take().unwrap_or(Ending::Told);

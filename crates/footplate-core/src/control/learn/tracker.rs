@@ -1,5 +1,5 @@
-//! Which reports are of the train, and what the others mean: one train runs, but contacts are missed, contacts report by
-//! themselves, turnouts fail, and people lift trains.
+//! Data association during a calibration: one train runs, but detections are missed or spurious, turnouts fail, and people
+//! lift trains.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
@@ -12,51 +12,50 @@ use crate::track::{Layout, Leg, Reach, TurnoutStates};
 use crate::tracking::{Locator, TrackContext};
 use crate::units::{Length, Speed};
 
-/// Contacts in a row that a train is believed to have passed unseen. Beyond that it is somewhere else.
+/// Missed detections in a row that are accepted. Beyond that the train is somewhere else.
 const LOOK_PAST: usize = 2;
 
-/// Reports of a contact that follow each other within this are of one closure: a pickup over it, or a contact that hangs.
+/// Reports of a sensor that follow each other within this are one detection: a pickup over it, or a sensor that sticks.
 const ONE_CLOSURE: TimeSpan = TimeSpan::from_ms(1_000);
 
 /// No train in the published tables runs faster.
 const FASTEST: Speed = Speed::from_mm_per_s(1_000.0);
 
-/// Reports that nothing explains, without as many that are explained between them, until the layout is not believed any
-/// more.
+/// This many unexplained reports, less the explained ones between them, contradict the layout.
 const TOO_STRANGE: usize = 4;
 
-/// Less likely than once in this many seconds, a report is rather spurious: contacts report by themselves about as often.
+/// A report with a lower density (1/s) is spurious: sensors report by themselves about this often.
 const LEAST_DENSITY: f64 = 1e-4;
 
 /// What a report means.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Verdict {
-    /// The first contact since nobody knew where the train is.
+    /// The first detection of a lost train.
     First(NodeId),
-    /// The train passed it on its way.
+    /// The train passed it on its path.
     Passed(NodeId),
-    /// It passed it by another leg of a turnout than the one for which it was set.
+    /// It passed it by the other leg of a turnout than the one set.
     ByOtherLeg {
         node: NodeId,
         turnout: TurnoutId,
-        /// The leg by which it went.
+        /// The leg it took.
         leg: Leg,
     },
-    /// The same closure again.
+    /// The same detection again.
     Again,
     /// Not of the train, or not of this layout.
     Unexplained,
-    /// The train is somewhere else than it can have run to.
+    /// The train is where it cannot have run to.
     Moved { from: Option<NodeId>, to: NodeId },
-    /// Too much of this to go on.
+    /// Too many unexplained reports to continue.
     WrongLayout { seen: Vec<SensorId>, expected: Vec<SensorId> },
 }
 
-/// Where the train was seen last, and what was seen that it does not explain.
+/// The last detection of the train, and the unexplained ones since.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tracker {
     last: Option<(NodeId, Timestamp)>,
-    /// A contact that reported where the train cannot be, if it is not there after all.
+    /// A sensor that reported where the train cannot have run to; it may have been moved there.
     elsewhere: Option<(NodeId, Timestamp)>,
     closed: BTreeMap<SensorId, Timestamp>,
     strange: Vec<SensorId>,
@@ -64,23 +63,23 @@ pub(super) struct Tracker {
 }
 
 impl Tracker {
-    /// The contact passed last.
+    /// The sensor passed last.
     pub(super) fn last(&self) -> Option<NodeId> {
         self.last.map(|(node, _)| node)
     }
 
-    /// When that was reported.
+    /// When it reported.
     pub(super) fn last_time(&self) -> Option<Timestamp> {
         self.last.map(|(_, time)| time)
     }
 
-    /// Nobody knows where the train is.
+    /// The train is lost.
     pub(super) fn lose(&mut self) {
         self.last = None;
         self.elsewhere = None;
     }
 
-    /// Judges a report.
+    /// Classifies a report.
     pub(super) fn judge(
         &mut self,
         context: TrackContext<'_>,
@@ -103,8 +102,8 @@ impl Tracker {
             || locator.locate(context, model, time).is_none(),
             |log| log > libm::log(LEAST_DENSITY),
         );
-        // The very next contact is believed whenever a train can have got there: contacts that report by themselves do so
-        // anywhere, and forecasts of a train that is not known yet are poor.
+        // The very next sensor is accepted whenever a train can have reached it: spurious reports come from any sensor, and
+        // predictions of an uncalibrated train are poor.
         let is_next = leads_to(context.layout, context.turnouts, last, node, 0)
             && self.in_time(context.layout, self.last, node, time);
         if is_next || is_likely && leads_to(context.layout, context.turnouts, last, node, LOOK_PAST) {
@@ -125,7 +124,7 @@ impl Tracker {
         self.strange(context, sensor, Some(node), time)
     }
 
-    /// The train was here: what was strange is a little less so.
+    /// The train was here: one unexplained report counts less.
     fn take(&mut self, node: NodeId, time: Timestamp) {
         self.strange.pop();
         self.last = Some((node, time));
@@ -155,7 +154,7 @@ impl Tracker {
         Verdict::WrongLayout { seen, expected: core::mem::take(&mut self.expected) }
     }
 
-    /// Whether a train that was at a node then can be at another now, by any leg, past one silent contact.
+    /// Whether a train that was at a node then can be at another now, by any leg, with one missed detection.
     fn in_time(
         &self,
         layout: &Layout,

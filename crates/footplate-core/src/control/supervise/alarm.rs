@@ -11,21 +11,21 @@ use crate::tracking::Drift;
 pub enum Alarm {
     /// Contacts close later and later than they should, or earlier and earlier.
     Drift(Drift),
-    /// Nobody knows any more where the train is.
+    /// The place of the train is unknown.
     Lost,
-    /// The train came to a contact where it cannot have run to.
+    /// A sensor reported the train where it cannot have run to.
     Elsewhere(SensorId),
-    /// The train came to a contact so early or so late that something was done to it on the way there.
+    /// A sensor reported the train so early or so late that a person or a fault must have moved or stopped it.
     Untimely(SensorId),
-    /// One contact after the other did not report the train.
+    /// One sensor after the other did not report the train.
     Misses,
     /// The station does not answer.
     LinkSilent,
     /// A command to stop has not left in time.
     StopUnconfirmed,
-    /// The train has been commanded to stop and still closes contacts.
+    /// The train was commanded to stop, and sensors still report it.
     DoesNotStop(SensorId),
-    /// Whoever is above does not trust it.
+    /// The caller does not trust the train.
     Distrusted,
 }
 

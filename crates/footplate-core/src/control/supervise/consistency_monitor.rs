@@ -1,4 +1,4 @@
-//! The tests that one train has to stand at every contact.
+//! The tests of one train at every sensor.
 
 use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::PassedContact;
@@ -6,27 +6,27 @@ use crate::tracking::{Drift, DriftTest};
 
 use super::alarm::Alarm;
 
-/// Lateness is standardised by what was expected of it and by this part of the time since the contact before: wheels
-/// get warm, a run differs from the next, and none of that is a disaster.
+/// The innovation is normalised by its predicted standard deviation and by this part of the time since the last sensor:
+/// wheels get warm, and runs differ.
 const USUAL_PART: f64 = 0.02;
-/// A contact that comes this many standard deviations off, ...
+/// An innovation of this many standard deviations, ...
 const WILD: f64 = 6.0;
-/// ... and by this part of its time, is a wild one; ...
+/// ... and of this part of its time, is an outlier; ...
 const WILD_PART: f64 = 0.08;
-/// ... and so many in a row are a disaster, whatever sums may say.
+/// ... and this many in a row raise the alarm, whatever the drift test says.
 const WILD_IN_A_ROW: u8 = 2;
-/// A train that ran all the way is as surely not as it was if one contact is off by so many standard deviations ...
+/// A single innovation of this many standard deviations raises the alarm for a train that ran all the way, ...
 const UNTIMELY: f64 = 8.0;
-/// ... and this part of its time, even if it runs on as before: another engine under the number may be as fast, a train
-/// that was lifted may come to the same contact.
+/// ... if it is also this part of its time, even if later ones fit: another engine under the number may be as fast, a lifted
+/// train may come to the same sensor.
 const UNTIMELY_PART: f64 = 0.2;
-/// Misses less what was seen in between, from which on a train is not followed any more.
+/// Missed sensors, less those that reported in between, that raise the alarm.
 const MOST_MISSES: usize = 4;
 
-/// What is remembered of a train from contact to contact.
+/// The state of the tests between sensors.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ConsistencyMonitor {
-    /// It was commanded to run since it stood, and has come to no contact yet: from rest, trains are late that are as they were.
+    /// It has started from rest and passed no sensor yet: a start is less predictable than a run.
     starts: bool,
     drift: DriftTest,
     wild: u8,
@@ -36,22 +36,22 @@ pub(super) struct ConsistencyMonitor {
 }
 
 impl ConsistencyMonitor {
-    /// Somebody knows where it is.
+    /// It is located.
     pub(super) fn place(&mut self) {
         *self = Self { starts: true, is_located: true, ..Self::default() };
     }
 
-    /// It was commanded to stop: what comes next is a start.
+    /// It was commanded to stop: next comes a start.
     pub(super) const fn stand(&mut self) {
         self.starts = true;
     }
 
-    /// Nobody does.
+    /// Its place is unknown.
     pub(super) fn lose(&mut self) {
         *self = Self::default();
     }
 
-    /// A contact that it passed. What is unusual about it, if anything.
+    /// Tests a passage. Returns the alarm that it raises, if any.
     pub(super) fn pass(&mut self, passed: &PassedContact) -> Option<Alarm> {
         let before = self.last.replace(passed.window.until);
         let started = core::mem::take(&mut self.starts);
@@ -65,7 +65,7 @@ impl ConsistencyMonitor {
             self.misses = 0;
             return Some(Alarm::Misses);
         }
-        // From rest a start is late or early by more than its forecast knows; that is no drift.
+        // A start deviates by more than its forecast says; that is no drift.
         let took = before.map(|before| passed.window.until - before).unwrap_or(TimeSpan::ZERO).as_s();
         let standardised = late.as_s() / libm::hypot(deviation.as_s(), USUAL_PART * took);
         let is_wild = standardised.abs() >= WILD && late.as_s().abs() >= WILD_PART * took;

@@ -1,4 +1,4 @@
-//! The station's line and the power on the track, as far as a watchdog hears of them and has a say in them.
+//! The link and the track power, as the watchdog handles them.
 
 use alloc::vec::Vec;
 
@@ -10,14 +10,14 @@ use crate::time::Timestamp;
 use super::alarm::Alarm;
 use super::watchdog::{Power, Watchdog};
 
-/// What is heard of the station's line.
+/// News of the link to the command station.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LinkNews {
-    /// Nothing that was asked has been answered for a while, or nothing may be written.
+    /// The station has not answered for a while, or accepts no bytes.
     Silent,
     /// It answers, for the first time or again.
     Answers,
-    /// A train was commanded to reverse, and nobody knows whether it heard: it may face either way.
+    /// It is unknown whether a train has received a command to reverse: it may face either way.
     ReverseInDoubt {
         /// The train.
         train: TrainId,
@@ -25,7 +25,7 @@ pub enum LinkNews {
 }
 
 impl Watchdog {
-    /// What is heard of the station's line.
+    /// Takes news of the link.
     pub fn handle_link(&mut self, now: Timestamp, news: LinkNews) {
         match news {
             LinkNews::ReverseInDoubt { train } => self.lose(now, train),
@@ -34,7 +34,8 @@ impl Watchdog {
                 self.silent = Some(now);
                 let trains: Vec<TrainId> = self.driver.trains().collect();
                 for train in trains {
-                    if self.driver.commanded(train) > SpeedStep::STAND || !self.driver.stands(train, now) {
+                    if self.driver.commanded(train) > SpeedStep::STAND || !self.driver.is_at_rest(train, now)
+                    {
                         self.raise(now, train, Alarm::LinkSilent);
                     }
                 }
@@ -42,7 +43,7 @@ impl Watchdog {
             LinkNews::Silent => {}
             LinkNews::Answers => {
                 if self.silent.take().is_some() {
-                    // Who knows what of it has been heard: everything stands, and is told so once more.
+                    // Stop commands may have been lost: each train is commanded to stop once more.
                     let trains: Vec<TrainId> = self.driver.trains().collect();
                     for train in trains {
                         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
@@ -53,7 +54,7 @@ impl Watchdog {
         self.act(now);
     }
 
-    /// A person takes the power from the track, or gives it back. What they took comes back when they say so.
+    /// A person switches the track power off or on. Power that a person switched off stays off until a person switches it on.
     pub fn switch_power(&mut self, now: Timestamp, on: bool) {
         if on {
             self.is_switched_off = false;
@@ -67,7 +68,7 @@ impl Watchdog {
         self.act(now);
     }
 
-    /// Whether the track has power, as far as this machine has a say in it.
+    /// Whether the track has power, as commanded.
     #[must_use]
     pub fn is_powered(&self) -> bool {
         self.power == Power::On

@@ -1,4 +1,4 @@
-//! One train on its way back from danger: standing, crawling, being measured.
+//! The recovery of one train: it is stopped, located at a creep, and measured again.
 
 use alloc::vec::Vec;
 
@@ -12,26 +12,27 @@ use crate::tracking::PassedContact;
 use crate::units::Length;
 
 use super::alarm::Alarm;
+use super::remeasuring::is_same;
 use super::trials::{SpeedTrial, Steps};
 use super::watchdog::Watchdog;
 use crate::control::{Notice, Outcome};
 
-/// How far a train may be off its model in speed and stops until it has been measured again, as ln: engines differ by up to
-/// a half in the middle of their speeds, but at the step where one of them barely crawls another runs three times as fast.
+/// How far a train may be from its model in speed and stops until it has been measured again, as ln: engines differ by up to
+/// a half at middle speeds, but at the step where one barely creeps another runs three times as fast.
 pub(super) const DOUBTED: f64 = 0.8;
-/// A train that is still believed to be about where it was may be this far off after an unforeseen stop.
+/// The uncertainty of a train that was located, after an unforeseen stop.
 const ABOUT: Length = Length::from_mm(150.0);
-/// A crawl that meets no contact is pushed up a step after this: the longest known hop, 1.5 m, at 110 mm/s.
+/// A creep that meets no sensor goes a step up after this: the longest known hop, 1.5 m, at 110 mm/s.
 const PUSH_AFTER: TimeSpan = TimeSpan::from_s(14.0);
-/// Each phase is over after this, and a person is asked for: standing, ...
+/// Limits of the phases, after which a person is needed: coming to rest, ...
 pub(super) const STANDS_WITHIN: TimeSpan = TimeSpan::from_s(30.0);
-/// ... being found, which may take two hops at a crawl and three pushes, ...
+/// ... being located, which may take two hops at a creep and three steps up, ...
 const FOUND_WITHIN: TimeSpan = TimeSpan::from_s(75.0);
 /// ... and one speed, or one stop.
 pub(super) const MEASURED_WITHIN: TimeSpan = TimeSpan::from_s(45.0);
 /// A train that is lost this often while it is being found needs a person.
 const MOST_LOST: u8 = 3;
-/// Any train stands this long after it was told to (the longest of the published stops).
+/// Any train is at rest this long after its stop command (the longest published stop).
 const SURELY_STANDS: TimeSpan = TimeSpan::from_s(5.0);
 
 /// A train in danger.
@@ -53,32 +54,32 @@ pub(super) struct Recovery {
     lost: u8,
 }
 
-/// How far it is.
+/// The phase of a recovery.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Phase {
     /// It comes to rest.
     Stopping,
-    /// It stands and waits for its turn, for power, for the station, and to be permitted to crawl.
+    /// It is at rest and waits for its turn, for power, for the station, and for clearance to creep.
     Waiting { asked: bool },
-    /// It crawls; the contact it has passed.
+    /// It creeps; `seen` is the sensor that it has passed.
     Crawling { step: SpeedStep, pushed: Timestamp, seen: Option<NodeId> },
-    /// The way ahead has ended: it turns around to crawl the other way.
-    Turning { step: SpeedStep },
+    /// It reverses, to creep the other way; the sensor that reported it last, as it comes to it then.
+    Turning { step: SpeedStep, seen: Option<NodeId> },
     /// It runs at a speed that is measured.
     Measuring { trial: SpeedTrial, from: SpeedStep },
-    /// It stops short of a contact by the new model.
+    /// It stops short of a sensor by the new model.
     StoppingShort { order: OrderId, way: Length },
-    /// It crawls up to that.
+    /// It creeps to that sensor.
     Creeping { way: Length },
     /// It runs at a speed from which it is to stop, ...
     LearningSpeed { trial: SpeedTrial, from: SpeedStep },
     /// ... comes to rest from that ...
     LearningStop { until: Timestamp },
-    /// ... and crawls to a contact that says where that was.
+    /// ... and creeps to a sensor that shows where that was.
     LearningRest,
-    /// Everything is known, and it comes to rest.
+    /// The recovery is complete, and it comes to rest.
     Ending { outcome: Outcome },
-    /// A person has to see to it.
+    /// A person is needed.
     GivenUp,
 }
 
@@ -111,12 +112,12 @@ impl Recovery {
         &self.base
     }
 
-    /// Whether it moves, or may, because it was told to by its recovery.
+    /// Whether it moves, or may, on commands of its recovery.
     pub(super) const fn is_active(&self) -> bool {
         !matches!(self.phase, Phase::Stopping | Phase::Waiting { .. } | Phase::GivenUp)
     }
 
-    /// When its phase is over at the latest, or wants to be looked at.
+    /// When its phase has to be examined, at the latest when it is over.
     pub(super) fn next_timeout(&self) -> Option<Timestamp> {
         match self.phase {
             Phase::Waiting { .. } | Phase::GivenUp => None,
@@ -126,7 +127,7 @@ impl Recovery {
         }
     }
 
-    /// Speeds from each of which a stop is learnt.
+    /// The speeds from which stops are learnt.
     pub(super) const fn lessons(&self) -> [SpeedStep; 4] {
         let Steps { middle, high, low, .. } = self.steps;
         [middle, high, low, middle]
@@ -134,7 +135,7 @@ impl Recovery {
 }
 
 impl Watchdog {
-    /// Whatever the clock or the state of things lets go on.
+    /// Takes the next step of every recovery that can go on.
     pub(super) fn go_on_recovering(&mut self, now: Timestamp) {
         let trains: Vec<TrainId> = self.dangers.keys().copied().collect();
         for train in trains {
@@ -174,7 +175,7 @@ impl Watchdog {
         }
     }
 
-    /// It stands: goes on when it is its turn and everything allows it.
+    /// It is at rest: goes on when it is its turn and everything allows it.
     fn wait(&mut self, now: Timestamp, train: TrainId, asked: bool) {
         let is_free = self.is_powered() && !self.is_silent() && !self.stops.waits(train);
         let is_first = self.dangers.values().all(|other| !other.is_active());
@@ -190,17 +191,46 @@ impl Watchdog {
         }
         let Some(recovery) = self.dangers.get(&train) else { return };
         let is_about = matches!(recovery.why, Alarm::Drift(_) | Alarm::Misses | Alarm::Distrusted);
-        let crawl = recovery.steps.crawl;
         match self.driver.locate(train, now).filter(|_| is_about) {
             Some(located) => self.driver.place(now, train, located.at, ABOUT.max(located.uncertainty)),
-            None => self.driver.lose(now, train),
+            None => {
+                self.driver.lose(now, train);
+                // Other trains are near, and the track may end ahead. What is behind the train it ran over.
+                if !self.permits_all {
+                    let seen = self.behind.get(&train).map(|node| node.reverse());
+                    return match seen {
+                        Some(_) => self.creep_back(now, train, seen),
+                        None if self.is_clear_ahead(now, train) => self.creep_ahead(now, train),
+                        None => self.need_person(now, train),
+                    };
+                }
+            }
         }
+        self.creep_ahead(now, train);
+    }
+
+    /// Creeps to the next sensor as the train faces.
+    fn creep_ahead(&mut self, now: Timestamp, train: TrainId) {
+        let Some(crawl) = self.dangers.get(&train).map(|recovery| recovery.steps.crawl) else { return };
         self.keep_clear(now, train);
         self.say(Notice::Creeps { train, step: crawl });
         if let Some(recovery) = self.dangers.get_mut(&train) {
             recovery.by = now + FOUND_WITHIN;
         }
         self.crawl(now, train, crawl, None);
+    }
+
+    /// Reverses and creeps back to the sensor that reported the train last.
+    fn creep_back(&mut self, now: Timestamp, train: TrainId, seen: Option<NodeId>) {
+        let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        let step = recovery.steps.crawl;
+        recovery.has_turned = true;
+        recovery.phase = Phase::Turning { step, seen };
+        recovery.by = now + STANDS_WITHIN;
+        // Behind it is where it came from.
+        self.driver.set_end_of_authority(now, train, None);
+        self.say(Notice::Creeps { train, step });
+        self.issue(now, Order::Reverse { train, then: step });
     }
 
     fn crawl(&mut self, now: Timestamp, train: TrainId, step: SpeedStep, seen: Option<NodeId>) {
@@ -215,8 +245,8 @@ impl Watchdog {
         let (EventKind::Speed { train, .. } | EventKind::Reverse { train }) = event.kind else { return };
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         recovery.fit.take(self.driver.layout(), self.driver.turnouts(), event);
-        if let (EventKind::Reverse { .. }, Phase::Turning { step }) = (event.kind, recovery.phase) {
-            recovery.phase = Phase::Crawling { step, pushed: now, seen: None };
+        if let (EventKind::Reverse { .. }, Phase::Turning { step, seen }) = (event.kind, recovery.phase) {
+            recovery.phase = Phase::Crawling { step, pushed: now, seen };
             recovery.by = now + FOUND_WITHIN;
             self.keep_clear(now, train);
         } else if let EventKind::Speed { step, .. } = event.kind
@@ -228,7 +258,7 @@ impl Watchdog {
         }
     }
 
-    /// A train in recovery has passed a contact.
+    /// A train in recovery has passed a sensor.
     pub(super) fn recovering_passed(&mut self, now: Timestamp, train: TrainId, passed: &PassedContact) {
         let Some(node) = self.driver.node_passed(passed) else { return };
         if !self.dangers.get(&train).is_some_and(|danger| matches!(danger.phase, Phase::Turning { .. })) {
@@ -245,8 +275,8 @@ impl Watchdog {
         match recovery.phase {
             Phase::Crawling { step, seen: Some(seen), .. } => {
                 recovery.fit.note_use(step, StepUse::Moves);
-                // Two contacts that follow each other say which way it runs.
-                if self.driver.felt_hop(train, seen, node).is_some() {
+                // Two sensors that follow each other say which way it runs, and so does one from both sides.
+                if node == seen || self.driver.hop_length(train, seen, node).is_some() {
                     self.say(Notice::Located { train });
                     self.measure(now, train);
                 } else {
@@ -257,7 +287,7 @@ impl Watchdog {
                 recovery.phase = Phase::Crawling { step, pushed: now, seen: Some(node) };
             }
             Phase::Measuring { mut trial, from } => {
-                let hop = trial.last().and_then(|last| self.driver.felt_hop(train, last, node));
+                let hop = trial.last().and_then(|last| self.driver.hop_length(train, last, node));
                 trial.pass(node, passed.window, hop);
                 recovery.phase = Phase::Measuring { trial, from };
                 if trial.is_over() {
@@ -307,9 +337,12 @@ impl Watchdog {
         }
     }
 
-    /// The way ahead of a train in recovery has ended, or another train stands there.
+    /// The track ahead of a train in recovery ends, or another train is there.
     pub(super) fn recovering_blocked(&mut self, now: Timestamp, train: TrainId) {
         match self.dangers.get(&train).map(|recovery| recovery.phase) {
+            Some(Phase::Measuring { .. }) if self.has_only_lost_its_place(train) => {
+                self.end(now, train, Outcome::AsBefore);
+            }
             Some(Phase::Crawling { .. } | Phase::Measuring { .. }) => self.turn_or_decide(now, train),
             Some(Phase::Creeping { .. } | Phase::StoppingShort { .. }) => self.end_rescaled(now, train),
             Some(Phase::LearningSpeed { .. } | Phase::LearningRest) => {
@@ -319,7 +352,14 @@ impl Watchdog {
         }
     }
 
-    /// It has been lost again: it is looked for once more.
+    /// Whether a train was in danger for its place alone, which is known again, and no speed measured since is another one.
+    fn has_only_lost_its_place(&self, train: TrainId) -> bool {
+        self.dangers.get(&train).is_some_and(|recovery| {
+            matches!(recovery.why, Alarm::Lost | Alarm::Elsewhere(_)) && recovery.ratios.iter().all(is_same)
+        })
+    }
+
+    /// Its place was lost again: it is located once more.
     pub(super) fn recovering_lost(&mut self, now: Timestamp, train: TrainId) {
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         recovery.lost += 1;
@@ -344,15 +384,14 @@ impl Watchdog {
             }
             return self.measure(now, train);
         }
-        if core::mem::replace(&mut recovery.has_turned, true) {
+        let seen = match recovery.phase {
+            Phase::Crawling { seen, .. } => seen.map(|node| node.reverse()),
+            _ => None,
+        };
+        if recovery.has_turned {
             return self.need_person(now, train);
         }
-        let step = recovery.steps.crawl;
-        recovery.phase = Phase::Turning { step };
-        recovery.by = now + STANDS_WITHIN;
-        // Behind it is where it came from.
-        self.driver.set_limit(now, train, None);
-        self.issue(now, Order::Reverse { train, then: step });
+        self.creep_back(now, train, seen);
     }
 
     /// Everything is known: the train comes to rest.
@@ -371,10 +410,10 @@ impl Watchdog {
         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 
-    /// It stands and is known again.
+    /// It is at rest, and known again.
     fn recovered(&mut self, now: Timestamp, train: TrainId, outcome: Outcome) {
         let Some(recovery) = self.dangers.remove(&train) else { return };
-        self.driver.set_limit(now, train, None);
+        self.driver.set_end_of_authority(now, train, None);
         if let Some(monitor) = self.monitors.get_mut(&train) {
             monitor.place();
         }
@@ -387,13 +426,13 @@ impl Watchdog {
                 self.resume(now, train, id, order);
             }
         } else {
-            // Others are still in danger: it is held until they are not.
+            // It is held until no other train is in danger.
             self.held.insert(train, recovery.interrupted);
         }
     }
 
     fn resume(&mut self, now: Timestamp, train: TrainId, id: OrderId, order: Order) {
-        // Nobody knows how far a move or a turn had got.
+        // How far a move or a reversal had got is unknown.
         let can_go_on = self.resumes() && !matches!(order, Order::Move { .. } | Order::Reverse { .. });
         let resumed = if can_go_on { self.order(now, order).ok() } else { None };
         match resumed {
@@ -402,7 +441,7 @@ impl Watchdog {
         }
     }
 
-    /// Its time is over.
+    /// The recovery has failed: a person is needed.
     pub(super) fn need_person(&mut self, now: Timestamp, train: TrainId) {
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let while_it = match recovery.phase {

@@ -25,10 +25,15 @@ const SAME_DEVIATIONS: f64 = 3.0;
 const ANOTHER: f64 = 1.10;
 /// A stop this many standard deviations from its forecast is not of the same train either.
 const ANOTHER_STOP: f64 = 2.5;
-/// How far before a contact the checked stop ends, and is crawled up to.
+/// How far before a sensor the checked stop ends.
 const SHORT_OF: Length = Length::from_mm(120.0);
 /// Hops ahead among which one is looked for that is long enough for that.
 const HOPS_TO_STOP: usize = 8;
+
+/// Whether a speed is the one of before.
+pub(super) fn is_same(measured: &MeasuredRatio) -> bool {
+    libm::log(measured.ratio).abs() <= SAME.max(SAME_DEVIATIONS * measured.deviation)
+}
 
 impl Watchdog {
     /// Begins with the next speed, or decides what the train is.
@@ -36,8 +41,6 @@ impl Watchdog {
         let commanded = self.driver.commanded(train);
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let Steps { middle, low, high, .. } = recovery.steps;
-        let is_same =
-            |one: &MeasuredRatio| libm::log(one.ratio).abs() <= SAME.max(SAME_DEVIATIONS * one.deviation);
         let all_same = !recovery.ratios.is_empty() && recovery.ratios.iter().all(is_same);
         // Only who is said to drift has to show all of its speeds before that is taken back.
         let is_enough = all_same && !matches!(recovery.why, Alarm::Drift(_));
@@ -90,7 +93,7 @@ impl Watchdog {
         self.measure(now, train);
     }
 
-    /// A stop that ends shortly before a contact.
+    /// Stops the train shortly before a sensor.
     pub(super) fn stop_short(&mut self, now: Timestamp, train: TrainId) {
         let Some(recovery) = self.dangers.get(&train) else { return };
         let step = recovery.steps.middle;
@@ -109,7 +112,7 @@ impl Watchdog {
         }
     }
 
-    /// A place shortly before a contact, behind the second one from here on.
+    /// A place shortly before a sensor, beyond the second one ahead.
     fn target_short_of_contact(&self, now: Timestamp, train: TrainId) -> Option<Landmark> {
         let context = self.driver.context();
         let from = self.driver.locate(train, now)?.at.node;

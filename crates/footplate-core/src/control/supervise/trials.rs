@@ -9,7 +9,7 @@ use crate::model::{MeasuredRatio, MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Length, Speed};
 
-/// A train that nobody is sure of runs no faster than this to be found, ...
+/// A train that is being located runs no faster than this, ...
 const CRAWL_UP_TO: Speed = Speed::from_mm_per_s(150.0);
 /// ... and no slower, or it may not start at all.
 const CRAWL_FROM: Speed = Speed::from_mm_per_s(80.0);
@@ -21,7 +21,7 @@ const HIGH: Speed = Speed::from_mm_per_s(430.0);
 const HOPS: u8 = 3;
 /// ... or as few as two, if they are this long.
 const LONG_ENOUGH: Length = Length::from_mm(1_200.0);
-/// One run differs from the next by so much, as a part.
+/// The standard deviation of speeds from run to run, as a part.
 const RUN_DEVIATION: f64 = 0.006;
 /// Changes of speed take a little longer than the model of another train says.
 const SETTLES_PART: f64 = 1.3;
@@ -55,7 +55,7 @@ impl Steps {
     }
 }
 
-/// A speed being measured: from contact to contact, once it has settled.
+/// A measurement of a speed: from sensor to sensor, once it has settled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SpeedTrial {
     pub(super) step: SpeedStep,
@@ -79,7 +79,7 @@ impl SpeedTrial {
         self.settled = Some(at + settles + SETTLES_MORE);
     }
 
-    /// Where the train passed a contact, and how far that is from the one before.
+    /// A passage of a sensor, with the distance from the one before.
     pub(super) fn pass(&mut self, node: NodeId, window: ContactWindow, hop: Option<Length>) {
         if self.settled.is_none_or(|settled| window.after < settled) {
             return;
@@ -99,7 +99,7 @@ impl SpeedTrial {
         self.last = Some((node, window));
     }
 
-    /// The contact from which the next hop counts.
+    /// The sensor from which the next hop counts.
     pub(super) fn last(&self) -> Option<NodeId> {
         self.last.map(|(node, _)| node)
     }

@@ -1,4 +1,4 @@
-//! Watches over a driver, and puts things right when they go wrong.
+//! The watchdog: monitors the trains of a driver, and recovers those that do not run as they should.
 
 use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
 use alloc::vec::Vec;
@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use crate::control::drive::{Driver, Order, OrderId, Refusal};
 use crate::control::{Machine, Output};
 use crate::event::{Command, Event, EventKind};
-use crate::ids::{SpeedStep, TrainId};
+use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Position;
@@ -19,21 +19,21 @@ use super::recovery::{Phase, Recovery};
 use super::stops::Stops;
 use crate::control::Notice;
 
-/// Times to rest are foreseen to this part, ...
+/// A time to rest is predicted to this factor, ...
 const REST_PART: f64 = 1.3;
 /// ... and this.
 const REST_MORE: TimeSpan = TimeSpan::from_ms(700);
-/// A train of which nobody knows how it moves stands after this (the longest of the published stops).
+/// The time to rest of a train without a valid model (the longest published stop).
 const REST_UNKNOWN: TimeSpan = TimeSpan::from_s(5.0);
 
-/// Whether the track has power, as far as this machine has a say in it.
+/// The track power, as commanded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Power {
     On,
     Off { since: Timestamp },
 }
 
-/// A driver and everything that is looked at while it drives. To whoever is above it is a driver that sometimes refuses.
+/// A driver and its monitors. For its caller it is a driver that sometimes refuses an order.
 #[derive(Debug, Clone)]
 pub struct Watchdog {
     pub(super) driver: Driver,
@@ -43,29 +43,31 @@ pub struct Watchdog {
     pub(super) power: Power,
     /// Since when the station has been silent.
     pub(super) silent: Option<Timestamp>,
-    /// Trains that are not as they were.
+    /// Trains in danger: their recoveries.
     pub(super) dangers: BTreeMap<TrainId, Recovery>,
-    /// Trains that are held until the danger is over, with what they were doing.
+    /// Trains that are held until the danger is over, each with its interrupted order.
     pub(super) held: BTreeMap<TrainId, Option<(OrderId, Order)>>,
-    /// What each train was commanded last that is not done with.
+    /// The last order of each train that has not ended.
     pub(super) standing: BTreeMap<TrainId, (OrderId, Order)>,
-    /// Where each train was seen last.
+    /// The place where a sensor reported each train last, or a person put it, facing as the train does.
     pub(super) seen: BTreeMap<TrainId, Position>,
-    /// Orders of the watchdog's own.
+    /// The sensor that reported each train last since it reversed or was placed: it is behind the train.
+    pub(super) behind: BTreeMap<TrainId, NodeId>,
+    /// The orders of recoveries.
     own: BTreeMap<OrderId, TrainId>,
-    /// Nobody above keeps trains apart and gives orders anew.
+    /// Whether no dispatcher keeps trains apart and repeats orders.
     pub(super) permits_all: bool,
-    /// Whether it does more than to hand everything through.
+    /// Whether it monitors; otherwise it only passes everything on.
     is_watching: bool,
-    /// A person took the power from the track.
+    /// Whether a person has switched the power off.
     pub(super) is_switched_off: bool,
     pub(super) permitted: BTreeSet<TrainId>,
-    /// When the clock was looked at last: nothing that was due until then is due again.
+    /// The last time that it acted: nothing due until then is due again.
     looked: Timestamp,
 }
 
 impl Watchdog {
-    /// Watches over a driver.
+    /// Monitors a driver.
     #[must_use]
     pub fn new(driver: Driver, now: Timestamp) -> Self {
         let mut watchdog = Self {
@@ -79,6 +81,7 @@ impl Watchdog {
             held: BTreeMap::new(),
             standing: BTreeMap::new(),
             seen: BTreeMap::new(),
+            behind: BTreeMap::new(),
             own: BTreeMap::new(),
             permits_all: true,
             is_watching: true,
@@ -96,19 +99,19 @@ impl Watchdog {
         watchdog
     }
 
-    /// Watches over nothing: a driver as it is, in the place of one that is watched.
+    /// A driver without monitoring, where a watched one is expected.
     #[must_use]
     pub fn unwatched(driver: Driver, now: Timestamp) -> Self {
         Self { is_watching: false, ..Self::new(driver, now) }
     }
 
-    /// What it watches over, for looking only: orders pass through the watchdog.
+    /// The driver, read only: orders pass through the watchdog.
     #[must_use]
     pub const fn driver(&self) -> &Driver {
         &self.driver
     }
 
-    /// The driver itself, for what the watchdog does not look at. Whoever orders trains there does so unwatched.
+    /// The driver, for settings that the watchdog does not monitor. Orders given there are not monitored.
     pub const fn driver_mut(&mut self) -> &mut Driver {
         &mut self.driver
     }
@@ -125,31 +128,31 @@ impl Watchdog {
         self.driver.add_located(model, locator);
     }
 
-    /// See [`Driver::set_model`]. What a recovery finds takes its place.
+    /// See [`Driver::set_model`]. Ignored while a recovery measures the train.
     pub fn set_model(&mut self, model: MotionModel) {
         if !self.dangers.contains_key(&model.train()) {
             self.driver.set_model(model);
         }
     }
 
-    /// See [`Driver::set_limit`]. A train in danger keeps the limits of its recovery.
-    pub fn set_limit(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
+    /// See [`Driver::set_end_of_authority`]. A train in danger keeps the limits of its recovery.
+    pub fn set_end_of_authority(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
         if !self.dangers.contains_key(&train) {
-            self.driver.set_limit(now, train, limit);
+            self.driver.set_end_of_authority(now, train, limit);
             self.drain(now);
         }
     }
 
-    /// A person put a train there, or read off where it stands; a train that could not be brought back is trusted again
-    /// with that, as it was before. When nobody is in danger then, those that were held are not any more; what they were
-    /// doing is dropped, and said to be.
+    /// A person put a train there, or read its place off. A train that could not be recovered is trusted again, with its model
+    /// of before. When no train is in danger any more, held trains are released; their orders are dropped, with a notice.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
         self.trust_again(train);
         self.driver.place(now, train, at, uncertainty);
         self.monitors.entry(train).or_default().place();
         self.note_place(now, train);
+        self.behind.remove(&train);
         if self.dangers.is_empty() {
-            // A hand was at the track: nothing that waited sets off by itself.
+            // A person is at the track: no waiting train starts by itself.
             for (train, order) in core::mem::take(&mut self.held) {
                 if let Some((_, order)) = order {
                     self.say(Notice::Cancelled { train, order });
@@ -159,10 +162,20 @@ impl Watchdog {
         self.drain(now);
     }
 
-    /// See [`Driver::lose`].
+    /// The place of a train was wrong: it is unknown from now on. A watched train is stopped and located again.
     pub fn lose(&mut self, now: Timestamp, train: TrainId) {
         self.driver.lose(now, train);
+        self.lost(now, train);
         self.drain(now);
+    }
+
+    fn lost(&mut self, now: Timestamp, train: TrainId) {
+        self.monitors.entry(train).or_default().lose();
+        if self.dangers.get(&train).is_some_and(Recovery::is_active) {
+            self.recovering_lost(now, train);
+        } else {
+            self.raise(now, train, Alarm::Lost);
+        }
     }
 
     /// See [`Driver::count_from_behind`].
@@ -177,7 +190,7 @@ impl Watchdog {
         self.dangers.contains_key(&train) || self.held.contains_key(&train)
     }
 
-    /// Whether any train is in danger: until none is, nobody knows what it may run into.
+    /// Whether any train is in danger.
     #[must_use]
     pub fn has_danger(&self) -> bool {
         !self.dangers.is_empty()
@@ -189,33 +202,32 @@ impl Watchdog {
         self.dangers.contains_key(&train)
     }
 
-    /// Whether orders to a train are refused for something that may yet end by itself: a danger that is seen to, a station
-    /// that is silent.
+    /// Whether orders to a train are refused for something that may end by itself: a recovery, a silent station.
     #[must_use]
     pub fn is_interrupted(&self, now: Timestamp, train: TrainId) -> bool {
         let may_end = self.dangers.values().any(|danger| danger.phase != Phase::GivenUp);
         self.is_silent() || may_end && (self.is_held(train) || self.could_meet(now, train))
     }
 
-    /// Somebody above keeps trains apart: from now on a train in danger asks before it crawls, see
-    /// [`permit`](Self::permit), and nothing that was interrupted is gone on with by itself.
+    /// A dispatcher keeps trains apart: from now on a train in danger asks before it creeps, see [`permit`](Self::permit), and
+    /// no interrupted order resumes by itself.
     pub const fn ask_before_crawling(&mut self) {
         self.permits_all = false;
     }
 
-    /// A train that asked may crawl and be measured.
+    /// A train that asked may creep and be measured.
     pub fn permit(&mut self, now: Timestamp, train: TrainId) {
         self.permitted.insert(train);
         self.act(now);
     }
 
-    /// Whoever is above does not trust a train any more.
+    /// The caller does not trust a train any more.
     pub fn distrust(&mut self, now: Timestamp, train: TrainId) {
         self.raise(now, train, Alarm::Distrusted);
         self.act(now);
     }
 
-    /// Whoever is above knows that one more train could meet one in danger: it is stopped and held with the others.
+    /// The caller knows of one more train that could meet one in danger: it is stopped and held with the others.
     pub fn also_hold(&mut self, now: Timestamp, train: TrainId) {
         if !self.dangers.is_empty() && !self.is_held(train) && self.driver.model(train).is_some() {
             self.hold(now, train);
@@ -223,15 +235,15 @@ impl Watchdog {
         }
     }
 
-    /// Begins to carry out an order; see [`Driver::order`].
+    /// Carries out an order; see [`Driver::order`].
     ///
     /// # Errors
-    /// Why it cannot be carried out: what the driver says, and that a train is held.
+    /// As [`Driver::order`], and that a train is held, the station silent or the power off.
     pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
         if let Some(train) = order.train() {
             let stops = matches!(order, Order::Speed { step: SpeedStep::STAND, .. });
             if !stops && matches!(order, Order::Speed { .. }) && self.driver.trains().count() == 1 {
-                // There is nothing to run into: a person lets it run over a contact, which says where it is.
+                // No other train is there: a person lets it run over a sensor, which locates it.
                 self.trust_again(train);
             }
             if !stops && (self.is_held(train) || self.could_meet(now, train)) {
@@ -259,7 +271,7 @@ impl Watchdog {
         Ok(id)
     }
 
-    /// A train that could not be brought back counts as it was before: a person has seen to it.
+    /// A person has checked a train that could not be recovered: its model of before is valid again.
     fn trust_again(&mut self, train: TrainId) {
         let given_up = self.dangers.get(&train).filter(|danger| danger.phase == Phase::GivenUp);
         if let Some(base) = given_up.map(|danger| danger.base().clone()) {
@@ -268,7 +280,7 @@ impl Watchdog {
         }
     }
 
-    /// An order of the watchdog's own.
+    /// Gives an order of a recovery.
     pub(super) fn issue(&mut self, now: Timestamp, order: Order) -> Option<OrderId> {
         let id = self.driver.order(now, order).ok()?;
         if let Some(train) = order.train() {
@@ -292,9 +304,10 @@ impl Watchdog {
         self.stops.forget(train);
         self.monitors.remove(&train);
         self.seen.remove(&train);
+        self.behind.remove(&train);
     }
 
-    /// Everything that follows from what has just been heard.
+    /// Acts on what has just been received.
     pub(super) fn act(&mut self, now: Timestamp) {
         self.drain(now);
         if let Some(train) = self.stops.overdue(now).filter(|_| self.is_watching && self.is_powered()) {
@@ -305,13 +318,13 @@ impl Watchdog {
         self.power_on_again(now);
         self.go_on_recovering(now);
         if self.dangers.values().all(|danger| !danger.is_active()) {
-            // One may have ended for which another has waited.
+            // The end of one may let another begin.
             self.go_on_recovering(now);
         }
         self.drain(now);
     }
 
-    /// Hands on what the driver wants, and looks at it on the way.
+    /// Passes on the outputs of the driver, and monitors them.
     fn drain(&mut self, now: Timestamp) {
         while let Some(output) = self.driver.poll_output() {
             match output {
@@ -336,20 +349,14 @@ impl Watchdog {
         match &notice {
             Notice::Passed { train, passed, .. } => self.passed(now, *train, &passed.clone()),
             Notice::Lost { train } => {
-                self.monitors.entry(*train).or_default().lose();
                 let train = *train;
                 self.say(notice);
-                if self.dangers.get(&train).is_some_and(Recovery::is_active) {
-                    self.recovering_lost(now, train);
-                } else {
-                    self.raise(now, train, Alarm::Lost);
-                }
-                return;
+                return self.lost(now, train);
             }
             Notice::Unexplained { sensor, .. } if self.is_watching => {
                 let stray = |train: &TrainId| {
                     self.stops.should_stand(*train, now)
-                        && self.driver.contact_ahead(*train, now) == Some(*sensor)
+                        && self.driver.sensor_ahead(*train, now) == Some(*sensor)
                 };
                 let stray = self.driver.trains().find(stray);
                 if let Some(train) = stray {
@@ -382,7 +389,7 @@ impl Watchdog {
                 if self.own.remove(order).is_some() {
                     return self.recovering_done(now, *train, *order, Some(why));
                 }
-                // Otherwise it goes on when the train has been found.
+                // Its order resumes once the train is located.
                 if self.resumes() && matches!(why, Refusal::Lost { .. }) {
                     return;
                 }
@@ -408,6 +415,9 @@ impl Watchdog {
     fn passed(&mut self, now: Timestamp, train: TrainId, passed: &crate::tracking::PassedContact) {
         let alarm = self.monitors.entry(train).or_default().pass(passed);
         self.note_place(now, train);
+        if let Some(node) = self.driver.node_passed(passed) {
+            self.behind.insert(train, node);
+        }
         if self.is_watching && self.stops.should_stand(train, now) {
             self.raise(now, train, Alarm::DoesNotStop(passed.sensor));
             self.power_off(now, train);
@@ -422,12 +432,13 @@ impl Watchdog {
         }
     }
 
-    /// Whether it goes on by itself with what was interrupted.
+    /// Whether interrupted orders resume by themselves.
     pub(super) const fn resumes(&self) -> bool {
         self.permits_all && self.is_watching
     }
 
-    pub(super) const fn is_watching(&self) -> bool {
+    /// Whether it monitors and recovers trains.
+    pub(in crate::control) const fn is_watching(&self) -> bool {
         self.is_watching
     }
 
@@ -454,6 +465,12 @@ impl Machine for Watchdog {
                 self.monitors.entry(train).or_default().stand();
             } else {
                 self.stops.forget(train);
+            }
+        }
+        if let EventKind::Reverse { train } = event.kind {
+            self.behind.remove(&train);
+            if let Some(place) = self.seen.get_mut(&train) {
+                *place = self.driver.layout().reversed(*place).unwrap_or(*place);
             }
         }
         self.driver.handle_event(now, event);

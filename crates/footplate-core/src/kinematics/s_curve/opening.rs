@@ -1,14 +1,14 @@
-//! What a jerk-limited profile does until it cruises, from any speed and acceleration.
+//! The first part of a jerk-limited profile, until it cruises, from any speed and acceleration.
 //!
-//! A train that already accelerates is treated as if it had begun earlier, and one that still brakes as if it
-//! began later: a ramp starts where acceleration was or will be zero, at a time, way and speed that follow from
-//! the present ones by the same jerk.
+//! A train that already accelerates is treated as if it had begun earlier, and one that still brakes as if it began
+//! later: a ramp starts where acceleration was or will be zero, at a time, distance and speed that follow from the
+//! present ones by the same jerk.
 
 use super::knot::Knot;
 use super::ramp::{Ramp, THIRD};
 use super::rate::Rate;
 
-/// Time, way and speed at which acceleration was, or will be, zero under a constant jerk.
+/// Time, distance and speed at which acceleration was, or will be, zero under a constant jerk.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Level {
     pub(super) time: f64,

@@ -65,7 +65,7 @@ impl Run {
         self.gains(peak - self.start.max(self.end))
     }
 
-    /// The way of both ramps, and how it grows with the peak speed.
+    /// The distance of both ramps, and its derivative by the peak speed.
     #[inline(always)]
     pub(super) fn way_and_slope(&self, gains: Gains) -> (f64, f64) {
         let (first, first_slope) = self.speeding.way_and_slope(self.start, gains.first);
@@ -78,8 +78,8 @@ impl Run {
         self.speeding.is_reached_by(gains.first) && self.braking.is_reached_by(gains.second)
     }
 
-    /// The gains, to a peak speed between `lowest` and `highest`, at which both ramps together take up a way or
-    /// as much of it as they can: closed where both hold their limits, by Newton's method where not.
+    /// The gains, to a peak speed between `lowest` and `highest`, with which both ramps cover a distance, or as much
+    /// of it as they can: in closed form where both hold their limits, otherwise by Newton's method.
     #[inline(always)]
     pub(super) fn gains_for(&self, way: f64, lowest: f64, highest: f64) -> Gains {
         let Self { start, end, speeding, braking } = *self;
@@ -101,8 +101,8 @@ impl Run {
         self.refine(way, lowest, highest)
     }
 
-    /// Newton's method in the root u of what the peak is above the higher of both ends, in which the way is a
-    /// convex function without a vertical start: once above the solution it comes down to it.
+    /// Newton's method in the root u of the peak's excess over the higher end, in which the distance is a convex
+    /// function without a vertical start: from above the solution it descends to it.
     #[inline(never)]
     fn refine(self, way: f64, lowest: f64, highest: f64) -> Gains {
         let base = self.start.max(self.end);
@@ -122,8 +122,8 @@ impl Run {
         self.gains(above)
     }
 
-    /// What the peak is above the higher end if the ramp from there does not hold its limit, and the other one
-    /// only grows by its slope: b u + s u² + k u³ is the way that is left, solved like a phase of a profile.
+    /// The peak's excess over the higher end if the ramp from there does not hold its limit, and the other one only
+    /// grows by its slope: b u + s u² + k u³ is the remaining distance, solved like a phase of a profile.
     fn first_guess(&self, way: f64, base: f64) -> f64 {
         let (low, other) =
             if self.start < self.end { (self.start, self.speeding) } else { (self.end, self.braking) };

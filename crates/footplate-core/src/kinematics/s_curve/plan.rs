@@ -1,13 +1,13 @@
-//! Which of the possible jerk-limited profiles leads to a target.
+//! Selects the jerk-limited profile that leads to a target.
 //!
-//! With the way left falling, from the most common to the rarest:
+//! With decreasing distance, from the most common to the rarest:
 //!
-//! 1. speed up to the limit, cruise, slow down to the target's speed;
+//! 1. accelerate to the limit, cruise, decelerate to the target's speed;
 //! 2. the same with a lower peak and no cruise;
-//! 3. slow down at once; below that way the target cannot be reached at its speed.
+//! 3. decelerate at once; below that distance the target cannot be reached at its speed.
 //!
-//! A train that brakes already has a case between 2 and 3: it eases off, but not to nothing, and brakes on. A
-//! train above the limit of speed slows down to it instead of speeding up, or only as far as the way allows.
+//! A train that brakes already has a case between 2 and 3: it eases off, but not to zero, and brakes on. A train
+//! above the speed limit decelerates to it instead of accelerating, or only as far as the distance allows.
 
 use super::opening::{Level, Opening};
 use super::peak::{Gains, Run, peak_between_stands};
@@ -27,7 +27,7 @@ pub(super) struct Plan {
     pub(super) cruises: bool,
     /// From the speed at which acceleration is zero, before the opening's end in the rare case of easing off.
     pub(super) closing: Ramp,
-    /// Time and way from the end of the opening to that point.
+    /// Time and distance from the end of the opening to that point.
     pub(super) level: (f64, f64),
 }
 
@@ -56,8 +56,8 @@ pub(super) struct Planner {
     highest: f64,
     speeding: Rate,
     braking: Rate,
-    /// Where the present acceleration was or will be zero if the train now eases off from braking or goes on
-    /// speeding up.
+    /// Where the present acceleration was or will be zero if the train now eases off from braking or continues to
+    /// accelerate.
     level: Level,
     /// Speed when the present acceleration has been brought to zero.
     leveled: f64,
@@ -174,7 +174,7 @@ impl Planner {
         }
     }
 
-    /// The way that it takes with the lowest peak there can be.
+    /// The distance with the lowest possible peak.
     #[inline(always)]
     fn shortest(&self, lowest: f64) -> f64 {
         let run = self.run();

@@ -58,14 +58,14 @@ impl Ramp {
         [self.built_up, self.held, top]
     }
 
-    /// The same when its lower end is passed at another time and way.
+    /// The same, passing its lower end at another time and distance.
     #[inline(always)]
     pub(super) fn upwards(&self, time: f64, way: f64) -> [Knot; 3] {
         self.upwards_from_here().map(|knot| Knot { time: time + knot.time, way: way + knot.way, ..knot })
     }
 
-    /// Its inner borders and its lower end in order of time, when it is run backwards, from the upper end down,
-    /// and the lower end is reached at a time and a way.
+    /// Its inner borders and its lower end in order of time, when it is run backwards from the upper end, reaching
+    /// the lower end at a time and a distance.
     #[inline(always)]
     pub(super) fn downwards(&self, time: f64, way: f64) -> [Knot; 3] {
         let before = |knot: Knot| Knot {

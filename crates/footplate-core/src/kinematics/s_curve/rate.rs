@@ -45,7 +45,7 @@ impl Rate {
         }
     }
 
-    /// The way from a speed up by a gain, and how it grows with the gain; one below zero is rounding.
+    /// The distance of a gain from a speed, and its derivative by the gain; a gain below zero is rounding.
     #[inline]
     pub(super) fn way_and_slope(&self, low: f64, gain: f64) -> (f64, f64) {
         let gain = gain.max(0.0);

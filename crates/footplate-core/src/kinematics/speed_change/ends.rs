@@ -5,9 +5,9 @@ use crate::kinematics::phase::Triple;
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
 
-/// The two speeds of a change, its duration and its distance, turned so that the train runs forwards.
+/// The two speeds of a change, its duration and its distance, mirrored so that the train runs forwards.
 ///
-/// Plain numbers in m, m/s and s. A change that is told to take less than no time takes none.
+/// Plain numbers in m, m/s and s. A negative duration counts as zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Ends {
     /// 1, or −1 for a train that runs towards smaller distances.
@@ -16,7 +16,7 @@ pub(super) struct Ends {
     pub(super) to: f64,
     pub(super) duration: f64,
     pub(super) distance: f64,
-    /// Whether the train turns around on the way, so that distances are passed twice.
+    /// Whether the direction changes during the motion, so that distances are passed twice.
     turns_around: bool,
 }
 
@@ -68,7 +68,7 @@ impl Ends {
         }
     }
 
-    /// Before the change and after it the train runs at a steady speed, unless it stands.
+    /// Before and after the change the train runs at a steady speed, or is at rest.
     fn time_outside(&self, way: f64) -> Option<TimeSpan> {
         let seconds =
             if way < 0.0 { way / self.from } else { self.duration + (way - self.distance) / self.to };

@@ -66,15 +66,14 @@ impl Lag {
         (self.to * time + difference * self.time_constant * gone, self.to + difference * left)
     }
 
-    /// Seconds to a distance ahead; not a finite number if that is out of reach.
+    /// Seconds to a distance ahead; not finite if it is out of reach.
     fn seconds_to(&self, way: f64) -> f64 {
         let Self { from, to, time_constant: lag, .. } = *self;
         if to == 0.0 {
             return -lag * libm::log1p(-way / (from * lag));
         }
-        // Newton's method on a curve that bends one way only never crosses the root again once it is on the
-        // right side of it: before the root of a distance that grows ever slower, behind that of one that
-        // grows ever faster.
+        // On a curve that is convex or concave throughout, Newton's method never crosses the root from its right
+        // side: start before the root if the distance decelerates, behind it if it accelerates.
         let mut time = if from >= to {
             way / from
         } else {

@@ -95,7 +95,7 @@ impl StepTable {
         usize::from(step.get()).min(self.last)
     }
 
-    /// The interval in which a fractional step lies: the index of its lower end and the way into it.
+    /// The interval of a fractional step: the index of its lower end and the fraction into it.
     fn interval(&self, step: f64) -> (usize, f64) {
         // A float that is too large, negative or NaN becomes the nearest index or 0.
         let lower = (step as usize).min(self.last - 1);

@@ -1,4 +1,4 @@
-//! From commands and reports to trips: what a train was told, and the contacts it passed, one after the other.
+//! From commands and reports to trips: the commands a train received and the sensors it passed, in order.
 
 use alloc::vec::Vec;
 
@@ -13,28 +13,28 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Layout, Reach, TurnoutStates};
 use crate::units::Length;
 
-/// A poll whose interval nobody recorded: one of the slowest link.
+/// The poll interval where the recording has none: that of the slowest link.
 const USUAL_INTERVAL: TimeSpan = TimeModel::POLLED_2400_BAUD.report_window;
 /// Seconds between the last entry of a run and the first of the next, whose clocks have nothing in common.
 const BETWEEN_RUNS: f64 = 60.0;
-/// Contacts that may stay silent in a row before the way is no longer believed.
-const BELIEVED_MISSED: usize = 2;
+/// With more missed detections in a row than this, the path between two sensors counts as unknown.
+const MOST_MISSED: usize = 2;
 
-/// The trips of one train, the last of them under way.
+/// The trips of one train; the last one may still be running.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Chain {
     pub(super) trips: Vec<Trip>,
-    /// The recording's clock, and the seconds of this chain that its first entry has.
+    /// When the recording's clock shows this, the chain's clock shows `begins`.
     origin: Option<Timestamp>,
     begins: f64,
     /// Seconds of the latest entry.
     latest: f64,
-    /// Whether the train is known to be at rest, because its run begins so.
+    /// Whether the train is known to be at rest because its run begins there.
     at_rest: bool,
     step: u8,
     above: bool,
-    /// The contact passed last.
+    /// The sensor passed last.
     at: Option<NodeId>,
     last_sensor: Option<SensorId>,
     /// Whether the next trip begins where the last one ended.
@@ -57,14 +57,14 @@ impl Chain {
         (self.step, self.above, self.at_rest) = (step.get(), false, step == SpeedStep::STAND);
     }
 
-    /// Breaks the chain: where the train is now has nothing to do with where it was.
+    /// Breaks the chain: the train's position no longer follows from its earlier positions.
     pub(super) fn interrupt(&mut self) {
         self.unbroken = false;
         self.at = None;
         self.last_sensor = None;
     }
 
-    /// A command to the train. Whether it stands by then is judged by how it answers as far as is known.
+    /// Takes a command to the train. The model decides whether the train was at rest by then.
     pub(super) fn command(&mut self, time: Timestamp, step: SpeedStep, answers: &Answers<'_>) {
         let sent = self.seconds(time);
         let (from, to) = (self.step, step.get());
@@ -91,7 +91,7 @@ impl Chain {
         (self.step, self.above) = (to, to < from);
     }
 
-    /// A report that was judged to be of the train.
+    /// Takes a report that data association assigned to the train.
     pub(super) fn pass(
         &mut self,
         layout: &Layout,
@@ -115,7 +115,7 @@ impl Chain {
             .and_then(|from| reach_of(layout, turnouts, from, report.sensor));
         let begins_anew = !self.unbroken || (self.at.is_some() && way.is_none());
         if begins_anew {
-            // Running, nobody knows from where: ways are counted from here.
+            // The train is running and its earlier path is unknown: distances count from here.
             self.trips.push(Trip::new(time, Some((self.step, self.above)), false));
             self.unbroken = true;
         }
@@ -133,7 +133,7 @@ impl Chain {
         (self.at, self.last_sensor) = (Some(node), Some(report.sensor));
     }
 
-    /// A person measured how far past a sensor the train came to rest.
+    /// Takes a tape measurement: the train came to rest this far past a sensor.
     pub(super) fn measure_rest(
         &mut self,
         layout: &Layout,
@@ -164,9 +164,9 @@ impl Chain {
     }
 }
 
-/// The way past the fewest silent contacts, and of these the shortest.
+/// The path with the fewest missed detections, and of these the shortest.
 fn reach_of(layout: &Layout, turnouts: &TurnoutStates, from: NodeId, sensor: SensorId) -> Option<Reach> {
-    (0..=BELIEVED_MISSED).find_map(|missed| {
+    (0..=MOST_MISSED).find_map(|missed| {
         layout
             .reaches(from, turnouts, missed)
             .filter(|reach| reach.sensor == Some(sensor))

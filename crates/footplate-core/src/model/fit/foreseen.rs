@@ -1,4 +1,4 @@
-//! How well the first sensor behind a stop and a start is foreseen before it is passed.
+//! Prediction of the first sensor after a stop and a start, compared with its detection.
 
 use alloc::vec::Vec;
 
@@ -6,25 +6,25 @@ use super::rows::{Linear, Point, Source, TripAt, add_term};
 use crate::model::MotionModel;
 use crate::model::priors::TRIP_DEVIATION;
 
-/// Where a train was at the last sensor before a stop is known from the whole run, which leaves this part of the variance of that
-/// sensor by itself (two or three sensors within the time in which a run's speed wanders).
+/// The whole run determines the train's position at the last sensor before a stop. That leaves this part of the variance of the
+/// sensor alone (two or three sensors lie within the correlation time of a run's speed).
 const LAST_SENSOR: f64 = 0.5;
 
-/// The first sensor behind a stop, before and after it was passed.
+/// The first sensor after a stop: detection against prediction.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Foreseen {
-    /// How much earlier or later along the path it was passed than foreseen (m).
+    /// By how much the train was behind its prediction (m).
     pub(super) residual: f64,
-    /// What was known to be unknown of that (m²): the train's numbers, the lengths of sections, this start, this run, and
-    /// when the two sensors were passed. The scatter of the stop itself is not in it.
+    /// The variance of that prediction (m²): numbers of the train, section lengths, this start, this run, and the times of both
+    /// detections. The scatter of the stop itself is not in it.
     pub(super) variance: f64,
 }
 
 impl Point<'_> {
-    /// What was foreseen of the first sensor of a trip that continues another, and what came.
+    /// Compares the first sensor of a trip that continues another with its prediction.
     ///
-    /// A stop that may be longer and a start that may be later are known as a sum far better than each of them: the sensor
-    /// is foreseen as well as that sum is, from the last sensor before the stop on.
+    /// The sum of a stop and the following start is known far better than either part: the prediction counts from the last
+    /// sensor before the stop and is as precise as that sum.
     pub(super) fn foreseen(
         &self,
         model: &MotionModel,

@@ -1,4 +1,4 @@
-//! A model that is told the truth, for yardsticks: what forecasts would come to if nothing were left to learn.
+//! A model with known values, for oracles: forecasts as they would be with nothing left to learn.
 
 use crate::event::Approach;
 use crate::ids::SpeedStep;
@@ -8,7 +8,7 @@ use crate::model::spread::Spread;
 use crate::units::Speed;
 
 impl MotionModel {
-    /// The same model with nothing uncertain: no number of the train, no length.
+    /// The same model without uncertainty, neither of the train's numbers nor of lengths.
     #[must_use]
     pub fn taken_for_certain(&self) -> Self {
         let side = crate::model::parameters::count(self.steps());
@@ -23,8 +23,7 @@ impl MotionModel {
         certain
     }
 
-    /// Tells it the steady speed at a step. Speeds that are not positive, and steps that its decoder does not have, leave it
-    /// as it was.
+    /// Sets the steady speed at a step. Speeds that are not positive and steps that the decoder does not have are ignored.
     pub fn tell_speed(&mut self, step: SpeedStep, approach: Approach, speed: Speed) {
         let (place, speed) = (usize::from(step.get()), speed.as_m_per_s());
         if !(1..=self.steps()).contains(&place) || speed.is_nan() || speed <= 0.0 {
@@ -45,7 +44,7 @@ impl MotionModel {
         }
     }
 
-    /// Contacts passed at all of its steps.
+    /// Sensors passed, over all steps.
     #[must_use]
     pub fn contacts_passed(&self) -> u32 {
         self.counts.iter().flatten().map(|counts| counts.contacts).sum()

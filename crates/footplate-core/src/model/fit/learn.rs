@@ -12,7 +12,7 @@ use crate::model::spread::Spread;
 use crate::time::Timestamp;
 
 impl MotionModel {
-    /// Takes over what a fit found; `scale` is how well the scale of the survey is known, where the fit counted it as right.
+    /// Takes over the solution of a fit; `scale` is the relative uncertainty of the survey's scale, if the fit used it.
     pub(super) fn learn(
         &mut self,
         columns: &Columns,
@@ -47,7 +47,7 @@ impl MotionModel {
         self.date = date;
     }
 
-    /// Counts again what was measured: before the trips that are kept, and in them.
+    /// Counts the measurements again: those before the kept trips, and those in them.
     pub(super) fn recount(&mut self, before: &[[Counts; 2]], trips: &[Trip]) {
         self.counts.clear();
         self.counts.extend_from_slice(before);
@@ -77,7 +77,7 @@ fn by_scale(values: &[f64], steps: usize) -> impl Iterator<Item = f64> + '_ {
 /// Place of `κ` among the numbers of a direction.
 const KAPPA: usize = 2;
 
-/// Counts what was measured in one trip, by step and approach.
+/// Counts the measurements of one trip, by step and approach.
 pub(super) fn count(counts: &mut [[Counts; 2]], trip: &Trip) {
     let mut at = |(step, above): (u8, bool), add: &dyn Fn(&mut Counts)| {
         if let Some(slot) =

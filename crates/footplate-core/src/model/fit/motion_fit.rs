@@ -1,4 +1,4 @@
-//! Everything a train did of late, and the model that explains it best.
+//! The recent trips of a train, and the model that fits them best.
 //!
 //! One chain of trips: a trip begins where the one before came to rest. With `p` the place where a trip began, counted
 //! from the sensor passed last before it, `F(t)` the distance run by the laws and `W` the path length to a sensor as the
@@ -7,9 +7,9 @@
 //! numerical. The numbers of single trips, and the places between them, are taken out of the equations trip by trip, and trips
 //! of the past for good ([`MarginalPrior`]): a fit costs as much after ten thousand stops as after sixty.
 //!
-//! A stop that is followed by a run to the next sensor is measured as the sum of stop and start: what one of them is longer,
-//! the other may be shorter. The covariance keeps that; what distinguishes them are sensors passed in braking, tapes, and starts
-//! to other speeds. What is far off counts little ([`robust`](super::robust)): one outlier costs one outlier.
+//! A stop and the run to the next sensor are measured as one sum: if the stop is longer, the start may be shorter. The
+//! covariance contains that; sensors passed while braking, tapes, and starts to other speeds separate the two. Large residuals
+//! count little ([`robust`](super::robust)): one outlier costs one outlier.
 
 mod refit;
 
@@ -32,26 +32,26 @@ use crate::model::survey::SectionIndex;
 use crate::time::Timestamp;
 use crate::track::{Layout, TurnoutStates};
 
-/// Promises are watched once so many stops are known: those of a train that is hardly known yet are broken because numbers
-/// that are far off do not change evenly, which says nothing of how its stops scatter.
+/// Promises are checked once this many stops are known. Before that they are broken because the fit is far from linear, which
+/// shows nothing about the scatter of stops.
 const WATCHED_FROM: u32 = 20;
-/// Steps after which an iteration that has not settled is taken as it is.
+/// After this many steps the iteration ends where it is.
 const MOST_ITERATIONS: usize = 15;
-/// A step is shortened by half so often before the point counts as the best.
+/// After this many halvings of a step the point counts as the best.
 const MOST_HALVINGS: usize = 6;
-/// A step of ln speed no longer than this is believed at once: beyond it the laws bend too much.
+/// Longest step of ln speed: beyond it the laws are not linear enough.
 const LONGEST_STEP: f64 = 0.6;
 /// A step that changes no number by more than this (in its unit) was the last.
 const SETTLED: f64 = 2e-4;
-/// In so many iterations all rows count in full: what is far off may only not be known yet.
+/// In this many iterations all rows count in full: at first, large residuals are mostly not outliers.
 const ALL_BELIEVED: usize = 3;
 /// How well the total of all sections passed counts as surveyed (m), ...
 const TOTAL: f64 = 0.001;
 /// ... where lengths of their own make that known to this part at least.
 const WELL_SURVEYED: f64 = 0.03;
-/// When so many trips are kept, the oldest become part of the prior, ...
+/// When this many trips are kept, the oldest become part of the prior, ...
 const MOST_TRIPS: usize = 60;
-/// ... but for so many.
+/// ... except for this many.
 const KEPT_TRIPS: usize = 30;
 
 /// Collects what one train does and fits its [`MotionModel`] to all of it.
@@ -61,13 +61,13 @@ pub struct MotionFit {
     model: MotionModel,
     prior: MarginalPrior,
     chain: Chain,
-    /// Follows from the layout, and is made when it is first needed.
+    /// Follows from the layout; made when first needed.
     #[cfg_attr(feature = "serde", serde(skip))]
     sections: Option<SectionIndex>,
     date: Timestamp,
 }
 
-/// A point of the search: the numbers that last, and those of each kept trip.
+/// A point of the search: the lasting numbers, and those of each kept trip.
 #[derive(Debug, Clone)]
 struct Values {
     lasting: Vec<f64>,
@@ -77,7 +77,7 @@ struct Values {
 /// The equations of all that is kept, the numbers of single trips taken out.
 #[derive(Debug, Clone)]
 struct Reduced {
-    /// Of the numbers that last and the place at which a next trip would begin.
+    /// Of the lasting numbers and the place at which a next trip would begin.
     equations: NormalEquations,
     /// What was taken out, trip by trip, in the order in which it was.
     trips: Vec<Vec<Eliminated>>,
@@ -95,7 +95,7 @@ struct Survey {
     scale: Option<f64>,
 }
 
-/// Equations of the numbers that last alone.
+/// Equations of the lasting numbers alone.
 #[derive(Debug, Clone)]
 struct Closed {
     equations: NormalEquations,
@@ -105,7 +105,7 @@ struct Closed {
 }
 
 impl MotionFit {
-    /// Nothing seen yet.
+    /// A fit without data.
     #[must_use]
     pub fn new(train: TrainId, highest: SpeedStep) -> Self {
         Self {
@@ -117,8 +117,8 @@ impl MotionFit {
         }
     }
 
-    /// The next entry that is about this train: a command to it that has been sent, or a report that was judged to be
-    /// of it. The turnouts as they lay at that time.
+    /// Takes the next entry about this train: a command that was sent to it, or a report that data association assigned to it.
+    /// The turnouts as they lay at that time.
     pub fn take(&mut self, layout: &Layout, turnouts: &TurnoutStates, event: &Event) {
         match event.kind {
             EventKind::Sensor(_) => {
@@ -138,14 +138,13 @@ impl MotionFit {
         self.date = event.time;
     }
 
-    /// A run begins: the train has been running steadily at `step`, or is at rest at step 0. The run's clock has
-    /// nothing to do with that of any run before.
+    /// Begins a run: the train has been running steadily at `step`, or is at rest at step 0. The run has its own clock.
     pub fn begin_run(&mut self, step: SpeedStep) {
         self.chain.begin_run(step);
     }
 
-    /// Another session begins with the train at rest: the train, its track and their voltage may have changed a little since
-    /// the last one, and what was measured before counts as much as it can. Takes as long as a fit.
+    /// Begins another session with the train at rest. Train, track and voltage may have changed a little since the last one, so
+    /// older measurements count for less. Takes as long as a fit.
     pub fn begin_session(&mut self, sections: &SectionIndex) {
         self.chain.begin_run(SpeedStep::STAND);
         if self.chain.trips.is_empty() {
@@ -157,12 +156,12 @@ impl MotionFit {
         self.refit(sections);
     }
 
-    /// The chain is broken: the train was lifted, pushed, stalled or lost. What it did before still counts.
+    /// Breaks the chain: the train was lifted, pushed, stalled or lost. Earlier trips still count.
     pub fn interrupt(&mut self) {
         self.chain.interrupt();
     }
 
-    /// A step moved the train, or did not.
+    /// Records whether a step moved the train.
     pub fn note_use(&mut self, step: SpeedStep, found: StepUse) {
         self.model.note_use(step, found);
     }
@@ -182,7 +181,7 @@ impl MotionFit {
         }
     }
 
-    /// Makes the oldest trips part of the prior.
+    /// Marginalises the oldest trips into the prior.
     fn condense(&mut self, count: usize) {
         let columns = self.prior.columns();
         let values = self.start(&columns);
@@ -198,7 +197,7 @@ impl MotionFit {
         }
     }
 
-    /// Where the search begins: what the last fit found; of trips that are new, where they would have begun.
+    /// The start of the search: the last fit, and for new trips the predicted places where they began.
     fn start(&self, columns: &Columns) -> Values {
         let mut lasting = self.model.values.clone();
         lasting.resize(columns.lasting, 0.0);
@@ -267,7 +266,7 @@ impl MotionFit {
         Some(Reduced { equations, trips })
     }
 
-    /// How unlikely a point is.
+    /// The cost of a point.
     fn cost(&self, columns: &Columns, values: &Values, believes_all: bool) -> f64 {
         let point = self.point(columns, &values.lasting);
         let mut known = values.lasting.clone();
@@ -278,7 +277,7 @@ impl MotionFit {
         self.prior.equations.cost(&known) + rows.map(|row| row.cost(believes_all)).sum::<f64>()
     }
 
-    /// Compares the first sensor after each stop that is new with what was foreseen of it before the fit.
+    /// Compares the first sensor after each new stop with its prediction from before the fit.
     fn compare_promises(&mut self, columns: &Columns, values: &Values) {
         let stops: u32 = self.model.counts.iter().flatten().map(|counts| counts.stops).sum();
         if stops < WATCHED_FROM {
@@ -288,7 +287,7 @@ impl MotionFit {
         let mut scatter = self.prior.scatter;
         for (place, pair) in self.chain.trips.windows(2).enumerate() {
             let [before, after] = pair else { continue };
-            // Where the stop began is known by a fit; the start behind it has not been seen by any.
+            // A fit has determined where the stop began, but no fit has seen the following start.
             let is_new = before.own.is_some() && after.own.is_none() && after.continues;
             let Some(next) = self.trip_at(values, place + 1).filter(|_| is_new) else { continue };
             let Some(foreseen) =
@@ -298,7 +297,7 @@ impl MotionFit {
             };
             let stop_speed =
                 before.commanded.iter().rev().nth(1).map_or(0.0, |commanded| point.speed(commanded.to));
-            // Residuals of a young fit scatter too little: it has much to explain them by.
+            // Residuals of a young fit scatter too little: it has many parameters to explain them.
             let stops = self.model.scatter.stops.max(1.0);
             let usual = Scatter { stops, floor: 0.0, ..self.model.scatter }.of_stop(stop_speed);
             let explained = foreseen.variance + usual * usual;

@@ -1,24 +1,24 @@
-//! How much a residual counts that is larger than chance allows: one outlier costs one outlier.
+//! Robust weights of large residuals: one outlier costs one outlier.
 //!
-//! Squares at first, linear beyond (Huber, 1964), and logarithmic in the end (Cauchy), so that what is wildly off pulls ever
-//! less. Cost and slope are continuous.
+//! The cost is quadratic at first, linear beyond (Huber, 1964), and logarithmic in the end (Cauchy), so that gross errors
+//! pull ever less. Cost and slope are continuous.
 
-/// How large a residual is believed, in standard deviations.
+/// Limits of the residuals, in standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RobustWeight {
     /// Beyond this a residual counts linearly.
     huber: f64,
-    /// Beyond this it is of something else: a train that was pushed, a sensor that another train tripped.
+    /// Beyond this it has another cause: a train that was pushed, a sensor that another train closed.
     wild: f64,
 }
 
 impl RobustWeight {
-    /// Of sensors: their times scatter within a poll, which has no tails.
+    /// For sensors: their times scatter within a poll, without tails.
     pub(super) const SENSORS: Self = Self { huber: 2.5, wild: 5.0 };
-    /// Of stops and starts: dirt, load and temperature give them tails, and few of them are alike.
+    /// For stops and starts: dirt, load and temperature give them tails, and few are alike.
     pub(super) const STOPS: Self = Self { huber: 1.5, wild: 3.0 };
 
-    /// By what part a measurement counts in a least-squares step (iteratively reweighted).
+    /// The weight of a measurement in a least-squares step (iteratively reweighted).
     pub(super) fn weight(self, size: f64) -> f64 {
         if size <= self.huber {
             1.0
@@ -29,7 +29,7 @@ impl RobustWeight {
         }
     }
 
-    /// What it costs, where a square would cost its square.
+    /// The cost, which is the square of a small residual.
     pub(super) fn cost(self, size: f64) -> f64 {
         if size <= self.huber {
             return size * size;

@@ -1,4 +1,4 @@
-//! What each sensor passed, each stop and each tape of a trip says of the numbers, as linear equations about a point.
+//! Linear equations of a trip about a point: of each sensor passed, each stop and each tape.
 #![expect(clippy::indexing_slicing, reason = "columns are counted before the vectors are made by that count")]
 
 use alloc::vec;
@@ -16,28 +16,28 @@ use crate::model::scatter::Scatter;
 use crate::model::segment::Segment;
 use crate::model::stop_offset::stop_offset_share;
 
-/// Sensors trip a little earlier or later from one passage to the next (m).
+/// Standard deviation of where a sensor closes, from one passage to the next (m).
 const SENSOR_SCATTER: f64 = 0.0015;
 /// A tape read to the centimetre beside a train: one standard deviation (m).
 const TAPE: f64 = 0.005;
-/// What the train's own settling leaves of a place of rest (m).
+/// Standard deviation of a place of rest after the train has settled (m).
 const REST_SCATTER: f64 = 0.0005;
 /// By how much the error of a law's shape counts more than that of one change: it is the same in every change of the kind, of
 /// which some ten are kept, and does not become less with their number (√10).
 const SYSTEMATIC: f64 = 3.2;
-/// Where a chain begins is known to some metres.
+/// Standard deviation of where a chain begins (m).
 const ANYWHERE: f64 = 10.0;
 
-/// What an equation comes from.
+/// The source of an equation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Source {
     /// A sensor passed, or a tape.
     Sensor,
     /// A stop: the next trip begins where this one came to rest.
     Stop,
-    /// What is usual of a start from rest.
+    /// The prior of a start from rest.
     Start,
-    /// What is usual of a trip's other numbers.
+    /// The prior of a trip's other numbers.
     Usual,
 }
 
@@ -47,7 +47,7 @@ pub(super) struct Linear {
     pub(super) terms: Vec<(usize, f64)>,
     pub(super) residual: f64,
     pub(super) variance: f64,
-    /// Variance of one such measurement by itself, which does not count what errors of a law's shape have in common.
+    /// Variance of a single such measurement, without the factor for common errors of a law's shape.
     pub(super) once: f64,
     pub(super) source: Source,
 }
@@ -57,7 +57,7 @@ impl Linear {
         self.residual.abs() / libm::sqrt(self.variance)
     }
 
-    /// How far it is believed; in full for what is only usual.
+    /// Its robust weight; priors count in full.
     fn belief(&self, believes_all: bool) -> Option<RobustWeight> {
         match self.source {
             _ if believes_all => None,
@@ -67,22 +67,22 @@ impl Linear {
         }
     }
 
-    /// How much it counts.
+    /// Its weight.
     pub(super) fn weight(&self, believes_all: bool) -> f64 {
         self.belief(believes_all).map_or(1.0, |belief| belief.weight(self.size()))
     }
 
-    /// What its residual costs.
+    /// Its cost.
     pub(super) fn cost(&self, believes_all: bool) -> f64 {
         let size = self.size();
         self.belief(believes_all).map_or(size * size, |belief| belief.cost(size))
     }
 }
 
-/// Steps of the numerical derivatives, in the unit of each number: small against its uncertainty.
+/// Step of the numerical derivatives, in the unit of each number: small against its uncertainty.
 const STEP: f64 = 1e-4;
 
-/// What a trip comes to with some numbers: distance (m) at each sensor, and at rest.
+/// A trip simulated with some numbers: distance (m) at each sensor, and at rest.
 struct Outcome {
     at: Vec<f64>,
     rest: f64,
@@ -95,22 +95,22 @@ fn outcome(trip: &Trip, answers: &Answers<'_>, own: &Own, segments: &mut Vec<Seg
     Outcome { at, rest: walk.way_to_rest() }
 }
 
-/// What is common to the trips of a fit.
+/// The point of a fit about which its trips are linearised.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Point<'p> {
     pub(super) columns: &'p Columns,
-    /// The numbers that last.
+    /// The lasting numbers.
     pub(super) lasting: &'p [f64],
     pub(super) highest: usize,
-    /// How far stops and starts scatter.
+    /// The scatter of stops and starts.
     pub(super) scatter: Scatter,
-    /// Variance of what stops are longer by for where they end (m²).
+    /// Prior variance of stop offsets (m²).
     pub(super) stop_offset_variance: f64,
-    /// Part of a stop's displacement by which its shape is not true in its middle.
+    /// Standard deviation of a stop's shape in its middle, as part of its displacement.
     pub(super) stop_shape_error: f64,
 }
 
-/// A trip and what was found of it, beside where the next one begins if it continues there.
+/// A trip with its own numbers, and where the next one begins if it continues there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TripAt<'t> {
     pub(super) trip: &'t Trip,
@@ -132,7 +132,7 @@ impl Point<'_> {
         (outcome.rest, outcome.at.first().copied())
     }
 
-    /// By how much the sections passed are longer than surveyed (m), and the terms of that.
+    /// By how much path length exceeds surveyed length over the sections passed (m), with its terms.
     fn longer<'s>(&self, sections: impl Iterator<Item = &'s usize>) -> (f64, Vec<(usize, f64)>) {
         let mut terms: Vec<(usize, f64)> = Vec::new();
         for column in sections.filter_map(|section| self.columns.sections.get(section)) {
@@ -141,7 +141,7 @@ impl Point<'_> {
         (terms.iter().map(|(column, slope)| slope * self.lasting[*column]).sum(), terms)
     }
 
-    /// The equations of a trip; without slopes they only tell how far off the point is.
+    /// The equations of a trip; without slopes only the residuals are set.
     pub(super) fn rows(&self, at: TripAt<'_>, with_slopes: bool) -> Vec<Linear> {
         let TripAt { trip, own, next_place } = at;
         let columns = self.columns;
@@ -204,7 +204,7 @@ impl Point<'_> {
             let passed = counted().flat_map(|contact| &contact.sections).chain(&rest.sections);
             let (taped_longer, taped_sections) = self.longer(passed);
             let tape = TAPE * TAPE + FELT * FELT * rest.beyond * rest.beyond;
-            // Where the next trip begins is where the tape found the train; otherwise the stop itself scatters.
+            // With a next trip the tape measures its beginning; otherwise the scatter of the stop is included.
             let (mut terms, at_rest, variance) = match next_place {
                 Some(place) => {
                     let mut terms = sections;
@@ -220,8 +220,7 @@ impl Point<'_> {
         rows
     }
 
-    /// The column of what a trip's stop is longer by for where it ended, with its slope, or the variance (m²) of that where nobody
-    /// knows on which hop it did.
+    /// The column of the stop offset of a trip, with its slope, or the prior variance (m²) where the hop is unknown.
     fn stop_offset(&self, trip: &Trip, speed: f64) -> (Option<(usize, f64)>, f64) {
         let share = stop_offset_share(speed);
         let column = trip.rest_hop.and_then(|hop| self.columns.stop_offsets.get(&hop));
@@ -231,15 +230,15 @@ impl Point<'_> {
         }
     }
 
-    /// A residual in m that noise of time makes is as large as the train is fast: its slope in ln speed is no error of speed.
-    /// Without that, speeds and lengths that are all smaller would fit better, by the sum of squares.
+    /// Timing noise makes residuals in metres that grow with the speed; their slope in ln speed is no error of speed. Without this
+    /// correction, smaller speeds and lengths would fit better by least squares.
     fn scaled(&self, terms: &mut Vec<(usize, f64)>, residual: f64, step: u8) {
         if (1..=self.highest).contains(&usize::from(step)) {
             add_term(terms, speed_at(usize::from(step)), -residual);
         }
     }
 
-    /// What is usual of a trip's own numbers.
+    /// Priors of a trip's own numbers.
     fn usual(&self, trip: &Trip, own: &Own) -> Vec<Linear> {
         let columns = self.columns;
         let mut rows = Vec::new();
@@ -271,7 +270,7 @@ impl Point<'_> {
         rows
     }
 
-    /// Outcomes with each number moved by a little on which the trip can depend.
+    /// The trip simulated with each number on which it can depend changed by one step.
     fn slopes(&self, trip: &Trip, own: &Own, segments: &[Segment]) -> Vec<(usize, Outcome)> {
         let columns = self.columns;
         let mut slopes: Vec<(usize, Outcome)> = Vec::new();
@@ -320,13 +319,13 @@ fn subtract(terms: &mut Vec<(usize, f64)>, others: &[(usize, f64)]) {
     }
 }
 
-/// What makes the time or the place of a sensor uncertain.
+/// Uncertainty of the place of the train at a sensor.
 struct Error {
     /// Speed there (m/s).
     speed: f64,
     /// By how much the law's shape may be off there (m).
     law: f64,
-    /// The step from which that speed comes.
+    /// The step of that speed.
     step: u8,
 }
 

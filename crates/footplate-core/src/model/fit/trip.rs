@@ -1,4 +1,4 @@
-//! One trip: from standstill to standstill, with the commands that made it and the contacts passed.
+//! One trip: from standstill to standstill, with its commands and the sensors passed.
 
 use alloc::vec::Vec;
 
@@ -6,29 +6,29 @@ use crate::ids::NodeId;
 use crate::model::parameters::Answers;
 use crate::model::segment::{Segment, SpeedCommand};
 
-/// A contact passed, and the way there from the one before (or from where the trip's ways are counted).
+/// A sensor passed, and the path to it from the sensor before, or from the origin of the trip's distances.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct TripContact {
     /// Its node.
     pub(super) node: NodeId,
-    /// Mean time at which it closed (s, on the clock of the run) and the variance of that.
+    /// Mean time of the detection (s, on the run's clock) and its variance.
     pub(super) time: f64,
     pub(super) variance: f64,
-    /// Way by the survey (m) and the sections on it.
+    /// Surveyed length of the path (m) and its sections.
     pub(super) way: f64,
     pub(super) sections: Vec<usize>,
 }
 
-/// Where a person measured that the train came to rest: a distance beyond one of the contacts of the trip.
+/// A tape measurement of where the train came to rest: a distance beyond one of the trip's sensors.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct MeasuredRest {
-    /// Contacts of the trip up to the one from which it is counted.
+    /// How many of the trip's sensors lie up to the one from which it counts.
     pub(super) contacts: usize,
-    /// Distance beyond that contact (m), by tape and survey.
+    /// Distance beyond that sensor (m), by tape and survey.
     pub(super) beyond: f64,
-    /// Sections between that contact and the one from which the tape was laid.
+    /// Sections between that sensor and the one from which the tape was laid.
     pub(super) sections: Vec<usize>,
 }
 
@@ -36,7 +36,7 @@ pub(super) struct MeasuredRest {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Trip {
-    /// Step and approach of a train that was running steadily when it was first seen; `None` from standstill.
+    /// Step and approach of a train that was running steadily at its first entry; `None` from standstill.
     pub(super) running: Option<(u8, bool)>,
     /// Whether it begins where the trip before it ended.
     pub(super) continues: bool,
@@ -48,14 +48,14 @@ pub(super) struct Trip {
     /// When pieces of a constant deviation of speed begin (s).
     #[cfg_attr(feature = "serde", serde(with = "super::bits"))]
     pub(super) pieces: Vec<f64>,
-    /// Whether it ended at rest by the train's own law.
+    /// Whether the train braked to rest undisturbed.
     pub(super) came_to_rest: bool,
-    /// The hop on which it did, once the next trip has told.
+    /// The hop on which it came to rest, known from the next trip.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
     pub(super) rest_hop: Option<usize>,
-    /// Where it did, if a person measured that.
+    /// Where it came to rest, if that was measured with a tape.
     pub(super) measured: Option<MeasuredRest>,
-    /// What the last fit found of it.
+    /// Its own numbers by the last fit.
     pub(super) own: Option<Own>,
 }
 
@@ -63,7 +63,7 @@ pub(super) struct Trip {
 /// a lap, not over a hop.
 const LONGEST_PIECE: f64 = 4.0;
 
-/// What a trip has of its own: where it began (m beyond the sensor passed last before), late start (s), deviations of ln
+/// A trip's own numbers: where it began (m beyond the sensor passed last before), late start (s), deviations of ln
 /// speed by piece, and additional distance of changes (m).
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -75,7 +75,7 @@ pub(super) struct Own {
 }
 
 impl Own {
-    /// How many numbers there are beside the place.
+    /// How many numbers there are, without the place.
     pub(super) const fn count(&self) -> usize {
         1 + self.deviations.len() + self.changes.len()
     }
@@ -140,7 +140,7 @@ impl Trip {
         })
     }
 
-    /// Its own numbers as the last fit found them; what it has done since is as usual.
+    /// Its own numbers by the last fit; for what happened since, the usual ones.
     pub(super) fn start(&self) -> Own {
         let mut own = self.own.clone().unwrap_or_default();
         let deviation = own.deviations.last().copied().unwrap_or(0.0);
@@ -176,17 +176,17 @@ impl Trip {
     }
 }
 
-/// The way of a trip as a function of time, for times that rise.
+/// The distance run in a trip as a function of time, for rising times.
 #[derive(Debug)]
 pub(super) struct Walk<'t> {
     trip: &'t Trip,
     own: &'t Own,
     segments: &'t [Segment],
     segment: usize,
-    /// Way without deviations at the beginning of the segment.
+    /// Distance without deviations at the beginning of the segment.
     base: f64,
     piece: usize,
-    /// Way without deviations and with them at the beginning of the piece.
+    /// Distance without deviations and with them at the beginning of the piece.
     piece_base: f64,
     done: f64,
 }
@@ -212,7 +212,7 @@ impl<'t> Walk<'t> {
         self.base + self.segments.get(self.segment).map_or(0.0, |segment| segment.way(time))
     }
 
-    /// Way (m) from where the trip began, at a time (s) that is not before the last asked for.
+    /// Distance (m) from the beginning of the trip, at a time (s) not before the last one asked for.
     pub(super) fn way(&mut self, time: f64) -> f64 {
         while let Some(next) = self.trip.pieces.get(self.piece + 1).copied()
             && next <= time
@@ -226,13 +226,13 @@ impl<'t> Walk<'t> {
         self.done + self.deviation() * (plain - self.piece_base) + self.added(time)
     }
 
-    /// The additional way of changes as far as they are done.
+    /// The additional distance of changes, as far as they are done.
     fn added(&self, time: f64) -> f64 {
         let changes = self.segments.iter().skip(1).zip(&self.own.changes);
         changes.filter(|(_, by)| **by != 0.0).map(|(segment, by)| by * segment.share(time)).sum()
     }
 
-    /// Way to standstill, when the last segment is a stop.
+    /// Distance to standstill, when the last segment is a stop.
     pub(super) fn way_to_rest(mut self) -> f64 {
         let Some(last) = self.segments.last() else { return 0.0 };
         let begins = last.begins;

@@ -1,17 +1,17 @@
-//! Which column of the equations belongs to which number: those that last first, those of one trip behind them.
+//! The columns of the equations: lasting numbers first, then those of one trip.
 
 use alloc::collections::BTreeMap;
 
 use super::trip::{Own, Trip};
 
-/// The columns of the numbers that last, and of those of the trip in hand.
+/// The columns of the lasting numbers, and of those of the current trip.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Columns {
-    /// Sections that were run over, with their columns behind the numbers of the train.
+    /// Sections that were run over, with their columns after the numbers of the train.
     pub(super) sections: BTreeMap<usize, usize>,
-    /// Hops on which a stop ended, with the columns of what stops there are longer by.
+    /// Hops on which a stop ended, with the columns of their stop offsets.
     pub(super) stop_offsets: BTreeMap<usize, usize>,
-    /// How many numbers last.
+    /// The count of lasting numbers.
     pub(super) lasting: usize,
 }
 

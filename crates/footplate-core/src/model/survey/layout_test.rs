@@ -46,8 +46,14 @@ pub struct LayoutTest {
 impl LayoutTest {
     /// A run begins in which so many trains move; steadily already, or from rest.
     pub fn begin_run(&mut self, trains: usize) {
-        self.end_stretch();
+        self.begin_run_at_rest(trains);
         self.sequence.begin_run(trains);
+    }
+
+    /// A session begins in which all trains are at rest: reports before the first command come from no train.
+    pub fn begin_run_at_rest(&mut self, trains: usize) {
+        self.end_stretch();
+        self.sequence.begin_run_at_rest(trains);
         self.turnouts = TurnoutStates::unknown();
         self.is_sole = trains <= 1;
         (self.last, self.steady_from) = (None, Timestamp::from_ns(i64::MIN));

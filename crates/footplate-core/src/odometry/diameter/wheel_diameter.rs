@@ -1,9 +1,9 @@
-//! The true diameters of two measured wheelsets, from balises that lie a known way apart and from each other.
+//! Learns the true diameters of two measured wheelsets, from balises at known distances and from each other.
 //!
-//! Two answers side by side. The *estimate* is the most likely scale with its standard deviation ([`ScaleFilter`]); the
-//! *interval* is what remains possible if the diameter was within its tolerance, no balise is further off than its bound
-//! and no rolling wheel creeps more than its allowance ([`ScaleInterval`]). A balise that the interval excludes is refused
-//! with its numbers and moves neither.
+//! Two results side by side. The *estimate* is the scale with its standard deviation ([`ScaleFilter`]). The *interval* is what
+//! remains possible if the diameter was within its tolerance, no balise is off by more than its bound and no rolling wheel
+//! creeps more than its allowance ([`ScaleInterval`]). A balise that the interval excludes is refused with its numbers and
+//! changes neither.
 
 use core::fmt;
 
@@ -18,56 +18,56 @@ use crate::odometry::wheels::Wheelset;
 use crate::time::Timestamp;
 use crate::units::Length;
 
-/// Balises nearer than this tell nothing about a diameter (m): half a metre in it is half a per cent.
+/// Least distance of balises that tell a diameter (m): half a metre in it is half a per cent.
 const NEAREST_PAIR_M: f64 = 100.0;
-/// So far both wheelsets have to roll in one go to be compared (m): a pulse is then 0.02 %.
+/// Least distance that both wheelsets roll before they are compared (m): a pulse is then 0.02 %.
 const COMPARED_WAY_M: f64 = 200.0;
-/// Two wheelsets that roll with little effort differ by so much in creepage and cone (one standard deviation). Chosen: a
+/// Standard deviation of the difference of two wheelsets that roll with little effort, from creepage and cone. Chosen: a
 /// third of what a curve does to one of them (0.1 %).
 const COMPARED_DEVIATION: f64 = 3e-4;
-/// Mean creepage of a rolling wheel over a pair of balises (one standard deviation). Chosen: the lower end of what normal
-/// traction and braking make (0.1 to 1 %), because most of a way is neither.
+/// Standard deviation of the mean creepage of a rolling wheel between two balises. Chosen: the lower end of normal traction and
+/// braking (0.1 to 1 %), because most of a distance is neither.
 const CREEPAGE_DEVIATION: f64 = 3e-4;
 /// The scale changes by no more than this part in a kilometre: thirty times the fastest wear (0.3 mm in 10 000 km).
 const CHANGES_PER_KM: f64 = 1e-6;
-/// From one step to the next in which a way makes the scales less certain (m). Chosen: so rare that it costs nothing.
+/// Distance after which the uncertainty of the scales grows by a step (m). Chosen: so rare that it costs nothing.
 const GROWS_EVERY_M: f64 = 100.0;
-/// The variance of what is left of a pulse at one end of a way, in squared pulses: even over one pulse.
+/// Variance of the phase within a pulse at one end of a distance, in squared pulses: uniform over one pulse.
 const PULSE_VARIANCE: f64 = 1.0 / 12.0;
 
-/// What is known of one wheelset, to be kept from run to run.
+/// The learnt scale of one wheelset, to be kept from run to run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct WheelScale {
-    /// True diameter over believed diameter.
+    /// True over stated diameter.
     pub estimate: Estimate,
-    /// Between which bounds it lies as long as the assumptions hold.
+    /// Its bounds, as long as the assumptions hold.
     pub interval: ScaleInterval,
 }
 
-/// What came of a balise.
+/// The result of a balise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PairVerdict {
-    /// There is none before it to pair it with.
+    /// There is no balise before it to pair it with.
     First,
-    /// It is so near to the one before that it tells nothing.
+    /// It is too near to the one before.
     TooNear,
     /// Both wheelsets slipped, slid or were not counted since the one before.
     Disturbed,
-    /// The scales have learnt from it.
+    /// It has changed the scales.
     Accepted,
-    /// It cannot lie where it says, so far from the one before.
+    /// Its distance from the one before is impossible.
     Refused {
-        /// The way between the two balises as they say, negative if the wheels turned the other way.
+        /// The stated distance between the two balises, negative if the wheels turned backwards.
         said: Length,
-        /// By the wheels it is at least this ...
+        /// The least distance by the wheels ...
         low: Length,
-        /// ... and at most this, the bounds of both balises included.
+        /// ... and the largest, with the bounds of both balises.
         high: Length,
     },
 }
 
-/// Learns the scales of two wheelsets. Fixed memory.
+/// The scales of two wheelsets. Fixed memory.
 #[derive(Debug, Clone)]
 pub struct WheelDiameters {
     wheelsets: [Wheelset; 2],
@@ -78,7 +78,7 @@ pub struct WheelDiameters {
     dates: [Timestamp; 2],
     /// The latest balise that agreed with the one before it.
     trusted: Option<Passage>,
-    /// A later one that did not. It is the right one if the next agrees with it.
+    /// A later one that did not. It is right if the next agrees with it.
     doubted: Option<Passage>,
     /// For each wheelset the first balise of those that agreed since which it has rolled.
     origins: [Option<Passage>; 2],
@@ -92,10 +92,10 @@ pub struct WheelDiameters {
 }
 
 impl WheelDiameters {
-    /// Knows the diameters and their tolerances, and nothing else.
+    /// Starts from stated diameters and their tolerances.
     #[must_use]
     pub fn new(wheelsets: [Wheelset; 2], balise: BaliseAccuracy) -> Self {
-        // All scales within the tolerance are alike: the standard deviation of an even distribution.
+        // The standard deviation of a uniform distribution within the tolerance.
         let deviations = wheelsets.map(|wheelset| wheelset.diameter_tolerance / sqrt(3.0));
         Self {
             wheelsets,
@@ -115,7 +115,7 @@ impl WheelDiameters {
         }
     }
 
-    /// Goes on from what an earlier run has learnt of the same wheelsets.
+    /// Continues with the scales that an earlier run of the same wheelsets learnt.
     ///
     /// # Errors
     /// The first scale that these wheelsets cannot have.
@@ -144,7 +144,7 @@ impl WheelDiameters {
 
     /// Takes in what was counted by the end of a period.
     ///
-    /// `counted` are the ways since the start by pulses and believed diameters, negative backwards; `rolling` whether each
+    /// `counted` are the distances since the start by pulses and stated diameters, negative backwards; `rolling` whether each
     /// wheelset was counted and neither slipped nor slid in this period; `little_effort` whether the train coasted or
     /// nearly so.
     pub fn roll(&mut self, time: Timestamp, counted: [Length; 2], rolling: [bool; 2], little_effort: bool) {
@@ -210,7 +210,7 @@ impl WheelDiameters {
         verdict
     }
 
-    /// True diameter over believed diameter of each wheelset, and between which bounds it lies.
+    /// True over stated diameter of each wheelset, with bounds.
     #[must_use]
     pub fn scales(&self) -> [WheelScale; 2] {
         let [first, second] = self.filter.scales();
@@ -244,7 +244,7 @@ impl WheelDiameters {
         ]
     }
 
-    /// What a way makes less certain, in steps that every period can afford.
+    /// Lets the uncertainty grow with the distance, in steps that every period can afford.
     fn grow(&mut self, counted: [Length; 2]) {
         self.counted_before = self.counted;
         self.counted = counted;
@@ -265,7 +265,7 @@ impl WheelDiameters {
         }
     }
 
-    /// Learns the ratio of the scales from ways that both wheelsets rolled.
+    /// Learns the ratio of the scales from distances that both wheelsets rolled.
     fn compare(&mut self, time: Timestamp, [first, second]: [Length; 2]) {
         let [first_pulse, second_pulse] = self.wheelsets.map(|wheelset| wheelset.pulse_pitch());
         let pulses = pulse_variance(first_pulse / first) + pulse_variance(second_pulse / second);
@@ -299,7 +299,7 @@ impl WheelDiameters {
         }
         self.intervals = met;
         self.lengthen(from, to);
-        // In advance, for the way until the next step.
+        // In advance, for the distance until the next step.
         self.widen(GROWS_EVERY_M);
         self.learn(&ways);
         self.settle(time, from.rolled);

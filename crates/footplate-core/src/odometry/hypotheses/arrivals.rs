@@ -1,4 +1,4 @@
-//! Which hypotheses end in one by which a wheel rolls: those that put the train at the speed of that wheel.
+//! Restricts transitions to hypotheses with a rolling wheel to trains that have the speed of that wheel.
 //!
 //! Without this, probability leaks to "both roll" from a train at 20 m/s with locked wheels: a filter that rolls is
 //! already at 0 m/s there, explains the silence and never pays for the leap of speed.
@@ -8,16 +8,16 @@ use super::filters::Filters;
 use super::lanes::Lanes;
 use super::scene::Scene;
 
-/// A wheel that rolls again has the speed of the train within this deviation (m/s).
+/// Standard deviation of the speed of a wheel that rolls again, relative to the train (m/s).
 const MEETS: f64 = 0.1;
-/// The square of a difference over its variance says no more than this where the wheel turns, and where it is silent: a
-/// train that is lost is found again within seconds. Tuned on seeds 301 to 306 of the families.
+/// Limit of the squared difference over its variance, for a wheel that turns and for a silent one, so that a lost train is found
+/// again within seconds. Tuned on seeds 301 to 306 of the families.
 const MEETS_NOT: (f64, f64) = (4.0, 7.0);
 const BOTH_ROLL: Lanes = Lanes([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 const FIRST_SLIPS: Lanes = Lanes([0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 const SECOND_SLIPS: Lanes = Lanes([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 
-/// What becomes of hypotheses that end, other than "both roll".
+/// The probability of hypotheses that end, other than "both roll".
 pub(super) struct Arrivals {
     /// The part of each that stays, because the wheels do not meet its train.
     pub(super) stays_lost: Lanes,
@@ -25,7 +25,7 @@ pub(super) struct Arrivals {
     pub(super) others: Lanes,
 }
 
-/// Where the probability `ending` of hypotheses that end may go, of which `follows` says how likely each is.
+/// Distributes the probability `ending` of hypotheses that end, in the proportions `follows`.
 pub(super) fn arrivals(
     scene: &Scene,
     wheels: &[Compared; 2],

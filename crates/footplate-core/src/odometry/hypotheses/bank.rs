@@ -1,4 +1,4 @@
-//! The filters of all hypotheses with their probabilities: what the train does, and how probable each account of it is.
+//! All hypotheses: a filter for each, and its probability.
 
 use super::arrivals::{Arrivals, arrivals};
 use super::evidence::{CREEP as CREEP_BY, Compared, SILENT, STEADY_S, evidence};
@@ -6,61 +6,65 @@ use super::filters::{Filters, Pool};
 use super::interval::interval;
 use super::lanes::Lanes;
 use super::rates::{Transitions, transitions};
+use super::reach::Reach;
 use super::scene::{Scene, WheelScene};
 use super::touch::Touch;
 use crate::odometry::wheels::{Range, Wheelset, larger, smaller};
 
-/// Density of the train's jerk while a wheel tells its speed (m²/s⁵): 0.14 m/s² in a second, what a driver's hand does
-/// to a cruising train; while none does, the acceleration is known to 0.3 m/s² after a few seconds.
+/// Spectral density of the train's jerk (m²/s⁵) while a wheel tells the speed: 0.14 m/s² in a second, as a driver corrects a
+/// cruising train. While none does, the acceleration is then known to 0.3 m/s² after a few seconds.
 const JERK: Lanes = Lanes([0.02, 0.02, 0.02, 0.007, 0.05, 0.0, 0.02, 0.02]);
-/// The same beyond that where no command is recorded that would announce it.
+/// What is added to that where no command is recorded.
 const UNANNOUNCED: f64 = 0.06;
-/// How long brakes and motors take to do what is commanded (s), and how much of it a train whose wheels roll can be expected
-/// to do: the rest is left to gradients, resistance and the state of the brakes.
+/// How long brakes and motors take to follow the command (s), and what part of it shows in the acceleration of a train whose wheels
+/// roll. The rest is uncertain: gradients, resistance and the state of the brakes.
 const BUILD_UP_S: f64 = 1.5;
 const EXPECTED: f64 = 0.5;
-/// By how much the acceleration changes when wheels that slipped have their grip again (m/s²).
+/// Standard deviation of the change of acceleration when slipping wheels adhere again (m/s²).
 const REGAINS: f64 = 0.4;
-/// Hypotheses that trust a counter: one (or zero) for each.
+/// 1 for hypotheses that trust a counter.
 const TRUSTS: Lanes = Lanes([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
-/// Hypotheses in which no wheel tells the speed.
+/// 1 for hypotheses in which no wheel tells the speed.
 const COASTS: Lanes = Lanes([0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
 const NOT_ROLLING: Lanes = Lanes([0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]);
 const BOTH_ROLL: Lanes = Lanes([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 const STANDS: Lanes = Lanes([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
-/// Variance of what is at rest (m²/s², m²/s⁴): none, but for rounding.
+/// Variance of the speed and acceleration at rest (m²/s², m²/s⁴): nothing but rounding.
 const AT_REST: f64 = 1e-6;
 const MOVES: Lanes = Lanes([1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0]);
 /// How long the error of a followed wheel lasts (s).
 const FOLLOWED_S: f64 = 0.15;
-/// The ratio of the diameters wanders by this much a second (part).
+/// Random walk of the ratio of the diameters (part, per square root of a second).
 const RATIO_WANDERS: f64 = 2e-5;
-/// Slower than this it is not learnt (m/s), and creepage under effort disturbs it (part).
+/// Time constant for the difference of the wheels beyond their tolerances (s).
+const BEYOND_S: f64 = 3.0;
+/// The ratio is learnt above this speed (m/s); creepage under effort disturbs it by this part.
 const RATIO_ABOVE: f64 = 3.0;
 const RATIO_CREEPAGE: f64 = 0.008;
-/// How long that keeps its sign: a whole run of a driven wheel beside one that is not (s).
+/// How long that creepage keeps its sign (s): a whole run of a driven wheel beside one that is not.
 const CREEPAGE_FOR_S: f64 = 200.0;
-/// Share of a driven wheel in traction beside one that is not: its creepage is a bias, the other has none.
+/// Share of a driven wheel in traction beside one that is not driven: creepage biases the driven one.
 const CREEPING_SHARE: f64 = 0.05;
-/// Least probability: far below what any interval minds.
+/// Least probability: far below the risk of any interval.
 const LEAST: f64 = 1e-30;
-/// Time over which the acceleration is smoothed that tells braking from motoring without a command (s).
+/// Time constant of the acceleration that tells braking from motoring without a command (s).
 const SIDE_S: f64 = 1.0;
-/// Speed at which half of all slips can begin (m/s), and at which steady creep can be told from rolling.
+/// Speed at which slips begin half as often as at high speed (m/s); the same for steady creep.
 const SLIPS_ABOVE: f64 = 0.5;
 const CREEPS_ABOVE: f64 = 5.0;
-/// The hypotheses by which both slip, each in its own manner and alike.
+/// The hypotheses that both slip, independently and alike.
 const SLIP: usize = 3;
 const CREEP: usize = 4;
-/// Wheels that are so far from the train have not come back to it (m/s, part of its speed).
+/// Wheels have not come back to the train while they differ from it by more (m/s, part of its speed) ...
 const AWAY: f64 = 0.5;
 const AWAY_PART: f64 = 0.03;
-/// Nor have wheels that turn towards it harder than any train accelerates (m/s²).
+/// ... or accelerate towards it harder than any train does (m/s²).
 const RETURNS: f64 = 2.5;
-/// A slide is lost this much less often than it ends, and wheels are so many deviations from it then.
+/// A hypothesis has lost the train this many times less often than it ends; the wheels are then this many standard deviations
+/// from it.
 const LOST: f64 = 2.5e-3;
 const FAR: f64 = 4.0;
-/// A train that stops does so from below this speed (m/s).
+/// A train comes to rest from below this speed (m/s).
 const STOPS_BELOW: f64 = 0.15;
 
 /// Filters and probabilities of all hypotheses.
@@ -68,30 +72,36 @@ const STOPS_BELOW: f64 = 0.15;
 pub(in super::super) struct Bank {
     probability: Lanes,
     pub(super) filters: Filters,
-    /// How far each hypothesis puts the train ahead of the estimate (m).
+    /// Distance by each hypothesis less that of the estimate (m).
     ahead: Lanes,
-    /// How far the train ran in the last period by each hypothesis (m).
-    ways: Lanes,
+    /// Distance run in the last period by each hypothesis (m).
+    distances: Lanes,
     /// First over second wheel speed when both roll, less 1, and its variance.
     pub(super) ratio: f64,
     ratio_variance: f64,
-    /// Mean acceleration, smoothed (m/s²), and that of the wheels.
+    /// Difference of the wheels beyond their tolerances, smoothed (part).
+    beyond: f64,
+    /// Smoothed acceleration of the estimate and of the wheels (m/s²).
     trend: f64,
     wheels_a: f64,
-    /// The commanded acceleration as far as brakes and motors follow it (m/s²).
+    /// The commanded acceleration after the delay of brakes and motors (m/s²).
     acted: f64,
-    /// 1 while wheels may turn slower than the train, −1 while they may turn faster.
+    /// 1 while slipping wheels turn slower than the train, −1 while they turn faster.
     pub(super) side: f64,
-    /// Whether each wheel has been turned up to the speed of the train.
+    /// Whether each wheel has been accelerated to the speed of the train.
     pub(super) touches: [Touch; 2],
-    /// What came out of the last period.
+    /// Time since one of them was (s).
+    pub(super) since_touch: f64,
+    /// How far the train may be from wheels that lost the rail together.
+    reach: Reach,
+    /// The estimate of the last period.
     speed: f64,
     acceleration: f64,
     variance: f64,
 }
 
 impl Bank {
-    /// A train met at a speed (m/s) with a variance.
+    /// A train at a speed (m/s) with a variance (m²/s²).
     pub(in super::super) fn new(speed: f64, variance: f64, wheelsets: &[Wheelset; 2]) -> Self {
         let mut filters = Filters::new(speed, variance);
         filters.v *= MOVES;
@@ -101,14 +111,17 @@ impl Bank {
             probability: Lanes([0.9, 1e-3, 1e-3, 1e-6, 1e-9, 0.1, LEAST, LEAST]),
             filters,
             ahead: Lanes::all(0.0),
-            ways: Lanes::all(0.0),
+            distances: Lanes::all(0.0),
             ratio: 0.0,
+            beyond: 0.0,
             ratio_variance: variances.iter().sum(),
             trend: 0.0,
             wheels_a: 0.0,
             acted: 0.0,
             side: 1.0,
             touches: [Touch::new(); 2],
+            since_touch: f64::INFINITY,
+            reach: Reach::new(),
             speed,
             acceleration: 0.0,
             variance,
@@ -125,12 +138,12 @@ impl Bank {
         self.probability.0
     }
 
-    /// Whether wheels may turn slower than the train now, and not faster.
+    /// Whether slipping wheels turn slower than the train now.
     pub(in super::super) fn holds_back(&self) -> bool {
         self.side > 0.0
     }
 
-    /// The train has turned round.
+    /// Reverses everything: the train has reversed.
     pub(in super::super) fn reverse(&mut self) {
         self.filters.reverse();
         self.ahead = -self.ahead;
@@ -138,9 +151,10 @@ impl Bank {
         self.acceleration = -self.acceleration;
         self.trend = -self.trend;
         self.wheels_a = -self.wheels_a;
+        self.reach.reverse();
     }
 
-    /// Takes in a period of `t` seconds; how far the train went (m).
+    /// Takes in a period of `t` seconds. Returns the distance run (m).
     pub(in super::super) fn step(&mut self, scene: &Scene, t: f64) -> f64 {
         self.side = self.next_side(scene, t);
         let [first, second] = &scene.wheels;
@@ -148,10 +162,10 @@ impl Bank {
         self.wheels_a += (wheels_a - self.wheels_a) * smaller(t / STEADY_S, 1.0);
         let wheels = self.compared(scene);
         self.mix(scene, &wheels, t);
-        let (ways, surprise) = self.run(scene, t);
-        self.ahead += ways;
-        self.ways = ways;
-        self.pull(scene, &wheels, t);
+        let (distances, surprise) = self.run(scene, t);
+        self.ahead += distances;
+        self.distances = distances;
+        self.correct_slips(scene, &wheels, t);
         let evidence = evidence(scene, &wheels, &self.filters, surprise, self.wheels_a, self.side, t);
         let weights = (self.probability * evidence.likelihoods()).at_least(LEAST);
         self.probability = weights * (1.0 / weights.sum());
@@ -159,27 +173,42 @@ impl Bank {
         self.summed_up(scene.top_speed)
     }
 
-    /// Between which speeds (m/s) and ways within the period (m) the train is at this confidence.
-    pub(in super::super) fn interval(&self, scene: &Scene, risk: f64, t: f64) -> [Range; 2] {
-        interval(&self.probability, &self.filters, &self.ways, scene, risk, t)
+    /// Intervals of the speed (m/s) and of the distance of the period (m) that leave out no more than `risk`.
+    pub(in super::super) fn interval(&mut self, scene: &Scene, risk: f64, t: f64) -> [Range; 2] {
+        let [likely, distance] =
+            interval(&self.probability, &self.filters, &self.distances, scene, (risk, self.beyond), t);
+        let wheels = self.compared(scene);
+        let speed = self.reach.widen(
+            likely,
+            scene,
+            &wheels,
+            self.probability.0,
+            (self.since_touch, self.wheels_a),
+            t,
+        );
+        let distance = Range {
+            low: distance.low + (speed.low - likely.low) * t,
+            high: distance.high + (speed.high - likely.high) * t,
+        };
+        [speed, distance]
     }
 
-    /// Which way wheels that lose their grip turn.
+    /// On which side of the train slipping wheels turn.
     fn next_side(&mut self, scene: &Scene, t: f64) -> f64 {
         self.trend += (self.acceleration - self.trend) * smaller(t / SIDE_S, 1.0);
         match scene.commanded {
-            // Wheels that were lost do not come back by the command of the opposite.
+            // The opposite command does not end a slip.
             Some(commanded) if commanded != 0.0 && self.is_away(scene) => self.side,
             Some(commanded) if commanded < 0.0 => 1.0,
             Some(commanded) if commanded > 0.0 => -1.0,
-            // What was last commanded may still act.
+            // The last command may still act.
             Some(_) => self.side,
             None if self.trend < 0.0 => 1.0,
             None => -1.0,
         }
     }
 
-    /// Whether both wheels slip, the way they were let to, and have not come back to the train.
+    /// Whether both wheels slip on the present side, and at least one has not come back to the train.
     fn is_away(&self, scene: &Scene) -> bool {
         let [.., slip, creep, _, _, _] = self.probability.0;
         let may = if self.side > 0.0 { scene.slide } else { scene.slip };
@@ -188,10 +217,10 @@ impl Bank {
             self.side * (train - wheel.speed) > AWAY + AWAY_PART * train.abs()
                 || self.side * wheel.acceleration > RETURNS
         };
-        may && slip + creep > 0.5 && scene.wheels.iter().all(away)
+        may && slip + creep > 0.5 && scene.wheels.iter().any(away)
     }
 
-    /// The wheels with the ratio of their diameters taken out.
+    /// The wheels, corrected by the ratio of their diameters.
     fn compared(&self, scene: &Scene) -> [Compared; 2] {
         let [first, second] = &scene.wheels;
         let of = |wheel: &WheelScene, scale: f64| {
@@ -203,10 +232,10 @@ impl Bank {
         [of(first, one), of(second, other)]
     }
 
-    /// Lets hypotheses end and begin.
+    /// Applies the transitions between hypotheses.
     fn mix(&mut self, scene: &Scene, wheels: &[Compared; 2], t: f64) {
         let Transitions { ends, after_rolling, after_others } = transitions(scene, t);
-        // What cannot begin now leaves its probability where it is.
+        // A hypothesis that cannot begin now takes no probability.
         let may = self.may_begin();
         let (after_rolling, after_others) = (after_rolling * may, after_others * may);
         let [rolling, ..] = self.probability.0;
@@ -220,13 +249,13 @@ impl Bank {
         pool.paa += REGAINS * REGAINS * (leaves * COASTS).sum() / leaves.sum();
         let pooled_ahead = (leaves * self.ahead).sum() / leaves.sum();
         let lost = self.lost(scene, wheels, &pool);
-        let found = if lost > 0.0 { BOTH_ROLL * LOST + NOT_ROLLING } else { Lanes::all(1.0) };
+        let found = Lanes(lost.0.map(|leap| if leap > 0.0 { LOST } else { 1.0 }));
         let arrives = after_rolling * rolling + after_others * others * found;
         let stays = self.probability - leaves;
         let next = (stays + arrives).at_least(LEAST);
         let share = arrives * next.inverse();
         self.filters.mix(&pool, share);
-        self.filters.pvv += BOTH_ROLL * share * lost;
+        self.filters.pvv += share * lost;
         self.ahead += share * (Lanes::all(pooled_ahead) - self.ahead);
         self.probability = next * (1.0 / next.sum());
         // A train at rest stays there.
@@ -238,21 +267,38 @@ impl Bank {
         *paa = *paa * MOVES + STANDS * AT_REST;
     }
 
-    /// Where wheels turn alike at quite another speed than a slide was thought to have, the slide may have been lost, and
-    /// they roll. By how much the variance of the train has to grow for that (m²/s²), so that the leap is paid for once.
-    fn lost(&self, scene: &Scene, [one, other]: &[Compared; 2], pool: &Pool) -> f64 {
-        let turn = scene.wheels.iter().all(|wheel| wheel.read && wheel.speed.abs() > SILENT);
-        let [.., slip, _, _, _, _] = self.probability.0;
-        let leap = (0.5 * (one.speed + other.speed) - pool.v).abs();
+    /// Variance (m²/s²) that each hypothesis begins with in addition, if its speed has to leap: the leap then costs likelihood
+    /// once, not in every period.
+    ///
+    /// A slide has lost the train where both wheels turn alike at quite another speed: they roll. A sensor that is taken for dead
+    /// may be the good one: its wheel rolls, and the other slips or has the dead sensor.
+    fn lost(&self, scene: &Scene, [one, other]: &[Compared; 2], pool: &Pool) -> Lanes {
+        let [.., slip, _, _, first_dead, second_dead] = self.probability.0;
         let [_, (most, part)] = CREEP_BY;
-        // Less can be wheels that creep alike.
-        let far = larger(FAR * libm::sqrt(pool.pvv + one.variance), most + part * pool.v.abs());
-        // Spinning wheels do turn alike.
-        if self.side > 0.0 && turn && slip > 0.9 && leap > far { leap * leap } else { 0.0 }
+        let leap = |speed: f64, variance: f64, least: f64| {
+            let leap = (speed - pool.v).abs();
+            let far = larger(FAR * libm::sqrt(pool.pvv + variance), least);
+            if leap > far { leap * leap } else { 0.0 }
+        };
+        let turn = scene.wheels.iter().all(|wheel| wheel.read && wheel.speed.abs() > SILENT);
+        // A smaller leap may be creep. Spinning wheels turn alike, too.
+        let alike = if self.side > 0.0 && turn && slip > 0.9 {
+            leap(0.5 * (one.speed + other.speed), one.variance, most + part * pool.v.abs())
+        } else {
+            0.0
+        };
+        let of_wheel = |wheel: &WheelScene, compared: &Compared| {
+            let counts = wheel.read && !wheel.stuck && wheel.speed.abs() > SILENT;
+            if counts { leap(compared.speed, compared.variance, AWAY) } else { 0.0 }
+        };
+        let [first, second] = &scene.wheels;
+        let of_first = if first_dead > 0.9 { of_wheel(first, one) } else { 0.0 };
+        let of_second = if second_dead > 0.9 { of_wheel(second, other) } else { 0.0 };
+        Lanes([alike, of_second, of_first, 0.0, 0.0, 0.0, of_second, of_first])
     }
 
-    /// Which hypotheses can begin at the speed of the train, 0 to 1: nothing slips at rest, and a train can only have
-    /// stopped that is slow enough.
+    /// How easily each hypothesis begins at the speed of the train, 0 to 1: nothing slips at rest, and only a slow train comes to
+    /// rest.
     fn may_begin(&self) -> Lanes {
         let moves = self.speed * self.speed;
         let moving = |above: f64| moves / (moves + above * above);
@@ -262,14 +308,14 @@ impl Bank {
         Lanes([1.0, slips, slips, slips, creeps, stops, 1.0, 1.0])
     }
 
-    /// Runs every filter on and lets the counters correct those that trust one; how far each went, and how
-    /// surprised it was.
+    /// Predicts every filter and corrects those that trust a counter. Returns the distance run by each, and its squared
+    /// innovation over the variance.
     fn run(&mut self, scene: &Scene, t: f64) -> (Lanes, Lanes) {
         let [first, second] = &scene.wheels;
         let [one, other] = self.scales(scene);
         let (counted_1, counted_2) = (first.counted * one, second.counted * other);
         let both = shares(scene);
-        // A hypothesis that trusts a wheel which is not read is left without.
+        // Without a reading, nothing corrects a hypothesis that trusts that wheel.
         let (one, two) = (f64::from(u8::from(first.read)), f64::from(u8::from(second.read)));
         let [b1, b2] = both;
         let alpha = Lanes([b1, 0.0, one, 0.0, 0.0, 0.0, 0.0, one]);
@@ -280,15 +326,15 @@ impl Bank {
         self.acted += acts;
         self.filters.a += TRUSTS * (EXPECTED * acts);
         let unannounced = if scene.commanded.is_some() { 0.0 } else { UNANNOUNCED };
-        let ways = self.filters.run(t, JERK + TRUSTS * unannounced);
-        self.filters.r += (ways - alpha * counted_1 - beta * counted_2) * trusted;
+        let distances = self.filters.run(t, JERK + TRUSTS * unannounced);
+        self.filters.r += (distances - alpha * counted_1 - beta * counted_2) * trusted;
         let off_1 = alpha * (first.pitch * (1.0 / 12.0_f64)) * alpha * first.pitch;
         let off_2 = beta * (second.pitch * (1.0 / 12.0_f64)) * beta * second.pitch;
         let (moved, surprise) = self.filters.place(off_1 + off_2 + Lanes::all(1e-9), trusted);
-        (ways + moved, surprise)
+        (distances + moved, surprise)
     }
 
-    /// What the counts of each wheel are multiplied by so that both say the same while both roll.
+    /// Factors that make both wheels agree while both roll.
     pub(super) fn scales(&self, scene: &Scene) -> [f64; 2] {
         let [one, other] = shares(scene);
         [1.0 - other * self.ratio, 1.0 + one * self.ratio]
@@ -311,18 +357,21 @@ impl Bank {
         let most = first.tolerance + second.tolerance;
         self.ratio = larger(smaller(self.ratio + gain * measured, most), -most);
         self.ratio_variance *= 1.0 - gain;
+        let differ = larger((measured + self.ratio).abs() - most, 0.0);
+        self.beyond += (differ - self.beyond) * smaller(t / BEYOND_S, 1.0);
     }
 
-    /// What all hypotheses come to; how far the estimate moved.
+    /// Combines all hypotheses. Returns the distance that the estimate moved (m).
     fn summed_up(&mut self, top: f64) -> f64 {
         let p = self.probability;
-        let (v, a, way) = ((p * self.filters.v).sum(), (p * self.filters.a).sum(), (p * self.ahead).sum());
+        let (v, a, distance) =
+            ((p * self.filters.v).sum(), (p * self.filters.a).sum(), (p * self.ahead).sum());
         let dv = self.filters.v - Lanes::all(v);
         self.variance = (p * (self.filters.pvv + dv * dv)).sum();
         self.speed = larger(smaller(v, top), -top);
         self.acceleration = a;
-        self.ahead -= Lanes::all(way);
-        way
+        self.ahead -= Lanes::all(distance);
+        distance
     }
 }
 

@@ -1,8 +1,8 @@
-//! How well each hypothesis explains what the wheels show: logarithms of likelihoods.
+//! Log-likelihoods of the hypotheses.
 //!
 //! Letters: `y` wheel speed less train speed, `b` wheel acceleration less train acceleration, `u` how much slower (in a
-//! spin: faster) a wheel turns than the train moves, `v`, `a`, `pvv`, `paa` the train as in `filters`. Speeds of wheels are followed, so that their errors last; evidence
-//! counts once in the time over which it lasts, not once a period.
+//! spin: faster) a wheel turns than the train moves, `v`, `a`, `pvv`, `paa` the train as in `filters`. The errors of a tracked
+//! speed are correlated; evidence counts once in a correlation time, not once a period.
 
 use core::array;
 
@@ -11,17 +11,17 @@ use super::lanes::Lanes;
 use super::scene::{Scene, WheelScene};
 use crate::odometry::wheels::{Range, larger, smaller};
 
-/// How long the error of a followed wheel speed lasts (s).
+/// Correlation time of the error of a tracked wheel speed (s).
 const FOLLOWED_S: f64 = 0.15;
-/// How long a wheel that slips keeps to a speed and an acceleration (s).
+/// Correlation time of the speed and acceleration of a slipping wheel (s).
 const SLIP_S: f64 = 0.85;
-/// A wheel that slips further than this many means is not less probable for it.
+/// Slips beyond this many means are equally probable.
 const FARTHEST: f64 = 1.5;
 /// Slower wheels are silent (m/s).
 pub(super) const SILENT: f64 = 0.1;
 /// Creepage of wheels that roll under full effort (m/s for each m/s).
 const ROLLING_CREEPAGE: f64 = 0.003;
-/// Deviation of the creepage of rolling wheels for which nothing is to blame, as part of the speed.
+/// Standard deviation of the creepage of rolling wheels without effort (part of the speed).
 const RESTLESS: f64 = 0.0015;
 /// Mean excess of a wheel that slips (m/s, part of the speed).
 const SLIPS: (f64, f64) = (0.5, 0.1);
@@ -35,29 +35,29 @@ const CREEP_APART: f64 = 0.02;
 /// How closely they accelerate with the train (m/s²), over so long (s).
 const STEADY: f64 = 0.1;
 pub(super) const STEADY_S: f64 = 1.0;
-/// Squares of deviations over their variance up to this say nothing.
+/// Squared innovations over their variance up to this are no evidence.
 const USUAL: f64 = 1.0;
 /// Variance of the acceleration of rolling wheels about that of the train (m²/s⁴).
 const RESTLESS_ACCELERATION: f64 = 0.04;
-/// What a dead sensor costs a second if it counts: it may say anything, so it explains nothing; most are silent.
+/// Cost of a dead sensor that counts (nats per second): it explains no count, and most dead sensors are silent.
 const DEAD_COUNTS: f64 = 10.0;
-/// What a silent wheel costs a second as a locked one: it may come free. A train slower than this has none (m/s).
+/// Cost of a locked wheel (nats per second): it may come free. A slower train has none (m/s).
 const LOCKED: f64 = 0.1;
 const NEARLY_STANDING: f64 = 0.15;
-/// What it costs a second to say that a count which stands still is that of a wheel.
+/// Cost of taking a stuck count for that of a wheel (nats per second).
 const STUCK: f64 = 10.0;
-/// What a hypothesis costs a second that the command or the axle rules out.
+/// Cost of a hypothesis that the command or the axle excludes (nats per second).
 const IMPOSSIBLE: f64 = 15.0;
 /// Deviation of the train's acceleration beyond what it can be (m/s²).
 const BEYOND: f64 = 0.06;
 /// Variance of an acceleration that is known no better because a run or a hypothesis has just begun (m²/s⁴).
 const UNKNOWN: f64 = 0.15;
-/// Pulses of a standing train that is shaken, and what each beyond costs.
+/// Pulses that vibration gives at rest, and the cost of each further one (nats).
 const SHAKEN: f64 = 1.5;
 const TURNS: f64 = 3.0;
-/// Innovations of the place with a smaller square over their variance are usual.
+/// Squared innovations of the place over their variance up to this are no evidence.
 const SURPRISING: f64 = 7.0;
-/// No period says more than this for or against a hypothesis: what one row says may be a fault of that row.
+/// Largest evidence of one period (nats): one row may be faulty.
 const MOST: f64 = 25.0;
 
 /// Hypotheses by which the rail carries the whole brake, and by which one wheelset finds that it does not.
@@ -91,7 +91,9 @@ pub(super) fn evidence(
     let (one, other) = (of(first, a), of(second, b));
     let [both, first_slips, second_slips, slip, creep, stands, first_dead, second_dead] =
         array::from_fn(|lane| filters.state(lane));
-    let turned = larger(first.counted.abs() / first.pitch, second.counted.abs() / second.pitch);
+    // A stuck count is no evidence against a train at rest.
+    let turned = |wheel: &WheelScene| if wheel.stuck { 0.0 } else { wheel.counted.abs() / wheel.pitch };
+    let turned = larger(turned(first), turned(second));
     let shaken = larger(turned - SHAKEN, 0.0) * TURNS;
     let of_wheels = Lanes([
         one.rolls(&both) + other.rolls(&both),
@@ -99,7 +101,7 @@ pub(super) fn evidence(
         one.rolls(&second_slips) + other.slips(&second_slips),
         one.slips(&slip) + other.slips(&slip),
         alike(&one, &other, &creep, wheels_a),
-        one.rolls(&stands) + other.rolls(&stands) - shaken,
+        one.rests(&stands) + other.rests(&stands) - shaken,
         one.dead() + other.rolls(&first_dead),
         one.rolls(&second_dead) + other.dead(),
     ]);
@@ -150,6 +152,11 @@ impl Shown<'_> {
         -0.5 * self.followed * (speed + self.unsteady(train)) - stuck * self.t
     }
 
+    /// It rests with the train.
+    fn rests(&self, train: &State) -> f64 {
+        if self.wheel.stuck { 0.0 } else { self.rolls(train) }
+    }
+
     /// By how much its acceleration is unlike that of the train.
     fn unsteady(&self, train: &State) -> f64 {
         let b = self.wheel.acceleration - train.a;
@@ -161,7 +168,7 @@ impl Shown<'_> {
         train.paa + own * own + RESTLESS_ACCELERATION
     }
 
-    /// It slips in its own manner.
+    /// It slips independently.
     fn slips(&self, train: &State) -> f64 {
         let Self { wheel, compared, followed, t, .. } = self;
         if !wheel.read {
@@ -169,7 +176,7 @@ impl Shown<'_> {
         }
         let ruled_out = self.ruled_out();
         if wheel.speed.abs() <= SILENT {
-            // Silence says nothing of how a wheel slips: a locked one keeps to its speed.
+            // A silent wheel is locked and stays so.
             let still = 1.0 / (1.0 + train.v * train.v / (NEARLY_STANDING * NEARLY_STANDING));
             return -t * (ruled_out + LOCKED + still * still * IMPOSSIBLE);
         }
@@ -178,7 +185,7 @@ impl Shown<'_> {
         let b = wheel.acceleration - train.a;
         let (least, part) = SLIPS;
         let mean = least + larger(part * train.v, 0.0);
-        // A wheel that is thrown about is followed late.
+        // The tracker lags behind a wheel that accelerates.
         let late = b * FOLLOWED_S;
         let variance = train.pvv + compared.variance + late * late;
         let steady = self.acceleration_variance(train);
@@ -195,7 +202,7 @@ impl Shown<'_> {
         if counts { -DEAD_COUNTS * self.t } else { 0.0 }
     }
 
-    /// What it costs a second to say that it slips.
+    /// Cost of a slip of this wheel (nats per second).
     fn ruled_out(&self) -> f64 {
         let Self { scene, wheel, side, .. } = self;
         let possible = if *side > 0.0 { scene.slide && wheel.braked } else { scene.slip && wheel.driven };
@@ -228,13 +235,12 @@ fn alike(one: &Shown, other: &Shown, train: &State, wheels_a: f64) -> f64 {
         - one.t * (ruled_out + silent + 0.5 / STEADY_S * unusual(b * b))
 }
 
-/// What a wheel that slips costs whose acceleration is so unlike the usual: it seldom is, but it is thrown about when the
-/// rail takes hold of it or loses it.
+/// Heavy-tailed cost of a squared innovation of the acceleration of a slipping wheel: the rail grips and lets go in jerks.
 fn jerks(square: f64) -> f64 {
     JERKS * libm::log1p(square * (1.0 / JERKS))
 }
 
-/// No hypothesis gains by explaining noise.
+/// A squared innovation without its usual part: no hypothesis gains by explaining noise.
 fn unusual(square: f64) -> f64 {
     larger(square - USUAL, 0.0)
 }

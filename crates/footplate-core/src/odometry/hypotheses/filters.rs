@@ -1,14 +1,16 @@
-//! A Kalman filter for each hypothesis, all of them at once.
+//! A Kalman filter for each hypothesis, all computed side by side.
 //!
-//! Letters: `r` how far the train is ahead of the counter that the hypothesis trusts (m), `v` speed, `a` acceleration,
+//! Letters: `r` distance of the train less that of the counter that the hypothesis trusts (m), `v` speed, `a` acceleration,
 //! `pxy` covariances, `q` density of the jerk (m²/s⁵), `k` gain, `y` innovation.
 
 use super::lanes::Lanes;
 
-/// What the diagonal keeps within, so that it stays positive and finite (m², m²/s², m²/s⁴).
+/// Limits of the variances, so that they stay positive and finite (m², m²/s², m²/s⁴).
 const PLACE: (f64, f64) = (1e-10, 1e2);
 const SPEED: (f64, f64) = (1e-8, 1e4);
 const ACCELERATION: (f64, f64) = (1e-8, 4.0);
+/// No train accelerates more (m/s²).
+const STRONGEST: f64 = 10.0;
 
 /// State and covariance of every hypothesis.
 #[derive(Debug, Clone, Copy)]
@@ -39,7 +41,7 @@ pub(super) struct State {
 }
 
 impl State {
-    /// The speed is `y` higher than assumed, with this much information (s²/m²), 0 for nothing.
+    /// Corrects by an innovation `y` of the speed with this information (s²/m²); 0 for none.
     pub(super) fn speed(&mut self, y: f64, information: f64) {
         let per = information / (self.pvv * information + 1.0);
         let (kr, kv, ka) = (self.prv * per, self.pvv * per, self.pva * per);
@@ -55,7 +57,7 @@ impl State {
         self.pva *= kept;
     }
 
-    /// The acceleration is `y` higher than assumed, with this much information (s⁴/m²).
+    /// Corrects by an innovation `y` of the acceleration with this information (s⁴/m²).
     pub(super) fn acceleration(&mut self, y: f64, information: f64) {
         let per = information / (self.paa * information + 1.0);
         let (kr, kv, ka) = (self.pra * per, self.pva * per, self.paa * per);
@@ -111,7 +113,7 @@ impl Filters {
         }
     }
 
-    /// A speed (m/s) with a variance, for all.
+    /// All at one speed (m/s) with one variance (m²/s²).
     pub(super) fn new(speed: f64, variance: f64) -> Self {
         let zero = Lanes::all(0.0);
         Self {
@@ -127,11 +129,11 @@ impl Filters {
         }
     }
 
-    /// Runs on for `t` seconds with jerk of density `q`; how far.
+    /// Predicts by `t` seconds with jerk of spectral density `q`. Returns the distances run.
     #[inline]
     pub(super) fn run(&mut self, t: f64, q: Lanes) -> Lanes {
         let half = 0.5 * t * t;
-        let way = self.v * t + self.a * half;
+        let distance = self.v * t + self.a * half;
         self.v += self.a * t;
         let prv = self.prv + self.pvv * t + self.pva * half;
         let pra = self.pra + self.pva * t + self.paa * half;
@@ -142,11 +144,11 @@ impl Filters {
         self.pvv += (self.pva + pva) * t + q * (t * t * t / 3.0);
         self.pva = pva + q * (t * t * 0.5);
         self.paa += q * t;
-        way
+        distance
     }
 
-    /// The counter says that `r` is 0, with variance `variance` where `trusted` is 1; by how much the place moved, and
-    /// the square of the innovation over its variance.
+    /// Corrects by the measurement `r` = 0 with this variance, where `trusted` is 1. Returns by how much the place moved, and the
+    /// squared innovation over its variance.
     #[inline]
     pub(super) fn place(&mut self, variance: Lanes, trusted: Lanes) -> (Lanes, Lanes) {
         let per = (self.prr + variance).inverse() * trusted;
@@ -167,7 +169,7 @@ impl Filters {
         (moved, surprise)
     }
 
-    /// Takes a share of each filter from `pool`, a state that others have left.
+    /// Mixes a share of `pool` into each filter.
     #[inline]
     pub(super) fn mix(&mut self, pool: &Pool, share: Lanes) {
         let one = Lanes::all(1.0);
@@ -179,30 +181,43 @@ impl Filters {
         self.pvv = self.pvv * kept + share * pool.pvv + spread * dv * dv;
         self.pva = self.pva * kept + share * pool.pva + spread * dv * da;
         self.paa = self.paa * kept + share * pool.paa + spread * da * da;
-        // Where the counter stands, a hypothesis that begins has yet to find out.
+        // A hypothesis that begins does not know its counter yet.
         self.r *= kept;
         self.prr = self.prr * kept + share * pool.prr;
         self.prv *= kept;
         self.pra *= kept;
     }
 
-    /// Keeps every variance positive and finite.
+    /// Keeps every covariance matrix finite and positive definite.
+    ///
+    /// The covariances of a variance that is cut to its limit are cut by the same factor. If the variance were cut alone, gains would
+    /// change sign and the filter would diverge.
     #[inline]
     pub(super) fn keep_sound(&mut self) {
         let within = |lanes: Lanes, (least, most)| lanes.at_least(least).at_most(most);
+        let limits = [(self.prr, PLACE), (self.pvv, SPEED), (self.paa, ACCELERATION)];
+        // Few periods need these divisions. In the others they would multiply by 1.
+        if limits.iter().any(|(lanes, (_, most))| lanes.largest() > *most) {
+            let [of_r, of_v, of_a] =
+                limits.map(|(lanes, (_, most))| (lanes.at_least(most).inverse() * most).at_most(1.0));
+            self.prv *= of_r * of_v;
+            self.pra *= of_r * of_a;
+            self.pva *= of_v * of_a;
+        }
         self.prr = within(self.prr, PLACE);
         self.pvv = within(self.pvv, SPEED);
         self.paa = within(self.paa, ACCELERATION);
+        self.a = self.a.at_least(-STRONGEST).at_most(STRONGEST);
     }
 
-    /// The train has turned round.
+    /// Reverses everything: the train has reversed.
     pub(super) fn reverse(&mut self) {
         self.r = -self.r;
         self.v = -self.v;
         self.a = -self.a;
     }
 
-    /// What the hypotheses come to with these weights, which need not add up to 1.
+    /// Mean and covariance over all hypotheses with these weights, which need not add up to 1.
     #[inline]
     pub(super) fn pooled(&self, weights: Lanes, prr: f64) -> Pool {
         let total = weights.sum();
@@ -220,7 +235,7 @@ impl Filters {
     }
 }
 
-/// One state that stands for several.
+/// The state of several hypotheses together.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pool {
     pub(super) v: f64,
@@ -229,4 +244,20 @@ pub(super) struct Pool {
     pub(super) pva: f64,
     pub(super) paa: f64,
     pub(super) prr: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_variance_that_is_cut_takes_its_covariances_with_it() {
+        let mut filters = Filters::new(10.0, 5e4);
+        filters.paa = Lanes::all(40.0);
+        filters.pva = Lanes::all(1400.0);
+        filters.keep_sound();
+        let State { pvv, pva, paa, .. } = filters.state(0);
+        assert_eq!((pvv, paa), (1e4, 4.0));
+        assert!(pva > 0.0 && pva * pva <= pvv * paa, "{pva}");
+    }
 }

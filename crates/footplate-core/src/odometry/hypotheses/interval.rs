@@ -1,39 +1,40 @@
-//! Between which speeds the train is with a stated probability.
+//! The interval that holds the speed with a stated probability.
 //!
 //! Each hypothesis may leave out an equal part of the risk. One of probability `w` with Gaussian errors leaves out no
-//! more than `risk` if it is given `k` deviations either way with `w exp(−k²/2) ≤ risk`.
+//! more than `risk` if it is given `k` deviations either side with `w exp(−k²/2) ≤ risk`.
 
 use super::filters::Filters;
 use super::lanes::Lanes;
 use super::scene::Scene;
 use crate::odometry::wheels::{Range, larger, smaller};
 
-/// The diameters are not off by their whole tolerance both at once; this part holds 99.99 % of two that are even over it.
+/// Both diameters are hardly off by their whole tolerance at once. The mean of two errors that are uniform over it is within this
+/// part in 99.99 % of cases.
 const TOLERANCE: f64 = 0.993;
 /// Creepage of rolling wheels under full effort (part of the speed).
-const CREEPAGE: f64 = 0.012;
+const CREEPAGE: f64 = 0.003;
 /// Hypotheses in which no wheel tells the speed.
 const COASTS: [bool; 8] = [false, false, false, true, true, false, false, false];
 
-/// Speed (m/s) and way of the period (m).
+/// Speed (m/s) and distance of the period (m); `beyond` is by how much the wheels differ beyond their tolerances (part).
 pub(super) fn interval(
     p: &Lanes,
     filters: &Filters,
-    ways: &Lanes,
+    distances: &Lanes,
     scene: &Scene,
-    risk: f64,
+    (risk, beyond): (f64, f64),
     t: f64,
 ) -> [Range; 2] {
     let part = risk / 8.0;
     let mut speed = Range { low: f64::INFINITY, high: f64::NEG_INFINITY };
-    let mut way = speed;
+    let mut distance = speed;
     let [first, second] = &scene.wheels;
     let wide = 0.5 * (first.tolerance + second.tolerance) * TOLERANCE;
     let wider = larger(first.tolerance, second.tolerance);
     let effort = scene.brake + scene.traction;
     for (lane, coasts) in COASTS.into_iter().enumerate() {
         let (Some(&w), Some(&v), Some(&pvv), Some(&ran)) =
-            (p.0.get(lane), filters.v.0.get(lane), filters.pvv.0.get(lane), ways.0.get(lane))
+            (p.0.get(lane), filters.v.0.get(lane), filters.pvv.0.get(lane), distances.0.get(lane))
         else {
             continue;
         };
@@ -42,13 +43,13 @@ pub(super) fn interval(
         }
         let k = libm::sqrt(2.0 * libm::log(w / part));
         let tolerance = if lane == 0 { wide } else { wider };
-        let scale = (tolerance + if coasts { 0.0 } else { CREEPAGE * effort }) * v.abs();
+        let scale = (tolerance + beyond + if coasts { 0.0 } else { CREEPAGE * effort }) * v.abs();
         let off = k * libm::sqrt(pvv) + scale;
         speed = speed.or(Range { low: v - off, high: v + off });
         let drift = if coasts { off } else { scale };
-        way = way.or(Range { low: ran - drift * t, high: ran + drift * t });
+        distance = distance.or(Range { low: ran - drift * t, high: ran + drift * t });
     }
     let top = scene.top_speed;
     speed = Range { low: larger(speed.low, -top), high: smaller(speed.high, top) };
-    [speed, way]
+    [speed, distance]
 }

@@ -1,7 +1,7 @@
-//! What two wheelsets and their sensors may be doing, side by side, each hypothesis with a filter and a probability.
+//! Competing hypotheses of what two wheelsets and their sensors do, each with a filter and a probability.
 //!
-//! The hypotheses are listed in [`Hypothesis`]. Every one explains all counts of a period; how well it does is its
-//! likelihood (`evidence`). A hypothesis can end and another begin at stated rates (`rates`). The bank of filters
+//! [`Hypothesis`] lists them. Each explains all counts of a period with some likelihood (`evidence`), and follows another at stated
+//! rates (`rates`). Where likelihoods cannot tell them apart, the interval reaches further (`reach`). The bank of filters
 //! (`bank`) is an interacting multiple model (Blom and Bar-Shalom, 1988) in which all transitions pass through one pool.
 
 mod arrivals;
@@ -11,6 +11,7 @@ mod filters;
 mod interval;
 mod lanes;
 mod rates;
+mod reach;
 mod scene;
 mod slides;
 mod touch;

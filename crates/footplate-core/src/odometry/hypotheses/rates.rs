@@ -1,4 +1,4 @@
-//! The hypotheses, and how often one follows another: the stated priors of the odometer.
+//! The hypotheses and their transition rates: the stated priors of the odometer.
 
 use super::lanes::Lanes;
 use super::scene::Scene;
@@ -12,7 +12,7 @@ pub enum Hypothesis {
     FirstSlips,
     /// The second slips or slides, the first rolls.
     SecondSlips,
-    /// Both slip or slide, each in its own manner.
+    /// Both slip or slide independently.
     BothSlip,
     /// Both creep alike and steadily, as on ice with slide control.
     BothCreep,

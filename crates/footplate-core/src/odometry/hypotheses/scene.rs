@@ -1,20 +1,21 @@
-//! What every hypothesis is asked to explain: one period of two wheelsets and the command.
+//! One period of both wheelsets and the command: what every hypothesis has to explain.
 
 use crate::odometry::wheels::Range;
 
 /// One wheelset in one period, in the direction of travel.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct WheelScene {
-    /// How far it turned (m).
+    /// How far it turned (m), and how much of that was not read in the period.
     pub(in super::super) counted: f64,
+    pub(in super::super) late: f64,
     /// Its count was read.
     pub(in super::super) read: bool,
-    /// Its count has stood still, not at zero, for longer than that of a wheel does beside one whose count moves.
+    /// Its count is stuck: constant, not zero, for longer than that of a wheel that turns.
     pub(in super::super) stuck: bool,
-    /// Speed it is followed at (m/s) and its standard deviation.
+    /// Tracked speed (m/s) and its standard deviation.
     pub(in super::super) speed: f64,
     pub(in super::super) speed_deviation: f64,
-    /// Acceleration it is followed at (m/s²) and its standard deviation.
+    /// Tracked acceleration (m/s²) and its standard deviation.
     pub(in super::super) acceleration: f64,
     pub(in super::super) acceleration_deviation: f64,
     /// Distance of one pulse (m).
@@ -31,10 +32,10 @@ pub(in super::super) struct WheelScene {
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Scene {
     pub(in super::super) wheels: [WheelScene; 2],
-    /// Between which accelerations the train can be (m/s²), whatever the rail carries, and if it carries all.
+    /// Possible accelerations of the train (m/s²), with any adhesion, and with enough for brake and traction.
     pub(in super::super) acceleration: Range,
     pub(in super::super) rolling: Range,
-    /// What the command makes the train do where the rail carries it (m/s²); nothing if it is not recorded.
+    /// The commanded acceleration (m/s²); none if the command is not recorded.
     pub(in super::super) commanded: Option<f64>,
     /// How much of the full brake may act, 0 to 1, and how much of full traction.
     pub(in super::super) brake: f64,
@@ -42,7 +43,7 @@ pub(in super::super) struct Scene {
     /// Slides and slips are possible at all.
     pub(in super::super) slide: bool,
     pub(in super::super) slip: bool,
-    /// Acceleration that an inertial sensor feels (m/s²).
+    /// Acceleration from an inertial sensor (m/s²).
     pub(in super::super) felt: Option<f64>,
     /// Both wheelsets sliding alike can be ruled out.
     pub(in super::super) independent: bool,

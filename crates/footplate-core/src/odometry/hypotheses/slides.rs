@@ -1,14 +1,14 @@
-//! What is known of a train while no wheel tells its speed: how it slows down, and wheels that touch its speed.
+//! What tells the speed while both wheels slip: a prior of the train's acceleration, and wheels that touch its speed.
 //!
 //! Letters as in `filters`; `y` innovation.
 
 use super::bank::Bank;
 use super::evidence::{CREEP, Compared, SILENT};
 use super::filters::State;
-use super::scene::Scene;
+use super::scene::{Scene, WheelScene};
 use crate::odometry::wheels::{Range, larger, smaller};
 
-/// The hypotheses in which both wheels slip, each in its own manner and alike.
+/// The hypotheses that both wheels slip, independently and alike.
 const SLIPS: usize = 3;
 const CREEPS: usize = 4;
 /// Those in which the train moves.
@@ -17,27 +17,27 @@ const MOVES: [usize; 7] = [0, 1, 2, SLIPS, CREEPS, 6, 7];
 /// this deviation (m/s², part of it); adhesion of 0.02 to 0.08 and the brakes of the other wheelsets.
 const SLIDES_BY: f64 = 0.5;
 const SLIDES_WITHIN: (f64, f64) = (0.1, 0.3);
-/// How long that stays what it is (s).
+/// Correlation time of that deceleration (s). Longer times are truer on long ice and worse in every family of scenarios.
 const SLIDES_FOR_S: f64 = 2.0;
 /// How closely wheels that creep alike accelerate with the train (m/s²), and for how long (s).
 const CREEPS_WITHIN: f64 = 0.5;
 const CREEPS_FOR_S: f64 = 3.0;
-/// What is felt is within this of the truth, for as long (m/s²).
+/// Standard deviation of the acceleration of an inertial sensor (m/s²), with the same correlation time.
 const FELT_WITHIN: f64 = 0.06;
-/// How sharp the limits of steady creep are (part of the speed).
+/// Softness of the limits of steady creep (part of the speed).
 const CREEP_EDGE: f64 = 0.03;
-/// A wheel faster than the train in a slide pushes it up within this (m/s).
+/// Standard deviation of the bound that a wheel sets which is faster than a sliding train (m/s).
 const PUSHES: f64 = 0.2;
-/// How well a wheel that has reached the speed of the train tells it (m/s): in a slide and in a spin.
+/// Standard deviation of the speed from a wheel that has reached the train (m/s): in a slide and in a spin.
 const REACHED: [f64; 2] = [0.35, 0.1];
-/// Square of the deviations at which half of what is level has not reached the train.
+/// Squared innovation over its variance at which such a wheel has reached the train in half of the cases.
 const REACHES_WITHIN: f64 = 2.0;
 /// How long the error of a followed wheel lasts (s).
 const FOLLOWED_S: f64 = 0.15;
 
 impl Bank {
-    /// Lets what is known of sliding trains hold the filters that trust no counter.
-    pub(super) fn pull(&mut self, scene: &Scene, wheels: &[Compared; 2], t: f64) {
+    /// Corrects the filters that trust no counter.
+    pub(super) fn correct_slips(&mut self, scene: &Scene, wheels: &[Compared; 2], t: f64) {
         let side = self.side;
         // How fast the train can change its speed with both wheelsets slipping.
         let wanted = scene.commanded.unwrap_or(-side * SLIDES_BY);
@@ -49,7 +49,7 @@ impl Bank {
         let mut creep = self.filters.state(CREEPS);
         creep.acceleration(slides - creep.a, usual);
         creep_alike(&mut creep, scene, wheels, side, t);
-        // A train that slides does not run backwards, and accelerates as a train can.
+        // A sliding train does not run backwards, and it accelerates within its limits.
         let Range { low, high } = scene.acceleration;
         for (lane, mut state) in [(SLIPS, slip), (CREEPS, creep)] {
             state.v = larger(state.v, 0.0);
@@ -67,25 +67,27 @@ impl Bank {
         self.filters.keep_sound();
     }
 
-    /// Lets wheels that touch the speed of the train tell it to a train whose wheels slip.
+    /// Corrects the speed by wheels that touch it.
     ///
-    /// The wheel that is nearest to the train is no faster than it in a slide: it pushes the train up. A wheel that was
-    /// turned towards the train's speed hard and then goes on level has reached it, as nothing else stops it there but its
-    /// slide control: that tells the speed from above and from below.
+    /// In a slide no wheel is faster than the train, so that a faster wheel raises the estimate. A wheel that was accelerated
+    /// towards the train and then keeps its speed has reached the train, unless its slide control stopped it: that measures the
+    /// speed from both sides.
     fn touch(&mut self, train: &mut State, scene: &Scene, t: f64) {
         let [in_a_slide, in_a_spin] = REACHED;
         let reached = if self.side > 0.0 { in_a_slide } else { in_a_spin };
         let reached = reached * reached;
         let scales = self.scales(scene);
+        self.since_touch += t;
         for ((touch, wheel), scale) in self.touches.iter_mut().zip(&scene.wheels).zip(scales) {
-            let speed = touch.follow(wheel.counted * scale / t, train.a, t);
+            let speed = touch.follow((wheel.counted - wheel.late) * scale / t, train.a, t);
             let has_reached = touch.reached(self.side * (wheel.acceleration - train.a), t);
-            if !wheel.read || speed.abs() < SILENT {
+            self.since_touch = if has_reached { 0.0 } else { self.since_touch };
+            if !wheel.read || wheel.stuck || speed.abs() < SILENT {
                 continue;
             }
             let y = speed - train.v;
             let pushes = if self.side * y > 0.0 { t / (FOLLOWED_S * PUSHES * PUSHES) } else { 0.0 };
-            // What is further off than the train can be was stopped by its slide control.
+            // A wheel that is too far off was stopped by its slide control.
             let off = y * y / ((train.pvv + reached) * REACHES_WITHIN);
             let tells = if has_reached { 1.0 / (reached * (1.0 + off * off)) } else { 0.0 };
             train.speed(y, pushes + tells);
@@ -93,10 +95,11 @@ impl Bank {
     }
 }
 
-/// Wheels that creep alike creep by what they can, and accelerate with the train.
+/// Wheels that creep alike keep a possible creepage and accelerate with the train.
 fn creep_alike(train: &mut State, scene: &Scene, [a, b]: &[Compared; 2], side: f64, t: f64) {
     let [first, second] = &scene.wheels;
-    let nearest = match (first.read, second.read) {
+    let tells = |wheel: &WheelScene| wheel.read && !wheel.stuck;
+    let nearest = match (tells(first), tells(second)) {
         (true, true) => side * larger(side * a.speed, side * b.speed),
         (false, true) => b.speed,
         (true, false) => a.speed,
@@ -115,7 +118,7 @@ fn creep_alike(train: &mut State, scene: &Scene, [a, b]: &[Compared; 2], side: f
     }
 }
 
-/// Information of a period of `t` seconds about what stays within a deviation for so many seconds.
+/// Information from a period of `t` seconds on a quantity with this standard deviation and correlation time (s).
 fn lasting(deviation: f64, seconds: f64, t: f64) -> f64 {
     t / (2.0 * seconds * deviation * deviation)
 }

@@ -1,23 +1,23 @@
-//! Whether a wheel that slipped has been turned to the speed of the train.
+//! Detects a slipping wheel that has reached the speed of the train.
 //!
-//! A wheel whose brake is let go is turned up by the rail at 10 m/s² and more. If it goes on level afterwards, it turns
-//! with the train; if the brake takes hold of it before, it turns down again at once and is level for no time.
+//! The rail accelerates a wheel whose brake is released by 10 m/s² and more. If the wheel then keeps its speed, it turns with the
+//! train. If the brake grips first, the wheel decelerates again at once.
 
-/// A wheel that is turned up accelerates by more than this (m/s²), beyond what the train does.
+/// A wheel that returns to the train accelerates by more than this (m/s²), relative to the train.
 const TURNED_UP: f64 = 4.0;
-/// It is level while it differs from the train by less (m/s²): noise of an acceleration by counts.
+/// It keeps its speed while its relative acceleration is smaller (m/s²): the noise of counts.
 const LEVEL: f64 = 1.5;
-/// For so long (s), which is as long as a followed speed looks back.
+/// It has to keep it for so long (s): the time constant of its tracker.
 const LEVEL_FOR_S: f64 = 0.25;
-/// How far its speed looks back (s).
+/// Time constant of the speed (s).
 const LOOKS_BACK_S: f64 = 0.1;
-/// How long having been turned up counts (s).
+/// The wheel has to keep its speed within this time after it was accelerated (s).
 const COUNTS_FOR_S: f64 = 1.0;
 
-/// Follows one wheel.
+/// One wheel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Touch {
-    /// Speed by the last counts (m/s), which never runs ahead of a wheel that is turned up.
+    /// Speed from the last counts (m/s). It never exceeds that of an accelerating wheel.
     speed: f64,
     since_turned_up: f64,
     level_for: f64,
@@ -28,18 +28,18 @@ impl Touch {
         Self { speed: 0.0, since_turned_up: f64::INFINITY, level_for: 0.0 }
     }
 
-    /// Its speed by the count of `t` seconds, as a wheel that goes with a train of acceleration `a`.
+    /// Takes in the count of `t` seconds. Returns its speed if it turns with a train of acceleration `a`.
     pub(super) fn follow(&mut self, counted: f64, a: f64, t: f64) -> f64 {
         self.speed += (counted - self.speed) * (t / (LOOKS_BACK_S + t));
         self.speed + a * LOOKS_BACK_S
     }
 
-    /// Whether it has just reached the train: `beyond` is its acceleration less the train's, towards the train (m/s²).
+    /// Whether it has just reached the train. `beyond` is its relative acceleration towards the train (m/s²).
     pub(super) fn reached(&mut self, beyond: f64, t: f64) -> bool {
         self.since_turned_up = if beyond > TURNED_UP {
             0.0
         } else if beyond < -TURNED_UP {
-            // The brake has taken hold of it.
+            // The brake has gripped.
             f64::INFINITY
         } else {
             self.since_turned_up + t
@@ -47,7 +47,7 @@ impl Touch {
         self.level_for = if beyond.abs() < LEVEL { self.level_for + t } else { 0.0 };
         let reached = self.level_for >= LEVEL_FOR_S && self.since_turned_up < COUNTS_FOR_S;
         if reached {
-            // Once for each time it is turned up.
+            // Once for each acceleration.
             self.since_turned_up = f64::INFINITY;
         }
         reached

@@ -1,27 +1,27 @@
-//! From what a tachometer reports to how far its wheel turned, with the quality of every sample.
+//! Turns the readings of a tachometer into rotation of its wheel, with the quality of every sample.
 //!
-//! Nothing is overwritten silently: a count that no wheel can have made is replaced by what its wheel was expected to
-//! turn, and said to be [`Quality::Substituted`]. One such count is a spike; a second in a row is passed on, and the
-//! first with it, because a real slide does not come alone. Whether a wheel or a fault made them, hypotheses decide.
+//! A count that no wheel can have made is replaced by the expected one and marked [`Quality::Substituted`]. One such count is a
+//! spike. A second in a row is passed on together with the first, because a real slide lasts; hypotheses decide whether a
+//! wheel or a fault made them.
 
 use super::period::{Count, Direction, WheelReading};
 use super::range::larger;
 
 /// Widths of running counters in use, narrowest first (bits).
 const COUNTER_BITS: [u32; 4] = [8, 16, 24, 32];
-/// Periods in a row in which the direction told has to contradict the train before it is taken for wired the wrong way.
+/// A sensor is taken to have swapped wires after its direction has contradicted the train in so many periods in a row.
 const CONTRADICTIONS: u32 = 20;
-/// Part of a period by which a span has to exceed it before rows are taken to be lost.
+/// Rows are taken to be lost if a time step is longer than this (periods).
 const LOST_ROWS: f64 = 1.5;
 
-/// How good one sample is.
+/// The quality of one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Quality {
     /// As read.
     Ok,
     /// Replaced by what was expected: a spike, a drop-out or pulses of lost rows.
     Substituted,
-    /// Nothing was read, or nothing that can be a count; what was expected stands for it.
+    /// Nothing was read that can be a count; the expected count stands in.
     Missing,
 }
 
@@ -30,35 +30,37 @@ pub enum Quality {
 pub struct Turn {
     /// Pulses, negative backwards. A whole number unless something was substituted.
     pub pulses: f64,
-    /// How good that is.
+    /// Its quality.
     pub quality: Quality,
-    /// By how many pulses it may be wrong, beyond the one that every count may be.
+    /// How many pulses it may be wrong by, beyond the one of every count.
     pub doubt: f64,
+    /// Those of its pulses that were not read in the period: they belong to the one before, or are only expected.
+    pub late: f64,
 }
 
-/// What the tachometer is expected to say, in signed pulses of the period.
+/// The expected count of a period, in signed pulses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Expected {
     /// The most likely count.
     pub pulses: f64,
-    /// By how much it can be larger ...
+    /// How much more the wheel can count ...
     pub more: f64,
-    /// ... or smaller without surprise.
+    /// ... and how much less.
     pub fewer: f64,
-    /// By how much it can differ without surprise if the wheel rolls.
+    /// How much the count of a rolling wheel can differ.
     pub rolling: f64,
-    /// The most pulses that the fastest wheel gives.
+    /// Pulses of the fastest wheel.
     pub most: f64,
 }
 
-/// Which way the train moves.
+/// The direction of travel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Heading {
-    /// 1 the way in which distance grows, −1 the other.
-    pub way: f64,
-    /// It is too fast to have turned round: a sensor that says so is wrong.
+    /// 1 where distance grows, −1 where it falls.
+    pub direction: f64,
+    /// The train is too fast to have reversed: a sensor that reports it is wrong.
     pub certain: bool,
-    /// The two sensors say different ways, so that neither is believed.
+    /// The two sensors report different directions, so that neither counts.
     pub disputed: bool,
 }
 
@@ -71,19 +73,21 @@ pub struct Tachometer {
     assumed: f64,
     /// Periods since the last reading, this one included.
     unread: f64,
-    /// What was taken away from the last sample as a spike.
+    /// Pulses withheld from the last sample as a spike.
     withheld: f64,
-    /// The sensor is wired the wrong way round: 1 or −1.
+    /// The last sample was surprising and passed on, so that the next is passed on, too. Withheld again and again, counts would feed
+    /// the expectation that they are compared with.
+    passes: bool,
+    /// −1 for a sensor with swapped wires, otherwise 1.
     wiring: f64,
     contradictions: u32,
-    /// The way it turned at the last pulse, and whether this period's pulses were the other way: some of them may have
-    /// been both.
+    /// The direction at the last pulse, and whether it changed in this period, which may then hold pulses of both.
     last_way: f64,
     turned_round: bool,
 }
 
 impl Tachometer {
-    /// A tachometer that has said nothing yet.
+    /// A tachometer before its first reading.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -91,6 +95,7 @@ impl Tachometer {
             assumed: 0.0,
             unread: 0.0,
             withheld: 0.0,
+            passes: false,
             wiring: 1.0,
             contradictions: 0,
             last_way: 0.0,
@@ -115,13 +120,23 @@ impl Tachometer {
                 self.assumed += expected.pulses;
                 self.unread += periods;
                 self.withheld = 0.0;
-                return Turn { pulses: expected.pulses, quality: Quality::Missing, doubt: f64::INFINITY };
+                return Turn {
+                    pulses: expected.pulses,
+                    quality: Quality::Missing,
+                    doubt: f64::INFINITY,
+                    late: 0.0,
+                };
             }
             Increment::Restarted => {
                 self.assumed = 0.0;
                 self.unread = 0.0;
                 self.withheld = 0.0;
-                return Turn { pulses: expected.pulses, quality: Quality::Missing, doubt: f64::INFINITY };
+                return Turn {
+                    pulses: expected.pulses,
+                    quality: Quality::Missing,
+                    doubt: f64::INFINITY,
+                    late: 0.0,
+                };
             }
         };
         self.assumed = 0.0;
@@ -129,21 +144,27 @@ impl Tachometer {
         let surprise = pulses - expected.pulses;
         if surprise <= expected.more && surprise >= -expected.fewer {
             self.withheld = 0.0;
+            self.passes = false;
             let quality = if whole { Quality::Ok } else { Quality::Substituted };
             let unusual =
                 if whole && surprise.abs() <= expected.rolling { 0.0 } else { surprise.abs() + 1.0 };
             let either_way = self.turned_round || heading.disputed;
             let doubt = unusual + if either_way { 2.0 * pulses.abs() } else { 0.0 };
-            return Turn { pulses, quality, doubt };
+            return Turn { pulses, quality, doubt, late: 0.0 };
         }
-        if self.withheld * surprise > 0.0 {
-            let believed = pulses + self.withheld;
+        if self.passes || self.withheld * surprise > 0.0 {
+            let late = self.withheld;
             self.withheld = 0.0;
-            return Turn { pulses: believed, quality: Quality::Ok, doubt: surprise.abs() + 1.0 };
+            self.passes = true;
+            let doubt = surprise.abs() + 1.0;
+            return Turn { pulses: pulses + late, quality: Quality::Ok, doubt, late };
         }
         let stand_in = libm::round(expected.pulses);
         self.withheld = pulses - stand_in;
-        Turn { pulses: stand_in, quality: Quality::Substituted, doubt: expected.more.max(expected.fewer) }
+        let doubt = expected.more.max(expected.fewer);
+        // The expectation may have run ahead of the wheel.
+        let late = if self.withheld * heading.direction < 0.0 { -self.withheld } else { 0.0 };
+        Turn { pulses: stand_in, quality: Quality::Substituted, doubt, late }
     }
 
     /// Signed pulses since the last reading, if they can be a count.
@@ -164,7 +185,7 @@ impl Tachometer {
                 match moved {
                     Some(turned) => {
                         let told = if turned < 0.0 { -self.wiring } else { self.wiring };
-                        // A running counter is counted down by a tooth that is shaken back: its sign is its own.
+                        // A running counter counts backwards itself.
                         let heading = Heading { disputed: false, ..heading };
                         let turned =
                             turned.abs() * if turned == 0.0 { 1.0 } else { self.believed(told, heading) };
@@ -186,7 +207,7 @@ impl Tachometer {
                 let counted = counted * way;
                 let expected_in_all = expected.pulses + self.assumed;
                 let expected_in_one = expected_in_all / larger(span, 1.0);
-                // A count after lost rows may cover them or its own period only: whichever is nearer to the expected.
+                // A count after lost rows covers them, or its own period only: whichever is nearer to the expectation.
                 let covers_one =
                     span > LOST_ROWS && (counted - expected_in_one).abs() < (counted - expected_in_all).abs();
                 if covers_one {
@@ -198,25 +219,25 @@ impl Tachometer {
         }
     }
 
-    /// 1, or −1 for a sensor that was found to be wired the wrong way round.
+    /// −1 for a sensor that was found to have swapped wires, otherwise 1.
     #[must_use]
     pub fn wiring(&self) -> f64 {
         self.wiring
     }
 
-    /// Which way the pulses count, minding a sensor that is wired the wrong way round.
+    /// The sign of the pulses, with swapped wires taken into account.
     fn sign(&mut self, direction: Direction, heading: Heading, turned: bool) -> f64 {
         let told = match direction {
-            Direction::Unknown => return heading.way,
+            Direction::Unknown => return heading.direction,
             Direction::Forward => self.wiring,
             Direction::Backward => -self.wiring,
         };
-        if turned { self.believed(told, heading) } else { heading.way }
+        if turned { self.believed(told, heading) } else { heading.direction }
     }
 
-    /// Which way a wheel turned that is told to have turned so.
+    /// The direction of a wheel whose sensor reports `told`.
     fn believed(&mut self, told: f64, heading: Heading) -> f64 {
-        if told == heading.way {
+        if told == heading.direction {
             self.contradictions = 0;
             return told;
         }
@@ -227,11 +248,11 @@ impl Tachometer {
                 self.contradictions = 0;
             }
         }
-        if heading.certain || heading.disputed { heading.way } else { told }
+        if heading.certain || heading.disputed { heading.direction } else { told }
     }
 }
 
-/// What a reading adds.
+/// What a reading contributes.
 enum Increment {
     /// Pulses since the last reading, and whether all of them were read.
     Turned { pulses: f64, whole: bool },
@@ -247,7 +268,7 @@ impl Default for Tachometer {
     }
 }
 
-/// What a running counter moved by, through a wrap if only that is possible.
+/// The difference of a running counter, through a wrap if nothing else is possible.
 fn unwrapped(before: i64, now: i64, most: f64) -> Option<f64> {
     let moved = now.saturating_sub(before) as f64;
     if moved.abs() <= most {
@@ -269,7 +290,7 @@ mod tests {
 
     use super::*;
 
-    const FORWARD: Heading = Heading { way: 1.0, certain: true, disputed: false };
+    const FORWARD: Heading = Heading { direction: 1.0, certain: true, disputed: false };
     const CALM: Expected = Expected { pulses: 20.0, more: 3.0, fewer: 3.0, rolling: 1.5, most: 60.0 };
 
     fn turns(counts: &[Count]) -> Vec<Turn> {
@@ -345,5 +366,11 @@ mod tests {
         }
         // At standstill it is now read the right way round.
         assert_eq!(tachometer.read(&reading, 1.0, Heading { certain: false, ..FORWARD }, &CALM).pulses, 20.0);
+    }
+
+    #[test]
+    fn a_sensor_that_dies_is_withheld_once_and_then_read() {
+        let pulses: Vec<f64> = turns(&[Count::Pulses(0); 6]).iter().map(|turn| turn.pulses).collect();
+        assert_eq!(pulses, [20.0, -20.0, 0.0, 0.0, 0.0, 0.0]);
     }
 }

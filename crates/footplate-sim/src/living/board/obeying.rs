@@ -1,13 +1,16 @@
 //! What the virtual board does with a request, and what it answers.
 
 use footplate_core::track::Leg;
-use footplate_core::{SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
-use footplate_wire::dcc_ex::{Power, Reply, Request, SPEED_PER_STEP, Throttle};
+use footplate_core::{SensorId, Timestamp, TrainId, TurnoutId};
+use footplate_wire::dcc_ex::{Power, Reply, Request, Throttle};
 
 use super::{IDENTITY, Slot, VirtualBoard, line};
+use crate::living::decoder::DecoderSpeed;
 
 /// Locomotives that it can drive: as many as a Mega.
 const SLOTS: usize = 50;
+/// The steps of a decoder.
+const HIGHEST: u8 = 126;
 
 impl VirtualBoard<'_> {
     /// Does what a request asks for; returns the answer.
@@ -116,15 +119,11 @@ impl VirtualBoard<'_> {
 
     /// The track carries a locomotive's speed and direction.
     fn command(&mut self, at: Timestamp, slot: Slot) {
-        let train = TrainId(slot.cab);
-        if self.world.runs_forward(train) == Some(!slot.forward) {
-            self.world.turn(train, at);
-        }
-        match slot.throttle {
-            Throttle::Speed(speed) => self.world.tell(train, step_of(speed), at),
-            // What is turned around twice while it runs stops at once and leads with the same end.
-            Throttle::EmergencyStop => (0..2).for_each(|_| self.world.turn(train, at)),
-        }
+        let speed = match slot.throttle {
+            Throttle::Speed(step) => DecoderSpeed::Step { step, highest: HIGHEST },
+            Throttle::EmergencyStop => DecoderSpeed::EmergencyStop,
+        };
+        self.world.carry(TrainId(slot.cab), slot.forward, speed, at);
     }
 
     fn state_of(&self, cab: u16) -> String {
@@ -155,10 +154,4 @@ impl VirtualBoard<'_> {
             self.world.points.power(turnout, Leg::from_curved(curved), at);
         }
     }
-}
-
-/// The step of the simulated decoders that is nearest to a speed of the board; none but 0 stops.
-fn step_of(speed: u8) -> SpeedStep {
-    let nearest = (speed + SPEED_PER_STEP / 2) / SPEED_PER_STEP;
-    SpeedStep::new(nearest.max(u8::from(speed > 0))).unwrap_or_default()
 }

@@ -1,12 +1,13 @@
 //! What the virtual Z21 does with a datagram, and what it says to whom.
 
-use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{TimeSpan, Timestamp, TrainId};
 use footplate_wire::z21::{
     Broadcasts, CentralState, Dataset, Datasets, Feedback, Firmware, FunctionSwitch, Lock, LocomotiveState,
     Reply, Request, Steps, SystemState, Throttle, TurnoutPosition,
 };
 
 use super::{ANSWER_S, Connected, FORGOTTEN_AFTER, MOST_CLIENTS, MOST_SUBSCRIBED, Slot, VirtualZ21};
+use crate::living::decoder::DecoderSpeed;
 
 /// What it says it is: a Z21, with firmware 1.42.
 const KIND: u32 = 0x0201;
@@ -17,8 +18,6 @@ const SERIAL_NUMBER: u32 = 101_953;
 /// On the X-BUS.
 const X_BUS_VERSION: u8 = 0x40;
 const X_BUS_STATION: u8 = 0x12;
-/// The program's highest step.
-const DECODER_STEPS: u16 = 14;
 
 impl VirtualZ21<'_> {
     /// Does what a datagram asks for.
@@ -220,17 +219,14 @@ impl VirtualZ21<'_> {
 
     /// The track carries a locomotive's speed and direction, unless all are stopped.
     fn command(&mut self, at: Timestamp, slot: Slot) {
-        let train = TrainId(slot.address);
-        if self.world.runs_forward(train) == Some(!slot.forward) {
-            self.world.turn(train, at);
-        }
         let is_stopped = self.central.0 & CentralState::STOPPED != 0;
-        match slot.throttle {
-            Throttle::Stop => self.world.tell(train, SpeedStep::STAND, at),
-            Throttle::Step(step) if !is_stopped => self.world.tell(train, step_of(step, slot.steps), at),
-            // What is turned around twice while it runs stops at once and leads with the same end.
-            Throttle::Step(_) | Throttle::EmergencyStop => (0..2).for_each(|_| self.world.turn(train, at)),
-        }
+        let highest = slot.steps.highest();
+        let speed = match slot.throttle {
+            Throttle::Stop => DecoderSpeed::Step { step: 0, highest },
+            Throttle::Step(step) if !is_stopped => DecoderSpeed::Step { step, highest },
+            Throttle::Step(_) | Throttle::EmergencyStop => DecoderSpeed::EmergencyStop,
+        };
+        self.world.carry(TrainId(slot.address), slot.forward, speed, at);
     }
 
     fn state_of(&self, address: u16) -> LocomotiveState {
@@ -299,11 +295,4 @@ impl VirtualZ21<'_> {
 
 fn is_x_bus(dataset: &Dataset<'_>) -> bool {
     dataset.x_bus().is_some()
-}
-
-/// The step of the simulated decoders that is nearest to one of the station's; none but 0 stops.
-fn step_of(step: u8, steps: Steps) -> SpeedStep {
-    let highest = u16::from(steps.highest());
-    let nearest = (u16::from(step) * DECODER_STEPS + highest / 2) / highest;
-    SpeedStep::new(nearest.clamp(1, DECODER_STEPS) as u8).unwrap_or_default()
 }

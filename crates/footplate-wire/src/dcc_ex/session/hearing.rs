@@ -1,52 +1,45 @@
-//! What becomes of the messages that come.
+//! Handles messages from the board.
 
 use alloc::borrow::ToOwned;
 
-use footplate_core::{Command, EventKind, Report, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
+use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
 
 use super::super::opening::Opening;
 use super::super::outstanding::Awaited;
 use super::super::reply::{Malformed, Reply};
 use super::super::request::{Throttle, speed_of};
-use super::super::sensors::Change;
 use super::super::settings::TurnoutRequests;
 use super::super::time_model::occupied;
 use super::Client;
+use crate::outstanding::Awaited as _;
+use crate::sensors::Change;
 use crate::session::LinkNotice;
 
 impl Client {
     pub(super) fn hear(&mut self, now: Timestamp, byte: u8) {
         let message = self.framing.push(byte).map(|text| (text.len(), Reply::read(text)));
         let unread = self.framing.take_unread();
-        if unread > 0 {
-            self.hear_noise(unread);
-        }
+        self.dialogue.hear_noise(unread);
         match message {
             Some((_, Ok(reply))) => {
-                let was_silent = self.silence.heard();
+                let was_silent = self.dialogue.hear(now);
                 if let Some(reply) = reply {
                     self.take(now, reply);
                 }
-                self.heard = now;
                 if was_silent && self.opening.is_open() {
                     self.verify();
                 }
             }
-            Some((length, Err(Malformed))) => self.hear_noise(length),
+            Some((length, Err(Malformed))) => self.dialogue.hear_noise(length),
             None => {}
         }
     }
 
-    fn hear_noise(&mut self, bytes: usize) {
-        if let Some(notice) = self.silence.heard_noise(bytes) {
-            self.notify(notice);
-        }
-    }
-
     fn take(&mut self, now: Timestamp, reply: Reply) {
-        let answered = self.outstanding.answered(&reply);
+        let answered = self.dialogue.outstanding.answered(&reply);
         if let Some(on) = reply.main_power() {
-            self.hear_power(on);
+            let is_lost = self.dialogue.is_power_lost(on, &Awaited::Power(false));
+            self.dialogue.hear_power(on, is_lost);
         }
         match reply {
             Reply::Identity(identity) => self.identified(now, identity.trim(), answered.is_some()),
@@ -63,20 +56,22 @@ impl Client {
                 self.opened(now);
             }
             Reply::Failed => {
-                if let Some(turnout) = self.outstanding.refused() {
-                    self.notify(LinkNotice::TurnoutRefused { turnout });
+                let refused = self.dialogue.outstanding.take_first(|one| one.awaited.turnout().is_some());
+                if let Some(turnout) = refused.and_then(|refused| refused.awaited.turnout()) {
+                    self.dialogue.notify(LinkNotice::TurnoutRefused { turnout });
                 }
             }
             _ => {}
         }
-        self.end_if_confirmed();
+        self.dialogue.end_if_confirmed();
     }
 
     fn identified(&mut self, now: Timestamp, identity: &str, was_asked: bool) {
         match &self.opening {
             Opening::Banner { .. } | Opening::Identity => {
-                let was_reset = self.opening.awaits_banner() && self.locomotives.iter().next().is_some();
-                self.notify(LinkNotice::Identified { identity: identity.to_owned() });
+                let was_reset =
+                    self.opening.awaits_banner() && self.dialogue.locomotives.iter().next().is_some();
+                self.dialogue.notify(LinkNotice::Identified { identity: identity.to_owned() });
                 if was_reset {
                     self.restarted();
                 }
@@ -91,57 +86,28 @@ impl Client {
         }
     }
 
-    /// Asks for all states, and how each locomotive is driven.
+    /// Reads all states again, including every locomotive's.
     fn verify(&mut self) {
-        self.opening = Opening::ask_states(&self.settings, self.power);
-        let known = self.locomotives.iter().filter(|locomotive| locomotive.forward.is_some());
-        self.unverified = known.map(|locomotive| locomotive.train).collect();
+        self.opening = Opening::ask_states(&self.settings, self.dialogue.power);
+        self.unverified = self.dialogue.directed();
     }
 
-    /// The board has forgotten everything: trains have stopped, and their directions are written again.
+    /// Handles a board that was reset.
     fn restarted(&mut self) {
-        self.notify(LinkNotice::Restarted);
-        self.outstanding.clear();
-        self.waiting.clear();
+        self.dialogue.restarted();
         self.unverified.clear();
-        for locomotive in self.locomotives.iter_mut() {
-            locomotive.step = SpeedStep::STAND;
-        }
-        let driven: alloc::vec::Vec<TrainId> =
-            self.locomotives.iter().filter(|known| known.is_driven).map(|known| known.train).collect();
-        for train in driven {
-            // Stops are always taken.
-            let _ = self.waiting.push(Command::Speed { train, step: SpeedStep::STAND });
-        }
     }
 
     fn opened(&mut self, now: Timestamp) {
         self.opening = Opening::Open { since: now };
         self.blind_since = None;
-        self.notify(LinkNotice::Answers);
+        self.dialogue.notify(LinkNotice::Answers);
     }
 
-    fn hear_power(&mut self, on: bool) {
-        if self.is_powered && !on && self.power && !self.outstanding.has(Awaited::Power(false)) {
-            self.notify(LinkNotice::PowerLost);
-        }
-        self.is_powered = on;
-        if !on {
-            self.farewell.power_went_off();
-        }
-    }
-
-    /// How a train is driven, and whether that is what was asked for.
+    /// Compares a train's state with the commanded one.
     fn hear_of_locomotive(&mut self, train: TrainId, driven: Driven, is_confirmed: bool) {
-        let is_outstanding = self.outstanding.blocks(train, false).is_some();
-        let Some(locomotive) = self.locomotives.get_mut(train) else {
-            // Asked for before its first command, or driven by others.
-            if self.waiting.iter().any(|command| super::train_of(command) == Some(train)) {
-                self.locomotives.know(train);
-                self.hear_of_locomotive(train, driven, is_confirmed);
-            }
-            return;
-        };
+        let is_outstanding = self.dialogue.outstanding.blocks(train, false).is_some();
+        let Some(locomotive) = self.dialogue.locomotive(train) else { return };
         if is_confirmed {
             locomotive.is_stopped = locomotive.step == SpeedStep::STAND;
             return;
@@ -160,33 +126,23 @@ impl Client {
             return;
         }
         if driven.register < 0 {
-            // The board does not drive it at all: it was restarted while nothing was heard of it.
+            // The board does not drive it: it was restarted while the line was silent.
             self.restarted();
             return;
         }
         let reversed = driven.forward != forward;
         locomotive.forward = Some(driven.forward);
         locomotive.is_stopped = false;
-        if self.farewell.has_begun() {
-            // Stops are always taken.
-            let _ = self.waiting.push(Command::Speed { train, step: SpeedStep::STAND });
-        }
-        self.notify(LinkNotice::OtherThrottle { train, reversed });
+        self.dialogue.stop_at_end(train);
+        self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed });
     }
 
     fn hear_of_turnout(&mut self, now: Timestamp, turnout: TurnoutId, thrown: bool, was_asked: bool) {
-        let known = self.turnouts.iter_mut().find(|(known, _)| *known == turnout);
-        let before = match known {
-            Some((_, lies)) => Some(core::mem::replace(lies, thrown)),
-            None => {
-                self.turnouts.push((turnout, thrown));
-                None
-            }
-        };
+        let before = self.dialogue.hear_of_turnout(turnout, thrown);
         let is_used = self.settings.turnouts == TurnoutRequests::Defined;
         if is_used && !was_asked && before == Some(!thrown) {
-            // Somebody else has thrown it: that is how it lies from now on.
-            self.enter(now, EventKind::Turnout { turnout, curved: thrown });
+            // Another throttle has thrown it.
+            self.dialogue.enter(now, EventKind::Turnout { turnout, curved: thrown });
         }
     }
 
@@ -195,18 +151,18 @@ impl Client {
         let sensor = SensorId(number);
         match self.sensors.heard(id, active, self.opening.is_listing()) {
             Change::Occupied => {
-                let (latest, width) = occupied(now, self.last_entry);
-                // It may have become occupied at any time since nothing was heard.
+                let (latest, width) = occupied(now, self.dialogue.last_entry);
+                // It may have become occupied at any time since the line was silent.
                 let width = self.blind_since.map_or(width, |since| width.max(latest - since));
-                self.enter(latest, EventKind::Sensor(Report { sensor, poll_interval: Some(width) }));
+                self.dialogue.report(sensor, latest, width);
             }
-            Change::HeldFromStart => self.notify(LinkNotice::HeldClosed { sensor }),
+            Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
             Change::None => {}
         }
     }
 }
 
-/// How the board drives a locomotive.
+/// A locomotive's state on the board.
 #[derive(Clone, Copy)]
 struct Driven {
     register: i16,

@@ -1,22 +1,22 @@
-//! Requests and commands as frames, and what is done when they are not answered.
+//! Sends requests and commands as frames, and handles missing answers.
 
 use footplate_core::{Command, EventKind, SpeedStep, Timestamp, TrainId};
 
 use super::super::frame::Frame;
 use super::super::message::{Direction, Message};
 use super::super::opening::Question;
-use super::super::outstanding::{Awaited, LIST_TRIES, MOST_TRIES, Outstanding};
+use super::super::outstanding::Awaited;
 use super::super::roster::LOCOMOTIVES_FILE;
 use super::super::settings::Transport;
 use super::super::solenoid::Solenoid;
 use super::super::speed::speed_of;
 use super::super::uid::Uid;
-use super::{Client, Outgoing, Query, position_of};
-use crate::queue::entry_of;
-use crate::session::{LinkNotice, Transmit};
+use super::{Client, Query, position_of};
+use crate::dialogue::Repeat;
+use crate::outstanding::Outgoing;
 
 impl Client {
-    pub(super) fn asking(&mut self, now: Timestamp, question: Question) -> Outgoing {
+    pub(super) fn asking(&mut self, now: Timestamp, question: Question) -> Outgoing<Awaited> {
         match question {
             Question::Ping => {
                 self.polled = now;
@@ -28,14 +28,18 @@ impl Client {
                 Outgoing::asks(Message::ModulePoll { uid: Uid::ALL, modules }, Awaited::Modules)
             }
             Question::Power => {
-                let message = if self.power { Message::Go(Uid::ALL) } else { Message::Stop(Uid::ALL) };
-                Outgoing::asks(message, Awaited::Power(self.power))
+                let message =
+                    if self.dialogue.power { Message::Go(Uid::ALL) } else { Message::Stop(Uid::ALL) };
+                Outgoing::asks(message, Awaited::Power(self.dialogue.power))
             }
-            Question::Roster => Outgoing::asks(Message::File(LOCOMOTIVES_FILE), Awaited::Roster),
+            Question::Roster => Outgoing::asks(
+                Message::File(LOCOMOTIVES_FILE),
+                Awaited::Roster { has_begun: self.roster.has_begun() },
+            ),
         }
     }
 
-    pub(super) fn query(&self, train: TrainId, query: Query) -> Outgoing {
+    pub(super) fn query(&self, train: TrainId, query: Query) -> Outgoing<Awaited> {
         let uid = self.uid(train);
         match query {
             Query::Speed => {
@@ -52,55 +56,36 @@ impl Client {
         self.roster.uid(train).unwrap_or_else(|| self.settings.locomotives.uid(train.0))
     }
 
-    /// The coil that has been powered for long enough is released.
-    pub(super) fn next_release(&mut self, now: Timestamp) -> Option<Outgoing> {
+    /// Releases the coil that was powered for long enough.
+    pub(super) fn next_release(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
         let Solenoid { turnout, curved, .. } = self.solenoid.take_if(|powered| now >= powered.release_at)?;
         let (uid, position) = (self.settings.turnout(turnout), position_of(curved));
         let message = Message::Accessory { uid, position, current: 0, time: None };
         Some(Outgoing::asks(message, Awaited::Accessory(turnout, uid, position, 0)))
     }
 
-    /// A request that was not answered in time, unless something newer waits or it was repeated often enough.
-    pub(super) fn next_repeat(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing> {
-        while let Some(due) = self.outstanding.take_due(now, only_urgent) {
-            let Outstanding { message, awaited, command, tries, .. } = due;
-            if command.is_some_and(|command| self.waiting.outdates(command)) {
-                continue;
-            }
-            // A list that was damaged on its way comes whole another time.
-            let most =
-                if awaited == Awaited::Roster && self.roster.has_begun() { LIST_TRIES } else { MOST_TRIES };
-            if tries >= most && due.may_be_given_up() {
-                if let Some(given_up) = self.given_up(awaited, command) {
-                    return Some(given_up);
+    /// Returns a request whose answer is overdue, unless it was repeated often enough.
+    pub(super) fn next_repeat(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
+        loop {
+            match self.dialogue.next_repeat(now, only_urgent)? {
+                Repeat::Again(outgoing) => return Some(outgoing),
+                Repeat::GivenUp(given_up) => {
+                    if let Some(instead) = self.instead_of(given_up.awaited) {
+                        return Some(instead);
+                    }
                 }
-                continue;
             }
-            // Once is no news on a network that loses datagrams.
-            if let Some(command) = command.filter(|_| tries > 1) {
-                self.notify(LinkNotice::Repeated { command });
-            }
-            return Some(Outgoing {
-                message,
-                awaited: Some(awaited),
-                command,
-                tries: tries.saturating_add(1),
-            });
         }
-        None
     }
 
-    /// The station does not answer this; what is done instead.
-    pub(super) fn given_up(&mut self, awaited: Awaited, command: Option<Command>) -> Option<Outgoing> {
-        if let Some(command) = command {
-            self.notify(LinkNotice::Unconfirmed { command });
-        }
+    /// Handles a request that the station does not answer; returns a request to send instead.
+    fn instead_of(&mut self, awaited: Awaited) -> Option<Outgoing<Awaited>> {
         match awaited {
             Awaited::Modules => self.has_modules = false,
             Awaited::AnyDirection(train, uid) => {
-                // It cannot be asked which end leads: it is commanded, so that it is known.
-                self.locomotives.know(train);
-                let locomotive = self.locomotives.get_mut(train)?;
+                // The direction cannot be read: it is commanded, so that it is known.
+                self.dialogue.locomotives.know(train);
+                let locomotive = self.dialogue.locomotives.get_mut(train)?;
                 if locomotive.forward.is_none() {
                     locomotive.forward = Some(true);
                     let message = Message::Direction { uid, direction: Some(Direction::Forward) };
@@ -112,8 +97,8 @@ impl Client {
         None
     }
 
-    /// The request of a command, and what was commanded by it.
-    pub(super) fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing {
+    /// Returns the request for a command, and notes what it commands.
+    pub(super) fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
         let (message, awaited) = match command {
             Command::Speed { train, step } => {
                 let uid = self.uid(train);
@@ -135,24 +120,18 @@ impl Client {
             }
             Command::PowerOff | Command::PowerOn => {
                 let on = command == Command::PowerOn;
-                self.power = on;
+                self.dialogue.power = on;
                 let message = if on { Message::Go(Uid::ALL) } else { Message::Stop(Uid::ALL) };
                 (message, Awaited::Power(on))
             }
         };
-        Outgoing { message, awaited: Some(awaited), command: Some(command), tries: 1 }
+        Outgoing::commands(command, message, Some(awaited))
     }
 
-    /// A train is commanded to run at a step, and the other way if it is reversed; returns whether its front end leads then.
-    pub(super) fn commanded(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> bool {
-        self.locomotives.know(train);
+    /// A train is commanded to run at a step, reversed or not; returns whether it runs forward then.
+    fn commanded(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> bool {
         self.suspected.retain(|other| *other != train);
-        let Some(locomotive) = self.locomotives.get_mut(train) else { return true };
-        if reverses {
-            locomotive.forward = Some(!locomotive.forward.unwrap_or(true));
-        }
-        (locomotive.step, locomotive.is_driven, locomotive.is_stopped) = (step, true, false);
-        locomotive.forward.unwrap_or(true)
+        self.dialogue.commanded(train, step, reverses)
     }
 
     pub(super) fn write(&mut self, message: Message, is_response: bool) {
@@ -165,21 +144,13 @@ impl Client {
                 line
             }
         };
-        self.output.push_back(Transmit::Message(bytes));
+        self.dialogue.write(bytes);
     }
 
-    pub(super) fn send(&mut self, now: Timestamp, outgoing: Outgoing) {
-        let Outgoing { message, awaited, command, tries } = outgoing;
-        self.pacing.sent(now);
-        self.write(message, false);
-        if let Some(awaited) = awaited {
-            self.outstanding.push(Outstanding { message, awaited, command, sent: now, tries });
-            self.silence.asked(now);
-        }
-        let Some(kind) = command.and_then(|command| entry_of(&command, tries)) else { return };
-        if let EventKind::Turnout { turnout, curved } = kind {
+    pub(super) fn send(&mut self, now: Timestamp, outgoing: Outgoing<Awaited>) {
+        self.write(outgoing.request, false);
+        if let Some(EventKind::Turnout { turnout, curved }) = self.dialogue.sent(now, outgoing) {
             self.solenoid = Some(Solenoid::powered(turnout, curved, now));
         }
-        self.enter(now, kind);
     }
 }

@@ -1,18 +1,20 @@
-//! What becomes of the frames that come.
+//! Handles frames from the bus.
 
 use alloc::format;
 
-use footplate_core::{Command, EventKind, Report, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
+use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
 
 use super::super::contacts::News;
 use super::super::frame::Frame;
 use super::super::message::{ContactChange, Direction, Message, kind_in_words};
-use super::super::opening::Opening;
+use super::super::opening::Question;
 use super::super::outstanding::Awaited;
 use super::super::speed::step_of;
 use super::super::time_model::{CONTACTS_PER_MODULE, Order};
 use super::super::uid::Uid;
 use super::{Client, Query};
+use crate::opening::Opening;
+use crate::queue::train_of;
 use crate::session::LinkNotice;
 
 /// What this program says of itself when it is asked: the version of the protocol that it speaks, and a device without a cable of its
@@ -24,24 +26,19 @@ impl Client {
     pub(super) fn hear(&mut self, now: Timestamp, byte: u8) {
         let frame = self.framing.push(byte);
         let unread = self.framing.take_unread() + self.framing.take_refused();
-        if unread > 0
-            && let Some(notice) = self.silence.heard_noise(unread)
-        {
-            self.notify(notice);
-        }
+        self.dialogue.hear_noise(unread);
         let Some(frame) = frame else { return };
         let is_own = frame.hash == self.hash && !frame.is_response;
         if is_own {
             // An echo says nothing of the station.
             return;
         }
-        let was_silent = self.silence.heard();
-        self.heard = now;
+        let was_silent = self.dialogue.hear(now);
         self.take(now, &frame);
         if was_silent && self.opening.is_open() {
             self.verify();
         }
-        self.end_if_confirmed();
+        self.dialogue.end_if_confirmed();
     }
 
     fn take(&mut self, now: Timestamp, frame: &Frame) {
@@ -53,25 +50,25 @@ impl Client {
                 self.write(participant, true);
             }
             (Message::StreamBegins { length, .. }, _) => {
-                self.outstanding.goes_on(Awaited::Roster, now);
+                self.dialogue.outstanding.goes_on(Awaited::Roster { has_begun: true }, now);
                 self.roster.begins(length);
             }
             (Message::StreamGoesOn(bytes), _) => {
-                self.outstanding.goes_on(Awaited::Roster, now);
+                self.dialogue.outstanding.goes_on(Awaited::Roster { has_begun: true }, now);
                 if self.roster.goes_on(bytes) == Some(true) {
-                    self.outstanding.take(Awaited::Roster);
+                    self.dialogue.outstanding.take(&Awaited::Roster { has_begun: true });
                 }
             }
             (Message::Overload { .. }, _) => self.hear_power(false),
             (message, true) => self.respond(now, message),
-            // What others ask of the station is none of this program's business until it is confirmed.
+            // Requests of other programs count only when the station confirms them.
             _ => {}
         }
     }
 
     /// The station confirms or reports something.
     fn respond(&mut self, now: Timestamp, message: Message) {
-        let answered = self.outstanding.answered(message).map(|outstanding| outstanding.awaited);
+        let answered = self.dialogue.outstanding.answered(&message).map(|outstanding| outstanding.awaited);
         match message {
             Message::Participant { uid, version, kind } => self.hear_of_participant(uid, version, kind),
             Message::Go(_) => self.hear_power(true),
@@ -115,12 +112,16 @@ impl Client {
 
     /// The train of a number on the bus, if it was ever commanded here.
     fn train(&self, uid: Uid) -> Option<TrainId> {
-        let known = self.locomotives.iter().map(|locomotive| locomotive.train);
-        known.chain(self.waiting.iter().filter_map(super::train_of)).find(|train| self.uid(*train) == uid)
+        let known = self.dialogue.locomotives.iter().map(|locomotive| locomotive.train);
+        known.chain(self.dialogue.waiting.iter().filter_map(train_of)).find(|train| self.uid(*train) == uid)
     }
 
     fn running(&self) -> alloc::vec::Vec<TrainId> {
-        let runs = self.locomotives.iter().filter(|known| known.is_driven && known.step != SpeedStep::STAND);
+        let runs = self
+            .dialogue
+            .locomotives
+            .iter()
+            .filter(|known| known.is_driven && known.step != SpeedStep::STAND);
         runs.map(|locomotive| locomotive.train).collect()
     }
 
@@ -133,15 +134,20 @@ impl Client {
             self.participants.push(uid);
         }
         let identity = format!("{}, number {:08X}, version {major}.{minor}", kind_in_words(kind), uid.0);
-        self.notify(LinkNotice::Identified { identity });
+        self.dialogue.notify(LinkNotice::Identified { identity });
     }
 
-    /// Asks for all states, and how each locomotive is driven.
+    /// Reads all states again, including every locomotive's.
     pub(super) fn verify(&mut self) {
-        self.opening = if self.roster.list().is_empty() { Opening::begin() } else { Opening::again() };
+        let is_listed = !self.roster.list().is_empty();
+        let questions: &[Question] = if is_listed { &Question::AGAIN } else { &Question::ALL };
+        self.opening = Opening::asking(questions.iter().copied());
         self.has_modules = true;
-        let known = self.locomotives.iter().filter(|locomotive| locomotive.forward.is_some());
-        let queries = known.flat_map(|known| [(known.train, Query::Direction), (known.train, Query::Speed)]);
+        let queries = self
+            .dialogue
+            .directed()
+            .into_iter()
+            .flat_map(|train| [(train, Query::Direction), (train, Query::Speed)]);
         self.unverified = queries.collect();
     }
 
@@ -149,20 +155,15 @@ impl Client {
     pub(super) fn opened(&mut self) {
         self.opening = Opening::Open;
         self.is_blind = false;
-        self.notify(LinkNotice::Answers);
+        self.dialogue.notify(LinkNotice::Answers);
     }
 
     fn hear_power(&mut self, on: bool) {
-        if self.is_powered && !on && self.power && !self.outstanding.has(Awaited::Power(false)) {
-            self.notify(LinkNotice::PowerLost);
-        }
-        self.is_powered = on;
-        if !on {
-            self.farewell.power_went_off();
-        }
+        let is_lost = self.dialogue.is_power_lost(on, &Awaited::Power(false));
+        self.dialogue.hear_power(on, is_lost);
     }
 
-    /// Something else was said of a train than was commanded: an old frame, or another throttle. It is asked for.
+    /// Reads the state of a train that does not fit the commands: it may be an old frame, or another throttle.
     fn suspect(&mut self, train: TrainId, query: Query) {
         if !self.suspected.contains(&train) {
             self.suspected.push(train);
@@ -173,8 +174,9 @@ impl Client {
     }
 
     fn hear_of_speed(&mut self, train: TrainId, step: SpeedStep, answered: Option<Awaited>) {
-        let is_outstanding = self.outstanding.has(Awaited::Speed(train, Uid::ALL, step));
-        let Some(locomotive) = self.locomotives.get_mut(train).filter(|known| known.is_driven) else {
+        let is_outstanding = self.dialogue.outstanding.has(&Awaited::Speed(train, Uid::ALL, step));
+        let Some(locomotive) = self.dialogue.locomotives.get_mut(train).filter(|known| known.is_driven)
+        else {
             return;
         };
         if matches!(answered, Some(Awaited::Speed(..))) {
@@ -187,25 +189,22 @@ impl Client {
         if answered.is_none() {
             return self.suspect(train, Query::Speed);
         }
-        // It was asked for and is not what was commanded.
+        // The station confirms a state that was not commanded.
         let was_blind = self.is_blind;
         (locomotive.step, locomotive.is_stopped) = (step, false);
-        if self.farewell.has_begun() {
-            // Stops are always taken.
-            let _ = self.waiting.push(Command::Speed { train, step: SpeedStep::STAND });
-        }
+        self.dialogue.stop_at_end(train);
         if was_blind && step == SpeedStep::STAND {
-            self.notify(LinkNotice::Restarted);
-            let _ = self.waiting.push(Command::Speed { train, step: SpeedStep::STAND });
+            self.dialogue.notify(LinkNotice::Restarted);
+            self.dialogue.stop(train);
         } else {
-            self.notify(LinkNotice::OtherThrottle { train, reversed: false });
+            self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed: false });
         }
     }
 
     fn hear_of_direction(&mut self, train: TrainId, forward: bool, answered: Option<Awaited>) {
-        let is_outstanding = self.outstanding.has(Awaited::Direction(train, Uid::ALL, forward));
-        self.locomotives.know(train);
-        let Some(locomotive) = self.locomotives.get_mut(train) else { return };
+        let is_outstanding = self.dialogue.outstanding.has(&Awaited::Direction(train, Uid::ALL, forward));
+        self.dialogue.locomotives.know(train);
+        let Some(locomotive) = self.dialogue.locomotives.get_mut(train) else { return };
         if matches!(answered, Some(Awaited::Direction(..))) {
             // A station sets the speed to 0 with it.
             locomotive.is_stopped |= locomotive.step == SpeedStep::STAND;
@@ -222,21 +221,15 @@ impl Client {
             return self.suspect(train, Query::Direction);
         }
         (locomotive.forward, locomotive.step) = (Some(forward), SpeedStep::STAND);
-        self.notify(LinkNotice::OtherThrottle { train, reversed: true });
+        self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed: true });
     }
 
     fn hear_of_turnout(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool, was_asked: bool) {
-        let before = match self.turnouts.iter_mut().find(|(known, _)| *known == turnout) {
-            Some((_, lies)) => Some(core::mem::replace(lies, curved)),
-            None => {
-                self.turnouts.push((turnout, curved));
-                None
-            }
-        };
-        let is_own = was_asked || self.outstanding.has(Awaited::Accessory(turnout, Uid::ALL, 0, 0));
+        let before = self.dialogue.hear_of_turnout(turnout, curved);
+        let is_own = was_asked || self.dialogue.outstanding.has(&Awaited::Accessory(turnout, Uid::ALL, 0, 0));
         if !is_own && before != Some(curved) {
-            // Somebody else has thrown it: that is how it lies from now on.
-            self.enter(now, EventKind::Turnout { turnout, curved });
+            // Another throttle has thrown it.
+            self.dialogue.enter(now, EventKind::Turnout { turnout, curved });
         }
     }
 
@@ -261,11 +254,11 @@ impl Client {
     fn report(&mut self, now: Timestamp, contact: u16, sensor: SensorId, news: News) {
         match news {
             News::Occupied(span) => {
-                let order = Order { not_before: self.last_entry, now };
+                let order = Order { not_before: self.dialogue.last_entry, now };
                 let (latest, width) = span.entry(contact, self.settings.scan, order);
-                self.enter(latest, EventKind::Sensor(Report { sensor, poll_interval: Some(width) }));
+                self.dialogue.report(sensor, latest, width);
             }
-            News::HeldFromStart => self.notify(LinkNotice::HeldClosed { sensor }),
+            News::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
             News::None => {}
         }
     }

@@ -1,34 +1,35 @@
-//! What is asked all the time, so that nothing that was lost on its way stays unknown.
+//! Polls, which find changes whose datagrams were lost.
 
 use footplate_core::{TimeSpan, Timestamp};
 
 use super::super::detectors::Feedback;
 use super::super::outstanding::Awaited;
 use super::super::request::Request;
-use super::{Client, Outgoing, query};
+use super::{Client, query};
+use crate::outstanding::Outgoing;
 
-/// How often something is asked for: what changed in a datagram that was lost is known after that. It also keeps the station from
-/// forgetting this client, which it does after a minute.
+/// The interval between polls. They find changes whose datagrams were lost, and keep the station from forgetting this client, which
+/// it does after a minute.
 const POLL_EVERY: TimeSpan = TimeSpan::from_ms(200);
-/// One question in so many is for a locomotive, so that all stay subscribed.
+/// One poll in this many is for a locomotive, so that all stay subscribed.
 const POLLS_A_LOCOMOTIVE: u32 = 8;
-/// One in so many is for what this client is told: a station that was restarted has forgotten it.
+/// One poll in this many is for the subscription, which a restarted station has lost.
 const POLLS_A_SUBSCRIPTION: u32 = 25;
 
 impl Client {
-    /// The next question of those that are asked all the time.
-    pub(super) fn poll(&mut self, now: Timestamp) -> Outgoing {
+    /// Returns the next poll.
+    pub(super) fn poll(&mut self, now: Timestamp) -> Outgoing<Awaited> {
         (self.polled, self.polls) = (now, self.polls.wrapping_add(1));
         let groups = self.settings.groups();
         let nth = self.polls / POLLS_A_LOCOMOTIVE;
-        let driven = self.locomotives.iter().filter(|locomotive| locomotive.is_driven).count();
+        let driven = self.dialogue.locomotives.iter().filter(|locomotive| locomotive.is_driven).count();
         let turn = (nth as usize).checked_rem(driven).unwrap_or(0);
-        let locomotive = self.locomotives.iter().filter(|locomotive| locomotive.is_driven).nth(turn);
+        let locomotive = self.dialogue.locomotives.iter().filter(|locomotive| locomotive.is_driven).nth(turn);
         let request = if self.polls.is_multiple_of(POLLS_A_SUBSCRIPTION) {
             Request::Broadcasts
         } else if let Some(locomotive) = locomotive.filter(|locomotive| {
             self.polls.is_multiple_of(POLLS_A_LOCOMOTIVE)
-                && self.outstanding.blocks(locomotive.train, false).is_none()
+                && self.dialogue.outstanding.blocks(locomotive.train, false).is_none()
         }) {
             return query(locomotive.train);
         } else {
@@ -41,7 +42,7 @@ impl Client {
                 Feedback::Can | Feedback::LocoNet => Request::Status,
             }
         };
-        Outgoing::of(request, self.awaited_of(request))
+        self.question(request)
     }
 
     pub(super) fn poll_due(&self) -> Timestamp {
@@ -49,9 +50,9 @@ impl Client {
         self.polled + TimeSpan::from_ns(POLL_EVERY.as_ns() / groups)
     }
 
-    /// What answers a question.
-    pub(super) const fn awaited_of(&self, request: Request) -> Option<Awaited> {
-        Some(match request {
+    /// Returns a request, with the answer that it has.
+    pub(super) const fn question(&self, request: Request) -> Outgoing<Awaited> {
+        let awaited = match request {
             Request::SerialNumber => Awaited::SerialNumber,
             Request::Hardware => Awaited::Hardware,
             Request::LockCode => Awaited::LockCode,
@@ -59,7 +60,8 @@ impl Client {
             Request::Status => Awaited::Status,
             Request::Feedback { group } => Awaited::Feedback(group),
             Request::Power { on } => Awaited::Power(on),
-            _ => return None,
-        })
+            _ => return Outgoing::says(request),
+        };
+        Outgoing::asks(request, awaited)
     }
 }

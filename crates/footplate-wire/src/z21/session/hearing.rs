@@ -1,20 +1,22 @@
-//! What becomes of the datagrams that come.
+//! Handles datagrams from the station.
 
 use alloc::format;
 use alloc::vec::Vec;
 
-use footplate_core::{Command, EventKind, Report, SensorId, SpeedStep, Timestamp, TrainId};
+use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId};
 
 use super::super::broadcasts::Broadcasts;
 use super::super::dataset::Datasets;
-use super::super::opening::Opening;
-use super::super::outstanding::{Awaited, MOST_TRIES, Outstanding};
+use super::super::outstanding::Awaited;
 use super::super::reply::{Malformed, Reply};
+use super::super::request::Request;
 use super::super::sensors::Change;
 use super::super::speed::Throttle;
 use super::super::states::{Firmware, Lock, LocomotiveState, TurnoutPosition};
 use super::super::time_model::occupied;
 use super::{Client, DETECTORS_WITHIN};
+use crate::opening::Opening;
+use crate::outstanding::{Awaited as _, Outstanding};
 use crate::session::LinkNotice;
 
 impl Client {
@@ -24,48 +26,39 @@ impl Client {
         for dataset in datasets.by_ref() {
             match Reply::read(&dataset) {
                 Ok(reply) => {
-                    let was_silent = self.silence.heard();
+                    let was_silent = self.dialogue.hear(now);
                     if let Some(reply) = reply {
                         self.take(now, &reply);
                     }
-                    self.heard = now;
                     if was_silent && self.opening.is_open() {
                         self.verify();
                     }
                 }
-                Err(Malformed) => self.hear_noise(dataset.data.len()),
+                Err(Malformed) => self.dialogue.hear_noise(dataset.data.len()),
             }
         }
-        self.hear_noise(datasets.unread());
-    }
-
-    fn hear_noise(&mut self, bytes: usize) {
-        if bytes > 0
-            && let Some(notice) = self.silence.heard_noise(bytes)
-        {
-            self.notify(notice);
-        }
+        self.dialogue.hear_noise(datasets.unread());
     }
 
     fn take(&mut self, now: Timestamp, reply: &Reply) {
-        let answered = self.outstanding.answered(reply);
+        let answered = self.dialogue.outstanding.answered(reply);
         if let Some(on) = reply.power() {
             self.hear_power(on);
         }
         match *reply {
             Reply::SerialNumber(number) => self.serial_number = number,
             Reply::Hardware { kind, firmware } => self.identified(kind, firmware),
-            Reply::LockCode(Lock::Locked) => self.notify(LinkNotice::Locked),
+            Reply::LockCode(Lock::Locked) => self.dialogue.notify(LinkNotice::Locked),
             Reply::Broadcasts(told) => self.hear_of_broadcasts(told),
             Reply::Locomotive(state) => {
-                let driven = |answered: Outstanding| matches!(answered.awaited, Awaited::Driven(..));
+                let driven = |answered: Outstanding<Awaited>| matches!(answered.awaited, Awaited::Driven(..));
                 self.hear_of_locomotive(&state, answered.is_some_and(driven));
             }
             Reply::Turnout { address, position: TurnoutPosition::Output { second } } => {
                 self.hear_of_turnout(now, address, second, answered.is_some());
             }
             Reply::Feedback { .. } | Reply::Can(_) | Reply::LocoNet(_) => {
-                // What is found when it is asked for may have been so since it was said to be free.
+                // A change found by a poll may have happened any time since the sensor was last reported free.
                 let is_answer = matches!(reply, Reply::Can(_))
                     && self.asked_detectors.is_some_and(|asked| now - asked < DETECTORS_WITHIN);
                 let was_missed = answered.is_some() || is_answer || self.is_blind;
@@ -76,7 +69,9 @@ impl Client {
             }
             _ => {}
         }
-        self.end_if_confirmed();
+        if self.dialogue.end_if_confirmed() {
+            self.log_off();
+        }
     }
 
     fn identified(&mut self, kind: u32, firmware: Firmware) {
@@ -93,41 +88,37 @@ impl Client {
         let identity = format!("{name}, firmware {firmware}, serial number {}", self.serial_number);
         if self.identity.as_ref() != Some(&identity) {
             self.identity = Some(identity.clone());
-            self.notify(LinkNotice::Identified { identity });
+            self.dialogue.notify(LinkNotice::Identified { identity });
         }
     }
 
-    /// Asks for all states, and how each locomotive is driven.
+    /// Reads all states again, including every locomotive's.
     pub(super) fn verify(&mut self) {
-        self.opening = Opening::begin(&self.settings, self.wanted, self.is_subscribed, self.power);
-        let known = self.locomotives.iter().filter(|locomotive| locomotive.forward.is_some());
-        self.unverified = known.map(|locomotive| locomotive.train).collect();
+        self.opening =
+            Opening::asking(self.settings.questions(self.wanted, self.is_subscribed, self.dialogue.power));
+        self.unverified = self.dialogue.directed();
     }
 
-    /// The station has forgotten everything: trains have stopped, and their directions are written again.
+    /// Handles a station that was reset.
     fn restarted(&mut self) {
-        self.notify(LinkNotice::Restarted);
-        self.outstanding.clear();
-        self.waiting.clear();
+        self.dialogue.restarted();
         self.suspected.clear();
-        for locomotive in self.locomotives.iter_mut() {
-            locomotive.step = SpeedStep::STAND;
-        }
-        let driven: Vec<TrainId> =
-            self.locomotives.iter().filter(|known| known.is_driven).map(|known| known.train).collect();
-        for train in driven {
-            // Stops are always taken.
-            let _ = self.waiting.push(Command::Speed { train, step: SpeedStep::STAND });
-        }
+    }
+
+    /// Frees this client's place at the station.
+    fn log_off(&mut self) {
+        let mut bytes = Vec::new();
+        Request::LogOff.write(&mut bytes);
+        self.dialogue.write(bytes);
     }
 
     pub(super) fn opened(&mut self) {
         self.opening = Opening::Open;
-        (self.is_blind, self.polled) = (false, self.now);
-        self.notify(LinkNotice::Answers);
+        (self.is_blind, self.polled) = (false, self.dialogue.now);
+        self.dialogue.notify(LinkNotice::Answers);
     }
 
-    /// What this client is told.
+    /// The subscription of this client.
     fn hear_of_broadcasts(&mut self, told: Broadcasts) {
         if told.has(self.wanted) {
             self.is_subscribed = true;
@@ -139,46 +130,32 @@ impl Client {
             self.restarted();
             return self.verify();
         }
-        // It is written again until the station has it, or does not want it.
-        let Some(asked) = self.outstanding.take(Awaited::Broadcasts(self.wanted)) else { return };
-        if asked.tries < MOST_TRIES {
-            return self.outstanding.push(asked);
+        // It is repeated until the station accepts or refuses it.
+        let Some(asked) = self.dialogue.outstanding.take(&Awaited::Broadcasts(self.wanted)) else { return };
+        if asked.tries < Awaited::REPEATS.most_tries {
+            return self.dialogue.outstanding.push(asked);
         }
         let missing = self.wanted.0 & !told.0;
         self.wanted = Broadcasts(self.wanted.0 & told.0);
         self.is_subscribed = true;
-        self.notify(LinkNotice::BroadcastsRefused { missing });
+        self.dialogue.notify(LinkNotice::BroadcastsRefused { missing });
     }
 
     fn hear_power(&mut self, on: bool) {
-        let is_unexpected =
-            self.is_powered && !on && self.power && !self.outstanding.has(Awaited::Power(false));
+        let is_unexpected = self.dialogue.is_power_lost(on, &Awaited::Power(false));
         if is_unexpected && !self.power_is_suspect {
             (self.power_is_suspect, self.asks_status) = (true, true);
             return;
         }
-        if is_unexpected {
-            self.notify(LinkNotice::PowerLost);
-        }
         self.power_is_suspect = false;
-        self.is_powered = on;
-        if !on {
-            self.farewell.power_went_off();
-        }
+        self.dialogue.hear_power(on, is_unexpected);
     }
 
-    /// How a train is driven, and whether that is what was asked for.
+    /// Compares a train's state with the commanded one.
     fn hear_of_locomotive(&mut self, state: &LocomotiveState, is_confirmed: bool) {
         let train = TrainId(state.address);
-        let is_outstanding = self.outstanding.blocks(train, false).is_some();
-        let Some(locomotive) = self.locomotives.get_mut(train) else {
-            // Asked for before its first command, or driven by others.
-            if self.waiting.iter().any(|command| super::train_of(command) == Some(train)) {
-                self.locomotives.know(train);
-                self.hear_of_locomotive(state, is_confirmed);
-            }
-            return;
-        };
+        let is_outstanding = self.dialogue.outstanding.blocks(train, false).is_some();
+        let Some(locomotive) = self.dialogue.locomotive(train) else { return };
         if is_confirmed {
             locomotive.is_stopped = locomotive.step == SpeedStep::STAND;
             return self.suspected.retain(|(other, ..)| *other != train);
@@ -196,7 +173,7 @@ impl Client {
             locomotive.forward = Some(state.forward);
             return;
         }
-        // An old datagram may say so: it counts when it is said again in answer to a question.
+        // It may be an old datagram: it counts when the station repeats it in answer to a question.
         let said = (train, state.throttle, state.forward);
         if !self.suspected.contains(&said) {
             self.suspected.retain(|(other, ..)| *other != train);
@@ -210,21 +187,18 @@ impl Client {
         locomotive.forward = Some(state.forward);
         locomotive.is_stopped = false;
         self.suspected.retain(|(other, ..)| *other != train);
-        if self.farewell.has_begun() {
-            // Stops are always taken.
-            let _ = self.waiting.push(Command::Speed { train, step: SpeedStep::STAND });
-        }
-        self.notify(LinkNotice::OtherThrottle { train, reversed: state.forward != forward });
+        self.dialogue.stop_at_end(train);
+        self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed: state.forward != forward });
     }
 
     fn hear_of_turnout(&mut self, now: Timestamp, address: u16, second: bool, was_asked: bool) {
         let Some(turnout) = self.settings.turnout_at(address) else { return };
         let curved = second != self.settings.second_is_straight;
-        let before = self.turnouts.heard(turnout, curved);
-        let is_outstanding = self.outstanding.has(Awaited::Turnout(turnout, address, second));
+        let before = self.dialogue.hear_of_turnout(turnout, curved);
+        let is_outstanding = self.dialogue.outstanding.has(&Awaited::Turnout(turnout, address, second));
         if !was_asked && !is_outstanding && before == Some(!curved) {
-            // Somebody else has thrown it: that is how it lies from now on.
-            self.enter(now, EventKind::Turnout { turnout, curved });
+            // Another throttle has thrown it.
+            self.dialogue.enter(now, EventKind::Turnout { turnout, curved });
         }
     }
 
@@ -238,10 +212,11 @@ impl Client {
         match self.sensors.heard(now, number, is_occupied, is_listing) {
             Change::Occupied { free_at } => {
                 let free_at = free_at.filter(|_| was_missed);
-                let (latest, width) = occupied(now, self.last_entry, self.settings.sensor_delay, free_at);
-                self.enter(latest, EventKind::Sensor(Report { sensor, poll_interval: Some(width) }));
+                let (latest, width) =
+                    occupied(now, self.dialogue.last_entry, self.settings.sensor_delay, free_at);
+                self.dialogue.report(sensor, latest, width);
             }
-            Change::HeldFromStart => self.notify(LinkNotice::HeldClosed { sensor }),
+            Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
             Change::None => {}
         }
     }

@@ -19,7 +19,8 @@ use footplate_core::model::MotionFit;
 use footplate_core::model::StepUse;
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
-use footplate_store::{KeptModel, MotionFile, MotionReplay, Store, layout_named};
+use footplate_store::{MotionFile, MotionReplay, Store, StoredModel, layout_named};
+use footplate_wire::Session as _;
 
 pub(crate) use self::beginning::CalibrationBeginning;
 use self::ended::{Why, outcome_of};
@@ -32,8 +33,8 @@ use crate::commands::left_running::stop_left_running;
 use crate::commands::plot::PictureFile;
 use crate::commands::serve::open_dashboard;
 use crate::commands::written_layout::WrittenLayout;
-use crate::dashboard::{ServedAt, Showing};
-use crate::link::{Address, Link, ObservedLink, Speed, open, open_session, open_simulated};
+use crate::dashboard::{ReadOnlyDashboard, ServedAt};
+use crate::link::{Address, Link, MeasuredLine, ObservedLink, Speed, open, open_session, open_simulated};
 use crate::recorded::Recorded;
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::SessionJournal;
@@ -120,7 +121,11 @@ impl Session<'_> {
                 }
                 self.drive(&written, link, output)
             }
-            Address::Serial(_) | Address::Board(_) | Address::Z21(_) | Address::Can(_) => {
+            Address::Serial(_)
+            | Address::Board(_)
+            | Address::Z21(_)
+            | Address::Can(_)
+            | Address::LocoNet(_) => {
                 let store = self.store.filter(|path| path.exists()).map(Store::open).transpose()?;
                 let stop = |store: &Store| stop_left_running(self.link, &real, store, pace);
                 let opened = store.as_ref().map(stop).transpose()?.flatten();
@@ -143,7 +148,8 @@ impl Session<'_> {
         let store = || self.store.map(Path::to_path_buf);
         let dashboard = self.serve.map(|at| open_dashboard(at, on, store())).transpose()?;
         let link = ObservedLink::new(link, dashboard.as_ref().map(|dashboard| Arc::clone(&dashboard.line)));
-        let showing = dashboard.as_ref().map(|dashboard| Showing::new(dashboard, layout, link.now()));
+        let showing =
+            dashboard.as_ref().map(|dashboard| ReadOnlyDashboard::new(dashboard, layout, link.now()));
         let (fit, turnouts) = self.known(layout)?;
         let settings = CalibratorSettings { budget: self.budget, ..CalibratorSettings::default() };
         let beginning = CalibrationBeginning::new(on, settings, fit, &turnouts);
@@ -151,7 +157,9 @@ impl Session<'_> {
             Some(path) => Some(kept::begin(path, layout, self.train, self.link, link.now(), &beginning)?),
             None => None,
         };
-        let session = open_session(self.link, &link, layout)?;
+        let line = MeasuredLine::of(self.link, self.store)?;
+        let mut session = open_session(self.link, &link, layout)?;
+        session.expect_delays(self.link.excess(line.as_ref()));
         let scribe = written.as_ref().and_then(SessionJournal::scribe);
         let recorder = written.as_mut().map(|written| written as &mut dyn Recorder);
         let mut calibrator = Recorded::new(beginning.calibrator(layout), scribe);
@@ -239,7 +247,7 @@ impl Session<'_> {
             replay.runs, self.train
         );
         let mut fit = replay.fit;
-        if let KeptModel::Model(model) = KeptModel::of_store(layout, &store, self.train, now())? {
+        if let StoredModel::Model(model) = StoredModel::of_store(layout, &store, self.train, now())? {
             // Which steps do not move it follows from what was tried, not from the events alone.
             let steps = (1..=HIGHEST_STEP).filter_map(SpeedStep::new);
             for step in steps.filter(|step| model.uses(*step) != StepUse::Untried) {

@@ -88,5 +88,5 @@ fn panel(y: &str, all: &[AtStep]) -> Panel {
         (!points.is_empty()).then(|| Layer::new(label, ink, Shape::Points(points)))
     };
     let layers = sides.into_iter().filter_map(layer).collect();
-    Panel { y: y.to_owned(), from_nought: true, layers, ..Panel::default() }
+    Panel { y: y.to_owned(), from_zero: true, layers, ..Panel::default() }
 }

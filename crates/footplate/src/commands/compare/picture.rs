@@ -51,7 +51,7 @@ fn panel(y: &str, figures: &[CheckedFigure]) -> Panel {
     ];
     Panel {
         y: y.to_owned(),
-        from_nought: true,
+        from_zero: true,
         layers: layers.into_iter().flatten().collect(),
         ..Panel::default()
     }

@@ -1,4 +1,4 @@
-//! The first half: a train that nobody has measured teaches how it moves.
+//! The first half of the demo: calibrates an unknown train.
 
 use footplate_core::control::learn::{
     CalibrationNotice, CalibratorSettings, Ending, Mishap, Phase, Progress, StepAccuracy,
@@ -10,62 +10,62 @@ use footplate_core::tracking::Locator;
 use footplate_core::{Approach, SpeedStep, TimeSpan, TrainId};
 
 use super::outcome::{Learnt, LearntStep, minutes};
-use super::stage::Stage;
+use super::running_demo::Demo;
 use crate::commands::calibrate::CalibrationBeginning;
 use crate::commands::written_layout::WrittenLayout;
 use crate::recorded::Recorded;
 
-/// The decoder of the trains of the real-time courses.
+/// The highest step of the decoders in the recorded trains.
 const HIGHEST_STEP: u8 = 14;
-/// How wide the bar of time is.
+/// The width of the time bar, in characters.
 const BAR: usize = 16;
 
-/// What came of it.
+/// A calibrated train at rest.
 pub(super) struct Calibrated {
     pub(super) fit: MotionFit,
     pub(super) locator: Locator,
     pub(super) turnouts: TurnoutStates,
 }
 
-/// Calibrates a train. Nothing if it could not be found.
+/// Calibrates a train; `None` if it could not be located.
 pub(super) fn calibrate(
-    stage: &mut Stage<'_, '_, '_>,
-    on: &WrittenLayout,
+    demo: &mut Demo<'_, '_, '_>,
+    written: &WrittenLayout,
     train: TrainId,
     turnouts: &TurnoutStates,
 ) -> anyhow::Result<Option<Calibrated>> {
     let highest = SpeedStep::new(HIGHEST_STEP).unwrap_or(SpeedStep::STAND);
     let settings = CalibratorSettings::default();
     let budget = settings.budget;
-    let beginning = CalibrationBeginning::new(on, settings, MotionFit::new(train, highest), turnouts);
-    let scribe = stage.begin_machine(CalibrationBeginning::KIND, &beginning)?;
-    let layout = &on.layout;
+    let beginning = CalibrationBeginning::new(written, settings, MotionFit::new(train, highest), turnouts);
+    let scribe = demo.begin_machine(CalibrationBeginning::KIND, &beginning)?;
+    let layout = &written.layout;
     let mut calibrator = Recorded::new(beginning.calibrator(layout), scribe);
-    let began = stage.now();
-    stage.works(train, "learns", "");
+    let began = demo.now();
+    demo.set_active(train, "learns", "");
     while calibrator.machine().ending().is_none() {
-        for notice in stage.go_on(&mut calibrator)? {
-            let now = stage.now();
-            if let Some(showing) = &mut stage.showing {
+        for notice in demo.advance(&mut calibrator)? {
+            let now = demo.now();
+            if let Some(dashboard_view) = &mut demo.dashboard_view {
                 let said = match &notice {
-                    CalibrationNotice::Mishap(mishap) => what_happened(layout, mishap),
+                    CalibrationNotice::Mishap(fault) => what_happened(layout, fault),
                     _ => String::new(),
                 };
-                showing.hear(now, train, &notice, &said);
+                dashboard_view.hear(now, train, &notice, &said);
             }
-            tell(stage, layout, train, budget, &notice)?;
+            report(demo, layout, train, budget, &notice)?;
         }
-        let now = stage.now();
-        if let Some(showing) = &mut stage.showing {
-            showing.calibrator(calibrator.machine(), now);
+        let now = demo.now();
+        if let Some(dashboard_view) = &mut demo.dashboard_view {
+            dashboard_view.calibrator(calibrator.machine(), now);
         }
-        if stage.is_broken() {
+        if demo.is_broken() {
             return Ok(None);
         }
     }
-    let calibrator = calibrator.end(stage.now());
+    let calibrator = calibrator.end(demo.now());
     if matches!(calibrator.ending(), Some(Ending::NotFound | Ending::WrongLayout { .. })) {
-        stage.screen.mishap(
+        demo.screen.fault(
             train,
             "could not be calibrated: its sensor reports fit no path of this \
                                     layout",
@@ -78,15 +78,15 @@ pub(super) fn calibrate(
         [Approach::Below, Approach::Above]
             .map(|approach| (model.speed(step, approach).count, model.stop(step, approach).count))
     });
-    let (contacts, stops) =
-        both.fold((0, 0), |(contacts, stops), (more, stopped)| (contacts + more, stops + stopped));
-    let learnt = Learnt { train, took: stage.now() - began, steps, stops, contacts };
-    stage.learnt(learnt)?;
+    let (detections, stops) =
+        both.fold((0, 0), |(detections, stops), (more, stopped)| (detections + more, stops + stopped));
+    let learnt = Learnt { train, took: demo.now() - began, steps, stops, detections };
+    demo.learnt(learnt)?;
     let (locator, turnouts) = (calibrator.locator().clone(), calibrator.turnouts().clone());
     Ok(Some(Calibrated { fit: calibrator.into_fit(), locator, turnouts }))
 }
 
-/// The steps that can be relied upon, for a picture.
+/// The usable steps with their speeds and stop accuracies, for display.
 fn known(accuracy: &[StepAccuracy]) -> Vec<LearntStep> {
     let below = accuracy.iter().filter(|line| line.approach == Approach::Below);
     below
@@ -98,15 +98,15 @@ fn known(accuracy: &[StepAccuracy]) -> Vec<LearntStep> {
         .collect()
 }
 
-/// The steps of a model that can be relied upon, lowest first.
+/// The steps that move the train reliably, lowest first.
 pub(super) fn usable(fit: &MotionFit) -> Vec<SpeedStep> {
     let model = fit.model();
     let steps = (1..=HIGHEST_STEP).filter_map(SpeedStep::new);
     steps.filter(|step| model.uses(*step) == StepUse::Moves).collect()
 }
 
-fn tell(
-    stage: &mut Stage<'_, '_, '_>,
+fn report(
+    demo: &mut Demo<'_, '_, '_>,
     layout: &Layout,
     train: TrainId,
     budget: TimeSpan,
@@ -115,23 +115,23 @@ fn tell(
     match notice {
         CalibrationNotice::Found { node, step } => {
             let node = layout.node_name(*node);
-            stage.screen.mention(&format!("  train {train}: found, it runs over {node} at step {step}"))
+            demo.screen.mention(&format!("  train {train}: found, it runs over {node} at step {step}"))
         }
-        CalibrationNotice::Circuit(circuit) => stage.screen.mention(&format!(
+        CalibrationNotice::Circuit(circuit) => demo.screen.mention(&format!(
             "  train {train}: uses a circuit of {} sensors and {:.1} m",
             circuit.lap.len(),
             circuit.length.as_m()
         )),
         CalibrationNotice::TurnsAround { node } => {
             let node = layout.node_name(*node);
-            stage.screen.mention(&format!("  train {train}: reverses beyond {node}"))
+            demo.screen.mention(&format!("  train {train}: reverses beyond {node}"))
         }
         CalibrationNotice::Progress(progress) => {
             let detail = detail(progress, budget);
-            stage.shows(train, &detail, Some(known(&progress.accuracy)));
+            demo.set_detail(train, &detail, Some(known(&progress.accuracy)));
             Ok(())
         }
-        CalibrationNotice::Mishap(mishap) => stage.screen.mishap(train, &what_happened(layout, mishap)),
+        CalibrationNotice::Mishap(fault) => demo.screen.fault(train, &what_happened(layout, fault)),
         CalibrationNotice::Begins { .. }
         | CalibrationNotice::Done(_)
         | CalibrationNotice::Finished { .. } => Ok(()),
@@ -152,10 +152,10 @@ fn detail(progress: &Progress, budget: TimeSpan) -> String {
     format!("{about:<32} {bar} {} of {}", minutes(progress.elapsed), minutes(budget))
 }
 
-fn what_happened(layout: &Layout, mishap: &Mishap) -> String {
+fn what_happened(layout: &Layout, fault: &Mishap) -> String {
     let sensor = |sensor| layout.sensor_name(sensor);
-    match mishap {
-        Mishap::Stalled { step } => format!("does not move reliably at step {step}"),
+    match fault {
+        Mishap::Stalled { step } => format!("activity not move reliably at step {step}"),
         Mishap::Missed { count, before } => {
             format!(
                 "{count} sensor{} before {} did not report",

@@ -1,37 +1,38 @@
-//! The second half: a train is driven to places drawn from the seed, and the truth is looked up.
+//! The second half of the demo: drives a train to places drawn from the seed and compares its stops with the truth.
 
 use std::collections::BTreeMap;
 
 use footplate_core::control::{Driver, Finished, Notice, Order, OrderId, PlannedStop, Refusal, StopOrder};
+use footplate_core::model::MotionModel;
 use footplate_core::model::survey::SectionIndex;
-use footplate_core::track::{Landmark, Layout};
-use footplate_core::tracking::{DueContact, PassedContact, TrackContext};
-use footplate_core::{Approach, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::track::{Landmark, Layout, Leg};
+use footplate_core::tracking::{DueContact, Locator, PassedContact, TrackContext};
+use footplate_core::{Approach, Length, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use serde::{Deserialize, Serialize};
 
-use super::beginning::TourBeginning;
 use super::calibrating::{Calibrated, usable};
 use super::outcome::{MadeStop, signed};
-use super::stage::Stage;
-use super::targets::{Dice, steps_to_stop_from, target_ahead};
+use super::running_demo::Demo;
+use super::targets::{Dice, steps_for_stops, target_ahead};
 use crate::commands::drive::NoticeFormatter;
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{Alarm, TrainPassed, TrainTask};
-use crate::recorded::{Input, Recorded};
+use crate::recorded::{Input, Listener, Recorded};
 
-/// Targets that may be refused before no more are tried.
-const TRIES: usize = 40;
-/// After so long on the railway's clock a stop is not coming any more: a lap at a crawl takes less.
-const PATIENCE: TimeSpan = TimeSpan::from_ms(180_000);
-/// So long after the driver says that a train stands the truth is looked up.
-const STANDS: TimeSpan = TimeSpan::from_ms(2_500);
+/// Refused targets after which a stop is skipped.
+const MAX_REFUSALS: usize = 40;
+/// Simulated time after which a stop has failed: a lap at creep speed takes less.
+const STOP_TIMEOUT: TimeSpan = TimeSpan::from_ms(180_000);
+/// The time from the driver's report of standstill to the reading of the true position.
+const SETTLING_TIME: TimeSpan = TimeSpan::from_ms(2_500);
 
-/// A tour of one train.
+/// The stops of one train.
 pub(super) struct Tour<'l> {
     layout: &'l Layout,
     sections: SectionIndex,
     train: TrainId,
     driver: Recorded<Driver>,
-    /// What was passed last, for the picture.
+    /// The last detection, for display.
     passed: String,
     next: Option<DueContact>,
     planned: Option<PlannedStop>,
@@ -39,50 +40,50 @@ pub(super) struct Tour<'l> {
 
 impl<'l> Tour<'l> {
     pub(super) fn new(
-        stage: &mut Stage<'_, '_, '_>,
-        on: &'l WrittenLayout,
+        demo: &mut Demo<'_, '_, '_>,
+        written: &'l WrittenLayout,
         train: TrainId,
         known: &Calibrated,
     ) -> anyhow::Result<Self> {
-        let layout = &on.layout;
-        let beginning = TourBeginning::new(on, known);
-        let scribe = stage.begin_machine(TourBeginning::KIND, &beginning)?;
+        let layout = &written.layout;
+        let beginning = TourBeginning::new(written, known);
+        let scribe = demo.begin_machine(TourBeginning::KIND, &beginning)?;
         let driver = Recorded::new(beginning.driver(layout), scribe);
         let sections = SectionIndex::of(layout);
         Ok(Self { layout, sections, train, driver, passed: String::new(), next: None, planned: None })
     }
 
-    /// Makes so many stops.
+    /// Makes one stop from each of `stops` steps.
     pub(super) fn run(
         mut self,
-        stage: &mut Stage<'_, '_, '_>,
+        demo: &mut Demo<'_, '_, '_>,
         known: &Calibrated,
         stops: usize,
         dice: &mut Dice,
     ) -> anyhow::Result<()> {
-        let steps = steps_to_stop_from(dice, &usable(&known.fit), stops);
+        let steps = steps_for_stops(dice, &usable(&known.fit), stops);
         for step in steps {
-            if stage.is_broken() {
+            if demo.is_broken() {
                 break;
             }
-            let Some((order, target)) = self.ask(stage.now(), step, dice) else {
-                stage.screen.mishap(self.train, &format!("nowhere to stop from step {step}"))?;
+            let Some((order, target)) = self.ask(demo.now(), step, dice) else {
+                demo.screen.fault(self.train, &format!("nowhere to stop from step {step}"))?;
                 continue;
             };
             let name = self.layout.display(target).to_string();
             self.planned = None;
-            match self.carry_out(stage, order, target, step)? {
+            match self.carry_out(demo, order, target, step)? {
                 Some(finished) => {
-                    let stop = self.truth(stage, target, &name, step, finished);
+                    let stop = self.truth(demo, target, &name, step, finished);
                     match stop {
-                        Some(stop) => stage.stopped(stop)?,
-                        None => stage.screen.mishap(self.train, &format!("did not stop at {name}"))?,
+                        Some(stop) => demo.stopped(stop)?,
+                        None => demo.screen.fault(self.train, &format!("did not stop at {name}"))?,
                     }
                 }
-                None => stage.screen.mishap(self.train, &format!("did not stop at {name}"))?,
+                None => demo.screen.fault(self.train, &format!("did not stop at {name}"))?,
             }
         }
-        self.driver.end(stage.now());
+        self.driver.end(demo.now());
         Ok(())
     }
 
@@ -90,13 +91,14 @@ impl<'l> Tour<'l> {
         self.driver.ask(now, &Input::Order(order), |driver| driver.order(now, order))
     }
 
-    /// Orders a stop from a step, at a place that is far enough.
+    /// Orders a stop from a step, at a place far enough ahead.
     fn ask(&mut self, now: Timestamp, step: SpeedStep, dice: &mut Dice) -> Option<(OrderId, Landmark)> {
         let at = self.driver.machine().locate(self.train, now)?.at;
         let model = self.driver.machine().model(self.train)?;
-        // To speed up takes about as long as to stop, and an even run before the stop makes it better.
+        // Acceleration takes about as long as braking, and a steady run before the stop makes it more accurate: hence
+        // 2.5 stopping distances.
         let mut least = at.way + model.stop(step, Approach::Below).distance * 2.5;
-        for _ in 0..TRIES {
+        for _ in 0..MAX_REFUSALS {
             let context = TrackContext {
                 layout: self.layout,
                 sections: &self.sections,
@@ -119,61 +121,61 @@ impl<'l> Tour<'l> {
         None
     }
 
-    /// Drives until the order is carried out.
+    /// Drives until the train is at rest; `None` if the stop failed.
     fn carry_out(
         &mut self,
-        stage: &mut Stage<'_, '_, '_>,
+        demo: &mut Demo<'_, '_, '_>,
         order: OrderId,
         target: Landmark,
         step: SpeedStep,
     ) -> anyhow::Result<Option<Finished>> {
         let name = self.layout.display(target).to_string();
-        let until = stage.now() + PATIENCE;
+        let until = demo.now() + STOP_TIMEOUT;
         let mut finished: Option<Finished> = None;
-        stage.works(self.train, "drives", "");
+        demo.set_active(self.train, "drives", "");
         loop {
-            let now = stage.now();
+            let now = demo.now();
             if let Some(done) = finished
-                && now >= done.time + STANDS
+                && now >= done.time + SETTLING_TIME
             {
                 return Ok(Some(done));
             }
-            if now > until || stage.is_broken() {
+            if now > until || demo.is_broken() {
                 return Ok(None);
             }
-            for notice in stage.go_on(&mut self.driver)? {
-                if let (Some(showing), Some(alarm)) =
-                    (&mut stage.showing, Alarm::of_notice(self.layout, &notice))
+            for notice in demo.advance(&mut self.driver)? {
+                if let (Some(dashboard_view), Some(alarm)) =
+                    (&mut demo.dashboard_view, Alarm::of_notice(self.layout, &notice))
                 {
                     let formatter = NoticeFormatter { driver: self.driver.machine(), began: Timestamp::ZERO };
-                    showing.alarm(now, &alarm.said(&formatter.line(&notice).unwrap_or_default()));
+                    dashboard_view.alarm(now, &alarm.said(&formatter.line(&notice).unwrap_or_default()));
                 }
                 match notice {
                     Notice::Done(done) if done.order == order => finished = Some(done),
                     Notice::GivenUp { order: of, why, .. } if of == order => {
-                        stage.screen.mishap(self.train, &format!("gave up {name}: {why}"))?;
+                        demo.screen.fault(self.train, &format!("gave up {name}: {why}"))?;
                         return Ok(None);
                     }
                     Notice::Lost { .. } => {
-                        stage.screen.mishap(self.train, "is lost")?;
+                        demo.screen.fault(self.train, "is lost")?;
                         return Ok(None);
                     }
                     Notice::Planned(planned) => self.planned = Some(planned),
                     Notice::Passed { train, passed, next } => {
-                        if let Some(showing) = &mut stage.showing {
-                            showing.passed(TrainPassed { train, passed, next });
+                        if let Some(dashboard_view) = &mut demo.dashboard_view {
+                            dashboard_view.passed(TrainPassed { train, passed, next });
                         }
                         self.pass(passed, next);
                     }
                     Notice::Overshoots { by, .. } => {
-                        stage.screen.mishap(
+                        demo.screen.fault(
                             self.train,
                             &format!("is too late for {name}: {:.0} mm beyond", by.as_mm()),
                         )?;
                     }
                     Notice::Unexplained { sensor, .. } => {
                         let sensor = self.layout.sensor_name(sensor);
-                        stage.screen.mishap(
+                        demo.screen.fault(
                             self.train,
                             &format!(
                                 "{sensor} reported, but it cannot have passed \
@@ -184,18 +186,18 @@ impl<'l> Tour<'l> {
                     _ => {}
                 }
             }
-            let now = stage.now();
-            if let Some(showing) = &mut stage.showing {
+            let now = demo.now();
+            if let Some(dashboard_view) = &mut demo.dashboard_view {
                 let promise = self.planned.map(|planned| planned.promise);
                 let task = TrainTask {
                     text: format!("stop {} at {name} from step {step}", self.train),
                     target: Some(target),
                     promise: promise.map(|promise| [promise.median, promise.low, promise.high]),
                 };
-                showing.driver(self.driver.machine(), &BTreeMap::from([(self.train, task)]), now);
+                dashboard_view.driver(self.driver.machine(), &BTreeMap::from([(self.train, task)]), now);
             }
-            let detail = self.detail(stage.now(), &name, step, finished.is_some());
-            stage.shows(self.train, &detail, None);
+            let detail = self.detail(demo.now(), &name, step, finished.is_some());
+            demo.set_detail(self.train, &detail, None);
         }
     }
 
@@ -210,12 +212,12 @@ impl<'l> Tour<'l> {
         self.next = next;
     }
 
-    fn detail(&self, now: Timestamp, target: &str, step: SpeedStep, stands: bool) -> String {
+    fn detail(&self, now: Timestamp, target: &str, step: SpeedStep, at_rest: bool) -> String {
         let promise = self.planned.map_or_else(String::new, |planned| {
             format!("{} … {} mm", signed(planned.promise.low), signed(planned.promise.high))
         });
         let next = match (&self.next, &self.planned) {
-            _ if stands => "stands".to_owned(),
+            _ if at_rest => "at rest".to_owned(),
             (_, Some(planned)) if planned.leaves > now && (planned.leaves - now).as_s() < 1.5 => {
                 format!("stops in {:.2} s", (planned.leaves - now).as_s())
             }
@@ -227,27 +229,68 @@ impl<'l> Tour<'l> {
         format!("to {target:<10} from step {step:<3} {promise:<15} {next:<16} {}", self.passed)
     }
 
-    /// Where the train really stands, against the target.
+    /// The stop with the true place of rest.
     fn truth(
         &self,
-        stage: &Stage<'_, '_, '_>,
+        demo: &Demo<'_, '_, '_>,
         target: Landmark,
         name: &str,
         step: SpeedStep,
         finished: Finished,
     ) -> Option<MadeStop> {
         let sensor = self.layout.sensor_at(target.node)?;
-        let past = stage.railway.world().truth().past(self.train, sensor)?;
+        let past = demo.railway.world().truth().past(self.train, sensor)?;
         let promise = finished.promise?;
-        let stood = Landmark { node: target.node, offset: Length::from_mm(past.as_mm().round()) };
+        let was_at = Landmark { node: target.node, offset: Length::from_mm(past.as_mm().round()) };
         Some(MadeStop {
             train: self.train,
             target: name.to_owned(),
             step,
-            rest: self.layout.display(stood).to_string(),
+            rest: self.layout.display(was_at).to_string(),
             error: past - target.offset,
             promised: [promise.low, promise.high],
-            believed: finished.achieved.and_then(|achieved| achieved.error),
+            estimated_error: finished.achieved.and_then(|achieved| achieved.error),
         })
+    }
+}
+
+/// Everything that the driver of a calibrated train is built from.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct TourBeginning {
+    /// The text of the layout file.
+    pub(crate) layout: String,
+    turnouts: Vec<(TurnoutId, Leg)>,
+    model: MotionModel,
+    /// The located train.
+    locator: Locator,
+}
+
+impl TourBeginning {
+    /// The kind of this machine in a store.
+    pub(crate) const KIND: &'static str = "tour";
+
+    pub(super) fn new(written: &WrittenLayout, known: &Calibrated) -> Self {
+        Self {
+            layout: written.text.clone(),
+            turnouts: written.legs(&known.turnouts),
+            model: known.fit.model().clone(),
+            locator: known.locator.clone(),
+        }
+    }
+
+    /// Builds the driver; `layout` is the one in the text.
+    pub(crate) fn driver(self, layout: &Layout) -> Driver {
+        let mut driver = Driver::new(layout.clone(), self.turnouts.into_iter().collect());
+        driver.add_located(self.model, self.locator);
+        driver
+    }
+}
+
+impl Listener for Driver {
+    fn handle_word(&mut self, now: Timestamp, word: &Input) {
+        if let Input::Order(order) = word {
+            // An order that was refused live is refused in a replay, too.
+            let _ = self.order(now, *order);
+        }
     }
 }

@@ -1,42 +1,41 @@
-//! What the demo ends with: where the trains really stood beside what had been promised.
+//! The results of the demo: true places of rest beside the predicted intervals.
 
 use footplate_core::{Length, SpeedStep, TimeSpan, TrainId};
 use serde_json::{Value, json};
 
-/// A stop as it was asked for, promised, and made.
+/// One stop: target, prediction and truth.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct MadeStop {
     pub(super) train: TrainId,
-    /// Where it was to stop.
+    /// The target.
     pub(super) target: String,
-    /// From which step.
+    /// The step that it stopped from.
     pub(super) step: SpeedStep,
-    /// Where it really stood, from the contact of the target.
+    /// The true place of rest, past the sensor of the target.
     pub(super) rest: String,
     /// How far beyond the target that is; negative short of it.
     pub(super) error: Length,
-    /// Between which places 95 of 100 stops were promised to end, counted like `error`.
+    /// The predicted 95 % interval of `error`.
     pub(super) promised: [Length; 2],
-    /// Where the program believes that it stands, counted like `error`.
-    pub(super) believed: Option<Length>,
+    /// The program's own estimate of `error`.
+    pub(super) estimated_error: Option<Length>,
 }
 
-/// A train's calibration, in a line.
+/// The calibration of one train.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Learnt {
     pub(super) train: TrainId,
-    /// Track time that it took.
+    /// Simulated time that it took.
     pub(super) took: TimeSpan,
-    /// The steps that move it, with the speed and how far stops from each are promised to end from where they should,
-    /// in 95 of 100 cases.
+    /// The steps that move the train.
     pub(super) steps: Vec<LearntStep>,
-    /// Stops that were made for it.
+    /// Stops that it was measured with.
     pub(super) stops: u32,
-    /// Contacts that were passed.
-    pub(super) contacts: u32,
+    /// Detections that it was measured with.
+    pub(super) detections: u32,
 }
 
-/// What is known of a step.
+/// The calibration of one step: mean speed, and half the 95 % interval of stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LearntStep {
     pub(super) step: SpeedStep,
@@ -60,12 +59,12 @@ impl MadeStop {
             "error_mm": tenths(self.error),
             "promised_low_mm": tenths(low),
             "promised_high_mm": tenths(high),
-            "believed_error_mm": self.believed.map(tenths),
+            "believed_error_mm": self.estimated_error.map(tenths),
             "inside": self.is_inside(),
         })
     }
 
-    /// The row of the table, without its last word.
+    /// The row of the table, without the last column.
     pub(super) fn row(&self) -> String {
         let [low, high] = self.promised;
         format!(
@@ -79,7 +78,7 @@ impl MadeStop {
         )
     }
 
-    /// The stop as a sentence, at the moment when the train stands.
+    /// The stop as a sentence.
     pub(super) fn sentence(&self) -> String {
         let mm = self.error.as_mm().round();
         let side = if mm < 0.0 { "short of" } else { "beyond" };
@@ -100,7 +99,7 @@ impl MadeStop {
     }
 }
 
-/// The head of the table.
+/// The header of the table.
 pub(super) fn head() -> String {
     format!(
         "  {:>5}  {:<12} {:>9}   {:<12} {:>9}   {:>16}   {}",
@@ -108,7 +107,7 @@ pub(super) fn head() -> String {
     )
 }
 
-/// What all stops come to, in a sentence; nothing for none.
+/// The results of all stops as a sentence; `None` without stops.
 pub(super) fn summary(stops: &[MadeStop]) -> Option<String> {
     let mut errors: Vec<f64> = stops.iter().map(|stop| stop.error.as_mm().abs()).collect();
     errors.sort_by(f64::total_cmp);
@@ -138,12 +137,12 @@ impl Learnt {
             "train": self.train.0,
             "track_time_s": (10.0 * self.took.as_s()).round() / 10.0,
             "stops": self.stops,
-            "contacts": self.contacts,
+            "contacts": self.detections,
             "steps": steps,
         })
     }
 
-    /// The same as a sentence.
+    /// The calibration as a sentence.
     pub(super) fn sentence(&self) -> String {
         let within = |known: &LearntStep| known.stops_within.as_mm();
         let best = self.steps.iter().min_by(|one, other| within(one).total_cmp(&within(other)));
@@ -157,7 +156,7 @@ impl Learnt {
              stops to ±{:.0} … ±{:.0} mm",
             self.train,
             minutes(self.took),
-            self.contacts,
+            self.detections,
             self.stops,
             first.step,
             last.step,
@@ -175,7 +174,7 @@ pub(super) fn minutes(time: TimeSpan) -> String {
     format!("{}:{:02}", seconds / 60, seconds % 60)
 }
 
-/// `+4`, `−12`, with a sign that is as wide as a plus.
+/// `+4`, `−12`, with a minus as wide as the plus.
 pub(super) fn signed(length: Length) -> String {
     let mm = length.as_mm().round();
     if mm < 0.0 { format!("−{:.0}", -mm) } else { format!("+{:.0}", mm.abs()) }
@@ -197,7 +196,7 @@ mod tests {
             rest: "C13+124mm".to_owned(),
             error: Length::from_mm(error_mm),
             promised: [-9.0, 9.0].map(Length::from_mm),
-            believed: None,
+            estimated_error: None,
         }
     }
 

@@ -1,4 +1,4 @@
-//! The virtual railway of the demo: a living layout behind the bytes of a 6051, and the loop that speaks with it.
+//! The simulated railway of the demo, behind the bytes of a 6051, and its control loop.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -15,14 +15,14 @@ use crate::link::{Heard, Link, Lost, SimulatedLink, Speed, module_count};
 use crate::runtime::{Attendant, Ended, Recorder, Runtime, StopFlag, Wish};
 use crate::session_journal::SessionJournal;
 
-/// What the runtime hands over to be written down: counted, and kept if there is a journal.
+/// Counts the events of the runtime, and records them if there is a journal.
 #[derive(Debug, Default)]
 pub(super) struct Record {
     pub(super) journal: Option<SessionJournal>,
     pub(super) events: u64,
 }
 
-/// A record that the runtime and the picture share.
+/// A record shared by the runtime and the display.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SharedRecord(pub(super) Rc<RefCell<Record>>);
 
@@ -37,7 +37,7 @@ impl Recorder for SharedRecord {
     }
 }
 
-/// A line that counts what goes over it.
+/// A link that counts its bytes.
 pub(super) struct CountedLink<'l> {
     line: SimulatedLink<'l>,
     bytes: u64,
@@ -70,21 +70,20 @@ impl Link for CountedLink<'_> {
     }
 }
 
-/// A train in somebody's hand, and where it stood.
+/// A train off the rails, and where it was.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct InHand {
+pub(super) struct LiftedTrain {
     train: TrainId,
-    stood: Option<(Position, End)>,
+    was_at: Option<(Position, End)>,
 }
 
 pub(super) struct Railway<'r, 'l> {
     runtime: Runtime<'r, CountedLink<'l>>,
-    in_hand: Vec<InHand>,
+    lifted: Vec<LiftedTrain>,
 }
 
 impl<'r, 'l> Railway<'r, 'l> {
-    /// Trains that nobody knows on a layout that is kept well, all drawn from the seed. The trains are in somebody's hand
-    /// until they are put on the rails.
+    /// Draws trains and a well-kept layout from the seed. All trains are off the rails until [`Self::put_down`].
     pub(super) fn new(
         layout: &'l Layout,
         seed: u64,
@@ -97,7 +96,7 @@ impl<'r, 'l> Railway<'r, 'l> {
         let line = CountedLink { line: SimulatedLink::new(station, speed), bytes: 0 };
         let session = Interface::new(line.now(), Settings::with_cts(module_count(layout)))?;
         let runtime = Runtime::new(line, session, Some(record), Some(StopFlag::install()));
-        let mut railway = Self { runtime, in_hand: Vec::new() };
+        let mut railway = Self { runtime, lifted: Vec::new() };
         trains.iter().for_each(|train| railway.lift(*train));
         Ok(railway)
     }
@@ -106,35 +105,37 @@ impl<'r, 'l> Railway<'r, 'l> {
         self.runtime.link().now()
     }
 
-    /// Bytes that went over the line, either way.
+    /// Bytes in both directions.
     pub(super) fn bytes(&self) -> u64 {
         self.runtime.link().bytes
     }
 
-    /// What really is.
+    /// The simulated world, with the truth.
     pub(super) fn world(&self) -> &LivingLayout<'l> {
         self.runtime.link().line.station().world()
     }
 
     /// Takes a train off the rails.
     pub(super) fn lift(&mut self, train: TrainId) {
-        let stood = self.world().truth().train(train).and_then(|truth| Some((truth.position?, truth.leads)));
-        self.in_hand.push(InHand { train, stood });
+        let was_at = self.world().truth().train(train).and_then(|truth| Some((truth.position?, truth.leads)));
+        self.lifted.push(LiftedTrain { train, was_at });
         self.runtime.link_mut().line.station_mut().world_mut().lift(train);
     }
 
-    /// Puts a train back to where it stood.
+    /// Puts a train back to where it was.
     pub(super) fn put_down(&mut self, train: TrainId) -> anyhow::Result<()> {
-        let Some(place) = self.in_hand.iter().position(|held| held.train == train) else { return Ok(()) };
-        if let (_, Some((position, leads))) = (train, self.in_hand.remove(place).stood) {
+        let Some(place) = self.lifted.iter().position(|lifted| lifted.train == train) else { return Ok(()) };
+        if let (_, Some((position, leads))) = (train, self.lifted.remove(place).was_at) {
             self.runtime.link_mut().line.station_mut().world_mut().place(train, position, leads)?;
         }
         Ok(())
     }
 
-    /// Goes on until something has happened or a person would want a look; returns what was said. An error if the line
-    /// is lost or somebody interrupts.
-    pub(super) fn go_on<M: Machine>(&mut self, machine: &mut M) -> anyhow::Result<Vec<M::Notice>> {
+    /// Runs the loop until its next turn has ended, and returns the notices of that turn.
+    ///
+    /// # Errors
+    /// The link is lost, or the operator interrupts.
+    pub(super) fn advance<M: Machine>(&mut self, machine: &mut M) -> anyhow::Result<Vec<M::Notice>> {
         let mut turn = Turn { notices: Vec::new() };
         match self.runtime.run(machine, &mut turn)? {
             Ended::Finished => Ok(turn.notices),
@@ -142,7 +143,7 @@ impl<'r, 'l> Railway<'r, 'l> {
         }
     }
 
-    /// Stops all trains and takes the power off.
+    /// Stops all trains and switches the track power off.
     pub(super) fn close(&mut self) {
         let closing = self.runtime.close();
         if !closing.is_complete() {
@@ -151,7 +152,7 @@ impl<'r, 'l> Railway<'r, 'l> {
     }
 }
 
-/// Takes part in one turn of the loop.
+/// Collects the notices of one turn of the loop.
 struct Turn<N> {
     notices: Vec<N>,
 }

@@ -1,4 +1,4 @@
-//! What somebody sees while the demo runs: lines that stay, and under them, on a terminal, a picture of both trains.
+//! The terminal output of the demo: permanent lines and, below them, a live picture of both trains.
 
 use std::io::{self, Write};
 
@@ -8,45 +8,51 @@ use serde_json::{Value, json};
 use super::outcome::{self, Learnt, LearntStep, MadeStop};
 use crate::live_lines::{LiveLines, Style};
 
-/// Steps of a 14-step decoder side by side, as wide as a terminal of 80 columns allows.
+/// The width of a step's column: 14 steps fit into 80 characters.
 const CELL: usize = 4;
-/// The head of the rows with a number a step.
+/// The width of the row labels.
 const LABEL: usize = 9;
 
-/// How it is told.
+/// The form of the output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Manner {
     /// For people.
     Text,
-    /// A line of JSON for everything that stays.
+    /// One line of JSON for each permanent line.
     Json,
 }
 
-/// What is shown of a train.
+/// The display of one train.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct TrainPicture {
     pub(super) train: TrainId,
-    /// What it is about, in a word or two.
-    pub(super) does: String,
-    /// The same in a line.
+    /// Its activity, in a word or two.
+    pub(super) activity: String,
+    /// Its activity, in a line.
     pub(super) detail: String,
-    /// Whether it is its turn.
-    pub(super) is_at_work: bool,
-    /// What is known of its steps.
+    /// Whether it is the active train.
+    pub(super) is_active: bool,
+    /// Its calibrated steps.
     pub(super) steps: Vec<LearntStep>,
 }
 
 impl TrainPicture {
-    pub(super) fn waiting(train: TrainId, does: &str) -> Self {
-        Self { train, does: does.to_owned(), detail: String::new(), is_at_work: false, steps: Vec::new() }
+    pub(super) fn waiting(train: TrainId, activity: &str) -> Self {
+        Self {
+            train,
+            activity: activity.to_owned(),
+            detail: String::new(),
+            is_active: false,
+            steps: Vec::new(),
+        }
     }
 }
 
-/// Where all of it goes.
+/// The terminal.
 pub(super) struct Screen<'o> {
     lines: LiveLines<'o>,
     manner: Manner,
-    /// What was acknowledged last, so that it is said once.
+    /// The last acknowledged event count, so that it is printed once.
     acknowledged: u64,
 }
 
@@ -55,17 +61,17 @@ impl<'o> Screen<'o> {
         Self { lines: LiveLines::new(output), manner, acknowledged: 0 }
     }
 
-    /// Whether anybody watches the picture.
+    /// Whether the live picture is visible.
     pub(super) fn is_watched(&self) -> bool {
         self.manner == Manner::Text && self.lines.is_terminal()
     }
 
-    /// Whether it is time for the next picture.
+    /// Whether the next picture is due.
     pub(super) fn is_due(&self) -> bool {
         self.manner == Manner::Text && self.lines.is_due()
     }
 
-    /// A line that stays.
+    /// Prints a permanent line.
     pub(super) fn say(&mut self, text: &str) -> io::Result<()> {
         match self.manner {
             Manner::Text => self.lines.line(text),
@@ -73,19 +79,19 @@ impl<'o> Screen<'o> {
         }
     }
 
-    /// A line that stays, of lesser weight.
+    /// Prints a permanent line, dimmed.
     pub(super) fn mention(&mut self, text: &str) -> io::Result<()> {
         let text = self.lines.styled(Style::Dim, text);
         self.say(&text)
     }
 
-    /// A heading.
+    /// Prints a heading.
     pub(super) fn announce(&mut self, text: &str) -> io::Result<()> {
         let text = self.lines.styled(Style::Bold, text);
         self.say(&text)
     }
 
-    /// Something for programs only.
+    /// Prints a line for programs only.
     pub(super) fn record(&mut self, value: &Value) -> io::Result<()> {
         match self.manner {
             Manner::Text => Ok(()),
@@ -93,25 +99,25 @@ impl<'o> Screen<'o> {
         }
     }
 
-    /// Something went wrong on the railway.
-    pub(super) fn mishap(&mut self, train: TrainId, what: &str) -> io::Result<()> {
+    /// Reports a fault.
+    pub(super) fn fault(&mut self, train: TrainId, what: &str) -> io::Result<()> {
         self.record(&json!({ "mishap": what, "train": train.0 }))?;
         self.mention(&format!("  train {train}: {what}"))
     }
 
-    /// A train is calibrated.
+    /// Reports a calibration.
     pub(super) fn learnt(&mut self, learnt: &Learnt) -> io::Result<()> {
         self.record(&json!({ "learnt": learnt.value() }))?;
         self.say(&format!("  {}", learnt.sentence()))
     }
 
-    /// A train stands where it was commanded to stop.
+    /// Reports a stop.
     pub(super) fn stopped(&mut self, stop: &MadeStop) -> io::Result<()> {
         self.record(&json!({ "stop": stop.value() }))?;
         self.say(&format!("  {}", stop.sentence()))
     }
 
-    /// All stops, one below the other.
+    /// Prints the table of stops.
     pub(super) fn table(&mut self, stops: &[MadeStop]) -> io::Result<()> {
         let head = self.lines.styled(Style::Dim, &outcome::head());
         self.say(&head)?;
@@ -123,7 +129,7 @@ impl<'o> Screen<'o> {
         Ok(())
     }
 
-    /// So many events of the session are on the disk.
+    /// Reports how many events of the session are on disk.
     pub(super) fn acknowledged(&mut self, count: u64) -> io::Result<()> {
         if count == self.acknowledged {
             return Ok(());
@@ -132,12 +138,12 @@ impl<'o> Screen<'o> {
         self.record(&json!({ "acknowledged": count }))
     }
 
-    /// The picture: a line of the session and some of every train.
+    /// Draws the live picture: the trains, then a line for the session.
     pub(super) fn picture(&mut self, session: &str, trains: &[TrainPicture]) -> io::Result<()> {
         let mut lines = vec![String::new()];
         for train in trains {
             lines.push(self.of_train(train));
-            if !train.steps.is_empty() && train.is_at_work {
+            if !train.steps.is_empty() && train.is_active {
                 lines.extend(self.of_steps(&train.steps));
             }
         }
@@ -145,14 +151,14 @@ impl<'o> Screen<'o> {
         self.lines.frame(&lines)
     }
 
-    /// Takes the picture away.
+    /// Removes the live picture.
     pub(super) fn clear(&mut self) -> io::Result<()> {
         self.lines.clear()
     }
 
     fn of_train(&self, train: &TrainPicture) -> String {
-        let (mark, style) = if train.is_at_work { ("▶", Style::Moving) } else { ("·", Style::Dim) };
-        let name = self.lines.styled(style, &format!("{mark} {:>3}  {:<11}", train.train, train.does));
+        let (mark, style) = if train.is_active { ("▶", Style::Moving) } else { ("·", Style::Dim) };
+        let name = self.lines.styled(style, &format!("{mark} {:>3}  {:<11}", train.train, train.activity));
         format!("  {name} {}", train.detail)
     }
 
@@ -170,7 +176,7 @@ impl<'o> Screen<'o> {
     }
 }
 
-/// Three digits at most; what is not known better than half a metre is not known.
+/// At most three digits; half a metre or more counts as unknown.
 fn shown_accuracy(within: Length) -> String {
     let mm = within.as_mm();
     if mm < 500.0 { format!("{mm:.0}") } else { "?".to_owned() }

@@ -1,66 +1,42 @@
 //! What the messages of a DCC-EX board come to: what it is, how soon it answers, and what it reports.
 
-use std::collections::BTreeMap;
 use std::io::Write;
 use std::mem::{Discriminant, discriminant};
 
-use footplate_core::Timestamp;
-use footplate_wire::dcc_ex::{Framing, Reply, Request, SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST};
+use footplate_wire::dcc_ex::{Framing, Power, Reply, Request, SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST};
 
-use super::figures::{line, quantiles};
-use crate::commands::plot::{Ink, Layer, Panel, Picture, Shape, shares};
+use super::answers::{Answers, Sensors, Waiting, write_noise};
+use super::figures::StationFigures;
 use crate::link::Passed;
 
 /// The figures of a board.
+#[derive(Default)]
 pub(super) struct BoardFigures {
     identity: Option<String>,
-    /// From a request to its answer, in ms, sorted.
-    answers: Vec<f64>,
-    asked: usize,
-    lost: usize,
-    /// Sensors by their numbers on the board, and whether they were occupied last.
-    sensors: BTreeMap<u16, bool>,
-    reports: usize,
+    answers: Answers,
+    sensors: Sensors,
     unread: usize,
 }
 
 impl BoardFigures {
     pub(super) fn of(passed: &[Passed]) -> Self {
         let (mut said, mut heard) = (Framing::default(), Framing::default());
-        let mut waiting: Vec<(Discriminant<Request>, Timestamp)> = Vec::new();
-        let mut figures = Self {
-            identity: None,
-            answers: Vec::new(),
-            asked: 0,
-            lost: 0,
-            sensors: BTreeMap::new(),
-            reports: 0,
-            unread: 0,
-        };
+        let mut waiting: Waiting<Discriminant<Request>> = Waiting::default();
+        let mut figures = Self::default();
         for one in passed {
             match *one {
                 Passed::Written(at, byte) => {
-                    let Some(request) = said.push(byte).and_then(Request::read) else { continue };
-                    if !is_answered(request) {
-                        continue;
+                    let request = said.push(byte).and_then(Request::read);
+                    if let Some(request) = request.filter(|request| is_answered(*request)) {
+                        waiting.asked(discriminant(&request), at);
                     }
-                    let kind = discriminant(&request);
-                    figures.asked += 1;
-                    // The same is asked again only when it was not answered.
-                    let before = waiting.len();
-                    waiting.retain(|(other, _)| *other != kind);
-                    figures.lost += before - waiting.len();
-                    waiting.push((kind, at));
                 }
                 Passed::Heard(at, byte) => {
                     let text = heard.push(byte);
                     match text.map(|text| (text.len(), Reply::read(text))) {
                         Some((_, Ok(Some(reply)))) => {
-                            if let Some(kind) = kind_answered(&reply)
-                                && let Some(place) = waiting.iter().position(|(other, _)| *other == kind)
-                            {
-                                let (_, since) = waiting.remove(place);
-                                figures.answers.push((at - since).as_ms());
+                            if let Some(kind) = kind_answered(&reply) {
+                                waiting.answered(&kind, at);
                             }
                             figures.take(reply);
                         }
@@ -71,81 +47,50 @@ impl BoardFigures {
             }
         }
         figures.unread += heard.take_unread();
-        figures.answers.sort_by(f64::total_cmp);
+        figures.answers = waiting.finish();
         figures
     }
 
     fn take(&mut self, reply: Reply) {
         match reply {
             Reply::Identity(identity) => self.identity = Some(identity.trim().to_owned()),
-            Reply::Sensor { id, active } => {
-                let before = self.sensors.insert(id, active);
-                self.reports += usize::from(before == Some(false) && active);
-            }
+            Reply::Sensor { id, active } => self.sensors.heard(id, active),
             _ => {}
         }
     }
+}
 
-    /// What the board says it is.
-    pub(super) fn identity(&self) -> Option<&str> {
-        self.identity.as_deref()
+impl StationFigures for BoardFigures {
+    fn check(&self) -> Result<(), &'static str> {
+        self.identity.as_ref().map(|_| ()).ok_or(
+            "no DCC-EX board has said what it is; check the port, and listen longer with --seconds 20 if the board is slow to \
+             start",
+        )
     }
 
-    /// The share of requests that were not answered.
-    pub(super) fn lost_share(&self) -> f64 {
-        self.lost as f64 / self.asked.max(1) as f64
+    fn answers(&self) -> &Answers {
+        &self.answers
     }
 
-    fn occupied(&self) -> usize {
-        self.sensors.values().filter(|occupied| **occupied).count()
+    fn json(&self) -> serde_json::Value {
+        let mut json = serde_json::json!({ "identity": self.identity, "unread_bytes": self.unread });
+        self.sensors.add_to(&mut json);
+        json
     }
 
-    pub(super) fn json(&self) -> serde_json::Value {
-        serde_json::json!({
-            "identity": self.identity,
-            "requests": self.asked,
-            "lost_answers": self.lost,
-            "answer_ms": quantiles(&self.answers),
-            "sensors": self.sensors.len(),
-            "occupied": self.occupied(),
-            "reports": self.reports,
-            "unread_bytes": self.unread,
-        })
+    fn write_station(&self, output: &mut dyn Write) -> std::io::Result<()> {
+        writeln!(output, "station       {}", self.identity.as_deref().unwrap_or("unknown"))
     }
 
-    pub(super) fn write(&self, output: &mut dyn Write) -> std::io::Result<()> {
-        writeln!(output, "station       {}", self.identity().unwrap_or("unknown"))?;
-        writeln!(output, "requests      {}, {} without an answer", self.asked, self.lost)?;
-        line(output, "answers", &self.answers)?;
-        let (count, occupied) = (self.sensors.len(), self.occupied());
-        writeln!(output, "sensors       {count}, {occupied} occupied, {} reports", self.reports)?;
+    fn write_reports(&self, output: &mut dyn Write) -> std::io::Result<()> {
+        let [count, occupied, reports] = self.sensors.counts();
+        writeln!(output, "sensors       {count}, {occupied} occupied, {reports} reports")?;
         let (from, to) = (SENSOR_DELAY_SHORTEST.as_ms(), SENSOR_DELAY_LONGEST.as_ms());
         writeln!(
             output,
             "delay         of reports taken to be {from:.1} to {to:.1} ms, as on firmware 5.6.0"
         )?;
-        if self.unread > 0 {
-            writeln!(output, "noise         {} bytes could not be read", self.unread)?;
-        }
-        Ok(())
-    }
-
-    /// How the times to answers are spread.
-    pub(super) fn picture(&self) -> Picture {
-        let curve = Shape::Line(shares(self.answers.iter().copied()));
-        let layers = (!self.answers.is_empty()).then(|| Layer::new("answer", Ink::First, curve));
-        let panel = Panel {
-            x: "at most (ms)".to_owned(),
-            y: "share (%)".to_owned(),
-            from_nought: true,
-            layers: layers.into_iter().collect(),
-            ..Panel::default()
-        };
-        Picture {
-            title: "How soon the board answers".to_owned(),
-            subtitle: format!("{} requests, {} without an answer", self.asked, self.lost),
-            panels: vec![panel],
-        }
+        write_noise(self.unread, output)
     }
 }
 
@@ -156,7 +101,6 @@ const fn is_answered(request: Request) -> bool {
 
 /// The kind of request that a message answers.
 fn kind_answered(reply: &Reply) -> Option<Discriminant<Request>> {
-    use footplate_wire::dcc_ex::Power;
     Some(match reply {
         Reply::Identity(_) => discriminant(&Request::Status),
         Reply::Slots(_) => discriminant(&Request::Slots),

@@ -4,8 +4,30 @@ use std::io::Write;
 
 use footplate_core::TimeSpan;
 
+use super::answers::Answers;
 use crate::commands::plot::{Ink, Layer, Panel, Picture, SHOWN, Shape, shares};
 use crate::link::{Passed, Rhythm};
+
+/// What the messages of a station come to that reports by itself.
+pub(super) trait StationFigures {
+    /// Whether a station of this kind was heard.
+    ///
+    /// # Errors
+    /// What the user should check, if none was heard.
+    fn check(&self) -> Result<(), &'static str>;
+
+    /// Times to its answers.
+    fn answers(&self) -> &Answers;
+
+    /// All figures except those of answers.
+    fn json(&self) -> serde_json::Value;
+
+    /// Prints what the station is.
+    fn write_station(&self, output: &mut dyn Write) -> std::io::Result<()>;
+
+    /// Prints what the station reports.
+    fn write_reports(&self, output: &mut dyn Write) -> std::io::Result<()>;
+}
 
 /// Bars of the histogram are as wide as this at most.
 const BAR: usize = 40;
@@ -14,11 +36,11 @@ const BINS: usize = 8;
 
 /// The figures of a line.
 pub(super) struct Figures {
-    /// From one request to the next with nothing between them, in ms, sorted.
+    /// Time between two polls with nothing between them, in ms, sorted.
     periods: Vec<f64>,
     /// The same with one command between them.
     with_command: Vec<f64>,
-    /// From the last bit of a request to the first byte of its answer.
+    /// Time from the last bit of a poll to the first byte of the reply.
     first_bytes: Vec<f64>,
     asked: usize,
     lost: usize,
@@ -51,9 +73,14 @@ impl Figures {
         match others {
             0 => self.periods.push(span.as_ms()),
             1 => self.with_command.push(span.as_ms()),
-            // What brings the line into step is no period.
+            // Bytes that synchronise the line are no period.
             _ => {}
         }
+    }
+
+    /// Whether any poll was answered.
+    pub(super) fn has_replies(&self) -> bool {
+        !self.first_bytes.is_empty() && self.lost < self.asked
     }
 
     /// The share of requests whose answer was lost.
@@ -78,7 +105,7 @@ impl Figures {
     pub(super) fn write(&self, output: &mut dyn Write) -> std::io::Result<()> {
         writeln!(output, "polls         {}, {} without a whole reply", self.asked, self.lost)?;
         line(output, "poll period", &self.periods)?;
-        self.histogram(output)?;
+        histogram(output, &self.periods)?;
         line(output, "first byte", &self.first_bytes)?;
         match self.command_cost() {
             Some(cost) => writeln!(
@@ -103,7 +130,7 @@ impl Figures {
         let panel = Panel {
             x: "at most (ms)".to_owned(),
             y: "share (%)".to_owned(),
-            from_nought: true,
+            from_zero: true,
             layers: layers.collect(),
             ..Panel::default()
         };
@@ -115,26 +142,6 @@ impl Figures {
             ),
             panels: vec![panel],
         }
-    }
-
-    fn histogram(&self, output: &mut dyn Write) -> std::io::Result<()> {
-        let (Some(low), Some(high)) = (at(&self.periods, 0.0), at(&self.periods, 0.99)) else {
-            return Ok(());
-        };
-        let width = ((high - low) / BINS as f64).max(0.1);
-        let mut counts = [0_usize; BINS];
-        for period in self.periods.iter().filter(|period| **period <= high) {
-            let bin = (((period - low) / width) as usize).min(BINS - 1);
-            if let Some(count) = counts.get_mut(bin) {
-                *count += 1;
-            }
-        }
-        let most = counts.iter().copied().max().unwrap_or(1).max(1);
-        for (bin, count) in counts.into_iter().enumerate() {
-            let from = low + width * bin as f64;
-            writeln!(output, "  {from:>7.1} ms  {}", "#".repeat((count * BAR).div_ceil(most)))?;
-        }
-        Ok(())
     }
 }
 
@@ -153,4 +160,23 @@ pub(super) fn line(output: &mut dyn Write, name: &str, sorted: &[f64]) -> std::i
         return writeln!(output, "{name:<13} none");
     };
     writeln!(output, "{name:<13} median {median:.1} ms, 5 % {low:.1}, 95 % {high:.1}, longest {most:.1}")
+}
+
+/// Bars of how often times were seen, up to the longest but one in a hundred.
+pub(super) fn histogram(output: &mut dyn Write, sorted: &[f64]) -> std::io::Result<()> {
+    let (Some(low), Some(high)) = (at(sorted, 0.0), at(sorted, 0.99)) else { return Ok(()) };
+    let width = ((high - low) / BINS as f64).max(0.1);
+    let mut counts = [0_usize; BINS];
+    for time in sorted.iter().filter(|time| **time <= high) {
+        let bin = (((time - low) / width) as usize).min(BINS - 1);
+        if let Some(count) = counts.get_mut(bin) {
+            *count += 1;
+        }
+    }
+    let most = counts.iter().copied().max().unwrap_or(1).max(1);
+    for (bin, count) in counts.into_iter().enumerate() {
+        let from = low + width * bin as f64;
+        writeln!(output, "  {from:>7.1} ms  {}", "#".repeat((count * BAR).div_ceil(most)))?;
+    }
+    Ok(())
 }

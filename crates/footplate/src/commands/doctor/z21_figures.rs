@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::io::Write;
 
-use footplate_core::{TimeSpan, Timestamp};
+use footplate_core::Timestamp;
 use footplate_wire::z21::{
-    Datasets, Feedback, Firmware, Lock, RailCom, Reply, Request, SENSOR_DELAY_SHORTEST, SystemState,
+    Datasets, Firmware, Lock, RailCom, Reply, Request, SENSOR_DELAY_SHORTEST, Settings, SystemState,
 };
 
-use super::figures::{line, quantiles};
-use crate::commands::plot::{Ink, Layer, Panel, Picture, Shape, shares};
+use super::answers::{Answers, Sensors, Waiting, write_noise};
+use super::figures::StationFigures;
 use crate::link::Passed;
 
 /// The figures of a station.
@@ -19,14 +19,10 @@ pub(super) struct Z21Figures {
     serial_number: Option<u32>,
     lock: Option<Lock>,
     system: Option<SystemState>,
-    /// From a request to its answer, in ms, sorted.
-    answers: Vec<f64>,
-    asked: usize,
-    lost: usize,
-    /// Sensors by their numbers on the station, and whether they were occupied last.
-    sensors: BTreeMap<u16, bool>,
-    reports: usize,
-    /// Locomotives whose decoders report by RailCom, and what they said last.
+    settings: Settings,
+    answers: Answers,
+    sensors: Sensors,
+    /// Locomotives whose decoders report by RailCom, with the last report.
     rail_com: BTreeMap<u16, RailCom>,
     /// X-BUS messages whose XOR byte was wrong, and bytes that could not be read.
     wrong_xor: usize,
@@ -46,33 +42,26 @@ enum Kind {
 }
 
 impl Z21Figures {
-    /// The figures of what passed, with sensors that are connected so.
-    pub(super) fn of(passed: &[Passed], feedback: Feedback) -> Self {
-        let mut figures = Self::default();
-        let mut waiting: Vec<(Kind, Timestamp)> = Vec::new();
+    /// The figures of what passed, with sensors that are connected as the settings say.
+    pub(super) fn of(passed: &[Passed], settings: &Settings) -> Self {
+        let mut figures = Self { settings: *settings, ..Self::default() };
+        let mut waiting: Waiting<Kind> = Waiting::default();
         for (at, is_heard, datagram) in datagrams(passed) {
             let mut datasets = Datasets::of(&datagram);
             for dataset in datasets.by_ref() {
                 if !is_heard {
                     if let Some(kind) = Request::read(&dataset).and_then(asked) {
-                        figures.asked += 1;
-                        // The same is asked again before it was answered only when no answer came.
-                        let before = waiting.len();
-                        waiting.retain(|(other, _)| *other != kind);
-                        figures.lost += before - waiting.len();
-                        waiting.push((kind, at));
+                        waiting.asked(kind, at);
                     }
                     continue;
                 }
                 figures.wrong_xor += usize::from(!dataset.is_sound());
                 match Reply::read(&dataset) {
                     Ok(Some(reply)) => {
-                        let place = waiting.iter().position(|(kind, _)| Some(*kind) == answered(&reply));
-                        if let Some(place) = place {
-                            let (_, since) = waiting.remove(place);
-                            figures.answers.push((at - since).as_ms());
+                        if let Some(kind) = answered(&reply) {
+                            waiting.answered(&kind, at);
                         }
-                        figures.take(reply, feedback);
+                        figures.take(reply);
                     }
                     Ok(None) => {}
                     Err(_) => figures.unread += dataset.data.len(),
@@ -82,20 +71,19 @@ impl Z21Figures {
                 figures.unread += datasets.unread();
             }
         }
-        figures.answers.sort_by(f64::total_cmp);
+        figures.answers = waiting.finish();
         figures
     }
 
-    fn take(&mut self, reply: Reply, feedback: Feedback) {
-        for (number, is_occupied) in feedback.detections(&reply) {
-            let before = self.sensors.insert(number, is_occupied);
-            self.reports += usize::from(before == Some(false) && is_occupied);
+    fn take(&mut self, reply: Reply) {
+        for (number, is_occupied) in self.settings.feedback.detections(&reply) {
+            self.sensors.heard(number, is_occupied);
         }
         match reply {
             Reply::SerialNumber(number) => self.serial_number = Some(number),
             Reply::Hardware { kind, firmware } => self.hardware = Some((kind, firmware)),
             Reply::LockCode(lock) => self.lock = Some(lock),
-            // What it says when the power goes off at the end is no news.
+            // The state after the power goes off at the end is not of interest.
             Reply::SystemState(state) if state.central.is_powered() || self.system.is_none() => {
                 self.system = Some(state);
             }
@@ -103,44 +91,36 @@ impl Z21Figures {
             _ => {}
         }
     }
+}
 
-    /// Whether anything was heard that only such a station says.
-    pub(super) const fn is_known(&self) -> bool {
-        self.serial_number.is_some()
+impl StationFigures for Z21Figures {
+    fn check(&self) -> Result<(), &'static str> {
+        let is_known = self.serial_number.map(|_| ());
+        is_known.ok_or("no Z21 has said its serial number; check its address and the network")
     }
 
-    /// The share of requests that were not answered.
-    pub(super) fn lost_share(&self) -> f64 {
-        self.lost as f64 / self.asked.max(1) as f64
+    fn answers(&self) -> &Answers {
+        &self.answers
     }
 
-    fn occupied(&self) -> usize {
-        self.sensors.values().filter(|occupied| **occupied).count()
-    }
-
-    pub(super) fn json(&self) -> serde_json::Value {
+    fn json(&self) -> serde_json::Value {
         let hardware = self.hardware.map(|(kind, firmware)| (format!("{kind:#06x}"), firmware.to_string()));
-        serde_json::json!({
+        let mut json = serde_json::json!({
             "serial_number": self.serial_number,
             "hardware": hardware.as_ref().map(|(kind, _)| kind),
             "firmware": hardware.as_ref().map(|(_, firmware)| firmware),
             "locked": self.lock.map(|lock| lock == Lock::Locked),
             "track_v": self.system.map(|state| f64::from(state.track_mv) / 1e3),
             "current_ma": self.system.map(|state| state.main_ma),
-            "requests": self.asked,
-            "lost_answers": self.lost,
-            "answer_ms": quantiles(&self.answers),
-            "sensors": self.sensors.len(),
-            "occupied": self.occupied(),
-            "reports": self.reports,
             "railcom_trains": self.rail_com.keys().collect::<Vec<_>>(),
             "wrong_xor": self.wrong_xor,
             "unread_bytes": self.unread,
-        })
+        });
+        self.sensors.add_to(&mut json);
+        json
     }
 
-    /// Says it to a person; `sensor_delay`: the longest delay that reports are taken to have.
-    pub(super) fn write(&self, sensor_delay: TimeSpan, output: &mut dyn Write) -> std::io::Result<()> {
+    fn write_station(&self, output: &mut dyn Write) -> std::io::Result<()> {
         let number = self.serial_number.unwrap_or_default();
         match self.hardware {
             Some((kind, firmware)) => {
@@ -155,11 +135,13 @@ impl Z21Figures {
             let volts = f64::from(track_mv) / 1e3;
             writeln!(output, "track         {volts:.1} V, {main_ma} mA, station at {temperature_c} °C")?;
         }
-        writeln!(output, "requests      {}, {} without an answer", self.asked, self.lost)?;
-        line(output, "answers", &self.answers)?;
-        let (count, occupied) = (self.sensors.len(), self.occupied());
-        writeln!(output, "sensors       {count} inputs, {occupied} occupied, {} reports", self.reports)?;
-        let (from, to) = (SENSOR_DELAY_SHORTEST.as_ms(), sensor_delay.as_ms());
+        Ok(())
+    }
+
+    fn write_reports(&self, output: &mut dyn Write) -> std::io::Result<()> {
+        let [count, occupied, reports] = self.sensors.counts();
+        writeln!(output, "sensors       {count} inputs, {occupied} occupied, {reports} reports")?;
+        let (from, to) = (SENSOR_DELAY_SHORTEST.as_ms(), self.settings.sensor_delay.as_ms());
         writeln!(output, "delay         of reports taken to be {from:.0} to {to:.0} ms (sensor-delay)")?;
         for RailCom { address, received, errors, .. } in self.rail_com.values() {
             let speed = self.rail_com.get(address).and_then(RailCom::reported_speed);
@@ -169,28 +151,7 @@ impl Z21Figures {
         if self.wrong_xor > 0 {
             writeln!(output, "checksums     {} wrong; they are not relied on", self.wrong_xor)?;
         }
-        if self.unread > 0 {
-            writeln!(output, "noise         {} bytes could not be read", self.unread)?;
-        }
-        Ok(())
-    }
-
-    /// How the times to answers are spread.
-    pub(super) fn picture(&self) -> Picture {
-        let curve = Shape::Line(shares(self.answers.iter().copied()));
-        let layers = (!self.answers.is_empty()).then(|| Layer::new("answer", Ink::First, curve));
-        let panel = Panel {
-            x: "at most (ms)".to_owned(),
-            y: "share (%)".to_owned(),
-            from_nought: true,
-            layers: layers.into_iter().collect(),
-            ..Panel::default()
-        };
-        Picture {
-            title: "How soon the station answers".to_owned(),
-            subtitle: format!("{} requests, {} without an answer", self.asked, self.lost),
-            panels: vec![panel],
-        }
+        write_noise(self.unread, output)
     }
 }
 

@@ -1,4 +1,4 @@
-//! How a session of driving begins, as it is kept: all that its script runner is made of.
+//! The inputs of a driving session, as they are recorded: enough to build its script runner again for a replay.
 
 use anyhow::Context;
 use footplate_core::control::Driver;
@@ -12,39 +12,39 @@ use serde::{Deserialize, Serialize};
 use super::learning::Learning;
 use super::reader::Known;
 use super::script::step;
-use super::script_runner::{Giver, ScriptRunner};
+use super::script_runner::{CommandSource, ScriptRunner};
 use crate::commands::written_layout::WrittenLayout;
 
-/// All that a [`ScriptRunner`] is made of. A session and its replay both make theirs of it.
+/// Everything that a [`ScriptRunner`] is built from, both in a live session and in its replay.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct DriveBeginning {
-    /// The text of the layout.
     pub(super) layout: String,
-    /// How turnouts lie, as far as that is known.
+    /// The known positions of turnouts.
     pub(super) turnouts: Vec<(TurnoutId, Leg)>,
-    /// How each train moves.
+    /// The motion model of each train.
     pub(super) models: Vec<MotionModel>,
-    /// What trains taught before, to learn on from.
+    /// The running fits that the session continues.
     pub(super) fits: Vec<MotionFit>,
-    pub(super) giver: Giver,
-    /// Lines that are known from the beginning ...
+    #[serde(rename = "giver")]
+    pub(super) source: CommandSource,
+    /// The lines of the script that are known at the beginning.
     pub(super) script: Vec<String>,
-    /// ... and whether more may come.
+    /// Whether no more lines will come.
     pub(super) is_complete: bool,
-    /// Seconds for which it waits at most, if that was said.
+    /// The longest wait, in seconds; `None` for the default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) wait_limit_s: Option<f64>,
-    /// How long the link takes; sessions of older versions supposed the slowest.
+    /// The delays of the link; sessions of older versions assumed the slowest link.
     #[serde(default)]
     pub(super) link: TimeModel,
 }
 
 impl DriveBeginning {
-    /// The name of such a machine in a store.
+    /// The kind of this machine in a store.
     pub(crate) const KIND: &'static str = "drive";
 
-    /// A session of a person who has said nothing yet, with trains as they were handed over.
-    pub(crate) fn of_person(
+    /// A session whose script arrives line by line, with trains as an earlier session handed them over.
+    pub(crate) fn line_by_line(
         written: &WrittenLayout,
         turnouts: &TurnoutStates,
         (models, fits): (Vec<MotionModel>, Vec<MotionFit>),
@@ -54,7 +54,7 @@ impl DriveBeginning {
             turnouts: written.legs(turnouts),
             models,
             fits,
-            giver: Giver::Person,
+            source: CommandSource::Script,
             script: Vec::new(),
             is_complete: false,
             wait_limit_s: None,
@@ -62,15 +62,14 @@ impl DriveBeginning {
         }
     }
 
-    /// The text of the layout.
     pub(crate) fn layout(&self) -> &str {
         &self.layout
     }
 
-    /// The script runner that begins so.
+    /// Builds the script runner.
     ///
     /// # Errors
-    /// What makes no script runner: the text of the layout, or a line of the script.
+    /// The layout or a line of the script is invalid.
     pub(crate) fn script_runner(self) -> anyhow::Result<ScriptRunner> {
         let layout = WrittenLayout::of("the layout of the session", self.layout)?.layout;
         let highest = self.models.iter().map(|model| (model.train(), model.highest()));
@@ -85,7 +84,7 @@ impl DriveBeginning {
         driver.set_link(self.link);
         self.models.into_iter().for_each(|model| driver.add_train(model));
         let mut script_runner =
-            ScriptRunner::new(driver, Learning::new(&layout, self.fits), self.giver, steps);
+            ScriptRunner::new(driver, Learning::new(&layout, self.fits), self.source, steps);
         if let Some(seconds) = self.wait_limit_s {
             script_runner.set_wait_limit(TimeSpan::from_s(seconds));
         }

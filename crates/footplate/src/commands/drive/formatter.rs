@@ -1,4 +1,4 @@
-//! Notices of the driver and the dispatcher as people read them.
+//! Formats the notices of driver, watchdog and dispatcher as one line of text each.
 
 use footplate_core::control::{
     Driver, Finished, Notice, Order, Outcome, PlannedArrival, PlannedStop, Refusal,
@@ -9,7 +9,7 @@ use footplate_core::{HALF_95, Length, SensorId, Timestamp, TrainId};
 
 use super::instruction::Instruction;
 
-/// Knows the names of things.
+/// Formats notices with the names of the layout and with times since the session began.
 pub(in crate::commands) struct NoticeFormatter<'d> {
     pub(in crate::commands) driver: &'d Driver,
     pub(in crate::commands) began: Timestamp,
@@ -47,14 +47,14 @@ impl NoticeFormatter<'_> {
         format!("{:9.3} s", (time - self.began).as_s())
     }
 
-    /// A place to the millimetre.
+    /// A place as sensor and offset, rounded to a millimetre.
     pub(super) fn place(&self, at: Landmark) -> String {
         let name = self.driver.layout().node_name(at.node);
         let mm = at.offset.as_mm().round();
         if mm == 0.0 { name.to_owned() } else { format!("{name}{mm:+}mm") }
     }
 
-    /// One line on where a train is.
+    /// Position and speed of a train, with 95 % intervals.
     pub(super) fn whereabouts(&self, train: TrainId, now: Timestamp) -> String {
         let Some(located) = self.driver.locate(train, now) else {
             return format!("train {train}: position unknown; run it over a sensor first");
@@ -64,14 +64,14 @@ impl NoticeFormatter<'_> {
         let moves = if located.at_rest {
             "at rest".to_owned()
         } else {
-            let (speed, doubt) =
+            let (speed, half_speed) =
                 (located.speed.as_mm_per_s(), HALF_95 * located.speed_uncertainty.as_mm_per_s());
-            format!("{speed:.0} \u{b1} {doubt:.0} mm/s at step {}", located.step)
+            format!("{speed:.0} \u{b1} {half_speed:.0} mm/s at step {}", located.step)
         };
         format!("train {train}: {place} \u{b1} {half:.0} mm (95 %), {moves}")
     }
 
-    /// Where all trains are, for a line that is looked at while something else is written.
+    /// Position and speed of all trains in one short line, for the line above the prompt.
     pub(super) fn status(&self, now: Timestamp) -> String {
         let train = |train: TrainId| {
             let Some(located) = self.driver.locate(train, now) else { return format!("{train} ?") };
@@ -83,7 +83,7 @@ impl NoticeFormatter<'_> {
         self.driver.trains().map(train).collect::<Vec<_>>().join(", ")
     }
 
-    /// A notice as one line, if there is anything to say.
+    /// A notice as one line; `None` if another notice or the result of the order already says it.
     pub(in crate::commands) fn line(&self, notice: &Notice) -> Option<String> {
         Some(match notice {
             Notice::Passed { train, passed, next } => self.passed(*train, passed, next.as_ref()),
@@ -184,7 +184,7 @@ impl NoticeFormatter<'_> {
             Notice::StepsAside { train, makes_room_for, to } => {
                 format!("train {train} moves to {} to make room for train {makes_room_for}", self.place(*to))
             }
-            // That has been said with the refusal.
+            // The refusal of the order has said that already.
             Notice::Withdrawn { why: Some(Refusal::Unreachable { .. }), .. } => return None,
             Notice::Withdrawn { train, why } => {
                 let why = why.as_ref().map_or_else(String::new, |why| format!(": {why}"));
@@ -278,7 +278,7 @@ impl NoticeFormatter<'_> {
     }
 }
 
-/// What the watchdog reports, as one line; `None` for notices of others.
+/// A notice of the watchdog as one line; `None` for other notices.
 fn supervised(notice: &Notice) -> Option<String> {
     Some(match notice {
         Notice::Danger { train, why, stopped, .. } if stopped.is_empty() => {
@@ -327,7 +327,7 @@ fn supervised(notice: &Notice) -> Option<String> {
     })
 }
 
-/// A train came to rest elsewhere than promised too often: what its promises are wider by, one standard deviation.
+/// Warns that the stops of a train missed their intervals too often; `by` is the standard deviation that was added.
 pub(super) fn promises_broken(train: TrainId, by: Length) -> String {
     format!(
         "stops of train {train} miss their intervals: the intervals are ±{:.0} mm wider from now on; if \
@@ -337,7 +337,7 @@ pub(super) fn promises_broken(train: TrainId, by: Length) -> String {
     )
 }
 
-/// Trains one after the other, as in a sentence.
+/// Lists trains as in a sentence: `train 24, train 58`.
 pub(super) fn trains(trains: &[TrainId]) -> String {
     let trains: Vec<String> = trains.iter().map(|train| format!("train {train}")).collect();
     if trains.is_empty() { "no train that can move".to_owned() } else { trains.join(", ") }

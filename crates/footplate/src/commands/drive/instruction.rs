@@ -1,4 +1,4 @@
-//! What a line says, once it has been understood.
+//! The instructions that a script or an operator can give.
 
 use footplate_core::control::{Journey, Order, TrainLengths};
 use footplate_core::track::Landmark;
@@ -7,44 +7,44 @@ use footplate_core::{SensorId, TimeSpan, TrainId};
 /// One line of a script or of the prompt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Instruction {
-    /// Something for the driver.
+    /// An order of the driver.
     Order(Order),
-    /// A train goes to a place by whatever way is free.
+    /// Send a train to a place; the dispatcher chooses the route.
     Go(TrainId, Journey),
-    /// All turnouts straight, one after the other.
+    /// Throw all turnouts straight, one after the other.
     Straighten,
-    /// A person put a train there, or sees that it stands there.
+    /// The operator says where a train at rest is.
     Place(TrainId, Landmark),
-    /// A person has measured a train.
+    /// The operator states the lengths of a train.
     Length(TrainId, TrainLengths),
-    /// All trains stand, and the power goes off the track, at once.
+    /// Stop all trains and switch the track power off, at once.
     Halt,
-    /// The power comes back.
+    /// Switch the track power on.
     PowerOn,
-    /// Where is a train, or all of them?
+    /// Print the position of one train, or of all.
     Where(Option<TrainId>),
-    /// Go on with the next line later.
+    /// Continue with the next line when a condition is met.
     Wait(Until),
-    /// What can be said?
+    /// Print the list of instructions.
     Help,
-    /// Stop all trains and end.
+    /// Stop all trains and end the session.
     Quit,
 }
 
-/// What is waited for.
+/// The condition of a `wait`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Until {
-    /// Time goes by.
+    /// A time has passed.
     Passed(TimeSpan),
-    /// A train has nothing to do and stands.
+    /// A train has finished its orders and is at rest.
     AtRest(TrainId),
-    /// A train passes a contact.
+    /// A sensor detects a train.
     At(TrainId, SensorId),
-    /// Somebody knows where a train is.
+    /// The position of a train is known.
     Located(TrainId),
 }
 
-/// What can be said, for `help`.
+/// The text of `help`.
 pub(super) const HELP: &str = "\
 speed 24 8                        run train 24 at step 8; step 0 stops it
 reverse 24 [at step 8]            stop, then reverse [and run at step 8]

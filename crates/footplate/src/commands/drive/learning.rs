@@ -1,4 +1,4 @@
-//! What trains teach while they are driven.
+//! Fits motion models to the events of the session while trains run.
 
 use std::collections::BTreeMap;
 
@@ -10,20 +10,20 @@ use footplate_core::track::Layout;
 use footplate_core::tracking::PassedContact;
 use footplate_core::{Event, EventKind, Report, SpeedStep, TrainId};
 
-/// Fits that go on from what was known at the beginning.
+/// The fits of all trains, continued from those that the session began with.
 #[derive(Debug)]
 pub(super) struct Learning {
     fits: BTreeMap<TrainId, MotionFit>,
     sections: SectionIndex,
-    /// Fits under way.
-    under_way: BTreeMap<TrainId, Refit>,
-    /// Steps told to a train since it stood last.
+    /// Refits that are being computed, a part at a time.
+    in_progress: BTreeMap<TrainId, Refit>,
+    /// Commanded steps of a train since its last standstill.
     changes: BTreeMap<TrainId, usize>,
 }
 
-/// A run with more changes of step than this teaches nothing that others do not: a train that is held at a speed between two
-/// steps changes every second, and a fit weighs every change of a run against every contact.
-const MOST_CHANGES: usize = 16;
+/// Runs with more step changes than this are not fitted. A train that holds a speed between two steps changes every
+/// second; the cost of a fit is changes times detections, and such a run adds little information.
+const MAX_STEP_CHANGES: usize = 16;
 
 impl Learning {
     pub(super) fn new(layout: &Layout, fits: Vec<MotionFit>) -> Self {
@@ -31,19 +31,19 @@ impl Learning {
         Self {
             fits,
             sections: SectionIndex::of(layout),
-            under_way: BTreeMap::new(),
+            in_progress: BTreeMap::new(),
             changes: BTreeMap::new(),
         }
     }
 
-    /// A command to a train has left.
+    /// Takes in a command that has left for a train.
     pub(super) fn take(&mut self, driver: &Driver, event: &Event) {
         match event.kind {
             EventKind::Speed { train, step } => {
                 let changes = self.changes.entry(train).or_default();
-                let was_restless = *changes > MOST_CHANGES;
+                let was_over_limit = *changes > MAX_STEP_CHANGES;
                 *changes = if step == SpeedStep::STAND { 0 } else { *changes + 1 };
-                if *changes > MOST_CHANGES || was_restless {
+                if *changes > MAX_STEP_CHANGES || was_over_limit {
                     self.interrupt(train);
                 } else {
                     self.learn(train, driver, event);
@@ -54,12 +54,12 @@ impl Learning {
         }
     }
 
-    /// A contact was judged to have been closed by a train. Where it was before is not known if it was just found.
+    /// Takes in a detection of a train. A train that has only just been located has no known earlier position.
     pub(super) fn passed(&mut self, train: TrainId, driver: &Driver, passed: &PassedContact) {
         if passed.late.is_none() {
             self.interrupt(train);
         }
-        if self.changes.get(&train).is_some_and(|changes| *changes > MOST_CHANGES) {
+        if self.changes.get(&train).is_some_and(|changes| *changes > MAX_STEP_CHANGES) {
             return;
         }
         let report = Report { sensor: passed.sensor, poll_interval: Some(passed.window.width()) };
@@ -73,20 +73,21 @@ impl Learning {
         }
     }
 
-    /// What a train did last follows from nothing that is known.
+    /// Ends the current run of a train: its next events do not follow from known ones.
     pub(super) fn interrupt(&mut self, train: TrainId) {
         if let Some(fit) = self.fits.get_mut(&train) {
             fit.interrupt();
         }
     }
 
-    /// A train is not what it was: nothing is learnt of it any more in this session, and what was is not kept.
+    /// Drops the fit of a train that has changed. It is not fitted again in this session, and its earlier fit is not
+    /// stored.
     pub(super) fn forget(&mut self, train: TrainId) {
         self.fits.remove(&train);
-        self.under_way.remove(&train);
+        self.in_progress.remove(&train);
     }
 
-    /// All fits, with the chain of what trains did broken: nobody knows what becomes of them until they are driven again.
+    /// All fits, with their current runs ended: what the trains do between sessions is unknown.
     pub(super) fn handed_over(&self) -> Vec<MotionFit> {
         let fits = self.fits.values().cloned();
         fits.map(|mut fit| {
@@ -96,26 +97,26 @@ impl Learning {
         .collect()
     }
 
-    /// Begins to fit to all that a train did so far.
-    pub(super) fn begin_fit(&mut self, train: TrainId) {
+    /// Starts a refit to all events of a train so far.
+    pub(super) fn begin_refit(&mut self, train: TrainId) {
         if let Some(fit) = self.fits.get(&train) {
-            self.under_way.insert(train, fit.begin_refit(&self.sections));
+            self.in_progress.insert(train, fit.begin_refit(&self.sections));
         }
     }
 
-    /// Whether any fit is under way.
-    pub(super) fn is_fitting(&self) -> bool {
-        !self.under_way.is_empty()
+    /// Whether any refit is being computed.
+    pub(super) fn is_refitting(&self) -> bool {
+        !self.in_progress.is_empty()
     }
 
-    /// Whether that of a train is.
-    pub(super) fn is_fitting_to(&self, train: TrainId) -> bool {
-        self.under_way.contains_key(&train)
+    /// Whether a refit of this train is being computed.
+    pub(super) fn is_refitting_to(&self, train: TrainId) -> bool {
+        self.in_progress.contains_key(&train)
     }
 
-    /// Does the next part of a fit under way, which takes milliseconds; gives the model if that was the last part.
-    pub(super) fn go_on(&mut self) -> Option<MotionModel> {
-        let mut first = self.under_way.first_entry()?;
+    /// Computes the next part of a refit, which takes milliseconds; returns the model after the last part.
+    pub(super) fn advance_refit(&mut self) -> Option<MotionModel> {
+        let mut first = self.in_progress.first_entry()?;
         first.get_mut().go_on();
         if !first.get().is_over() {
             return None;
@@ -126,9 +127,9 @@ impl Learning {
         Some(fit.model().clone())
     }
 
-    /// What is known of a train by now. Takes a while: not for between two reports.
+    /// The model fitted to all events of a train. Too slow to run between two reports.
     pub(super) fn model(&mut self, train: TrainId) -> Option<MotionModel> {
-        self.under_way.remove(&train);
+        self.in_progress.remove(&train);
         let fit = self.fits.get_mut(&train)?;
         fit.refit(&self.sections);
         Some(fit.model().clone())

@@ -1,4 +1,4 @@
-//! Reads what people write to drive trains, and tells them what would be right where it is not.
+//! Parses lines of a script or the prompt; an error names the column and suggests a correction.
 
 use footplate_core::SpeedStep;
 use footplate_core::control::{Aim, Gap, Journey, Order, StopOrder, TrainLengths};
@@ -12,10 +12,10 @@ const VERBS: [&str; 16] = [
     "halt", "power", "where", "wait", "help",
 ];
 
-/// Reads one line; `None` where it says nothing.
+/// Parses one line; `None` for an empty line or a comment.
 ///
 /// # Errors
-/// What is wrong with it.
+/// The first mistake in the line.
 pub(super) fn parse(line: &str, known: Known<'_>) -> Result<Option<Instruction>, Mistake> {
     let words = words(line);
     let Some((verb, rest)) = words.split_first() else { return Ok(None) };
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn every_line_of_the_help_is_understood() {
+    fn every_line_of_the_help_parses() {
         let (train, step) = (TrainId(24), |step| SpeedStep::new(step).expect("a step"));
         assert_eq!(order("speed 24 8"), Order::Speed { train, step: step(8) });
         assert_eq!(order("stop 24"), Order::Speed { train, step: step(0) });
@@ -256,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mistake_is_named_with_its_column_and_what_would_be_right() {
+    fn errors_name_the_column_and_the_correction() {
         let wrong: Vec<String> = [
             ("stopp 24 at C13", "column 1: `stopp` is not a command: did you mean `stop`?"),
             ("stop 25 at C13", "column 6: `25` is not a train of this session: 24, 58"),
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn no_line_whatever_makes_it_panic() {
+    fn no_line_panics() {
         for line in [
             "\u{0}",
             "speed 99999999999 1",

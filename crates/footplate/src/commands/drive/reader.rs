@@ -1,4 +1,4 @@
-//! What can stand in a line, read word by word: trains, steps, places, lengths, times.
+//! Parses the words of a line one by one: trains, steps, places, lengths, times.
 
 use std::collections::BTreeMap;
 
@@ -7,18 +7,18 @@ use footplate_core::{Length, Ratio, SensorId, Speed, SpeedStep, TimeSpan, TrainI
 
 use super::words::{Mistake, Word, meant};
 
-/// What a line may name: the places of a layout, and trains with their highest steps.
+/// What a line may refer to: a layout, and trains with their highest steps.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Known<'k> {
     pub(super) layout: &'k Layout,
     pub(super) trains: &'k BTreeMap<TrainId, SpeedStep>,
 }
 
-/// The words that have not been read yet.
+/// The words that are not parsed yet.
 pub(super) struct Words<'w, 't, 'k> {
     pub(super) rest: &'w [Word<'t>],
     pub(super) known: Known<'k>,
-    /// Where a word would stand that is missing at the end.
+    /// The column after the last word, for the error that one is missing.
     pub(super) end: usize,
     pub(super) after: Word<'t>,
 }
@@ -33,7 +33,7 @@ impl<'t> Words<'_, 't, '_> {
         Ok(*word)
     }
 
-    /// Takes this word if it is next.
+    /// Consumes the next word if it is this one.
     pub(super) fn take(&mut self, word: &str) -> bool {
         match self.rest.split_first() {
             Some((first, rest)) if first.text == word => {
@@ -100,15 +100,15 @@ impl<'t> Words<'_, 't, '_> {
         }
     }
 
-    /// A place, with its offset in one word or several.
+    /// A place; its offset may be a word of its own.
     pub(super) fn landmark(&mut self) -> Result<Landmark, Mistake> {
         let first = self.next("a place, such as `C13` or `C13+120mm`")?;
         let mut text = first.text.to_owned();
         while let Some(word) = self.rest.first() {
-            let goes_on = word.text.starts_with(['+', '-'])
+            let continues = word.text.starts_with(['+', '-'])
                 || text.ends_with(['+', '-'])
                 || (word.text == "mm" && text.ends_with(|c: char| c.is_ascii_digit()));
-            if !goes_on {
+            if !continues {
                 break;
             }
             text.push_str(word.text);
@@ -170,7 +170,7 @@ impl<'t> Words<'_, 't, '_> {
         }
     }
 
-    /// A time from now on, not longer than a day.
+    /// A time of at most one day.
     pub(super) fn span(&mut self) -> Result<TimeSpan, Mistake> {
         let (word, number, unit) = self.with_unit("a time, such as 2s or 500ms", &["ms", "s"])?;
         let seconds = if unit == "ms" { 1e-3 * number } else { number };
@@ -181,13 +181,13 @@ impl<'t> Words<'_, 't, '_> {
         }
     }
 
-    /// Whether a time comes next, in one word or two.
+    /// Whether the next word, or the next two, are a time.
     pub(super) fn is_at_span(&self) -> bool {
         self.rest.first().is_some_and(|word| word.text.ends_with('s'))
             || self.rest.get(1).is_some_and(|word| ["s", "ms"].contains(&word.text))
     }
 
-    /// A number and its unit, in one word or two.
+    /// A number with its unit, in one word or two.
     pub(super) fn with_unit(
         &mut self,
         wanted: &str,
@@ -200,7 +200,7 @@ impl<'t> Words<'_, 't, '_> {
             unit = self.next("")?.text;
         }
         let unit = units.iter().find(|known| **known == unit);
-        // Neither `inf` nor a sign alone: digits only.
+        // `inf` and `nan` parse as numbers: reject them.
         let number = digits.parse::<f64>().ok().filter(|number| number.is_finite());
         match (number, unit) {
             (Some(number), Some(unit)) => Ok((word, number, *unit)),
@@ -209,7 +209,7 @@ impl<'t> Words<'_, 't, '_> {
     }
 }
 
-/// Millimetres in a unit of length.
+/// Millimetres per unit of length.
 fn mm_per(unit: &str) -> f64 {
     match unit {
         "mm" => 1.0,

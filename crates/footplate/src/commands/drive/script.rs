@@ -1,4 +1,4 @@
-//! A file of instructions, read and checked as a whole before the first train moves.
+//! Reads a script and checks it as a whole before the first train moves.
 
 use std::path::Path;
 
@@ -8,25 +8,25 @@ use super::instruction::Instruction;
 use super::parse::parse;
 use super::reader::Known;
 
-/// The longest script that is read, in bytes: a day of driving.
+/// The largest script, in bytes: about a day of driving.
 const LONGEST: u64 = 1 << 20;
 
-/// One instruction and what was written for it.
+/// One instruction and the text that it was parsed from.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Step {
-    /// As it was written, without remarks and spaces around.
+    /// The line without its comment and surrounding spaces.
     pub(super) text: String,
     pub(super) instruction: Instruction,
-    /// Only a part of what was written, and not the last: nothing is said when it has been done.
+    /// One of several steps that a line expands to, and not the last: its end is not reported.
     pub(super) is_part: bool,
-    /// Whether it has been tried before, and waited for its train to be found.
-    pub(super) is_again: bool,
+    /// Whether this is the second attempt, after its train was lost and located.
+    pub(super) is_retry: bool,
 }
 
 /// Reads a script.
 ///
 /// # Errors
-/// All that is wrong with it, each with its line and column.
+/// All mistakes of the script, each with its line and column.
 pub(super) fn read_script(path: &Path, known: Known<'_>) -> anyhow::Result<Vec<Step>> {
     let named = || format!("reading script `{}`", path.display());
     let size = std::fs::metadata(path).with_context(named)?.len();
@@ -48,13 +48,13 @@ pub(super) fn read_script(path: &Path, known: Known<'_>) -> anyhow::Result<Vec<S
     Ok(steps)
 }
 
-/// Reads one line.
+/// Parses one line; `None` for an empty line or a comment.
 pub(super) fn step(line: &str, known: Known<'_>) -> Result<Option<Step>, super::words::Mistake> {
     let text = line.split('#').next().unwrap_or_default().trim();
     Ok(parse(line, known)?.map(|instruction| Step {
         text: text.to_owned(),
         instruction,
         is_part: false,
-        is_again: false,
+        is_retry: false,
     }))
 }

@@ -1,5 +1,5 @@
-//! Carries out instructions one after the other: hands orders and journeys to the dispatcher, waits, and says what comes
-//! of it.
+//! Carries out instructions one after the other: passes orders and journeys to the dispatcher, waits for them, and
+//! reports their results.
 
 mod outcomes;
 mod waiting;
@@ -16,79 +16,80 @@ use footplate_core::tracking::WayPoint;
 use footplate_core::{Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 use serde::{Deserialize, Serialize};
 
-use self::waiting::{LOOK_AGAIN, Wait, runs_on};
+use self::waiting::{CHECK_INTERVAL, Wait, is_open_ended};
 use super::formatter::NoticeFormatter;
 use super::instruction::{HELP, Instruction, Until};
 use super::learning::Learning;
 use super::reader::Known;
 use super::script::{Step, step};
-use super::spoken::Spoken;
+use super::session_message::SessionMessage;
 use crate::dashboard::{Painter, TrainTask};
 use crate::recorded::{Input, Listener};
 
-/// What waits longer than this waits for nothing, unless another limit is set: a train at a crawl goes once round within it.
+/// The default limit of a wait: a creeping train completes one round of a layout within it.
 pub(super) const WAIT_LIMIT: TimeSpan = TimeSpan::from_s(600.0);
-/// Between two parts of a fit, so that everything else has its turn.
-const BETWEEN_PARTS: TimeSpan = TimeSpan::from_ms(5);
-/// How well a person sees where the end of a shoe is beside a contact, whose own place is known to 5 mm.
-const SEEN_BY_HAND: Length = Length::from_mm(12.0);
+/// The pause between two parts of a refit, in which reports and commands are handled.
+const FIT_INTERVAL: TimeSpan = TimeSpan::from_ms(5);
+/// The standard deviation of a position that an operator reads off: the end of the shoe beside a sensor, whose own
+/// place is known to 5 mm.
+const READ_OFF_BY_HAND: Length = Length::from_mm(12.0);
 
-/// Who gives the instructions.
+/// The source of the instructions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Giver {
-    /// A file, or another program: a train ends one order before it begins the next.
+pub(super) enum CommandSource {
+    /// A file or a program: a train finishes one order before it begins the next.
     Script,
-    /// A person: a new order takes the place of the one before.
+    /// An operator: a new order replaces the previous one.
     Person,
 }
 
-/// Drives by instructions.
+/// Drives trains by instructions.
 #[derive(Debug)]
 pub(crate) struct ScriptRunner {
     dispatcher: Dispatcher,
     learning: Learning,
-    /// Models that wait for their trains to stand.
-    taught: BTreeMap<TrainId, MotionModel>,
-    giver: Giver,
+    /// Refitted models that are used as soon as their trains are at rest.
+    refitted: BTreeMap<TrainId, MotionModel>,
+    source: CommandSource,
     steps: VecDeque<Step>,
-    /// No more will come.
+    /// Whether no more lines will come.
     complete: bool,
     trains: BTreeMap<TrainId, SpeedStep>,
     wait: Option<Wait>,
-    /// What is waited for longer than this is waited for in vain.
+    /// The longest wait for a train; a `wait` for a time is not limited.
     wait_limit: TimeSpan,
-    /// Since when the next line has waited for a train that cannot be driven now.
+    /// Since when the next line has waited for a train that cannot be driven at present.
     interrupted: Option<Timestamp>,
     pending: BTreeMap<OrderId, Step>,
-    /// What was promised last of orders that are under way.
+    /// The last predicted interval of each order in progress.
     promises: BTreeMap<OrderId, Promise>,
-    /// Trains that are not as they were when the session began.
+    /// Trains whose recovery found a changed model.
     changed: BTreeSet<TrainId>,
-    /// Trains of which it was said that they break their promises.
+    /// Trains whose missed intervals have been reported.
     unreliable: BTreeSet<TrainId>,
-    /// When journeys were asked for.
+    /// When each journey was requested.
     journeys: BTreeMap<OrderId, Timestamp>,
-    /// How each train came to rest last.
+    /// The last stop of each train.
     rests: BTreeMap<TrainId, Finished>,
-    outputs: VecDeque<Output<Spoken>>,
+    outputs: VecDeque<Output<SessionMessage>>,
     began: Option<Timestamp>,
-    /// When something was last looked at.
-    looked: Timestamp,
+    /// The time of the last event or timeout.
+    last_event: Timestamp,
     is_over: bool,
     fell_short: bool,
 }
 
 impl ScriptRunner {
-    pub(super) fn new(driver: Driver, learning: Learning, giver: Giver, steps: Vec<Step>) -> Self {
+    pub(super) fn new(driver: Driver, learning: Learning, source: CommandSource, steps: Vec<Step>) -> Self {
         let highest =
             |train| driver.model(train).map_or(SpeedStep::STAND, footplate_core::model::MotionModel::highest);
         let trains = driver.trains().map(|train| (train, highest(train))).collect();
         Self {
             dispatcher: Dispatcher::watched(Timestamp::ZERO, driver),
             learning,
-            taught: BTreeMap::new(),
-            giver,
+            refitted: BTreeMap::new(),
+            source,
             steps: steps.into(),
             complete: false,
             trains,
@@ -103,18 +104,17 @@ impl ScriptRunner {
             rests: BTreeMap::new(),
             outputs: VecDeque::new(),
             began: None,
-            looked: Timestamp::ZERO,
+            last_event: Timestamp::ZERO,
             is_over: false,
             fell_short: false,
         }
     }
 
-    /// Whether somebody sits there who may not know what can be said.
-    pub(super) fn listens_to_a_person(&self) -> bool {
-        self.giver == Giver::Person
+    /// Whether an operator gives the instructions.
+    pub(super) fn is_interactive(&self) -> bool {
+        self.source == CommandSource::Person
     }
 
-    /// What drives the trains.
     fn driver(&self) -> &Driver {
         self.dispatcher.driver()
     }
@@ -124,11 +124,11 @@ impl ScriptRunner {
         self.fell_short
     }
 
-    /// What trains taught.
+    /// The models fitted in this session.
     pub(super) fn learnt(&mut self) -> Vec<MotionModel> {
         let trains: Vec<TrainId> = self.trains.keys().copied().collect();
         let learnt = trains.into_iter().filter_map(|train| {
-            // One that was measured again is kept as it was found then.
+            // A recovery measured this train again: its model is kept as measured.
             let measured_again =
                 self.changed.contains(&train).then(|| self.dispatcher.driver().model(train).cloned());
             measured_again.flatten().or_else(|| self.learning.model(train))
@@ -136,41 +136,40 @@ impl ScriptRunner {
         learnt.collect()
     }
 
-    /// What the next session goes on from.
+    /// The models and fits that the next session starts from.
     pub(crate) fn handed_over(&mut self) -> (Vec<MotionModel>, Vec<MotionFit>) {
         (self.learnt(), self.learning.handed_over())
     }
 
-    /// A person wrote a line.
-    fn hear(&mut self, now: Timestamp, line: &str) {
+    /// Takes in a line of the operator.
+    fn handle_line(&mut self, now: Timestamp, line: &str) {
         let known = Known { layout: self.driver().layout(), trains: &self.trains };
         match step(line, known) {
             Ok(Some(Step { instruction: Instruction::Halt, .. })) => return self.halt(now),
             Ok(heard) => {
-                // Who says something else has waited long enough.
-                if heard.is_some() && self.giver == Giver::Person {
+                // A new line from an operator ends the wait.
+                if heard.is_some() && self.source == CommandSource::Person {
                     self.wait = None;
                 }
                 self.steps.extend(heard);
             }
             Err(mistake) => self.say(mistake.to_string()),
         }
-        self.go_on(now);
+        self.advance(now);
     }
 
-    /// Waits no longer than this for anything but time.
     pub(super) const fn set_wait_limit(&mut self, limit: TimeSpan) {
         self.wait_limit = limit;
     }
 
-    /// No more lines will come: what is under way is ended.
+    /// States that no more lines will come: the session ends when its orders have ended.
     pub(super) const fn complete(&mut self) {
         self.complete = true;
     }
 
     fn say(&mut self, line: String) {
-        let status = self.formatter().status(self.looked);
-        self.outputs.push_back(Output::Notice(Spoken::Line { text: line, status }));
+        let status = self.formatter().status(self.last_event);
+        self.outputs.push_back(Output::Notice(SessionMessage::Line { text: line, status }));
     }
 
     fn since_begin(&self, time: Timestamp) -> TimeSpan {
@@ -181,26 +180,26 @@ impl ScriptRunner {
         NoticeFormatter { driver: self.driver(), began: self.began.unwrap_or_default() }
     }
 
-    /// Does what can be done now.
-    fn go_on(&mut self, now: Timestamp) {
+    /// Handles everything that is due now.
+    fn advance(&mut self, now: Timestamp) {
         self.began.get_or_insert(now);
-        self.looked = now;
-        self.hand_on(now);
-        self.learn_on(now);
-        while !self.is_over && self.may_go_on(now) {
+        self.last_event = now;
+        self.forward_outputs(now);
+        self.continue_refit(now);
+        while !self.is_over && self.may_advance(now) {
             let Some(instruction) = self.steps.front().map(|step| step.instruction) else { break };
             if self.waits_for_model(now, instruction)
-                || self.giver == Giver::Script && self.must_wait(now, instruction)
+                || self.source == CommandSource::Script && self.must_wait(now, instruction)
             {
                 break;
             }
             if let Some(step) = self.steps.pop_front() {
                 self.carry_out(now, step);
-                self.hand_on(now);
+                self.forward_outputs(now);
             }
         }
-        self.tire_of_waiting(now);
-        let idle = self.steps.is_empty() && self.wait.is_none() && self.pending.values().all(runs_on);
+        self.cancel_late_journeys(now);
+        let idle = self.steps.is_empty() && self.wait.is_none() && self.pending.values().all(is_open_ended);
         if self.complete && idle && !self.is_over {
             self.end();
         }
@@ -208,21 +207,21 @@ impl ScriptRunner {
 
     fn end(&mut self) {
         self.is_over = true;
-        self.outputs.push_back(Output::Notice(Spoken::Over));
+        self.outputs.push_back(Output::Notice(SessionMessage::Over));
     }
 
     fn carry_out(&mut self, now: Timestamp, step: Step) {
         match step.instruction {
-            Instruction::Order(order) => match self.hand_down(now, order) {
+            Instruction::Order(order) => match self.give_order(now, order) {
                 Ok(id) => {
                     if let (Order::Stop(_) | Order::Move { .. } | Order::Arrive { .. }, Some(train)) =
                         (order, order.train())
                     {
-                        self.outputs.push_back(Output::Notice(Spoken::Begun(train)));
+                        self.outputs.push_back(Output::Notice(SessionMessage::Begun(train)));
                     }
                     self.pending.insert(id, step);
                 }
-                Err(Refusal::Lost { train }) if !step.is_again => self.find_first(train, step),
+                Err(Refusal::Lost { train }) if !step.is_retry => self.locate_first(train, step),
                 Err(why) => self.refuse(now, &step, &why),
             },
             Instruction::Go(train, journey) => self.send(now, step, train, journey),
@@ -232,7 +231,7 @@ impl ScriptRunner {
                 for (place, turnout) in turnouts.into_iter().rev().enumerate() {
                     let instruction = Instruction::Order(Order::Turnout { turnout, curved: false });
                     let part =
-                        Step { text: step.text.clone(), instruction, is_part: place > 0, is_again: false };
+                        Step { text: step.text.clone(), instruction, is_part: place > 0, is_retry: false };
                     self.steps.push_front(part);
                 }
             }
@@ -266,8 +265,8 @@ impl ScriptRunner {
         }
     }
 
-    /// Hands an order down; it takes the place of a journey.
-    fn hand_down(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
+    /// Gives an order to the dispatcher; it replaces a journey of the same train.
+    fn give_order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
         let journey = order.train().and_then(|train| self.dispatcher.journey(train));
         let taken = self.dispatcher.order(now, order);
         if let Some((journey, _)) =
@@ -286,37 +285,37 @@ impl ScriptRunner {
                     self.pending.remove(&before);
                 }
                 self.journeys.insert(id, now);
-                self.outputs.push_back(Output::Notice(Spoken::Begun(train)));
+                self.outputs.push_back(Output::Notice(SessionMessage::Begun(train)));
                 self.pending.insert(id, step);
             }
-            Err(Refusal::Lost { train } | Refusal::OtherNowhere { other: train, .. }) if !step.is_again => {
-                self.find_first(train, step);
+            Err(Refusal::Lost { train } | Refusal::OtherNowhere { other: train, .. }) if !step.is_retry => {
+                self.locate_first(train, step);
             }
             Err(why) => self.refuse(now, &step, &why),
         }
     }
 
-    /// Everything stands, whatever was said before and waits.
+    /// Stops all trains, switches the track power off, and drops all waiting lines.
     fn halt(&mut self, now: Timestamp) {
         self.steps.clear();
         self.wait = None;
         for train in self.trains.keys().copied().collect::<Vec<_>>() {
             // Step 0 is a step of every train, so that nothing refuses it.
-            let _ = self.hand_down(now, Order::Speed { train, step: SpeedStep::STAND });
+            let _ = self.give_order(now, Order::Speed { train, step: SpeedStep::STAND });
         }
         self.dispatcher.switch_power(now, false);
-        self.hand_on(now);
+        self.forward_outputs(now);
         self.say("halt: all trains stopped, track power off; enter `power on` to switch it on".to_owned());
-        self.go_on(now);
+        self.advance(now);
     }
 
-    /// What is wrong with a line, if something is.
+    /// The mistake in a line, if there is one.
     pub(super) fn mistake(&self, line: &str) -> Option<String> {
         let known = Known { layout: self.driver().layout(), trains: &self.trains };
         step(line, known).err().map(|mistake| mistake.to_string())
     }
 
-    /// Shows what there is to see now.
+    /// Paints the current state for dashboard and terminal.
     pub(crate) fn show(&self, painter: &mut Painter, now: Timestamp) {
         let task = |train: TrainId| {
             let busy = self.driver().busy(train);
@@ -329,7 +328,7 @@ impl ScriptRunner {
                 Instruction::Order(Order::Arrive { target, .. }) => Some(target),
                 _ => None,
             };
-            // A journey promises no more than the run that it is on, and only the last one leads to its end.
+            // The interval belongs to the current run of a journey; only the last run ends at the journey's target.
             let promise = self.promises.get(&order).filter(|_| busy == Some(order));
             let promise = promise.map(|promise| [promise.median, promise.low, promise.high]);
             Some((train, TrainTask { text: step.text.clone(), target, promise }))
@@ -338,11 +337,11 @@ impl ScriptRunner {
         painter.paint(&self.dispatcher, &tasks, now, self.began.unwrap_or(now));
     }
 
-    /// A person says where a train stands.
+    /// Takes in the position of a train at rest from the operator.
     fn place(&mut self, now: Timestamp, step: &Step, train: TrainId, at: Landmark) {
-        if self.driver().stands(train, now) {
+        if self.driver().is_at_rest(train, now) {
             let at = WayPoint { node: at.node, way: at.offset };
-            self.dispatcher.place(now, train, at, SEEN_BY_HAND);
+            self.dispatcher.place(now, train, at, READ_OFF_BY_HAND);
             self.learning.interrupt(train);
             let line = self.formatter().whereabouts(train, now);
             self.say(line);
@@ -351,34 +350,34 @@ impl ScriptRunner {
         }
     }
 
-    /// Hands on what the driver asks for, and says what it has to say.
-    fn hand_on(&mut self, now: Timestamp) {
+    /// Forwards commands and notices of the dispatcher.
+    fn forward_outputs(&mut self, now: Timestamp) {
         while let Some(output) = self.dispatcher.poll_output() {
             match output {
                 Output::Command(command) => self.outputs.push_back(Output::Command(command)),
                 Output::HoldLine(until) => self.outputs.push_back(Output::HoldLine(until)),
                 Output::Watch(sensor) => self.outputs.push_back(Output::Watch(sensor)),
-                Output::Notice(notice) => self.dispatched(now, &notice),
+                Output::Notice(notice) => self.handle_notice(now, &notice),
             }
         }
     }
 }
 
 impl Machine for ScriptRunner {
-    type Notice = Spoken;
+    type Notice = SessionMessage;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         self.dispatcher.handle_event(now, event);
         self.learning.take(self.dispatcher.driver(), event);
-        self.go_on(now);
+        self.advance(now);
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
         self.dispatcher.handle_timeout(now);
-        self.go_on(now);
+        self.advance(now);
     }
 
-    fn poll_output(&mut self) -> Option<Output<Spoken>> {
+    fn poll_output(&mut self) -> Option<Output<SessionMessage>> {
         self.outputs.pop_front()
     }
 
@@ -386,15 +385,15 @@ impl Machine for ScriptRunner {
         if self.began.is_none() {
             return Some(Timestamp::ZERO);
         }
-        let now_and_then = self.wait.map(|wait| match wait.until {
+        let waited_for = self.wait.map(|wait| match wait.until {
             Until::Passed(span) => wait.since + span,
-            Until::AtRest(_) => self.looked + LOOK_AGAIN,
+            Until::AtRest(_) => self.last_event + CHECK_INTERVAL,
             Until::At(..) | Until::Located(_) => wait.since + self.wait_limit,
         });
-        let learns = self.learning.is_fitting().then(|| self.looked + BETWEEN_PARTS);
-        let tried_again =
-            self.interrupted.map(|since| (self.looked + LOOK_AGAIN).min(since + self.wait_limit));
-        [self.dispatcher.next_timeout(), now_and_then, self.tires(), tried_again, learns]
+        let learns = self.learning.is_refitting().then(|| self.last_event + FIT_INTERVAL);
+        let retried =
+            self.interrupted.map(|since| (self.last_event + CHECK_INTERVAL).min(since + self.wait_limit));
+        [self.dispatcher.next_timeout(), waited_for, self.journey_deadline(), retried, learns]
             .into_iter()
             .flatten()
             .min()
@@ -404,12 +403,12 @@ impl Machine for ScriptRunner {
 impl Listener for ScriptRunner {
     fn handle_word(&mut self, now: Timestamp, word: &Input) {
         match word {
-            Input::Line(line) => self.hear(now, line),
+            Input::Line(line) => self.handle_line(now, line),
             Input::EmergencyStop => self.halt(now),
             Input::NoMoreLines => self.complete(),
             Input::Link(news) => {
                 self.dispatcher.handle_link(now, *news);
-                self.go_on(now);
+                self.advance(now);
             }
             _ => {}
         }

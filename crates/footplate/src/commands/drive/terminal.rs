@@ -1,9 +1,9 @@
-//! The live view in a terminal: where trains are, what they said, and a line to write orders in. It looks at the same board as
-//! the dashboard, from a thread of its own, so that a slow terminal delays no train.
+//! The live view in a terminal: trains, messages and a prompt. It shows the same board as the dashboard, from a thread
+//! of its own, so that a slow terminal delays no train.
 
 mod prompt;
-mod seen;
 mod view;
+mod view_model;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,36 +16,36 @@ use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, Ke
 use tokio::sync::oneshot;
 
 use self::prompt::Prompt;
-use self::seen::Seen;
+use self::view_model::TerminalModel;
 use crate::dashboard::{Answer, Board, LayoutPicture, Request};
 
-/// Fifteen frames a second look smooth, and a line of 9600 baud can carry what changes.
+/// Frame interval: 15 frames a second look smooth, and a line of 9600 baud can carry the changes.
 const FRAME: Duration = Duration::from_millis(66);
 
-/// A live view until it is dropped.
+/// The live view; dropping it restores the terminal.
 pub(super) struct Terminal {
     is_over: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Terminal {
-    /// Takes the terminal.
+    /// Starts the live view.
     ///
     /// # Errors
-    /// What the terminal said against it.
+    /// The terminal does not support it.
     pub(super) fn open(board: &Arc<Board>, layout: &LayoutPicture) -> anyhow::Result<Self> {
         let terminal = ratatui::try_init().context("the terminal cannot show the screen: try --plain")?;
         let is_over = Arc::new(AtomicBool::new(false));
-        let sitting = Sitting {
+        let view_thread = ViewThread {
             board: Arc::clone(board),
-            seen: Seen::of(layout)?,
+            model: TerminalModel::of(layout)?,
             prompt: Prompt::default(),
             asked: Vec::new(),
         };
         let over = Arc::clone(&is_over);
         let thread = std::thread::Builder::new().name("terminal".to_owned()).spawn(move || {
-            // Whatever a terminal says, trains are driven on; the program still ends by a signal.
-            let _ = sitting.sit(terminal, &over);
+            // If the terminal fails, the trains are still driven, and the program still ends by a signal.
+            let _ = view_thread.run(terminal, &over);
         })?;
         Ok(Self { is_over, thread: Some(thread) })
     }
@@ -61,21 +61,21 @@ impl Drop for Terminal {
     }
 }
 
-/// Somebody sits there.
-struct Sitting {
+/// The state of the view's thread.
+struct ViewThread {
     board: Arc<Board>,
-    seen: Seen,
+    model: TerminalModel,
     prompt: Prompt,
-    /// Orders that wait to be taken.
+    /// Requests without an answer yet.
     asked: Vec<oneshot::Receiver<Answer>>,
 }
 
-impl Sitting {
-    fn sit(mut self, mut terminal: DefaultTerminal, is_over: &AtomicBool) -> std::io::Result<()> {
+impl ViewThread {
+    fn run(mut self, mut terminal: DefaultTerminal, is_over: &AtomicBool) -> std::io::Result<()> {
         while !is_over.load(Ordering::Relaxed) {
-            self.seen.look(&self.board);
-            self.hear_answers();
-            terminal.draw(|frame| view::draw(frame, &self.seen, &self.prompt))?;
+            self.model.look(&self.board);
+            self.show_answers();
+            terminal.draw(|frame| view::draw(frame, &self.model, &self.prompt))?;
             if event::poll(FRAME)?
                 && let Event::Key(key) = event::read()?
                 && key.kind == KeyEventKind::Press
@@ -97,28 +97,30 @@ impl Sitting {
                     self.ask(Request::Line(line));
                 }
             }
-            KeyCode::PageUp => self.seen.scroll(1),
-            KeyCode::PageDown => self.seen.scroll(-1),
+            KeyCode::PageUp => self.model.scroll(1),
+            KeyCode::PageDown => self.model.scroll(-1),
             other => self.prompt.press(other),
         }
     }
 
     fn ask(&mut self, request: Request) {
-        self.seen.say(match &request {
+        self.model.say(match &request {
             Request::EmergencyStop => "> emergency stop".to_owned(),
             Request::Line(line) => format!("> {line}"),
         });
         match self.board.ask(request) {
             Ok(answer) => self.asked.push(answer),
-            Err(_) => self.seen.say("! too many commands are waiting: enter it again in a moment".to_owned()),
+            Err(_) => {
+                self.model.say("! too many commands are waiting: enter it again in a moment".to_owned());
+            }
         }
     }
 
-    fn hear_answers(&mut self) {
-        let seen = &mut self.seen;
+    fn show_answers(&mut self) {
+        let model = &mut self.model;
         self.asked.retain_mut(|asked| match asked.try_recv() {
             Ok(Answer::Refused(why)) => {
-                seen.say(format!("! {why}"));
+                model.say(format!("! {why}"));
                 false
             }
             Err(oneshot::error::TryRecvError::Empty) => true,

@@ -1,4 +1,4 @@
-//! Which trains are driven, and what is known of how they move.
+//! Finds the trains of a session and their motion models.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -9,38 +9,40 @@ use footplate_core::model::survey::SectionIndex;
 use footplate_core::model::{MotionModel, StepUse};
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{SpeedStep, TrainId};
-use footplate_store::{KeptModel, MotionFile, MotionReplay, Store};
+use footplate_store::{MotionFile, MotionReplay, Store, StoredModel};
 
 use crate::clock::now;
 
-/// Addresses of a 6050 or 6051.
+/// Locomotive addresses of a Märklin 6050 or 6051.
 const ADDRESSES: std::ops::RangeInclusive<u16> = 1..=80;
-/// The highest step of its decoders.
+/// The highest step of their decoders.
 const HIGHEST: u8 = 14;
 
-/// Trains as they are known when a session begins.
+/// The trains that a session begins with.
 #[derive(Debug, Default)]
 pub(super) struct KnownTrains {
     pub(super) models: BTreeMap<TrainId, MotionModel>,
-    /// What they follow from, where that is known, to go on from.
+    /// The fits that led to the models, to be continued.
     pub(super) fits: Vec<MotionFit>,
     pub(super) turnouts: TurnoutStates,
-    /// Trains of which nothing is known.
+    /// Trains without a motion model.
     pub(super) unknown: Vec<TrainId>,
 }
 
-/// Where to look for trains.
+/// Where motion models come from.
 pub(super) struct Sources<'s> {
     /// Files of motion models.
     pub(super) files: &'s [PathBuf],
     pub(super) store: Option<&'s mut Store>,
-    /// Trains to drive whether or not anything is known of them.
+    /// Trains to drive even without a model.
     pub(super) named: BTreeSet<TrainId>,
 }
 
 impl KnownTrains {
+    /// Collects the trains of files, store and command line, in this order of precedence.
+    ///
     /// # Errors
-    /// A file or the store cannot be read, a model is of another layout, or there is no train at all.
+    /// A file or the store cannot be read, a model belongs to another layout, or there is no train at all.
     pub(super) fn gather(layout: &Layout, sources: Sources<'_>) -> anyhow::Result<Self> {
         let mut known = Self::default();
         for path in sources.files {
@@ -85,7 +87,7 @@ impl KnownTrains {
         Ok(())
     }
 
-    /// What a store knows: the model kept last, and the events it follows from, to learn on.
+    /// Adds a train of the store: its latest model, and the fit to its events.
     fn add_of_store(
         &mut self,
         layout: &Layout,
@@ -94,14 +96,14 @@ impl KnownTrains {
         is_named: bool,
     ) -> anyhow::Result<()> {
         let at = now();
-        match KeptModel::of_store(layout, store, train, at)? {
-            KeptModel::Model(model) => drop(self.models.insert(train, model.for_later_session())),
-            KeptModel::OfOtherFormulas => eprintln!(
+        match StoredModel::of_store(layout, store, train, at)? {
+            StoredModel::Model(model) => drop(self.models.insert(train, model.for_later_session())),
+            StoredModel::Outdated => eprintln!(
                 "the stored model of train {train} is from another version of the formulas; it is \
                  fitted again from the stored events"
             ),
-            KeptModel::Nothing if is_named => {}
-            KeptModel::Nothing => return Ok(()),
+            StoredModel::Nothing if is_named => {}
+            StoredModel::Nothing => return Ok(()),
         }
         let replay = MotionReplay::of_store(layout, store, train, highest(), at)?;
         if replay.is_empty() {
@@ -110,7 +112,7 @@ impl KnownTrains {
         let mut fit = replay.fit;
         fit.begin_session(&SectionIndex::of(layout));
         if let Some(model) = self.models.get(&train) {
-            // Which steps move it follows from experiments, not from the events alone.
+            // The events alone do not show which steps move the train: the model's experiments do.
             for step in (1..=HIGHEST).filter_map(SpeedStep::new) {
                 if model.uses(step) != StepUse::Untried {
                     fit.note_use(step, model.uses(step));
@@ -128,7 +130,7 @@ impl KnownTrains {
         Ok(())
     }
 
-    /// Keeps what was learnt.
+    /// Stores the fitted models.
     ///
     /// # Errors
     /// The store cannot be written.
@@ -137,7 +139,8 @@ impl KnownTrains {
         let at = now();
         for model in models {
             MotionFile::of(layout, model, Some(at)).keep(&mut store, at, at)?;
-            // What this session added is gone through now that all trains stand, and not when the next one is to begin.
+            // Digests the events of this session now, while all trains are at rest, instead of at the start of the next
+            // session.
             MotionReplay::of_store(layout, &mut store, model.train(), highest(), at)?;
         }
         Ok(())

@@ -1,23 +1,23 @@
-//! What really happened on a simulated layout, for the last column of results and for nobody who drives.
+//! The true positions of a simulated layout, for the column `true_error_mm` of results; no driving code reads them.
 
 use std::collections::BTreeMap;
 
 use footplate_core::track::Layout;
 use footplate_core::{Length, TrainId};
 
-use super::spoken::{Ended, Target};
+use super::session_message::{Ended, Target};
 use crate::link::{Link, ObservedLink, SimulatedLink};
 
-/// Knows where trains really are, if anybody does.
-pub(super) trait Referee {
-    /// How far a train has gone in all.
+/// The true state of the railway; `None` on a real one.
+pub(super) trait GroundTruth {
+    /// The total distance of a train.
     fn odometer(&self, train: TrainId) -> Option<Length>;
 
-    /// How far beyond a place the train's pickup is, counted from where it closes the contact.
+    /// How far beyond a place the train's pickup is, counted from where the sensor detects it.
     fn beyond(&self, layout: &Layout, train: TrainId, target: Target) -> Option<Length>;
 }
 
-impl Referee for SimulatedLink<'_> {
+impl GroundTruth for SimulatedLink<'_> {
     fn odometer(&self, train: TrainId) -> Option<Length> {
         Some(self.station().world().truth().train(train)?.odometer)
     }
@@ -29,7 +29,7 @@ impl Referee for SimulatedLink<'_> {
     }
 }
 
-impl<L: Link + Referee> Referee for ObservedLink<L> {
+impl<L: Link + GroundTruth> GroundTruth for ObservedLink<L> {
     fn odometer(&self, train: TrainId) -> Option<Length> {
         self.inner().odometer(train)
     }
@@ -39,7 +39,7 @@ impl<L: Link + Referee> Referee for ObservedLink<L> {
     }
 }
 
-impl Referee for Box<dyn Link + '_> {
+impl GroundTruth for Box<dyn Link + '_> {
     fn odometer(&self, _: TrainId) -> Option<Length> {
         None
     }
@@ -49,24 +49,24 @@ impl Referee for Box<dyn Link + '_> {
     }
 }
 
-/// Where trains really were when their orders began.
+/// The true odometer readings at which orders began.
 #[derive(Debug, Default)]
-pub(super) struct Beginnings(BTreeMap<TrainId, Length>);
+pub(super) struct StartOdometers(BTreeMap<TrainId, Length>);
 
-impl Beginnings {
-    pub(super) fn note(&mut self, referee: &dyn Referee, train: TrainId) {
-        if let Some(odometer) = referee.odometer(train) {
+impl StartOdometers {
+    pub(super) fn note(&mut self, truth: &dyn GroundTruth, train: TrainId) {
+        if let Some(odometer) = truth.odometer(train) {
             self.0.insert(train, odometer);
         }
     }
 
     /// How far beyond its target an order really ended.
-    pub(super) fn error(&self, referee: &dyn Referee, layout: &Layout, ended: &Ended) -> Option<Length> {
+    pub(super) fn error(&self, truth: &dyn GroundTruth, layout: &Layout, ended: &Ended) -> Option<Length> {
         ended.error?;
         let train = ended.train?;
-        match ended.faced.map_or(ended.target, Target::Place) {
-            Target::Ahead(distance) => Some(referee.odometer(train)? - *self.0.get(&train)? - distance),
-            target => referee.beyond(layout, train, target),
+        match ended.target_on_arrival.map_or(ended.target, Target::Place) {
+            Target::Ahead(distance) => Some(truth.odometer(train)? - *self.0.get(&train)? - distance),
+            target => truth.beyond(layout, train, target),
         }
     }
 }

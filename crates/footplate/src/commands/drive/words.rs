@@ -1,32 +1,32 @@
-//! A line cut into words that know their columns, and mistakes that name them.
+//! Splits a line into words with their columns, and formats mistakes.
 
 use std::fmt;
 
-/// A word and the column it begins at, from 1.
+/// A word and the column at which it begins, counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Word<'t> {
     pub(super) text: &'t str,
     pub(super) column: usize,
 }
 
-/// Cuts a line at spaces, and leaves out what follows a `#`.
+/// Splits a line at spaces and drops the comment after `#`.
 pub(super) fn words(line: &str) -> Vec<Word<'_>> {
     let said = line.split('#').next().unwrap_or_default();
     said.split_whitespace()
         .map(|text| {
-            // Both are parts of one line, so that the difference is where the word begins in it.
+            // Both point into the same line: the difference is the word's byte offset.
             let byte = text.as_ptr() as usize - line.as_ptr() as usize;
             Word { text, column: line[..byte].chars().count() + 1 }
         })
         .collect()
 }
 
-/// What is wrong with a line.
+/// A mistake in a line.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Mistake {
-    /// Where the word begins that is wrong, or where one is missing.
+    /// The column of the wrong or missing word.
     pub(super) column: usize,
-    /// What is wrong and what would be right.
+    /// What is wrong, and what would be right.
     pub(super) what: String,
 }
 
@@ -37,26 +37,26 @@ impl fmt::Display for Mistake {
 }
 
 impl Word<'_> {
-    /// This word is wrong.
+    /// A mistake in this word.
     pub(super) fn mistake(&self, what: impl fmt::Display) -> Mistake {
         Mistake { column: self.column, what: format!("`{}` {what}", self.text.escape_debug()) }
     }
 }
 
-/// Most letters that may be wrong in a word that is still recognised.
-const MOST_MISTAKES: usize = 2;
+/// The largest edit distance at which a word is still recognised.
+const MAX_EDITS: usize = 2;
 
-/// The known word that is nearest to one that was written, if it is near.
+/// The known word nearest to a written one, if it is near enough.
 pub(super) fn nearest<'k>(written: &str, known: impl Iterator<Item = &'k str>) -> Option<&'k str> {
     let distance = |known: &str| strsim::damerau_levenshtein(&known.to_lowercase(), &written.to_lowercase());
     known
         .map(|known| (distance(known), known))
-        .filter(|(distance, _)| *distance <= MOST_MISTAKES.min(written.chars().count().div_ceil(2)))
+        .filter(|(distance, _)| *distance <= MAX_EDITS.min(written.chars().count().div_ceil(2)))
         .min()
         .map(|(_, known)| known)
 }
 
-/// `: did you mean `x`?`, or what else to say.
+/// `: did you mean `x`?`, or `otherwise` if no known word is near.
 pub(super) fn meant<'k>(written: &str, known: impl Iterator<Item = &'k str>, otherwise: &str) -> String {
     nearest(written, known).map_or_else(|| otherwise.to_owned(), |near| format!(": did you mean `{near}`?"))
 }

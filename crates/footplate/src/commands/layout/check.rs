@@ -1,4 +1,4 @@
-//! `footplate layout check`: is a layout file right, and if not, what is wrong where?
+//! `footplate layout check`: checks a layout file and locates its first error.
 
 use std::io::Write;
 
@@ -9,7 +9,7 @@ use crate::commands::Outcome;
 
 /// Check a layout.
 ///
-/// The first thing that is wrong is named with file, line and column, and what would be right.
+/// Reports the first error with file, line and column, and says what would be right.
 #[derive(Args)]
 #[command(after_help = "Example: footplate layout check loop.toml")]
 pub(super) struct Arguments {

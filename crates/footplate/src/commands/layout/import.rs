@@ -1,4 +1,4 @@
-//! `footplate layout import`: from tables of nodes and edges to a layout file.
+//! `footplate layout import`: converts tables of nodes and edges to a layout file.
 
 use std::ffi::OsStr;
 use std::io::Write;
@@ -12,8 +12,8 @@ use footplate_store::{ImportContext, LayoutTables, import_layout, write_layout, 
 
 use crate::commands::Outcome;
 
-/// What is assumed of lengths that come without a figure: two surveys of one course track by hand differ from
-/// a third by 9 and 11 mm (standard deviation).
+/// The default standard deviation of lengths in mm: two hand surveys of one course track differ from a third by 9 and
+/// 11 mm (standard deviation).
 const ASSUMED_UNCERTAINTY_MM: &str = "10";
 const ASSUMED_ORIGIN: &str = "assumed: surveys of one track differ by 9 to 11 mm (standard deviation)";
 
@@ -38,16 +38,16 @@ pub(super) struct Arguments {
     /// The layout file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// What to call the layout [default: as the file].
+    /// The name of the layout [default: the file's name].
     #[arg(long)]
     name: Option<String>,
-    /// A few words about the layout: where it stands, who measured it.
+    /// A description of the layout: its place, the surveyor.
     #[arg(long, value_name = "TEXT", default_value = "", hide_default_value = true)]
     about: String,
-    /// One standard deviation of the length of an edge.
+    /// The standard deviation of the length of an edge.
     #[arg(long, value_name = "MM", default_value = ASSUMED_UNCERTAINTY_MM)]
     length_uncertainty: f64,
-    /// Where that figure comes from.
+    /// The origin of that figure.
     #[arg(long, value_name = "TEXT", default_value = ASSUMED_ORIGIN)]
     length_origin: String,
     /// Two turnouts in one place of which at most one may lie curved, such as 153+154.

@@ -1,4 +1,4 @@
-//! `footplate layout show`: what a layout consists of, in words, as JSON or as a drawing.
+//! `footplate layout show`: describes a layout as text, JSON or a drawing.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -17,10 +17,10 @@ use crate::commands::Outcome;
 pub(super) struct Arguments {
     /// The layout: the name of a built-in layout (track-a, track-b), or a file.
     layout: String,
-    /// List the hops from sensor to sensor as well.
+    /// Also list the hops from sensor to sensor.
     #[arg(long)]
     hops: bool,
-    /// Draw it to this file.
+    /// Draw the layout to this file.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
     /// Write JSON, always with the hops.
@@ -69,9 +69,14 @@ fn write_words(file: &LayoutFile, output: &mut dyn Write) -> anyhow::Result<()> 
         writeln!(output, "rails   {:.0} mm", layout.total_length().as_mm())?;
     }
     let survey = layout.survey();
-    writeln!(output, "        an edge is known to {} mm: {}", survey.uncertainty.as_mm(), survey.origin)?;
+    writeln!(
+        output,
+        "        edge lengths are known to {} mm: {}",
+        survey.uncertainty.as_mm(),
+        survey.origin
+    )?;
     if survey.scale > 0.0 {
-        writeln!(output, "        all lengths together to {:.1} %", 100.0 * survey.scale)?;
+        writeln!(output, "        their common scale is known to {:.1} %", 100.0 * survey.scale)?;
     }
     let measured = sensor_hops(layout).filter(|hop| is_measured(layout, hop));
     let (shortest, longest) = range_mm(measured.map(|hop| hop.length.as_mm()));
@@ -91,13 +96,13 @@ fn write_words(file: &LayoutFile, output: &mut dyn Write) -> anyhow::Result<()> 
     Ok(())
 }
 
-/// How long the rails of a zone are.
+/// The length of rail in a zone, in mm.
 fn restricted_mm(layout: &Layout, zone: &Zone) -> f64 {
     let stretches = layout.edges().step_by(2).filter(|(edge, _)| layout.zone(*edge) == Some(zone));
     stretches.map(|(_, edge)| edge.length.as_mm()).sum()
 }
 
-/// Every way from a sensor to the next, one a line.
+/// Writes each hop from a sensor to the next, one a line.
 fn write_hops(layout: &Layout, output: &mut dyn Write) -> anyhow::Result<()> {
     for hop in sensor_hops(layout) {
         let (from, to) = (layout.node_name(hop.from), layout.node_name(hop.to));
@@ -145,7 +150,7 @@ fn summary(layout: &Layout) -> Value {
     })
 }
 
-/// Sensors, turnouts and track ends.
+/// The numbers of sensors, turnouts and track ends.
 fn counts(layout: &Layout) -> [usize; 3] {
     let count =
         |is_counted: fn(&NodeKind) -> bool| layout.nodes().filter(|(_, node)| is_counted(&node.kind)).count();
@@ -160,13 +165,13 @@ fn sensor_hops(layout: &Layout) -> impl Iterator<Item = Hop<'_>> {
     layout.hops().filter(|hop| layout.sensor_at(hop.from).is_some() && hop.sensor.is_some())
 }
 
-/// Whether the length of every edge of a hop is known in some way.
+/// Whether the lengths of all edges of a hop are known.
 fn is_measured(layout: &Layout, hop: &Hop<'_>) -> bool {
     let mut edges = hop.edges.iter().filter_map(|edge| layout.edge(*edge));
     edges.all(|edge| edge.known != StretchLength::Unknown)
 }
 
-/// The turnouts that decide whether a train takes a hop.
+/// The facing turnouts of a hop.
 fn facing<'l>(hop: &Hop<'l>) -> impl Iterator<Item = &'l TurnoutNeed> {
     hop.needs.iter().filter(|need| need.facing)
 }
@@ -175,7 +180,7 @@ fn range_mm(lengths: impl Iterator<Item = f64>) -> (f64, f64) {
     lengths.fold((f64::INFINITY, 0.0), |(least, most), mm| (mm.min(least), mm.max(most)))
 }
 
-/// To the nanometre, so that the rounding of sums does not show.
+/// Rounds to a nanometre, which hides the rounding errors of sums.
 fn rounded_mm(mm: f64) -> f64 {
     (mm * 1e6).round() / 1e6
 }

@@ -1,4 +1,4 @@
-//! `footplate layout survey`: the lengths of a layout from what its trains did, without a tape.
+//! `footplate layout survey`: estimates the lengths of a layout from the runs of its trains, without a tape.
 
 use std::collections::BTreeSet;
 use std::io::Write;
@@ -17,10 +17,10 @@ use crate::clock::now;
 use crate::commands::Outcome;
 use crate::counted::counted;
 
-/// Estimate the lengths of a layout from what its trains did.
+/// Estimate the lengths of a layout from the runs of its trains.
 ///
-/// Edges of the layout need no length (leave out `mm`), but one has to be measured: best a long one between two sensors that
-/// every train passes. Trains that `calibrate` or `drive` have driven tell all others.
+/// Edges may have no length (leave out `mm`), except one that is measured: best a long one between two sensors that
+/// every train passes. The runs of `calibrate` and `drive` determine all others.
 #[derive(Args)]
 #[command(
     after_help = "Example: footplate layout survey attic.toml --store railway.db --out attic-surveyed.toml"
@@ -28,10 +28,10 @@ use crate::counted::counted;
 pub(super) struct Arguments {
     /// The layout: a file, or the name of a built-in layout.
     layout: String,
-    /// The store with what trains did on it.
+    /// The store with the runs.
     #[arg(long, value_name = "FILE")]
     store: PathBuf,
-    /// Write the layout with these lengths to this file; every `--layout` takes it.
+    /// Write the layout with the estimated lengths to this file; every `--layout` accepts it.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Write JSON.
@@ -39,7 +39,7 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// The highest step of the decoders that a 6051 can talk to.
+/// The highest step of the decoders that a 6051 supports.
 const HIGHEST: u8 = 14;
 
 impl Arguments {
@@ -79,7 +79,7 @@ impl Arguments {
         }
         writeln!(
             output,
-            "{} from {} (95 %); all of them may be off together by {:.1} %",
+            "{} from {} (95 %); a common scale error of up to {:.1} % comes on top",
             counted(distances.len(), "distance"),
             counted(models.len(), "train"),
             100.0 * HALF_95 * survey.scale()
@@ -88,7 +88,7 @@ impl Arguments {
     }
 }
 
-/// A distance between neighbouring sensors.
+/// The estimated distance between neighbouring sensors.
 struct Surveyed {
     from: String,
     to: String,
@@ -108,7 +108,7 @@ fn surveyed(layout: &Layout, sections: &SectionIndex, survey: &TrackSurvey) -> V
     found.collect()
 }
 
-/// What is known of all trains that moved alone on the layout.
+/// The models of all trains that ran on the layout alone.
 fn models(layout: &Layout, path: &Path) -> anyhow::Result<Vec<MotionModel>> {
     let mut store = Store::open(path)?;
     let at = now();
@@ -129,7 +129,7 @@ fn models(layout: &Layout, path: &Path) -> anyhow::Result<Vec<MotionModel>> {
     Ok(models)
 }
 
-/// The layout file with the lengths of a survey.
+/// The layout file with the estimated lengths.
 fn written(
     file: &LayoutFile,
     survey: &TrackSurvey,

@@ -51,7 +51,7 @@ fn picture(train: &BatchTrain, layout: &str, newest: SpeedStep) -> Picture {
     let panel = Panel {
         x: "speed at the command (mm/s)".to_owned(),
         y: "stopping distance (mm)".to_owned(),
-        from_nought: true,
+        from_zero: true,
         layers,
         ..Panel::default()
     };

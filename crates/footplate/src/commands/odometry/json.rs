@@ -1,7 +1,8 @@
 //! What recordings come to, for machines.
 
 use footplate_core::odometry::PlacedValue;
-use footplate_store::odometry::{OdometryScore, Preset, RunScores};
+use footplate_eval::line::{figure, score_json};
+use footplate_store::odometry::{Preset, RunScores};
 use serde_json::{Map, Value, json};
 
 use super::recording::{WalkedRecording, WalkedRun};
@@ -81,26 +82,14 @@ fn run(file: &str, run: &WalkedRun, walked: &Walked) -> Value {
 
 /// The score of the preset that was asked for, and beside it those of both and of what others would make of it.
 fn insert_scores(fields: &mut Map<String, Value>, scores: &RunScores, preset: Preset) {
-    if let Value::Object(own) = score(&scores.preset(preset)) {
+    if let Value::Object(own) = score_json(&scores.preset(preset)) {
         fields.extend(own);
     }
-    let presets =
-        preset.scored().into_iter().map(|preset| (preset.key().to_owned(), score(&scores.preset(preset))));
+    let presets = preset
+        .scored()
+        .into_iter()
+        .map(|preset| (preset.key().to_owned(), score_json(&scores.preset(preset))));
     fields.insert("presets".into(), Value::Object(presets.collect()));
-    let rivals = scores.rivals().map(|(rival, of)| (rival.key().to_owned(), score(&of)));
+    let rivals = scores.rivals().map(|(rival, of)| (rival.key().to_owned(), score_json(&of)));
     fields.insert("baselines".into(), Value::Object(rivals.collect()));
-}
-
-/// The figures of a score by their names in files.
-pub(in crate::commands) fn score(score: &OdometryScore) -> Value {
-    let figures =
-        score.figures().into_iter().map(|(key, value)| (key.to_owned(), value.map_or(Value::Null, figure)));
-    let mut fields: Map<String, Value> = figures.collect();
-    fields.insert("scored".into(), json!(score.scored));
-    fields.into()
-}
-
-/// To a micrometre or a millionth of a per cent, so that files do not show the rounding of sums.
-fn figure(value: f64) -> Value {
-    json!((value * 1e6).round() / 1e6 + 0.0)
 }

@@ -1,4 +1,4 @@
-//! Draws a picture with what puts lines and text onto SVG and pixels alike.
+//! Draws a picture through one backend for SVG and for pixels.
 
 use std::ops::Range;
 use std::sync::Once;
@@ -10,18 +10,18 @@ use plotters::style::register_font;
 
 use super::picture::{Ink, Layer, Panel, Picture, Shape};
 
-/// Pixels of a picture's sides.
+/// Width and height of a picture, in pixels.
 pub(super) const SIZE: (u32, u32) = (1600, 1000);
-/// Pixels above the panels, above each panel for its legend, and beside it for its numbers.
+/// Margins in pixels: above the panels, above each panel for its legend, and beside it for its numbers.
 const HEAD: u32 = 96;
 const LEGEND: u32 = 40;
 const LEFT: u32 = 100;
-/// How wide a piece of a line is in a legend, and how faint a band.
+/// The length of a line in the legend, and the opacity of a band.
 const SWATCH: i32 = 40;
 const FAINT: f64 = 0.18;
-/// Half as wide as a point and the ends of its error bar are.
+/// Half the width of a point and of the caps of its error bar, in pixels.
 const DOT: u32 = 6;
-/// What letters are called and how high they are.
+/// The name and sizes of the font.
 const FONT: &str = "sans-serif";
 const TITLE: u32 = 34;
 const WORDS: u32 = 22;
@@ -49,7 +49,7 @@ pub(super) fn draw<B: DrawingBackend>(
     scale: u32,
 ) -> Drawn<B> {
     static LETTERS: Once = Once::new();
-    // A face of its own: what a machine has installed, or has not, changes nothing.
+    // The font is part of the program, so that pictures are the same on all machines.
     LETTERS.call_once(|| {
         let _ = register_font(FONT, FontStyle::Normal, epaint_default_fonts::UBUNTU_LIGHT);
     });
@@ -79,23 +79,23 @@ pub(super) fn draw<B: DrawingBackend>(
     Ok(())
 }
 
-/// The range that holds all numbers, with a little room around them.
-fn range(values: impl Iterator<Item = f64>, nought: bool, room: f64) -> Range<f64> {
+/// The range of all values, with a margin.
+fn range(values: impl Iterator<Item = f64>, with_zero: bool, room: f64) -> Range<f64> {
     let known = values.filter(|value| value.is_finite());
     let (mut low, mut high) = known
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     if low > high {
         (low, high) = (0.0, 1.0);
     }
-    if nought {
+    if with_zero {
         (low, high) = (low.min(0.0), high.max(0.0));
     }
     let span = if high > low { high - low } else { 1.0 };
-    let below = if nought && low == 0.0 { 0.0 } else { room * span };
+    let below = if with_zero && low == 0.0 { 0.0 } else { room * span };
     low - below..high + room * span
 }
 
-/// As many decimals as tell a hundredth of what is shown, without noughts at the end, and a true minus.
+/// A number with enough decimals to show a hundredth of the axis, without trailing zeros, and with a true minus.
 fn number(value: f64, shown: &Range<f64>) -> String {
     let hundredth = (shown.end - shown.start) / 100.0;
     let decimals = (-libm::log10(hundredth)).ceil().clamp(0.0, 6.0) as usize;
@@ -104,7 +104,7 @@ fn number(value: f64, shown: &Range<f64>) -> String {
     if text == "-0" { "0".to_owned() } else { text.replace('-', "\u{2212}") }
 }
 
-/// Words for all layers side by side, so that they cover nothing.
+/// The legend: names of all layers in one row above the panel.
 fn draw_legend<B: DrawingBackend>(area: &DrawingArea<B, Shift>, layers: &[Layer], scale: u32) -> Drawn<B> {
     let style = (FONT, NUMBERS * scale).into_font().color(&TEXT);
     let unit = pixels(scale);
@@ -134,7 +134,7 @@ fn draw_legend<B: DrawingBackend>(area: &DrawingArea<B, Shift>, layers: &[Layer]
     Ok(())
 }
 
-/// A count of pixels as a place.
+/// Pixels as a coordinate.
 fn pixels(count: u32) -> i32 {
     i32::try_from(count).unwrap_or(i32::MAX)
 }
@@ -148,7 +148,7 @@ fn draw_panel<B: DrawingBackend>(
     let (legend, area) = area.split_vertically(LEGEND * scale);
     draw_legend(&legend, &panel.layers, scale)?;
     let points = panel.layers.iter().flat_map(|layer| layer.shape.extent());
-    let y = range(points.map(|(_, y)| y), panel.from_nought, 0.06);
+    let y = range(points.map(|(_, y)| y), panel.from_zero, 0.06);
     let letters = |height: u32, colour: &RGBColor| (FONT, height * scale).into_font().color(colour);
     let mut chart = ChartBuilder::on(&area)
         .margin(10 * scale)
@@ -170,8 +170,8 @@ fn draw_panel<B: DrawingBackend>(
         .set_all_tick_mark_size(6 * scale)
         .draw()?;
     if y.start < 0.0 && y.end > 0.0 {
-        let nought = [(x.start, 0.0), (x.end, 0.0)];
-        chart.draw_series([PathElement::new(nought, QUIET.stroke_width(scale))])?;
+        let zero_line = [(x.start, 0.0), (x.end, 0.0)];
+        chart.draw_series([PathElement::new(zero_line, QUIET.stroke_width(scale))])?;
     }
     for Layer { ink, shape, .. } in &panel.layers {
         let ink = colour(*ink);
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn an_axis_holds_everything_and_nought_where_it_belongs() {
+    fn an_axis_contains_all_values_and_zero_where_asked() {
         let speeds = [f64::NAN, 3.0, 7.0];
         let shown = range(speeds.into_iter(), true, 0.05);
         assert!(shown.start == 0.0 && shown.end > 7.0, "{shown:?}");

@@ -1,4 +1,4 @@
-//! A picture as a file: SVG or PNG, by the ending of its name.
+//! Writes a picture to a file, as SVG or PNG by its extension.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -10,12 +10,12 @@ use plotters::prelude::{BitMapBackend, IntoDrawingArea, SVGBackend};
 use super::drawing::{SIZE, draw};
 use super::picture::Picture;
 
-/// Points of a picture of pixels are drawn at so many times its size and made smaller, so that lines are smooth.
+/// PNGs are drawn at this multiple of their size and averaged, which smooths lines.
 const FINER: u32 = 2;
 /// Red, green and blue.
 const COLOURS: usize = 3;
 
-/// Where a picture is to be written.
+/// A picture file to write.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::commands) struct PictureFile {
     path: PathBuf,
@@ -37,7 +37,7 @@ impl FromStr for PictureFile {
         let form = match ending.as_deref() {
             Some("svg") => Form::Svg,
             Some("png") => Form::Png,
-            _ => return Err(format!("`{name}` should end with .svg or .png: that says what is drawn")),
+            _ => return Err(format!("`{name}` should end with .svg or .png")),
         };
         Ok(Self { path, form })
     }
@@ -48,7 +48,7 @@ impl PictureFile {
         &self.path
     }
 
-    /// Draws; whoever looks finds the old picture or the new one.
+    /// Draws the picture and replaces the file in one step.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -87,7 +87,7 @@ fn png(picture: &Picture) -> anyhow::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Every pixel is the mean of those that were drawn for it.
+/// Averages blocks of pixels down to the final size.
 fn smaller(fine: &[u8], wide: usize) -> Vec<u8> {
     let finer = FINER as usize;
     let line = wide * COLOURS;
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ending_says_what_is_drawn() {
+    fn the_extension_selects_the_format() {
         assert_eq!("a/b.SVG".parse::<PictureFile>().unwrap().form, Form::Svg);
         assert_eq!("b.png".parse::<PictureFile>().unwrap().form, Form::Png);
         assert!("b.gif".parse::<PictureFile>().unwrap_err().contains("end with .svg or .png"));

@@ -42,7 +42,7 @@ fn row(layout: &Layout, hit: &ScoredHit) -> String {
         "{head} {phase:<9} {:>10.3}  {reported:>10.3} {:>9.1} {:>8.1} {:>9.1}{} {}",
         forecast.time.as_s(),
         late.as_ms(),
-        hit.way_mm(late).unwrap_or_default(),
+        hit.distance_mm(late).unwrap_or_default(),
         (high - low).as_ms() / 2.0,
         if (low..=high).contains(&hit.reported()) { ' ' } else { '!' },
         notes(layout, hit),

@@ -2,8 +2,8 @@
 
 use footplate_core::track::Layout;
 use footplate_store::score::{
-    BASELINES, Comparison, Coverage, ForecastScore, GateAgreement, GateCheck, LEVELS, Rival, ScoredHit,
-    ScoredRecording,
+    BASELINES, Comparison, Coverage, ForecastScore, GateAgreement, GateCheck, LEVELS, ReferenceForecaster,
+    ScoredHit, ScoredRecording,
 };
 use serde_json::{Map, Value, json};
 
@@ -63,21 +63,26 @@ fn trains(hits: &[&ScoredHit]) -> Value {
 
 fn comparison(comparison: &Comparison) -> Map<String, Value> {
     let mut fields = score(&comparison.ours);
-    let rival_median = |rival: Rival| comparison.rival(rival).and_then(|found| found.score.median_abs_mm);
-    fields.insert("oracle_median_abs_mm".into(), figure(rival_median(Rival::Oracle)));
-    fields.insert("next_sensor_right".into(), figure(comparison.named_right()));
-    let others = |rivals: &[Rival]| {
-        let found = rivals.iter().filter_map(|rival| comparison.rival(*rival));
+    let reference_median = |reference: ReferenceForecaster| {
+        comparison.reference(reference).and_then(|found| found.score.median_abs_mm)
+    };
+    fields.insert("oracle_median_abs_mm".into(), figure(reference_median(ReferenceForecaster::Oracle)));
+    fields.insert("next_sensor_right".into(), figure(comparison.named_correctly()));
+    let others = |references: &[ReferenceForecaster]| {
+        let found = references.iter().filter_map(|reference| comparison.reference(*reference));
         let named = found.map(|found| {
             let mut fields = score(&found.score);
             // Ours on the hits that this one forecast, too: the figure to hold its own against.
             fields.insert("footplate_median_abs_mm".into(), figure(found.ours.median_abs_mm));
-            (found.rival.key().to_owned(), Value::Object(fields))
+            (found.reference.key().to_owned(), Value::Object(fields))
         });
         Value::Object(named.collect())
     };
     fields.insert("baselines".into(), others(&BASELINES));
-    fields.insert("in_hindsight".into(), others(&[Rival::Oracle, Rival::HindsightTable]));
+    fields.insert(
+        "in_hindsight".into(),
+        others(&[ReferenceForecaster::Oracle, ReferenceForecaster::HindsightTable]),
+    );
     fields
 }
 
@@ -121,7 +126,7 @@ fn row(layout: &Layout, hit: &ScoredHit) -> Value {
         fields["phase"] = json!(forecast.phase);
         fields["forecast_s"] = figure(Some(forecast.time.as_s()));
         fields["late_ms"] = figure(Some(late.as_ms()));
-        fields["late_mm"] = figure(hit.way_mm(late));
+        fields["late_mm"] = figure(hit.distance_mm(late));
         fields["speed_mm_per_s"] = figure(Some(forecast.speed.as_mm_per_s()));
         for level in LEVELS {
             let (low, high) = forecast.interval(level);

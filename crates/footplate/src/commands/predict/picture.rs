@@ -2,7 +2,7 @@
 
 use footplate_core::TimeSpan;
 use footplate_core::track::Layout;
-use footplate_store::score::{Rival, ScoredHit, ScoredRecording};
+use footplate_store::score::{ReferenceForecaster, ScoredHit, ScoredRecording};
 
 use super::figures::{Hits, PHASES, only};
 use crate::commands::plot::{Ink, Layer, Panel, Picture, SHOWN, Shape, shares};
@@ -11,10 +11,10 @@ use crate::commands::plot::{Ink, Layer, Panel, Picture, SHOWN, Shape, shares};
 type Drawn = fn(Vec<(f64, f64)>) -> Shape;
 
 /// Who stands beside us: what courses use, what clubs use, and what could be known at best.
-const BESIDE: [(Rival, Ink, Drawn); 3] = [
-    (Rival::ConstantTable, Ink::Second, Shape::Line),
-    (Rival::MiddleAverage, Ink::Third, Shape::Line),
-    (Rival::Oracle, Ink::Plain, Shape::Dashed),
+const BESIDE: [(ReferenceForecaster, Ink, Drawn); 3] = [
+    (ReferenceForecaster::ConstantTable, Ink::Second, Shape::Line),
+    (ReferenceForecaster::MiddleAverage, Ink::Third, Shape::Line),
+    (ReferenceForecaster::Oracle, Ink::Plain, Shape::Dashed),
 ];
 
 /// The forecasts of all recordings; nothing where none could be made.
@@ -43,18 +43,19 @@ pub(super) fn of(layout: &Layout, recordings: &[ScoredRecording]) -> Option<Pict
 /// One phase, with those who forecast at least half of what we did: of the others too little is known.
 fn panel(phase: &str, hits: &[&ScoredHit]) -> Panel {
     let curve = |late: &dyn Fn(&ScoredHit) -> Option<TimeSpan>| {
-        shares(hits.iter().filter_map(|hit| hit.way_mm(late(hit)?)).map(f64::abs))
+        shares(hits.iter().filter_map(|hit| hit.distance_mm(late(hit)?)).map(f64::abs))
     };
-    let often = |rival| 2 * only(hits, |hit| hit.late_by(rival).is_some()).len() >= hits.len();
-    let rivals = BESIDE.iter().filter(|(rival, ..)| often(*rival)).map(|(rival, ink, shape)| {
-        Layer::new(&rival.to_string(), *ink, shape(curve(&|hit| hit.late_by(*rival))))
-    });
-    let mut layers: Vec<Layer> = rivals.collect();
+    let often = |reference| 2 * only(hits, |hit| hit.late_by(reference).is_some()).len() >= hits.len();
+    let references =
+        BESIDE.iter().filter(|(reference, ..)| often(*reference)).map(|(reference, ink, shape)| {
+            Layer::new(&reference.to_string(), *ink, shape(curve(&|hit| hit.late_by(*reference))))
+        });
+    let mut layers: Vec<Layer> = references.collect();
     layers.push(Layer::new("Footplate", Ink::First, Shape::Line(curve(&ScoredHit::late))));
     Panel {
         x: format!("{phase}: error at most (mm)"),
         y: "reports (%)".to_owned(),
-        from_nought: true,
+        from_zero: true,
         layers,
         ..Panel::default()
     }

@@ -9,8 +9,8 @@ use footplate_core::TrainId;
 use footplate_core::track::Layout;
 use footplate_core::tracking::Phase;
 use footplate_store::score::{
-    BASELINES, Comparison, Coverage, ForecastScore, GateAgreement, GateCheck, LEVELS, Rival, RivalScore,
-    ScoredHit, ScoredRecording,
+    BASELINES, Comparison, Coverage, ForecastScore, GateAgreement, GateCheck, LEVELS, ReferenceForecaster,
+    ReferenceScore, ScoredHit, ScoredRecording,
 };
 
 use super::figures::{Hits, PHASES, in_phase, one_decimal, per_cent, ratio};
@@ -101,28 +101,28 @@ fn steady(output: &mut dyn Write, groups: &[Group<'_>], all: &[&ScoredHit]) -> i
         if ours.scored == 0 {
             return writeln!(output, "| {name} | 0 | | | | | | | | | | | | | |");
         }
-        let oracle = comparison.rival(Rival::Oracle);
+        let oracle = comparison.reference(ReferenceForecaster::Oracle);
         let best = best_baseline(&comparison);
         let mut missed = Vec::new();
         missed.extend(ours.median_abs_mm.filter(|mm| *mm > STEADY_MEDIAN_MM).map(|_| "median"));
         missed.extend(
-            oracle.and_then(RivalScore::ratio).filter(|ratio| *ratio > ORACLE_RATIO).map(|_| "oracle"),
+            oracle.and_then(ReferenceScore::ratio).filter(|ratio| *ratio > ORACLE_RATIO).map(|_| "oracle"),
         );
         let lap = lap_comparison(hits);
-        let beaten = best.and_then(RivalScore::ratio).is_some_and(|ratio| ratio > 1.0);
+        let beaten = best.and_then(ReferenceScore::ratio).is_some_and(|ratio| ratio > 1.0);
         let lapped = lap.is_some_and(|[ours, lap]| ours > lap);
         missed.extend((beaten || lapped).then_some("baseline"));
         missed.extend(missed_coverage(&ours));
         let baseline = best.map_or_else(String::new, |best| {
-            format!("{} {}", best.rival, one_decimal(best.score.median_abs_mm))
+            format!("{} {}", best.reference, one_decimal(best.score.median_abs_mm))
         });
         writeln!(
             output,
             "| {name} | {} | {} | {} | {baseline} | {} | {} | {} | {} |",
             our_cells(&ours),
             one_decimal(oracle.and_then(|oracle| oracle.score.median_abs_mm)),
-            ratio(oracle.and_then(RivalScore::ratio)),
-            ratio(best.and_then(RivalScore::ratio)),
+            ratio(oracle.and_then(ReferenceScore::ratio)),
+            ratio(best.and_then(ReferenceScore::ratio)),
             one_decimal(lap.map(|[ours, _]| ours)),
             one_decimal(lap.map(|[_, lap]| lap)),
             missed.join(", "),
@@ -132,16 +132,17 @@ fn steady(output: &mut dyn Write, groups: &[Group<'_>], all: &[&ScoredHit]) -> i
 
 /// Mean errors of our forecasts of the poll and of the last lap's, on the hits that both forecast.
 fn lap_comparison(hits: &[&ScoredHit]) -> Option<[f64; 2]> {
-    let both: Hits<'_> = hits.iter().filter(|hit| hit.late_by(Rival::LastLap).is_some()).copied().collect();
+    let both: Hits<'_> =
+        hits.iter().filter(|hit| hit.late_by(ReferenceForecaster::LastLap).is_some()).copied().collect();
     let comparison = in_phase(&both, Phase::Steady);
-    let mean = |rival| comparison.rival(rival)?.score.mean_abs_mm;
-    Some([mean(Rival::AtPoll)?, mean(Rival::LastLap)?])
+    let mean = |reference| comparison.reference(reference)?.score.mean_abs_mm;
+    Some([mean(ReferenceForecaster::AtPoll)?, mean(ReferenceForecaster::LastLap)?])
 }
 
 /// The table or average that we beat least.
-fn best_baseline(comparison: &Comparison) -> Option<&RivalScore> {
-    let averages = BASELINES.iter().filter(|rival| **rival != Rival::LastLap);
-    let scored = averages.filter_map(|rival| comparison.rival(*rival));
+fn best_baseline(comparison: &Comparison) -> Option<&ReferenceScore> {
+    let averages = BASELINES.iter().filter(|reference| **reference != ReferenceForecaster::LastLap);
+    let scored = averages.filter_map(|reference| comparison.reference(*reference));
     let with_ratio = scored.filter_map(|found| Some((found, found.ratio()?)));
     with_ratio.max_by(|(_, one), (_, other)| one.total_cmp(other)).map(|(found, _)| found)
 }
@@ -170,7 +171,8 @@ fn other_phase(
         let mut missed = Vec::new();
         missed.extend(ours.median_abs_mm.zip(target).filter(|(mm, most)| mm > most).map(|_| "median"));
         missed.extend(missed_coverage(&ours));
-        let oracle = comparison.rival(Rival::Oracle).and_then(|oracle| oracle.score.median_abs_mm);
+        let oracle =
+            comparison.reference(ReferenceForecaster::Oracle).and_then(|oracle| oracle.score.median_abs_mm);
         writeln!(
             output,
             "| {name} | {} | {} | {} |",
@@ -238,10 +240,15 @@ fn everybody(output: &mut dyn Write, all: &[&ScoredHit]) -> io::Result<()> {
     for (phase, name, _) in PHASES {
         let comparison = in_phase(all, phase);
         writeln!(output, "| {name} | **Footplate** | {} | | |", score_cells(&comparison.ours))?;
-        for found in comparison.rivals.iter().filter(|found| found.score.scored > 0) {
+        for found in comparison.references.iter().filter(|found| found.score.scored > 0) {
             let theirs = score_cells(&found.score);
             let ours = one_decimal(found.ours.median_abs_mm);
-            writeln!(output, "| {name} | {} | {theirs} | {ours} | {} |", found.rival, ratio(found.ratio()))?;
+            writeln!(
+                output,
+                "| {name} | {} | {theirs} | {ours} | {} |",
+                found.reference,
+                ratio(found.ratio())
+            )?;
         }
     }
     Ok(())

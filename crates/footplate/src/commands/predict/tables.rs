@@ -4,7 +4,8 @@ use std::io::{self, Write};
 
 use footplate_core::TrainId;
 use footplate_store::score::{
-    Comparison, ForecastScore, GateAgreement, GateCheck, LEVELS, Rival, ScoredHit, ScoredRecording,
+    Comparison, ForecastScore, GateAgreement, GateCheck, LEVELS, ReferenceForecaster, ScoredHit,
+    ScoredRecording,
 };
 
 use super::figures::{Hits, PHASES, by_step, by_train, comparison, in_phase, one_decimal, per_cent, ratio};
@@ -41,7 +42,7 @@ fn block(output: &mut dyn Write, name: &str, hits: &[&ScoredHit]) -> io::Result<
     let overall = comparison(hits);
     writeln!(output, "{name}")?;
     write!(output, "  {} hits, {} forecast", overall.ours.hits, overall.ours.scored)?;
-    if let Some(right) = overall.named_right() {
+    if let Some(right) = overall.named_correctly() {
         write!(output, "; the sensor named as the next was right in {} %", per_cent(right))?;
     }
     let phases = PHASES.map(|(phase, ..)| in_phase(hits, phase));
@@ -57,10 +58,10 @@ fn block(output: &mut dyn Write, name: &str, hits: &[&ScoredHit]) -> io::Result<
     for phase in &phases {
         columns(output, &phase.ours, "")?;
     }
-    for rival in Rival::ALL {
-        write!(output, "\n  {:<16}", rival.to_string())?;
+    for reference in ReferenceForecaster::ALL {
+        write!(output, "\n  {:<16}", reference.to_string())?;
         for phase in &phases {
-            if let Some(found) = phase.rival(rival) {
+            if let Some(found) = phase.reference(reference) {
                 columns(output, &found.score, &ratio(found.ratio()))?;
             }
         }

@@ -12,9 +12,9 @@ use footplate_store::{RecordingKey, Side, Store, StoredMachine, Traced, parse_la
 use super::session::read;
 use crate::commands::calibrate::{CalibrationBeginning, calibration_line};
 use crate::commands::demo::TourBeginning;
-use crate::commands::drive::{DriveBeginning, ScriptRunner, Spoken};
+use crate::commands::drive::{DriveBeginning, ScriptRunner, SessionMessage};
 use crate::commands::written_layout::WrittenLayout;
-use crate::dashboard::{Alarm, Board, LayoutPicture, Painter, Shadow, TrainPassed};
+use crate::dashboard::{Alarm, Board, CalibrationFollower, LayoutPicture, Painter, TrainPassed};
 use crate::recorded::{Input, Listener};
 
 /// Between two pictures, unless the session is so long that there would be too many of them.
@@ -30,11 +30,11 @@ enum Shown {
     Calibration(CalibrationNotice),
 }
 
-fn of_session(notice: Spoken) -> Option<Shown> {
+fn of_session(notice: SessionMessage) -> Option<Shown> {
     match notice {
-        Spoken::Line { text, .. } => Some(Shown::Line(text)),
-        Spoken::Passed(passed) => Some(Shown::Passed(passed)),
-        Spoken::Alarm(alarm) => Some(Shown::Alarm(alarm)),
+        SessionMessage::Line { text, .. } => Some(Shown::Line(text)),
+        SessionMessage::Passed(passed) => Some(Shown::Passed(passed)),
+        SessionMessage::Alarm(alarm) => Some(Shown::Alarm(alarm)),
         _ => None,
     }
 }
@@ -91,7 +91,7 @@ impl Walked {
                 self.draws(&beginning.layout)?;
                 let layout = WrittenLayout::of("the layout of the session", beginning.layout.clone())?.layout;
                 let look = |machine: &Driver, painter: &mut Painter, now| {
-                    painter.paint_alone(machine, &BTreeMap::new(), now, Timestamp::ZERO);
+                    painter.paint_undispatched(machine, &BTreeMap::new(), now, Timestamp::ZERO);
                 };
                 self.tell(&mut beginning.driver(&layout), trace, Painter::new, look, |notice| {
                     of_driver(&notice)
@@ -101,9 +101,9 @@ impl Walked {
                 let beginning: CalibrationBeginning = read(stored)?;
                 self.draws(&beginning.layout)?;
                 let layout = WrittenLayout::of("the layout of the session", beginning.layout.clone())?.layout;
-                let mut shadow = Shadow::new(&layout);
+                let mut shadow = CalibrationFollower::new(&layout);
                 let look = |machine: &Calibrator<'_>, painter: &mut Painter, now| {
-                    painter.paint_alone(shadow.of(machine), &BTreeMap::new(), now, Timestamp::ZERO);
+                    painter.paint_undispatched(shadow.of(machine), &BTreeMap::new(), now, Timestamp::ZERO);
                 };
                 let mut calibrator = beginning.calibrator(&layout);
                 let heard = |notice| Some(Shown::Calibration(notice));
@@ -119,7 +119,7 @@ impl Walked {
     fn hear(&self, board: &Board, painter: &mut Painter, at: Timestamp, notice: &CalibrationNotice) {
         let Some((layout, train)) = &self.calibrated else { return };
         let line = calibration_line(layout, notice);
-        painter.hear_calibration(layout, at, *train, notice, line.as_deref().unwrap_or_default());
+        painter.handle_calibration(layout, at, *train, notice, line.as_deref().unwrap_or_default());
         if let Some(line) = line {
             board.say((at - Timestamp::ZERO).as_s(), &line);
         }
@@ -169,7 +169,7 @@ impl Walked {
         }
         look(machine, &mut painter, last.time);
         self.pictures.push(board.pictures().borrow().to_string());
-        let (happened, _) = board.happened_from(0);
+        let (happened, _) = board.events_from(0);
         self.happened.extend(
             happened
                 .iter()

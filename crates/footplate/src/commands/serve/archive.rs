@@ -1,11 +1,11 @@
-//! What the dashboard shows of the store: recordings, what was measured of trains, and what people think of it.
+//! The routes of the dashboard to the store: recordings, calibrations and marks.
 //!
 //! ```text
-//! GET  /api/recordings               what can be looked at again
-//! GET  /api/recordings/3/pictures    a session walked again: pictures as they were, and what happened
-//! GET  /api/trains/24/calibration    what all recordings together say of a train
-//! GET  /api/trains/24/why/SPEED:8    the measurements behind a number
-//! GET  /api/marks                    what is excluded, and why
+//! GET  /api/recordings               the list of recordings
+//! GET  /api/recordings/3/pictures    a session replayed: its pictures and events
+//! GET  /api/trains/24/calibration    the calibration of a train from all recordings
+//! GET  /api/trains/24/why/SPEED:8    the measurements behind a value
+//! GET  /api/marks                    excluded events, with reasons
 //! POST /api/marks                    {"events": [465], "mark": "excluded", "reason": "the wheels were dirty"}
 //! ```
 
@@ -25,7 +25,7 @@ use footplate_store::{Batch, EventKey, MarkKind, RecordingKey, Store};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::desk::{Desk, Wished};
+use super::answer_queue::{AnswerForm, AnswerQueue};
 use crate::clock::{now, rfc3339};
 use crate::commands::calibrate;
 use crate::commands::clerk::Question;
@@ -35,20 +35,27 @@ use crate::commands::store::words;
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::Routes;
 
-/// The most events that are marked at once: more than one hop, fewer than a session.
-const MOST_MARKED: usize = 1_000;
+/// The most events in one mark: more than a hop has, fewer than a session.
+const MAX_MARKED: usize = 1_000;
 
 #[derive(Clone)]
 struct Archive {
     store: Option<Arc<PathBuf>>,
     layout: Arc<WrittenLayout>,
-    desk: Desk,
+    answer_queue: AnswerQueue,
 }
 
-/// The routes, over a store if the session has one.
-pub(crate) fn archive_routes(store: Option<PathBuf>, layout: &WrittenLayout, desk: &Desk) -> Routes {
-    let archive =
-        Archive { store: store.map(Arc::new), layout: Arc::new(layout.clone()), desk: desk.clone() };
+/// The routes; without a store they answer that there is none.
+pub(crate) fn archive_routes(
+    store: Option<PathBuf>,
+    layout: &WrittenLayout,
+    answer_queue: &AnswerQueue,
+) -> Routes {
+    let archive = Archive {
+        store: store.map(Arc::new),
+        layout: Arc::new(layout.clone()),
+        answer_queue: answer_queue.clone(),
+    };
     Routes::new(
         archive,
         [
@@ -64,15 +71,15 @@ pub(crate) fn archive_routes(store: Option<PathBuf>, layout: &WrittenLayout, des
 impl Archive {
     async fn answer(&self, query: StoreQuery) -> Response {
         let Some(path) = &self.store else {
-            let says = "this session keeps nothing: begin it with `--store railway.db`";
-            return (StatusCode::NOT_FOUND, Json(json!({ "error": says }))).into_response();
+            let why = "this session has no store: start it with `--store railway.db`";
+            return (StatusCode::NOT_FOUND, Json(json!({ "error": why }))).into_response();
         };
         let question = Question::Store { path: path.to_path_buf(), layout: self.layout.text.clone(), query };
-        self.desk.answer(question).await
+        self.answer_queue.answer(question).await
     }
 }
 
-/// What is asked of the store.
+/// A request to the store.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) enum StoreQuery {
     Recordings,
@@ -84,10 +91,10 @@ pub(crate) enum StoreQuery {
 }
 
 impl StoreQuery {
-    /// The answer, as text of JSON.
+    /// The answer as JSON text.
     ///
     /// # Errors
-    /// What is wrong with the question or the store.
+    /// The request or the store is invalid.
     pub(crate) fn answer(self, layout: &Layout, mut store: Store) -> anyhow::Result<String> {
         match self {
             Self::Recordings => listed(&store),
@@ -96,7 +103,7 @@ impl StoreQuery {
                 pictures(&store, RecordingKey(recording.parse().with_context(wrong)?))
             }
             Self::Calibration { train, language } => {
-                store_report(layout, &store, train_of(&train)?, Wished::named(language).language())
+                store_report(layout, &store, train_of(&train)?, AnswerForm::named(language).language())
             }
             Self::Why { train, number } => {
                 let question: calibrate::Question = number.parse().map_err(anyhow::Error::msg)?;
@@ -148,7 +155,7 @@ async fn recorded_pictures(State(archive): State<Archive>, Path(recording): Path
 async fn calibration(
     State(archive): State<Archive>,
     Path(train): Path<String>,
-    Query(wished): Query<Wished>,
+    Query(wished): Query<AnswerForm>,
 ) -> Response {
     archive.answer(StoreQuery::Calibration { train, language: wished.into_name() }).await
 }
@@ -180,7 +187,7 @@ fn marked(layout: &Layout, store: &Store) -> anyhow::Result<String> {
     Ok(serde_json::to_string(&list)?)
 }
 
-/// What somebody thinks of events.
+/// A new mark on events.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct NewMark {
@@ -201,8 +208,8 @@ async fn mark(State(archive): State<Archive>, body: Result<Json<NewMark>, JsonRe
         Ok(new) => new,
         Err(wrong) => {
             let right = "{\"events\": [465], \"mark\": \"excluded\", \"reason\": \"the wheels were dirty\"}";
-            let says = format!("{}; write {right}", wrong.body_text());
-            return (wrong.status(), Json(json!({ "error": says }))).into_response();
+            let why = format!("{}; write {right}", wrong.body_text());
+            return (wrong.status(), Json(json!({ "error": why }))).into_response();
         }
     };
     archive.answer(StoreQuery::Mark(new)).await
@@ -210,8 +217,8 @@ async fn mark(State(archive): State<Archive>, body: Result<Json<NewMark>, JsonRe
 
 impl NewMark {
     fn make(self, store: &mut Store) -> anyhow::Result<String> {
-        if self.events.is_empty() || self.events.len() > MOST_MARKED {
-            bail!("{} events cannot be marked at once: 1 to {MOST_MARKED} can", self.events.len());
+        if self.events.is_empty() || self.events.len() > MAX_MARKED {
+            bail!("{} events cannot be marked at once: 1 to {MAX_MARKED} can", self.events.len());
         }
         let events: Vec<EventKey> = self.events.into_iter().map(EventKey).collect();
         let kind = match self.mark {

@@ -1,7 +1,7 @@
-//! Simulated slides, live: a train of the simulator through the real odometer in real time, or faster.
+//! Live simulated slides: a train of the simulator through the real odometer, in real time or faster.
 //!
 //! ```text
-//! GET /api/slides                          what there is to watch
+//! GET /api/slides                          the scenarios
 //! GET /api/slides/S2?seed=7&speed=2        server-sent events: `train`, `rows` of periods, and `score` at the end
 //! ```
 
@@ -26,19 +26,19 @@ use tokio::time::{Instant, sleep_until};
 use crate::commands::odometry::WatchedSlide;
 use crate::dashboard::Routes;
 
-/// Slides that are shown at once; each takes a few thousandths of a core.
-const MOST_WATCHED: usize = 4;
-/// Between two parcels of periods: twenty-five a second look like motion.
-const BETWEEN_PARCELS: Duration = Duration::from_millis(40);
-/// Periods of one parcel. Who does not read for a while misses older ones, and nobody keeps them.
-const MOST_ROWS: usize = 400;
-/// Times real time that can be asked for: a stop that takes a minute is over in three seconds.
+/// Slides stream at once; each takes a few thousandths of a core.
+const MAX_WATCHED: usize = 4;
+/// The interval between two events: 25 a second look smooth.
+const EVENT_INTERVAL: Duration = Duration::from_millis(40);
+/// The most periods in one event; a slow reader misses older ones.
+const MAX_ROWS: usize = 400;
+/// Allowed ratios of simulated to real time: at 20, a stop of a minute takes three seconds.
 const SPEEDS: std::ops::RangeInclusive<f64> = 0.1..=20.0;
 
 /// The routes.
 pub(crate) fn slide_routes() -> Routes {
-    let places = Arc::new(Semaphore::new(MOST_WATCHED));
-    Routes::new(places, [("/api/slides", get(list)), ("/api/slides/{scenario}", get(watch))])
+    let permits = Arc::new(Semaphore::new(MAX_WATCHED));
+    Routes::new(permits, [("/api/slides", get(list)), ("/api/slides/{scenario}", get(watch))])
 }
 
 #[derive(Debug, Deserialize)]
@@ -60,17 +60,17 @@ async fn list() -> Response {
     Json(LineScenario::all().iter().map(one).collect::<Vec<_>>()).into_response()
 }
 
-fn refused(status: StatusCode, says: &str) -> Response {
-    (status, Json(json!({ "error": says }))).into_response()
+fn reject(status: StatusCode, why: &str) -> Response {
+    (status, Json(json!({ "error": why }))).into_response()
 }
 
 async fn watch(
-    State(places): State<Arc<Semaphore>>,
+    State(permits): State<Arc<Semaphore>>,
     Path(name): Path<String>,
     asked: Result<Query<Asked>, axum::extract::rejection::QueryRejection>,
 ) -> Response {
     let Some(scenario) = LineScenario::by_name(&name) else {
-        return refused(
+        return reject(
             StatusCode::NOT_FOUND,
             &format!("there is no scenario `{name}`; /api/slides lists them"),
         );
@@ -78,46 +78,44 @@ async fn watch(
     let asked = match asked {
         Ok(Query(asked)) if SPEEDS.contains(&asked.speed) => asked,
         _ => {
-            let says = "write a whole number as seed and a speed from 0.1 to 20 times real: ?seed=7&speed=2";
-            return refused(StatusCode::UNPROCESSABLE_ENTITY, says);
+            let why = "write a whole number as seed and a speed from 0.1 to 20 times real: ?seed=7&speed=2";
+            return reject(StatusCode::UNPROCESSABLE_ENTITY, why);
         }
     };
-    let Ok(place) = places.try_acquire_owned() else {
-        return refused(
+    let Ok(permit) = permits.try_acquire_owned() else {
+        return reject(
             StatusCode::SERVICE_UNAVAILABLE,
-            "four slides are watched already: come again in a minute",
+            "four slides are being watched already: try again in a minute",
         );
     };
-    // A run of minutes is simulated in a moment, but not on the server's thread.
+    // Simulating minutes takes a moment, too long for the server's thread.
     match tokio::task::spawn_blocking(move || WatchedSlide::new(scenario, asked.seed)).await {
         Ok(Ok(slide)) => {
-            let shown = Shown {
+            let stream = SlideStream {
                 slide,
                 speed: asked.speed,
                 began: Instant::now(),
-                parcels: 0,
+                events_sent: 0,
                 part: Part::Train,
-                _place: place,
+                _permit: permit,
             };
-            Sse::new(shown.events()).keep_alive(KeepAlive::default()).into_response()
+            Sse::new(stream.events()).keep_alive(KeepAlive::default()).into_response()
         }
-        _ => {
-            refused(StatusCode::INTERNAL_SERVER_ERROR, "this could not be simulated: the terminal says more")
-        }
+        _ => reject(StatusCode::INTERNAL_SERVER_ERROR, "this could not be simulated: the terminal why more"),
     }
 }
 
-/// A slide that somebody watches. It ends with them: nobody else holds it.
-struct Shown {
+/// A slide that one client watches; it ends with the connection.
+struct SlideStream {
     slide: WatchedSlide,
     speed: f64,
     began: Instant,
-    parcels: u32,
+    events_sent: u32,
     part: Part,
-    _place: OwnedSemaphorePermit,
+    _permit: OwnedSemaphorePermit,
 }
 
-/// What is sent next.
+/// The next event to send.
 #[derive(Debug, Clone, Copy)]
 enum Part {
     Train,
@@ -126,35 +124,35 @@ enum Part {
     Nothing,
 }
 
-impl Shown {
+impl SlideStream {
     fn events(self) -> impl Stream<Item = Result<Event, Infallible>> {
-        unfold(self, |mut shown| async move {
-            let event = match shown.part {
+        unfold(self, |mut stream| async move {
+            let event = match stream.part {
                 Part::Train => {
-                    shown.part = Part::Rows;
-                    event("train", &shown.slide.opening())
+                    stream.part = Part::Rows;
+                    event("train", &stream.slide.opening())
                 }
-                Part::Rows => shown.rows().await,
+                Part::Rows => stream.rows().await,
                 Part::Score => {
-                    shown.part = Part::Nothing;
-                    event("score", &shown.slide.score())
+                    stream.part = Part::Nothing;
+                    event("score", &stream.slide.score())
                 }
                 Part::Nothing => return None,
             };
-            Some((Ok(event), shown))
+            Some((Ok(event), stream))
         })
     }
 
     async fn rows(&mut self) -> Event {
-        self.parcels += 1;
-        sleep_until(self.began + BETWEEN_PARCELS * self.parcels).await;
+        self.events_sent += 1;
+        sleep_until(self.began + EVENT_INTERVAL * self.events_sent).await;
         let elapsed = self.began.elapsed();
-        // Who reads slowly gets the next parcel when it is due, and not those in between.
-        self.parcels = self
-            .parcels
-            .max(elapsed.as_millis().div_euclid(BETWEEN_PARCELS.as_millis()).try_into().unwrap_or(u32::MAX));
+        // A slow reader continues with the next event that is due.
+        self.events_sent = self
+            .events_sent
+            .max(elapsed.as_millis().div_euclid(EVENT_INTERVAL.as_millis()).try_into().unwrap_or(u32::MAX));
         let until = TimeSpan::from_s(self.speed * elapsed.as_secs_f64());
-        let (rows, gone) = self.slide.go_on(until, MOST_ROWS);
+        let (rows, gone) = self.slide.go_on(until, MAX_ROWS);
         if self.slide.is_over() {
             self.part = Part::Score;
         }
@@ -163,6 +161,6 @@ impl Shown {
 }
 
 fn event(kind: &'static str, what: &impl Serialize) -> Event {
-    // What cannot be written as JSON is a mistake of ours that a test finds.
+    // A failure to write JSON is a bug that a test finds.
     Event::default().event(kind).data(serde_json::to_string(what).unwrap_or_default())
 }

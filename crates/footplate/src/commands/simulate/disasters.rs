@@ -58,7 +58,7 @@ impl Arguments {
         if self.budget != 240 {
             again += &format!(" --budget {}", self.budget);
         }
-        let failed = scored.troubles().into_iter().map(|trouble| FailedRun {
+        let failed = scored.failures().into_iter().map(|trouble| FailedRun {
             what: format!("seed {}, {trouble}", scored.seed),
             again: again.clone(),
         });

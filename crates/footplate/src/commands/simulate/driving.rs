@@ -69,7 +69,7 @@ impl Arguments {
 
     /// What went wrong with a train that we drove: how others drive it is no check of ours.
     fn failure(&self, train: &ScoredTrain) -> Option<FailedRun> {
-        let mishaps = train.mishaps();
+        let mishaps = train.faults();
         (mishaps > 0).then(|| {
             let (seed, law) = (train.seed, train.law);
             let mut again = format!("simulate driving --seed {seed} --law {law} --budget {}", self.budget);

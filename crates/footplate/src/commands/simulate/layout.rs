@@ -54,12 +54,13 @@ pub(super) struct Arguments {
     /// pseudo-terminal.
     #[arg(long, value_parser = place_named, conflicts_with_all = ["scenario", "out", "json"])]
     station: Option<Place>,
-    /// What the station is: `marklin`, a 6051, `dcc-ex`, a DCC-EX board, `z21`, a Z21, or `marklin-can`, a
-    /// Central Station.
+    /// What the station is: `marklin`, a 6051, `dcc-ex`, a DCC-EX board, `z21`, a Z21, `marklin-can`, a Central Station, or `loconet`, a
+    /// command station on LocoNet behind a server.
     #[arg(long, value_parser = StationKind::named, default_value = "marklin", requires = "station")]
     protocol: StationKind,
     /// How a station behaves, with commas between: chatter, merged, split, lossy, silent (DCC-EX); lossy, twice, overtaken,
-    /// unsubscribed, strict, wrong-xor, short, first-only, locked, can, loconet (Z21).
+    /// unsubscribed, strict, wrong-xor, short, first-only, locked, can, loconet (Z21); refused, no-echo, no-version, one-slot, merged,
+    /// split (LocoNet).
     #[arg(long, value_parser = quirks, requires = "station")]
     quirks: Option<Quirks>,
     /// How many times faster than real time the station runs.

@@ -1,10 +1,6 @@
 //! `footplate simulate line`: full-size trains on wheels with tachometers, as recordings or straight through the odometer.
 
-mod family;
 mod files;
-mod random_worlds;
-mod score_page;
-mod scored_run;
 mod world;
 
 use std::io::Write;
@@ -14,18 +10,15 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use footplate_core::TimeSpan;
+use footplate_eval::line::{FamiliesPage, ScoredRun, ScoredWorld, WorldsPage};
+use footplate_eval::seeds::Seeds;
 use footplate_sim::line::{LineConditions, LineLevel, LineScenario};
 use footplate_store::TableForm;
 
-use self::family::Family;
 use self::files::WrittenRun;
-use self::random_worlds::{ScoredWorld, WorldsPage};
-use self::score_page::ScorePage;
-use self::scored_run::{ScoredRun, score};
 use self::world::{LevelName, Scenarios, World};
 use super::super::Outcome;
 use crate::spread::each;
-use footplate_eval::seeds::Seeds;
 
 /// Least share of periods whose true speed has to lie within the interval (per cent), as `footplate odometry` asks for.
 const SPEED_INSIDE_PCT: f64 = 99.99;
@@ -237,11 +230,10 @@ impl Arguments {
 
     fn write_scores(&self, worlds: &[World], output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let runs = self.each("simulating and scoring", worlds, |Job { world: at, teeth, seed }, world| {
-            let (scores, flags) = score(&world.run(seed, self.conditions(teeth)))?;
-            Ok(ScoredRun { world: at, teeth, seed, scores, flags })
+            ScoredRun::new(at, seed, teeth, &world.run(seed, self.conditions(teeth)))
         })?;
         let names: Vec<String> = worlds.iter().map(|world| world.name().to_owned()).collect();
-        let page = self.page(&names, &runs);
+        let page = FamiliesPage::new(&names, &runs, self.train.is_some(), self.asked());
         if self.json {
             writeln!(output, "{}", serde_json::to_string_pretty(&page.as_json(&runs, &names))?)?;
         } else if self.markdown {
@@ -250,26 +242,6 @@ impl Arguments {
             page.write_text(output)?;
         }
         Ok(if page.falls_short(SPEED_INSIDE_PCT) { Outcome::FallsShort } else { Outcome::Done })
-    }
-
-    fn page<'r>(&self, names: &[String], runs: &'r [ScoredRun]) -> ScorePage<'r> {
-        let family = |name: &str, is_in: &dyn Fn(usize) -> bool| {
-            Family::new(name, runs.iter().filter(|run| is_in(run.world)))
-        };
-        let families = names.iter().enumerate().map(|(at, name)| family(name, &|world| world == at));
-        let kind =
-            |name: &str| if self.train.is_some() { name.to_owned() } else { name.chars().take(1).collect() };
-        let mut kinds: Vec<String> = names.iter().map(|name| kind(name)).collect();
-        kinds.dedup();
-        let of_kind = |wanted: &String| {
-            family(wanted, &|world| names.get(world).is_some_and(|name| kind(name) == *wanted))
-        };
-        ScorePage {
-            families: families.collect(),
-            groups: kinds.iter().map(of_kind).collect(),
-            all: family("all", &|_| true),
-            asked: self.asked(),
-        }
     }
 
     /// What makes the same page again.

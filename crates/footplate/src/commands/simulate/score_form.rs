@@ -3,17 +3,8 @@
 use std::io::{self, Write};
 
 use clap::Args;
-use footplate_eval::seeds::FRESH;
+use footplate_eval::seeds::{FRESH, seeds_sentence};
 use footplate_eval::written_scores::WrittenScores;
-
-const OF_FRESH_SEEDS: &str =
-    "The seeds are fresh: the commit behind the `@` drew them, and nobody chose them.";
-const OF_REGRESSION_SEEDS: &str = "The seeds are regression seeds: they were looked at while the program was made. `./ci.sh fresh` draws others.";
-
-/// Who chose the seeds of a page.
-pub(super) const fn seeds_sentence(are_fresh: bool) -> &'static str {
-    if are_fresh { OF_FRESH_SEEDS } else { OF_REGRESSION_SEEDS }
-}
 
 /// The form that was asked for; a text for people without a word.
 #[derive(Debug, Clone, Copy, Args)]

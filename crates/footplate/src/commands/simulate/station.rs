@@ -80,6 +80,9 @@ pub(super) fn serve(
                 "only a Z21 and a Central Station are spoken to over UDP: write --protocol z21 or marklin-can, or --station tcp:127.0.0.1:0"
             )
         }
+        (StationKind::LocoNet, Place::PseudoTerminal) => {
+            bail!("a LocoNet server is spoken to over TCP: write --station tcp:127.0.0.1:0")
+        }
         _ => {}
     }
     let station = station(&address, layout)?;
@@ -112,6 +115,10 @@ pub(super) fn serve(
             let scan = wanted.quirks.can.scan.as_ms();
             writeln!(output, "marklin-can:{port}?{receive}scan={scan}&speed={speed}")?;
             "Central Station"
+        }
+        StationKind::LocoNet => {
+            writeln!(output, "loconet:{port}?speed={speed}")?;
+            "command station on LocoNet"
         }
     };
     output.flush()?;

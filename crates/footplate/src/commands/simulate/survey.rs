@@ -64,8 +64,8 @@ impl Arguments {
     }
 
     fn failure(&self, world: &Surveyed) -> Option<FailedRun> {
-        (world.mishaps > 0).then(|| FailedRun {
-            what: format!("seed {}: {} on the way", world.seed, counted(world.mishaps, "mishap")),
+        (world.faults > 0).then(|| FailedRun {
+            what: format!("seed {}: {} on the way", world.seed, counted(world.faults, "mishap")),
             again: format!("simulate survey {}", self.asked_of(&world.seed.to_string())),
         })
     }

@@ -109,7 +109,7 @@ pub(super) fn parameters(railway: &Railway<'_>, simulated: &SimulatedRecording, 
         .sensors(layout)
         .into_iter()
         .map(|sensor| {
-            json!({ "name": layout.sensor_name(sensor), "offset_mm": railway.track.contact_offset(sensor).as_mm() })
+            json!({ "name": layout.sensor_name(sensor), "offset_mm": railway.track.sensor_offset(sensor).as_mm() })
         })
         .collect();
     json!({
@@ -134,7 +134,7 @@ pub(super) fn parameters(railway: &Railway<'_>, simulated: &SimulatedRecording, 
         "wander_time_s": train.wander_time.as_s(),
         "warm_up": train.warm_up.as_parts(),
         "warm_up_time_s": train.warm_up_time.as_s(),
-        "curve_feel": train.curve_feel,
+        "curve_feel": train.curve_sensitivity,
         "shoe_mm": train.shoe.as_mm(),
         "poll_period_ms": link.period.as_ms(),
         "poll_jitter_ms": link.jitter.as_ms(),
@@ -156,7 +156,7 @@ fn speeds(railway: &Railway<'_>, train: &Train) -> Vec<Value> {
             "step": step.get(), "approach": name,
             "level_mm_s": train.speeds.speed(step, approach).as_mm_per_s(),
             "lap_mm_s": railway.lap_speed(train, step, approach).as_mm_per_s(),
-            "way_to_rest_mm": train.way_to_rest(step, approach).as_mm(),
+            "way_to_rest_mm": train.stopping_distance(step, approach).as_mm(),
         })
     };
     rows.map(row).collect()

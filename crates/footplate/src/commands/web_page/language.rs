@@ -1,4 +1,4 @@
-//! The language that a page is read in.
+//! The language of a page.
 
 use clap::ValueEnum;
 
@@ -13,7 +13,7 @@ pub(crate) enum Language {
 }
 
 impl Language {
-    /// That of a code as browsers write it, such as `de-AT`; English for all that pages are not written in.
+    /// The language of a browser's language code, such as `de-AT`; English if there is no translation.
     pub(crate) fn of_code(code: &str) -> Self {
         match code.split('-').next() {
             Some(language) if language.eq_ignore_ascii_case("de") => Self::German,
@@ -21,7 +21,7 @@ impl Language {
         }
     }
 
-    /// What browsers call it.
+    /// The language code.
     pub(super) const fn code(self) -> &'static str {
         match self {
             Self::English => "en",
@@ -29,7 +29,7 @@ impl Language {
         }
     }
 
-    /// The one of two texts that is read in it; both say the same.
+    /// The text in this language.
     pub(in crate::commands) const fn pick<'t>(self, english: &'t str, german: &'t str) -> &'t str {
         match self {
             Self::English => english,

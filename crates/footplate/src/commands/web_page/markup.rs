@@ -1,10 +1,10 @@
-//! HTML from text that others wrote: nothing in it is ever taken for markup.
+//! Escapes foreign text for HTML.
 
 use std::fmt::Write;
 
 use super::Language;
 
-/// Text as it may stand in an element or a quoted attribute.
+/// Text escaped for an element or a quoted attribute.
 pub(in crate::commands) fn text(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
@@ -20,13 +20,13 @@ pub(in crate::commands) fn text(text: &str) -> String {
     escaped
 }
 
-/// JSON as it may stand in a script element: without a character that could end it or begin a comment.
+/// JSON escaped for a script element: without characters that could end it or begin a comment.
 pub(in crate::commands) fn json(json: &str) -> String {
-    // Outside its strings JSON has none of these, and inside an escape means the same.
+    // JSON has these characters only inside strings, where the escapes mean the same.
     json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
 }
 
-/// What stands in the place of a chart where no scripts run.
+/// The replacement of a chart in a browser without scripts.
 pub(in crate::commands) const fn without_script(language: Language) -> &'static str {
     language.pick(
         "This chart needs JavaScript; the tables do without.",
@@ -34,14 +34,14 @@ pub(in crate::commands) const fn without_script(language: Language) -> &'static 
     )
 }
 
-/// A table. The first column names its row, columns in `numbers` stand to the right.
+/// A table. The first column holds row headers; columns in `numbers` are aligned right.
 pub(in crate::commands) struct Table {
     html: String,
     numbers: &'static [bool],
 }
 
 impl Table {
-    /// Begins a table with its caption and columns, each with whether it holds numbers.
+    /// Begins a table with a caption and columns.
     pub(in crate::commands) fn new(caption: &str, columns: &[&str], numbers: &'static [bool]) -> Self {
         let mut html = format!("<div class=\"wide\"><table><caption>{}</caption><thead><tr>", text(caption));
         for (column, number) in columns.iter().zip(numbers) {
@@ -58,7 +58,7 @@ impl Table {
         self.row_of_markup(&escaped);
     }
 
-    /// Adds a row of cells that are markup already.
+    /// Adds a row of markup.
     pub(in crate::commands) fn row_of_markup(&mut self, cells: &[String]) {
         self.html.push_str("<tr>");
         for (place, (cell, number)) in cells.iter().zip(self.numbers).enumerate() {

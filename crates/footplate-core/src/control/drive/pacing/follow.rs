@@ -1,13 +1,12 @@
-//! A train that runs behind another and keeps the gap to it.
+//! Follows another train at a gap.
 //!
-//! A gap in time `g` asks the follower to be at `t` where the leader was at `t − g`. Mostly that is past, and known from
-//! when the leader came by the contacts about that place (see [`LeadLine`]). Who follows a follower does not run after what
-//! that one does to make up for its own errors: it follows the first train of all, by the sum of the gaps, so that errors do
-//! not grow from train to train.
+//! A gap in time `g` puts the follower at `t` where the leader was at `t − g`. That is mostly in the past and known
+//! from the leader's detections (see [`LeadLine`]). In a chain, each train follows the first one by the sum of the
+//! gaps, not its own leader's corrections: errors do not grow along the chain.
 //!
-//! Whatever the gap, the follower can come to rest before the rear of its leader, should that be commanded to stop now, but for
-//! one time in about a thousand. It slows down step by step before that needs a stop. Of a leader that is in doubt only the
-//! contact counts at which it was seen last.
+//! Whatever the gap, the follower can stop before the rear of its leader if the leader is commanded to stop now, with
+//! a probability of about 0.999. It slows down step by step before that takes a stop. If the leader's position is
+//! uncertain, only its last detection counts.
 
 use alloc::collections::BTreeMap;
 
@@ -17,61 +16,60 @@ use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::driver::Driver;
 use crate::control::drive::order::{Aim, Gap, OrderId};
 use crate::control::drive::outputs::Outputs;
-use crate::control::drive::path_length::way_between;
+use crate::control::drive::path::distance_between;
 use crate::control::drive::refusal::Refusal;
-use crate::control::drive::task::{Goal, Phase, Task};
+use crate::control::drive::task::{Goal, Task, TaskPhase};
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::INTERRUPTED;
-use crate::tracking::{TrackContext, WayPoint};
+use crate::tracking::{INTERRUPTED, TrackContext, WayPoint};
 use crate::units::{Length, Ratio, Speed};
 
-use super::command_budget::seconds;
 use super::lead_line::LeadLine;
 use super::pace::{Following, Pace, Pacing};
-use super::reference::Reference;
-use super::surveyed_way::SurveyedWay;
+use super::reference::{Reference, SurveyedPath};
+use super::step_search::seconds;
 
-/// From the rear of one train to the front of the next there is never less: a hand's breadth.
-pub(in crate::control) const SAFE: Length = Length::from_mm(50.0);
-/// How often a follower may come to rest beyond the place where it should, ...
-const NEARER: Ratio = Ratio::from_percent(0.1);
-/// ... and its leader short of where it is thought to. Where both scatter alike, both together are as far off as one time in
-/// a thousand: 3.09 + 1.28 standard deviations of one are 3.09 of the root of the sum of both squares.
-const SHORTER: Ratio = Ratio::from_percent(10.0);
-/// One standard deviation of where a train is believed to be between contacts.
-const BELIEVED: Length = Length::from_mm(10.0);
-/// A leader may slow down to what is left of its speed without this part, and its follower need not be held back for it.
-const SLOWS: f64 = 0.35;
-/// So far a train strays from where it should be.
-const STRAYS: Length = Length::from_mm(25.0);
-/// A step that was told is followed by a stop no sooner than this: the next look, and a poll.
-const UNDONE: TimeSpan = TimeSpan::from_ms(300);
-/// A leader is looked at this often (s), whatever is reported.
-const LOOK_AGAIN: f64 = 0.4;
-/// A train that was held back starts again when it can run so far before it would have to stop: no train should start for
-/// less.
+/// Smallest clearance between the rear of a train and the front of the next.
+pub(in crate::control) const SAFE_GAP: Length = Length::from_mm(50.0);
+/// Probability that a follower comes to rest beyond its bound, ...
+const BEYOND_PROBABILITY: Ratio = Ratio::from_percent(0.1);
+/// ... and that its leader comes to rest short of its own. With equal spreads, both bounds together are 3.09 standard
+/// deviations of the difference, exceeded once in a thousand times: 3.09 + 1.28 standard deviations of one train are
+/// 3.09 times the root of the sum of both squares.
+const LEADER_SHORT_PROBABILITY: Ratio = Ratio::from_percent(10.0);
+/// One standard deviation of a train's position between sensors.
+const POSITION_DEVIATION: Length = Length::from_mm(10.0);
+/// The leader may lose this part of its speed without the follower having to stop.
+const SPEED_DROP: f64 = 0.35;
+/// Largest error of a paced train.
+const PACING_ERROR: Length = Length::from_mm(25.0);
+/// Shortest time between a step and a stop: the next check, and a poll.
+const MIN_STEP_TIME: TimeSpan = TimeSpan::from_ms(300);
+/// The leader is checked this often (s) without a report.
+const RECHECK_INTERVAL: f64 = 0.4;
+/// A stopped follower starts again when it can run this far before it would have to stop.
 const WORTH_STARTING: Length = Length::from_mm(150.0);
-/// A follower that will not be able to stop in so much time slows down: a change of step begins to be felt within it, and a
-/// longer one would hold back trains that are in no danger.
-const FORESEEN: TimeSpan = TimeSpan::from_ms(500);
-/// It does not creep up to its leader, and trains that run so fast do not stall.
-const CREEPS: Speed = Speed::from_mm_per_s(60.0);
-const LIVELY: Speed = Speed::from_mm_per_s(150.0);
-/// A train has run ever since it was seen if it needed no more than this part of the time for its way at its speed.
-const RAN_ON: f64 = 1.5;
-/// More trains in a row are on no layout.
-const MOST_IN_A_ROW: usize = 12;
-/// Gaps are judged for speeds from the one to the other, or to that of the leader if it is faster: one that stands, or crawls,
-/// will not do so for ever.
-const SLOWEST_JUDGED: Speed = Speed::from_mm_per_s(200.0);
-const USUAL_SPEED: Speed = Speed::from_mm_per_s(250.0);
-/// So many speeds beside the slowest.
-const SPEEDS_JUDGED: u8 = 4;
+/// A follower that will no longer be able to stop after this time slows down: a change of step takes effect within
+/// it, and a longer time would slow down trains in no danger.
+const LOOKAHEAD: TimeSpan = TimeSpan::from_ms(500);
+/// Below the first speed a train may stall; above the second it does not.
+const CREEP_SPEED: Speed = Speed::from_mm_per_s(60.0);
+const STALL_FREE_SPEED: Speed = Speed::from_mm_per_s(150.0);
+/// A train has run without a stop since its last detection if the time exceeds distance over speed by at most this
+/// factor.
+const MAX_TIME_RATIO: f64 = 1.5;
+/// Longest chain of followers.
+const MAX_CHAIN: usize = 12;
+/// Gaps are checked between these speeds, or up to the leader's if that is faster: a leader at rest or at creep speed
+/// will not stay so.
+const MIN_GAP_SPEED: Speed = Speed::from_mm_per_s(200.0);
+const MAX_GAP_SPEED: Speed = Speed::from_mm_per_s(250.0);
+/// Number of speeds checked above the lowest.
+const GAP_SPEEDS: u8 = 4;
 
 impl Following {
-    /// The fastest step that is safe, as of the last look.
+    /// The fastest safe step, as of the last check.
     pub(super) const fn fastest(&self) -> Option<SpeedStep> {
         self.fastest
     }
@@ -81,7 +79,7 @@ impl Following {
 pub(super) type Others = BTreeMap<TrainId, DrivenTrain>;
 
 impl Driver {
-    /// The train behind which a train has been ordered to keep a gap.
+    /// The train that a train has been ordered to follow.
     #[must_use]
     pub fn leader(&self, train: TrainId) -> Option<TrainId> {
         match &self.trains.get(&train)?.paced()?.pace {
@@ -92,7 +90,7 @@ impl Driver {
 }
 
 impl DrivenTrain {
-    /// Takes an order to follow.
+    /// Starts an order to follow.
     pub(in crate::control::drive) fn follow(
         &mut self,
         context: TrackContext<'_>,
@@ -108,7 +106,7 @@ impl DrivenTrain {
                 return Err(Refusal::Lost { train: train.id() });
             }
         }
-        if self.leads(leader, others) {
+        if self.is_followed_by(leader, others) {
             return Err(Refusal::FollowsInCircle { train: self.id(), leader });
         }
         let shortest = self.shortest_gap(ahead, gap, others);
@@ -120,9 +118,14 @@ impl DrivenTrain {
         if is_short {
             return Err(Refusal::GapTooShort { leader, shortest });
         }
-        self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
-        let following =
-            Following { leader, gap, is_held: self.commanded == SpeedStep::STAND, rear: None, fastest: None };
+        self.start_task(Task { order, goal: Goal::Pace, phase: TaskPhase::Pacing }, out);
+        let following = Following {
+            leader,
+            gap,
+            is_stopped: self.commanded == SpeedStep::STAND,
+            rear: None,
+            fastest: None,
+        };
         self.pacing = Some(Pacing::new(Pace::Follow(following), self.usable_steps(), now));
         Ok(())
     }
@@ -135,9 +138,9 @@ impl DrivenTrain {
     }
 
     /// Whether a train follows this one, directly or behind others.
-    fn leads(&self, other: TrainId, others: &Others) -> bool {
+    fn is_followed_by(&self, other: TrainId, others: &Others) -> bool {
         let mut at = other;
-        for _ in 0..MOST_IN_A_ROW {
+        for _ in 0..MAX_CHAIN {
             if at == self.id() {
                 return true;
             }
@@ -149,29 +152,30 @@ impl DrivenTrain {
         true
     }
 
-    /// The shortest gap at which it could still stop behind a leader that is commanded to stop, whatever usual speed they run at.
+    /// The shortest gap at which this train can still stop behind a leader that is commanded to stop, at all usual
+    /// speeds.
     fn shortest_gap(&self, leader: &Self, gap: Gap, others: &Others) -> Gap {
-        // Who follows runs faster for a while to catch up: the first of all says how fast all of them usually are.
+        // Followers run faster for a while to catch up: the first train of the chain shows the usual speed.
         let mut first = leader;
         while let Some(next) = first.followed().and_then(|following| others.get(&following.leader)) {
             first = next;
         }
-        let fastest = first.model.steady_speed(first.commanded, Approach::Below).max(USUAL_SPEED);
-        let speeds = (0..=SPEEDS_JUDGED).map(|nth| {
-            SLOWEST_JUDGED + (fastest - SLOWEST_JUDGED) * (f64::from(nth) / f64::from(SPEEDS_JUDGED))
-        });
-        let gaps = speeds.map(|speed| (self.bumpers_apart(leader, speed), speed));
+        let fastest = first.model.steady_speed(first.commanded, Approach::Below).max(MAX_GAP_SPEED);
+        let speeds = (0..=GAP_SPEEDS)
+            .map(|nth| MIN_GAP_SPEED + (fastest - MIN_GAP_SPEED) * (f64::from(nth) / f64::from(GAP_SPEEDS)));
+        let gaps = speeds.map(|speed| (self.min_clearance(leader, speed), speed));
         match gap {
-            Gap::Way(_) => Gap::Way(gaps.map(|(bumpers, _)| bumpers).fold(SAFE, Length::max)),
+            Gap::Way(_) => Gap::Way(gaps.map(|(clearance, _)| clearance).fold(SAFE_GAP, Length::max)),
             Gap::Time(_) => {
-                let times = gaps.map(|(bumpers, speed)| (bumpers + leader.reach[1] + self.reach[0]) / speed);
+                let times =
+                    gaps.map(|(clearance, speed)| (clearance + leader.reach[1] + self.reach[0]) / speed);
                 Gap::Time(times.fold(TimeSpan::ZERO, TimeSpan::max))
             }
         }
     }
 
-    /// The least way from bumper to bumper at a speed.
-    fn bumpers_apart(&self, leader: &Self, speed: Speed) -> Length {
+    /// The smallest clearance at a speed.
+    fn min_clearance(&self, leader: &Self, speed: Speed) -> Length {
         let stop = |train: &Self, speed: Speed, margins: f64| {
             let steady = |step: &SpeedStep| train.model.steady_speed(*step, Approach::Below);
             let off = |step: &SpeedStep| (steady(step) - speed).abs();
@@ -182,26 +186,26 @@ impl DrivenTrain {
             let nearest = steps.iter().min_by(near);
             nearest.map_or(Length::ZERO, |step| {
                 let stop = train.model.stop(*step, Approach::Below);
-                // Steps are coarse: what a stop from just this speed takes.
+                // Interpolates the stop between steps.
                 let faster = speed - steady(step);
                 let next = steps.iter().filter(|next| *next != step).min_by(near);
-                // Who is paced is always between two steps.
+                // A paced train alternates between two steps.
                 let switches = next.map_or(Speed::ZERO, |next| (steady(next) - steady(step)).abs());
                 let is_paced = train.id() == self.id() || train.paced().is_some();
                 let switching =
                     if is_paced { switches * TimeSpan::from_s(INTERRUPTED) } else { Length::ZERO };
-                let doubts = [stop.doubt, stop.scatter, BELIEVED, switching].map(Length::as_m);
-                let doubt = Length::from_m(libm::sqrt(doubts.iter().map(|doubt| doubt * doubt).sum()));
-                stop.distance + faster * stop.time + doubt * margins
+                let deviations = [stop.doubt, stop.scatter, POSITION_DEVIATION, switching].map(Length::as_m);
+                let deviation = Length::from_m(libm::sqrt(deviations.iter().map(|one| one * one).sum()));
+                stop.distance + faster * stop.time + deviation * margins
             })
         };
-        let own = stop(self, speed * (1.0 + SLOWS), Aim::NotBeyond(NEARER).margin());
-        let ahead = stop(leader, speed, -Aim::NotBeyond(SHORTER).margin());
-        let strays = if leader.followed().is_some() { STRAYS + STRAYS } else { STRAYS };
-        (own - ahead + speed * self.link.usually_left() + strays + SAFE).max(SAFE)
+        let own = stop(self, speed * (1.0 + SPEED_DROP), Aim::NotBeyond(BEYOND_PROBABILITY).margin());
+        let ahead = stop(leader, speed, -Aim::NotBeyond(LEADER_SHORT_PROBABILITY).margin());
+        let strays = if leader.followed().is_some() { PACING_ERROR + PACING_ERROR } else { PACING_ERROR };
+        (own - ahead + speed * self.link.usually_left() + strays + SAFE_GAP).max(SAFE_GAP)
     }
 
-    /// Where a follower should be; `None` while nobody knows where its leader is.
+    /// Where a follower should be; `None` while the position of its leader is unknown.
     pub(super) fn follow_reference(
         &self,
         context: TrackContext<'_>,
@@ -211,10 +215,10 @@ impl DrivenTrain {
         others: &Others,
     ) -> Option<Reference> {
         let located = self.located(context, now)?;
-        let past = SurveyedWay::ahead(context, &self.model, node).of_felt(located.at.way.as_m());
+        let past = SurveyedPath::ahead(context, &self.model, node).surveyed(located.at.way.as_m());
         let (mut late, mut behind) = (0.0, 0.0);
         let (mut train, mut following) = (self, following);
-        // The first of all, by the sum of what is kept.
+        // The first train of the chain, and the sum of the gaps.
         let first = loop {
             let leader = others.get(&following.leader)?;
             match following.gap {
@@ -231,8 +235,8 @@ impl DrivenTrain {
         Some(Reference::of(|ahead| line.place(ahead - late) - behind, speeds))
     }
 
-    /// What the follower shall not pass: the rear of its leader, where that comes to rest if it is commanded to stop at a time
-    /// from now on, on the follower's way. `None` if no way leads there.
+    /// The bound for the follower: the rear of its leader at rest, if that is commanded to stop at a time from now
+    /// on, on the follower's path. `None` if no path leads there.
     fn rear_of(
         &self,
         context: TrackContext<'_>,
@@ -248,47 +252,49 @@ impl DrivenTrain {
             .map(|(node, _)| node)
             .or(leader.locator.rollout().map(|rollout| rollout.node()))?;
         let rest = leader.locator.rest_if_stopped(context, &leader.model, stopped);
-        let rest = rest.filter(|_| !leader.is_in_doubt(context, now));
+        let rest = rest.filter(|_| !leader.is_position_uncertain(context, now));
         let past = rest.map_or(Length::ZERO, |rest| {
-            let surely = rest.at.way - spread(&rest) * Aim::NotBeyond(SHORTER).margin();
-            surely.max(Length::ZERO)
+            let short_of = rest.at.way - spread(&rest) * Aim::NotBeyond(LEADER_SHORT_PROBABILITY).margin();
+            short_of.max(Length::ZERO)
         });
         let from = rest.map_or(seen, |rest| rest.at.node);
-        let between = way_between(context, &self.model, node, from)?;
-        Some(WayPoint { node, way: between + past - leader.reach[1] - self.reach[0] - SAFE })
+        let between = distance_between(context, &self.model, node, from)?;
+        Some(WayPoint { node, way: between + past - leader.reach[1] - self.reach[0] - SAFE_GAP })
     }
 
-    /// Whether it may be elsewhere than where it is believed to be. Contacts fail thirty times as often as trains stall: one
-    /// that was silent is no doubt of a train that was seen running before, and runs too fast to stall, until the next is late.
-    /// Of one that creeps only the contact is sure that it came by last: it stalls any time, and the next is late long after.
-    fn is_in_doubt(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
+    /// Whether the train may be far from its estimated position. Sensors miss a train thirty times as often as trains
+    /// stall: one missed detection is no evidence against a train that was running and is too fast to stall, until
+    /// the next is late. For a creeping train only the last detection is certain: it may stall at any time, and its
+    /// next detection is late long after.
+    fn is_position_uncertain(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
         let Some(located) = self.located(context, now) else { return true };
         let speed = self.model.steady_speed(self.commanded, Approach::Below);
-        if self.unseen().is_none() {
-            return self.commanded > SpeedStep::STAND && speed < CREEPS;
+        if self.missed_sensor().is_none() {
+            return self.commanded > SpeedStep::STAND && speed < CREEP_SPEED;
         }
         let seen = self.passages.iter().next_back().map(|(_, time)| now - time);
-        let has_run = seen.is_some_and(|since| located.speed * since <= located.at.way * RAN_ON);
-        !(has_run && speed >= LIVELY && self.missed_just_one(now))
+        let has_run = seen.is_some_and(|since| located.speed * since <= located.at.way * MAX_TIME_RATIO);
+        !(has_run && speed >= STALL_FREE_SPEED && self.missed_just_one(now))
     }
 
-    /// The fastest step that it could be commanded now and still stop before the rear of its leader in a while, if neither is told
-    /// anything else until then; `None` if it is time to stand.
+    /// The fastest step that still allows a stop before the rear of the leader after [`LOOKAHEAD`], if neither train
+    /// is commanded anything else before; `None` if the train has to stop.
     fn fastest_behind(&self, context: TrackContext<'_>, now: Timestamp, leader: &Self) -> Option<SpeedStep> {
-        let later = now + FORESEEN;
+        let later = now + LOOKAHEAD;
         let rear = self.rear_of(context, now, leader, later)?;
         let start = now + self.link.usually_left();
         let is_safe = |step: &SpeedStep| {
             let rest = self.locator.rest_after_move(context, &self.model, start, *step, later);
-            let beyond =
-                rest.and_then(|rest| self.aimed_beyond(context, &rest, rear, Aim::NotBeyond(NEARER)));
+            let beyond = rest
+                .and_then(|rest| self.aimed_beyond(context, &rest, rear, Aim::NotBeyond(BEYOND_PROBABILITY)));
             beyond.is_some_and(|beyond| beyond <= Length::ZERO)
         };
-        let runs = |step: &&SpeedStep| self.model.steady_speed(**step, Approach::Below) >= CREEPS;
+        let runs = |step: &&SpeedStep| self.model.steady_speed(**step, Approach::Below) >= CREEP_SPEED;
         self.pacing.as_ref()?.usable.iter().rev().filter(runs).find(|step| is_safe(step)).copied()
     }
 
-    /// Looks after the distance to the leader. Says whether the train may be paced now.
+    /// Checks the clearance to the leader and slows down or stops if need be. Returns whether the train may be paced
+    /// now.
     pub(super) fn may_follow(
         &mut self,
         context: TrackContext<'_>,
@@ -305,7 +311,7 @@ impl DrivenTrain {
         };
         let rear = self.rear_of(context, now, ahead, now);
         let fastest = self.fastest_behind(context, now, ahead);
-        let soon = now + self.link.command + TimeSpan::from_s(LOOK_AGAIN);
+        let soon = now + self.link.command + TimeSpan::from_s(RECHECK_INTERVAL);
         let stop_by = rear.and_then(|rear| self.last_stop_before(context, now, rear));
         let is_free = rear.is_some_and(|rear| {
             if self.commanded > SpeedStep::STAND {
@@ -317,32 +323,32 @@ impl DrivenTrain {
             ahead.commanded > SpeedStep::STAND && beyond.is_some_and(|beyond| beyond < -WORTH_STARTING)
         });
         let commanded = self.commanded;
-        let Some(Pacing { pace: Pace::Follow(following), look, budget, .. }) = &mut self.pacing else {
+        let Some(Pacing { pace: Pace::Follow(following), next_update, budget, .. }) = &mut self.pacing else {
             return true;
         };
-        *look =
+        *next_update =
             Some(stop_by.map_or(soon, |by| (by - self.link.command).clamp(now + self.link.command, soon)));
         (following.rear, following.fastest) = (rear, fastest);
         if is_free {
-            following.is_held = false;
+            following.is_stopped = false;
             let slower = fastest.filter(|step| *step < commanded);
             if let Some(step) = slower.filter(|_| budget.spaced() <= seconds(now)) {
-                self.issue_step(context, now, step, out);
+                self.command_step(context, now, step, out);
             }
             return slower.is_none();
         }
         if commanded > SpeedStep::STAND {
-            if !following.is_held {
-                following.is_held = true;
-                out.say(Notice::HeldBack { order: task.order, train: self.id(), leader });
+            if !following.is_stopped {
+                following.is_stopped = true;
+                out.notify(Notice::HeldBack { order: task.order, train: self.id(), leader });
             }
-            self.issue_stop(now, out);
+            self.command_stop(now, out);
         }
         false
     }
 
-    /// Whether a step may be commanded now: whether a stop that is told as soon as the line is free again would still end before
-    /// the leader. Who gets slower always may.
+    /// Whether a step may be commanded now: a stop commanded as soon as the line is free again must still end before
+    /// the leader. A slower step always may.
     pub(super) fn could_still_stop(
         &self,
         context: TrackContext<'_>,
@@ -352,8 +358,9 @@ impl DrivenTrain {
         let Some(following) = self.followed().filter(|_| step > self.commanded) else { return true };
         let Some(rear) = following.rear else { return false };
         let start = now + self.link.usually_left();
-        let rest = self.locator.rest_after_move(context, &self.model, start, step, start + UNDONE);
-        let beyond = rest.and_then(|rest| self.aimed_beyond(context, &rest, rear, Aim::NotBeyond(NEARER)));
+        let rest = self.locator.rest_after_move(context, &self.model, start, step, start + MIN_STEP_TIME);
+        let beyond =
+            rest.and_then(|rest| self.aimed_beyond(context, &rest, rear, Aim::NotBeyond(BEYOND_PROBABILITY)));
         beyond.is_some_and(|beyond| beyond <= Length::ZERO)
     }
 }

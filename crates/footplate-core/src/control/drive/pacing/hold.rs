@@ -1,10 +1,10 @@
-//! A train that runs at a speed between those of its steps.
+//! Holds a speed that may lie between those of two steps.
 
 use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::order::OrderId;
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::refusal::Refusal;
-use crate::control::drive::task::{Goal, Phase, Task};
+use crate::control::drive::task::{Goal, Task, TaskPhase};
 use crate::control::{Notice, PacedLine};
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep};
@@ -12,13 +12,11 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::TrackContext;
 use crate::units::{Length, Speed};
 
-use super::ideal_line::IdealLine;
 use super::pace::{Holding, Pace, Pacing};
-use super::reference::Reference;
-use super::surveyed_way::SurveyedWay;
+use super::reference::{IdealLine, Reference, SurveyedPath};
 
 impl Holding {
-    /// Where it should be; `None` before there is a line, and when the way does not lead on from it any more.
+    /// Where the train should be; `None` before the line starts, and when the path leads elsewhere.
     pub(super) fn reference(
         &mut self,
         context: TrackContext<'_>,
@@ -26,7 +24,7 @@ impl Holding {
         node: NodeId,
     ) -> Option<Reference> {
         if self.line?.node != node {
-            self.line = self.line?.counted_from(context, node, now);
+            self.line = self.line?.recount_from(context, node, now);
         }
         let line = self.line?;
         let speed = line.speed.as_m_per_s();
@@ -35,7 +33,7 @@ impl Holding {
 }
 
 impl DrivenTrain {
-    /// Takes an order to hold a speed.
+    /// Starts an order to hold a speed.
     pub(in crate::control::drive) fn hold(
         &mut self,
         context: TrackContext<'_>,
@@ -65,18 +63,19 @@ impl DrivenTrain {
             self.model.settles_within(self.commanded, step)
         };
         let holding = Holding { speed, settled: now + settles, line: None };
-        self.take(Task { order, goal: Goal::Pace, phase: Phase::Pacing }, out);
+        self.start_task(Task { order, goal: Goal::Pace, phase: TaskPhase::Pacing }, out);
         self.pacing = Some(Pacing::new(Pace::Hold(holding), usable, now));
-        // Where zones are, it may have to slow down at any time, and what keeps it to them knows it as it was calibrated.
+        // Near zones, speed supervision relies on the calibrated motion: corrections from repeated runs stay off.
         self.locator.repeat(context.layout.zones().is_empty());
         if step != self.commanded {
-            self.issue_step(context, now, step, out);
+            self.command_step(context, now, step, out);
         }
         Ok(())
     }
 
-    /// The first contact that is passed at a settled speed begins the line; from then on it is counted from every one.
-    pub(super) fn begin_line(
+    /// Starts the line at the first sensor that the train passes at a settled speed, and measures it again from each
+    /// further one.
+    pub(super) fn start_line(
         &self,
         context: TrackContext<'_>,
         now: Timestamp,
@@ -86,18 +85,18 @@ impl DrivenTrain {
     ) {
         let Some(located) = self.located(context, now) else { return };
         let node = located.at.node;
-        holding.line = holding.line.and_then(|line| line.counted_from(context, node, now));
-        if holding.line.is_some() || now < holding.settled || self.is_restrained() {
+        holding.line = holding.line.and_then(|line| line.recount_from(context, node, now));
+        if holding.line.is_some() || now < holding.settled || self.is_speed_limited() {
             return;
         }
-        let way = SurveyedWay::ahead(context, &self.model, node).of_felt(located.at.way.as_m());
-        let line = IdealLine { node, way: Length::from_m(way), time: now, speed: holding.speed };
+        let distance = SurveyedPath::ahead(context, &self.model, node).surveyed(located.at.way.as_m());
+        let line = IdealLine { node, distance: Length::from_m(distance), time: now, speed: holding.speed };
         holding.line = Some(line);
-        let IdealLine { way, time, speed, .. } = line;
-        out.say(Notice::Paced(PacedLine { order, train: self.id(), node, way, time, speed }));
+        let IdealLine { distance: way, time, speed, .. } = line;
+        out.notify(Notice::Paced(PacedLine { order, train: self.id(), node, way, time, speed }));
     }
 
-    /// How far it is ahead of its line, as far as is believed; `None` while there is none.
+    /// The estimated distance ahead of the line; `None` while there is none.
     pub(in crate::control::drive) fn ahead_of_line(
         &self,
         context: TrackContext<'_>,
@@ -107,19 +106,19 @@ impl DrivenTrain {
             return None;
         };
         let at = self.located(context, now)?.at;
-        let line = line.counted_from(context, at.node, now)?;
-        let way = SurveyedWay::ahead(context, &self.model, at.node).of_felt(at.way.as_m());
-        Some(Length::from_m(way - line.place(now)))
+        let line = line.recount_from(context, at.node, now)?;
+        let distance = SurveyedPath::ahead(context, &self.model, at.node).surveyed(at.way.as_m());
+        Some(Length::from_m(distance - line.place(now)))
     }
 
-    /// It is slowed down for a zone: the line ends here.
+    /// Ends the line: speed supervision slows the train down.
     pub(in crate::control::drive) const fn interrupt_line(&mut self) {
         if let Some(Pacing { pace: Pace::Hold(holding), .. }) = &mut self.pacing {
             holding.line = None;
         }
     }
 
-    /// It is told a step again at which it can hold its speed: another line begins once it is settled.
+    /// The speed can be held again: another line starts once the step has settled.
     pub(in crate::control::drive) fn resume_line(&mut self, now: Timestamp, step: SpeedStep) {
         let settles = self.model.settles_within(self.commanded, step);
         if let Some(Pacing { pace: Pace::Hold(holding), .. }) = &mut self.pacing {

@@ -1,54 +1,54 @@
-//! The step from which a train stops that shall stand somewhere in time.
+//! Chooses the step to stop from so that a train arrives on time.
 //!
-//! Whatever the plan was, a train comes to its last steady stretch a little early or late, and the last contacts before the
-//! target say so better than anything before. What is left of the time can still be chosen: a step faster or slower brings it
-//! to where the stop begins sooner or later, and its own stop takes as long as it takes. Each step about the one that it runs
-//! at is looked at as a whole, up to the standstill.
+//! A train reaches its last steady run a little early or late, and the last sensors before the target show this best.
+//! The rest of the time can still be corrected: a faster or slower step reaches the stop earlier or later, and its
+//! stop takes its own time. Each step near the present one is predicted as a whole, up to rest.
 
 use crate::control::drive::command_time::{CommandTime, command_time, spread};
 use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::outputs::Outputs;
-use crate::control::drive::task::{Destination, Goal, Phase, Task};
+use crate::control::drive::task::{Destination, Goal, Task, TaskPhase};
 use crate::ids::SpeedStep;
 use crate::model::StandingTimes;
 use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{Rest, TrackContext};
 
-use super::command_budget::seconds;
+use super::step_search::seconds;
 
-/// One standard deviation of what is asked for in time (s): 0.3 s at the 95th percentile ...
-const LATE: f64 = 0.15;
+/// One standard deviation of the required accuracy in time (s): 0.3 s at the 95th percentile ...
+const TIME_TOLERANCE: f64 = 0.15;
 /// ... and in place (m): 25 mm.
-const BESIDE: f64 = 0.0125;
-/// Another step has to be better by this, in squares of both: half of either is worth a command.
-const BETTER: f64 = 0.25;
-/// Steps looked at on either side.
-const ABOUT: u8 = 2;
-/// A step that is told is followed by the stop no sooner than this: it has to be felt to be worth its command.
-const FELT: TimeSpan = TimeSpan::from_ms(600);
+const PLACE_TOLERANCE: f64 = 0.0125;
+/// Smallest gain for a change of step, in squared standard deviations: half of one is worth a command.
+const MIN_GAIN: f64 = 0.25;
+/// Steps examined on either side.
+const STEPS_AROUND: u8 = 2;
+/// Shortest time between a change of step and the stop: it must take effect to be worth its command.
+const MIN_STEP_TIME: TimeSpan = TimeSpan::from_ms(600);
 
 impl DrivenTrain {
-    /// Looks whether a train that will stop by itself should do so from another step to stand in time, and tells it.
+    /// Changes the step of a train on its planned stop if it arrives closer to its time from another one.
     pub(in crate::control::drive) fn keep_time(
         &mut self,
         context: TrackContext<'_>,
         now: Timestamp,
         out: &mut Outputs,
     ) {
-        let Some(Task { goal: Goal::RestAt(destination), phase: Phase::Running { plan }, .. }) = self.task
+        let Some(Task { goal: Goal::RestAt(destination), phase: TaskPhase::Running { plan }, .. }) =
+            self.task
         else {
             return;
         };
-        let is_soon = plan.is_some_and(|plan| plan.leaves - now < FELT);
-        if destination.in_time.is_none() || is_soon || !self.is_told() {
+        let is_soon = plan.is_some_and(|plan| plan.leaves - now < MIN_STEP_TIME);
+        if destination.in_time.is_none() || is_soon || !self.is_all_sent() {
             return;
         }
         if let Some(step) = self.step_in_time(context, now, &destination) {
-            self.issue_step(context, now, step, out);
+            self.command_step(context, now, step, out);
         }
     }
 
-    /// The step that it should be commanded now, if another is better than the one it has been told.
+    /// The step to command now, if one is better than the present one.
     pub(super) fn step_in_time(
         &self,
         context: TrackContext<'_>,
@@ -61,49 +61,48 @@ impl DrivenTrain {
             return None;
         }
         let commanded = self.commanded.get();
-        let about = commanded.saturating_sub(ABOUT)..=commanded.saturating_add(ABOUT);
+        let about = commanded.saturating_sub(STEPS_AROUND)..=commanded.saturating_add(STEPS_AROUND);
         let steps = self.usable_steps();
         let others = steps.iter().filter(|step| about.contains(&step.get()) && **step != self.commanded);
-        let stands = self.model.standing_times();
+        let rest_times = self.model.standing_times();
         let cost = |step: SpeedStep| {
-            let found = self.rest_from(context, now, &stands, step, destination);
+            let found = self.rest_from(context, now, &rest_times, step, destination);
             found.map_or(f64::INFINITY, |(time, rest)| cost_of(by, time, &rest))
         };
-        let as_it_is = cost(self.commanded);
+        let current_cost = cost(self.commanded);
         let costs = others.map(|step| (*step, cost(*step)));
         let (step, cost) = costs.min_by(|(_, one), (_, other)| one.total_cmp(other))?;
-        (cost + BETTER < as_it_is).then_some(step)
+        (cost + MIN_GAIN < current_cost).then_some(step)
     }
 
-    /// When and where it stands if it is told a step now and stops from there.
+    /// When and where the train comes to rest if it is commanded a step now and stops from it.
     fn rest_from(
         &self,
         context: TrackContext<'_>,
         now: Timestamp,
-        stands: &StandingTimes<'_>,
+        rest_times: &StandingTimes<'_>,
         step: SpeedStep,
         destination: &Destination,
     ) -> Option<(Timestamp, Rest)> {
         let at = destination.at?;
         let start = now + self.link.usually_left();
-        let first = if step == self.commanded { now + self.link.command } else { start + FELT };
+        let first = if step == self.commanded { now + self.link.command } else { start + MIN_STEP_TIME };
         let found = command_time(first, |stop| {
             let rest = self.locator.rest_after_move(context, &self.model, start, step, stop)?;
             Some((rest, self.aimed_beyond(context, &rest, at, destination.aim)?))
         });
         match found {
             CommandTime::At(stop, rest) => {
-                Some((self.standing_time(stands, [start, stop], step, &rest)?, rest))
+                Some((self.standing_time(rest_times, [start, stop], step, &rest)?, rest))
             }
             CommandTime::TooLate(..) | CommandTime::Never => None,
         }
     }
 
-    /// When it stands that is told a step at the first time, if it runs at another, and to stop at the second, and so comes to
-    /// rest.
+    /// When a train is at rest that is commanded a step at the first time, and to stop at the second.
     pub(super) fn standing_time(
         &self,
-        stands: &StandingTimes<'_>,
+        rest_times: &StandingTimes<'_>,
         [start, stop]: [Timestamp; 2],
         step: SpeedStep,
         rest: &Rest,
@@ -113,12 +112,13 @@ impl DrivenTrain {
             rollout.command(&self.model, rollout.seconds(start), step);
         }
         let [_, speed] = rollout.place_and_speed(&self.model, rollout.seconds(stop));
-        Some(rest.time + TimeSpan::from_s(stands.later(speed)))
+        Some(rest.time + TimeSpan::from_s(rest_times.later(speed)))
     }
 }
 
-/// How far off it is in time, and may be in place.
-fn cost_of(by: Timestamp, stands: Timestamp, rest: &Rest) -> f64 {
-    let (late, beside) = ((stands - by).as_s() / LATE, spread(rest).as_m() / BESIDE);
-    late * late + beside * beside
+/// The squared error in time, plus the squared spread in place, in units of the required accuracy.
+fn cost_of(by: Timestamp, rest_times: Timestamp, rest: &Rest) -> f64 {
+    let (time_cost, spread_cost) =
+        ((rest_times - by).as_s() / TIME_TOLERANCE, spread(rest).as_m() / PLACE_TOLERANCE);
+    time_cost * time_cost + spread_cost * spread_cost
 }

@@ -1,9 +1,9 @@
-//! Where a train was, is and will be, on the map of one that comes after it.
+//! Where a train was, is and will be, on the map of its follower.
 //!
-//! Both trains pass the same contacts. Where the one ahead was at a time that is past follows from when it came by the
-//! contacts about that place, whatever either train feels of the way between them; only what it has not come to yet is
-//! foreseen, from the steps that it was told.
+//! Both trains pass the same sensors. The leader's past positions follow from its detections, in surveyed lengths,
+//! whatever either train's path length between them. Only its future is predicted, from its commanded steps.
 
+use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
 use crate::control::drive::driven_train::DrivenTrain;
@@ -13,28 +13,27 @@ use crate::time::Timestamp;
 use crate::tracking::{Rollout, TrackContext};
 use crate::units::Length;
 
-use super::surveyed_way::{SurveyedWay, surveyed_between};
+use super::reference::{SurveyedPath, surveyed_distance};
 
-/// Half of the time (s) over which a speed is taken: two places of one line that far apart say it to a few mm/s.
+/// Half of the time (s) over which a speed is measured: two points of one line that far apart give it to a few mm/s.
 const SPEED_SPAN: f64 = 0.15;
 
-/// The line of a train.
+/// The motion of a leader.
 pub(super) struct LeadLine<'a> {
-    /// When it came by contacts (s from now), and where those are (surveyed m from the contact that the train behind it
-    /// passed last).
+    /// Its detections: time (s from now) and place (surveyed m past the last sensor of the follower).
     marks: Vec<[f64; 2]>,
-    /// Where it goes from there: from the last of them, or from where it was put.
+    /// Its predicted motion from the last of them, or from where it was placed.
     rollout: Rollout,
     begins: f64,
-    way: SurveyedWay,
+    path: SurveyedPath,
     model: &'a MotionModel,
     /// Now, on the clock of the rollout.
     now: f64,
 }
 
 impl<'a> LeadLine<'a> {
-    /// The line of `leader` for a train that passed the contact at `from` last and is so far (surveyed m) past it; `None` if
-    /// nobody knows it.
+    /// The motion of `leader` for a follower that is `past` (surveyed m) beyond its last sensor `from`; `None` if the
+    /// leader's position is unknown.
     pub(super) fn of(
         context: TrackContext<'_>,
         leader: &'a DrivenTrain,
@@ -42,40 +41,40 @@ impl<'a> LeadLine<'a> {
         (from, past): (NodeId, f64),
     ) -> Option<Self> {
         let rollout = leader.locator.rollout()?;
-        let way = SurveyedWay::ahead(context, &leader.model, rollout.node());
+        let path = SurveyedPath::ahead(context, &leader.model, rollout.node());
         let zero = rollout.seconds(now);
         let mut here = rollout;
-        let since = way.of_felt(here.place(&leader.model, zero));
+        let since = path.surveyed(here.place(&leader.model, zero));
         let mut begins = ahead_of(context, from, rollout.node())?;
-        // It may have come by the contact without a report, and be less than a round ahead.
-        if let Some(round) = surveyed_between(context, from, from).map(Length::as_m)
-            && begins + since - round > past
+        // The leader may have been missed there and be less than a lap ahead.
+        if let Some(lap) = surveyed_distance(context, from, from).map(Length::as_m)
+            && begins + since - lap > past
         {
-            begins -= round;
+            begins -= lap;
         }
         let mut marks: Vec<[f64; 2]> = Vec::new();
         let (mut surveyed, mut next) = (begins, rollout.node());
         for (node, time) in leader.passages.iter().rev() {
             if node != next {
-                surveyed -= surveyed_between(context, node, next)?.as_m();
+                surveyed -= surveyed_distance(context, node, next)?.as_m();
             }
             next = node;
             marks.push([(time - now).as_s(), surveyed]);
-            // What is behind the train that comes after it is over.
+            // Detections behind the follower no longer matter.
             if surveyed <= 0.0 {
                 break;
             }
         }
         marks.reverse();
-        Some(Self { marks, rollout, begins, way, model: &leader.model, now: zero })
+        Some(Self { marks, rollout, begins, path, model: &leader.model, now: zero })
     }
 
-    /// Where it is at a time (s from now).
+    /// Its place at a time (s from now).
     pub(super) fn place(&self, time: f64) -> f64 {
         let next = self.marks.partition_point(|[at, _]| *at <= time);
         let pair = match (next.checked_sub(1).and_then(|at| self.marks.get(at)), self.marks.get(next)) {
             (Some(from), Some(to)) => Some([*from, *to]),
-            // Before the first of them it ran as it did behind it.
+            // Extrapolate from the first two detections.
             (None, Some(first)) => self.marks.get(1).map(|second| [*first, *second]),
             (Some(_) | None, None) => None,
         };
@@ -85,17 +84,44 @@ impl<'a> LeadLine<'a> {
             return from + (to - from) * (time - at) / (until - at);
         }
         let mut rollout = self.rollout;
-        let since = self.way.of_felt(rollout.place(self.model, self.now + time));
+        let since = self.path.surveyed(rollout.place(self.model, self.now + time));
         self.begins + since
     }
 
-    /// How fast it is there (m/s).
+    /// Its speed at that time (m/s).
     pub(super) fn speed(&self, time: f64) -> f64 {
         (self.place(time + SPEED_SPAN) - self.place(time - SPEED_SPAN)) / (2.0 * SPEED_SPAN)
     }
 }
 
-/// The surveyed way (m) from a contact to one ahead of it, which may be itself.
+/// The surveyed distance (m) from a sensor to one ahead, zero to itself.
 fn ahead_of(context: TrackContext<'_>, from: NodeId, to: NodeId) -> Option<f64> {
-    if from == to { Some(0.0) } else { surveyed_between(context, from, to).map(Length::as_m) }
+    if from == to { Some(0.0) } else { surveyed_distance(context, from, to).map(Length::as_m) }
+}
+
+/// Detections kept: enough for the last train of a chain, ten seconds of the densest known track, twice over.
+const MAX_PASSAGES: usize = 40;
+
+/// The sensors that a train passed last, oldest first, each with the most likely time, from its report and the
+/// train's motion.
+#[derive(Debug, Clone, Default)]
+pub(in crate::control::drive) struct Passages(VecDeque<(NodeId, Timestamp)>);
+
+impl Passages {
+    /// Adds a passage.
+    pub(in crate::control::drive) fn note(&mut self, node: NodeId, time: Timestamp) {
+        if self.0.len() >= MAX_PASSAGES {
+            self.0.pop_front();
+        }
+        self.0.push_back((node, time));
+    }
+
+    /// Clears the record: the train is elsewhere.
+    pub(in crate::control::drive) fn forget(&mut self) {
+        self.0.clear();
+    }
+
+    pub(super) fn iter(&self) -> impl DoubleEndedIterator<Item = (NodeId, Timestamp)> + '_ {
+        self.0.iter().copied()
+    }
 }

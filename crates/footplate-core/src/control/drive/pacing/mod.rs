@@ -1,26 +1,20 @@
-//! Keeping trains to a pace: any speed out of coarse steps, behind another train, or in time at a place.
+//! Pacing: holds any speed with coarse steps, follows another train, or arrives at a place at a given time.
 //!
-//! What a train should do is a [`Reference`]: where it should be at a few moments ahead, in surveyed lengths. A
-//! [`StepSearch`] finds the commands that bring its most likely course nearest to that, within a budget of commands; the
-//! first of them is given, and everything is looked at again when something was learnt.
+//! A [`Reference`](reference::Reference) states where the train should be at a few times ahead, in surveyed lengths.
+//! A [`StepSearch`](step_search::StepSearch) finds the commands that bring its predicted motion closest to that,
+//! within a budget of commands. The first of them is sent; the search is repeated after each report.
 
 mod arrival_plan;
 mod arrive;
-mod command_budget;
 mod follow;
 mod hold;
-mod ideal_line;
 mod last_step;
 mod lead_line;
 mod pace;
-mod pacer;
-mod passages;
 mod reference;
 mod step_search;
-mod surveyed_way;
-mod task;
 mod zoned_transit;
 
 pub use arrival_plan::ArrivalProfile;
+pub(super) use lead_line::Passages;
 pub(super) use pace::Pacing;
-pub(super) use passages::Passages;

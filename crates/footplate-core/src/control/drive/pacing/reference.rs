@@ -1,29 +1,35 @@
-//! Where a train should be at a few moments ahead.
+//! The reference of a paced train, and the scale between surveyed lengths and its path lengths.
 
-/// From one moment to the next (s): a tenth of a hop between contacts, and short against every change of speed.
-pub(super) const GRID: f64 = 0.2;
-/// Moments ahead: a little longer than a change by a step takes to be felt and answered with the next.
-pub(super) const LOOKS: usize = 12;
+use crate::ids::NodeId;
+use crate::model::MotionModel;
+use crate::time::Timestamp;
+use crate::tracking::TrackContext;
+use crate::units::{Length, Speed};
 
-/// The ideal, from now on.
+/// Grid interval (s): a tenth of a hop between sensors, and short compared with a change of speed.
+pub(super) const GRID_S: f64 = 0.2;
+/// Points of the grid: a little longer than a change of step takes to take effect and to be corrected.
+pub(super) const POINTS: usize = 12;
+
+/// Where a train should be, from now on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::control::drive) struct Reference {
-    /// Surveyed m past the contact that the train passed last, after 1, 2 … [`LOOKS`] times [`GRID`].
-    pub(super) places: [f64; LOOKS],
-    /// How fast it should be now and at the last of them (surveyed m/s).
+    /// Surveyed m past the last sensor passed, after 1, 2 … [`POINTS`] times [`GRID_S`].
+    pub(super) places: [f64; POINTS],
+    /// Its speed now and at the last point (surveyed m/s).
     pub(super) speeds: [f64; 2],
 }
 
 impl Reference {
-    /// From now to the last moment (s).
-    pub(super) const SPAN: f64 = GRID * LOOKS as f64;
+    /// From now to the last point (s).
+    pub(super) const SPAN: f64 = GRID_S * POINTS as f64;
 
-    /// From places at times from now (s).
+    /// The reference from a function of time (s from now).
     pub(super) fn of(place_at: impl Fn(f64) -> f64, speeds: [f64; 2]) -> Self {
-        Self { places: core::array::from_fn(|look| place_at(GRID * (look + 1) as f64)), speeds }
+        Self { places: core::array::from_fn(|point| place_at(GRID_S * (point + 1) as f64)), speeds }
     }
 
-    /// Where it should be now, by where it should be soon.
+    /// Where the train should be now, extrapolated.
     pub(super) fn now(&self) -> f64 {
         let [first, second, ..] = self.places;
         first + first - second
@@ -32,4 +38,106 @@ impl Reference {
     pub(super) fn last(&self) -> f64 {
         self.places.last().copied().unwrap_or_default()
     }
+}
+
+/// A speed held from a place and a time on, in surveyed lengths.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::control::drive) struct IdealLine {
+    /// The sensor that distances are measured from.
+    pub(in crate::control::drive) node: NodeId,
+    /// The surveyed distance past it ...
+    pub(in crate::control::drive) distance: Length,
+    /// ... at this time.
+    pub(in crate::control::drive) time: Timestamp,
+    pub(in crate::control::drive) speed: Speed,
+}
+
+impl IdealLine {
+    /// Surveyed distance past the sensor (m) at a time.
+    pub(super) fn place(&self, time: Timestamp) -> f64 {
+        (self.distance + self.speed * (time - self.time)).as_m()
+    }
+
+    /// The same line measured from another sensor near the train: passed since, or before if a detection was assigned
+    /// wrongly. `None` if no path connects the two.
+    pub(super) fn recount_from(
+        self,
+        context: TrackContext<'_>,
+        node: NodeId,
+        now: Timestamp,
+    ) -> Option<Self> {
+        if node == self.node {
+            // Subtract the laps run since.
+            let circuit_length = surveyed_distance(context, node, node);
+            let laps = circuit_length.map_or(0.0, |circuit_length| {
+                libm::round((self.place(now) / circuit_length.as_m()).max(0.0))
+            });
+            let distance = self.distance - circuit_length.unwrap_or(Length::ZERO) * laps;
+            return Some(Self { distance, ..self });
+        }
+        let after = surveyed_distance(context, self.node, node).map(|between| self.distance - between);
+        let before = surveyed_distance(context, node, self.node).map(|between| self.distance + between);
+        let off = |distance: &Length| Self { distance: *distance, ..self }.place(now).abs();
+        let distance =
+            after.into_iter().chain(before).min_by(|one, other| off(one).total_cmp(&off(other)))?;
+        Some(Self { node, distance, ..self })
+    }
+}
+
+/// Hops between sensors considered: 3 m of the densest known track.
+const MAX_HOPS: usize = 12;
+
+/// The ends of the hops ahead of a sensor, as path lengths and surveyed lengths (m past the sensor).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SurveyedPath {
+    ends: [[f64; 2]; MAX_HOPS],
+    count: usize,
+}
+
+impl SurveyedPath {
+    /// The path ahead of a node, with the turnouts as they are.
+    pub(super) fn ahead(context: TrackContext<'_>, model: &MotionModel, node: NodeId) -> Self {
+        let mut path = Self { ends: [[0.0; 2]; MAX_HOPS], count: 0 };
+        let (mut length, mut surveyed) = (0.0, 0.0);
+        for (hop, end) in context.hops_ahead(node).zip(&mut path.ends) {
+            length += model.length(context.sections, &hop)[0].as_m();
+            surveyed += hop.length.as_m();
+            *end = [length, surveyed];
+            path.count += 1;
+        }
+        path
+    }
+
+    /// The identity, for references in path lengths.
+    pub(super) const fn unscaled() -> Self {
+        Self { ends: [[0.0; 2]; MAX_HOPS], count: 0 }
+    }
+
+    /// The surveyed length of a path length: linear within each hop, and beyond the last hop as within it.
+    pub(super) fn surveyed(&self, path_length: f64) -> f64 {
+        let ([mut length, mut surveyed], mut slope) = ([0.0, 0.0], 1.0);
+        for (nth, [until, there]) in self.ends.iter().take(self.count).enumerate() {
+            if *until > length {
+                slope = (there - surveyed) / (until - length);
+            }
+            // The last hop extends without end.
+            if path_length <= *until || nth + 1 == self.count {
+                break;
+            }
+            [length, surveyed] = [*until, *there];
+        }
+        surveyed + (path_length - length) * slope
+    }
+}
+
+/// The surveyed distance from one sensor to the next passage of another; the circuit if both are the same.
+pub(super) fn surveyed_distance(context: TrackContext<'_>, from: NodeId, to: NodeId) -> Option<Length> {
+    let mut distance = Length::ZERO;
+    for hop in context.hops_ahead(from).take(context.layout.nodes().len()) {
+        distance += hop.length;
+        if hop.to == to {
+            return Some(distance);
+        }
+    }
+    None
 }

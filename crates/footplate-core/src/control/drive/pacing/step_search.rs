@@ -1,46 +1,46 @@
-//! Which step to command next, and when, so that a train stays where it should be.
+//! Finds the next step and its time so that a train stays on its reference.
 //!
-//! All sequences of commands on a grid of times are looked at, none sooner after another than the budget allows, with the
-//! steps about the speed that is wanted. Letters: `x(t)` the course that a sequence would bring about, `r(t)` the
-//! reference, `z(t)` the course at the end if the speed that it will settle to had always been run at: what the
-//! commands of the last moments still will do. What a sequence costs is
+//! The search covers all sequences of commands on a time grid within the command budget, with the steps around the
+//! desired speed. Letters: `x(t)` predicted place, `r(t)` reference, `z` the place at the end if the speed that it
+//! will settle to had applied all the time: it includes what the last commands have yet to do. The cost of a sequence
+//! is
 //!
 //! ```text
 //! Σ (x − r)² δ  +  W (z − r)²  +  V (v − v_r)²  +  C per command
 //! ```
 //!
-//! Sequences that already cost more than the best one found are not followed further (branch and bound).
+//! A sequence that costs more than the best one so far is not continued (branch and bound).
 
-use super::command_budget::CommandBudget;
-use super::reference::{GRID, LOOKS, Reference};
-use super::surveyed_way::SurveyedWay;
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::model::MotionModel;
+use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::Rollout;
 
-/// Commands in one plan: what the budget leaves for its time, and few enough to look at all of them.
-const MOST_COMMANDS: usize = 3;
-/// Times nearer than this (s) are one.
+use super::reference::{GRID_S, POINTS, Reference, SurveyedPath};
+
+/// Commands in one sequence: what the budget allows, and few enough to enumerate.
+const MAX_COMMANDS: usize = 3;
+/// Times closer than this (s) are equal.
 const SAME_TIME: f64 = 1e-6;
-/// Weight of where the course leads at the end, as time (s) for which that error would last.
+/// Weight of the error at the end, as the time (s) that it would last.
 const END_WEIGHT: f64 = 0.8;
-/// Weight of a speed at the end that is not the ideal's (s³): a tenth of it over two seconds counts little.
+/// Weight of the speed error at the end (s³): chosen small, a tenth of the speed over two seconds counts little.
 const SPEED_WEIGHT: f64 = 0.02;
-/// A command costs as much as being 1 mm off for a second (m² s).
+/// The cost of a command: an error of 1 mm for one second (m² s).
 const COMMAND_COST: f64 = 1e-6;
-/// Steps tried: those about the ideal speed, and one more on either side to catch up or fall back with.
+/// Steps searched: those around the desired speed, and one more on either side to catch up or fall back.
 const STEPS: usize = 4;
 
-/// A train that is far off is brought back over about this time (s), by no more than so much speed (m/s): nobody wants to
-/// see it race.
-const CATCHES_UP: f64 = 3.0;
-const FASTEST_CATCH: f64 = 0.12;
+/// A large error is corrected over about this time (s), with at most this difference in speed (m/s), so that the
+/// train does not race.
+const CATCH_UP_TIME: f64 = 3.0;
+const MAX_CATCH_UP_SPEED: f64 = 0.12;
 
-/// What to do.
+/// The result of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Choice {
-    /// The first command and the grid time at which it should leave.
+    /// The first command and its grid time.
     pub(super) first: Option<(usize, SpeedStep)>,
     pub(super) cost: f64,
 }
@@ -57,10 +57,9 @@ struct Sequence {
 /// The search from one moment.
 pub(super) struct StepSearch<'a> {
     pub(super) model: &'a MotionModel,
-    pub(super) way: &'a SurveyedWay,
+    pub(super) path: &'a SurveyedPath,
     pub(super) reference: &'a Reference,
-    /// The moment (s on the clock of the rollout) from which the grid counts, and how much later a command leaves than it
-    /// is given.
+    /// Start of the grid (s on the clock of the rollout), and the delay from a command to its being sent.
     pub(super) now: f64,
     pub(super) leaves_after: f64,
     steps: [Option<SpeedStep>; STEPS],
@@ -68,33 +67,34 @@ pub(super) struct StepSearch<'a> {
 }
 
 impl<'a> StepSearch<'a> {
-    /// With the steps about the speed that is wanted in the middle of the time looked at, for a train that is so far (m)
-    /// behind its reference. Times as in the fields of those names.
+    /// A search with the steps around the desired speed at the middle of the grid, for a train that is `behind` (m)
+    /// its reference.
     pub(super) fn new(
         model: &'a MotionModel,
-        way: &'a SurveyedWay,
+        path: &'a SurveyedPath,
         reference: &'a Reference,
         usable: &[SpeedStep],
         [now, leaves_after]: [f64; 2],
         behind: f64,
     ) -> Self {
         let [first, last] = reference.speeds;
-        let wanted = 0.5 * (first + last) + (behind / CATCHES_UP).clamp(-FASTEST_CATCH, FASTEST_CATCH);
+        let wanted =
+            0.5 * (first + last) + (behind / CATCH_UP_TIME).clamp(-MAX_CATCH_UP_SPEED, MAX_CATCH_UP_SPEED);
         let below = |step: &SpeedStep| model.steady_speed(*step, Approach::Below).as_m_per_s() <= wanted;
         let under = usable.iter().take_while(|step| below(step)).count();
         let from = under.saturating_sub(2).min(usable.len().saturating_sub(STEPS));
         let steps = core::array::from_fn(|nth| usable.get(from + nth).copied());
         let best = Choice { first: None, cost: f64::INFINITY };
-        Self { model, way, reference, now, leaves_after, steps, best }
+        Self { model, path, reference, now, leaves_after, steps, best }
     }
 
-    /// The best of all sequences that stay within what is left of a budget.
+    /// The best sequence within the rest of a budget.
     pub(super) fn best(mut self, rollout: Rollout, budget: CommandBudget) -> Choice {
-        self.go_on(0, &rollout, Sequence { budget, first: None, commands: 0, cost: 0.0 });
+        self.extend(0, &rollout, Sequence { budget, first: None, commands: 0, cost: 0.0 });
         self.best
     }
 
-    fn go_on(&mut self, at: usize, rollout: &Rollout, sequence: Sequence) {
+    fn extend(&mut self, at: usize, rollout: &Rollout, sequence: Sequence) {
         if sequence.cost >= self.best.cost {
             return;
         }
@@ -102,43 +102,109 @@ impl<'a> StepSearch<'a> {
             return self.end(rollout, sequence);
         };
         let Sequence { budget, first, commands, .. } = sequence;
-        let time = self.now + GRID * at as f64;
+        let time = self.now + GRID_S * at as f64;
         let leaves = time + self.leaves_after;
         let commanded = rollout.step();
         let steps = self.steps;
-        let may = commands < MOST_COMMANDS && budget.free() <= time + SAME_TIME;
+        let may = commands < MAX_COMMANDS && budget.free() <= time + SAME_TIME;
         let others = steps.iter().flatten().filter(|step| may && step.get() != commanded);
         for command in core::iter::once(None).chain(others.map(Some)) {
             let mut next = *rollout;
-            let mut paid = 0.0;
+            let mut command_cost = 0.0;
             let mut left = budget;
             if let Some(step) = command {
-                let doubt = next.doubt_of_interruption(self.model, leaves);
-                paid = COMMAND_COST + END_WEIGHT * doubt * doubt;
+                let deviation = next.doubt_of_interruption(self.model, leaves);
+                command_cost = COMMAND_COST + END_WEIGHT * deviation * deviation;
                 next.command(self.model, leaves, *step);
-                left.take(time);
+                left.record(time);
             }
-            let place = self.way.of_felt(next.place(self.model, time + GRID));
-            let off = place - ideal;
+            let place = self.path.surveyed(next.place(self.model, time + GRID_S));
+            let error = place - ideal;
             let so_far = Sequence {
                 budget: left,
                 first: first.or(command.map(|step| (at, *step))),
                 commands: commands + usize::from(command.is_some()),
-                cost: sequence.cost + paid + off * off * GRID,
+                cost: sequence.cost + command_cost + error * error * GRID_S,
             };
-            self.go_on(at + 1, &next, so_far);
+            self.extend(at + 1, &next, so_far);
         }
     }
 
     fn end(&mut self, rollout: &Rollout, Sequence { cost, first, .. }: Sequence) {
-        let time = self.now + GRID * LOOKS as f64;
+        let time = self.now + GRID_S * POINTS as f64;
         let [place, speed] = rollout.settled_place_and_speed(self.model, time);
-        let off = self.way.of_felt(place) - self.reference.last();
+        let error = self.path.surveyed(place) - self.reference.last();
         let [_, wanted] = self.reference.speeds;
         let faster = speed - wanted;
-        let cost = cost + END_WEIGHT * off * off + SPEED_WEIGHT * faster * faster;
+        let cost = cost + END_WEIGHT * error * error + SPEED_WEIGHT * faster * faster;
         if cost < self.best.cost {
             self.best = Choice { first, cost };
         }
+    }
+}
+
+/// Shortest time between two commands to a train: decoders receive each command, but one before the last has taken
+/// effect is useless.
+pub(super) const SPACING: TimeSpan = TimeSpan::from_ms(200);
+/// A paced train sends at most [`IN_A_ROW`] commands within this time: four trains then use 6 % of a 2400-baud line.
+pub(super) const BUDGET: TimeSpan = TimeSpan::from_s(2.0);
+pub(super) const IN_A_ROW: usize = 3;
+
+/// When the last commands were sent, oldest first (s on any clock); `-∞` for none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct CommandBudget {
+    sent: [f64; IN_A_ROW],
+}
+
+impl CommandBudget {
+    /// No command sent yet.
+    pub(super) const UNUSED: Self = Self { sent: [f64::NEG_INFINITY; IN_A_ROW] };
+
+    /// Records a command.
+    pub(super) fn record(&mut self, sent: f64) {
+        self.sent.rotate_left(1);
+        if let Some(last) = self.sent.last_mut() {
+            *last = sent;
+        }
+    }
+
+    /// When the next command may be sent.
+    pub(super) fn free(&self) -> f64 {
+        let [oldest, .., last] = self.sent;
+        (last + SPACING.as_s()).max(oldest + BUDGET.as_s())
+    }
+
+    /// When the next urgent command may be sent, whatever the budget.
+    pub(super) fn spaced(&self) -> f64 {
+        let [.., last] = self.sent;
+        last + SPACING.as_s()
+    }
+
+    /// The same budget on a clock that is ahead by a time (s).
+    pub(super) fn later(self, by: f64) -> Self {
+        Self { sent: self.sent.map(|sent| sent + by) }
+    }
+}
+
+/// A time in seconds on the clock of budgets.
+pub(super) fn seconds(time: Timestamp) -> f64 {
+    (time - Timestamp::ZERO).as_s()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn three_commands_in_a_row_use_up_the_budget_of_two_seconds() {
+        let mut budget = CommandBudget::UNUSED;
+        assert!(budget.free() < 0.0);
+        for sent in [10.0, 10.2] {
+            budget.record(sent);
+            assert!((budget.free() - (sent + 0.2)).abs() < 1e-9);
+        }
+        budget.record(10.4);
+        assert!((budget.free() - 12.0).abs() < 1e-9);
+        assert!((budget.later(-10.0).free() - 2.0).abs() < 1e-9);
     }
 }

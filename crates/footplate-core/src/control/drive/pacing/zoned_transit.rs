@@ -1,25 +1,25 @@
-//! From one speed to another over a given way in a given time, slower where that is asked for.
+//! A motion from one speed to another over a distance in a time, with lower limits on parts of it.
 //!
-//! Letters: `V` the speed kept wherever nothing restricts it, `c` what a part of the way allows, `R` the time of a change of
-//! speed. The speed is `min(V, c)`; a change to a lower one is done where the restricted part begins, one to a higher one
-//! begins where it ends. The time that takes falls as `V` grows, so that halving finds the `V` that takes the time given.
+//! Letters: `V` the speed kept where there is no limit, `c` the limit of a part. The speed is `min(V, c)`. A change
+//! to a lower speed ends where the limited part starts; a change to a higher speed starts where it ends. The duration
+//! falls as `V` grows, so that bisection finds the `V` for a given time.
 
 use crate::kinematics::{Motion, MotionState, SpeedChange, SpeedLaw};
 use crate::time::TimeSpan;
 use crate::units::{Length, Speed};
 
-/// A change of speed takes so long (s): as long as a train needs for some steps.
+/// Duration of a change of speed (s): as long as a change by several steps.
 const CHANGE: f64 = 2.0;
-/// Parts of the way that are distinguished, with changes between them and at both ends: two zones, and what is before, between and
-/// behind them. A way with more is as slow all along as its slowest part.
-const MOST_PARTS: usize = 5;
-const MOST_PIECES: usize = 2 * MOST_PARTS + 1;
-/// A motion is looked at so many times: every quarter of a second of a minute.
+/// Parts distinguished, with changes between them and at both ends: two zones, and the parts before, between and
+/// behind them. A path with more parts runs at its lowest limit throughout.
+const MAX_PARTS: usize = 5;
+const MAX_PIECES: usize = 2 * MAX_PARTS + 1;
+/// Points at which a motion is checked: every quarter of a second of a minute.
 const SAMPLES: u16 = 240;
-/// Halvings of a speed that leave less than a thousandth of a mm/s.
+/// Enough bisections for a thousandth of a mm/s.
 const HALVINGS: usize = 20;
 
-/// A part of the way (m from its beginning) with the greatest speed there (m/s).
+/// A part of the path (m from its start) with its speed limit (m/s).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SlowPart {
     pub(super) from: f64,
@@ -28,12 +28,12 @@ pub(super) struct SlowPart {
 }
 
 impl SlowPart {
-    /// The same counted from where a train is, for one that is given by how far before a target it is.
+    /// The same part measured from the train, for one measured back from a target that is `left` ahead.
     pub(super) fn before(self, left: f64) -> Self {
         Self { from: left - self.from, to: left - self.to, ..self }
     }
 
-    /// Whether a motion is no faster there.
+    /// Whether a motion keeps the limit.
     pub(super) fn allows(&self, motion: &dyn Motion) -> bool {
         let seconds = motion.duration().as_s();
         (0..=SAMPLES).all(|nth| {
@@ -44,7 +44,7 @@ impl SlowPart {
     }
 }
 
-/// A change of speed, or none, from a moment (s) and a place (m) on.
+/// A change of speed, or none, from a time (s) and a place (m) on.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Piece {
     time: f64,
@@ -53,18 +53,18 @@ struct Piece {
     speeds: [f64; 2],
 }
 
-/// Speeds kept one after the other, with changes between them.
+/// A sequence of constant speeds and the changes between them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ZonedTransit {
-    /// The speed at the beginning (m/s).
+    /// Initial speed (m/s).
     from: f64,
-    /// How long each piece lasts (s), and the speed at its end (m/s): to seven digits, which are micrometres of a way, so that
-    /// what is planned is not much larger than what else a train is paced for.
-    pieces: [[f32; 2]; MOST_PIECES],
+    /// The duration of each piece (s) and its final speed (m/s), in seven digits, micrometres of path, to keep the
+    /// plan small.
+    pieces: [[f32; 2]; MAX_PIECES],
     count: usize,
 }
 
-/// A stretch of the way with the speed kept on it.
+/// A length with the speed kept on it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Level {
     length: f64,
@@ -72,16 +72,16 @@ struct Level {
 }
 
 impl ZonedTransit {
-    /// Over a way (m), from a speed to another (m/s), in a time (s), with speeds between two bounds wherever parts of the way
-    /// leave that. `None` where no speed takes the time, or there are more parts than can be looked at.
+    /// A motion over a distance (m) between two speeds (m/s) in a time (s), with speeds between two bounds where
+    /// parts allow it. `None` if no speed takes the time, or with too many pieces.
     pub(super) fn new(
-        way: f64,
+        distance: f64,
         ends: [f64; 2],
         time: f64,
         [slowest, fastest]: [f64; 2],
         parts: &[SlowPart],
     ) -> Option<Self> {
-        let at = |speed: f64| Self::at_speed(way, ends, speed, parts);
+        let at = |speed: f64| Self::at_speed(distance, ends, speed, parts);
         let takes = |transit: &Self| transit.duration().as_s();
         let (mut low, mut high) = (slowest, fastest);
         if takes(&at(high)?) > time || takes(&at(low)?) < time {
@@ -94,26 +94,26 @@ impl ZonedTransit {
         at(high)
     }
 
-    /// With one speed wherever nothing restricts it.
-    fn at_speed(way: f64, ends: [f64; 2], speed: f64, parts: &[SlowPart]) -> Option<Self> {
-        let mut levels = [Level::default(); MOST_PARTS];
-        let count = levels_of(way, speed, parts, &mut levels).unwrap_or_else(|| {
+    /// The motion with one speed outside the limited parts.
+    fn at_speed(distance: f64, ends: [f64; 2], speed: f64, parts: &[SlowPart]) -> Option<Self> {
+        let mut levels = [Level::default(); MAX_PARTS];
+        let count = levels_of(distance, speed, parts, &mut levels).unwrap_or_else(|| {
             let slowest = parts.iter().map(|part| part.speed).fold(speed, f64::min);
-            levels = [Level { length: way, speed: slowest }; MOST_PARTS];
+            levels = [Level { length: distance, speed: slowest }; MAX_PARTS];
             1
         });
         let levels = levels.get_mut(..count)?;
         while let Some((nth, lower)) = too_short(levels, ends) {
             levels.get_mut(nth)?.speed = lower;
         }
-        let mut transit = Self { from: ends[0], pieces: [[0.0; 2]; MOST_PIECES], count: 0 };
+        let mut transit = Self { from: ends[0], pieces: [[0.0; 2]; MAX_PIECES], count: 0 };
         let mut speed = ends[0];
         for (nth, level) in levels.iter().enumerate() {
             let next = levels.get(nth + 1).map_or(ends[1], |next| next.speed);
             let is_last = nth + 1 == levels.len();
-            let rises = change_way(speed, level.speed);
-            let falls = if is_last || next < level.speed { change_way(level.speed, next) } else { 0.0 };
-            // What is too short for its changes is run through by shorter ones.
+            let rises = change_distance(speed, level.speed);
+            let falls = if is_last || next < level.speed { change_distance(level.speed, next) } else { 0.0 };
+            // A part too short for its changes runs through them in proportion.
             let scale = (level.length / (rises + falls).max(f64::MIN_POSITIVE)).min(1.0);
             transit.push(speed, level.speed, rises * scale)?;
             transit.push(level.speed, level.speed, level.length - (rises + falls) * scale)?;
@@ -126,12 +126,12 @@ impl ZonedTransit {
         Some(transit)
     }
 
-    /// Goes on for a way (m), from the speed that was come to before.
-    fn push(&mut self, from: f64, to: f64, way: f64) -> Option<()> {
-        if way <= 0.0 {
+    /// Adds a piece over a distance (m), from the speed reached before.
+    fn push(&mut self, from: f64, to: f64, distance: f64) -> Option<()> {
+        if distance <= 0.0 {
             return Some(());
         }
-        *self.pieces.get_mut(self.count)? = [2.0 * way / (from + to), to].map(|number| number as f32);
+        *self.pieces.get_mut(self.count)? = [2.0 * distance / (from + to), to].map(|number| number as f32);
         self.count += 1;
         Some(())
     }
@@ -147,7 +147,7 @@ impl ZonedTransit {
         })
     }
 
-    /// The last piece that begins by then, or the first.
+    /// The last piece that satisfies a condition, or the first of all.
     fn piece(&self, begins_by: impl Fn(&Piece) -> bool) -> Option<Piece> {
         self.pieces().filter(begins_by).last().or(self.pieces().next())
     }
@@ -195,19 +195,19 @@ impl Motion for ZonedTransit {
     }
 }
 
-/// The way of a change, which every symmetric law runs at the mean of its speeds.
-fn change_way(from: f64, to: f64) -> f64 {
+/// The distance of a change: any symmetric law covers the mean speed times its duration.
+fn change_distance(from: f64, to: f64) -> f64 {
     if from == to { 0.0 } else { 0.5 * (from + to) * CHANGE }
 }
 
-/// The way in parts of one speed each, in order; how many there are.
-fn levels_of(way: f64, speed: f64, parts: &[SlowPart], levels: &mut [Level]) -> Option<usize> {
+/// The parts of constant speed, in order; returns how many.
+fn levels_of(distance: f64, speed: f64, parts: &[SlowPart], levels: &mut [Level]) -> Option<usize> {
     let (mut at, mut count) = (0.0, 0);
-    while at < way {
+    while at < distance {
         let here = parts.iter().filter(|part| part.from <= at && part.to > at);
         let level = here.map(|part| part.speed).fold(speed, f64::min);
         let bounds = parts.iter().flat_map(|part| [part.from, part.to]);
-        let until = bounds.filter(|bound| *bound > at).fold(way, f64::min);
+        let until = bounds.filter(|bound| *bound > at).fold(distance, f64::min);
         match levels.get_mut(..count).and_then(|known| known.last_mut()) {
             Some(last) if last.speed == level => last.length += until - at,
             _ => {
@@ -220,15 +220,15 @@ fn levels_of(way: f64, speed: f64, parts: &[SlowPart], levels: &mut [Level]) -> 
     (count > 0).then_some(count)
 }
 
-/// A part that is too short to get to its speed and away from it again, and the speed that it is run at instead.
+/// A part too short to reach its speed and leave it again, and the speed to run it at instead.
 fn too_short(levels: &[Level], ends: [f64; 2]) -> Option<(usize, f64)> {
     levels.iter().enumerate().find_map(|(nth, level)| {
         let before =
             nth.checked_sub(1).and_then(|nth| levels.get(nth)).map_or(ends[0], |before| before.speed);
         let next = levels.get(nth + 1).map_or(ends[1], |next| next.speed);
         let beside = before.max(next);
-        let falls = if next < level.speed { change_way(level.speed, next) } else { 0.0 };
-        let is_short = level.length < change_way(before.min(level.speed), level.speed) + falls;
+        let falls = if next < level.speed { change_distance(level.speed, next) } else { 0.0 };
+        let is_short = level.length < change_distance(before.min(level.speed), level.speed) + falls;
         (is_short && beside < level.speed).then_some((nth, beside))
     })
 }
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn it_covers_the_way_in_the_time_and_is_slow_where_that_is_asked() {
+    fn it_covers_the_distance_in_the_time_and_keeps_the_limits() {
         for time in [22.0, 25.0, 35.0, 60.0] {
             let transit = transit(time, &[HALL]).expect("time enough");
             assert!((transit.duration().as_s() - time).abs() < 0.01, "{time}: {:?}", transit.duration());
@@ -260,7 +260,7 @@ mod tests {
                     "{time}: {speed} at {place}"
                 );
                 assert!(state.distance >= before.distance, "{time}");
-                let at = transit.time_at(state.distance).expect("on the way");
+                let at = transit.time_at(state.distance).expect("on the distance");
                 assert!((transit.state_at(at).distance - state.distance).abs() < Length::from_mm(0.01));
                 before = state;
             }
@@ -268,20 +268,20 @@ mod tests {
     }
 
     #[test]
-    fn the_soonest_is_what_the_slow_part_leaves() {
-        // By hand at 0.5 m/s: 0.75 m in 2 s, 0.55 m at 0.5 m/s, 0.7 m in 2 s, 1 m at 0.2 m/s, 0.7 m in 2 s, 1.65 m at 0.5 m/s
-        // and 0.65 m in 2 s: 17.4 s.
+    fn the_shortest_time_includes_the_slow_part() {
+        // By hand at 0.5 m/s: 0.75 m in 2 s, 0.55 m at 0.5 m/s, 0.7 m in 2 s, 1 m at 0.2 m/s, 0.7 m in 2 s, 1.65 m at
+        // 0.5 m/s and 0.65 m in 2 s make 17.4 s.
         assert!(transit(17.3, &[HALL]).is_none());
         assert!(transit(17.5, &[HALL]).is_some());
-        // Without it 4.2 s less: 0.75 and 0.65 m in 2 s each, 4.6 m at 0.5 m/s.
+        // Without the limit, 4.2 s less: 0.75 and 0.65 m in 2 s each, 4.6 m at 0.5 m/s.
         assert!(transit(13.3, &[]).is_some() && transit(13.1, &[]).is_none());
     }
 
     #[test]
-    fn a_gap_too_short_to_get_faster_in_is_run_through_as_slowly() {
+    fn a_gap_too_short_to_accelerate_in_is_run_at_the_lower_limit() {
         let next = SlowPart { from: 3.3, to: 4.0, speed: 0.15 };
         let transit = transit(24.0, &[HALL, next]).expect("time enough");
-        let between = transit.time_at(Length::from_m(3.1)).expect("on the way");
+        let between = transit.time_at(Length::from_m(3.1)).expect("on the distance");
         assert!((transit.state_at(between).speed.as_m_per_s() - 0.2).abs() < 0.051);
     }
 }

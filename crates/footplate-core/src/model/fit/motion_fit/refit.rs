@@ -1,7 +1,7 @@
-//! A fit in parts, each of which takes milliseconds, so that what drives trains can fit between two reports.
+//! A fit in parts of milliseconds each, so that it can run between two reports.
 //!
-//! A part is one step of Gauss and Newton. What is searched is a copy: the train may go on meanwhile, and what it does since
-//! is part of the next fit.
+//! A part is one Gauss-Newton step. The fit works on a copy: the train may run on meanwhile, and new entries are part of the next
+//! fit.
 
 use super::{
     ALL_BELIEVED, Closed, KEPT_TRIPS, LONGEST_STEP, MOST_HALVINGS, MOST_ITERATIONS, MOST_TRIPS, MotionFit,
@@ -27,7 +27,7 @@ pub struct Refit {
 }
 
 impl MotionFit {
-    /// Begins to fit anew to all that was seen; sections as the layout has them.
+    /// Begins a fit to all entries so far, with the sections of the layout.
     #[must_use]
     pub fn begin_refit(&self, sections: &SectionIndex) -> Refit {
         let mut fit = self.clone();
@@ -41,7 +41,7 @@ impl MotionFit {
         Refit { fit, columns, values, survey, closed: None, iteration: 0, condensed: 0, is_over: false }
     }
 
-    /// Takes over what a fit found that was begun here. What was seen since then stays, and is part of the next.
+    /// Takes over the result of a fit that was begun here. Newer entries stay and are part of the next fit.
     pub fn adopt(&mut self, refit: Refit) {
         let Refit { fit, condensed, .. } = refit;
         self.chain.trips.drain(..condensed.min(self.chain.trips.len()));
@@ -53,7 +53,7 @@ impl MotionFit {
         self.model = fit.model;
     }
 
-    /// Fits anew to all that was seen, at once. Takes milliseconds; not for between two reports.
+    /// Fits to all entries so far, at once. Takes milliseconds: not between two reports.
     pub fn refit(&mut self, sections: &SectionIndex) {
         let mut refit = self.begin_refit(sections);
         while !refit.is_over() {
@@ -64,13 +64,13 @@ impl MotionFit {
 }
 
 impl Refit {
-    /// The model that the fit found; before it is over that of the fit before.
+    /// The model of the fit; until it is over, that of the fit before.
     #[must_use]
     pub const fn model(&self) -> &MotionModel {
         self.fit.model()
     }
 
-    /// Whether nothing is left to do.
+    /// Whether the fit is complete.
     #[must_use]
     pub const fn is_over(&self) -> bool {
         self.is_over
@@ -118,7 +118,7 @@ impl Refit {
         believes_all || moved >= SETTLED
     }
 
-    /// What was found goes into the model, and the oldest trips into the prior.
+    /// Updates the model, and moves the oldest trips into the prior.
     fn conclude(&mut self) {
         self.is_over = true;
         let Self { fit, columns, values, survey, .. } = self;

@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::figures::minutes;
 use super::told;
-use crate::dashboard::{Alarm, Showing};
+use crate::dashboard::{Alarm, ReadOnlyDashboard};
 use crate::layout_check::layout_with;
 use crate::recorded::Recorded;
 use crate::runtime::{Attendant, Wish};
@@ -27,7 +27,7 @@ pub(super) struct Watcher<'l> {
     pub(super) mishaps: u32,
     /// The layout that the reports fit better, by name.
     pub(super) other_layout: Option<&'static str>,
-    showing: Option<Showing>,
+    showing: Option<ReadOnlyDashboard>,
     is_halted: bool,
 }
 
@@ -52,7 +52,7 @@ impl<'l> Watcher<'l> {
     }
 
     /// Those who watch in a browser see it, too.
-    pub(super) fn seen_by(self, showing: Option<Showing>) -> Self {
+    pub(super) fn seen_by(self, showing: Option<ReadOnlyDashboard>) -> Self {
         Self { showing, ..self }
     }
 

@@ -1,4 +1,4 @@
-//! What comes of instructions: refusals, notices of the driver and the dispatcher, orders that have ended, and what trains taught.
+//! The results of instructions: refusals, notices of the dispatcher, ended orders, refitted models.
 
 use footplate_core::control::{
     Achieved, Finished, Machine, Notice, Order, OrderId, Outcome, Output, Refusal,
@@ -7,18 +7,18 @@ use footplate_core::model::MotionModel;
 use footplate_core::track::Landmark;
 use footplate_core::{Length, TimeSpan, Timestamp, TrainId};
 
-use super::ScriptRunner;
+use super::{CommandSource, ScriptRunner};
 use crate::commands::drive::formatter::{promises_broken, trains, verb};
 use crate::commands::drive::instruction::{Instruction, Until};
 use crate::commands::drive::script::Step;
-use crate::commands::drive::spoken::{Ended, Spoken, Target};
+use crate::commands::drive::session_message::{Ended, SessionMessage, Target};
 use crate::dashboard::{Alarm, TrainPassed};
 
-/// A train is said to break its promises once they are wider by this, one standard deviation (chosen: ±30 mm are seen beside a
-/// platform, and no train of the usual worlds comes to it).
+/// Warn about a train once its stop intervals are this much wider, one standard deviation (chosen: ±30 mm is visible at
+/// a platform; no train of the usual simulated worlds reaches it).
 const UNRELIABLE_FROM: Length = Length::from_mm(15.0);
 
-/// Nothing is learnt when something has to be done so soon: a part of a fit takes less.
+/// No refit is computed if something is due within this time: one part takes less.
 const DUE_SOON: TimeSpan = TimeSpan::from_ms(50);
 
 impl ScriptRunner {
@@ -26,7 +26,7 @@ impl ScriptRunner {
         self.fell_short = true;
         self.say(format!("refused `{}`: {why}", step.text));
         let ended = Ended { refused: Some(why.to_string()), ..self.ended(now, step) };
-        self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
+        self.outputs.push_back(Output::Notice(SessionMessage::Ended(ended)));
     }
 
     fn ended(&self, time: Timestamp, step: &Step) -> Ended {
@@ -48,7 +48,7 @@ impl ScriptRunner {
             command: verb(&step.instruction),
             train,
             target,
-            faced: None,
+            target_on_arrival: None,
             achieved: None,
             error: None,
             promise: None,
@@ -58,8 +58,8 @@ impl ScriptRunner {
         }
     }
 
-    /// Prints a notice, and does what follows from it.
-    pub(super) fn dispatched(&mut self, now: Timestamp, notice: &Notice) {
+    /// Reports a notice and acts on it.
+    pub(super) fn handle_notice(&mut self, now: Timestamp, notice: &Notice) {
         if let Some(mut line) = self.formatter().line(notice) {
             if let Notice::AuthorityEnds { train } = notice {
                 let holders = self.dispatcher.holders_beyond(*train, now);
@@ -68,7 +68,7 @@ impl ScriptRunner {
                 }
             }
             if let Some(alarm) = Alarm::of_notice(self.driver().layout(), notice) {
-                self.outputs.push_back(Output::Notice(Spoken::Alarm(alarm.said(&line))));
+                self.outputs.push_back(Output::Notice(SessionMessage::Alarm(alarm.said(&line))));
             }
             self.say(line);
         }
@@ -78,7 +78,7 @@ impl ScriptRunner {
             }
             Notice::Passed { train, passed, next } => {
                 let passed_by = TrainPassed { train: *train, passed: *passed, next: *next };
-                self.outputs.push_back(Output::Notice(Spoken::Passed(passed_by)));
+                self.outputs.push_back(Output::Notice(SessionMessage::Passed(passed_by)));
                 self.learning.passed(*train, self.dispatcher.driver(), passed);
                 if let Some(wait) = &mut self.wait {
                     wait.is_met |= wait.until == Until::At(*train, passed.sensor);
@@ -94,29 +94,30 @@ impl ScriptRunner {
             Notice::TurnoutThrown { order: Some(order), .. } => {
                 if let Some(step) = self.pending.remove(order).filter(|step| !step.is_part) {
                     let ended = self.ended(now, &step);
-                    self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
+                    self.outputs.push_back(Output::Notice(SessionMessage::Ended(ended)));
                 }
             }
             Notice::GivenUp { order, train, why } => {
                 self.promises.remove(order);
                 self.rests.remove(train);
-                match self.pending.remove(order) {
-                    Some(step) if self.takes_up_again(&step, why) => {
-                        self.say(format!("`{}` waits: {why}", step.text));
-                        self.steps.push_front(Step { is_again: true, ..step });
-                    }
-                    Some(step) => self.refuse(now, &step, why),
-                    None => {}
+                if let Some(step) = self.pending.remove(order) {
+                    self.cancelled(now, step, why);
                 }
             }
-            Notice::Replaced { order, .. } => {
+            Notice::Replaced { order, train } => {
                 self.promises.remove(order);
-                self.pending.remove(order);
+                let step = self.pending.remove(order);
+                // No other line of a script replaces such a command: the recovery of its train did.
+                if let Some(step) =
+                    step.filter(|step| self.source == CommandSource::Script && ends_at_rest(step))
+                {
+                    self.cancelled(now, step, &Refusal::InDanger { train: *train });
+                }
             }
-            // It learns from what the recovery measured; what it learnt before was true of another train.
+            // The fit restarts from what the recovery measured: earlier events belong to the train as it was before.
             Notice::Recovered { train, outcome, .. } if *outcome != Outcome::AsBefore => {
                 self.learning.forget(*train);
-                self.taught.remove(train);
+                self.refitted.remove(train);
                 self.changed.insert(*train);
             }
             Notice::NeedsOperator { .. } => self.fell_short = true,
@@ -125,20 +126,31 @@ impl ScriptRunner {
         }
     }
 
-    /// A journey has ended: its result says where the train came to rest.
+    /// Ends a journey with the place where the train came to rest.
     fn arrived(&mut self, now: Timestamp, order: OrderId, train: TrainId, error: Option<Length>) {
         let Some(step) = self.pending.remove(&order) else { return };
         let rest = self.rests.remove(&train);
         let achieved = match &rest {
             Some(rest) => rest.achieved,
-            None => self.stands_at(now, train),
+            None => self.rest_position(now, train),
         };
-        let faced = achieved.zip(error);
-        let faced = faced.map(|(Achieved { at, .. }, error)| Landmark { offset: at.offset - error, ..at });
-        let ended = Ended { error, faced, ..self.ended(now, &step) };
+        let target_on_arrival = achieved.zip(error);
+        let target_on_arrival = target_on_arrival
+            .map(|(Achieved { at, .. }, error)| Landmark { offset: at.offset - error, ..at });
+        let ended = Ended { error, target_on_arrival, ..self.ended(now, &step) };
         let achieved = achieved.map(|achieved| self.formatter().place(achieved.at));
         let ended = rest.map_or(ended.clone(), |rest| self.at_rest(&rest, ended));
-        self.outputs.push_back(Output::Notice(Spoken::Ended(Ended { achieved, ..ended })));
+        self.outputs.push_back(Output::Notice(SessionMessage::Ended(Ended { achieved, ..ended })));
+    }
+
+    /// What a line asked for was cancelled: a script tries it again once the train can be driven, or the line is refused.
+    fn cancelled(&mut self, now: Timestamp, step: Step, why: &Refusal) {
+        if self.is_retried(&step, why) {
+            self.say(format!("`{}` waits: {why}", step.text));
+            self.steps.push_front(Step { is_retry: true, ..step });
+        } else {
+            self.refuse(now, &step, why);
+        }
     }
 
     fn done(&mut self, finished: &Finished) {
@@ -151,17 +163,17 @@ impl ScriptRunner {
             ..self.ended(finished.time, &step)
         };
         let ended = self.at_rest(finished, ended);
-        self.outputs.push_back(Output::Notice(Spoken::Ended(ended)));
+        self.outputs.push_back(Output::Notice(SessionMessage::Ended(ended)));
     }
 
-    /// Where a train stands that was stopped before the end of its run.
-    fn stands_at(&self, now: Timestamp, train: TrainId) -> Option<Achieved> {
+    /// The place of a train that was stopped before the end of its run.
+    fn rest_position(&self, now: Timestamp, train: TrainId) -> Option<Achieved> {
         let located = self.driver().locate(train, now)?;
         let at = self.driver().landmark(train, located.at)?;
         Some(Achieved { at, uncertainty: located.uncertainty, error: None })
     }
 
-    /// With the place where a train came to rest, and what had been promised of that.
+    /// Adds the place of rest, and the interval that was predicted for it.
     fn at_rest(&self, rest: &Finished, ended: Ended) -> Ended {
         let name = |achieved: Achieved| self.formatter().place(achieved.at);
         Ended {
@@ -172,24 +184,24 @@ impl ScriptRunner {
         }
     }
 
-    /// What a train taught is used from the next order on.
+    /// Starts a refit to what the train just did; later orders use its result.
     fn learn(&mut self, finished: &Finished) {
         if finished.unseen.is_some() {
             self.learning.interrupt(finished.train);
         }
-        self.learning.begin_fit(finished.train);
+        self.learning.begin_refit(finished.train);
     }
 
-    /// Goes on with what is learnt, unless something is due: nobody waits for it. A train that moves is driven to the end as
-    /// it began.
-    pub(super) fn learn_on(&mut self, now: Timestamp) {
+    /// Computes the next part of a refit unless something is due, and replaces the models of trains at rest. A moving
+    /// train keeps the model that its order was planned with.
+    pub(super) fn continue_refit(&mut self, now: Timestamp) {
         let is_free = self.dispatcher.next_timeout().is_none_or(|due| due > now + DUE_SOON);
-        if is_free && let Some(model) = self.learning.go_on() {
-            self.taught.insert(model.train(), model);
+        if is_free && let Some(model) = self.learning.advance_refit() {
+            self.refitted.insert(model.train(), model);
         }
-        let stands = |train: &TrainId| self.driver().stands(*train, now);
-        let standing: Vec<TrainId> = self.taught.keys().copied().filter(stands).collect();
-        for model in standing.iter().filter_map(|train| self.taught.remove(train)).collect::<Vec<_>>() {
+        let is_at_rest = |train: &TrainId| self.driver().is_at_rest(*train, now);
+        let at_rest: Vec<TrainId> = self.refitted.keys().copied().filter(is_at_rest).collect();
+        for model in at_rest.iter().filter_map(|train| self.refitted.remove(train)).collect::<Vec<_>>() {
             self.use_model(model);
         }
     }
@@ -200,8 +212,13 @@ impl ScriptRunner {
         if unexplained >= UNRELIABLE_FROM && self.unreliable.insert(train) {
             let line = promises_broken(train, unexplained);
             let alarm = Alarm::promises_broken(train, unexplained).said(&line);
-            self.outputs.push_back(Output::Notice(Spoken::Alarm(alarm)));
+            self.outputs.push_back(Output::Notice(SessionMessage::Alarm(alarm)));
             self.say(line);
         }
     }
+}
+
+/// Whether what a line asks for ends with its train at rest.
+const fn ends_at_rest(step: &Step) -> bool {
+    matches!(step.instruction, Instruction::Order(Order::Stop(_) | Order::Move { .. } | Order::Arrive { .. }))
 }

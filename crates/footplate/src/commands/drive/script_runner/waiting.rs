@@ -1,16 +1,16 @@
-//! What the lines of a script wait for: a train to end what it does or to be brought back, time, contacts.
+//! What the lines of a script wait for: a train that finishes an order or is recovered, a time, a detection.
 
 use footplate_core::control::{Order, Refusal};
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use super::{Giver, ScriptRunner};
+use super::{CommandSource, ScriptRunner};
 use crate::commands::drive::instruction::{Instruction, Until};
 use crate::commands::drive::script::Step;
 
-/// How often it is looked whether a train stands.
-pub(super) const LOOK_AGAIN: TimeSpan = TimeSpan::from_ms(100);
+/// How often to check whether a train is at rest.
+pub(super) const CHECK_INTERVAL: TimeSpan = TimeSpan::from_ms(100);
 
-/// The line that is waited at.
+/// A `wait` in progress.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Wait {
     pub(super) until: Until,
@@ -19,16 +19,16 @@ pub(super) struct Wait {
 }
 
 impl ScriptRunner {
-    /// When the first journey of a script has lasted too long.
-    pub(super) fn tires(&self) -> Option<Timestamp> {
+    /// When the oldest journey of a script exceeds the wait limit.
+    pub(super) fn journey_deadline(&self) -> Option<Timestamp> {
         let asked = self.journeys.iter().filter(|(order, _)| self.pending.contains_key(order));
-        let first = asked.map(|(_, since)| *since).min().filter(|_| self.giver == Giver::Script);
+        let first = asked.map(|(_, since)| *since).min().filter(|_| self.source == CommandSource::Script);
         first.map(|since| since + self.wait_limit)
     }
 
-    /// Calls off the journeys of a script that have lasted too long.
-    pub(super) fn tire_of_waiting(&mut self, now: Timestamp) {
-        if self.tires().is_none_or(|at| now < at) {
+    /// Cancels the journeys of a script that exceed the wait limit.
+    pub(super) fn cancel_late_journeys(&mut self, now: Timestamp) {
+        if self.journey_deadline().is_none_or(|at| now < at) {
             return;
         }
         for train in self.trains.keys().copied().collect::<Vec<_>>() {
@@ -42,42 +42,44 @@ impl ScriptRunner {
             }
         }
         self.journeys.retain(|order, _| self.pending.contains_key(order));
-        self.hand_on(now);
+        self.forward_outputs(now);
     }
 
-    /// In a script a train ends one order before it begins the next, what follows a turnout follows it, and a train that
-    /// comes to rest or is being brought back is waited for.
+    /// Whether a line of a script has to wait: for the previous order of its train, for a turnout, or for a train that
+    /// brakes or is being recovered.
     pub(super) fn must_wait(&mut self, now: Timestamp, instruction: Instruction) -> bool {
         let is_turnout = |step: &Step| matches!(step.instruction, Instruction::Order(Order::Turnout { .. }));
-        let (train, stands) = match instruction {
+        let (train, is_stop) = match instruction {
             Instruction::Order(order) => {
                 (order.train(), matches!(order, Order::Speed { step: SpeedStep::STAND, .. }))
             }
             Instruction::Go(train, _) => (Some(train), false),
             _ => return false,
         };
-        if train.is_some_and(|train| !stands && self.is_kept_waiting(now, train)) {
+        if train.is_some_and(|train| !is_stop && self.is_blocked_for_now(now, train)) {
             return true;
         }
-        let is_busy = train.is_some_and(|train| self.must_end(train));
+        let is_busy = train.is_some_and(|train| self.has_finite_order(train));
         let is_of_turnout = matches!(instruction, Instruction::Order(Order::Turnout { .. }));
         is_busy || !is_of_turnout && self.pending.values().any(is_turnout)
     }
 
-    /// Whether a train stands of which is being learnt how it moves.
+    /// Whether the train is at rest and its model is being refitted.
     pub(super) fn waits_for_model(&self, now: Timestamp, instruction: Instruction) -> bool {
         let train = match instruction {
             Instruction::Order(order) => order.train(),
             Instruction::Go(train, _) => Some(train),
             _ => None,
         };
-        train.is_some_and(|train| self.learning.is_fitting_to(train) && self.driver().stands(train, now))
+        train
+            .is_some_and(|train| self.learning.is_refitting_to(train) && self.driver().is_at_rest(train, now))
     }
 
-    /// Whether a train cannot be driven now and may be soon; not for ever, so that in the end it is refused and said why.
-    fn is_kept_waiting(&mut self, now: Timestamp, train: TrainId) -> bool {
+    /// Whether a train cannot be driven at present but may be soon. Beyond the wait limit the order is tried anyway, so
+    /// that its refusal says why.
+    fn is_blocked_for_now(&mut self, now: Timestamp, train: TrainId) -> bool {
         let comes_to_rest =
-            self.driver().commanded(train) == SpeedStep::STAND && !self.driver().stands(train, now);
+            self.driver().commanded(train) == SpeedStep::STAND && !self.driver().is_at_rest(train, now);
         if !comes_to_rest && !self.dispatcher.is_interrupted(now, train) {
             self.interrupted = None;
             return false;
@@ -85,17 +87,17 @@ impl ScriptRunner {
         now - *self.interrupted.get_or_insert(now) < self.wait_limit
     }
 
-    /// Whether what was given up is taken up again: in a script, once, where it was because its train was lost on the way, and
-    /// it is to a place.
-    pub(super) fn takes_up_again(&self, step: &Step, why: &Refusal) -> bool {
+    /// Whether a given-up order is retried: in a script, once, if the order has a target and its train was lost on the
+    /// route.
+    pub(super) fn is_retried(&self, step: &Step, why: &Refusal) -> bool {
         let is_to_place =
             matches!(step.instruction, Instruction::Order(Order::Stop(_) | Order::Arrive { .. }));
         let was_lost = matches!(why, Refusal::Lost { .. } | Refusal::InDanger { .. });
-        self.giver == Giver::Script && !step.is_again && is_to_place && was_lost
+        self.source == CommandSource::Script && !step.is_retry && is_to_place && was_lost
     }
 
-    /// Lets a train that nobody has seen run over a contact and come to rest, before what was asked for.
-    pub(super) fn find_first(&mut self, train: TrainId, step: Step) {
+    /// Has a lost train run to a sensor and stop before its order is carried out.
+    pub(super) fn locate_first(&mut self, train: TrainId, step: Step) {
         self.say(format!("train {train} is located first"));
         let speed = |step| Instruction::Order(Order::Speed { train, step });
         let parts = [
@@ -105,30 +107,30 @@ impl ScriptRunner {
             Instruction::Wait(Until::AtRest(train)),
         ];
         let text = step.text.clone();
-        self.steps.push_front(Step { is_again: true, ..step });
+        self.steps.push_front(Step { is_retry: true, ..step });
         for instruction in parts.into_iter().rev() {
-            self.steps.push_front(Step { text: text.clone(), instruction, is_part: true, is_again: true });
+            self.steps.push_front(Step { text: text.clone(), instruction, is_part: true, is_retry: true });
         }
     }
 
-    /// Whether a train is busy with something that ends by itself.
-    fn must_end(&self, train: TrainId) -> bool {
+    /// Whether a train carries out something that ends by itself.
+    fn has_finite_order(&self, train: TrainId) -> bool {
         let order = self.driver().busy(train);
-        let runs_on = order.and_then(|order| self.pending.get(&order)).is_some_and(runs_on);
-        self.dispatcher.journey(train).is_some() || order.is_some() && !runs_on
+        let is_open_ended = order.and_then(|order| self.pending.get(&order)).is_some_and(is_open_ended);
+        self.dispatcher.journey(train).is_some() || order.is_some() && !is_open_ended
     }
 
-    /// Whether a train has nothing to do.
+    /// Whether a train has neither an order nor a journey.
     pub(super) fn is_idle(&self, train: TrainId) -> bool {
         self.driver().busy(train).is_none() && self.dispatcher.journey(train).is_none()
     }
 
-    pub(super) fn may_go_on(&mut self, now: Timestamp) -> bool {
+    pub(super) fn may_advance(&mut self, now: Timestamp) -> bool {
         let Some(wait) = self.wait else { return true };
         let met = wait.is_met
             || match wait.until {
                 Until::Passed(span) => now - wait.since >= span,
-                Until::AtRest(train) => self.is_idle(train) && self.driver().stands(train, now),
+                Until::AtRest(train) => self.is_idle(train) && self.driver().is_at_rest(train, now),
                 Until::Located(train) => self.driver().locate(train, now).is_some(),
                 Until::At(..) => false,
             };
@@ -148,14 +150,17 @@ impl ScriptRunner {
         } else if !matches!(wait.until, Until::Passed(_)) && now - wait.since >= self.wait_limit {
             self.wait = None;
             self.fell_short = true;
-            self.say(format!("nothing happened within {:.0} s; the script goes on", self.wait_limit.as_s()));
+            self.say(format!(
+                "nothing happened within {:.0} s; the script continues",
+                self.wait_limit.as_s()
+            ));
             return true;
         }
         met
     }
 }
 
-/// Whether what a line asks for goes on until something else is asked for.
-pub(super) fn runs_on(step: &Step) -> bool {
+/// Whether an order continues until another one replaces it.
+pub(super) fn is_open_ended(step: &Step) -> bool {
     matches!(step.instruction, Instruction::Order(Order::Hold { .. } | Order::Follow { .. }))
 }

@@ -1,8 +1,8 @@
-//! The line that is being written, and those that were written before.
+//! The line editor of the prompt, with a history.
 
 use ratatui::crossterm::event::KeyCode;
 
-/// Lines that can be had again.
+/// Lines kept in the history.
 const REMEMBERED: usize = 200;
 
 /// A line with a cursor.
@@ -11,7 +11,7 @@ pub(super) struct Prompt {
     letters: Vec<char>,
     cursor: usize,
     before: Vec<String>,
-    /// How many lines back the one is that is shown.
+    /// The place of the shown line in the history, counted from its end; 0 for a new line.
     back: usize,
 }
 
@@ -20,7 +20,7 @@ impl Prompt {
         self.letters.iter().collect()
     }
 
-    /// How many letters stand before the cursor.
+    /// The number of characters before the cursor.
     pub(super) const fn cursor(&self) -> usize {
         self.cursor
     }
@@ -30,7 +30,7 @@ impl Prompt {
         self.cursor += 1;
     }
 
-    /// The line is done; nothing if there is nothing in it.
+    /// Takes the finished line; `None` if it is blank.
     pub(super) fn take(&mut self) -> Option<String> {
         let line = self.text();
         self.write("");
@@ -47,7 +47,7 @@ impl Prompt {
         Some(line)
     }
 
-    /// A key that is no letter.
+    /// Handles a key that is not a character.
     pub(super) fn press(&mut self, key: KeyCode) {
         match key {
             KeyCode::Backspace if self.cursor > 0 => {
@@ -66,7 +66,7 @@ impl Prompt {
         }
     }
 
-    /// Shows a line of before.
+    /// Shows the line `back` places before the end of the history.
     fn turn(&mut self, back: usize) {
         let back = back.min(self.before.len());
         let line = self.before.len().checked_sub(back).and_then(|place| self.before.get(place));
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_is_written_mended_and_had_again() {
+    fn a_line_is_edited_and_recalled() {
         let mut prompt = Prompt::default();
         write(&mut prompt, "speed ä4 8");
         for _ in 0..4 {

@@ -1,4 +1,4 @@
-//! How it is drawn: the track, a card a train, what was said, and the prompt.
+//! Draws the terminal view: track, one card per train, messages and prompt.
 
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -9,62 +9,66 @@ use ratatui::widgets::canvas::{Canvas, Context, Line as Stroke, Points};
 use ratatui::widgets::{Block, Paragraph, Wrap};
 
 use super::prompt::Prompt;
-use super::seen::{Seen, Train};
+use super::view_model::{TerminalModel, Train};
 
 /// Colours of trains, in their order.
-const COLOURS: [Color; 6] =
+const TRAIN_COLOURS: [Color; 6] =
     [Color::LightBlue, Color::LightRed, Color::LightMagenta, Color::LightGreen, Color::Yellow, Color::Cyan];
-/// Narrower than this there is no room for the track beside the trains.
-const WIDE: u16 = 90;
-/// Lower than this there is no room for the track at all.
-const HIGH: u16 = 20;
-/// A card of a train is so wide ...
+/// The least width, in characters, that shows the track beside the trains.
+const TRACK_FROM_WIDTH: u16 = 90;
+/// The least height, in lines, that shows the track.
+const TRACK_FROM_HEIGHT: u16 = 20;
+/// The width of a train's card, in characters.
 const CARD: u16 = 46;
-/// ... and so many lines high.
+/// The height of a train's card, in lines.
 const CARD_LINES: u16 = 5;
 
-pub(super) fn draw(frame: &mut Frame<'_>, seen: &Seen, prompt: &Prompt) {
+pub(super) fn draw(frame: &mut Frame<'_>, model: &TerminalModel, prompt: &Prompt) {
     let area = frame.area();
-    let cards = CARD_LINES * u16::try_from(seen.picture.trains.len()).unwrap_or(u16::MAX).max(1) + 1;
-    let upper = if area.height >= HIGH { (area.height / 2).max(cards.min(area.height / 2)) } else { cards };
-    let [head, upper, said, line] = Layout::vertical([
+    let cards = CARD_LINES * u16::try_from(model.picture.trains.len()).unwrap_or(u16::MAX).max(1) + 1;
+    let upper = if area.height >= TRACK_FROM_HEIGHT {
+        (area.height / 2).max(cards.min(area.height / 2))
+    } else {
+        cards
+    };
+    let [head, upper, messages, line] = Layout::vertical([
         Constraint::Length(1),
         Constraint::Length(upper),
         Constraint::Min(3),
         Constraint::Length(1),
     ])
     .areas(area);
-    head_line(frame, head, seen);
-    if area.width >= WIDE && area.height >= HIGH {
+    head_line(frame, head, model);
+    if area.width >= TRACK_FROM_WIDTH && area.height >= TRACK_FROM_HEIGHT {
         let [track, trains] =
             Layout::horizontal([Constraint::Min(20), Constraint::Length(CARD)]).areas(upper);
-        draw_track(frame, track, seen);
-        draw_trains(frame, trains, seen);
+        draw_track(frame, track, model);
+        draw_trains(frame, trains, model);
     } else {
-        draw_trains(frame, upper, seen);
+        draw_trains(frame, upper, model);
     }
-    draw_said(frame, said, seen);
+    draw_messages(frame, messages, model);
     draw_prompt(frame, line, prompt);
 }
 
-fn head_line(frame: &mut Frame<'_>, area: Rect, seen: &Seen) {
+fn head_line(frame: &mut Frame<'_>, area: Rect, model: &TerminalModel) {
     let line = Line::from(vec![
         Span::from("Footplate ").bold(),
-        Span::from(seen.layout.clone()),
-        Span::from(format!("  {:.1} s", seen.picture.t_s)).dim(),
+        Span::from(model.layout.clone()),
+        Span::from(format!("  {:.1} s", model.picture.t_s)).dim(),
         Span::from("   space on an empty line: emergency stop").light_red(),
     ]);
     frame.render_widget(line, area);
 }
 
-fn draw_track(frame: &mut Frame<'_>, area: Rect, seen: &Seen) {
-    let ends = || seen.rails.values().flat_map(|rail| [rail.from, rail.to]);
+fn draw_track(frame: &mut Frame<'_>, area: Rect, model: &TerminalModel) {
+    let ends = || model.rails.values().flat_map(|rail| [rail.from, rail.to]);
     let bounds = |axis: usize| {
         let least = ends().map(|end| end[axis]).fold(f64::INFINITY, f64::min);
         let most = ends().map(|end| end[axis]).fold(f64::NEG_INFINITY, f64::max);
         if least < most { [least, most] } else { [least, least + 1.0] }
     };
-    // Screens count downwards, canvases upwards.
+    // The canvas counts upwards, pictures downwards.
     let [top, foot] = bounds(1);
     let up = |y: f64| top + foot - y;
     let stroke = |context: &mut Context<'_>, [one, other]: [[f64; 2]; 2], color: Color| {
@@ -76,17 +80,17 @@ fn draw_track(frame: &mut Frame<'_>, area: Rect, seen: &Seen) {
         .x_bounds(bounds(0))
         .y_bounds([top, foot])
         .paint(|context| {
-            for rail in seen.rails.values() {
+            for rail in model.rails.values() {
                 stroke(context, [rail.from, rail.to], Color::DarkGray);
             }
-            let contacts: Vec<(f64, f64)> = seen.contacts.iter().map(|(x, y)| (*x, up(*y))).collect();
-            context.draw(&Points { coords: &contacts, color: Color::Gray });
+            let sensors: Vec<(f64, f64)> = model.sensors.iter().map(|(x, y)| (*x, up(*y))).collect();
+            context.draw(&Points { coords: &sensors, color: Color::Gray });
             context.layer();
-            for (train, color) in seen.picture.trains.iter().zip(COLOURS.iter().cycle()) {
-                for ends in train.body.iter().filter_map(|span| seen.ends(*span)) {
+            for (train, color) in model.picture.trains.iter().zip(TRAIN_COLOURS.iter().cycle()) {
+                for ends in train.body.iter().filter_map(|span| model.ends(*span)) {
                     stroke(context, ends, *color);
                 }
-                if let Some([_, [x, y]]) = train.body.last().and_then(|span| seen.ends(*span)) {
+                if let Some([_, [x, y]]) = train.body.last().and_then(|span| model.ends(*span)) {
                     context.print(x, up(y), Line::from(train.train.to_string()).fg(*color).bold());
                 }
             }
@@ -94,16 +98,16 @@ fn draw_track(frame: &mut Frame<'_>, area: Rect, seen: &Seen) {
     frame.render_widget(canvas, area);
 }
 
-fn draw_trains(frame: &mut Frame<'_>, area: Rect, seen: &Seen) {
+fn draw_trains(frame: &mut Frame<'_>, area: Rect, model: &TerminalModel) {
     let mut text = Text::default();
-    for (train, color) in seen.picture.trains.iter().zip(COLOURS.iter().cycle()) {
-        text.extend(card(train, seen, *color));
+    for (train, color) in model.picture.trains.iter().zip(TRAIN_COLOURS.iter().cycle()) {
+        text.extend(card(train, model, *color));
     }
     frame.render_widget(Paragraph::new(text).block(Block::bordered().title("trains").dim()), area);
 }
 
-/// The lines of a train.
-fn card(train: &Train, seen: &Seen, color: Color) -> Vec<Line<'static>> {
+/// The card of a train.
+fn card(train: &Train, model: &TerminalModel, color: Color) -> Vec<Line<'static>> {
     let plain = Style::new().not_dim();
     let place = match (&train.at, train.half_mm) {
         (Some(at), Some(half)) => format!("{at} ± {half:.0} mm"),
@@ -114,19 +118,19 @@ fn card(train: &Train, seen: &Seen, color: Color) -> Vec<Line<'static>> {
         Some(_) => format!("{:.0} ± {:.0} mm/s", train.speed_mm_per_s, train.speed_half_mm_per_s),
         None => String::new(),
     };
-    let passed = seen.passed.get(&train.train);
+    let passed = model.passed.get(&train.train);
     let next = passed.and_then(|passed| passed.next.as_ref()).filter(|_| !train.at_rest).map_or_else(
         || "–".to_owned(),
         |next| {
-            let left = (next.t_s - seen.picture.t_s).max(0.0);
-            format!("{} in {left:.1} s ± {:.0} ms", next.contact, next.half_ms)
+            let left = (next.t_s - model.picture.t_s).max(0.0);
+            format!("{} in {left:.1} s ± {:.0} ms", next.sensor, next.half_ms)
         },
     );
     let last = passed.map_or_else(
         || "–".to_owned(),
         |passed| match (passed.late_ms, passed.short_mm) {
-            (Some(late), Some(short)) => format!("{} {late:+.0} ms, {:+.1} mm", passed.contact, -short),
-            _ => format!("{}, found", passed.contact),
+            (Some(late), Some(short)) => format!("{} {late:+.0} ms, {:+.1} mm", passed.sensor, -short),
+            _ => format!("{}, found", passed.sensor),
         },
     );
     let busy = train.doing.clone().map_or_else(String::new, |doing| {
@@ -150,10 +154,10 @@ fn card(train: &Train, seen: &Seen, color: Color) -> Vec<Line<'static>> {
     ]
 }
 
-fn draw_said(frame: &mut Frame<'_>, area: Rect, seen: &Seen) {
+fn draw_messages(frame: &mut Frame<'_>, area: Rect, model: &TerminalModel) {
     let room = usize::from(area.height.saturating_sub(2));
-    let end = seen.lines.len() - seen.back.min(seen.lines.len());
-    let shown = seen.lines.range(end.saturating_sub(room)..end);
+    let end = model.lines.len() - model.back.min(model.lines.len());
+    let shown = model.lines.range(end.saturating_sub(room)..end);
     let lines: Vec<Line<'_>> = shown
         .map(|line| {
             let style = if line.starts_with('!') {
@@ -166,9 +170,10 @@ fn draw_said(frame: &mut Frame<'_>, area: Rect, seen: &Seen) {
             Line::styled(line.as_str(), style)
         })
         .collect();
-    let title = if seen.back > 0 { "messages (page down for the newest)" } else { "said" };
-    let said = Paragraph::new(lines).wrap(Wrap { trim: false }).block(Block::bordered().title(title).dim());
-    frame.render_widget(said, area);
+    let title = if model.back > 0 { "messages (page down for the newest)" } else { "messages" };
+    let paragraph =
+        Paragraph::new(lines).wrap(Wrap { trim: false }).block(Block::bordered().title(title).dim());
+    frame.render_widget(paragraph, area);
 }
 
 fn draw_prompt(frame: &mut Frame<'_>, area: Rect, prompt: &Prompt) {

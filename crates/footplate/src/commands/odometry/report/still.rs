@@ -46,7 +46,7 @@ fn speed(form: &SeriesForm) -> Panel {
     layers.extend(
         points(form, "true_speed_m_s").map(|points| Layer::new("truth", Ink::Plain, Shape::Dashed(points))),
     );
-    Panel { y: "speed (m/s)".to_owned(), height: Some(3), from_nought: true, layers, ..Panel::default() }
+    Panel { y: "speed (m/s)".to_owned(), height: Some(3), from_zero: true, layers, ..Panel::default() }
 }
 
 /// Against the truth where it is known, or else how wide the interval is.
@@ -72,7 +72,7 @@ fn distance(form: &SeriesForm) -> Panel {
                 ("distance (m)", lines.into_iter().filter_map(layer).collect())
             }
         };
-    Panel { x, y: y.to_owned(), height: Some(2), from_nought: true, layers }
+    Panel { x, y: y.to_owned(), height: Some(2), from_zero: true, layers }
 }
 
 fn points(form: &SeriesForm, line: &str) -> Option<Vec<(f64, f64)>> {

@@ -13,11 +13,11 @@ use footplate_sim::{LivingSwitches, TrainTruth, VirtualStation};
 use super::Extent;
 use super::timed::Timed;
 use super::world::WorldName;
-use crate::commands::drive::{DriveBeginning, ScriptRunner, Spoken};
+use crate::commands::drive::{DriveBeginning, ScriptRunner, SessionMessage};
 use crate::commands::written_layout::WrittenLayout;
 use crate::recorded::Input;
 use footplate_eval::driving::{Plan, TRAIN};
-use footplate_eval::rehearsal::{VirtualLine, calibrate};
+use footplate_eval::testbed::{VirtualLine, calibrate};
 
 /// Stops are asked for from steps whose true speed is at least this, in mm/s (chosen: slower ones may not move at all).
 const SLOWEST_MM_PER_S: f64 = 35.0;
@@ -25,8 +25,9 @@ const SLOWEST_MM_PER_S: f64 = 35.0;
 const SEEKS_AT_MM_PER_S: f64 = 250.0;
 /// ... for this long.
 const SEEKS_FOR: TimeSpan = TimeSpan::from_ms(12_000);
-/// A stop that has not ended by then is not carried out.
-const PATIENCE: TimeSpan = TimeSpan::from_ms(150_000);
+/// A line of a script that has not ended by then never will: a script waits at most 600 s for a recovery, and may then locate
+/// the train and bring it to rest first, each within the same limit.
+const PATIENCE: TimeSpan = TimeSpan::from_ms(1_950_000);
 /// No train rolls for longer after it was said to have stopped.
 const ROLLS_FOR: TimeSpan = TimeSpan::from_ms(15_000);
 /// Between two sessions.
@@ -101,7 +102,8 @@ pub(super) fn score(
     };
     let plan = Plan::new(&line, seed);
     let mut learnt = (vec![calibrated.model], vec![calibrated.fit]);
-    let mut driven = Driven { written, line, plan, turnouts: calibrated.turnouts, scored: &mut scored };
+    let mut driven =
+        Driven { written, line, plan, turnouts: calibrated.turnouts, is_stuck: false, scored: &mut scored };
     for session in 1..=extent.sessions {
         learnt = driven.session(session, extent.stops, learnt)?;
         if !driven.is_sound() {
@@ -118,6 +120,8 @@ struct Driven<'a, 'l> {
     line: VirtualLine<'l>,
     plan: Plan,
     turnouts: TurnoutStates,
+    /// A line of this session never ended: no other will be carried out.
+    is_stuck: bool,
     scored: &'a mut ScoredWorld,
 }
 
@@ -131,11 +135,16 @@ impl Driven<'_, '_> {
     ) -> anyhow::Result<(Vec<MotionModel>, Vec<MotionFit>)> {
         self.line.station.world_mut().begin_session(PAUSE);
         let mut machine = Timed::new(self.begin(learnt)?);
+        self.is_stuck = false;
         self.seek(&mut machine);
         let early_at = (self.scored.name == WorldName::EarlyStart && session == 1).then_some(stops / 2);
         for nth in 0..stops {
             if !self.is_sound() {
                 break;
+            }
+            if self.is_stuck {
+                self.failed("a stop", "the line before it never ended");
+                continue;
             }
             self.stop(&mut machine, session, early_at == Some(nth));
         }
@@ -148,8 +157,13 @@ impl Driven<'_, '_> {
     fn begin(&self, mut learnt: (Vec<MotionModel>, Vec<MotionFit>)) -> anyhow::Result<ScriptRunner> {
         let sections = SectionIndex::of(&self.written.layout);
         learnt.1.iter_mut().for_each(|fit| fit.begin_session(&sections));
-        learnt.0 = learnt.1.iter().map(|fit| fit.model().clone()).collect();
-        let beginning = DriveBeginning::of_person(self.written, &self.turnouts, learnt);
+        // A train that a recovery measured again has a model and no fit.
+        let fitted = |model: MotionModel| {
+            let fit = learnt.1.iter().find(|fit| fit.model().train() == model.train());
+            fit.map_or_else(|| model.for_later_session(), |fit| fit.model().clone())
+        };
+        learnt.0 = learnt.0.into_iter().map(fitted).collect();
+        let beginning = DriveBeginning::line_by_line(self.written, &self.turnouts, learnt);
         let text = serde_json::to_string(&beginning).context("what was learnt is kept as text")?;
         let kept: DriveBeginning = serde_json::from_str(&text).context("what was kept is read back")?;
         kept.script_runner()
@@ -162,7 +176,7 @@ impl Driven<'_, '_> {
         let Some((node, offset, step)) = asked else { return };
         if early {
             let by = TimeSpan::from_s(EARLY.as_mm() / self.true_speed(step).max(1.0));
-            self.line.station.world_mut().hasten_next_start(TRAIN, by);
+            self.line.station.world_mut().advance_next_start(TRAIN, by);
         }
         let offset = Length::from_mm(offset.as_mm().round());
         let order = format!(
@@ -175,23 +189,25 @@ impl Driven<'_, '_> {
         let ended = self.drive(
             machine,
             until,
-            |spoken| matches!(spoken, Spoken::Ended(ended) if ended.command == "stop"),
+            |message| matches!(message, SessionMessage::Ended(ended) if ended.command == "stop"),
         );
         self.until_at_rest(machine);
         match ended {
-            Some(Spoken::Ended(ended)) => match (ended.refused, ended.promise, self.beyond(node, offset)) {
-                (None, Some(promise), Some(error)) => {
-                    let promised = [promise.low.as_mm(), promise.high.as_mm()];
-                    self.scored.stops.push(ScoredStop { session, step, error, promised });
+            Some(SessionMessage::Ended(ended)) => {
+                match (ended.refused, ended.promise, self.beyond(node, offset)) {
+                    (None, Some(promise), Some(error)) => {
+                        let promised = [promise.low.as_mm(), promise.high.as_mm()];
+                        self.scored.stops.push(ScoredStop { session, step, error, promised });
+                    }
+                    (refused, ..) => {
+                        self.failed(&order, refused.as_deref().unwrap_or("no promise"));
+                        self.seek(machine);
+                    }
                 }
-                (refused, ..) => {
-                    self.failed(&order, refused.as_deref().unwrap_or("no promise"));
-                    self.seek(machine);
-                }
-            },
+            }
             _ => {
                 self.failed(&order, "not ended in time");
-                self.seek(machine);
+                self.is_stuck = true;
             }
         }
     }
@@ -236,19 +252,19 @@ impl Driven<'_, '_> {
         &mut self,
         machine: &mut Timed,
         until: Timestamp,
-        is_waited_for: impl Fn(&Spoken) -> bool,
-    ) -> Option<Spoken> {
+        is_waited_for: impl Fn(&SessionMessage) -> bool,
+    ) -> Option<SessionMessage> {
         loop {
-            let spoken = self.line.drive_hearing(machine, until, |machine, now, notice| {
+            let message = self.line.drive_hearing(machine, until, |machine, now, notice| {
                 if let Some(news) = notice.news() {
                     machine.handle_word(now, &Input::Link(news));
                 }
             })?;
-            if matches!(&spoken, Spoken::Alarm(alarm) if alarm.is_of_promises()) {
+            if matches!(&message, SessionMessage::Alarm(alarm) if alarm.is_of_promises()) {
                 self.scored.sessions_warned += 1;
             }
-            if is_waited_for(&spoken) {
-                return Some(spoken);
+            if is_waited_for(&message) {
+                return Some(message);
             }
         }
     }

@@ -6,7 +6,7 @@ use footplate_core::control::{Machine, Output};
 use footplate_core::{Event, Timestamp};
 
 use crate::clock::Stopwatch;
-use crate::commands::drive::{ScriptRunner, Spoken};
+use crate::commands::drive::{ScriptRunner, SessionMessage};
 use crate::recorded::{Input, Listener};
 
 /// Passes everything on, and counts the time it takes.
@@ -38,7 +38,7 @@ impl Timed {
 }
 
 impl Machine for Timed {
-    type Notice = Spoken;
+    type Notice = SessionMessage;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         self.time(|script_runner| script_runner.handle_event(now, event));
@@ -48,7 +48,7 @@ impl Machine for Timed {
         self.time(|script_runner| script_runner.handle_timeout(now));
     }
 
-    fn poll_output(&mut self) -> Option<Output<Spoken>> {
+    fn poll_output(&mut self) -> Option<Output<SessionMessage>> {
         self.script_runner.poll_output()
     }
 

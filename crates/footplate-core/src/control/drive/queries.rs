@@ -1,0 +1,188 @@
+//! Queries about trains and their paths, and the corrections that dispatcher and watchdog make.
+
+use alloc::collections::BTreeSet;
+
+use crate::ids::{NodeId, SensorId, TrainId, TurnoutId};
+use crate::model::MotionFit;
+use crate::time::Timestamp;
+use crate::track::Position;
+use crate::tracking::{PassedContact, Rest, TrackContext, WayPoint, place_of, way_to};
+use crate::units::Length;
+
+use super::driver::Driver;
+use super::order::OrderId;
+use super::path::{circuit_length, reversed_on_current_path, reversed_position, trailing_position};
+use super::turnout_guard::turnouts_under;
+
+impl Driver {
+    /// An order number for a sequence of orders; no single order gets it.
+    pub(in crate::control) const fn number(&mut self) -> OrderId {
+        let id = OrderId(self.orders);
+        self.orders = self.orders.wrapping_add(1);
+        id
+    }
+
+    /// The median place of rest if a stop command is sent at a time not before the last event.
+    #[must_use]
+    pub fn rest_if_stopped(&self, train: TrainId, at: Timestamp) -> Option<WayPoint> {
+        Some(self.stopped_at(train, at)?.at)
+    }
+
+    /// The same with its uncertainty and the time of rest.
+    #[must_use]
+    pub fn stopped_at(&self, train: TrainId, at: Timestamp) -> Option<Rest> {
+        let train = self.trains.get(&train)?;
+        train.locator.rest_if_stopped(self.track.context(), &train.model, at)
+    }
+
+    /// Sets the lengths of a train ahead of and behind the leading end of its pickup; not exchanged when it reverses.
+    /// The default is 250 mm, for a long locomotive.
+    pub fn set_reach(&mut self, train: TrainId, ahead: Length, behind: Length) {
+        if let Some(train) = self.trains.get_mut(&train) {
+            train.reach = [ahead, behind].map(|reach| reach.max(Length::ZERO));
+        }
+    }
+
+    /// One standard deviation of the least precise stop from a step that moves the train; `None` if no step is known
+    /// to.
+    #[must_use]
+    pub fn widest_stop(&self, train: TrainId) -> Option<Length> {
+        self.trains.get(&train)?.widest_stop
+    }
+
+    /// A sensor that should have reported the train since its last detection and did not: the train may be far behind
+    /// its estimate.
+    #[must_use]
+    pub fn missed_sensor(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
+        let (train, context) = (self.trains.get(&train)?, self.track.context());
+        train.missed_sensor().or_else(|| train.sensor_missed_before(context, &train.located(context, now)?))
+    }
+
+    /// Whether the position of a train depends on an ambiguous detection.
+    #[must_use]
+    pub fn is_position_ambiguous(&self, train: TrainId) -> bool {
+        self.association.is_ambiguous(train)
+    }
+
+    /// Measures the position of a train at rest from the node behind its pickup: turnouts further away no longer
+    /// affect it.
+    pub(in crate::control) fn count_from_behind(&mut self, now: Timestamp, train: TrainId) {
+        let Some(located) = self.locate(train, now).filter(|located| located.at_rest) else { return };
+        let at = self.position_at(train, located.at).and_then(|place| {
+            let model = &self.trains.get(&train)?.model;
+            let trailing = trailing_position(self.track.context(), model, located.at)?;
+            let behind = self.track.layout.edge(trailing.edge)?.from;
+            if behind == located.at.node { None } else { self.way_point(train, behind, place) }
+        });
+        if let Some(at) = at {
+            self.place(now, train, at, located.uncertainty);
+        }
+    }
+
+    /// The turnouts that cannot be thrown now because of this train.
+    #[must_use]
+    pub fn turnouts_under(&self, train: TrainId, now: Timestamp) -> BTreeSet<TurnoutId> {
+        let train = self.trains.get(&train);
+        train.map_or_else(BTreeSet::new, |train| turnouts_under(self.track.context(), train, now))
+    }
+
+    /// The position of a train on the layout; `None` if it is unknown.
+    #[must_use]
+    pub fn position(&self, train: TrainId, now: Timestamp) -> Option<Position> {
+        self.position_at(train, self.locate(train, now)?.at)
+    }
+
+    /// A point of a train's path as a position on the layout, with the turnouts as they are.
+    #[must_use]
+    pub fn position_at(&self, train: TrainId, at: WayPoint) -> Option<Position> {
+        place_of(self.track.context(), &self.trains.get(&train)?.model, at)
+    }
+
+    /// A position on the layout as a point of a train's path ahead of another point; on a circuit, after one more lap
+    /// if need be.
+    #[must_use]
+    pub fn way_point_ahead(&self, train: TrainId, from: WayPoint, to: Position) -> Option<WayPoint> {
+        let found = self.way_point(train, from.node, to)?;
+        if found.way > from.way {
+            return Some(found);
+        }
+        let lap = circuit_length(self.track.context(), &self.trains.get(&train)?.model, from.node)?;
+        Some(WayPoint { way: found.way + lap, ..found })
+    }
+
+    /// Where the leading end of the pickup will be once a train at rest has reversed. It is then measured from the
+    /// node behind it: a turnout there must be set for the track under the train.
+    #[must_use]
+    pub fn reversed_position(&self, train: TrainId, now: Timestamp) -> Option<Position> {
+        let at = self.locate(train, now)?.at;
+        reversed_position(self.track.context(), &self.trains.get(&train)?.model, at)
+    }
+
+    /// The same for a train that would be at rest at a position, arriving on any path.
+    #[must_use]
+    pub fn reversed_position_at(&self, place: Position) -> Option<Position> {
+        reversed_on_current_path(self.track.context(), place)
+    }
+
+    /// A position on the layout as a point of a train's path from a node, with the turnouts as they are; `None` if no
+    /// path leads there.
+    #[must_use]
+    pub fn way_point(&self, train: TrainId, from: NodeId, to: Position) -> Option<WayPoint> {
+        let way = way_to(self.track.context(), &self.trains.get(&train)?.model, from, to)?;
+        Some(WayPoint { node: from, way })
+    }
+
+    /// Gives up the position of a train that was found to be wrong.
+    pub fn lose(&mut self, now: Timestamp, train: TrainId) {
+        self.association.forget(train);
+        let context = self.track.context();
+        if let Some(train) = self.trains.get_mut(&train) {
+            train.locator.lose();
+            train.passages.forget();
+            train.clear_missed();
+            train.expect_next(context, now);
+        }
+        self.update_line_requests(now);
+    }
+
+    /// The layout, turnouts and lengths as estimators use them.
+    pub(crate) const fn context(&self) -> TrackContext<'_> {
+        self.track.context()
+    }
+
+    /// The next sensor ahead of a train, with the turnouts as they are, whether or not the train moves.
+    #[must_use]
+    pub fn sensor_ahead(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
+        let located = self.locate(train, now)?;
+        let context = self.track.context();
+        let model = self.model(train)?;
+        let mut way = Length::ZERO;
+        let hops = context.hops_ahead(located.at.node).take(context.layout.nodes().len());
+        for hop in hops {
+            way += model.length(context.sections, &hop)[0];
+            if way > located.at.way {
+                return hop.sensor;
+            }
+        }
+        None
+    }
+
+    /// The path length of a train from one node to the next sensor's node; `None` if `to` is not that node.
+    #[must_use]
+    pub fn hop_length(&self, train: TrainId, from: NodeId, to: NodeId) -> Option<Length> {
+        let context = self.track.context();
+        let hop = context.hop_from(from).filter(|hop| hop.to == to)?;
+        Some(self.model(train)?.length(context.sections, &hop)[0])
+    }
+
+    /// The node of the sensor that a train passed.
+    #[must_use]
+    pub fn node_passed(&self, passed: &PassedContact) -> Option<NodeId> {
+        self.track.layout.sensor_node(passed.sensor)
+    }
+
+    /// Repeats the fit of a train's motion; see [`MotionFit::refit`].
+    pub(crate) fn refit(&self, fit: &mut MotionFit) {
+        fit.refit(&self.track.sections);
+    }
+}

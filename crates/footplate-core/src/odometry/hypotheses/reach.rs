@@ -1,0 +1,248 @@
+//! Which speeds the train can have while both wheelsets may have lost the rail together.
+//!
+//! Two wheels that creep alike look like two wheels that roll: no likelihood tells them apart, so no probability can be
+//! trusted there. While brake or traction act on both wheelsets, the interval therefore reaches beyond the wheels by the
+//! creepage that goes unseen. Once both were seen to slip, it reaches as far as the train can have accelerated since.
+//! That ends where wheels must roll: some time after brake and traction were released.
+
+use super::evidence::{Compared, SILENT};
+use super::scene::{Scene, WheelScene};
+use crate::odometry::wheels::{Range, larger, smaller};
+
+/// Creepage of both wheelsets that begins unseen (part of the speed), under the brake and in traction. Steady creepage of
+/// converters and proportional protection reaches 0.2, but all beyond this begins visibly; rolling contact on a wet rail
+/// takes 0.05 for full traction.
+const UNSEEN: [f64; 2] = [0.2, 0.08];
+/// The same where no command is recorded: most of the time that the wheels' acceleration is taken for, nothing acts.
+const UNSEEN_UNTOLD: [f64; 2] = [0.14, 0.07];
+/// Wheels that begin to creep faster than this are seen to (m/s²).
+const UNSEEN_RATE: f64 = 0.8;
+/// Wheels that turn alike so soon after one was turned up to the train (s), and slip with no more than this probability,
+/// roll.
+const TOUCHED_S: f64 = 3.0;
+const ROLLS: f64 = 0.01;
+/// The same of wheelsets that are braked independently: no converter holds both.
+const UNSEEN_INDEPENDENT: f64 = 0.04;
+/// A command of less acceleration than this is carried by what ice leaves of adhesion (m/s²).
+const SLIDES_BY: f64 = 0.2;
+/// Creepage of both that lasts after they were seen to slip: part of the speed, and m/s.
+const LASTING: (f64, f64) = (0.25, 1.0);
+/// Probability at which both are seen to slip, and below which wheels that turn alike creep within limits.
+const SEEN: f64 = 0.3;
+const ALIKE: f64 = 0.05;
+/// Wheels turn alike that differ by less than this part of their speed, and this (m/s), for so long (s).
+const APART: (f64, f64) = (0.03, 0.3);
+const ALIKE_FOR_S: f64 = 1.0;
+/// Deviations within which a wheel tells its own speed.
+const OF_WHEEL: f64 = 4.0;
+/// How long after brake or traction ended both roll (s).
+const ROLLS_AFTER_S: f64 = 5.0;
+/// How far the train accelerates beyond its command while both slip (m/s²): gradients of 35 mm/m ...
+const GRADIENT: f64 = 0.35;
+/// ... and how much it decelerates at least with locked wheels (m/s²): by ice of 0.012 of which a fifth is left.
+const LOCKED: f64 = 0.025;
+/// Least effort that makes wheels creep.
+const EFFORT: f64 = 0.02;
+/// Acceleration of wheels by which a train without a recorded command is braked or driven (m/s²).
+const TREND: f64 = 0.03;
+
+/// How far the train may be from its wheels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reach {
+    /// Speeds that the train can have (m/s).
+    speed: Range,
+    /// Both were seen to slip, and have not had to roll since.
+    slipped: bool,
+    alike_for: f64,
+    /// Time since brake and traction acted (s).
+    since: [f64; 2],
+    /// Time since both rolled for certain (s).
+    since_rolling: f64,
+    /// The acceleration that was last commanded (m/s²).
+    by: f64,
+}
+
+impl Reach {
+    pub(super) const fn new() -> Self {
+        let speed = Range { low: 0.0, high: 0.0 };
+        Self {
+            speed,
+            slipped: false,
+            alike_for: 0.0,
+            since: [f64::INFINITY; 2],
+            since_rolling: f64::INFINITY,
+            by: 0.0,
+        }
+    }
+
+    /// The train has turned round.
+    pub(super) fn reverse(&mut self) {
+        self.speed = self.speed.reversed();
+    }
+
+    /// Widens the interval `likely` of a period of `t` seconds. `p` are the probabilities of the hypotheses, `since_touch` the
+    /// time since a wheel was turned up to the train (s), `wheels_a` how the wheels accelerate (m/s²).
+    pub(super) fn widen(
+        &mut self,
+        likely: Range,
+        scene: &Scene,
+        wheels: &[Compared; 2],
+        p: [f64; 8],
+        (since_touch, wheels_a): (f64, f64),
+        t: f64,
+    ) -> Range {
+        let [.., slip, creep, _, first_dead, second_dead] = p;
+        let silent = wheels.iter().all(|wheel| wheel.speed.abs() < SILENT);
+        let [brakes, drives] = self.acts(scene, silent, wheels_a);
+        for (since, acts) in self.since.iter_mut().zip([brakes, drives]) {
+            *since = if acts { 0.0 } else { *since + t };
+        }
+        let [brake, traction] = self.since.map(|since| 1.0 - smaller(since / ROLLS_AFTER_S, 1.0));
+        let dead = first_dead + second_dead;
+        let turn_alike = turn_alike(scene, wheels, [first_dead, second_dead]);
+        let creeps_at_most = slip + creep < ALIKE && turn_alike && !(silent && self.slipped && brakes);
+        self.alike_for = if creeps_at_most { self.alike_for + t } else { 0.0 };
+        let alike = self.alike_for >= ALIKE_FOR_S;
+        let free = brake <= 0.0 && traction <= 0.0;
+        // A wheel that spins is slowed down to no certain speed.
+        let is_known = scene.commanded.is_some() && traction <= 0.0;
+        let touched = is_known && since_touch < TOUCHED_S && slip + creep + dead < ROLLS;
+        let roll = alike && (free || touched);
+        self.slipped = slip + creep + dead > SEEN && !free || self.slipped && !roll;
+        self.since_rolling = if roll { 0.0 } else { self.since_rolling + t };
+
+        let Range { low, high } = scene.acceleration;
+        let commanded = scene.commanded.unwrap_or(0.0);
+        let up = if silent && brakes { -LOCKED } else { GRADIENT + larger(commanded, 0.0) };
+        let (up, down) = match scene.commanded {
+            Some(_) => (smaller(high, up), larger(low, smaller(commanded, 0.0) - GRADIENT)),
+            None => (smaller(high, if silent { 0.0 } else { high }), low),
+        };
+        let reaches = Range { low: self.speed.low + down * t, high: self.speed.high + up * t };
+        if brakes || drives {
+            self.by = scene.commanded.map_or(SLIDES_BY, f64::abs);
+        }
+        let effort = smaller(self.by / SLIDES_BY, 1.0);
+        let moving = larger(likely.high.abs(), likely.low.abs());
+        let creeps = |unseen: f64| {
+            let unseen = if scene.independent { UNSEEN_INDEPENDENT * effort } else { unseen };
+            if self.slipped {
+                LASTING.0 * moving + LASTING.1
+            } else {
+                smaller(
+                    unseen * moving,
+                    if is_known { UNSEEN_RATE * self.since_rolling } else { f64::INFINITY },
+                )
+            }
+        };
+        let unseen = if scene.commanded.is_some() { UNSEEN } else { UNSEEN_UNTOLD };
+        let [of_brake, of_traction] = unseen.map(creeps);
+        let about = Range { low: likely.low - traction * of_traction, high: likely.high + brake * of_brake };
+        let reached = if alike || free && !self.slipped { reaches.and(about) } else { reaches };
+        self.speed = Range { low: smaller(reached.low, likely.low), high: larger(reached.high, likely.high) };
+        if dead > SEEN && !turn_alike {
+            // The sensor that is taken for dead may be the one that is right.
+            self.speed = wheels.iter().fold(self.speed, |all, wheel| {
+                let off = OF_WHEEL * libm::sqrt(wheel.variance);
+                all.or(Range { low: wheel.speed - off, high: wheel.speed + off })
+            });
+        }
+        self.speed
+    }
+
+    /// Whether brake and traction act on both wheelsets.
+    fn acts(&self, scene: &Scene, silent: bool, wheels_a: f64) -> [bool; 2] {
+        let [brakes, drives] = match scene.commanded {
+            Some(commanded) => [commanded < -EFFORT, commanded > EFFORT],
+            // Wheels that a brake has locked show nothing more of it.
+            None if silent => self.since.map(|since| since <= 0.0),
+            None => [wheels_a < -TREND, wheels_a > TREND],
+        };
+        let all = |of: fn(&WheelScene) -> bool| scene.wheels.iter().all(of);
+        [brakes && all(|wheel| wheel.braked), drives && all(|wheel| wheel.driven)]
+    }
+}
+
+/// Whether what is read of the wheels is one speed; `dead` is the probability that the sensor of each is.
+fn turn_alike(scene: &Scene, [one, other]: &[Compared; 2], [first_dead, second_dead]: [f64; 2]) -> bool {
+    let [first, second] = &scene.wheels;
+    let quiet = |wheel: &WheelScene, compared: &Compared, dead: f64| {
+        !wheel.read || wheel.stuck || dead > 0.5 && compared.speed.abs() < SILENT
+    };
+    if quiet(first, one, first_dead) || quiet(second, other, second_dead) {
+        return true;
+    }
+    let (part, least) = APART;
+    let noise = libm::sqrt(one.variance + other.variance);
+    (one.speed - other.speed).abs() < part * one.speed.abs() + least + 2.0 * noise
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wheel(speed: f64) -> WheelScene {
+        WheelScene {
+            counted: 0.05 * speed,
+            late: 0.0,
+            read: true,
+            stuck: false,
+            speed,
+            speed_deviation: 0.05,
+            acceleration: 0.0,
+            acceleration_deviation: 0.5,
+            pitch: 0.03,
+            tolerance: 0.002,
+            braked: true,
+            driven: false,
+        }
+    }
+
+    /// The width above the wheels after so many seconds of a command (m/s²) with wheels at 20 m/s that slip with this
+    /// probability.
+    fn above(reach: &mut Reach, commanded: f64, slip: f64, seconds: f64) -> f64 {
+        let scene = Scene {
+            wheels: [wheel(20.0); 2],
+            acceleration: Range { low: -1.5, high: 0.4 },
+            rolling: Range { low: -1.5, high: 0.4 },
+            commanded: Some(commanded),
+            brake: 0.0,
+            traction: 0.0,
+            slide: true,
+            slip: true,
+            felt: None,
+            independent: false,
+            top_speed: 40.0,
+        };
+        let compared = [Compared { speed: 20.0, variance: 0.0025 }; 2];
+        let p = [1.0 - slip, 0.0, 0.0, slip, 0.0, 0.0, 0.0, 0.0];
+        let likely = Range { low: 19.8, high: 20.2 };
+        let mut high = 0.0;
+        for _ in 0..(seconds / 0.05) as usize {
+            high = reach.widen(likely, &scene, &compared, p, (f64::INFINITY, 0.0), 0.05).high;
+        }
+        high - likely.high
+    }
+
+    #[test]
+    fn brakes_widen_it_by_unseen_creepage_and_coasting_ends_that() {
+        let mut reach = Reach::new();
+        assert!(above(&mut reach, 0.0, 0.0, 10.0) < 1e-9, "coasting");
+        let soon = above(&mut reach, -0.5, 0.0, 1.5);
+        assert!(soon > 0.1 && soon < 0.8 * 1.6, "{soon}: no more than the reach and the rate allow");
+        let long = above(&mut reach, -0.5, 0.0, 60.0);
+        assert!((long - 0.2 * 20.2).abs() < 1e-9, "{long}: a fifth of the speed");
+        assert!(above(&mut reach, 0.0, 0.0, 6.0) < 1e-9, "coasting again");
+    }
+
+    #[test]
+    fn after_a_slip_of_both_it_lasts_as_long_as_the_brake() {
+        let mut reach = Reach::new();
+        above(&mut reach, 0.0, 0.0, 10.0);
+        let slides = above(&mut reach, -0.5, 0.9, 10.0);
+        assert!((slides - 0.35 * 10.0).abs() < 0.2, "{slides}: what gradients add");
+        let alike = above(&mut reach, -0.5, 0.0, 10.0);
+        assert!(alike > 5.0 && alike <= 0.25 * 20.2 + 1.0 + 1e-9, "{alike}");
+        assert!(above(&mut reach, 0.0, 0.0, 6.0) < 1e-9, "they roll");
+    }
+}

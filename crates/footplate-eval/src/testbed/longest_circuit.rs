@@ -1,0 +1,62 @@
+//! The longest circuit with all turnouts straight, and places beside it.
+
+use std::collections::BTreeSet;
+
+use footplate_core::track::{Layout, Leg, TurnoutStates};
+use footplate_core::{EdgeId, Length, NodeId};
+
+/// The least length of an edge that a train may rest on beside the circuit, and its place past the sensor.
+const BESIDE_CIRCUIT: [Length; 2] = [Length::from_mm(500.0), Length::from_mm(300.0)];
+/// The most sensors of a circuit (chosen).
+const MAX_SENSORS: usize = 60;
+
+/// A circuit.
+pub struct LongestCircuit {
+    /// Its sensors in the order of travel.
+    pub nodes: Vec<NodeId>,
+    /// Its edges in the order of travel.
+    pub edges: Vec<EdgeId>,
+    /// Places past sensors that are not on it.
+    pub beside: Vec<(NodeId, Length)>,
+}
+
+impl LongestCircuit {
+    /// The sum of the surveyed lengths of its first edges (mm).
+    pub fn surveyed(&self, layout: &Layout, edges: usize) -> f64 {
+        let edges = self.edges.iter().take(edges).filter_map(|edge| layout.edge(*edge));
+        edges.map(|edge| edge.length.as_mm()).sum()
+    }
+
+    /// Finds the circuit with the most sensors; empty if there is none.
+    pub fn of(layout: &Layout) -> Self {
+        let turnouts: TurnoutStates =
+            layout.turnouts().map(|(turnout, _)| (turnout, Leg::Straight)).collect();
+        let from = |start: NodeId| {
+            let (mut nodes, mut edges, mut node) = (Vec::new(), Vec::new(), start);
+            for _ in 0..MAX_SENSORS {
+                let hop = layout.open_hops_from(node, &turnouts).next()?;
+                hop.sensor?;
+                nodes.push(node);
+                edges.extend_from_slice(hop.edges);
+                node = hop.to;
+                if node == start {
+                    return Some((nodes, edges));
+                }
+            }
+            None
+        };
+        let rounds = layout.sensors().filter_map(|(_, node)| from(node));
+        let (nodes, edges) = rounds.max_by_key(|(nodes, _)| nodes.len()).unwrap_or_default();
+        let taken: BTreeSet<_> = edges.iter().map(|edge| edge.stretch()).collect();
+        let beside = layout
+            .sensors()
+            .filter_map(|(_, node)| {
+                let edge = *layout.open_hops_from(node, &turnouts).next()?.edges.first()?;
+                let length = layout.edge(edge)?.length;
+                (length >= BESIDE_CIRCUIT[0] && !taken.contains(&edge.stretch()))
+                    .then_some((node, BESIDE_CIRCUIT[1]))
+            })
+            .collect();
+        Self { nodes, edges, beside }
+    }
+}

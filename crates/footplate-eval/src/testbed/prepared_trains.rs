@@ -1,0 +1,183 @@
+//! Several trains on one layout, each calibrated alone, and then put where a score needs them.
+
+use std::collections::BTreeMap;
+
+use anyhow::Context;
+use footplate_core::control::{Driver, Machine};
+use footplate_core::model::MotionModel;
+use footplate_core::track::{Layout, Leg, Position, TurnoutStates};
+use footplate_core::tracking::WayPoint;
+use footplate_core::{Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_sim::living::{End, LivingLayout, LivingSwitches, VirtualStation};
+
+use super::{VirtualLine, calibrate};
+
+/// The standard deviation of a position that an operator reads off: the end of the shoe beside a sensor, whose own
+/// place is known to 5 mm.
+const READ_OFF_BY_HAND: Length = Length::from_mm(12.0);
+/// The time in which repeated commands to lifted trains end.
+const REPEATS_END: TimeSpan = TimeSpan::from_s(12.0);
+
+/// A world with calibrated trains.
+#[derive(Clone)]
+pub struct PreparedTrains<'l> {
+    layout: &'l Layout,
+    /// The link to the station.
+    pub line: VirtualLine<'l>,
+    /// The calibrated models.
+    pub models: BTreeMap<TrainId, MotionModel>,
+    /// The turnout positions: all straight at first.
+    pub turnouts: TurnoutStates,
+    /// Where trains were put.
+    places: BTreeMap<TrainId, WayPoint>,
+}
+
+impl<'l> PreparedTrains<'l> {
+    /// Draws trains and track from the seed, calibrates each train while the others are off the layout, lifts them all,
+    /// and sets all turnouts straight. A calibration with a fault is repeated from another place.
+    ///
+    /// # Errors
+    /// The layout has no room for a train.
+    pub fn prepare(
+        layout: &'l Layout,
+        seed: u64,
+        trains: &[TrainId],
+        switches: &LivingSwitches,
+        budget: TimeSpan,
+    ) -> anyhow::Result<Self> {
+        Self::prepare_on(layout, layout, seed, trains, switches, budget)
+    }
+
+    /// The same, with trains calibrated on the layout `assumed`, whose lengths may differ from the true ones.
+    ///
+    /// # Errors
+    /// The layout has no room for a train.
+    pub fn prepare_on(
+        layout: &'l Layout,
+        assumed: &Layout,
+        seed: u64,
+        trains: &[TrainId],
+        switches: &LivingSwitches,
+        budget: TimeSpan,
+    ) -> anyhow::Result<Self> {
+        let mut station = VirtualStation::draw(layout, seed, trains, switches)?;
+        let starts_at: Vec<Option<(Position, End)>> = trains
+            .iter()
+            .map(|train| {
+                let truth = station.world().truth().train(*train)?;
+                Some((truth.position?, truth.leads))
+            })
+            .collect();
+        trains.iter().for_each(|train| station.world_mut().lift(*train));
+        let mut line = VirtualLine::open(station)?;
+        let mut models = BTreeMap::new();
+        for (nth, train) in trains.iter().enumerate() {
+            // The route ahead of a train is unknown at first. If it runs off the track, it starts again from another
+            // train's place.
+            let starts = starts_at.iter().cycle().skip(nth).take(trains.len()).flatten();
+            let mut model = None;
+            for (position, leads) in starts {
+                let faults = line.station.world().mishaps().len();
+                line.station.world_mut().place(*train, *position, *leads)?;
+                model = Some(calibrate(assumed, &mut line, *train, budget).model);
+                line.station.world_mut().lift(*train);
+                if line.station.world().mishaps().len() == faults {
+                    break;
+                }
+            }
+            models.insert(*train, model.with_context(|| format!("there is no room for train {train}"))?);
+        }
+        let mut turnouts = TurnoutStates::unknown();
+        for (turnout, _) in layout.turnouts() {
+            line.station.world_mut().lay(turnout, Leg::Straight);
+            turnouts.set(turnout, Leg::Straight);
+        }
+        let mut prepared = Self { layout, line, models, turnouts, places: BTreeMap::new() };
+        prepared.drain_commands();
+        Ok(prepared)
+    }
+
+    /// Waits until commands in transit have reached the decoders of lifted trains.
+    fn drain_commands(&mut self) {
+        let until = self.line.now() + REPEATS_END;
+        while self.line.drive(&mut Idle, until).is_some() {}
+    }
+
+    /// The world, with the truth.
+    pub fn world(&self) -> &LivingLayout<'l> {
+        self.line.station.world()
+    }
+
+    /// Puts a train down with the leading end of its shoe past the sensor at a node, nose first, in the node's
+    /// direction.
+    ///
+    /// # Errors
+    /// There is no room.
+    pub fn put(&mut self, train: TrainId, node: NodeId, offset: Length) -> anyhow::Result<()> {
+        let at = footplate_core::track::Landmark { node, offset };
+        let position = self.layout.locate(at, &self.turnouts)?;
+        self.line.station.world_mut().place(train, position, End::Nose)?;
+        self.places.insert(train, WayPoint { node, way: offset });
+        Ok(())
+    }
+
+    /// A driver that knows the trains and their places.
+    pub fn driver(&self) -> Driver {
+        self.driver_on(self.layout)
+    }
+
+    /// The same, on a layout whose lengths may differ.
+    pub fn driver_on(&self, layout: &Layout) -> Driver {
+        let mut driver = Driver::new(layout.clone(), self.turnouts.clone());
+        for (train, at) in &self.places {
+            if let Some(model) = self.models.get(train) {
+                driver.add_train(model.clone());
+                driver.place(self.line.now(), *train, *at, READ_OFF_BY_HAND);
+            }
+        }
+        driver
+    }
+}
+
+/// A machine that sends no commands.
+struct Idle;
+
+impl Machine for Idle {
+    type Notice = SpeedStep;
+
+    fn handle_event(&mut self, _: Timestamp, _: &footplate_core::Event) {}
+    fn handle_timeout(&mut self, _: Timestamp) {}
+    fn poll_output(&mut self) -> Option<footplate_core::control::Output<SpeedStep>> {
+        None
+    }
+    fn next_timeout(&self) -> Option<Timestamp> {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use footplate_store::layout_named;
+
+    #[test]
+    fn trains_are_located_at_rest_where_they_were_put() {
+        let layout = layout_named("track-a").expect("built in").layout;
+        let trains = [TrainId(24), TrainId(58)];
+        let budget = TimeSpan::from_s(60.0);
+        let switches = LivingSwitches::well_kept();
+        let mut prepared =
+            PreparedTrains::prepare(&layout, 3, &trains, &switches, budget).expect("two trains");
+        for (train, sensor) in trains.into_iter().zip(["C13", "D5"]) {
+            let node = layout.node_named(sensor).expect("a sensor of track A");
+            prepared.put(train, node, Length::from_mm(60.0)).expect("room");
+            let driver = prepared.driver();
+            let located = driver.locate(train, prepared.line.now()).expect("placed");
+            assert_eq!(located.at.node, node);
+            let sensor = layout.sensor_at(node).expect("a sensor");
+            let past = prepared.world().truth().felt_past(train, sensor).expect("near");
+            assert!((past - located.at.way).abs() < Length::from_mm(30.0), "{past:?}");
+            assert!(driver.is_at_rest(train, prepared.line.now()));
+        }
+    }
+}

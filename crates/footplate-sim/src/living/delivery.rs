@@ -1,0 +1,87 @@
+//! How what a station says in a stream is cut into portions on its way.
+
+use std::collections::VecDeque;
+
+use footplate_core::{TimeSpan, Timestamp};
+
+use crate::draws::Draws;
+
+/// Messages that are merged wait for others for up to so long.
+const MERGED_EVERY: TimeSpan = TimeSpan::from_ms(20);
+/// The second part of a split message comes so much later (s).
+const SPLIT_S: std::ops::Range<f64> = 0.000_5..0.005;
+
+/// How messages are cut.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Delivery {
+    /// A message arrives by itself.
+    #[default]
+    Each,
+    /// What is said within 20 ms arrives together.
+    Merged,
+    /// A message arrives in two parts.
+    Split,
+}
+
+/// What is on its way to the host, and when it arrives.
+#[derive(Debug, Clone)]
+pub(crate) struct Outgoing {
+    delivery: Delivery,
+    /// From one line to the next when each arrives by itself.
+    line_time: TimeSpan,
+    line_is_free: Timestamp,
+    portions: VecDeque<(Timestamp, Vec<u8>)>,
+}
+
+impl Outgoing {
+    pub(crate) fn new(now: Timestamp, delivery: Delivery, line_time: TimeSpan) -> Self {
+        Self { delivery, line_time, line_is_free: now, portions: VecDeque::new() }
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.portions.clear();
+    }
+
+    /// When the next portion arrives.
+    pub(crate) fn due(&self) -> Option<Timestamp> {
+        self.portions.front().map(|(at, _)| *at)
+    }
+
+    /// The portion that arrives next.
+    pub(crate) fn take(&mut self) -> Option<Vec<u8>> {
+        let (at, mut bytes) = self.portions.pop_front()?;
+        while self.delivery == Delivery::Merged
+            && let Some((_, more)) = self.portions.pop_front_if(|(other, _)| *other <= at)
+        {
+            bytes.extend(more);
+        }
+        Some(bytes)
+    }
+
+    /// Puts lines on their way.
+    pub(crate) fn post(&mut self, now: Timestamp, bytes: &[u8], draws: &mut Draws) {
+        let last = self.portions.back().map_or(now, |(last, _)| (*last).max(now));
+        match self.delivery {
+            Delivery::Each => {
+                for line in bytes.split_inclusive(|byte| *byte == b'\n') {
+                    let due = self.line_is_free.max(now);
+                    self.line_is_free = due + self.line_time;
+                    self.portions.push_back((due, line.to_vec()));
+                }
+            }
+            Delivery::Merged => {
+                let every = MERGED_EVERY.as_ns();
+                let due = (last - Timestamp::ZERO).as_ns().div_euclid(every) * every + every;
+                let due = Timestamp::ZERO + TimeSpan::from_ns(due);
+                let due = self.portions.back().map_or(due, |(last, _)| *last);
+                self.portions.push_back((due, bytes.to_vec()));
+            }
+            Delivery::Split => {
+                let (first, second) = bytes.split_at(draws.below(bytes.len() + 1));
+                self.portions.push_back((last, first.to_vec()));
+                let later = last + TimeSpan::from_s(draws.uniform(SPLIT_S));
+                self.portions.push_back((later, second.to_vec()));
+            }
+        }
+    }
+}

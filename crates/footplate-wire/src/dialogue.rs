@@ -1,0 +1,376 @@
+//! The state that every session with a confirming station shares.
+//!
+//! Commands wait in a queue that sends stops first. Each train has at most one request without an answer, which is repeated until
+//! the station confirms it. A session adds its codec, its questions while the line opens, and the meaning of the station's messages.
+
+use alloc::collections::{BTreeMap, VecDeque};
+use alloc::vec::Vec;
+
+use footplate_core::{
+    Command, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+};
+
+use crate::farewell::Farewell;
+use crate::locomotives::{Locomotive, Locomotives};
+use crate::outstanding::{AllOutstanding, Awaited, Outgoing, Outstanding};
+use crate::pacing::Pacing;
+use crate::queue::{Queue, entry_of, train_of};
+use crate::session::{Closing, CommandError, LinkNotice, Transmit};
+use crate::silence::{Checks, Silence};
+
+/// The state of a session with one station.
+#[derive(Debug, Clone)]
+pub(crate) struct Dialogue<A: Awaited> {
+    pub(crate) now: Timestamp,
+    pub(crate) pacing: Pacing,
+    pub(crate) silence: Silence,
+    checks: Checks,
+    pub(crate) waiting: Queue,
+    pub(crate) outstanding: AllOutstanding<A>,
+    pub(crate) locomotives: Locomotives,
+    /// Whether each turnout is set to its curved leg, as the station reported.
+    turnouts: BTreeMap<TurnoutId, bool>,
+    /// Whether the track should have power, and whether the station reported that it has.
+    pub(crate) power: bool,
+    pub(crate) is_powered: bool,
+    /// How much longer than usual for this station the line may delay a report.
+    pub(crate) excess: TimeSpan,
+    /// When the last message arrived.
+    pub(crate) heard: Timestamp,
+    /// Time of the last entry in the recording; entries stay in order.
+    pub(crate) last_entry: Timestamp,
+    pub(crate) farewell: Farewell,
+    /// Whether to stop all locomotives next, including those that cannot be commanded yet.
+    stops_all: bool,
+    pub(crate) output: VecDeque<Transmit>,
+}
+
+/// What to do with a request whose answer is overdue.
+pub(crate) enum Repeat<A: Awaited> {
+    /// Write it again.
+    Again(Outgoing<A>),
+    /// Give it up: it was written often enough.
+    GivenUp(Outstanding<A>),
+}
+
+impl<A: Awaited> Dialogue<A> {
+    pub(crate) fn new(now: Timestamp, pacing: Pacing, checks: Checks) -> Self {
+        Self {
+            now,
+            pacing,
+            silence: Silence::new(checks),
+            checks,
+            waiting: Queue::default(),
+            outstanding: AllOutstanding::new(),
+            locomotives: Locomotives::default(),
+            turnouts: BTreeMap::new(),
+            power: true,
+            is_powered: false,
+            excess: TimeSpan::ZERO,
+            heard: now,
+            last_entry: now,
+            farewell: Farewell::default(),
+            stops_all: false,
+            output: VecDeque::new(),
+        }
+    }
+
+    /// Advances the clock; returns whether the station has just become silent.
+    pub(crate) fn watch(&mut self, now: Timestamp) -> bool {
+        self.now = now;
+        let notice = self.silence.watch(now);
+        notice.into_iter().map(|notice| self.notify(notice)).count() > 0
+    }
+
+    /// Resets what was on the line after it was opened again.
+    pub(crate) fn reopened(&mut self) {
+        self.silence = Silence::new(self.checks);
+        self.outstanding.clear();
+        if self.farewell.has_begun() {
+            self.stop_driven();
+        }
+    }
+
+    pub(crate) fn notify(&mut self, notice: LinkNotice) {
+        self.output.push_back(Transmit::Notice(notice));
+    }
+
+    /// Adds an entry to the recording.
+    pub(crate) fn enter(&mut self, time: Timestamp, kind: EventKind) {
+        self.last_entry = self.last_entry.max(time);
+        self.output.push_back(Transmit::Event(Event { time, kind }));
+    }
+
+    /// A sensor became occupied within a span that ends at `latest`.
+    pub(crate) fn report(&mut self, sensor: SensorId, latest: Timestamp, width: TimeSpan) {
+        let poll_interval = Some(width + self.excess);
+        self.enter(latest, EventKind::Sensor(Report { sensor, poll_interval }));
+    }
+
+    pub(crate) fn write(&mut self, bytes: Vec<u8>) {
+        self.output.push_back(Transmit::Message(bytes));
+    }
+
+    /// Notes that a message arrived; returns whether the station was silent before.
+    pub(crate) fn hear(&mut self, now: Timestamp) -> bool {
+        self.heard = now;
+        self.silence.heard()
+    }
+
+    /// Counts bytes that form no message.
+    pub(crate) fn hear_noise(&mut self, bytes: usize) {
+        if bytes > 0
+            && let Some(notice) = self.silence.heard_noise(bytes)
+        {
+            self.notify(notice);
+        }
+    }
+
+    // What is written next.
+
+    /// Whether anything may be written now.
+    pub(crate) fn may_write(&self, now: Timestamp) -> bool {
+        !self.farewell.is_over() && now >= self.pacing.urgent_at()
+    }
+
+    /// Whether to stop all locomotives now; true once.
+    pub(crate) fn take_stop_of_all(&mut self) -> bool {
+        core::mem::take(&mut self.stops_all)
+    }
+
+    /// Returns the next command that stops something. With `directed`, a stop needs a known direction, because it would set one.
+    pub(crate) fn next_stop(&mut self, now: Timestamp, directed: bool) -> Option<Command> {
+        let (locomotives, outstanding) = (&self.locomotives, &self.outstanding);
+        self.waiting.next_urgent(|command| {
+            train_of(command).is_none_or(|train| {
+                let is_free = outstanding.blocks(train, true).is_none_or(|until| now >= until);
+                is_free && (!directed || locomotives.has_direction(train))
+            })
+        })
+    }
+
+    /// Returns a request whose answer is overdue, unless a newer command replaces it.
+    pub(crate) fn next_repeat(&mut self, now: Timestamp, only_urgent: bool) -> Option<Repeat<A>> {
+        loop {
+            let due = self.outstanding.take_due(now, only_urgent)?;
+            let Outstanding { request, awaited, command, tries, .. } = due;
+            if command.is_some_and(|command| self.waiting.outdates(command)) {
+                continue;
+            }
+            if due.is_exhausted() {
+                if let Some(command) = command {
+                    self.notify(LinkNotice::Unconfirmed { command });
+                }
+                return Some(Repeat::GivenUp(due));
+            }
+            if let Some(command) = command.filter(|_| tries > A::REPEATS.usual) {
+                self.notify(LinkNotice::Repeated { command });
+            }
+            let tries = tries.saturating_add(1);
+            return Some(Repeat::Again(Outgoing { request, awaited: Some(awaited), command, tries }));
+        }
+    }
+
+    /// Returns, at the end, a train to stop whose direction is unknown and not asked for yet.
+    pub(crate) fn undirected_at_end(&self) -> Option<TrainId> {
+        let is_unasked = |train: &TrainId| {
+            !self.locomotives.has_direction(*train) && self.outstanding.blocks(*train, false).is_none()
+        };
+        let waits = matches!(self.farewell, Farewell::Stopping { .. });
+        self.locomotives.driven(false).into_iter().filter(|_| waits).find(is_unasked)
+    }
+
+    /// Whether to switch the power off now; true once.
+    pub(crate) fn switch_off_is_due(&mut self, now: Timestamp) -> bool {
+        self.farewell.switch_off_is_due(now, &self.locomotives)
+    }
+
+    /// Returns a train with a waiting command whose direction must be asked for first.
+    pub(crate) fn undirected(&self, is_asked: impl Fn(TrainId) -> bool) -> Option<TrainId> {
+        let asks = |train: &TrainId| !self.locomotives.has_direction(*train) && !is_asked(*train);
+        self.waiting.iter().filter_map(train_of).find(asks)
+    }
+
+    /// Returns the next command that is not urgent; `may_throw`: whether a turnout may be thrown now.
+    pub(crate) fn next_command(&mut self, may_throw: bool) -> Option<Command> {
+        let (locomotives, outstanding) = (&self.locomotives, &self.outstanding);
+        self.waiting.next_usual(|command| match command {
+            Command::Turnout { turnout, .. } => {
+                may_throw && !outstanding.any(|awaited| awaited.turnout() == Some(*turnout))
+            }
+            _ => train_of(command).is_none_or(|train| {
+                locomotives.has_direction(train) && outstanding.blocks(train, false).is_none()
+            }),
+        })
+    }
+
+    /// Notes the commanded step of a train, reversed or not; returns whether it then runs forward.
+    pub(crate) fn commanded(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> bool {
+        self.locomotives.know(train);
+        let Some(locomotive) = self.locomotives.get_mut(train) else { return true };
+        if reverses {
+            locomotive.forward = Some(!locomotive.forward.unwrap_or(true));
+        }
+        (locomotive.step, locomotive.is_driven, locomotive.is_stopped) = (step, true, false);
+        locomotive.forward.unwrap_or(true)
+    }
+
+    /// Notes that a request was written; adds its command to the recording and returns the entry.
+    pub(crate) fn sent(&mut self, now: Timestamp, outgoing: Outgoing<A>) -> Option<EventKind> {
+        let Outgoing { request, awaited, command, tries } = outgoing;
+        self.pacing.sent(now);
+        if let Some(awaited) = awaited {
+            self.outstanding.push(Outstanding { request, awaited, command, sent: now, tries });
+            self.silence.asked(now);
+        }
+        let kind = command.and_then(|command| entry_of(&command, tries))?;
+        self.enter(now, kind);
+        Some(kind)
+    }
+
+    /// Puts a command in the queue.
+    pub(crate) fn push(&mut self, command: Command) -> Result<(), CommandError> {
+        if self.farewell.has_begun() {
+            return Err(CommandError::Closed);
+        }
+        self.waiting.push(command).map_err(CommandError::TooManyWaiting)
+    }
+
+    /// Returns when to continue. `usual`: the session's next question; `release`: when to switch a coil off; `asks`: whether more
+    /// questions wait.
+    pub(crate) fn next_timeout(
+        &self,
+        usual: Option<Timestamp>,
+        release: Option<Timestamp>,
+        asks: bool,
+    ) -> Option<Timestamp> {
+        if self.farewell.is_over() {
+            return None;
+        }
+        let (urgent, paced) = (self.pacing.urgent_at(), self.pacing.usual_at());
+        let of_command = |command: &Command| {
+            let stops = matches!(command, Command::PowerOff | Command::Speed { step: SpeedStep::STAND, .. });
+            let free = train_of(command).and_then(|train| self.outstanding.blocks(train, stops));
+            free.unwrap_or(Timestamp::ZERO).max(if stops { urgent } else { paced })
+        };
+        let times = [
+            usual,
+            release.map(|due| due.max(urgent)),
+            asks.then_some(paced),
+            self.waiting.iter().map(of_command).min(),
+            self.outstanding.due(true).map(|due| due.max(urgent)),
+            self.outstanding.due(false).map(|due| due.max(paced)),
+            self.silence.due(),
+            self.farewell.due(),
+        ];
+        times.into_iter().flatten().filter(|at| *at > self.now).min()
+    }
+
+    // What the station says.
+
+    /// Returns the locomotive of a train that was commanded or is about to be.
+    pub(crate) fn locomotive(&mut self, train: TrainId) -> Option<&mut Locomotive> {
+        if self.waiting.iter().any(|command| train_of(command) == Some(train)) {
+            self.locomotives.know(train);
+        }
+        self.locomotives.get_mut(train)
+    }
+
+    /// Returns the trains whose direction is known.
+    pub(crate) fn directed(&self) -> Vec<TrainId> {
+        let known = self.locomotives.iter().filter(|locomotive| locomotive.forward.is_some());
+        known.map(|locomotive| locomotive.train).collect()
+    }
+
+    /// Notes a turnout's position from the station; returns the position before.
+    pub(crate) fn hear_of_turnout(&mut self, turnout: TurnoutId, curved: bool) -> Option<bool> {
+        self.turnouts.insert(turnout, curved)
+    }
+
+    /// Whether a turnout is known to be in this position.
+    pub(crate) fn lies(&self, turnout: TurnoutId, curved: bool) -> bool {
+        self.turnouts.get(&turnout) == Some(&curved)
+    }
+
+    /// Whether the track lost its power unexpectedly; `request`: what this program awaits after switching it itself.
+    pub(crate) fn is_power_lost(&self, on: bool, request: &A) -> bool {
+        self.is_powered && !on && self.power && !self.outstanding.has(request)
+    }
+
+    /// Notes whether the track has power, as the station reports.
+    pub(crate) fn hear_power(&mut self, on: bool, is_lost: bool) {
+        if is_lost {
+            self.notify(LinkNotice::PowerLost);
+        }
+        self.is_powered = on;
+        if !on {
+            self.farewell.power_went_off();
+        }
+    }
+
+    /// Handles a station that was reset: trains have stopped, and their directions are written again.
+    pub(crate) fn restarted(&mut self) {
+        self.notify(LinkNotice::Restarted);
+        self.outstanding.clear();
+        self.waiting.clear();
+        for locomotive in self.locomotives.iter_mut() {
+            locomotive.step = SpeedStep::STAND;
+        }
+        let driven: Vec<TrainId> =
+            self.locomotives.iter().filter(|known| known.is_driven).map(|known| known.train).collect();
+        for train in driven {
+            self.stop(train);
+        }
+    }
+
+    // The end.
+
+    /// Stops a train next.
+    pub(crate) fn stop(&mut self, train: TrainId) {
+        // Stops are always taken.
+        let _ = self.waiting.push(Command::Speed { train, step: SpeedStep::STAND });
+    }
+
+    /// Stops a train again if the session is ending.
+    pub(crate) fn stop_at_end(&mut self, train: TrainId) {
+        if self.farewell.has_begun() {
+            self.stop(train);
+        }
+    }
+
+    /// Begins the end, once: stops every train that was driven, then switches the power off.
+    ///
+    /// Waiting stops are kept. With `directed`, a train of unknown direction, such as one that an earlier session left running, cannot be
+    /// commanded yet; it is stopped together with all others first.
+    pub(crate) fn close(&mut self, now: Timestamp, directed: bool) -> bool {
+        let begins = !self.farewell.has_begun();
+        if begins {
+            self.farewell.begin(now);
+            for train in self.waiting.stops() {
+                self.locomotives.know_driven(train);
+                self.stops_all |= directed && !self.locomotives.has_direction(train);
+            }
+            self.waiting.clear();
+            self.outstanding.clear();
+            self.stop_driven();
+        }
+        begins
+    }
+
+    /// Stops every train that was driven.
+    fn stop_driven(&mut self) {
+        self.locomotives.stop_driven(&mut self.waiting);
+        self.farewell.begin_again(self.now);
+    }
+
+    /// Returns how far the end has come.
+    pub(crate) fn closing(&self) -> Closing {
+        self.farewell.statement(&self.locomotives)
+    }
+
+    /// Ends the session when everything is confirmed; returns whether it has just ended.
+    pub(crate) fn end_if_confirmed(&mut self) -> bool {
+        let closing = self.farewell.end_if_confirmed(&self.locomotives);
+        closing.into_iter().map(|closing| self.notify(LinkNotice::Closed(closing))).count() > 0
+    }
+}

@@ -1,0 +1,104 @@
+//! What the session asks for, as messages of the bus in their order.
+
+use alloc::vec::Vec;
+use core::ops::RangeInclusive;
+
+use footplate_core::SpeedStep;
+
+use super::message::Message;
+
+/// What stops everything: all locomotives stop, and the track loses its power.
+pub const LAST_WILL: &[u8] = b"SEND 85 7A\r\nSEND 82 7D\r\n";
+
+/// The decoders' addresses.
+pub const LOCOMOTIVES: RangeInclusive<u16> = 1..=9_983;
+
+/// The addresses of turnouts.
+pub const TURNOUTS: RangeInclusive<u16> = 1..=2_048;
+
+/// Steps of the decoder, of 126, for each of the program's.
+pub const SPEED_PER_STEP: u8 = 9;
+
+/// The program's highest step on this link.
+pub(super) const HIGHEST_STEP: u8 = 126 / SPEED_PER_STEP;
+
+/// The speed of an emergency stop; the decoder's steps lie above it.
+const EMERGENCY_STOP: u8 = 1;
+
+/// How often detectors are asked for their states: four addresses of turnouts that no turnout has, each both ways. Detectors report what
+/// they see in answer to one of them (as JMRI asks them).
+pub(super) const INTERROGATIONS: u8 = 8;
+const FIRST_INTERROGATION: u16 = 1_017;
+
+/// The speed of a slot for a step of the program; `None` beyond the highest.
+#[must_use]
+pub const fn speed_of(step: SpeedStep) -> Option<u8> {
+    match step.get() {
+        0 => Some(0),
+        step if step <= HIGHEST_STEP => Some(step * SPEED_PER_STEP + EMERGENCY_STOP),
+        _ => None,
+    }
+}
+
+/// What is asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Request {
+    Power {
+        on: bool,
+    },
+    StopAll,
+    /// A slot's state; slot 0 is the station's own.
+    Slot(u8),
+    /// The nth question for the states of detectors.
+    Interrogate(u8),
+    /// A slot for a decoder's address.
+    Locomotive(u16),
+    /// That a slot is in use by a throttle.
+    Use(u8),
+    /// How a slot's locomotive is driven; its direction and functions where they change.
+    Drive {
+        slot: u8,
+        speed: u8,
+        direction: Option<(bool, u8)>,
+    },
+    Switch {
+        address: u16,
+        closed: bool,
+        on: bool,
+    },
+}
+
+impl Request {
+    /// The messages, in the order in which they are put on the bus.
+    pub(super) fn messages(self) -> Vec<Message> {
+        let mut messages = Vec::new();
+        match self {
+            Self::Power { on } => {
+                messages.push(if on { Message::PowerOn } else { Message::PowerOff });
+                messages.push(Message::ReadSlot { slot: 0 });
+            }
+            Self::StopAll => messages.push(Message::StopAll),
+            Self::Slot(slot) => messages.push(Message::ReadSlot { slot }),
+            Self::Interrogate(nth) => {
+                let address = FIRST_INTERROGATION + u16::from(nth % (INTERROGATIONS / 2));
+                messages.push(Message::Switch { address, closed: nth < INTERROGATIONS / 2, on: false });
+            }
+            Self::Locomotive(address) => messages.push(Message::Locomotive { address }),
+            Self::Use(slot) => messages.push(Message::MoveSlots { from: slot, to: slot }),
+            Self::Drive { slot, speed, direction } => {
+                let direction =
+                    direction.map(|(forward, functions)| Message::Direction { slot, forward, functions });
+                // A locomotive stops before it is reversed, and is reversed before it starts.
+                let (before, after) = if speed == 0 { (None, direction) } else { (direction, None) };
+                messages.extend(before);
+                messages.push(Message::Speed { slot, speed });
+                messages.extend(after);
+                messages.push(Message::ReadSlot { slot });
+            }
+            Self::Switch { address, closed, on } => {
+                messages.push(Message::Switch { address, closed, on });
+            }
+        }
+        messages
+    }
+}

@@ -1,0 +1,401 @@
+//! The session with a server: stops first, one command at a time for each train, and everything confirmed by the command station.
+
+mod hearing;
+
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use footplate_core::{Command, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+
+use super::line::{Line, Lines};
+use super::message::Message;
+use super::outbox::{Outbox, SENT_WITHIN, SENT_WITHIN_AT_END};
+use super::outstanding::Awaited;
+use super::request::{HIGHEST_STEP, INTERROGATIONS, LOCOMOTIVES, Request, speed_of};
+use super::settings::Settings;
+use super::slot::DrivenSlots;
+use crate::dialogue::{Dialogue, Repeat};
+use crate::opening::Opening;
+use crate::outstanding::Outgoing;
+use crate::pacing::Pacing;
+use crate::sensors::Sensors;
+use crate::session::{Closing, CommandError, LinkNotice, Session, Transmit};
+use crate::silence::Checks;
+
+/// A request is up to three messages of some 5 ms on the bus, which has other users: 30 requests a second leave them half of it.
+const PACING: Pacing = Pacing::new(TimeSpan::from_ms(33), 3, TimeSpan::from_ms(5));
+
+/// A slot is read when no message has arrived for this time.
+const POLL_EVERY: TimeSpan = TimeSpan::from_ms(500);
+
+/// Between two questions for the states of detectors: each may be answered by many of them, at 2.4 ms a report.
+const INTERROGATION_EVERY: TimeSpan = TimeSpan::from_ms(125);
+
+/// A command station gives a slot away whose locomotive was not commanded for about 200 s: it is commanded again before that.
+const REFRESHED_EVERY: TimeSpan = TimeSpan::from_ms(60_000);
+
+/// How long an output of a turnout is powered (150 ms are usual).
+const PULSE: TimeSpan = TimeSpan::from_ms(150);
+
+/// What the user should check.
+const CHECKS: Checks = Checks {
+    nothing_heard: "check that the LocoNet server (LbServer) is running, its address and port, and the power of the command station",
+    nothing_whole: "check that the port belongs to a LocoNet-over-TCP server (usually port 1234)",
+    noise: "check that the port belongs to a LocoNet-over-TCP server (usually port 1234)",
+};
+
+/// The client's session with a LocoNet server.
+#[derive(Debug, Clone)]
+pub struct Client {
+    settings: Settings,
+    dialogue: Dialogue<Awaited>,
+    lines: Lines,
+    outbox: Outbox,
+    opening: Opening<Request>,
+    /// When the next question for the states of detectors may go.
+    next_interrogation: Timestamp,
+    slots: DrivenSlots,
+    /// Slots that are to be put in use, and their trains.
+    unused: Vec<(TrainId, u8)>,
+    sensors: Sensors,
+    /// The output of a turnout that is powered, and until when.
+    pulse: Option<(u16, bool, Timestamp)>,
+    /// Trains whose slots have to be read again.
+    unverified: Vec<TrainId>,
+    identity: Option<String>,
+    /// Since when the station was silent, until its states have been read again.
+    blind_since: Option<Timestamp>,
+    /// Trains for which the station was said to have no slot.
+    without_slot: Vec<TrainId>,
+    polled: Timestamp,
+    polls: usize,
+}
+
+impl Client {
+    /// A session over a line that has just been opened.
+    #[must_use]
+    pub fn new(now: Timestamp, settings: Settings) -> Self {
+        let mut client = Self {
+            settings,
+            dialogue: Dialogue::new(now, PACING, CHECKS),
+            lines: Lines::default(),
+            outbox: Outbox::default(),
+            opening: Opening::asking(questions(true)),
+            next_interrogation: now,
+            slots: DrivenSlots::default(),
+            unused: Vec::new(),
+            sensors: Sensors::default(),
+            pulse: None,
+            unverified: Vec::new(),
+            identity: None,
+            blind_since: None,
+            without_slot: Vec::new(),
+            polled: now,
+            polls: 0,
+        };
+        client.go_on(now);
+        client
+    }
+
+    /// What the bus is taken to be like.
+    #[must_use]
+    pub const fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Sends what is due.
+    fn go_on(&mut self, now: Timestamp) {
+        if self.dialogue.watch(now) {
+            self.blind_since.get_or_insert(self.dialogue.heard);
+        }
+        self.write_waiting(now);
+        // A request waits until the messages of the one before are on the bus: so a stop waits for one request at most.
+        while let Some(next) = self.next(now) {
+            self.send(now, next);
+        }
+    }
+
+    /// Writes the message that waits, if the server may be given one.
+    fn write_waiting(&mut self, now: Timestamp) {
+        if !self.dialogue.farewell.is_over()
+            && let Some(message) = self.outbox.next(now, self.sent_within())
+        {
+            self.dialogue.write(Line::Send(message).text().into_bytes());
+        }
+    }
+
+    /// How long the server's word on a message is waited for.
+    fn sent_within(&self) -> TimeSpan {
+        if self.dialogue.farewell.has_begun() { SENT_WITHIN_AT_END } else { SENT_WITHIN }
+    }
+
+    /// Returns the next request, if one may be written now.
+    fn next(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
+        if !self.dialogue.may_write(now) || !self.outbox.is_empty() {
+            return None;
+        }
+        if self.dialogue.take_stop_of_all() {
+            return Some(Outgoing::says(Request::StopAll));
+        }
+        if let Some((train, slot)) = self.unused.pop() {
+            return Some(Outgoing::asks(Request::Use(slot), Awaited::Locomotive(train)));
+        }
+        if let Some(command) = self.dialogue.next_stop(now, true) {
+            return Some(self.outgoing(now, command));
+        }
+        if let Some(repeat) = self.next_repeat(now, true) {
+            return Some(repeat);
+        }
+        if let Some((address, closed, _)) = self.pulse.take_if(|(.., until)| now >= *until) {
+            return Some(Outgoing::says(Request::Switch { address, closed, on: false }));
+        }
+        if let Some(train) = self.dialogue.undirected_at_end() {
+            return Some(acquire(train));
+        }
+        if self.dialogue.switch_off_is_due(now) {
+            return Some(self.outgoing(now, Command::PowerOff));
+        }
+        if now < self.dialogue.pacing.usual_at() {
+            return None;
+        }
+        // At the end, too: a train whose slot is asked for can be stopped only when that is answered.
+        let repeat = self.next_repeat(now, false);
+        if self.dialogue.farewell.has_begun() { repeat } else { repeat.or_else(|| self.next_usual(now)) }
+    }
+
+    fn next_usual(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
+        if let Opening::Asking(requests) = &mut self.opening {
+            if self.dialogue.outstanding.any(Awaited::is_question) || now < self.next_interrogation {
+                return None;
+            }
+            match requests.pop_front() {
+                Some(request) => return Some(self.question(now, request)),
+                None => self.opened(),
+            }
+        }
+        if let Some(train) = self.unverified.pop() {
+            return Some(self.query(train));
+        }
+        let outstanding = &self.dialogue.outstanding;
+        if let Some(train) = self.dialogue.undirected(|train| outstanding.blocks(train, false).is_some()) {
+            return Some(acquire(train));
+        }
+        if let Some(command) = self.dialogue.next_command(self.pulse.is_none()) {
+            return Some(self.outgoing(now, command));
+        }
+        let is_polled = self.dialogue.outstanding.has(&Awaited::Status);
+        (now >= self.poll_due() && !is_polled).then(|| self.poll(now))
+    }
+
+    fn poll_due(&self) -> Timestamp {
+        self.dialogue.heard.max(self.polled) + POLL_EVERY
+    }
+
+    /// A sign of life: the slots of trains in turn, written again where they have not been for long.
+    fn poll(&mut self, now: Timestamp) -> Outgoing<Awaited> {
+        (self.polled, self.polls) = (now, self.polls.wrapping_add(1));
+        let free = |train: &TrainId| self.dialogue.outstanding.blocks(*train, false).is_none();
+        let stale =
+            self.slots.iter().find(|slot| now - slot.refreshed > REFRESHED_EVERY && free(&slot.train));
+        let stale = stale.and_then(|slot| self.dialogue.locomotives.get(slot.train));
+        if let Some((train, step)) = stale.map(|known| (known.train, known.step)) {
+            let (request, awaited) = self.drive(now, train, step);
+            return Outgoing { request, awaited, command: None, tries: 1 };
+        }
+        let driven: Vec<TrainId> = self.slots.iter().map(|slot| slot.train).filter(free).collect();
+        let turn = self.polls.checked_rem(driven.len() + 1).unwrap_or(0);
+        match driven.get(turn) {
+            Some(train) => self.query(*train),
+            None => Outgoing::asks(Request::Slot(0), Awaited::Status),
+        }
+    }
+
+    /// A question of the opening.
+    fn question(&mut self, now: Timestamp, request: Request) -> Outgoing<Awaited> {
+        let awaited = match request {
+            Request::Power { on } => Awaited::Power(on),
+            Request::Interrogate(nth) => {
+                self.next_interrogation = now + INTERROGATION_EVERY;
+                Awaited::Interrogation(nth)
+            }
+            _ => Awaited::Status,
+        };
+        Outgoing::asks(request, awaited)
+    }
+
+    /// Asks how a train is driven.
+    fn query(&self, train: TrainId) -> Outgoing<Awaited> {
+        match self.slots.of(train).and_then(|slot| slot.number) {
+            Some(slot) => Outgoing::asks(Request::Slot(slot), Awaited::Locomotive(train)),
+            None => acquire(train),
+        }
+    }
+
+    fn next_repeat(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
+        loop {
+            if let Repeat::Again(outgoing) = self.dialogue.next_repeat(now, only_urgent)? {
+                return Some(outgoing);
+            }
+        }
+    }
+
+    /// Returns the request for a command, and notes what it commands.
+    fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
+        let (request, awaited) = match command {
+            Command::Speed { train, step } => {
+                self.dialogue.commanded(train, step, false);
+                self.drive(now, train, step)
+            }
+            Command::Reverse { train } => {
+                self.dialogue.commanded(train, SpeedStep::STAND, true);
+                self.drive(now, train, SpeedStep::STAND)
+            }
+            Command::Turnout { turnout, curved } => self.throw(now, turnout, curved),
+            Command::PowerOff | Command::PowerOn => {
+                let on = command == Command::PowerOn;
+                self.dialogue.power = on;
+                (Request::Power { on }, Some(Awaited::Power(on)))
+            }
+        };
+        Outgoing::commands(command, request, awaited)
+    }
+
+    fn drive(&mut self, now: Timestamp, train: TrainId, step: SpeedStep) -> (Request, Option<Awaited>) {
+        let forward = self.dialogue.locomotives.get(train).and_then(|known| known.forward).unwrap_or(true);
+        let speed = speed_of(step).unwrap_or_default();
+        let awaited = Some(Awaited::Driven(train, speed, forward));
+        let Some(slot) = self.slots.of_mut(train) else { return (Request::Locomotive(train.0), awaited) };
+        slot.refreshed = now;
+        let direction = (slot.forward != forward).then_some((forward, slot.functions));
+        match slot.number {
+            Some(slot) => (Request::Drive { slot, speed, direction }, awaited),
+            None => (Request::Locomotive(train.0), awaited),
+        }
+    }
+
+    fn throw(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) -> (Request, Option<Awaited>) {
+        let address = self.settings.address_of(turnout);
+        let closed = curved != self.settings.closed_is_straight;
+        self.pulse = Some((address, closed, now + PULSE));
+        let message = Message::Switch { address, closed, on: true };
+        (Request::Switch { address, closed, on: true }, Some(Awaited::Turnout(turnout, message)))
+    }
+
+    fn send(&mut self, now: Timestamp, outgoing: Outgoing<Awaited>) {
+        let request = outgoing.request;
+        self.outbox.push(request.messages());
+        self.write_waiting(now);
+        let entry = self.dialogue.sent(now, outgoing);
+        if let (Some(EventKind::Turnout { .. }), Request::Switch { address, closed, .. }) = (entry, request) {
+            self.pulse = Some((address, closed, now + PULSE));
+        }
+    }
+
+    /// Everything that has to be known is known.
+    fn opened(&mut self) {
+        self.opening = Opening::Open;
+        (self.blind_since, self.polled) = (None, self.dialogue.now);
+        self.dialogue.notify(LinkNotice::Answers);
+    }
+
+    /// Reads all states again, including every locomotive's.
+    fn verify(&mut self) {
+        self.opening = Opening::asking(questions(self.dialogue.power));
+        self.unverified = self.dialogue.directed();
+    }
+}
+
+/// What is asked before trains are driven: whether the station answers, the power, and what detectors see.
+fn questions(power: bool) -> impl Iterator<Item = Request> {
+    let first = [Request::Slot(0), Request::Power { on: power }];
+    first.into_iter().chain((0..INTERROGATIONS).map(Request::Interrogate)).chain([Request::Slot(0)])
+}
+
+const fn acquire(train: TrainId) -> Outgoing<Awaited> {
+    Outgoing::asks(Request::Locomotive(train.0), Awaited::Locomotive(train))
+}
+
+impl Session for Client {
+    fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]) {
+        self.dialogue.now = now;
+        if self.dialogue.farewell.is_over() {
+            return;
+        }
+        for byte in bytes {
+            self.hear(now, *byte);
+        }
+        self.go_on(now);
+    }
+
+    fn handle_reopened(&mut self, now: Timestamp) {
+        self.lines = Lines::default();
+        self.outbox.clear();
+        self.unused.clear();
+        self.blind_since.get_or_insert(self.dialogue.heard);
+        self.verify();
+        self.dialogue.reopened();
+        self.go_on(now);
+    }
+
+    fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
+        match command {
+            Command::Speed { step, .. } if speed_of(step).is_none() => {
+                return Err(CommandError::Step { step, highest: HIGHEST_STEP });
+            }
+            Command::Speed { train, .. } | Command::Reverse { train } => {
+                CommandError::check_train(train, &LOCOMOTIVES)?;
+            }
+            Command::Turnout { turnout, .. } => {
+                CommandError::check_turnout(turnout, &self.settings.turnouts())?;
+            }
+            _ => {}
+        }
+        self.dialogue.push(command)?;
+        self.go_on(now);
+        Ok(())
+    }
+
+    fn expect_delays(&mut self, excess: TimeSpan) {
+        self.dialogue.excess = excess;
+    }
+
+    fn handle_timeout(&mut self, now: Timestamp) {
+        self.go_on(now);
+    }
+
+    fn poll_output(&mut self) -> Option<Transmit> {
+        self.dialogue.output.pop_front()
+    }
+
+    fn next_timeout(&self) -> Option<Timestamp> {
+        if !self.outbox.is_empty() && !self.dialogue.farewell.is_over() {
+            // Nothing is written before the server has said what became of the last message.
+            let times = [
+                self.outbox.due(self.sent_within()),
+                self.dialogue.silence.due(),
+                self.dialogue.farewell.due(),
+            ];
+            return times.into_iter().flatten().filter(|at| *at > self.dialogue.now).min();
+        }
+        let paced = self.dialogue.pacing.usual_at();
+        let usual = match &self.opening {
+            _ if self.dialogue.farewell.has_begun() => Some(self.dialogue.pacing.urgent_at()),
+            Opening::Asking(_) if self.dialogue.outstanding.any(Awaited::is_question) => None,
+            Opening::Asking(_) => Some(self.next_interrogation.max(paced)),
+            Opening::Open => Some(self.poll_due().max(paced)),
+        };
+        let release = self.pulse.map(|(.., until)| until);
+        self.dialogue.next_timeout(usual, release, !self.unverified.is_empty() || !self.unused.is_empty())
+    }
+
+    fn close(&mut self, now: Timestamp) {
+        if self.dialogue.close(now, true) {
+            self.pulse.iter_mut().for_each(|(.., until)| *until = now);
+        }
+        self.go_on(now);
+    }
+
+    fn closing(&self) -> Closing {
+        self.dialogue.closing()
+    }
+}

@@ -1,0 +1,181 @@
+//! Handles lines from the server.
+
+use alloc::string::String;
+
+use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId};
+
+use super::super::line::{Line, SentReport};
+use super::super::message::{Malformed, Message};
+use super::super::outstanding::{Answer, Awaited};
+use super::super::request::speed_of;
+use super::super::slot::{SlotData, SlotUse};
+use super::super::time_model::occupied;
+use super::Client;
+use crate::sensors::Change;
+use crate::session::LinkNotice;
+
+/// The opcode of a request for a slot, as the station's refusal of it names it.
+const NO_SLOT: Message = Message::LongAck { opcode: 0x3F, code: 0 };
+
+impl Client {
+    pub(super) fn hear(&mut self, now: Timestamp, byte: u8) {
+        let line = self.lines.push(byte).map(|text| (text.len(), Line::read(text)));
+        let unread = self.lines.take_unread();
+        self.dialogue.hear_noise(unread);
+        match line {
+            Some((_, Ok(line))) => {
+                let was_silent = self.dialogue.hear(now);
+                match line {
+                    Line::Version(version) => self.identified(version),
+                    Line::Receive(message) => self.take(now, message),
+                    Line::Sent(report) => self.sent(report),
+                    Line::Send(_) | Line::Other => {}
+                }
+                if was_silent && self.opening.is_open() {
+                    self.verify();
+                }
+                self.dialogue.end_if_confirmed();
+            }
+            Some((length, Err(Malformed))) => self.dialogue.hear_noise(length),
+            None => {}
+        }
+    }
+
+    fn identified(&mut self, identity: String) {
+        if self.identity.as_ref() != Some(&identity) {
+            self.identity = Some(identity.clone());
+            self.dialogue.notify(LinkNotice::Identified { identity });
+        }
+    }
+
+    /// The server has said what became of a message of this client.
+    fn sent(&mut self, report: SentReport) {
+        if let Some(message) = self.outbox.sent().filter(|_| report == SentReport::Ok) {
+            self.dialogue.outstanding.answered(&Answer::Sent(message));
+        }
+    }
+
+    /// A message has passed on the bus.
+    fn take(&mut self, now: Timestamp, message: Message) {
+        let is_own = self.outbox.is_own(&message);
+        match message {
+            Message::PowerOn => self.hear_power(true),
+            Message::PowerOff => self.hear_power(false),
+            Message::Slot(data) => self.hear_of_slot(now, &data),
+            Message::Input { number, is_occupied } => self.hear_of_sensor(now, number, is_occupied),
+            Message::Switch { address, closed, on: true } => {
+                self.hear_of_turnout(now, address, closed, is_own);
+            }
+            Message::Speed { slot, .. } | Message::Direction { slot, .. } if !is_own => {
+                // Another throttle drives it: the slot says how.
+                if let Some(train) =
+                    self.slots.train_in(slot).filter(|train| !self.unverified.contains(train))
+                {
+                    self.unverified.push(train);
+                }
+            }
+            NO_SLOT => {
+                let waiting = self.dialogue.waiting.iter().filter_map(crate::queue::train_of);
+                let refused = waiting.chain(self.dialogue.locomotives.driven(false)).find(|train| {
+                    let has_slot = self.slots.of(*train).is_some_and(|slot| slot.number.is_some());
+                    !has_slot && !self.without_slot.contains(train)
+                });
+                if let Some(train) = refused {
+                    self.without_slot.push(train);
+                    self.dialogue.notify(LinkNotice::NoSlot { train });
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn hear_power(&mut self, on: bool) {
+        let is_lost = self.dialogue.is_power_lost(on, &Awaited::Power(false));
+        self.dialogue.hear_power(on, is_lost);
+    }
+
+    fn hear_of_slot(&mut self, now: Timestamp, data: &SlotData) {
+        self.hear_power(data.is_powered());
+        let answered = self.dialogue.outstanding.answered(&Answer::Slot(*data));
+        if data.slot == 0 {
+            return;
+        }
+        if let Some(train) = self.slots.train_in(data.slot)
+            && (train.0 != data.address || data.slot_use() == SlotUse::Free)
+        {
+            return self.restarted();
+        }
+        let train = TrainId(data.address);
+        let is_outstanding = self.dialogue.outstanding.blocks(train, false).is_some();
+        if self.dialogue.locomotive(train).is_none() {
+            return;
+        }
+        let commanded = self.slots.of(train).and_then(|slot| slot.commanded);
+        self.slots.found(train, data, now);
+        self.without_slot.retain(|other| *other != train);
+        if data.slot_use() != SlotUse::InUse && !self.unused.iter().any(|(other, _)| *other == train) {
+            self.unused.push((train, data.slot));
+        }
+        let Some(locomotive) = self.dialogue.locomotive(train) else { return };
+        if matches!(answered, Some(answered) if matches!(answered.awaited, Awaited::Driven(..))) {
+            locomotive.is_stopped = locomotive.step == SpeedStep::STAND;
+            return;
+        }
+        let Some(forward) = locomotive.forward else {
+            if data.slot_use() == SlotUse::InUse {
+                locomotive.forward = Some(commanded.unwrap_or(data.forward));
+            }
+            return;
+        };
+        let is_as_commanded = Some(data.speed) == speed_of(locomotive.step) && data.forward == forward;
+        if is_outstanding || is_as_commanded {
+            return;
+        }
+        locomotive.forward = Some(data.forward);
+        if !locomotive.is_driven {
+            return;
+        }
+        locomotive.is_stopped = false;
+        self.dialogue.stop_at_end(train);
+        self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed: data.forward != forward });
+    }
+
+    /// The station has given a slot to others or has forgotten it: trains have stopped, and all slots are asked for again.
+    fn restarted(&mut self) {
+        let forward = |train| self.dialogue.locomotives.get(train).and_then(|known| known.forward);
+        for slot in self.slots.iter_mut() {
+            (slot.number, slot.commanded) = (None, forward(slot.train).or(slot.commanded));
+        }
+        self.dialogue.restarted();
+        self.unused.clear();
+        for locomotive in self.dialogue.locomotives.iter_mut() {
+            locomotive.forward = None;
+        }
+        self.verify();
+    }
+
+    fn hear_of_turnout(&mut self, now: Timestamp, address: u16, closed: bool, is_own: bool) {
+        let Some(turnout) = self.settings.turnout_at(address) else { return };
+        let curved = closed != self.settings.closed_is_straight;
+        let before = self.dialogue.hear_of_turnout(turnout, curved);
+        if !is_own && before != Some(curved) {
+            // Another throttle has thrown it.
+            self.dialogue.enter(now, EventKind::Turnout { turnout, curved });
+        }
+    }
+
+    fn hear_of_sensor(&mut self, now: Timestamp, number: u16, is_occupied: bool) {
+        let Some(index) = number.checked_sub(self.settings.first_sensor) else { return };
+        let sensor = SensorId(index);
+        match self.sensors.heard(number, is_occupied, !self.opening.is_open()) {
+            Change::Occupied => {
+                let (latest, width) = occupied(now, self.dialogue.last_entry, self.settings.sensor_delay);
+                // It may have become occupied at any time since the line was silent.
+                let width = self.blind_since.map_or(width, |since| width.max(latest - since));
+                self.dialogue.report(sensor, latest, width);
+            }
+            Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
+            Change::None => {}
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! Sensor states on a line that loses and repeats no messages.
+
+use alloc::vec::Vec;
+
+/// The sensors that the station has reported, in the order of their numbers there.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Sensors(Vec<(u16, bool)>);
+
+/// What a message means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Change {
+    /// It became occupied.
+    Occupied,
+    /// It was occupied before it was first read.
+    HeldFromStart,
+    /// No change, or free.
+    None,
+}
+
+impl Sensors {
+    /// Notes a sensor's state. `listing`: all states are being read, so the first message about a sensor is no change.
+    pub(crate) fn heard(&mut self, id: u16, active: bool, listing: bool) -> Change {
+        let before = match self.0.binary_search_by_key(&id, |(id, _)| *id) {
+            Ok(at) => self.0.get_mut(at).map(|(_, state)| core::mem::replace(state, active)),
+            Err(at) => {
+                self.0.insert(at, (id, active));
+                None
+            }
+        };
+        match (before, active) {
+            (None, true) if listing => Change::HeldFromStart,
+            (None | Some(false), true) => Change::Occupied,
+            _ => Change::None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sensor_is_reported_once_each_time_it_becomes_occupied() {
+        let mut sensors = Sensors::default();
+        assert_eq!(sensors.heard(5, false, true), Change::None);
+        assert_eq!(sensors.heard(3, true, true), Change::HeldFromStart);
+        assert_eq!(sensors.heard(5, true, false), Change::Occupied);
+        assert_eq!(sensors.heard(5, true, false), Change::None);
+        assert_eq!(sensors.heard(5, false, false), Change::None);
+        assert_eq!(sensors.heard(3, true, false), Change::None);
+        assert_eq!(sensors.heard(9, true, false), Change::Occupied, "defined while the line was open");
+        // Asked for again after the line was lost: what has become occupied meanwhile is reported.
+        assert_eq!(sensors.heard(5, true, true), Change::Occupied);
+    }
+}

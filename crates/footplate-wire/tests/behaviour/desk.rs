@@ -1,0 +1,98 @@
+//! A session, the station it speaks with, and the line between them.
+
+use footplate_core::{Command, Event, EventKind, Report, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_wire::{LinkNotice, Session, Transmit};
+
+pub(crate) const T24: TrainId = TrainId(24);
+pub(crate) const T58: TrainId = TrainId(58);
+
+pub(crate) fn ms(ms: i64) -> Timestamp {
+    Timestamp::ZERO + TimeSpan::from_ms(ms)
+}
+
+pub(crate) fn speed(train: TrainId, step: u8) -> Command {
+    Command::Speed { train, step: SpeedStep::new(step).unwrap() }
+}
+
+/// The station's side of a line.
+pub(crate) trait Station {
+    /// What is written to it, as it reads it.
+    type Written;
+    /// From a request to the answer.
+    const ANSWER: TimeSpan;
+
+    /// Reads what the session wrote in one piece; returns it as read, and the answers.
+    fn hear(&mut self, bytes: Vec<u8>) -> (Vec<Self::Written>, Vec<Vec<u8>>);
+}
+
+/// A session, the station, and the line between them.
+pub(crate) struct Desk<C, S: Station> {
+    pub(crate) client: C,
+    pub(crate) now: Timestamp,
+    pub(crate) station: S,
+    /// Answers that are on their way, and when they arrive.
+    pub(crate) coming: Vec<(Timestamp, Vec<u8>)>,
+    /// What was written, and when (ms).
+    pub(crate) written: Vec<(i64, S::Written)>,
+    pub(crate) events: Vec<Event>,
+    pub(crate) notices: Vec<LinkNotice>,
+}
+
+impl<C: Session, S: Station> Desk<C, S> {
+    pub(crate) fn with(client: C, station: S) -> Self {
+        let (coming, written, events, notices) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { client, now: ms(0), station, coming, written, events, notices }
+    }
+
+    pub(crate) fn run_until(&mut self, end: Timestamp) {
+        loop {
+            while let Some(output) = self.client.poll_output() {
+                match output {
+                    Transmit::Message(bytes) => {
+                        let at = (self.now - ms(0)).as_ns() / 1_000_000;
+                        let (written, answers) = self.station.hear(bytes);
+                        self.written.extend(written.into_iter().map(|written| (at, written)));
+                        let due = self.now + S::ANSWER;
+                        self.coming.extend(answers.into_iter().map(|bytes| (due, bytes)));
+                    }
+                    Transmit::Event(event) => self.events.push(event),
+                    Transmit::Notice(notice) => self.notices.push(notice),
+                    Transmit::Byte(byte) => unreachable!("a lone byte {byte}"),
+                }
+            }
+            self.coming.sort_by_key(|(at, _)| *at);
+            let next = [self.coming.first().map(|(at, _)| *at), self.client.next_timeout()];
+            let Some(at) = next.into_iter().flatten().min().filter(|at| *at <= end) else { break };
+            self.now = self.now.max(at);
+            if self.coming.first().is_some_and(|(due, _)| *due <= at) {
+                let (_, bytes) = self.coming.remove(0);
+                self.client.handle_bytes(self.now, &bytes);
+            } else {
+                self.client.handle_timeout(at);
+                let next = self.client.next_timeout();
+                assert!(next.is_none_or(|next| next > at), "a session that is never done");
+            }
+        }
+        self.now = end;
+    }
+
+    pub(crate) fn run_for(&mut self, span_ms: i64) {
+        self.run_until(self.now + TimeSpan::from_ms(span_ms));
+    }
+
+    pub(crate) fn command(&mut self, command: Command) {
+        self.client.handle_command(self.now, command).unwrap();
+    }
+
+    /// The reports of sensors: when, which, and the width of the span before it (ms).
+    pub(crate) fn reports(&self) -> Vec<(i64, u16, i64)> {
+        let report = |event: &Event| match event.kind {
+            EventKind::Sensor(Report { sensor, poll_interval }) => {
+                let at = (event.time - ms(0)).as_ns() / 1_000_000;
+                Some((at, sensor.0, poll_interval.unwrap().as_ns() / 1_000_000))
+            }
+            _ => None,
+        };
+        self.events.iter().filter_map(report).collect()
+    }
+}

@@ -1,0 +1,224 @@
+//! Connects a script runner to its operators: lines of standard input and requests of browsers go in, messages come
+//! out.
+
+use std::io::{BufRead, IsTerminal, Read, Write};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+use std::thread;
+use std::time::Duration;
+
+use footplate_core::control::{LinkNews, Machine as _};
+use footplate_core::{Command, Timestamp};
+use footplate_wire::{CommandError, LinkNotice};
+
+use super::script_runner::ScriptRunner;
+use super::session_message::{Ended, SessionMessage};
+use crate::clock::Stopwatch;
+use crate::dashboard::{Alarm, Answer, Board, Painter, Request};
+use crate::recorded::{Input, Recorded};
+use crate::runtime::{Attendant, Wish};
+
+/// The interval between two pictures of the dashboard: 50 a second.
+const PICTURE_INTERVAL: Duration = Duration::from_millis(20);
+
+/// The longest line of input, in bytes.
+const LONGEST_LINE: u64 = 4_096;
+/// Lines that wait to be carried out; reading pauses beyond it.
+const LINES_WAITING: usize = 1_000;
+
+/// Reads standard input in a thread. Memory stays bounded whatever the input is.
+pub(super) fn lines_of_stdin() -> Receiver<String> {
+    let (said, lines) = sync_channel(LINES_WAITING);
+    // The thread ends with the input or with the program.
+    thread::spawn(move || {
+        let mut input = std::io::stdin().lock();
+        let mut line = Vec::new();
+        let mut is_rest = false;
+        loop {
+            line.clear();
+            match (&mut input).take(LONGEST_LINE).read_until(b'\n', &mut line) {
+                Ok(1..) => {}
+                _ => return,
+            }
+            let is_whole = line.ends_with(b"\n") || (line.len() as u64) < LONGEST_LINE;
+            let was_rest = std::mem::replace(&mut is_rest, !is_whole);
+            if is_whole && !was_rest {
+                let text = String::from_utf8_lossy(&line).trim_end().to_owned();
+                if said.send(text).is_err() {
+                    return;
+                }
+            } else if !was_rest {
+                eprintln!("a line is longer than {LONGEST_LINE} bytes: it is not read");
+            }
+        }
+    });
+    lines
+}
+
+/// The operators of a driving session.
+pub(super) struct Console {
+    lines: Option<Receiver<String>>,
+    screen: Screen,
+    live_view: Option<LiveView>,
+    /// News of the link since the script runner was last called.
+    news: Vec<LinkNews>,
+    /// Messages that are scored against the simulated truth before time moves on.
+    pub(super) for_scoring: Vec<SessionMessage>,
+    pub(super) is_over: bool,
+}
+
+/// The dashboard and the terminal view.
+struct LiveView {
+    board: Arc<Board>,
+    painter: Painter,
+    stopwatch: Stopwatch,
+    painted: Duration,
+}
+
+impl LiveView {
+    fn attend(&mut self, now: Timestamp, script_runner: &mut Recorded<ScriptRunner>) {
+        while let Some(asked) = self.board.next_request() {
+            let answer = match &asked.request {
+                Request::EmergencyStop => {
+                    script_runner.handle_word(now, &Input::EmergencyStop);
+                    Answer::Taken
+                }
+                Request::Line(line) => match script_runner.machine().mistake(line) {
+                    Some(mistake) => Answer::Refused(mistake),
+                    None => {
+                        script_runner.handle_word(now, &Input::Line(line.clone()));
+                        Answer::Taken
+                    }
+                },
+            };
+            asked.answer(answer);
+        }
+        let elapsed = self.stopwatch.elapsed();
+        if elapsed >= self.painted + PICTURE_INTERVAL {
+            // Counted from when the picture was due, so that a late one does not delay all others.
+            self.painted = (self.painted + PICTURE_INTERVAL).max(elapsed.saturating_sub(PICTURE_INTERVAL));
+            script_runner.machine().show(&mut self.painter, now);
+        }
+    }
+}
+
+/// Where lines for operators are printed.
+struct Screen {
+    to_stderr: bool,
+    prompts: bool,
+    /// Whether the terminal view shows the lines instead.
+    is_silent: bool,
+}
+
+impl Screen {
+    fn say(&self, text: &str, status: &str) {
+        // A closed output does not stop the trains.
+        let _ = if self.is_silent {
+            Ok(())
+        } else if self.to_stderr {
+            writeln!(std::io::stderr(), "{text}")
+        } else if self.prompts {
+            let mut output = std::io::stdout();
+            write!(output, "\r\x1b[2K{text}\n{status}> ").and_then(|()| output.flush())
+        } else {
+            writeln!(std::io::stdout(), "{text}")
+        };
+    }
+}
+
+impl Console {
+    /// `lines`: the operator's input. `json`: standard output carries results, so that lines go to standard error.
+    pub(super) fn new(lines: Option<Receiver<String>>, json: bool, board: Option<&Arc<Board>>) -> Self {
+        let live_view = board.map(|board| LiveView {
+            board: Arc::clone(board),
+            painter: Painter::new(board),
+            stopwatch: Stopwatch::start(),
+            painted: Duration::ZERO,
+        });
+        let prompts =
+            lines.is_some() && !json && std::io::stdin().is_terminal() && std::io::stdout().is_terminal();
+        let screen = Screen { to_stderr: json, prompts, is_silent: false };
+        Self { lines, screen, live_view, news: Vec::new(), for_scoring: Vec::new(), is_over: false }
+    }
+
+    pub(super) fn say(&self, text: &str, status: &str) {
+        self.screen.say(text, status);
+    }
+
+    /// Stops printing: the terminal view shows the lines from now on.
+    pub(super) const fn silence(&mut self) {
+        self.screen.is_silent = true;
+    }
+
+    fn alarm(&mut self, now: Timestamp, alarm: &Alarm) {
+        if let Some(live_view) = &mut self.live_view {
+            live_view.painter.alarm(now, alarm);
+        }
+    }
+}
+
+impl Attendant<Recorded<ScriptRunner>> for Console {
+    fn hear(&mut self, now: Timestamp, notice: SessionMessage) {
+        match notice {
+            SessionMessage::Line { text, status } => {
+                if let Some(live_view) = &self.live_view {
+                    live_view.board.say((now - Timestamp::ZERO).as_s(), &text);
+                }
+                self.screen.say(&text, &status);
+            }
+            SessionMessage::Passed(passed) => {
+                if let Some(live_view) = &mut self.live_view {
+                    live_view.painter.passed(passed);
+                }
+            }
+            SessionMessage::Alarm(alarm) => self.alarm(now, &alarm),
+            SessionMessage::Over => self.is_over = true,
+            begun_or_ended => self.for_scoring.push(begun_or_ended),
+        }
+    }
+
+    fn hear_of_line(&mut self, now: Timestamp, notice: &LinkNotice) {
+        self.news.extend(notice.news());
+        if let Some(alarm) = Alarm::of_line(notice) {
+            self.alarm(now, &alarm);
+        }
+        if !matches!(notice, LinkNotice::Answers | LinkNotice::Closed(_)) {
+            self.screen.say(&notice.to_string(), "");
+        }
+    }
+
+    fn hear_of_refusal(&mut self, now: Timestamp, command: Command, error: CommandError) {
+        let why = format!("{command}: {error}");
+        self.screen.say(&format!("not sent: {why}"), "");
+        self.alarm(now, &Alarm::not_sent(&why));
+    }
+
+    fn attend(&mut self, now: Timestamp, script_runner: &mut Recorded<ScriptRunner>) -> Wish {
+        for news in std::mem::take(&mut self.news) {
+            script_runner.handle_word(now, &Input::Link(news));
+        }
+        while let Some(lines) = &self.lines {
+            match lines.try_recv() {
+                Ok(line) => script_runner.handle_word(now, &Input::Line(line)),
+                Err(TryRecvError::Empty) => break,
+                Err(TryRecvError::Disconnected) => {
+                    self.lines = None;
+                    script_runner.handle_word(now, &Input::NoMoreLines);
+                    script_runner.handle_timeout(now);
+                }
+            }
+        }
+        if let Some(live_view) = &mut self.live_view {
+            live_view.attend(now, script_runner);
+        }
+        if self.is_over || !self.for_scoring.is_empty() { Wish::Finish } else { Wish::GoOn }
+    }
+}
+
+/// The ended order in a message, if it is one.
+pub(super) fn ended(message: &SessionMessage) -> Option<&Ended> {
+    match message {
+        SessionMessage::Ended(ended) => Some(ended),
+        _ => None,
+    }
+}

@@ -1,0 +1,132 @@
+//! What a person writes to name a LocoNet server: `loconet:192.168.0.20` or `loconet:HOST:PORT`, with
+//! `[?first-sensor=17&first-turnout=5&straight=thrown&sensor-delay=60&speed=20]`.
+
+use footplate_core::{Ratio, TimeSpan};
+use footplate_sim::LocoNetSwitches;
+use footplate_wire::loconet::Settings;
+
+use super::address::{number, times};
+use super::port::{Port, host_and_port};
+
+const SCHEME: &str = "loconet:";
+/// The port at which servers listen (LbServer).
+const PORT: u16 = 1234;
+/// The longest delay of a sensor that can be meant, in ms.
+const LONGEST_DELAY_MS: u16 = 2_000;
+
+/// A LocoNet server.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct LocoNetAddress {
+    /// Where it is.
+    pub(crate) port: Port,
+    /// Settings of the bus.
+    pub(crate) settings: Settings,
+    /// How many times faster than real time it runs; 1 for a real station.
+    pub(crate) speed: f64,
+}
+
+impl LocoNetAddress {
+    /// Returns a server at a place in the network.
+    ///
+    /// # Errors
+    /// When no place is named.
+    pub(super) fn of(place: &str) -> Result<Self, String> {
+        let named = place.strip_prefix("tcp://").unwrap_or(place);
+        let (host, port) = host_and_port(named, PORT).ok_or_else(|| {
+            format!(
+                "`{SCHEME}{place}` names no server: write {SCHEME}192.168.0.20 or {SCHEME}HOST:{PORT}, where a LocoNet-over-TCP \
+                 server (LbServer, JMRI, Rocrail, a gateway) runs"
+            )
+        })?;
+        Ok(Self { port: Port::Tcp { host, port }, settings: Settings::default(), speed: 1.0 })
+    }
+
+    pub(super) fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
+        match (key, value) {
+            ("first-sensor", _) => self.settings.first_sensor = number(key, value, "17")?,
+            ("first-turnout", _) => self.settings.first_turnout = number(key, value, "5")?,
+            ("straight", "closed") => self.settings.closed_is_straight = true,
+            ("straight", "thrown") => self.settings.closed_is_straight = false,
+            ("straight", _) => {
+                return Err(format!(
+                    "`{value}` is no state of a turnout: use straight=closed or straight=thrown"
+                ));
+            }
+            ("sensor-delay", _) => {
+                let ms: u16 = number(key, value, "60")?;
+                if !(3..=LONGEST_DELAY_MS).contains(&ms) {
+                    return Err(format!("sensor-delay {ms} is not between 3 and {LONGEST_DELAY_MS} ms"));
+                }
+                self.settings.sensor_delay = TimeSpan::from_ms(ms.into());
+            }
+            ("speed", _) => self.speed = times(value)?,
+            _ => {
+                return Err(format!(
+                    "a LocoNet link has no `{key}`; it has first-sensor, first-turnout, straight, sensor-delay and speed"
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// How often the bus refuses a message of a simulated server that is bad: one in twenty.
+const BAD: Ratio = Ratio::from_percent(5.0);
+
+/// The quirks of a simulated LocoNet server, as they are listed for people.
+pub(super) const QUIRKS: &str = "refused (messages do not come to the bus), no-echo (a client's messages are not repeated), no-version \
+                                 (the server does not say what it is), one-slot (the station drives one locomotive), merged and split";
+
+/// Sets a quirk of a simulated server; returns whether there is one of that name that only it has.
+pub(super) fn set_quirk(switches: &mut LocoNetSwitches, name: &str) -> bool {
+    match name {
+        "refused" => switches.refused = BAD,
+        "no-echo" => switches.echoes = false,
+        "no-version" => switches.has_version = false,
+        "one-slot" => switches.slots = 1,
+        _ => return false,
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::address::Address;
+    use super::*;
+
+    #[test]
+    fn a_server_is_named_by_its_place_in_the_network() {
+        for (text, place) in [
+            ("loconet:192.168.0.20", ("192.168.0.20", 1234)),
+            ("loconet:localhost:5550", ("localhost", 5550)),
+            ("loconet:tcp://[::1]:5550", ("::1", 5550)),
+        ] {
+            let Ok(Address::LocoNet(server)) = text.parse() else { panic!("{text}") };
+            assert_eq!(server.port, Port::Tcp { host: place.0.to_owned(), port: place.1 });
+        }
+        let written = "loconet:host?first-sensor=17&first-turnout=5&straight=thrown&sensor-delay=60&speed=20";
+        let Ok(Address::LocoNet(server)) = written.parse() else { panic!("a server") };
+        let expected = Settings {
+            first_sensor: 17,
+            first_turnout: 5,
+            closed_is_straight: false,
+            sensor_delay: TimeSpan::from_ms(60),
+        };
+        assert_eq!((server.settings, server.speed), (expected, 20.0));
+    }
+
+    #[test]
+    fn what_is_wrong_is_answered_with_what_would_be_right() {
+        for (text, right) in [
+            ("loconet:", "loconet:192.168.0.20"),
+            ("loconet:/dev/ttyUSB0", "LbServer"),
+            ("loconet:host:many", "HOST:1234"),
+            ("loconet:host?straight=left", "straight=thrown"),
+            ("loconet:host?sensor-delay=1", "between 3 and 2000 ms"),
+            ("loconet:host?modules=5", "first-sensor, first-turnout"),
+        ] {
+            let refused = text.parse::<Address>().expect_err(text);
+            assert!(refused.contains(right), "{text}: {refused}");
+        }
+    }
+}
