@@ -12,8 +12,7 @@ use crate::tracking::PassedContact;
 use crate::units::Length;
 
 use super::alarm::Alarm;
-use super::remeasuring::is_same;
-use super::trials::{SpeedTrial, Steps};
+use super::trials::{SpeedTrial, Steps, is_same};
 use super::watchdog::Watchdog;
 use crate::control::{Notice, Outcome};
 

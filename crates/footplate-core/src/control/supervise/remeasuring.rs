@@ -13,14 +13,10 @@ use crate::units::Length;
 
 use super::alarm::Alarm;
 use super::recovery::{MEASURED_WITHIN, Phase, Recovery};
-use super::trials::{SpeedTrial, Steps};
+use super::trials::{SpeedTrial, Steps, is_same};
 use super::watchdog::Watchdog;
 use crate::control::{Notice, Outcome};
 
-/// A ratio no further from 1 than this is none: what a run differs from the next, three times.
-const SAME: f64 = 0.02;
-/// See [`SAME`]: in standard deviations.
-const SAME_DEVIATIONS: f64 = 3.0;
 /// Ratios that are further apart than this are not of one train that has changed, but of two.
 const ANOTHER: f64 = 1.10;
 /// A stop this many standard deviations from its forecast is not of the same train either.
@@ -29,11 +25,6 @@ const ANOTHER_STOP: f64 = 2.5;
 const SHORT_OF: Length = Length::from_mm(120.0);
 /// Hops ahead among which one is looked for that is long enough for that.
 const HOPS_TO_STOP: usize = 8;
-
-/// Whether a speed is the one of before.
-pub(super) fn is_same(measured: &MeasuredRatio) -> bool {
-    libm::log(measured.ratio).abs() <= SAME.max(SAME_DEVIATIONS * measured.deviation)
-}
 
 impl Watchdog {
     /// Begins with the next speed, or decides what the train is.

@@ -21,12 +21,21 @@ const HIGH: Speed = Speed::from_mm_per_s(430.0);
 const HOPS: u8 = 3;
 /// ... or as few as two, if they are this long.
 const LONG_ENOUGH: Length = Length::from_mm(1_200.0);
+/// A ratio this close to 1 is no change: three standard deviations from run to run.
+const SAME: f64 = 0.02;
+/// See [`SAME`]: in standard deviations of the measurement.
+const SAME_DEVIATIONS: f64 = 3.0;
 /// The standard deviation of speeds from run to run, as a part.
 const RUN_DEVIATION: f64 = 0.006;
 /// Changes of speed take a little longer than the model of another train says.
 const SETTLES_PART: f64 = 1.3;
 /// See [`SETTLES_PART`].
 const SETTLES_MORE: TimeSpan = TimeSpan::from_ms(400);
+
+/// Whether a measured speed is that of the model.
+pub(super) fn is_same(measured: &MeasuredRatio) -> bool {
+    libm::log(measured.ratio).abs() <= SAME.max(SAME_DEVIATIONS * measured.deviation)
+}
 
 /// The steps that a recovery uses.
 #[derive(Debug, Clone, PartialEq)]
