@@ -12,7 +12,8 @@ pub(crate) fn fuzz(bytes: &[u8]) {
         }
         // What follows may be the reply, or noise of any length.
         if let Ok(states) = decode_reply(message, rest) {
-            let written: Vec<u8> = states.flat_map(|state| state.encode()).collect();
+            let written: Vec<u8> =
+                states.flat_map(footplate_wire::marklin_serial::ModuleState::encode).collect();
             assert_eq!(written, rest);
         }
         ahead = rest;

@@ -13,11 +13,11 @@ mod live_lines;
 mod progress;
 mod reading;
 mod runtime;
-#[allow(dead_code, reason = "the verbs that drive trains live are being written")]
+
+mod recorded;
 mod session_journal;
 mod spread;
 mod tally;
-mod witness;
 
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;

@@ -1,14 +1,14 @@
-//! Writes a live session down on a thread of its own, so that whoever drives trains never waits for a disk.
+//! Records a live session on a thread of its own, so that control never waits for a disk.
 //!
-//! The loop hands entries over through a queue that is long and has an end. The thread writes down together whatever
-//! has gathered while the disk was busy with the last ones: an entry waits for two commits at most, and none waits for more
-//! to come. What cannot be written is kept and tried again, so a disk that has room again, or another process that ends,
-//! costs nothing; what no longer fits into the queue is lost, counted, and the run broken there.
+//! The loop passes entries through a bounded queue. The thread commits together all entries that arrived while the disk was
+//! busy: an entry waits for two commits at most, and no commit waits for more entries. Entries that cannot be written are
+//! kept and tried again, so a full disk or another process that holds the store costs nothing once it is over. Entries that
+//! do not fit into the queue are lost and counted, and the run is broken there.
 
 mod scribe;
 mod writer;
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
@@ -23,21 +23,20 @@ use crate::runtime::Recorder;
 
 /// The version of the program that decides.
 pub(crate) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
-/// Entries that can wait: more than five minutes of the 50 events a second that a busy line brings, with what follows from
-/// each of them, in some 10 MB.
+/// Capacity of the queue: more than five minutes of a busy line (50 events a second) with all decisions, about 10 MB.
 const QUEUE: usize = 60_000;
 
-/// What may be done when the queue is full.
+/// What to do when the queue is full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum WhenFull {
-    /// Lose the entry: trains run on a clock that does not wait.
+    /// Lose the entry: real trains do not wait.
     Lose,
-    /// Wait for the disk: the clock is simulated and stands still meanwhile.
+    /// Wait for the disk: a simulated clock stands still meanwhile.
     Wait,
 }
 
 impl WhenFull {
-    /// Whether a queue took an entry.
+    /// Offers an entry to a queue; returns whether the queue took it.
     fn offer(self, queue: &SyncSender<Entry>, entry: Entry) -> bool {
         match self {
             Self::Wait => queue.send(entry).is_ok(),
@@ -49,41 +48,59 @@ impl WhenFull {
     }
 }
 
-/// What is to be done when the session cannot be written down.
+/// What to do when the session cannot be recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum IfUnkept {
-    /// Stop the trains: what they do is for the record.
+    /// Stop the trains: the session is for the record.
     Stop,
-    /// Go on, because somebody said so; it is said once.
+    /// Continue, with one warning.
     GoOn,
 }
 
-/// A live session on its way to the disk.
+/// The recorder of a live session.
 #[derive(Debug)]
 pub(crate) struct SessionJournal {
     queue: Option<SyncSender<Entry>>,
     when_full: WhenFull,
     if_unkept: IfUnkept,
-    /// Whether trouble was said.
+    /// Whether the warning was printed.
     said: bool,
-    /// Entries lost since the last that was taken: the chain is broken there.
+    /// Set if entries were lost since the last one in the queue: the run is broken there.
     broken: Option<Beginning>,
     beginning: Beginning,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<Journal>>,
 }
 
-/// What the thread says about itself.
+/// State that the thread shares.
 #[derive(Debug, Default)]
 struct Shared {
-    /// No entry will come any more.
+    /// No more entries follow.
     ended: AtomicBool,
+    /// Events in the queue so far, and those of them that are on disk.
+    taken: AtomicU64,
     acknowledged: AtomicU64,
+    /// Time of the last event on disk, in ns.
+    written_ns: AtomicI64,
     lost: AtomicU64,
     trouble: Mutex<Option<String>>,
 }
 
-/// How a run begins.
+/// Tells how much of a session is on disk.
+#[derive(Debug, Clone)]
+pub(crate) struct WrittenUntil(Arc<Shared>);
+
+impl WrittenUntil {
+    /// Returns the time before which all events are on disk.
+    pub(crate) fn at(&self, now: Timestamp) -> Timestamp {
+        // An event that arrives between the two reads makes the answer earlier, never later.
+        let acknowledged = self.0.acknowledged.load(Ordering::Acquire);
+        let written = Timestamp::from_ns(self.0.written_ns.load(Ordering::Acquire));
+        if self.0.taken.load(Ordering::Acquire) <= acknowledged { now } else { written.min(now) }
+    }
+}
+
+/// The beginning of a run.
 #[derive(Debug, Clone)]
 struct Beginning {
     began_at: Option<Timestamp>,
@@ -94,25 +111,25 @@ struct Beginning {
 enum Entry {
     Of(JournalEntry),
     Run(Beginning),
-    /// What is traced from here on is of this machine: its kind and its body.
+    /// The traced entries that follow belong to this machine: its kind and its body.
     Machine(&'static str, String),
-    /// No more will come; only wakes the thread.
+    /// No more entries follow; it only wakes the thread.
     End,
 }
 
-/// What became of a session in the end.
+/// How much of a session was recorded.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Kept {
-    /// Entries on the disk.
+    /// Entries on disk.
     pub(crate) acknowledged: u64,
-    /// Entries that are not.
+    /// Entries that are lost.
     pub(crate) lost: u64,
     /// Why not.
     pub(crate) trouble: Option<String>,
 }
 
 impl SessionJournal {
-    /// Takes over a journal that has begun. `began_at` is when the session's clock stood at zero.
+    /// Starts the thread over a journal that has begun. `began_at` is when the session's clock was zero.
     ///
     /// # Errors
     /// The system gives no thread.
@@ -150,7 +167,7 @@ impl SessionJournal {
         })
     }
 
-    /// Hands an entry over. Does not wait, unless told so.
+    /// Passes an entry to the thread. Waits only with [`WhenFull::Wait`].
     fn hand_over(&mut self, event: &Event) {
         if let Some(beginning) = self.broken.take()
             && !self.offer(Entry::Run(beginning.clone()))
@@ -159,13 +176,15 @@ impl SessionJournal {
             self.shared.lost.fetch_add(1, Ordering::Relaxed);
             return;
         }
-        if !self.offer(Entry::Of(JournalEntry::Event(*event))) {
+        if self.offer(Entry::Of(JournalEntry::Event(*event))) {
+            self.shared.taken.fetch_add(1, Ordering::Release);
+        } else {
             self.broken = Some(self.beginning.clone());
             self.shared.lost.fetch_add(1, Ordering::Relaxed);
         }
     }
 
-    /// The chain is broken: a train was lifted, or others take part from here on.
+    /// Begins the next run: a train was lifted, or other trains take part from here on.
     pub(crate) fn begin_run(&mut self, trains: &[TrainAtStart]) {
         self.beginning.trains = trains.to_vec();
         if !self.offer(Entry::Run(self.beginning.clone())) {
@@ -173,12 +192,12 @@ impl SessionJournal {
         }
     }
 
-    /// Whether the queue took it.
+    /// Returns whether the queue took the entry.
     fn offer(&self, entry: Entry) -> bool {
         self.queue.as_ref().is_some_and(|queue| self.when_full.offer(queue, entry))
     }
 
-    /// Another machine begins to decide, and the one before has ended; what writes down of it.
+    /// Begins to record another machine; the one before has ended. Returns its scribe.
     pub(crate) fn begin_machine(&mut self, kind: &'static str, body: String) -> Option<Scribe> {
         if !self.offer(Entry::Machine(kind, body)) {
             // Nothing of it can be distinguished from the one before.
@@ -188,19 +207,24 @@ impl SessionJournal {
         self.scribe()
     }
 
-    /// What writes down, in the same order, what a machine is told and decides. The journal has
-    /// [begun](Journal::begin_machine) the machine.
+    /// Returns what records the inputs and decisions of a machine that the journal has [begun](Journal::begin_machine), in
+    /// order with the events.
     pub(crate) fn scribe(&self) -> Option<Scribe> {
         let queue = self.queue.clone()?;
         Some(Scribe::new(queue, self.when_full, Arc::clone(&self.shared)))
     }
 
-    /// How many entries of the session are on the disk by now.
+    /// Number of events of the session on disk.
     pub(crate) fn acknowledged(&self) -> u64 {
         self.shared.acknowledged.load(Ordering::Acquire)
     }
 
-    /// Why entries are not written down at present, if they are not.
+    /// Returns a handle that tells how much of the session is on disk.
+    pub(crate) fn written(&self) -> WrittenUntil {
+        WrittenUntil(Arc::clone(&self.shared))
+    }
+
+    /// Why entries are not recorded at present, if they are not.
     pub(crate) fn trouble(&self) -> Option<String> {
         let lost = self.shared.lost.load(Ordering::Relaxed);
         let trouble = self.shared.trouble.lock().unwrap_or_else(PoisonError::into_inner).clone();
@@ -212,7 +236,7 @@ impl SessionJournal {
         }
     }
 
-    /// Writes down what still waits, once more even if there was trouble, and says what became of the session.
+    /// Writes the entries that still wait, once more even after failures. Returns how much of the session was recorded.
     pub(crate) fn finish(mut self) -> (Kept, Option<Journal>) {
         let journal = self.end();
         let kept = Kept {
@@ -233,7 +257,7 @@ impl SessionJournal {
     }
 }
 
-/// Entries are handed over before anybody acts on them, and measured once they are
+/// Entries are passed on before the machine acts on them. They count as measured once they are
 /// [acknowledged](SessionJournal::acknowledged).
 impl Recorder for SessionJournal {
     fn record(&mut self, events: &[Event]) -> anyhow::Result<()> {
@@ -252,7 +276,7 @@ impl Recorder for SessionJournal {
 }
 
 impl Drop for SessionJournal {
-    /// Whoever leaves in a hurry still leaves nothing behind that was taken.
+    /// Writes every entry that the queue took, also after an error.
     fn drop(&mut self) {
         self.end();
     }
@@ -278,6 +302,50 @@ mod tests {
     fn journal(path: &Path) -> Journal {
         let store = Store::open_or_create(path).unwrap().with_patience(Duration::from_millis(5)).unwrap();
         Journal::begin(store, "evening", "track-a", None, &[], now()).unwrap()
+    }
+
+    /// `cargo nextest run -p footplate -E 'test(how_long_an_event)' --run-ignored all --no-capture`
+    #[test]
+    #[ignore = "measures the disk of this machine"]
+    fn how_long_an_event_is_on_its_way_to_the_disk() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("railway.db");
+        let mut session =
+            SessionJournal::start(journal(&path), None, WhenFull::Lose, IfUnkept::GoOn).unwrap();
+        let mut took: Vec<f64> = Vec::new();
+        for number in 1..=500 {
+            let watch = crate::clock::Stopwatch::start();
+            session.hand_over(&event(number));
+            while session.acknowledged() < number {
+                thread::sleep(Duration::from_micros(50));
+            }
+            took.push(1e3 * watch.elapsed().as_secs_f64());
+            // As fast as a busy line brings them.
+            thread::sleep(Duration::from_millis(20).saturating_sub(watch.elapsed()));
+        }
+        took.sort_by(f64::total_cmp);
+        println!(
+            "on the disk after: median {:.1} ms, p99 {:.1} ms, longest {:.1} ms",
+            took[250], took[495], took[499]
+        );
+    }
+
+    #[test]
+    fn it_is_said_how_far_the_session_is_written_down() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("railway.db");
+        let mut session =
+            SessionJournal::start(journal(&path), None, WhenFull::Lose, IfUnkept::GoOn).unwrap();
+        let (written, now) = (session.written(), event(9).time);
+        assert_eq!(written.at(now), now);
+        session.hand_over(&event(1));
+        until(|| written.at(now) == now);
+        let other = Connection::open(&path).unwrap();
+        other.execute_batch("BEGIN IMMEDIATE").unwrap();
+        session.hand_over(&event(2));
+        assert_eq!(written.at(now), event(1).time);
+        other.execute_batch("ROLLBACK").unwrap();
+        until(|| written.at(now) == now);
     }
 
     fn times(path: &Path) -> Vec<Vec<i64>> {

@@ -23,6 +23,17 @@ pub enum JournalEntry {
     Traced(Traced),
 }
 
+impl JournalEntry {
+    /// The event, if it is one.
+    #[must_use]
+    pub const fn event(&self) -> Option<&Event> {
+        match self {
+            Self::Event(event) => Some(event),
+            Self::Traced(_) => None,
+        }
+    }
+}
+
 /// No row has this number, so that the store refuses what is of no machine.
 const NO_MACHINE: MachineKey = MachineKey(0);
 
@@ -110,7 +121,7 @@ impl Journal {
             })
         };
         append().and_then(|()| transaction.commit()).map_err(|error| StoreError::of(&path, error))?;
-        let events = entries.iter().filter(|entry| matches!(entry, JournalEntry::Event(_))).count();
+        let events = entries.iter().filter_map(JournalEntry::event).count();
         self.acknowledged += events as u64;
         Ok(self.acknowledged)
     }

@@ -60,6 +60,8 @@ pub struct Client {
     dialogue: Dialogue<Awaited>,
     framing: Framing,
     opening: Opening<Question>,
+    /// Whether to halt all locomotives next, whatever their numbers.
+    halts_all: bool,
     roster: Roster,
     contacts: Contacts,
     /// Participants that have identified themselves.
@@ -98,6 +100,7 @@ impl Client {
             dialogue: Dialogue::new(now, PACING, checks),
             framing: Framing::new(settings.transport),
             opening: Opening::asking(Question::ALL),
+            halts_all: false,
             roster: Roster::default(),
             contacts: Contacts::default(),
             participants: Vec::new(),
@@ -146,6 +149,9 @@ impl Client {
     fn next(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
         if !self.dialogue.may_write(now) {
             return None;
+        }
+        if core::mem::take(&mut self.halts_all) {
+            return Some(Outgoing::says(Message::Halt(Uid::ALL)));
         }
         // A speed contains no direction, so a train can be stopped before its direction is known.
         if let Some(command) = self.dialogue.next_stop(now, false) {
@@ -270,6 +276,8 @@ impl Session for Client {
 
     fn close(&mut self, now: Timestamp) {
         if self.dialogue.close(now, false) {
+            // Before the station's list is read, the number of a locomotive is only supposed: a stop may reach none.
+            self.halts_all = matches!(self.opening, Opening::Asking(_));
             self.solenoid.iter_mut().for_each(|powered| powered.release_at = now);
         }
         self.go_on(now);

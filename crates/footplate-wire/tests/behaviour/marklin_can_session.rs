@@ -353,6 +353,10 @@ fn a_train_that_was_never_driven_here_is_stopped_at_the_end_if_that_was_commande
     let closing = desk.client.closing();
     assert_eq!((closing.is_complete(), closing.commanded_to_stop), (true, vec![T24]));
     assert!(desk.messages().contains(&drives(24, 0)));
+    // The list has not been read: its number may be another.
+    let at = |message| desk.messages().iter().position(|written| *written == message);
+    assert!(at(Message::Halt(Uid::ALL)) < at(Message::Stop(Uid::ALL)), "{:?}", desk.messages());
+    assert!(at(Message::Halt(Uid::ALL)).is_some(), "{:?}", desk.messages());
 }
 
 #[test]

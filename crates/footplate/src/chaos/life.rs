@@ -23,12 +23,14 @@ pub(super) struct Life {
     steps: Cell<u64>,
     ends: Option<(u64, Death)>,
     died: Cell<Option<Death>>,
+    /// Whether the program has found that its guardian is dead, and wants to end.
+    is_orphan: Cell<bool>,
 }
 
 impl Life {
     /// A life that ends at a step, if it comes so far.
     pub(super) const fn new(ends: Option<(u64, Death)>) -> Self {
-        Self { steps: Cell::new(0), ends, died: Cell::new(None) }
+        Self { steps: Cell::new(0), ends, died: Cell::new(None), is_orphan: Cell::new(false) }
     }
 
     /// The program is about to do something that can be seen outside. Returns whether it still does.
@@ -49,6 +51,14 @@ impl Life {
     /// Ends it from outside: its guardian found that it hangs.
     pub(super) fn end(&self, death: Death) {
         self.died.set(Some(death));
+    }
+
+    pub(super) fn orphan(&self) {
+        self.is_orphan.set(true);
+    }
+
+    pub(super) fn is_orphan(&self) -> bool {
+        self.is_orphan.get()
     }
 
     pub(super) fn death(&self) -> Option<Death> {

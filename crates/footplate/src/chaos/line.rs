@@ -122,10 +122,6 @@ impl<'l> FaultyLine<'l> {
         cuts.map(|cut| Spell { from: at(cut.spell.from), until: at(cut.spell.until) }).collect()
     }
 
-    pub(super) fn is_orphan(&self) -> bool {
-        self.life.death() == Some(Death::GuardianKilled)
-    }
-
     /// Lets things begin that happen at one moment.
     fn happen(&mut self) {
         for at in 0..self.troubles.len() {
@@ -149,7 +145,7 @@ impl<'l> FaultyLine<'l> {
                 _ => {}
             }
         }
-        if self.is_orphan() && self.holder == Holder::Guardian {
+        if self.life.death() == Some(Death::GuardianKilled) && self.holder == Holder::Guardian {
             self.holder = Holder::Nobody;
             self.tell("the guardian is killed");
         }
@@ -351,6 +347,7 @@ impl Link for FaultyLine<'_> {
         }
         if self.holder == Holder::Nobody {
             self.holder = Holder::Program;
+            self.life.orphan();
         }
         if self.is_cut() && !self.has_datagrams {
             return Err(Lost("the line is cut".to_owned()));

@@ -12,7 +12,7 @@ use footplate_eval::traffic::{HAND, is_on_reserved_track, place_by_hand};
 use footplate_wire::{CommandError, LinkNotice};
 
 use super::disk::FaultyDisk;
-use super::life::{Death, Life};
+use super::life::Life;
 use super::line::SharedStation;
 use crate::runtime::{Attendant, Recorder, Wish};
 
@@ -49,6 +49,7 @@ pub(super) struct People<'p, 'l> {
     pub(super) ends: Timestamp,
     pub(super) seen: Seen,
     is_inside: BTreeMap<TrainId, bool>,
+    moves: BTreeMap<TrainId, bool>,
     /// Trains that a person was told to look after, and since when.
     troubled: BTreeMap<TrainId, Timestamp>,
     without_power: Option<Timestamp>,
@@ -83,6 +84,7 @@ impl<'p, 'l> People<'p, 'l> {
             ends: now + lasts,
             seen: Seen::default(),
             is_inside: BTreeMap::new(),
+            moves: BTreeMap::new(),
             troubled: BTreeMap::new(),
             without_power: None,
             is_silent: false,
@@ -128,14 +130,21 @@ impl<'p, 'l> People<'p, 'l> {
                 self.seen.intrusions.push((now, *train));
                 self.tell(now, format!("train {train} is on track that is not reserved for it"));
             }
-            if world.truth().train(*train).is_some_and(|truth| truth.at_rest_since.is_none()) {
+            let moves = world.truth().train(*train).is_some_and(|truth| truth.at_rest_since.is_none());
+            if moves {
                 self.moved = now;
+            }
+            if self.moves.insert(*train, moves) != Some(moves) {
+                self.tell(
+                    now,
+                    format!("really: train {train} {}", if moves { "moves" } else { "is at rest" }),
+                );
             }
             // A person looks where it stands, and says so.
             if self.troubled.get(train).is_some_and(|since| now - *since >= HELP_AFTER) {
-                self.troubled.remove(train);
                 let stands = world.truth().train(*train).is_some_and(|truth| truth.at_rest_since.is_some());
                 if stands && let Some(at) = place_by_hand(self.layout, world, *train) {
+                    self.troubled.remove(train);
                     dispatcher.place(now, *train, at, HAND);
                     self.tell(now, format!("a person says where train {train} is"));
                 }
@@ -208,7 +217,7 @@ impl Attendant<Dispatcher> for People<'_, '_> {
     }
 
     fn attend(&mut self, now: Timestamp, dispatcher: &mut Dispatcher) -> Wish {
-        if !self.life.step() || self.life.death() == Some(Death::GuardianKilled) {
+        if !self.life.step() || self.life.is_orphan() {
             return Wish::Finish;
         }
         for news in self.news.drain(..) {

@@ -217,6 +217,22 @@ impl<'l> Teller<'_, 'l> {
         self.fate.told.push((now, words));
     }
 
+    /// What the decoders heard last, and which ends lead.
+    fn tell_truth(&mut self) {
+        let truth = |train: &TrainId| {
+            let station = self.station.borrow();
+            let truth = station.world().truth().train(*train)?;
+            Some(format!(
+                "{train} step {} {:?} leads {:.0} mm/s",
+                truth.commanded,
+                truth.leads,
+                truth.speed.as_mm_per_s()
+            ))
+        };
+        let truths: Vec<String> = TRAINS.iter().filter_map(truth).collect();
+        self.note(format!("really: {}", truths.join(", ")));
+    }
+
     fn fail(&mut self, words: String) {
         self.note(format!("FAILED: {words}"));
         self.fate.failures.push(words);
@@ -247,7 +263,7 @@ impl<'l> Teller<'_, 'l> {
             self.fail(format!("trains of the session before were not stopped at the start: {closing}"));
         }
         let took = (self.now() - began).as_ms();
-        self.note(format!("the next start stopped all trains and took {took:.0} ms"));
+        self.note(format!("the next start took {took:.0} ms: {closing}"));
         Ok(())
     }
 
@@ -313,7 +329,7 @@ impl<'l> Teller<'_, 'l> {
         }
         let unreachable = line.unreachable();
         self.check_mishaps(mishaps, &unreachable);
-        self.bury(death, began, &mut line, disk)
+        self.bury(death, began, closing.is_complete(), &mut line, disk)
     }
 
     fn count(&mut self, mut seen: Seen) {
@@ -348,12 +364,14 @@ impl<'l> Teller<'_, 'l> {
         &mut self,
         death: Option<Death>,
         began: Timestamp,
+        is_complete: bool,
         line: &mut FaultyLine<'l>,
         disk: FaultyDisk,
     ) -> anyhow::Result<()> {
         self.fate.deaths += u32::from(death.is_some());
         let kept = match death {
-            None | Some(Death::GuardianKilled) => disk.finish(),
+            None | Some(Death::GuardianKilled) if is_complete => disk.finish(),
+            None | Some(Death::GuardianKilled) => disk.die(),
             Some(Death::Killed | Death::Hangs) => disk.die(),
             Some(Death::PowerCut(_)) => disk.lose_power(&mut self.choice),
         };
@@ -381,6 +399,8 @@ impl<'l> Teller<'_, 'l> {
             Some(Death::Killed) | None => {}
         }
         let Some(will) = line.will.take() else { return Ok(()) };
+        self.note(format!("the guardian begins with a last will of {} bytes", will.len()));
+        self.tell_truth();
         // While the line is cut nobody can be stopped.
         let mut since = began;
         if line.all_stopped() {

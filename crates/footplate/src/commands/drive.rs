@@ -49,9 +49,9 @@ use crate::clock::{local, now};
 use crate::dashboard::{Board, Dashboard, LayoutPicture, ServedAt};
 use crate::layout_check::LayoutWatch;
 use crate::link::{Address, Link, MeasuredLine, ObservedLink, Speed, open, open_session, open_simulated};
+use crate::recorded::Recorded;
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
-use crate::witness::Witnessed;
 
 /// Drive trains: set speeds and turnouts, stop at a place, move by a distance, follow another train.
 ///
@@ -299,13 +299,16 @@ impl Arguments {
             terminal = Some(Terminal::open(&board, &LayoutPicture::of(&file))?);
         }
         let mut journal = self.journal(layout, link.now(), &beginning)?;
+        if let (Some(journal), Some(dashboard)) = (&journal, dashboard) {
+            dashboard.board.follow_journal(journal.written());
+        }
         let scribe = journal.as_ref().and_then(SessionJournal::scribe);
         let trains = beginning.models.len();
         let script_runner = beginning.script_runner()?;
         if script_runner.is_interactive() && !self.json {
             console.say(HELP, "");
         }
-        let mut script_runner = Witnessed::new(script_runner, scribe);
+        let mut script_runner = Recorded::new(script_runner, scribe);
         let recorder = journal.as_mut().map(|journal| journal as &mut dyn Recorder);
         let mut watch = LayoutWatch::new(layout, trains, recorder);
         let mut runtime = Runtime::new(link, session, Some(&mut watch), Some(StopFlag::install()));
@@ -341,7 +344,9 @@ impl Arguments {
         if let Some(said) = watch.lengths_doubted() {
             eprintln!("{said}");
         }
-        let mut script_runner = script_runner.end(at);
+        // A session whose trains may still run has no end: the next one stops them first.
+        let mut script_runner =
+            if closing.is_complete() { script_runner.end(at) } else { script_runner.into_machine() };
         if !closing.is_complete() {
             eprintln!("{closing}");
         }

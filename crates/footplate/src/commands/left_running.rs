@@ -1,7 +1,7 @@
-//! Before a session begins: trains that an earlier one left running are stopped.
+//! Before a session begins: stops trains that an earlier session left running.
 //!
-//! A program that is killed stops nobody, and a station goes on sending what it was told last. The store knows such a session:
-//! it has no end.
+//! After a crash a station repeats its last commands, and trains keep running. The store knows such a session: it has no
+//! end.
 
 use footplate_core::track::Layout;
 use footplate_core::{Command, SpeedStep, TrainId};
@@ -11,8 +11,8 @@ use footplate_wire::{Closing, Session};
 use crate::link::{Address, Link, Speed, StationSession, open, open_session};
 use crate::runtime::Runtime;
 
-/// Opens the link and stops all trains if the newest session of the store has not ended. Gives back the link, which the session that
-/// begins goes on with; `None` where there is nothing to stop. A simulated railway is new each time.
+/// Opens the link and stops all trains if the newest session of the store has no end. Returns the link for the session that
+/// begins; `None` if there is nothing to stop. A simulated railway is new each time.
 ///
 /// # Errors
 /// The store cannot be read, or the link cannot be opened.

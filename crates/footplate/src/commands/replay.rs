@@ -14,11 +14,11 @@ use footplate_store::{RecordingKey, Store, StoredMachine, StoredRecording};
 
 use super::Outcome;
 use crate::clock::now;
+use crate::recorded::{Ending, Extent};
 use crate::session_journal::PROGRAM;
-use crate::witness::{Ending, Extent};
 use page::Page;
 pub(super) use pictures::pictures;
-use session::rehearse;
+use session::replay_session;
 
 /// Decide a recorded session of driving or calibrating once more, and compare.
 ///
@@ -94,10 +94,10 @@ impl Arguments {
         for machine in self.choose(&machines, &recordings)? {
             let trace = store.trace(machine.key)?;
             let extent = Extent { until: self.until, all: self.diff, notices: machine.program == PROGRAM };
-            let rehearing = rehearse(machine, trace, extent)?;
-            page.write(machine, &rehearing, output)?;
-            let stuck = matches!(rehearing.ending, Ending::Unreadable { .. } | Ending::Gap { .. });
-            if stuck || !rehearing.differences.is_empty() {
+            let replay = replay_session(machine, trace, extent)?;
+            page.write(machine, &replay, output)?;
+            let stuck = matches!(replay.ending, Ending::Unreadable { .. } | Ending::Gap { .. });
+            if stuck || !replay.differences.is_empty() {
                 outcome = Outcome::FallsShort;
             }
         }

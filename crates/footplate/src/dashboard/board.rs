@@ -5,13 +5,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use footplate_core::TrainId;
 use footplate_core::model::MotionModel;
+use footplate_core::{Timestamp, TrainId};
 use serde::Serialize;
 use serde_json::json;
 use tokio::sync::{oneshot, watch};
 
 use super::history::{History, Sample};
+use crate::session_journal::WrittenUntil;
 
 /// Events kept for watchers that reconnect: a quarter of an hour of a busy railway.
 const MAX_EVENTS: usize = 4_000;
@@ -93,6 +94,8 @@ pub(crate) struct Board {
     histories: Mutex<BTreeMap<TrainId, History>>,
     models: Mutex<BTreeMap<TrainId, Arc<MotionModel>>>,
     waiting: Mutex<VecDeque<PendingRequest>>,
+    /// How much of the session is on disk, if it is recorded.
+    journal: Mutex<Option<WrittenUntil>>,
     /// The number of connected watchers.
     watchers: AtomicUsize,
 }
@@ -107,8 +110,20 @@ impl Board {
             histories: Mutex::default(),
             models: Mutex::default(),
             waiting: Mutex::default(),
+            journal: Mutex::default(),
             watchers: AtomicUsize::new(0),
         })
+    }
+
+    /// The session is recorded from now on.
+    pub(crate) fn follow_journal(&self, written: WrittenUntil) {
+        *self.journal.lock().unwrap_or_else(PoisonError::into_inner) = Some(written);
+    }
+
+    /// Returns the time before which all events are on disk; `None` if the session is not recorded.
+    pub(super) fn written_until(&self, now: Timestamp) -> Option<Timestamp> {
+        let journal = self.journal.lock().unwrap_or_else(PoisonError::into_inner);
+        journal.as_ref().map(|written| written.at(now))
     }
 
     /// Replaces the picture.

@@ -234,6 +234,7 @@ impl Painter {
         self.flashes.retain(|_, at| seconds_since(*at) < FLASH_S);
         self.board.show(&Picture {
             t_s: millis((now - began).as_s()),
+            written_until_s: self.board.written_until(now).map(|at| millis((at - began).as_s())),
             trains,
             turnouts: driver
                 .layout()

@@ -32,6 +32,9 @@ pub(crate) struct TrainTask {
 #[derive(Debug, Serialize)]
 pub(super) struct Picture {
     pub(super) t_s: f64,
+    /// All that happened before this is on the disk; nothing where nothing is written down.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) written_until_s: Option<f64>,
     pub(super) trains: Vec<TrainPicture>,
     pub(super) turnouts: BTreeMap<u16, Option<&'static str>>,
     /// Recent detections: sensor, and seconds since.

@@ -1,4 +1,4 @@
-//! What a guardian and its child say to each other: a letter, a length, and so many bytes.
+//! Frames between a guardian and its child: a letter, a length and a payload.
 
 use std::io::{ErrorKind, Read, Result, Write};
 use std::os::unix::net::UnixStream;
@@ -14,23 +14,23 @@ const HEADER: usize = 3;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Kind {
-    /// The child: open the line, or open it again.
+    /// Child: open the line, or open it again.
     Open = b'o',
-    /// The child: put these bytes on the line, in one piece.
+    /// Child: write these bytes to the line in one piece.
     Write = b'w',
-    /// The child: what to say if it dies: parts of a pause (µs, four bytes), a length (two bytes) and bytes.
+    /// Child: the last will, which the guardian sends if the child dies (`runtime/last_will.rs`).
     Will = b'l',
-    /// The child: it lives. One byte: whether a train was commanded to run.
+    /// Child: heartbeat. One byte: whether a train is commanded to run.
     Alive = b'a',
-    /// The child: nothing is left to stop.
+    /// Child: no train is left to stop.
     Goodbye = b'g',
-    /// The guardian: the line is open. One byte: the hand-shake line.
+    /// Guardian: the line is open. One byte: state of the handshake line.
     Opened = b'O',
-    /// The guardian: bytes from the station.
+    /// Guardian: bytes from the station; one datagram where it sends datagrams.
     Heard = b'H',
-    /// The guardian: the hand-shake line is up (1) or down (0).
+    /// Guardian: the handshake line is up (1) or down (0).
     Cts = b'C',
-    /// The guardian: the line is gone, or cannot be opened; why.
+    /// Guardian: the line is lost or cannot be opened; the reason as text.
     Lost = b'L',
 }
 
@@ -52,7 +52,7 @@ impl Kind {
     }
 }
 
-/// The hand-shake line in one byte.
+/// Encodes the state of the handshake line.
 pub(super) const fn cts_byte(cts: Option<bool>) -> u8 {
     match cts {
         None => 2,
@@ -60,7 +60,7 @@ pub(super) const fn cts_byte(cts: Option<bool>) -> u8 {
     }
 }
 
-/// The hand-shake line of such a byte.
+/// Decodes the state of the handshake line.
 pub(super) const fn cts_of(byte: u8) -> Option<bool> {
     match byte {
         0 => Some(false),
@@ -69,7 +69,7 @@ pub(super) const fn cts_of(byte: u8) -> Option<bool> {
     }
 }
 
-/// Writes frames. Its memory does not grow after the first long one.
+/// Writes frames. Its buffer keeps the size of the longest frame.
 #[derive(Debug)]
 pub(super) struct FrameWriter {
     stream: UnixStream,
@@ -82,7 +82,7 @@ impl FrameWriter {
     }
 
     /// # Errors
-    /// The other side is gone, or the payload too long.
+    /// The peer has closed, or the payload is too long.
     pub(super) fn send(&mut self, kind: Kind, payload: &[u8]) -> Result<()> {
         let length = u16::try_from(payload.len()).ok().filter(|length| usize::from(*length) <= MOST_BYTES);
         let length = length.ok_or(ErrorKind::InvalidInput)?;
@@ -94,12 +94,12 @@ impl FrameWriter {
     }
 }
 
-/// Reads frames into memory that does not grow.
+/// Reads frames into a buffer of fixed size.
 #[derive(Debug)]
 pub(super) struct FrameReader {
     stream: UnixStream,
     bytes: Box<[u8]>,
-    /// What was read and not returned lies in `begin..end`.
+    /// Bytes that were read and not returned yet are in `begin..end`.
     begin: usize,
     end: usize,
 }
@@ -109,10 +109,10 @@ impl FrameReader {
         Self { stream, bytes: vec![0; HEADER + MOST_BYTES].into(), begin: 0, end: 0 }
     }
 
-    /// The next frame; `None` when none came within the time. No time: waits for ever.
+    /// Returns the next frame; `None` after `within`. Without a time it waits for ever.
     ///
     /// # Errors
-    /// The other side is gone, or says what is no frame.
+    /// The peer has closed, or sent something that is not a frame.
     pub(super) fn next(&mut self, within: Option<Duration>) -> Result<Option<(Kind, &[u8])>> {
         loop {
             if let Some(length) = self.whole()? {
@@ -140,7 +140,7 @@ impl FrameReader {
         }
     }
 
-    /// How long the frame is that has come whole, if one has.
+    /// Length of the first frame, once it has arrived completely.
     fn whole(&self) -> Result<Option<usize>> {
         let come = self.bytes.get(self.begin..self.end).unwrap_or_default();
         let [_, low, high, ..] = come else { return Ok(None) };
@@ -152,7 +152,7 @@ impl FrameReader {
     }
 }
 
-/// Whether there is something to read within a time, to a fraction of a millisecond.
+/// Waits until the stream is readable, with a resolution below a millisecond. Returns whether it is.
 fn is_readable(stream: &UnixStream, within: Option<Duration>) -> Result<bool> {
     let limit = within.map(|within| Timespec {
         tv_sec: within.as_secs().try_into().unwrap_or(i64::MAX),
@@ -160,7 +160,7 @@ fn is_readable(stream: &UnixStream, within: Option<Duration>) -> Result<bool> {
     });
     match poll(&mut [PollFd::new(stream, PollFlags::IN)], limit.as_ref()) {
         Ok(count) => Ok(count > 0),
-        // Whoever waits looks at the clock again.
+        // The caller checks the clock again.
         Err(rustix::io::Errno::INTR) => Ok(false),
         Err(error) => Err(error.into()),
     }

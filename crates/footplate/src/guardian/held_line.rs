@@ -1,4 +1,4 @@
-//! The line that a guardian holds: opened when its child asks, and again for ever when trains have to be stopped.
+//! The line that a guardian holds. It opens the line when its child asks, and retries for ever when trains must be stopped.
 
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
@@ -11,7 +11,7 @@ use super::voice::say;
 use crate::link::{Arrival, Cable, Lost};
 use crate::runtime::WillLine;
 
-/// Who is told what is heard on the line: the child that there is now.
+/// The present child, which receives everything that arrives on the line.
 pub(super) type Ear = Arc<Mutex<Option<FrameWriter>>>;
 
 /// A line, open or not.
@@ -20,9 +20,9 @@ pub(super) struct HeldLine {
     ear: Ear,
     writer: Option<Box<dyn Write + Send>>,
     cts: Arc<AtomicU8>,
-    /// Which opening it is: what is heard of an earlier one is of no interest. An even number: the line is gone.
+    /// Counts openings, so that arrivals of an earlier one are ignored. An even number: the line is lost.
     opening: Arc<AtomicU32>,
-    /// Whether the station has said anything since this was cleared.
+    /// Whether the station has sent anything since this was cleared.
     has_heard: Arc<AtomicBool>,
 }
 
@@ -36,10 +36,10 @@ impl HeldLine {
         self.writer.is_some() && !self.opening.load(Ordering::Acquire).is_multiple_of(2)
     }
 
-    /// Opens the line, anew if it is open. Says how the hand-shake line is.
+    /// Opens the line; reopens it if it is open. Returns the state of the handshake line.
     ///
     /// # Errors
-    /// When the port cannot be opened.
+    /// The port cannot be opened.
     pub(super) fn open(&mut self) -> Result<Option<bool>, Lost> {
         self.writer = None;
         // The next odd number.
@@ -53,7 +53,7 @@ impl HeldLine {
             }
             let told = |kind, bytes: &[u8]| {
                 let mut ear = ear.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-                // A child that is gone hears nothing; its guardian notices by itself.
+                // If the child is gone, reading from it fails too.
                 let _ = ear.as_mut().map(|child| child.send(kind, bytes));
             };
             match arrival {
@@ -86,10 +86,10 @@ impl HeldLine {
         }
     }
 
-    /// Puts bytes on the line now.
+    /// Writes bytes to the line.
     ///
     /// # Errors
-    /// When the line is gone.
+    /// The line is lost.
     pub(super) fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
         let lost = |why: &dyn std::fmt::Display| Lost(format!("cannot write to `{}`: {why}", self.cable));
         if self.opening.load(Ordering::Acquire).is_multiple_of(2) {
@@ -105,7 +105,7 @@ impl HeldLine {
     }
 }
 
-/// A held line that is told what stops trains, and the people who may give up.
+/// The held line while a last will is sent, and the signals by which people give up.
 pub(super) struct LastLine<'l> {
     pub(super) line: &'l mut HeldLine,
     pub(super) signals: &'l Signals,

@@ -1,4 +1,4 @@
-//! The guardian itself: starts its child, passes bytes, watches, and does the last will.
+//! The guardian: starts its child, relays bytes, monitors it, and sends its last will.
 
 use std::ffi::OsString;
 use std::io::{IoSlice, Write};
@@ -23,35 +23,35 @@ use crate::clock::Stopwatch;
 use crate::link::Cable;
 use crate::runtime::carry_out;
 
-/// A child that drives trains and says nothing for so long is taken for dead (issue of trust: stops within 1 s).
+/// A child that drives trains counts as dead after this time without a frame (requirement: stops within 1 s).
 const LATE: Duration = Duration::from_millis(500);
-/// Before a child is started again.
+/// Pause before a restart.
 const RESTART_AFTER: Duration = Duration::from_secs(1);
-/// A child that dies sooner than this is not started again: it would die again.
+/// A child that dies sooner than this is not restarted: it would die again.
 const LONG_ENOUGH: Duration = Duration::from_secs(10);
-/// Exit status of a program that a signal ended, as shells have it, without the number of the signal.
+/// Exit status after a signal, less the number of the signal, as in shells.
 const ENDED_BY_SIGNAL: u8 = 128;
 
-/// How a child left.
+/// How serving a child ended.
 enum Left {
-    /// It closed its side of the connection.
+    /// The child closed its connection.
     Gone,
-    /// It said nothing for too long.
+    /// The child sent nothing for too long.
     Late,
 }
 
-/// What is known of a child.
+/// State of the present child.
 struct Watched {
-    /// What stops its trains.
+    /// The bytes that stop its trains.
     will: Vec<u8>,
     has_will: bool,
     runs: bool,
 }
 
-/// Runs the program again as a child and holds its line. Returns when the child has ended and no train is left to be stopped.
+/// Runs the program again as a child and holds its line. Returns once the child has ended and all trains are stopped.
 ///
 /// # Errors
-/// When no child can be started.
+/// No child can be started.
 pub(crate) fn keep(cable: Cable, restarts: bool) -> anyhow::Result<ExitCode> {
     let signals = Signals::listen().context("cannot listen to signals")?;
     let modes = tcgetattr(std::io::stdin()).ok();
@@ -72,10 +72,10 @@ pub(crate) fn keep(cable: Cable, restarts: bool) -> anyhow::Result<ExitCode> {
                 "the program has said nothing for {} ms while trains run; it is ended",
                 LATE.as_millis()
             ));
-            // It must not write any more, and cannot: only this process holds the line.
+            // It cannot write any more: only this process holds the line.
             let _ = child.kill();
         }
-        // The will comes before everything else, also before it is known how the child ended.
+        // Stopping trains comes first, before the guardian finds out how the child ended.
         let died = watched.has_will;
         let mut said = false;
         if died {
@@ -103,7 +103,7 @@ pub(crate) fn keep(cable: Cable, restarts: bool) -> anyhow::Result<ExitCode> {
     }
 }
 
-/// Starts the child. Its standard input is the connection until it has taken the real one from there.
+/// Starts the child. Its standard input is the connection, over which it receives the real one.
 fn start() -> anyhow::Result<(Child, UnixStream)> {
     let (here, there) = UnixStream::pair()?;
     let arguments: Vec<OsString> = std::env::args_os().skip(1).collect();
@@ -121,11 +121,11 @@ fn start() -> anyhow::Result<(Child, UnixStream)> {
     Ok((child, here))
 }
 
-/// Serves a child until it is gone or late.
+/// Serves a child until it closes or is late.
 fn watch(frames: &mut FrameReader, line: &mut HeldLine, ear: &Ear, watched: &mut Watched) -> Left {
     let tell = |kind, bytes: &[u8]| {
         let mut ear = ear.lock().unwrap_or_else(PoisonError::into_inner);
-        // If it is gone, reading will say so.
+        // If the child is gone, reading reports it.
         let _ = ear.as_mut().map(|child| child.send(kind, bytes));
     };
     let mut heard = Stopwatch::start();
@@ -154,14 +154,14 @@ fn watch(frames: &mut FrameReader, line: &mut HeldLine, ear: &Ear, watched: &mut
             }
             Kind::Alive => watched.runs = payload == [1],
             Kind::Goodbye => (watched.has_will, watched.runs) = (false, false),
-            // Only a guardian says these.
+            // Only a guardian sends these.
             Kind::Opened | Kind::Heard | Kind::Cts | Kind::Lost => return Left::Gone,
         }
         heard = Stopwatch::start();
     }
 }
 
-/// A child that closed the connection and does not end is ended: it has nothing left to drive with.
+/// Waits for the end of a child that closed its connection, and kills it after a while: it cannot drive any more.
 fn wait_for(child: &mut Child) -> anyhow::Result<ExitStatus> {
     const WITHIN: Duration = Duration::from_secs(10);
     const EVERY: Duration = Duration::from_millis(20);
@@ -197,7 +197,7 @@ fn exit_code(ended: ExitStatus) -> ExitCode {
     }))
 }
 
-/// Gives a terminal back as it was, which a child that drew on it and died did not.
+/// Restores the terminal, which a child that drew on it and died has left changed.
 fn restore(modes: Option<&Termios>) {
     /// Leaves the other screen of a terminal and shows its cursor.
     const PLAIN: &[u8] = b"\x1b[?1049l\x1b[?25h";

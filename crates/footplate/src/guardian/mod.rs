@@ -1,19 +1,19 @@
 //! Two processes: a small one that holds the line to the station, and the program that drives trains over it.
 //!
-//! Whoever types `footplate drive` starts the guardian, which starts the same program again as its child. The guardian
-//! opens the line, passes bytes in both directions and reads no files, no orders and no HTTP. What stops the trains it is
-//! told in advance, as bytes. If its child dies, falls silent or closes without a word, the guardian says these bytes,
-//! however long it takes to reach the station. If the guardian dies, its child opens the line itself, stops all trains and
-//! ends.
+//! `footplate drive` starts as the guardian, which starts the same program again as its child. The guardian opens the line
+//! and relays bytes in both directions; it reads no files, no commands and no HTTP. The child tells it in advance which
+//! bytes stop all trains: its last will. If the child dies, hangs or closes without a goodbye, the guardian sends these
+//! bytes, and retries until it reaches the station. If the guardian dies, the child opens the line itself, stops all trains
+//! and ends.
 //!
 //! ```text
-//! frame     what the two say to each other
-//! keeper    the guardian: starts its child, watches it, and does its last will
+//! frame     the protocol between the two
+//! keeper    the guardian: starts its child, monitors it, and sends its last will
 //! held_line the line that the guardian holds
-//! signals   what people say to the guardian by signals
-//! voice     what the guardian says to people
+//! signals   signals to the guardian
+//! voice     the guardian's messages
 //! ward      how the child finds its guardian
-//! ward_link the line, as the child sees it
+//! ward_link the line as the child sees it
 //! ```
 
 mod frame;

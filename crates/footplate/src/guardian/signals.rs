@@ -1,4 +1,4 @@
-//! What people say to a guardian by signals: it passes them on, and does not end before its trains are at rest.
+//! Signals to a guardian: it passes them on to its child, and does not end before its trains are stopped.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
@@ -9,7 +9,7 @@ use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP};
 /// No child.
 const NONE: i32 = 0;
 
-/// Signals from now on.
+/// The signals that the guardian handles.
 #[derive(Debug, Clone)]
 pub(super) struct Signals {
     child: Arc<AtomicI32>,
@@ -17,11 +17,11 @@ pub(super) struct Signals {
 }
 
 impl Signals {
-    /// From now on no signal that a person or a system sends ends this process, except SIGKILL. A terminal sends its keys to the
-    /// child, too; what comes from elsewhere is passed on.
+    /// Installs the handlers. From now on only SIGKILL ends this process. A terminal sends its keys to the child as well; the
+    /// guardian passes on signals from elsewhere.
     ///
     /// # Errors
-    /// The system does not let this process listen.
+    /// The system refuses the handlers.
     pub(super) fn listen() -> std::io::Result<Self> {
         let signals = Self { child: Arc::new(AtomicI32::new(NONE)), gives_up: Arc::default() };
         let mut incoming = signal_hook::iterator::Signals::new([SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP])?;
@@ -36,12 +36,12 @@ impl Signals {
             SIGINT => Some(Signal::INT),
             SIGTERM => Some(Signal::TERM),
             SIGHUP => Some(Signal::HUP),
-            // Keys of a terminal, which the child has heard itself.
+            // Keys of a terminal, which the child has received itself.
             _ => None,
         };
         match Pid::from_raw(self.child.load(Ordering::Acquire)) {
             Some(child) => {
-                // A child that has ended this moment hears nothing.
+                // The child may have ended at this moment.
                 let _ = wanted.map(|signal| kill_process(child, signal));
             }
             None if matches!(signal, SIGINT | SIGTERM) => self.gives_up.store(true, Ordering::Release),
@@ -49,13 +49,13 @@ impl Signals {
         }
     }
 
-    /// Whose child is told; `None`: a signal that asks for the end means now that it is not waited for a lost line.
+    /// Sets the child that receives signals. `None`: from now on a signal to end means not to wait for a lost line.
     pub(super) fn pass_on_to(&self, child: Option<u32>) {
         let child = child.and_then(|child| child.try_into().ok()).unwrap_or(NONE);
         self.child.store(child, Ordering::Release);
     }
 
-    /// Whether somebody does not want to wait any longer.
+    /// Whether a signal asked not to wait any longer.
     pub(super) fn gives_up(&self) -> bool {
         self.gives_up.load(Ordering::Acquire)
     }

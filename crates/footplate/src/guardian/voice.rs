@@ -1,8 +1,8 @@
-//! What a guardian says to people, on standard error.
+//! The guardian's messages on standard error.
 
 use std::io::Write;
 
-/// Says something. A guardian goes on when nobody listens.
+/// Prints a message. A closed standard error does not stop the guardian.
 pub(super) fn say(words: &str) {
     let _ = writeln!(std::io::stderr(), "guardian: {words}");
 }

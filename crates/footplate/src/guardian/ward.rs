@@ -10,17 +10,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::{Context, bail};
 use rustix::net::{RecvAncillaryBuffer, RecvAncillaryMessage, RecvFlags, recvmsg};
 
-/// The variable of the environment that says to a program that it is a guardian's child.
+/// The environment variable that marks a guardian's child.
 pub(super) const WARD: &str = "FOOTPLATE_WARD";
 
 static CONNECTION: Mutex<Option<UnixStream>> = Mutex::new(None);
 static IS_WARD: AtomicBool = AtomicBool::new(false);
 
-/// If a guardian started this program: finds it, and takes the standard input that it passes on. Called once, before anything is
-/// read from there.
+/// If a guardian started this program: connects to it and takes the standard input that it passes on. Call it once, before
+/// anything reads standard input.
 ///
 /// # Errors
-/// When standard input is no guardian's.
+/// Standard input is not a guardian's connection.
 pub(crate) fn become_ward() -> anyhow::Result<()> {
     if std::env::var_os(WARD).is_none() {
         return Ok(());
@@ -42,7 +42,7 @@ pub(crate) fn become_ward() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Whether a guardian watches over this program.
+/// Whether a guardian monitors this program.
 pub(crate) fn is_ward() -> bool {
     IS_WARD.load(Ordering::Acquire)
 }

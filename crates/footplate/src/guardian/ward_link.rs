@@ -1,4 +1,4 @@
-//! The line as a guardian's child sees it: every byte passes through the guardian, which is told that the child lives.
+//! The line as a guardian's child sees it: every byte passes through the guardian, which also receives the heartbeat.
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Result as IoResult};
@@ -13,7 +13,7 @@ use crate::clock::Stopwatch;
 use crate::link::{Bequest, Cable, CableLink, Guardian, Heard, Link, Lost, PERSON_MS};
 use crate::runtime::{StopFlag, written};
 
-/// How often a guardian is told that its child lives: five times as often as it has to.
+/// Period of the heartbeat: a fifth of what the guardian tolerates.
 const ALIVE_EVERY: Duration = Duration::from_millis(100);
 
 /// A line that a guardian holds.
@@ -21,23 +21,23 @@ pub(crate) struct WardLink {
     cable: Cable,
     frames: FrameReader,
     guardian: FrameWriter,
-    /// Bytes that came in one frame.
+    /// Bytes of the last frame that were not returned yet.
     bytes: VecDeque<u8>,
     cts: Option<bool>,
     stopwatch: Stopwatch,
-    /// Since the guardian heard of this program.
+    /// Time since the last frame to the guardian.
     spoken: Stopwatch,
     runs: bool,
     is_orphan: bool,
-    /// The line, held by this process after the guardian's death.
+    /// The line, which this process opens itself after the guardian's death.
     own: Option<CableLink>,
 }
 
 impl WardLink {
-    /// Has the guardian open the line; `None` if there is no guardian.
+    /// Asks the guardian to open the line; `None` without a guardian.
     ///
     /// # Errors
-    /// When the line cannot be opened.
+    /// The line cannot be opened.
     pub(crate) fn open(cable: &Cable) -> Result<Option<Self>, Lost> {
         let unreached = |error| Lost(format!("cannot reach the guardian: {error}"));
         let Some(stream) = connection().map_err(unreached)? else { return Ok(None) };
@@ -83,7 +83,7 @@ impl WardLink {
         Lost(format!("the guardian that held `{}` has died", self.cable))
     }
 
-    /// Waits until the guardian has opened the line, or could not.
+    /// Asks the guardian to open the line and waits for the answer.
     fn have_opened(&mut self) -> Result<(), Lost> {
         self.tell(Kind::Open, &[])?;
         self.bytes.clear();
@@ -91,7 +91,7 @@ impl WardLink {
             let answer = match self.frames.next(None) {
                 Ok(Some((Kind::Opened, payload))) => Ok(payload.first().copied().and_then(cts_of)),
                 Ok(Some((Kind::Lost, why))) => Err(Lost(String::from_utf8_lossy(why).into_owned())),
-                // Of an earlier opening.
+                // Arrivals of an earlier opening.
                 Ok(_) => continue,
                 Err(error) => return Err(self.bereft(&error)),
             };
@@ -136,7 +136,7 @@ impl Link for WardLink {
 
     fn wait(&mut self, until: Timestamp) -> Heard {
         if let Some(own) = &mut self.own {
-            // Its clock began later.
+            // The clock of the own line began later.
             let span = until - Timestamp::from_s(self.stopwatch.elapsed().as_secs_f64() * self.cable.speed());
             let until = own.now() + span;
             return own.wait(until);
@@ -180,7 +180,7 @@ impl Link for WardLink {
         if !self.is_orphan {
             return self.have_opened();
         }
-        // Without a guardian no train runs: the line is opened to stop them.
+        // No train runs without a guardian: open the line to stop them.
         self.own = Some(CableLink::open(self.cable.clone())?);
         StopFlag::raise();
         eprintln!("without a guardian all trains are stopped, and the program ends");

@@ -1,44 +1,44 @@
-//! Who watches a run: what is written down, what people are told, and what they want.
+//! Interfaces of the runtime: the recorder, and the attendant that passes notices to people and their requests back.
 
 use footplate_core::control::Machine;
 use footplate_core::{Command, Event, Timestamp};
 use footplate_wire::{CommandError, LinkNotice};
 
-/// What writes the entries of a run down, before anybody acts on them.
+/// Records the entries of a run before the machine receives them.
 pub(crate) trait Recorder {
-    /// Writes them down; what is not written when this returns must not be called measured.
+    /// Takes entries for the record, in order.
     ///
     /// # Errors
-    /// Why they could not be written. The run ends, and trains are commanded to stop.
+    /// The entries cannot be recorded. The run ends, and all trains are commanded to stop.
     fn record(&mut self, events: &[Event]) -> anyhow::Result<()>;
 }
 
-/// How a run goes on after somebody was asked.
+/// Whether a run continues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Wish {
-    /// As before.
+    /// Continue.
     GoOn,
-    /// Not at all: what was wanted is reached, or nothing more is wanted.
+    /// End the run: its purpose is reached, or nothing more is requested.
     Finish,
 }
 
-/// Who watches a run of a machine.
+/// Receives the notices of a run, and controls it.
 pub(crate) trait Attendant<M: Machine> {
-    /// The machine has something to say.
+    /// A notice of the machine.
     fn hear(&mut self, now: Timestamp, notice: M::Notice);
 
-    /// The line has something to say.
+    /// A notice of the session about the line.
     fn hear_of_line(&mut self, now: Timestamp, notice: &LinkNotice);
 
-    /// Something for people to read that concerns the line itself.
+    /// A message about the line for people to read.
     fn read(&mut self, words: &str) {
         eprintln!("{words}");
     }
 
-    /// A command of the machine was not taken. Without an own answer it is only said.
+    /// The session rejected a command of the machine.
     fn hear_of_refusal(&mut self, now: Timestamp, command: Command, error: CommandError);
 
-    /// Between entries, and at least every few hundredths of a second of real time: whatever people want of the
-    /// machine now, and whether the run goes on.
+    /// Called between entries, at least every few hundredths of a second of real time: passes requests of people to the
+    /// machine, and returns whether the run continues.
     fn attend(&mut self, now: Timestamp, machine: &mut M) -> Wish;
 }

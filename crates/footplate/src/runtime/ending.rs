@@ -1,4 +1,4 @@
-//! How a run ends, and what a person has to know then.
+//! How a run ends, and what people have to know then.
 
 use std::fmt::{Display, Formatter, Result as FmtResult};
 use std::time::Duration;
@@ -7,26 +7,26 @@ use footplate_core::TimeSpan;
 
 use crate::link::Lost;
 
-/// For how long the end may take: a poll to wait out, a turnout to let go, and every train to be told. A line that is
-/// in order needs a third of it.
+/// Longest time for the end of a session: one poll, the release of a turnout, and a stop for each train. A line in order
+/// takes a third of it.
 pub(super) const WITHIN: TimeSpan = TimeSpan::from_ms(5_000);
 
-/// After a station was called silent, it has so long to answer after all.
+/// After a station was reported silent, it has this long to answer.
 pub(super) const SECOND_CHANCE: TimeSpan = TimeSpan::from_ms(3_000);
 
-/// How long a lost line is tried to be opened again, in real time: long enough for a plug to be pushed back in.
+/// How long the runtime tries to reopen a lost line, in real time: long enough to push a plug back in.
 pub(super) const REOPEN_WITHIN: Duration = Duration::from_secs(5);
 
 /// Why a run has ended.
 #[derive(Debug)]
 pub(crate) enum Ended {
-    /// The attendant had no more wishes.
+    /// The attendant ended it.
     Finished,
-    /// Somebody pressed Ctrl-C, or a signal came.
+    /// Ctrl-C or another signal.
     Interrupted,
-    /// The line is gone and did not come back.
+    /// The line was lost and could not be reopened.
     LineLost(Lost),
-    /// The station does not answer, or is not ready; what was said of it.
+    /// The station does not answer or is not ready; the message about it.
     NoAnswer(String),
 }
 

@@ -1,8 +1,8 @@
-//! What is to be said to the station if this program dies: the end of the session, played in advance.
+//! The last will: what a guardian sends to the station if this program dies. It is the end of the session, computed in
+//! advance.
 //!
-//! A guardian knows no station. It is given bytes and times, which are those that a copy of the session makes when it is
-//! closed on a line that was opened again and from which nothing is heard. So each station has a last will as soon as it
-//! has a session.
+//! A guardian knows no station. It receives bytes and times: those that a copy of the session produces when it is closed on
+//! a line that was reopened and stays silent. So every station that has a session has a last will.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -13,30 +13,30 @@ use footplate_wire::{Session, Transmit};
 use super::ending::WITHIN;
 use crate::link::{Bequest, Link, Lost, StationSession};
 
-/// How long the station's hand-shake line is down after a byte, in the copy's world: a byte at 2400 baud (Märklin). The guardian
-/// waits for the real one.
+/// How long the handshake line is down after a byte, for the copy: one byte at 2400 baud (Märklin). The guardian waits for
+/// the real one.
 const HAND_SHAKE: TimeSpan = TimeSpan::from_ms(5);
-/// More is not bequeathed: many times what stops every train that a station has.
+/// Upper bound: many times what stops every train of a station.
 const MOST_PARTS: usize = 2_000;
 
 /// Between two attempts to open a line again.
 const REOPEN_EVERY: Duration = Duration::from_millis(250);
-/// How long a byte waits for the hand-shake: a station that keeps it down for longer is told all the same.
+/// How long a byte waits for the handshake. After that it is sent all the same.
 const HAND_SHAKE_WITHIN: Duration = Duration::from_millis(100);
-/// How often the hand-shake line is looked at meanwhile.
+/// How often the handshake line is read meanwhile.
 const HAND_SHAKE_EVERY: Duration = Duration::from_micros(500);
-/// How long the hand-shake may take to go down after a byte, which it needs to be believed when it is up.
+/// How long the handshake line may take to go down after a byte; before that, "up" means nothing.
 const HAND_SHAKE_FALLS: Duration = Duration::from_millis(10);
 
 /// Keeps the guardian's last will up to date.
 #[derive(Debug, Default)]
 pub(super) struct LastWill {
-    /// Trains that may be told a step and are in no will yet.
+    /// Trains whose command was accepted and that no last will stops yet.
     expected: BTreeSet<TrainId>,
     /// Trains that were commanded to run.
     running: BTreeSet<TrainId>,
     was_running: bool,
-    /// Whether the will has to be written anew.
+    /// Whether the last will must be computed again.
     is_stale: bool,
 }
 
@@ -70,8 +70,8 @@ impl LastWill {
         }
     }
 
-    /// Tells the guardian what has changed. Call it before bytes leave: a guardian then knows each train before the train
-    /// knows its step.
+    /// Tells the guardian what has changed. Call it before bytes leave, so that the guardian can stop a train before the train
+    /// receives its step.
     pub(super) fn keep<L: Link>(&mut self, session: &StationSession, link: &mut L) -> Result<(), Lost> {
         let (now, has_cts) = (link.now(), link.cts().is_some());
         let Some(guardian) = link.guardian() else { return Ok(()) };
@@ -106,7 +106,7 @@ pub(crate) fn written(will: &[Bequest], speed: f64) -> Vec<u8> {
     bytes
 }
 
-/// A line on which a last will is carried out, by whoever outlived the program.
+/// A line over which a last will is sent.
 pub(crate) trait WillLine {
     fn is_open(&self) -> bool;
 
@@ -136,8 +136,8 @@ pub(crate) trait WillLine {
     fn say(&self, words: &str);
 }
 
-/// Carries a last will out, from its beginning each time the line had to be opened again, until all of it is said or a person
-/// gives up. Returns whether it was said.
+/// Sends a last will. Starts again each time the line has to be reopened, until all of it is sent or a person gives up.
+/// Returns whether it was sent.
 pub(crate) fn carry_out(line: &mut impl WillLine, will: &[u8]) -> bool {
     let mut was_gone = false;
     while !line.gives_up() {
@@ -190,7 +190,7 @@ fn await_hand_shake(line: &mut impl WillLine) {
     }
 }
 
-/// What a session says at its end on a line that was opened again and is silent.
+/// What a session sends at its end on a line that was reopened and is silent.
 fn farewell_of(session: &StationSession, began: Timestamp, has_cts: bool) -> Vec<Bequest> {
     let mut copy = session.clone();
     let mut said = Vec::new();

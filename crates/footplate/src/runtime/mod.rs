@@ -1,10 +1,10 @@
-//! The one loop around a line, a session and a machine: live, simulated and in tests.
+//! The loop around a line, a session and a machine: the same live, simulated and in tests.
 //!
 //! ```text
-//! run         bytes in, bytes out, entries written down before the machine sees them
-//! attendant   who watches it: notices to people, orders from them
-//! ending      trains are commanded to stop, whatever ends it; what could not be confirmed is said
-//! last_will   what a guardian says to the station if this program dies
+//! run         bytes in, bytes out; entries are recorded before the machine receives them
+//! attendant   interfaces to the record and to people
+//! ending      how a run ends
+//! last_will   what a guardian sends to the station if this program dies
 //! stop_flag   Ctrl-C and the signals that end a program
 //! ```
 

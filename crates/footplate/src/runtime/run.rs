@@ -1,4 +1,4 @@
-//! Goes round between a line, a session and a machine until somebody has enough.
+//! The loop between a line, a session and a machine.
 
 use std::time::Duration;
 
@@ -12,26 +12,26 @@ use super::last_will::LastWill;
 use super::stop_flag::StopFlag;
 use crate::link::{Heard, Link, Lost, StationSession};
 
-/// A machine that was woken and still asks for a time that has passed is woken again after this, so that time goes on
-/// whatever it asks for: as long as a byte takes on the line.
+/// A machine that was woken and still asks for a past time is woken again after this time, so that time always advances:
+/// the duration of a byte on the line.
 const NEXT_WAKING: TimeSpan = TimeSpan::from_ms(5);
 
 /// Between two attempts to open a line again.
 const REOPEN_EVERY: Duration = Duration::from_millis(250);
 
-/// A line that opens so often and is lost again each time before the station has answered is given up: it takes connections and closes
-/// them, as a server does that allows one client only.
+/// A line that opens so often and is lost again each time before the station has answered is given up: the server accepts
+/// connections and closes them, as one does that allows a single client.
 const REOPENED_IN_VAIN: u32 = 4;
 
-/// A line, a session over it and what writes down what happens.
+/// A line, a session over it and the recorder.
 ///
-/// However it is left, at its end, with an error or in a panic: trains are commanded to stop first.
+/// When it is dropped, at its end, after an error or in a panic, it commands all trains to stop first.
 pub(crate) struct Runtime<'r, L: Link> {
     link: L,
     session: StationSession,
     recorder: Option<&'r mut dyn Recorder>,
     stop: Option<StopFlag>,
-    /// Entries that are not written down yet; kept so that no byte costs an allocation.
+    /// Entries that are not recorded yet; reused, so that no byte costs an allocation.
     fresh: Vec<Event>,
     notices: Vec<LinkNotice>,
     will: LastWill,
@@ -40,14 +40,14 @@ pub(crate) struct Runtime<'r, L: Link> {
     is_closed: bool,
 }
 
-/// What ends a round.
+/// What interrupts a turn of the loop.
 enum Broken {
     Lost(Lost),
     Recorder(anyhow::Error),
 }
 
 impl<'r, L: Link> Runtime<'r, L> {
-    /// `stop`: what raises the flag that ends a run, if something may.
+    /// Joins them. `stop` is the flag that ends a run, if signals may end it.
     pub(crate) fn new(
         link: L,
         session: impl Into<StationSession>,
@@ -77,21 +77,21 @@ impl<'r, L: Link> Runtime<'r, L> {
         &self.link
     }
 
-    /// The line, to change a simulated world with.
+    /// The line, mutably: to change a simulated world.
     pub(crate) fn link_mut(&mut self) -> &mut L {
         &mut self.link
     }
 
-    /// The program's side of the line.
+    /// The session with the station.
     pub(crate) const fn session(&self) -> &StationSession {
         &self.session
     }
 
-    /// Runs until the attendant has enough, somebody stops the program, or the line is lost. The session stays open:
-    /// another machine may go on with it.
+    /// Runs until the attendant or a signal ends it, or the line is lost. The session stays open: another machine may
+    /// continue with it.
     ///
     /// # Errors
-    /// When the recorder could not write down what happened.
+    /// The recorder failed.
     pub(crate) fn run<M: Machine>(
         &mut self,
         machine: &mut M,
@@ -156,7 +156,7 @@ impl<'r, L: Link> Runtime<'r, L> {
             match self.link.wait(until) {
                 Heard::Nothing => {}
                 heard => {
-                    // Whatever the machine wants to say now goes before the next poll, which may begin with this byte.
+                    // Commands that are due now precede the next poll, which may begin with this byte.
                     let now = self.link.now();
                     if wakes.is_some_and(|at| now >= at) {
                         machine.handle_timeout(now);
@@ -179,7 +179,7 @@ impl<'r, L: Link> Runtime<'r, L> {
         }
     }
 
-    /// Takes what the session has to say; entries are written down before the machine hears of them.
+    /// Takes the session's outputs. Entries are recorded before the machine receives them.
     fn serve<M: Machine>(&mut self, machine: &mut M) -> Result<bool, Broken> {
         self.write().map_err(Broken::Lost)?;
         if self.fresh.is_empty() {
@@ -200,7 +200,7 @@ impl<'r, L: Link> Runtime<'r, L> {
         }
     }
 
-    /// Writes the session's bytes and gathers its entries and notices.
+    /// Writes the session's bytes to the line; collects its entries and notices.
     fn write(&mut self) -> Result<(), Lost> {
         self.will.keep(&self.session, &mut self.link)?;
         while let Some(output) = self.session.poll_output() {
@@ -222,7 +222,7 @@ impl<'r, L: Link> Runtime<'r, L> {
         self.will.keep(&self.session, &mut self.link)
     }
 
-    /// Asks the machine what it wants.
+    /// Takes the machine's outputs.
     fn ask<M: Machine>(&mut self, machine: &mut M, attendant: &mut dyn Attendant<M>) {
         let now = self.link.now();
         while let Some(output) = machine.poll_output() {
@@ -238,7 +238,7 @@ impl<'r, L: Link> Runtime<'r, L> {
         }
     }
 
-    /// A lost line may come back: a plug was pushed in again, a server was started anew.
+    /// Tries to reopen a lost line: a plug may be pushed in again, a server restarted.
     fn open_again<M: Machine>(&mut self, lost: Lost, attendant: &mut dyn Attendant<M>) -> Result<(), Lost> {
         if self.reopened >= REOPENED_IN_VAIN {
             return Err(Lost(format!(
@@ -265,8 +265,8 @@ impl<'r, L: Link> Runtime<'r, L> {
         Err(lost)
     }
 
-    /// Tells every train to stand, lets go of solenoids, takes the power from the track, and says what of it was said.
-    /// Not longer than a few seconds, whatever the line does.
+    /// Stops all trains, releases solenoids and switches the track power off. Returns what the station confirmed. Takes a few
+    /// seconds at most, whatever the line does.
     pub(crate) fn close(&mut self) -> Closing {
         if !self.is_closed {
             self.is_closed = true;
@@ -284,11 +284,17 @@ impl<'r, L: Link> Runtime<'r, L> {
     fn say_goodbye(&mut self) {
         let (began, since) = (self.link.now(), self.link.real_time());
         self.session.close(began);
+        let mut has_reopened = false;
         loop {
             if self.write().is_err() {
-                return;
+                // A guardian that has just died stops no train: this process opens the line itself.
+                if std::mem::replace(&mut has_reopened, true) || self.link.reopen().is_err() {
+                    return;
+                }
+                self.session.handle_reopened(self.link.now());
+                continue;
             }
-            // What was told is part of the record; that it could not be written must not keep a train running.
+            // The last commands belong to the record, but a failing record must not keep a train running.
             if !self.fresh.is_empty() {
                 if let Err(error) = self.write_down() {
                     eprintln!("the last commands were not recorded: {error:#}");
@@ -308,19 +314,23 @@ impl<'r, L: Link> Runtime<'r, L> {
                 Heard::Datagram(datagram) => self.session.handle_bytes(self.link.now(), &datagram),
                 Heard::Cts(up) => self.session.handle_cts(self.link.now(), up),
                 Heard::Nothing => self.session.handle_timeout(self.link.now()),
-                Heard::Lost(_) => return,
+                Heard::Lost(_) if has_reopened || self.link.reopen().is_err() => return,
+                Heard::Lost(_) => {
+                    has_reopened = true;
+                    self.session.handle_reopened(self.link.now());
+                }
             }
         }
     }
 }
 
-/// When a machine is woken next, after it was just now or was not.
+/// When to wake a machine next.
 fn next_waking<M: Machine>(machine: &M, now: Timestamp, is_woken: bool) -> Option<Timestamp> {
     let asked = machine.next_timeout()?;
     Some(if is_woken && asked <= now { now + NEXT_WAKING } else { asked })
 }
 
-/// Whether a notice puts the station in doubt or clears it.
+/// Updates the time until which a silent station may still answer.
 fn judge(doubt: &mut Option<(Timestamp, String)>, now: Timestamp, notice: &LinkNotice) {
     match notice {
         LinkNotice::Silent { .. } | LinkNotice::NotReady { .. } => {

@@ -1,4 +1,4 @@
-//! Ctrl-C and the signals that end a program, so that trains are stopped before it goes.
+//! Ctrl-C and the signals that end a program: trains are stopped first.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -6,19 +6,19 @@ use std::sync::atomic::{AtomicU32, Ordering};
 #[cfg(unix)]
 use crate::guardian::is_ward;
 
-/// How often somebody wanted the program to end.
+/// How often the program was asked to end.
 static ASKED: AtomicU32 = AtomicU32::new(0);
 static INSTALLED: OnceLock<bool> = OnceLock::new();
 
 /// Exit status of a program that was interrupted (128 and the number of the signal).
 const INTERRUPTED: i32 = 130;
 
-/// Whether somebody wants the program to end.
+/// Whether the program was asked to end.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StopFlag(());
 
 impl StopFlag {
-    /// From now on a signal does not end the program but raises the flag; a third one ends it at once.
+    /// Installs the handler: a signal raises the flag instead of ending the program; a third one ends it at once.
     pub(crate) fn install() -> Self {
         #[cfg(unix)]
         if is_ward() {
@@ -40,7 +40,7 @@ impl StopFlag {
         Self(())
     }
 
-    /// The program itself wants to end, as if somebody had asked.
+    /// Raises the flag from inside the program.
     pub(crate) fn raise() {
         ASKED.fetch_add(1, Ordering::Relaxed);
     }

@@ -1,4 +1,4 @@
-//! Writes down what a machine is told and what it decides, on the way of a session's events.
+//! Records the inputs and decisions of a machine, in order with the session's events.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -10,15 +10,14 @@ use footplate_store::{JournalEntry, Side, Traced};
 
 use super::{Entry, Shared, WhenFull};
 
-/// The way from one machine to the disk: the queue of its session, so that all stands there in the order in which it
-/// happened.
+/// Records one machine through the queue of its session, which keeps the order of all entries.
 #[derive(Debug)]
 pub(crate) struct Scribe {
     queue: SyncSender<Entry>,
     when_full: WhenFull,
     shared: Arc<Shared>,
     number: u64,
-    /// When the machine was told something last.
+    /// Time of the machine's last input.
     told: Timestamp,
 }
 
@@ -27,18 +26,18 @@ impl Scribe {
         Self { queue, when_full, shared, number: 0, told: Timestamp::ZERO }
     }
 
-    /// The machine is about to be told something.
+    /// Records an input, before the machine receives it.
     pub(crate) fn input(&mut self, now: Timestamp, kind: &'static str, text: String) {
         self.told = now;
         self.write(Side::Input, kind, text);
     }
 
-    /// The machine has decided something, and nobody has acted upon it yet.
+    /// Records a decision, before it takes effect.
     pub(crate) fn decision(&mut self, kind: &'static str, text: String) {
         self.write(Side::Decision, kind, text);
     }
 
-    /// Hands over. What the queue does not take is counted as lost, and leaves a gap in the numbers.
+    /// Passes an entry on. An entry that the queue refuses is counted as lost, and leaves a gap in the numbers.
     fn write(&mut self, side: Side, kind: &'static str, text: String) {
         let (number, time) = (self.number, self.told);
         self.number += 1;

@@ -1,4 +1,4 @@
-//! The thread that writes a session down: together whatever has gathered, and again what could not be written.
+//! The thread that records a session: it commits together what has gathered, and retries what failed.
 
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, TryRecvError};
@@ -11,12 +11,12 @@ use footplate_store::{Journal, JournalEntry, NewMachine, StoreError};
 use super::{Entry, PROGRAM, QUEUE, Shared};
 use crate::clock::now;
 
-/// The most that goes to the disk together: so many are written in a few milliseconds, and then acknowledged.
+/// Most entries in one commit: so many are written in a few milliseconds.
 const MOST_TOGETHER: usize = 2_000;
-/// How long after a failure the disk is tried again, chosen: soon for a person, seldom for a disk.
+/// Pause after a failure (chosen: short for a person, long for a disk).
 const RETRY: Duration = Duration::from_millis(500);
 
-/// Writes down what is handed over, on a thread of its own.
+/// The state of the recording thread.
 pub(super) struct Writer {
     pub(super) journal: Journal,
     pub(super) shared: Arc<Shared>,
@@ -24,10 +24,10 @@ pub(super) struct Writer {
 
 impl Writer {
     pub(super) fn run(mut self, entries: &Receiver<Entry>) -> Journal {
-        // Taken and not on the disk yet, in order.
+        // Entries that are not on disk yet, in order.
         let mut pending: Vec<Entry> = Vec::new();
         loop {
-            // Asked before taking what is there: what comes between the two is seen next time.
+            // Read before the queue: entries that arrive between the two are taken next time.
             let ended = self.shared.ended.load(Ordering::Acquire);
             let ended = gather(entries, &mut pending, ended) || ended && pending.len() >= QUEUE;
             let written = self.write(&mut pending);
@@ -44,7 +44,7 @@ impl Writer {
         }
     }
 
-    /// Writes down what it can, and leaves the rest.
+    /// Writes what it can, and keeps the rest.
     fn write(&mut self, pending: &mut Vec<Entry>) -> Result<(), StoreError> {
         while let Some(first) = pending.first() {
             match first {
@@ -52,6 +52,9 @@ impl Writer {
                     let entries = pending.iter().map_while(Entry::of_journal).take(MOST_TOGETHER);
                     let entries: Vec<JournalEntry> = entries.cloned().collect();
                     let acknowledged = self.journal.append_all(&entries, now())?;
+                    if let Some(event) = entries.iter().rev().find_map(JournalEntry::event) {
+                        self.shared.written_ns.store(event.time.as_ns(), Ordering::Release);
+                    }
                     self.shared.acknowledged.store(acknowledged, Ordering::Release);
                     pending.drain(..entries.len());
                     continue;
@@ -81,8 +84,8 @@ impl Entry {
     }
 }
 
-/// Waits for an entry, unless some are pending or the end was told, and takes all that are there. Says whether none
-/// will come any more.
+/// Waits for an entry, unless some are pending or the session has ended, and takes all that are in the queue. Returns
+/// whether no more follow.
 fn gather(entries: &Receiver<Entry>, pending: &mut Vec<Entry>, ended: bool) -> bool {
     if pending.is_empty() && !ended {
         match entries.recv() {

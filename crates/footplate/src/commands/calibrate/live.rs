@@ -35,9 +35,9 @@ use crate::commands::serve::open_dashboard;
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{ReadOnlyDashboard, ServedAt};
 use crate::link::{Address, Link, MeasuredLine, ObservedLink, Speed, open, open_session, open_simulated};
+use crate::recorded::Recorded;
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::SessionJournal;
-use crate::witness::Witnessed;
 
 /// The highest step of the decoders that a 6051 can talk to.
 const HIGHEST_STEP: u8 = 14;
@@ -162,7 +162,7 @@ impl Session<'_> {
         session.expect_delays(self.link.excess(line.as_ref()));
         let scribe = written.as_ref().and_then(SessionJournal::scribe);
         let recorder = written.as_mut().map(|written| written as &mut dyn Recorder);
-        let mut calibrator = Witnessed::new(beginning.calibrator(layout), scribe);
+        let mut calibrator = Recorded::new(beginning.calibrator(layout), scribe);
         let mut watcher = Watcher::new(layout, self.train, self.budget).seen_by(showing);
         let mut runtime = Runtime::new(link, session, recorder, Some(StopFlag::install()));
         let ended = runtime.run(&mut calibrator, &mut watcher);

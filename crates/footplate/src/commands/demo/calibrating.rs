@@ -13,7 +13,7 @@ use super::outcome::{Learnt, LearntStep, minutes};
 use super::running_demo::Demo;
 use crate::commands::calibrate::CalibrationBeginning;
 use crate::commands::written_layout::WrittenLayout;
-use crate::witness::Witnessed;
+use crate::recorded::Recorded;
 
 /// The highest step of the decoders in the recorded trains.
 const HIGHEST_STEP: u8 = 14;
@@ -40,7 +40,7 @@ pub(super) fn calibrate(
     let beginning = CalibrationBeginning::new(written, settings, MotionFit::new(train, highest), turnouts);
     let scribe = demo.begin_machine(CalibrationBeginning::KIND, &beginning)?;
     let layout = &written.layout;
-    let mut calibrator = Witnessed::new(beginning.calibrator(layout), scribe);
+    let mut calibrator = Recorded::new(beginning.calibrator(layout), scribe);
     let began = demo.now();
     demo.set_active(train, "learns", "");
     while calibrator.machine().ending().is_none() {

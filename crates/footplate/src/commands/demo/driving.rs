@@ -17,7 +17,7 @@ use super::targets::{Dice, steps_for_stops, target_ahead};
 use crate::commands::drive::NoticeFormatter;
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{Alarm, TrainPassed, TrainTask};
-use crate::witness::{Input, Listener, Witnessed};
+use crate::recorded::{Input, Listener, Recorded};
 
 /// Refused targets after which a stop is skipped.
 const MAX_REFUSALS: usize = 40;
@@ -31,7 +31,7 @@ pub(super) struct Tour<'l> {
     layout: &'l Layout,
     sections: SectionIndex,
     train: TrainId,
-    driver: Witnessed<Driver>,
+    driver: Recorded<Driver>,
     /// The last detection, for display.
     passed: String,
     next: Option<DueContact>,
@@ -48,7 +48,7 @@ impl<'l> Tour<'l> {
         let layout = &written.layout;
         let beginning = TourBeginning::new(written, known);
         let scribe = demo.begin_machine(TourBeginning::KIND, &beginning)?;
-        let driver = Witnessed::new(beginning.driver(layout), scribe);
+        let driver = Recorded::new(beginning.driver(layout), scribe);
         let sections = SectionIndex::of(layout);
         Ok(Self { layout, sections, train, driver, passed: String::new(), next: None, planned: None })
     }

@@ -15,8 +15,8 @@ use super::script_runner::ScriptRunner;
 use super::session_message::{Ended, SessionMessage};
 use crate::clock::Stopwatch;
 use crate::dashboard::{Alarm, Answer, Board, Painter, Request};
+use crate::recorded::{Input, Recorded};
 use crate::runtime::{Attendant, Wish};
-use crate::witness::{Input, Witnessed};
 
 /// The interval between two pictures of the dashboard: 50 a second.
 const PICTURE_INTERVAL: Duration = Duration::from_millis(20);
@@ -76,7 +76,7 @@ struct LiveView {
 }
 
 impl LiveView {
-    fn attend(&mut self, now: Timestamp, script_runner: &mut Witnessed<ScriptRunner>) {
+    fn attend(&mut self, now: Timestamp, script_runner: &mut Recorded<ScriptRunner>) {
         while let Some(asked) = self.board.next_request() {
             let answer = match &asked.request {
                 Request::EmergencyStop => {
@@ -157,7 +157,7 @@ impl Console {
     }
 }
 
-impl Attendant<Witnessed<ScriptRunner>> for Console {
+impl Attendant<Recorded<ScriptRunner>> for Console {
     fn hear(&mut self, now: Timestamp, notice: SessionMessage) {
         match notice {
             SessionMessage::Line { text, status } => {
@@ -193,7 +193,7 @@ impl Attendant<Witnessed<ScriptRunner>> for Console {
         self.alarm(now, &Alarm::not_sent(&why));
     }
 
-    fn attend(&mut self, now: Timestamp, script_runner: &mut Witnessed<ScriptRunner>) -> Wish {
+    fn attend(&mut self, now: Timestamp, script_runner: &mut Recorded<ScriptRunner>) -> Wish {
         for news in std::mem::take(&mut self.news) {
             script_runner.handle_word(now, &Input::Link(news));
         }

@@ -24,7 +24,7 @@ use super::reader::Known;
 use super::script::{Step, step};
 use super::session_message::SessionMessage;
 use crate::dashboard::{Painter, TrainTask};
-use crate::witness::{Input, Listener};
+use crate::recorded::{Input, Listener};
 
 /// The default limit of a wait: a creeping train completes one round of a layout within it.
 pub(super) const WAIT_LIMIT: TimeSpan = TimeSpan::from_s(600.0);

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::clock::{local, rfc3339};
 use crate::counted::counted;
-use crate::witness::{Difference, Ending, Rehearing};
+use crate::recorded::{Difference, Ending, Replay};
 
 /// How it is said.
 #[derive(Debug, Clone, Copy)]
@@ -65,20 +65,20 @@ impl Page {
     pub(super) fn write(
         self,
         machine: &StoredMachine,
-        rehearing: &Rehearing,
+        replay: &Replay,
         output: &mut dyn Write,
     ) -> io::Result<()> {
-        let differences = &rehearing.differences;
+        let differences = &replay.differences;
         if self.is_json {
             let line = json!({
                 "session": machine.recording.0,
                 "machine": machine.kind,
                 "recorded_by": machine.program,
-                "inputs": rehearing.inputs,
-                "decisions": rehearing.decisions,
+                "inputs": replay.inputs,
+                "decisions": replay.decisions,
                 "same": differences.is_empty(),
-                "ending": word(&rehearing.ending),
-                "until_s": rehearing.at.as_s(),
+                "ending": word(&replay.ending),
+                "until_s": replay.at.as_s(),
                 "differences": differences.iter().map(value).collect::<Vec<_>>(),
             });
             return writeln!(output, "{line}");
@@ -87,7 +87,7 @@ impl Page {
             "session {} ({}, recorded by version {})",
             machine.recording, machine.kind, machine.program
         );
-        let decisions = counted(rehearing.decisions, "decision");
+        let decisions = counted(replay.decisions, "decision");
         match differences.first() {
             None => writeln!(output, "{of}: {decisions}, all the same")?,
             Some(first) if !self.is_diff => {
@@ -102,7 +102,7 @@ impl Page {
                 writeln!(output, "{of}: {decisions}, {}", tally(differences))?;
             }
         }
-        if let Some(remark) = remark(rehearing) {
+        if let Some(remark) = remark(replay) {
             writeln!(output, "  {remark}")?;
         }
         Ok(())
@@ -154,9 +154,9 @@ const fn word(ending: &Ending) -> &'static str {
 }
 
 /// Why it did not go to the end of the session.
-fn remark(rehearing: &Rehearing) -> Option<String> {
-    let at = rehearing.at.as_s();
-    match &rehearing.ending {
+fn remark(replay: &Replay) -> Option<String> {
+    let at = replay.at.as_s();
+    match &replay.ending {
         Ending::Whole | Ending::Differs => None,
         Ending::Asked => Some(format!("until {at:.3} s, as asked")),
         Ending::CutOff => Some(format!(

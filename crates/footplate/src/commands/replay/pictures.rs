@@ -15,7 +15,7 @@ use crate::commands::demo::TourBeginning;
 use crate::commands::drive::{DriveBeginning, ScriptRunner, SessionMessage};
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{Alarm, Board, CalibrationFollower, LayoutPicture, Painter, TrainPassed};
-use crate::witness::{Input, Listener};
+use crate::recorded::{Input, Listener};
 
 /// Between two pictures, unless the session is so long that there would be too many of them.
 const BETWEEN: TimeSpan = TimeSpan::from_ms(200);

@@ -7,7 +7,7 @@ use footplate_core::{Length, StretchId, TimeSpan, TurnoutId};
 use serde::{Deserialize, Serialize};
 
 use crate::commands::written_layout::WrittenLayout;
-use crate::witness::Listener;
+use crate::recorded::Listener;
 
 /// All that a [`Calibrator`] is made of. A session and its replay both make theirs of it.
 #[derive(Debug, Clone, Serialize, Deserialize)]

@@ -13,8 +13,8 @@ use footplate_wire::{CommandError, LinkNotice};
 
 use super::watcher::Watcher;
 use crate::link::{Link, SimulatedLink, Speed};
+use crate::recorded::Recorded;
 use crate::runtime::{Attendant, Runtime, Wish};
-use crate::witness::Witnessed;
 
 const TRAIN: TrainId = TrainId(24);
 
@@ -148,7 +148,7 @@ fn another_layout_than_was_said_is_noticed_by_its_lengths() {
     let link = SimulatedLink::new(station, Speed::Unpaced);
     let session = Interface::new(link.now(), Settings::with_cts(5)).expect("modules");
     let fit = MotionFit::new(TRAIN, SpeedStep::new(14).expect("a step"));
-    let mut calibrator = Witnessed::new(Calibrator::new(&said, CalibratorSettings::default(), fit), None);
+    let mut calibrator = Recorded::new(Calibrator::new(&said, CalibratorSettings::default(), fit), None);
     let mut watcher = Watcher::new(&said, TRAIN, TimeSpan::from_s(300.0));
     let mut runtime = Runtime::new(link, session, None, None);
     runtime.run(&mut calibrator, &mut watcher).expect("nothing is written down");

@@ -10,8 +10,8 @@ use super::figures::minutes;
 use super::told;
 use crate::dashboard::{Alarm, ReadOnlyDashboard};
 use crate::layout_check::layout_with;
+use crate::recorded::Recorded;
 use crate::runtime::{Attendant, Wish};
-use crate::witness::Witnessed;
 
 /// What a browser is told that wants to drive.
 const DRIVES_ITSELF: &str = "a calibration runs by itself: use `footplate serve` to command trains";
@@ -70,7 +70,7 @@ impl<'l> Watcher<'l> {
     }
 }
 
-impl<'l> Attendant<Witnessed<Calibrator<'l>>> for Watcher<'_> {
+impl<'l> Attendant<Recorded<Calibrator<'l>>> for Watcher<'_> {
     fn hear(&mut self, now: Timestamp, notice: CalibrationNotice) {
         let line = told::line(self.layout, &notice);
         if let Some(showing) = &mut self.showing {
@@ -106,7 +106,7 @@ impl<'l> Attendant<Witnessed<Calibrator<'l>>> for Watcher<'_> {
         self.say(now, &format!("{command} was not sent: {error}"));
     }
 
-    fn attend(&mut self, now: Timestamp, machine: &mut Witnessed<Calibrator<'l>>) -> Wish {
+    fn attend(&mut self, now: Timestamp, machine: &mut Recorded<Calibrator<'l>>) -> Wish {
         if let Some(showing) = &mut self.showing {
             showing.calibrator(machine.machine(), now);
             self.is_halted |= showing.is_halted(DRIVES_ITSELF);

@@ -15,7 +15,7 @@ use super::timed::Timed;
 use super::world::WorldName;
 use crate::commands::drive::{DriveBeginning, ScriptRunner, SessionMessage};
 use crate::commands::written_layout::WrittenLayout;
-use crate::witness::Input;
+use crate::recorded::Input;
 use footplate_eval::driving::{Plan, TRAIN};
 use footplate_eval::testbed::{VirtualLine, calibrate};
 

@@ -7,7 +7,7 @@ use footplate_core::{Event, Timestamp};
 
 use crate::clock::Stopwatch;
 use crate::commands::drive::{ScriptRunner, SessionMessage};
-use crate::witness::{Input, Listener};
+use crate::recorded::{Input, Listener};
 
 /// Passes everything on, and counts the time it takes.
 pub(super) struct Timed {

@@ -1,17 +1,17 @@
-//! What a machine answers, and the words for it in a recording.
+//! The decisions of a machine, and their form in the store.
 
 use std::fmt::Debug;
 
 use footplate_core::control::Output;
 use footplate_store::ContentHash;
 
-/// A notice longer than this (bytes) is kept as its beginning and the hash of all of it: the tables that a calibration
-/// shows at every contact would be ten times all the rest, and a difference is noticed all the same.
+/// A notice longer than this (bytes) is kept as its beginning and a hash: the tables of a calibration would be ten times all
+/// the rest, and the hash shows a difference all the same.
 const LONGEST_NOTICE: usize = 600;
-/// So much (bytes) of a long notice is kept for people.
+/// Length of that beginning, in bytes.
 const BEGINNING: usize = 160;
 
-/// Something that a machine decided. Two are the same if their rows are.
+/// A decision of a machine. Two decisions are equal if their rows are.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Decision {
     pub(crate) kind: &'static str,
@@ -24,7 +24,7 @@ impl Decision {
     pub(crate) const WATCH: &'static str = "watch";
     pub(crate) const NOTICE: &'static str = "notice";
 
-    /// The row of an answer. Numbers stand in it with all their digits, so that the last bit counts.
+    /// Returns the row of an output. Numbers have all their digits, so that the last bit counts.
     pub(crate) fn of<Notice: Debug>(output: &Output<Notice>) -> Self {
         let (kind, text) = match output {
             Output::Command(command) => (Self::COMMAND, command.to_string()),

@@ -1,40 +1,40 @@
-//! What a machine can be told, and the words for it in a recording.
+//! The inputs of a machine, and their form in the store.
 
 use footplate_core::control::{LinkNews, Order};
 use footplate_core::{Event, TrainId};
 use serde::de::DeserializeOwned;
 
-/// Before the number of the train.
+/// Prefix of the train number.
 const REVERSE_IN_DOUBT: &str = "reverse-in-doubt ";
 
-/// Something that a machine is told. All that it decides follows from how it began and these, in their order and at
-/// their times.
+/// An input of a machine. All decisions follow from the machine's beginning and its inputs, in their order and at their
+/// times.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Input {
-    /// An entry of the recording.
+    /// An event of the recording.
     Event(Event),
-    /// The time that it asked for has come.
+    /// The time that the machine asked for has come.
     Timeout,
-    /// Somebody wrote a line.
+    /// A line that a person wrote.
     Line(String),
-    /// Somebody stops all trains and switches the track power off.
+    /// An emergency stop: all trains stop, and the track power goes off.
     EmergencyStop,
-    /// No more lines will come.
+    /// No more lines follow.
     NoMoreLines,
-    /// A program gave an order.
+    /// An order of a program.
     Order(Order),
-    /// The station has fallen silent, or answers again.
+    /// The station fell silent, or answers again.
     Link(LinkNews),
-    /// Nothing more: whoever ran it had enough. Not told to the machine; a recording without it was cut off.
+    /// The end of the session. The machine does not receive it; a recording without it was cut off.
     End,
 }
 
-/// Why a row of a recording is no input.
+/// Why a row of the store is not an input.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum InputError {
     /// A kind that this program does not know.
     Unknown { kind: String },
-    /// An event or an order that is none.
+    /// An event or an order that cannot be read.
     Wrong { kind: String, text: String, why: String },
 }
 
@@ -54,7 +54,7 @@ impl std::fmt::Display for InputError {
 impl std::error::Error for InputError {}
 
 impl Input {
-    /// The kind and the text of its row.
+    /// Returns the kind and the text of its row.
     pub(crate) fn written(&self) -> (&'static str, String) {
         match self {
             // Numbers and names of variants have a form in JSON, so this cannot fail; an empty text would be no input.

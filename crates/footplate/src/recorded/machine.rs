@@ -1,4 +1,4 @@
-//! A machine with somebody beside it who writes down what it is told and what it decides.
+//! A machine whose inputs and decisions are recorded.
 
 use footplate_core::control::{Machine, Output};
 use footplate_core::{Event, Timestamp};
@@ -8,31 +8,36 @@ use super::input::Input;
 use super::listener::Listener;
 use crate::session_journal::Scribe;
 
-/// A machine whose inputs are written down before it hears of them, and whose decisions before anybody acts on them.
+/// A machine whose inputs are recorded before it receives them, and whose decisions before they take effect.
 #[derive(Debug)]
-pub(crate) struct Witnessed<M> {
+pub(crate) struct Recorded<M> {
     machine: M,
     scribe: Option<Scribe>,
 }
 
-impl<M: Listener> Witnessed<M> {
-    /// Without a scribe nobody writes.
+impl<M: Listener> Recorded<M> {
+    /// Joins them. Without a scribe nothing is recorded.
     pub(crate) const fn new(machine: M, scribe: Option<Scribe>) -> Self {
         Self { machine, scribe }
     }
 
-    /// The machine, to look at.
+    /// The machine.
     pub(crate) const fn machine(&self) -> &M {
         &self.machine
     }
 
-    /// Whoever ran it has had enough, at this time.
+    /// Ends the record at this time and returns the machine.
     pub(crate) fn end(mut self, now: Timestamp) -> M {
         self.note(now, &Input::End);
         self.machine
     }
 
-    /// Somebody says something to it.
+    /// Returns the machine and leaves the record without an end.
+    pub(crate) fn into_machine(self) -> M {
+        self.machine
+    }
+
+    /// Records an input of a person or a program, and passes it on.
     pub(crate) fn handle_word(&mut self, now: Timestamp, word: &Input) {
         self.tell(now, word);
     }
@@ -57,7 +62,7 @@ impl<M: Listener> Witnessed<M> {
     }
 }
 
-impl<M: Listener> Machine for Witnessed<M> {
+impl<M: Listener> Machine for Recorded<M> {
     type Notice = M::Notice;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {

@@ -1,4 +1,4 @@
-//! A machine that can be told all that an [`Input`] is.
+//! A machine that accepts every [`Input`].
 
 use std::fmt::Debug;
 
@@ -7,12 +7,12 @@ use footplate_core::control::Machine;
 
 use super::input::Input;
 
-/// A machine that takes inputs, and whose decisions follow from them and from nothing else.
+/// A machine whose decisions follow from its inputs alone.
 pub(crate) trait Listener: Machine<Notice: Debug> {
-    /// A person or a program says what no railway says. A machine that nobody speaks to has nothing to do.
+    /// Takes an input that comes from a person or a program. The default ignores it.
     fn handle_word(&mut self, _now: Timestamp, _word: &Input) {}
 
-    /// Whatever it is.
+    /// Takes any input.
     fn handle_input(&mut self, now: Timestamp, input: &Input) {
         match input {
             Input::Event(event) => self.handle_event(now, event),

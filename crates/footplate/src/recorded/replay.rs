@@ -1,8 +1,8 @@
-//! The recorded inputs told to a machine once more, and what it decides now beside what was decided then.
+//! Replay: gives the recorded inputs to a machine again, and compares its decisions with the recorded ones.
 //!
-//! The railway is not there: whatever the machine decides now, it is told what was recorded. So behind a first
-//! difference the inputs are those that followed from the decisions of then, but for the clock: from there on the machine
-//! is also woken when it asks for it.
+//! Replay is open loop: the machine receives the recorded inputs, whatever it decides. After the first difference the
+//! inputs still follow from the recorded decisions, except for the clock: from there on the machine is also woken when it
+//! asks for it.
 
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -14,21 +14,20 @@ use super::decision::Decision;
 use super::input::{Input, InputError};
 use super::listener::Listener;
 
-/// The same command so much earlier or later is called the same; farther apart two commands have nothing to do with each
-/// other (chosen: a lap takes longer).
+/// Two equal commands within this time count as the same command (chosen: a lap takes longer).
 const SAME_COMMAND_WITHIN: TimeSpan = TimeSpan::from_ms(10_000);
 
-/// A loop around a machine may wake it so late. If something was recorded within this time, that wakes it.
+/// How late a loop may wake a machine. An input that was recorded within this time wakes it.
 const WOKEN_WITHIN: TimeSpan = TimeSpan::from_ms(5);
 
-/// How far to go.
+/// What to replay and compare.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Extent {
-    /// Not beyond this time, on the clock of the session.
+    /// Stop at this time, on the clock of the session.
     pub(crate) until: Option<Timestamp>,
-    /// On behind the first difference.
+    /// Continue after the first difference.
     pub(crate) all: bool,
-    /// Notices, too: they are compared by the text that this version gives them, which another may word otherwise.
+    /// Compare notices, too. They are compared by their text, which may differ between versions.
     pub(crate) notices: bool,
 }
 
@@ -38,56 +37,56 @@ impl Extent {
     }
 }
 
-/// What came of it.
+/// The result of a replay.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Rehearing {
-    /// Inputs that the machine was told.
+pub(crate) struct Replay {
+    /// Inputs that the machine received.
     pub(crate) inputs: u64,
-    /// Decisions of then that were looked at.
+    /// Recorded decisions that were compared.
     pub(crate) decisions: u64,
     pub(crate) differences: Vec<Difference>,
     pub(crate) ending: Ending,
-    /// The time of the last input that was told.
+    /// Time of the last input.
     pub(crate) at: Timestamp,
 }
 
 /// Where it ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum Ending {
-    /// With the session.
+    /// At the end of the session.
     Whole,
-    /// Where it was asked to.
+    /// At the time that was asked for.
     Asked,
-    /// With the first difference, as asked.
+    /// At the first difference, as asked.
     Differs,
-    /// The recording ends before the session did: the program was killed, or the power went.
+    /// The recording has no end: the program was killed, or the power failed.
     CutOff,
     /// Rows are missing from this number on.
     Gap { number: u64 },
-    /// A row that is no input.
+    /// A row is not an input.
     Unreadable { number: u64, why: InputError },
 }
 
-/// Something that is decided otherwise.
+/// A decision that differs from the recorded one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Difference {
-    /// When the machine was told what it follows from.
+    /// Time of the input that it follows from.
     pub(crate) time: Timestamp,
     /// Command, hold-line, watch or notice.
     pub(crate) kind: String,
-    /// What was decided then, if anything was.
+    /// The recorded decision, if there was one.
     pub(crate) then: Option<String>,
-    /// What is decided now, if anything is.
+    /// The decision now, if there is one.
     pub(crate) now: Option<String>,
-    /// By how much the same is decided later now.
+    /// By how much the same decision comes later now.
     pub(crate) later_by: Option<TimeSpan>,
-    /// The input before it, in words.
+    /// The input before it, as text.
     pub(crate) after: String,
 }
 
-/// Tells a machine the inputs of a trace, and compares.
-pub(crate) fn rehear<M: Listener>(machine: &mut M, trace: Vec<Traced>, extent: Extent) -> Rehearing {
-    let mut rehearing = Rehearing {
+/// Gives the inputs of a trace to a machine, and compares its decisions.
+pub(crate) fn replay<M: Listener>(machine: &mut M, trace: Vec<Traced>, extent: Extent) -> Replay {
+    let mut replay = Replay {
         inputs: 0,
         decisions: 0,
         differences: Vec::new(),
@@ -105,16 +104,16 @@ pub(crate) fn rehear<M: Listener>(machine: &mut M, trace: Vec<Traced>, extent: E
             match told(&row, place, extent) {
                 Ok(input) => {
                     if !lone.is_empty() {
-                        now.extend(decided_by_itself(machine, rehearing.at, row.time, extent));
+                        now.extend(decided_by_itself(machine, replay.at, row.time, extent));
                     }
                     after = format!("input {}: {} {}", row.number, row.kind, row.text).into();
                     machine.handle_input(row.time, &input);
                     now.extend(decided(machine, row.time, &after, extent));
-                    rehearing.inputs += 1;
-                    rehearing.at = row.time;
+                    replay.inputs += 1;
+                    replay.at = row.time;
                 }
                 Err(ending) => {
-                    rehearing.ending = ending;
+                    replay.ending = ending;
                     is_over = true;
                     break;
                 }
@@ -124,7 +123,7 @@ pub(crate) fn rehear<M: Listener>(machine: &mut M, trace: Vec<Traced>, extent: E
         let mut then = Vec::new();
         while let Some((row, place)) = rows.next_if(|(row, _)| !is_over && row.side == Side::Decision) {
             if let Some(ending) = obstacle(&row, place, extent) {
-                rehearing.ending = ending;
+                replay.ending = ending;
                 is_over = true;
                 break;
             }
@@ -135,22 +134,22 @@ pub(crate) fn rehear<M: Listener>(machine: &mut M, trace: Vec<Traced>, extent: E
         }
         is_over |= rows.peek().is_none();
         // Killed in the middle of writing: what is missing at the very end was decided, and is not there.
-        let is_torn = is_over && rehearing.ending != Ending::Whole && rehearing.ending != Ending::Asked;
+        let is_torn = is_over && replay.ending != Ending::Whole && replay.ending != Ending::Asked;
         if is_torn && now.starts_with(&then) {
             now.truncate(then.len());
         }
-        rehearing.decisions += then.len() as u64;
+        replay.decisions += then.len() as u64;
         let now = std::mem::take(&mut now);
         if then != now {
             lone.push(unmatched(&then, &now));
             if !extent.all {
-                rehearing.ending = Ending::Differs;
+                replay.ending = Ending::Differs;
                 break;
             }
         }
     }
-    rehearing.differences = differences(lone);
-    rehearing
+    replay.differences = differences(lone);
+    replay
 }
 
 /// What a machine that has decided otherwise decides between two inputs of then: it asks for other times now.
@@ -204,7 +203,7 @@ fn decided<M: Listener>(machine: &mut M, time: Timestamp, after: &Rc<str>, exten
 struct Row {
     kind: String,
     text: String,
-    /// When the machine was told what it follows from.
+    /// Time of the input that it follows from.
     time: Timestamp,
     /// That, in words.
     after: Rc<str>,
@@ -369,7 +368,7 @@ mod tests {
 
     #[test]
     fn the_same_machine_decides_the_same() {
-        let found = rehear(&mut Obedient::default(), evening(), ALL);
+        let found = replay(&mut Obedient::default(), evening(), ALL);
         assert_eq!((found.inputs, found.decisions, found.ending), (4, 4, Ending::Whole));
         assert_eq!(found.differences, []);
     }
@@ -377,14 +376,14 @@ mod tests {
     #[test]
     fn another_command_is_shown_with_both_and_the_input_before() {
         let mut other = Obedient { adds: 1, ..Obedient::default() };
-        let found = rehear(&mut other, evening(), ALL);
+        let found = replay(&mut other, evening(), ALL);
         assert_eq!(found.differences.len(), 2);
         let first = &found.differences[0];
         assert_eq!(first.then.as_deref(), Some("step 3 for train 24"));
         assert_eq!(first.now.as_deref(), Some("step 4 for train 24"));
         assert_eq!((first.after.as_str(), first.later_by), ("input 0: line 3", None));
         let only_first =
-            rehear(&mut Obedient { adds: 1, ..Obedient::default() }, evening(), Extent::default());
+            replay(&mut Obedient { adds: 1, ..Obedient::default() }, evening(), Extent::default());
         assert_eq!(
             (only_first.ending, &only_first.differences[..]),
             (Ending::Differs, &found.differences[..1])
@@ -396,7 +395,7 @@ mod tests {
         let mut trace = evening();
         let said = trace.iter_mut().find(|row| row.kind == "notice").unwrap();
         said.text = "Drive(\"3\")".to_owned();
-        let differences = |extent| rehear(&mut Obedient::default(), trace.clone(), extent).differences.len();
+        let differences = |extent| replay(&mut Obedient::default(), trace.clone(), extent).differences.len();
         assert_eq!(differences(ALL), 1);
         assert_eq!(differences(Extent { notices: false, ..ALL }), 0);
     }
@@ -406,7 +405,7 @@ mod tests {
         // It is woken when it asks for it, or when something was recorded soon after.
         for (waits, later_by) in [(40, [40, 40]), (488, [490, 100])] {
             let mut slow = Obedient { waits: TimeSpan::from_ms(waits), ..Obedient::default() };
-            let found = rehear(&mut slow, evening(), ALL);
+            let found = replay(&mut slow, evening(), ALL);
             let by: Vec<_> = found.differences.iter().filter_map(|difference| difference.later_by).collect();
             assert_eq!(by, later_by.map(TimeSpan::from_ms)[..by.len()], "{waits} ms");
             assert!(!by.is_empty());
@@ -418,13 +417,13 @@ mod tests {
         for length in 0..evening().len() {
             let mut trace = evening();
             trace.truncate(length);
-            let found = rehear(&mut Obedient::default(), trace, ALL);
+            let found = replay(&mut Obedient::default(), trace, ALL);
             assert_eq!((found.ending, found.differences), (Ending::CutOff, Vec::new()), "{length}");
         }
         // But for a decision that was another one.
         let mut trace = evening();
         trace.truncate(7);
-        let found = rehear(&mut Obedient { adds: 1, ..Obedient::default() }, trace, ALL);
+        let found = replay(&mut Obedient { adds: 1, ..Obedient::default() }, trace, ALL);
         assert_eq!(found.differences.len(), 2);
     }
 
@@ -432,14 +431,14 @@ mod tests {
     fn a_gap_an_unknown_input_and_the_time_asked_for_end_it() {
         let mut gap = evening();
         gap.remove(3);
-        let found = rehear(&mut Obedient::default(), gap, ALL);
+        let found = replay(&mut Obedient::default(), gap, ALL);
         assert_eq!((found.ending, found.differences.len()), (Ending::Gap { number: 3 }, 0));
         let mut strange = evening();
         strange[3].kind = Cow::Borrowed("telepathy");
-        let found = rehear(&mut Obedient::default(), strange, ALL);
+        let found = replay(&mut Obedient::default(), strange, ALL);
         assert!(matches!(found.ending, Ending::Unreadable { number: 3, .. }));
         let until = Extent { until: Some(Timestamp::ZERO + TimeSpan::from_ms(600)), ..ALL };
-        let found = rehear(&mut Obedient::default(), evening(), until);
+        let found = replay(&mut Obedient::default(), evening(), until);
         assert_eq!((found.ending, found.inputs, found.decisions), (Ending::Asked, 2, 2));
     }
 }
