@@ -216,7 +216,7 @@ impl Arguments {
         }
         writeln!(
             output,
-            "line          {:.0} ms slower than usual ({within:.0} ms), {:.1} % lost: up to {repeats} repeats of a command",
+            "line          {:.0} ms slower than usual ({within:.0} ms), {:.1} % lost: a command may need {repeats} more tries",
             excess.as_ms(),
             100.0 * line.lost_share()
         )?;
