@@ -92,7 +92,7 @@ impl Supposed {
             for (place, term) in sum.iter_mut().enumerate().take(node + 1) {
                 *term = (STOP_NODES + place, weights[place]);
             }
-            supposed.exchange(&sum, (0.0, 1.0), (0.0, LEFT_OVER));
+            supposed.exchange(&sum, (0.0, model.residual_scales[0]), (0.0, LEFT_OVER));
         }
         supposed
     }

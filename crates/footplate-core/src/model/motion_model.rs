@@ -64,6 +64,8 @@ pub struct MotionModel {
     /// By how much stops are longer because of where they end.
     #[cfg_attr(feature = "serde", serde(default))]
     pub(crate) stop_offsets: StopOffsets,
+    /// By how much more than usual the laws of stops and of starts leave over: factors on a standard deviation.
+    pub(crate) residual_scales: [f64; 2],
     uses: Vec<StepUse>,
     /// Sensors passed and stops made at each step, from below and from above.
     pub(crate) counts: Vec<[Counts; 2]>,
@@ -100,6 +102,7 @@ impl MotionModel {
             spread: Spread::prior(steps),
             sections: BTreeMap::new(),
             stop_offsets: StopOffsets::default(),
+            residual_scales: [1.0; 2],
             uses: vec![StepUse::Untried; steps + 1],
             counts: vec![[Counts::default(); 2]; steps + 1],
             scatter: Scatter::USUAL,
@@ -171,7 +174,7 @@ impl MotionModel {
     #[must_use]
     pub fn for_later_session(&self) -> Self {
         let mut later = self.clone();
-        later.spread.widen(&Variation::between_sessions(), self.steps());
+        later.spread.widen(&Variation::between_sessions(), &self.values, self.steps());
         later
     }
 

@@ -28,6 +28,8 @@ pub struct MotionNumbers {
     pub stop_offsets: Vec<(usize, f64, f64)>,
     /// One standard deviation of that from hop to hop (m).
     pub stop_offset_deviation: f64,
+    /// By how much more than usual the laws of stops and of starts leave over: factors on a standard deviation.
+    pub residual_scales: [f64; 2],
     /// By step from 0 on, what experience says of it.
     pub uses: Vec<StepUse>,
     /// By step from 0 on, contacts passed and stops made from below and then from above.
@@ -100,6 +102,7 @@ impl MotionModel {
             sections: of_places(&self.sections),
             stop_offsets: of_places(&self.stop_offsets.of_hop),
             stop_offset_deviation: self.stop_offsets.deviation,
+            residual_scales: self.residual_scales,
             uses: steps.map(|step| self.uses(step)).collect(),
             counts: self.counts.iter().map(|both| both.each_ref().map(counts)).collect(),
             scatter_scale: self.scatter.stops,
@@ -155,6 +158,8 @@ impl MotionModel {
             numbers.scatter_floor,
             numbers.start_scale,
             numbers.stop_offset_deviation,
+            numbers.residual_scales[0],
+            numbers.residual_scales[1],
         ];
         if scatters.iter().any(|scatter| !scatter.is_finite() || *scatter < 0.0) {
             return wrong("scatters");
@@ -164,6 +169,7 @@ impl MotionModel {
         model.sections = by_place(&numbers.sections);
         model.stop_offsets =
             StopOffsets { of_hop: by_place(&numbers.stop_offsets), deviation: numbers.stop_offset_deviation };
+        model.residual_scales = numbers.residual_scales;
         for (step, found) in (0..=numbers.highest.get()).filter_map(SpeedStep::new).zip(&numbers.uses) {
             model.note_use(step, *found);
         }

@@ -66,9 +66,20 @@ const RESIDUAL_BY_SPEED: f64 = 0.06;
 /// Correlation length of what laws leave over, as a difference of speed (m/s).
 const RESIDUAL_LENGTH: f64 = 0.2;
 
-/// Places of a train's numbers: the single ones, the nodes, speeds, hysteresis by step.
+/// How many numbers describe the shape of stops, and as many that of starts: see [`Answers::shape`].
+pub(super) const SHAPES: usize = 2;
+/// Prior standard deviation of each. In the middle of a change both together make twice [`SHAPE_ERROR`](super::priors::SHAPE_ERROR):
+/// braking in two stages and constant power differ by more from their nearest law than published decoders do.
+pub(super) const SHAPE_DEVIATION: f64 = 2.0 * core::f64::consts::SQRT_2 * super::priors::SHAPE_ERROR;
+
+/// How many numbers a train has: the single ones, nodes, speeds, hysteresis by step, shapes.
 pub(super) const fn count(highest: usize) -> usize {
-    SPEEDS + 2 * highest
+    SPEEDS + 2 * highest + 2 * SHAPES
+}
+
+/// Place of the first shape number of starts (`up`) or stops.
+pub(super) const fn shape_at(up: bool, highest: usize) -> usize {
+    SPEEDS + 2 * highest + if up { SHAPES } else { 0 }
 }
 
 /// Place of ln speed from below at a step from 1 on.
@@ -213,6 +224,13 @@ impl<'v> Answers<'v> {
     /// What the law leaves over of a start to a speed (m).
     pub(super) fn start_residual(&self, speed: f64) -> f64 {
         self.residual(START_NODES, speed)
+    }
+
+    /// By how much a train is ahead of its law early and late in a start (`up`) or stop, as parts of its displacement: no
+    /// law has the shape of every decoder.
+    pub(super) fn shape(&self, up: bool) -> [f64; SHAPES] {
+        let first = shape_at(up, self.highest);
+        core::array::from_fn(|nth| self.at(first + nth))
     }
 
     fn residual(&self, first: usize, speed: f64) -> f64 {

@@ -3,8 +3,8 @@
 use alloc::vec::Vec;
 
 use super::parameters::{
-    BEND, HYSTERESIS_SPREAD, NODES, PRIOR, START_NODES, STOP_NODES, count, hysteresis_at, node_covariance,
-    speed_at, speed_prior,
+    BEND, HYSTERESIS_SPREAD, NODES, PRIOR, SHAPE_DEVIATION, SHAPES, count, hysteresis_at, node_covariance,
+    shape_at, speed_at, speed_prior,
 };
 use super::survey::SectionIndex;
 use crate::linalg::NormalEquations;
@@ -54,8 +54,8 @@ pub(crate) fn prior(highest: usize) -> NormalEquations {
     for (column, (mean, deviation)) in PRIOR.iter().enumerate() {
         equations.add(&[(column, 1.0)], *mean, deviation * deviation);
     }
-    for first in [STOP_NODES, START_NODES] {
-        add_nodes(&mut equations, first);
+    for place in (shape_at(false, highest)..).take(2 * SHAPES) {
+        equations.add(&[(place, 1.0)], 0.0, SHAPE_DEVIATION * SHAPE_DEVIATION);
     }
     for step in 1..=highest {
         let (mean, deviation) = speed_prior(step, highest);
@@ -74,13 +74,13 @@ pub(crate) fn prior(highest: usize) -> NormalEquations {
     equations
 }
 
-/// The nodes of what a law leaves over, correlated by speed: rows of the inverse Cholesky factor of their covariance.
-fn add_nodes(equations: &mut NormalEquations, first: usize) {
-    for (node, terms) in whitened().iter().enumerate() {
-        let terms: Vec<(usize, f64)> =
-            terms.iter().take(node + 1).enumerate().map(|(i, weight)| (first + i, *weight)).collect();
-        equations.add(&terms, 0.0, 1.0);
-    }
+/// Sums of the nodes from `first` on that are independent with variance one where laws leave over what is usual: rows of the
+/// inverse Cholesky factor of their covariance.
+pub(super) fn independent_nodes(first: usize) -> Vec<Vec<(usize, f64)>> {
+    let sum = |(node, terms): (usize, &[f64; NODES])| {
+        terms.iter().take(node + 1).enumerate().map(|(i, weight)| (first + i, *weight)).collect()
+    };
+    whitened().iter().enumerate().map(sum).collect()
 }
 
 /// The inverse of the lower Cholesky factor of the covariance of the nodes.

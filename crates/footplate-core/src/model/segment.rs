@@ -1,6 +1,6 @@
 //! The motion between one command's effect and the next: a change of speed and the run after it.
 
-use super::parameters::Answers;
+use super::parameters::{Answers, SHAPES};
 use super::priors::SHAPE_ERROR;
 use crate::kinematics::RampedLag;
 
@@ -64,8 +64,11 @@ pub(crate) struct Segment {
     pub(crate) from: Pace,
     pub(crate) to: f64,
     shape: RampedLag,
-    /// Way that the law leaves over.
+    /// Distance that the law leaves over.
     residual: f64,
+    /// By how much the train is ahead of the law early and late in the change (m).
+    #[cfg_attr(feature = "serde", serde(default))]
+    ahead: [f64; SHAPES],
     braking: Option<Rolling>,
 }
 
@@ -113,14 +116,23 @@ impl Segment {
     /// A train at rest, or running steadily.
     pub(crate) const fn steady(begins: f64, speed: f64) -> Self {
         let from = Pace::steady(speed);
-        Self { begins, from, to: speed, shape: RampedLag::new(0.0, 0.0), residual: 0.0, braking: None }
+        Self {
+            begins,
+            from,
+            to: speed,
+            shape: RampedLag::new(0.0, 0.0),
+            residual: 0.0,
+            ahead: [0.0; SHAPES],
+            braking: None,
+        }
     }
 
     /// A start or a stop by a known law: from one steady speed to another, with friction (m/s²) where it ends at rest.
     pub(crate) fn by_law(begins: f64, speeds: [f64; 2], shape: RampedLag, friction: Option<f64>) -> Self {
         let [from, to] = speeds;
         let from = Pace::steady(from);
-        let mut segment = Self { begins, from, to, shape, residual: 0.0, braking: None };
+        let mut segment =
+            Self { begins, from, to, shape, residual: 0.0, ahead: [0.0; SHAPES], braking: None };
         segment.braking = friction.map(|friction| segment.rolling(friction));
         segment
     }
@@ -152,7 +164,12 @@ impl Segment {
             0.0
         };
         let begins = commanded.effect(answers);
-        let mut segment = Self { begins, from, to, shape, residual: residual + cut, braking: None };
+        let mut segment =
+            Self { begins, from, to, shape, residual: residual + cut, ahead: [0.0; SHAPES], braking: None };
+        if commanded.to == 0 || commanded.at_rest {
+            let displacement = segment.displacement().abs();
+            segment.ahead = answers.shape(commanded.to > 0).map(|part| part * displacement);
+        }
         if commanded.to == 0 {
             segment.braking = Some(segment.rolling(answers.friction()));
         }
@@ -184,8 +201,19 @@ impl Segment {
         }
         let caught_up = (speed - set) * self.shape.lag() * (1.0 - self.behind(since));
         let taken = self.braking.map_or(0.0, |rolling| rolling.taken(since, self.shape.lag()).1);
-        set * since + (self.to - set) * self.shape.area(since) + caught_up + self.residual * self.done(since)
+        let done = self.done(since);
+        set * since
+            + (self.to - set) * self.shape.area(since)
+            + caught_up
+            + self.residual * done
+            + self.ahead_of_law(done)
             - taken
+    }
+
+    /// By how much the train is ahead of the law (m) when a share of the change is done: nothing at both ends.
+    fn ahead_of_law(&self, done: f64) -> f64 {
+        let [early, late] = self.ahead;
+        4.0 * done * (1.0 - done) * ((1.0 - done) * early + done * late)
     }
 
     /// Speed (m/s).

@@ -5,8 +5,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::parameters::{
-    Answers, HYSTERESIS_SPREAD, NODES, PRIOR, START_NODES, STOP_NODES, count, hysteresis_at, node_covariance,
-    speed_at, speed_prior,
+    Answers, HYSTERESIS_SPREAD, NODES, PRIOR, SHAPE_DEVIATION, SHAPES, START_NODES, STOP_NODES, count,
+    hysteresis_at, node_covariance, shape_at, speed_at, speed_prior,
 };
 use super::variation::Variation;
 use crate::linalg::Solution;
@@ -37,6 +37,9 @@ impl Spread {
                 }
             }
         }
+        for place in (shape_at(false, highest)..).take(2 * SHAPES) {
+            spread.covariance[place * side + place] = SHAPE_DEVIATION * SHAPE_DEVIATION;
+        }
         for step in 1..=highest {
             let (_, deviation) = speed_prior(step, highest);
             let (speed, hysteresis) = (speed_at(step), hysteresis_at(step, highest));
@@ -63,9 +66,9 @@ impl Spread {
     }
 
     /// What may have changed is known less well.
-    pub(super) fn widen(&mut self, by: &Variation, highest: usize) {
+    pub(super) fn widen(&mut self, by: &Variation, values: &[f64], highest: usize) {
         let (side, covariance) = (self.side, &mut self.covariance);
-        by.each(highest, |one, other, more| {
+        by.each(values, highest, |one, other, more| {
             covariance[one * side + other] += more;
             if one != other {
                 covariance[other * side + one] += more;

@@ -3,6 +3,8 @@
 //! The same engine in another team's session runs at 1 % another speed in the median and 10 % at worst (18 pairs of published
 //! tables); within an hour trains that get warm become some per cent faster. Predictions from an older model include this.
 
+use alloc::vec::Vec;
+
 use super::parameters::{
     DOWN, FRICTION, HYSTERESIS, NODES, START_DELAY, START_NODES, STOP_NODES, UP, hysteresis_at, node_speed,
     speed_at,
@@ -25,6 +27,10 @@ pub(super) struct Variation {
     friction: f64,
     /// Of what the law of stops and starts leaves over, as part of the speed (m per m/s).
     residual: f64,
+    /// Of the time that starts and other accelerations take, and of the time that stops and other decelerations take, each
+    /// as a part of it: a heavier load makes all of them slower by the same factor.
+    acceleration_time: f64,
+    deceleration_time: f64,
 }
 
 impl Variation {
@@ -39,6 +45,8 @@ impl Variation {
             kappa: 0.05,
             friction: 0.001,
             residual: 0.010,
+            acceleration_time: 0.08,
+            deceleration_time: 0.08,
         }
     }
 
@@ -53,6 +61,8 @@ impl Variation {
             kappa: 0.03,
             friction: 0.001,
             residual: 0.008,
+            acceleration_time: 0.0,
+            deceleration_time: 0.0,
         }
     }
 
@@ -68,12 +78,25 @@ impl Variation {
             kappa: by * self.kappa,
             friction: by * self.friction,
             residual: by * self.residual,
+            acceleration_time: by * self.acceleration_time,
+            deceleration_time: by * self.deceleration_time,
         }
     }
 
-    /// Calls `add` with each pair of numbers that changes, once, and the covariance of their changes.
-    pub(super) fn each(&self, highest: usize, mut add: impl FnMut(usize, usize, f64)) {
+    /// Calls `add` with pairs of numbers that change and a covariance of their changes, each pair in one order only; the
+    /// covariances of a pair add up. `values` are the numbers before the change.
+    pub(super) fn each(&self, values: &[f64], highest: usize, mut add: impl FnMut(usize, usize, f64)) {
         let squared = |deviation: f64| deviation * deviation;
+        for (slopes, deviation) in [
+            (time_slopes(values, UP, START_NODES), self.acceleration_time),
+            (time_slopes(values, DOWN, STOP_NODES), self.deceleration_time),
+        ] {
+            for (nth, (one, slope)) in slopes.iter().enumerate() {
+                for (other, by) in slopes.iter().take(nth + 1) {
+                    add(*one, *other, squared(deviation) * slope * by);
+                }
+            }
+        }
         add(HYSTERESIS, HYSTERESIS, squared(self.hysteresis));
         for first in [UP, DOWN] {
             add(first, first, squared(self.delay));
@@ -96,4 +119,13 @@ impl Variation {
             add(own, own, 0.25 * squared(self.hysteresis));
         }
     }
+}
+
+/// How the numbers of a direction change with ln of the time that its speed changes take: lag, ramps and what the law leaves
+/// over grow with it, friction falls. The delay of the command remains.
+fn time_slopes(values: &[f64], first: usize, nodes: usize) -> Vec<(usize, f64)> {
+    let value = |place: usize| values.get(place).copied().unwrap_or(0.0);
+    let grows = (first + 1..first + 4).chain(nodes..nodes + NODES).map(|place| (place, value(place)));
+    let falls = (first == DOWN).then(|| (FRICTION, -value(FRICTION)));
+    grows.chain(falls).collect()
 }

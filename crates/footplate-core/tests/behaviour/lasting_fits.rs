@@ -7,6 +7,8 @@ use footplate_core::{Approach, Command, EdgeId, Event, EventKind, Length, SpeedS
 use crate::toy_railway::{ToyRailway, step, straight};
 
 const TRAIN: TrainId = TrainId(24);
+/// The knee of a train with other laws.
+const KNEE_MM_PER_S: f64 = 150.0;
 
 /// The toy's trains run at 32 mm/s a step and stop at 170 mm/s², 180 ms after the command.
 fn true_stop_mm(number: u8) -> f64 {
@@ -100,6 +102,75 @@ fn after_three_hundred_stops_a_model_is_as_accurate_as_stated() {
 
 /// How much further a train rolls if it comes to rest on the falling hop (mm).
 const DOWNHILL_MM: f64 = 25.0;
+
+/// Where a train with a knee at 150 mm/s comes to rest, 180 ms after the command and in steps of a millisecond.
+fn true_stop_with_knee_mm(number: u8) -> f64 {
+    let mut v = 32.0 * f64::from(number);
+    let mut distance = 0.18 * v;
+    while v > 0.0 {
+        v -= 0.170 * (0.4 + 0.6 * v / KNEE_MM_PER_S);
+        distance += 1e-3 * v.max(0.0);
+    }
+    distance
+}
+
+#[test]
+fn stops_of_a_train_with_other_laws_are_as_accurate_as_stated() {
+    // Given a train that accelerates at constant power, which no law of the model does,
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    world.trains[0].knee = Some(KNEE_MM_PER_S);
+    let sections = SectionIndex::of(&world.layout);
+    let mut fit = MotionFit::new(TRAIN, step(14));
+    for number in [8, 12, 4, 10, 6, 13, 9].into_iter().cycle().take(120) {
+        trip(&mut world, &mut fit, number, TimeSpan::ZERO);
+        fit.refit(&sections);
+    }
+    // then an error that its starts would hide is within what is claimed of its stops.
+    for (number, stop, claimed) in stops_mm(&fit) {
+        let truth = true_stop_with_knee_mm(number);
+        assert!(
+            (stop - truth).abs() < 2.0 * claimed,
+            "step {number}: {stop} ± {claimed} mm, true {truth}; {:?}",
+            fit.model().numbers().residual_scales
+        );
+    }
+}
+
+#[test]
+fn a_train_that_is_located_while_it_accelerates_does_not_count_as_steady() {
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let sections = SectionIndex::of(&world.layout);
+    let mut fit = MotionFit::new(TRAIN, step(14));
+    for number in [8, 12, 4, 10, 6].into_iter().cycle().take(20) {
+        trip(&mut world, &mut fit, number, TimeSpan::ZERO);
+        fit.refit(&sections);
+    }
+    let before = stops_mm(&fit);
+    // Given a session that begins at an unknown place, and a stop as soon as the train is located,
+    fit.begin_session(&sections);
+    world.command(Command::Speed { train: TRAIN, step: step(12) });
+    let mut located_at = None;
+    let end = world.now + TimeSpan::from_s(15.0);
+    while world.now < end {
+        for event in world.tick() {
+            if located_at.is_none() && matches!(event.kind, EventKind::Sensor(_)) {
+                located_at = Some(world.trains[0].speed_mm_per_s);
+                fit.lose_place();
+                world.command(Command::Speed { train: TRAIN, step: SpeedStep::STAND });
+            }
+            fit.take(&world.layout, &straight(), &event);
+        }
+    }
+    trip(&mut world, &mut fit, 6, TimeSpan::ZERO);
+    fit.refit(&sections);
+    // then stops are what they were.
+    for ((number, before, _), (_, after, _)) in before.into_iter().zip(stops_mm(&fit)) {
+        assert!(
+            (after - before).abs() < 8.0,
+            "step {number}: {before} mm, then {after} mm; located at {located_at:?} mm/s"
+        );
+    }
+}
 
 #[test]
 fn stops_downhill_are_learnt_to_be_longer_only_there() {

@@ -106,6 +106,8 @@ pub(crate) struct ToyTrain {
     pub(crate) travelled_mm: f64,
     /// Distance run over that with clean wheels.
     pub(crate) wheels: f64,
+    /// Above this speed it accelerates at constant power, and it brakes the harder the faster it is (mm/s).
+    pub(crate) knee: Option<f64>,
     pub(crate) is_off_the_track: bool,
 }
 
@@ -115,8 +117,13 @@ impl ToyTrain {
             let _ = (self.obeys.pop_front(), from);
             self.target_mm_per_s = target;
         }
-        let change = MM_PER_S2 * TICK.as_s();
         let missing = self.target_mm_per_s - self.speed_mm_per_s;
+        let rate = match self.knee {
+            Some(knee) if missing > 0.0 => MM_PER_S2 * knee / self.speed_mm_per_s.max(knee),
+            Some(knee) => MM_PER_S2 * (0.4 + 0.6 * self.speed_mm_per_s / knee),
+            None => MM_PER_S2,
+        };
+        let change = rate * TICK.as_s();
         self.speed_mm_per_s += missing.clamp(-change, change);
         let distance = self.speed_mm_per_s * TICK.as_s() * self.wheels;
         let edge = layout.edge(self.at.edge).expect("on the layout");
@@ -181,6 +188,7 @@ impl ToyRailway {
             obeys: VecDeque::new(),
             travelled_mm: 0.0,
             wheels: 1.0,
+            knee: None,
             is_off_the_track: false,
         });
     }

@@ -64,6 +64,7 @@ impl MotionFile {
             sections: sections.collect(),
             stop_offsets: offsets.collect(),
             stop_offset_deviation: exact.stop_offset_deviation,
+            residual_scales: exact.residual_scales,
             uses: exact.uses.iter().map(|form| form.step_use()).collect(),
             counts: exact
                 .counts
@@ -154,6 +155,7 @@ fn exact(numbers: &MotionNumbers, measured_at_s: Option<f64>) -> ExactForm {
         scatter_scale: numbers.scatter_scale,
         scatter_floor: numbers.scatter_floor,
         stop_offset_deviation: numbers.stop_offset_deviation,
+        residual_scales: numbers.residual_scales,
         start_scale: numbers.start_scale,
         scale: numbers.scale.clone(),
         counts: counts.collect(),

@@ -9,7 +9,7 @@ use crate::quantity::Quantity;
 /// change of the fit in `calibration::motion` of core, or of the events that [`MotionReplay`](crate::MotionReplay)
 /// feeds it. Stored models and replays are then computed again from the events. A test pins the numbers of every
 /// version.
-pub const MOTION_MODEL_VERSION: &str = "4";
+pub const MOTION_MODEL_VERSION: &str = "5";
 
 /// The motion model of one train on one layout.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -52,6 +52,8 @@ pub struct ExactForm {
     /// The standard deviation of stop offsets (m).
     #[serde(default)]
     pub stop_offset_deviation: f64,
+    /// What the laws of stops and of starts leave over, relative to the prior: factors on a standard deviation.
+    pub residual_scales: [f64; 2],
     /// The scatter of start delays relative to the prior.
     pub start_scale: f64,
     /// The change of each of `values` for one standard deviation of the survey's scale.

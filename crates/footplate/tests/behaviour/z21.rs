@@ -47,8 +47,8 @@ fn a_train_is_calibrated_behind_a_z21_and_stops_where_it_should() {
     println!("{} stops, errors in mm: {all:.1?}, {broken} promises of 95 % broken", all.len());
     assert!(all.len() >= 15, "{all:?}");
     assert!(all[all.len() / 2] < 12.0 && all[all.len() - 1] < 60.0, "{all:?}");
-    // One in twenty should be. All five are of the world of seed 10, which stops about 30 mm too far each time.
-    assert!(broken <= 5, "{broken} of {} promises of 95 % broken", all.len());
+    // One in twenty should be.
+    assert!(broken <= 3, "{broken} of {} promises of 95 % broken", all.len());
 }
 
 /// Takes minutes: `cargo nextest run -p footplate --run-ignored all -E 'test(valid_over_a_z21)' --no-capture`.

@@ -128,7 +128,7 @@ impl Chain {
             // The earlier path is unknown: distances count from here. A train that has moved as commanded since it was at rest
             // may still be accelerating; any other counts as running steadily.
             let trip = match self.trips.last().filter(|_| self.moves_as_commanded) {
-                Some(moving) => moving.from_another_place(),
+                Some(moving) => moving.at_another_place(),
                 None => Trip::new(time, Some((self.step, self.above)), false),
             };
             self.trips.push(trip);

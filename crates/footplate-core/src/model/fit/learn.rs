@@ -6,7 +6,8 @@ use super::trip::Trip;
 use super::unknowns::Columns;
 use crate::linalg::Solution;
 use crate::model::motion_model::{Counts, MotionModel};
-use crate::model::parameters::{DOWN, SPEEDS, START_DELAY, UP};
+use crate::model::parameters::{DOWN, NODES, SPEEDS, START_DELAY, START_NODES, STOP_NODES, UP, shape_at};
+use crate::model::priors::independent_nodes;
 use crate::model::scatter::ScatterSums;
 use crate::model::spread::Spread;
 use crate::time::Timestamp;
@@ -44,6 +45,9 @@ impl MotionModel {
             |column: usize| (lasting.get(column).copied().unwrap_or(0.0), solution.variance(column).max(0.0));
         let offsets = columns.stop_offsets.iter().map(|(hop, column)| (*hop, offset(*column)));
         self.stop_offsets.learn(offsets.collect(), self.scatter.floor);
+        for (scale, first) in self.residual_scales.iter_mut().zip([STOP_NODES, START_NODES]) {
+            *scale = residual_scale(first, lasting, solution);
+        }
         self.date = date;
     }
 
@@ -57,6 +61,22 @@ impl MotionModel {
     }
 }
 
+/// The usual size of what laws leave over weighs as much as this many nodes.
+const USUAL_NODES: f64 = 4.0;
+
+/// By how much more than usual a law leaves over, as its nodes show: one step of expectation and maximisation (Dempster, Laird and
+/// Rubin, 1977). Less than usual is no evidence that the next speed is like those seen.
+fn residual_scale(first: usize, lasting: &[f64], solution: &Solution) -> f64 {
+    let squares = independent_nodes(first).into_iter().map(|sum| {
+        let mean: f64 = sum.iter().filter_map(|(place, slope)| Some(slope * lasting.get(*place)?)).sum();
+        let with = |(one, by): &(usize, f64)| -> f64 {
+            sum.iter().map(|(other, slope)| by * slope * solution.covariance(*one, *other)).sum()
+        };
+        mean * mean + sum.iter().map(with).sum::<f64>().max(0.0)
+    });
+    libm::sqrt((squares.sum::<f64>() + USUAL_NODES) / (NODES as f64 + USUAL_NODES)).max(1.0)
+}
+
 /// How each number changes with ln of the scale by which lengths are measured.
 fn by_scale(values: &[f64], steps: usize) -> impl Iterator<Item = f64> + '_ {
     let speeds = SPEEDS..SPEEDS + steps;
@@ -67,7 +87,7 @@ fn by_scale(values: &[f64], steps: usize) -> impl Iterator<Item = f64> + '_ {
         match of_change {
             Some(KAPPA) => -value,
             Some(_) => 0.0,
-            None if place == START_DELAY => 0.0,
+            None if place == START_DELAY || place >= shape_at(false, steps) => 0.0,
             None if speeds.contains(&place) => 1.0,
             None => *value,
         }

@@ -1,8 +1,8 @@
-//! What trips that are no longer kept say of a train, and what was known before the first: one Gaussian.
+//! One Gaussian that holds the prior and everything learnt from trips that are no longer kept.
 //!
-//! Taking a trip out of the equations leaves what it says of the numbers that last and of where the next trip begins
-//! (Schur complement), at the point and with the weights of the last fit. So the cost of a fit does not grow with the
-//! age of a train, and old measurements still count: as much as is right after what may have changed since.
+//! Marginalising a trip (Schur complement, at the point and with the weights of the last fit) leaves its information on the
+//! lasting numbers and on where the next trip begins. The cost of a fit therefore does not grow with the age of a train.
+//! Old measurements still count; process noise reduces their weight as the train may have changed since.
 
 use alloc::collections::BTreeMap;
 use alloc::vec;
@@ -11,12 +11,16 @@ use alloc::vec::Vec;
 use super::unknowns::Columns;
 use crate::linalg::NormalEquations;
 use crate::model::motion_model::Counts;
+use crate::model::parameters::{SPEEDS, STOP_NODES};
 use crate::model::priors::prior;
 use crate::model::scatter::ScatterSums;
 use crate::model::variation::Variation;
 
-/// No place is farther (m) from the sensor passed last: what this adds to knowledge is nothing beside any measurement.
+/// No place is farther than this from the sensor passed last (m). Any measurement outweighs this bound.
 const BOUND: f64 = 100.0;
+
+/// No law leaves over more than this (m).
+const NODE_BOUND: f64 = 10.0;
 
 /// A number that belongs to a place on the layout.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,24 +35,23 @@ enum Local {
     },
 }
 
-/// The numbers of a train, then those of places in the order in which they were met, then the place at which the first kept
-/// trip begins.
+/// Columns: the numbers of the train, those of places in order of first use, and the place at which the first kept trip begins.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct MarginalPrior {
     pub(super) equations: NormalEquations,
-    /// What belongs to places, in the order of the columns.
+    /// The numbers that belong to places, in the order of the columns.
     #[cfg_attr(feature = "serde", serde(rename = "sections"))]
     local: Vec<Local>,
-    /// What was counted of the trips that are no longer kept.
+    /// Counts of the trips that are no longer kept.
     pub(super) counts: Vec<[Counts; 2]>,
     pub(super) scatter: ScatterSums,
-    /// Until when (s) variation with time is in it.
+    /// Until when (s) it includes the process noise of time.
     widened: f64,
 }
 
 impl MarginalPrior {
-    /// What is known of any train.
+    /// The prior of any train.
     pub(super) fn new(highest: usize) -> Self {
         let mut equations = prior(highest);
         equations.append(1);
@@ -61,15 +64,15 @@ impl MarginalPrior {
         }
     }
 
-    /// Sections are run over, perhaps for the first time. What a survey says of them is not in it: a survey may be doubted
-    /// later.
+    /// Adds columns for sections that are run over for the first time. Surveyed lengths are not part of the prior, because a
+    /// survey may be rejected later.
     pub(super) fn meet<'s>(&mut self, passed: impl Iterator<Item = &'s usize>) {
         for section in passed {
             self.meet_local(Local::Section(*section));
         }
     }
 
-    /// Stops ended on hops, perhaps for the first time.
+    /// Adds columns for hops on which a stop ended for the first time.
     pub(super) fn meet_stops(&mut self, hops: impl Iterator<Item = usize>) {
         for hop in hops {
             self.meet_local(Local::StopOffset { hop });
@@ -98,23 +101,26 @@ impl MarginalPrior {
         Columns { sections, stop_offsets, lasting: self.equations.unknowns() - 1 }
     }
 
-    /// Time has passed on a chain that goes on: trains get warm, rails get dirty.
-    pub(super) fn age(&mut self, highest: usize, until: f64) {
+    /// Adds the process noise of time: trains get warm, rails get dirty.
+    pub(super) fn age(&mut self, values: &[f64], highest: usize, until: f64) {
         let hours = (until - self.widened).max(0.0) / 3600.0;
         self.widened = until;
-        self.widen(highest, &Variation::per_hour().over(hours));
+        self.widen(values, highest, &Variation::per_hour().over(hours));
     }
 
-    /// A session is over: by the next the train, the track and the voltage are a little different.
-    pub(super) fn begin_session(&mut self, highest: usize) {
-        self.widen(highest, &Variation::between_sessions());
+    /// Adds the process noise between two sessions: train, track and voltage are a little different.
+    pub(super) fn begin_session(&mut self, values: &[f64], highest: usize) {
+        self.widen(values, highest, &Variation::between_sessions());
     }
 
-    fn widen(&mut self, highest: usize, by: &Variation) {
+    fn widen(&mut self, values: &[f64], highest: usize, by: &Variation) {
         let side = self.equations.unknowns();
-        // Where the first kept trip begins may not be known at all, nor a section or an offset; a covariance needs a bound.
+        // The first place, a section or an offset may have no information yet; a covariance needs a bound.
         for free in side - 1 - self.local.len()..side {
             self.equations.add(&[(free, 1.0)], 0.0, BOUND * BOUND);
+        }
+        for node in STOP_NODES..SPEEDS {
+            self.equations.add(&[(node, 1.0)], 0.0, NODE_BOUND * NODE_BOUND);
         }
         let mut more = vec![0.0; side * (side + 1) / 2];
         let mut add = |one: usize, other: usize, variance: f64| {
@@ -123,7 +129,7 @@ impl MarginalPrior {
                 *slot += variance;
             }
         };
-        by.each(highest, &mut add);
+        by.each(values, highest, &mut add);
         self.equations.widen(&more);
     }
 }

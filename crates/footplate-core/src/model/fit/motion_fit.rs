@@ -26,7 +26,8 @@ use crate::event::{Event, EventKind};
 use crate::ids::{SpeedStep, TrainId};
 use crate::linalg::{Eliminated, NormalEquations};
 use crate::model::motion_model::{MotionModel, StepUse};
-use crate::model::priors::section_variance;
+use crate::model::parameters::{START_NODES, STOP_NODES};
+use crate::model::priors::{independent_nodes, section_variance};
 use crate::model::scatter::{Scatter, ScatterSums};
 use crate::model::survey::SectionIndex;
 use crate::time::Timestamp;
@@ -83,7 +84,7 @@ struct Reduced {
     trips: Vec<Vec<Eliminated>>,
 }
 
-/// What the survey of the layout says of the sections passed, and what is usual of stops for where they end.
+/// Priors whose widths a fit learns or the layout gives: lengths of sections, stop offsets, and what laws leave over.
 ///
 /// Speeds and lengths could all be longer by the same part, and no timing would tell: where the survey's scale is known, give
 /// or take a deviation, its total is the measure. All that is asked of a model, where a train comes to rest, is the same in
@@ -152,7 +153,7 @@ impl MotionFit {
         }
         self.refit(sections);
         self.condense(self.chain.trips.len());
-        self.prior.begin_session(self.highest());
+        self.prior.begin_session(&self.model.values, self.highest());
         self.refit(sections);
     }
 
@@ -199,7 +200,7 @@ impl MotionFit {
             super::learn::count(&mut self.prior.counts, trip);
         }
         if let Some(last) = old.last() {
-            self.prior.age(self.highest(), last.begins);
+            self.prior.age(&self.model.values, self.highest(), last.begins);
         }
     }
 
@@ -343,14 +344,18 @@ impl MotionFit {
 }
 
 impl Survey {
-    fn of(columns: &Columns, index: &SectionIndex, stop_offset_variance: f64) -> Self {
+    fn of(columns: &Columns, index: &SectionIndex, model: &MotionModel) -> Self {
         let mut rows: Vec<(Vec<(usize, f64)>, f64)> = columns
             .sections
             .iter()
             .map(|(section, column)| (alloc::vec![(*column, 1.0)], section_variance(index, *section)))
             .collect();
         let offsets = columns.stop_offsets.values();
-        rows.extend(offsets.map(|column| (alloc::vec![(*column, 1.0)], stop_offset_variance)));
+        let offset_variance = model.stop_offsets.variance();
+        rows.extend(offsets.map(|column| (alloc::vec![(*column, 1.0)], offset_variance)));
+        for (first, scale) in [STOP_NODES, START_NODES].into_iter().zip(model.residual_scales) {
+            rows.extend(independent_nodes(first).into_iter().map(|sum| (sum, scale * scale)));
+        }
         let of_total = index.scale_variance(columns.sections.keys().copied());
         // What all lengths have in common does not keep their total from being a measure.
         let of_lengths = of_total - index.scale() * index.scale();

@@ -8,7 +8,7 @@ use super::robust::RobustWeight;
 use super::trip::{Own, Trip, Walk};
 use super::unknowns::Columns;
 use crate::model::parameters::{
-    Answers, NODES, SPEEDS, START_NODES, STOP_NODES, hysteresis_at, nodes_about, speed_at,
+    Answers, NODES, SHAPES, START_NODES, STOP_NODES, count, hysteresis_at, nodes_about, shape_at, speed_at,
 };
 use crate::model::priors::SHAPE_ERROR;
 use crate::model::priors::{FELT, TRIP_DEVIATION, WANDER, change_error};
@@ -22,8 +22,8 @@ const SENSOR_SCATTER: f64 = 0.0015;
 const TAPE: f64 = 0.005;
 /// Standard deviation of a place of rest after the train has settled (m).
 const REST_SCATTER: f64 = 0.0005;
-/// By how much the error of a law's shape counts more than that of one change: it is the same in every change of the kind, of
-/// which some ten are kept, and does not become less with their number (√10).
+/// Factor on the error of a law's shape in changes between two speeds: some ten changes of the kind are kept and have the same
+/// error, which does not average out (√10).
 const SYSTEMATIC: f64 = 3.2;
 /// Standard deviation of where a chain begins (m).
 const ANYWHERE: f64 = 10.0;
@@ -171,9 +171,9 @@ impl Point<'_> {
             let (longer, sections) = self.longer(passed);
             let mut terms = terms_of(&|outcome| outcome.at[index]);
             subtract(&mut terms, &sections);
-            let Error { speed, law, step } = errors[index];
+            let Error { speed, law, systematic, step } = errors[index];
             let own = speed * speed * contact.variance + SENSOR_SCATTER * SENSOR_SCATTER;
-            let variance = own + SYSTEMATIC * SYSTEMATIC * law * law;
+            let variance = own + systematic * systematic * law * law;
             let residual = at.own.place + here.at[index] - surveyed - longer;
             if with_slopes {
                 self.scaled(&mut terms, residual, step);
@@ -323,8 +323,10 @@ fn subtract(terms: &mut Vec<(usize, f64)>, others: &[(usize, f64)]) {
 struct Error {
     /// Speed there (m/s).
     speed: f64,
-    /// By how much the law's shape may be off there (m).
+    /// Standard deviation of the law's shape there (m), ...
     law: f64,
+    /// ... and the factor on it for errors that changes of the kind have in common.
+    systematic: f64,
     /// The step of that speed.
     step: u8,
 }
@@ -338,7 +340,11 @@ fn errors(trip: &Trip, own: &Own, segments: &[Segment], stop_shape_error: f64) -
             let (middle, displacement) = walk.in_change(contact.time);
             let shape_error = if walk.is_stopping() { stop_shape_error } else { SHAPE_ERROR };
             let law = shape_error * middle * displacement.abs();
-            Error { speed: walk.speed(contact.time), law, step: trip.step_of(walk.segment()) }
+            // The common errors of starts and of stops are learnt: see `Answers::shape`.
+            let change = walk.segment().checked_sub(1).and_then(|place| trip.commanded.get(place));
+            let is_end = change.is_some_and(|change| change.to == 0 || change.at_rest);
+            let systematic = if is_end { 1.0 } else { SYSTEMATIC };
+            Error { speed: walk.speed(contact.time), law, systematic, step: trip.step_of(walk.segment()) }
         })
         .collect()
 }
@@ -372,6 +378,12 @@ fn involved(trip: &Trip, segments: &[Segment], highest: usize) -> Vec<usize> {
             add(hysteresis_at(step, highest));
         }
     }
-    debug_assert!(columns.iter().all(|column| *column < SPEEDS + 2 * highest));
+    for up in [false, true] {
+        let changes = trip.commanded.iter().filter(|change| if up { change.at_rest } else { change.to == 0 });
+        if changes.count() > 0 {
+            (0..SHAPES).for_each(|nth| add(shape_at(up, highest) + nth));
+        }
+    }
+    debug_assert!(columns.iter().all(|column| *column < count(highest)));
     columns
 }

@@ -118,7 +118,7 @@ impl Trip {
     }
 
     /// The same motion from an unknown place, with no sensor passed yet.
-    pub(super) fn from_another_place(&self) -> Self {
+    pub(super) fn at_another_place(&self) -> Self {
         Self {
             commanded: self.commanded.clone(),
             pieces: self.pieces.clone(),

@@ -37,7 +37,7 @@ impl MotionFit {
         let columns = fit.prior.columns();
         let values = fit.start(&columns);
         fit.compare_promises(&columns, &values);
-        let survey = Survey::of(&columns, sections, fit.model.stop_offsets.variance());
+        let survey = Survey::of(&columns, sections, &fit.model);
         Refit { fit, columns, values, survey, closed: None, iteration: 0, condensed: 0, is_over: false }
     }
 
