@@ -343,9 +343,6 @@ impl<'l> Session<'l> {
     /// A person reads off where a train stands.
     fn help(&mut self, train: TrainId, now: Timestamp) {
         self.needs_person.remove(&train);
-        if self.dispatcher.driver().position(train, now).is_some() {
-            return;
-        }
         let Some(at) = place_by_hand(self.layout, self.rehearsal.world(), train) else { return };
         self.tally.hands += 1;
         self.dispatcher.place(now, train, at, HAND);
