@@ -296,7 +296,7 @@ impl<M: Machine> Attendant<M> for Ear {
             }
             LinkNotice::ReplyLost { .. } => self.lost += 1,
             LinkNotice::Unreadable { .. } | LinkNotice::UnexpectedBytes { .. } => {
-                self.noise = Some(notice.to_string())
+                self.noise = Some(notice.to_string());
             }
             _ => {}
         }
