@@ -238,7 +238,7 @@ step_chaos() {
   "$TARGET/debug/footplate" simulate chaos --seeds "$CHAOS_SEEDS"
 }
 
-# Orders and HTTP bodies are read inside the program: property tests of its own do the same there.
+# Orders and HTTP bodies are read inside the program and have no target yet.
 step_fuzz() {
   need_nextest
   cargo build --quiet --workspace --bins --profile test
