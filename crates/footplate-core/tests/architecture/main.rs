@@ -11,3 +11,4 @@ mod links;
 mod project;
 mod purity;
 mod source;
+mod words;
