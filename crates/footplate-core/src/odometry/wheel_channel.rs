@@ -3,7 +3,7 @@
 use super::command_watch::Allowed;
 use super::wheels::{
     CountWindows, Expected, Heading, Period, Quality, Range, ReportedDirection, Tachometer, Vehicle,
-    WheelReading, WheelTracker, Wheelset,
+    WheelReading, WheelTracker, Wheelset, larger,
 };
 
 /// A count of a rolling wheel differs from the expected one by no more than this (pulses): one for the phase at either end, one
@@ -16,6 +16,9 @@ const ROLLING: f64 = 2.5;
 const SLIPPING: f64 = 30.0;
 /// A count that is the same for longer is hardly that of a wheel (s).
 const STUCK_AFTER_S: f64 = 0.7;
+/// Counts of rolling wheels differ by no more than these pulses, and this part of them (diameters, creepage in curves).
+const APART_PULSES: f64 = 2.0;
+const APART_PART: f64 = 0.03;
 /// Readings after which the tracker's expectation is good enough to reject a count.
 const WARM: u32 = 8;
 /// How many times faster than the fastest train a wheel may turn: one that rolls or is braked, and one that a motor can
@@ -189,10 +192,15 @@ impl WheelChannel {
         self.is_read() && self.pulses != 0.0 && !self.stands_still()
     }
 
-    /// Compares both counts of a period of `t` seconds. A constant count, not zero, beside one that changes is stuck until it
-    /// changes itself, even if the other wheel stops.
+    /// Compares both counts of a period of `t` seconds. A constant count, not zero, beside one that changes and is apart from
+    /// it is stuck until it changes itself, even if the other wheel stops. At a constant speed near a whole number of pulses
+    /// in a period the counts of rolling wheels are constant, too, and not apart.
     pub(super) fn compare(&mut self, other: &mut Self, t: f64) {
-        let (moves, other_moves) = (self.moves(), other.moves());
+        let (turned, other_turned) = (self.pulses * self.pitch, other.pulses * other.pitch);
+        let least = APART_PULSES * larger(self.pitch, other.pitch);
+        let apart =
+            (turned - other_turned).abs() > least + APART_PART * larger(turned.abs(), other_turned.abs());
+        let (moves, other_moves) = (apart && self.moves(), apart && other.moves());
         for (wheel, beside) in [(self, other_moves), (other, moves)] {
             let was = wheel.stuck;
             wheel.stuck = wheel.stands_still() && (was || beside);

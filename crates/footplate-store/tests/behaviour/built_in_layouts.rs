@@ -173,7 +173,7 @@ fn built_in_layouts_are_what_the_importer_makes_of_the_published_tables() {
             Some(&folder.join(format!("{points}_schematic_xy.csv"))),
         );
         let mut imported = import_layout(tables.unwrap(), &context).unwrap();
-        // Two published points of track A are wrong, as the comments beside them say.
+        // Two published points of track A are wrong, as the file says of itself.
         for (node, point) in [("BR2", [1222.0, 1588.0]), ("EN10", [257.0, 1559.0])] {
             if points == "tracka" {
                 let node = imported.layout.node_named(node).unwrap();

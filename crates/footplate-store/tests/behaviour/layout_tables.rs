@@ -129,7 +129,7 @@ fn a_node_that_does_not_agree_with_its_reverse_is_named() {
     );
     assert_eq!(
         complaint("B1,sensor,16,B2", "B1,sensor,16,"),
-        "nodes.csv, line 4: the reverse of `B1` should be a node of this file, and `` is none"
+        "nodes.csv, line 4: the reverse of `B1` should be a node of this file; `` is not"
     );
     assert_eq!(
         complaint("B1,sensor,16,B2", "B1,sensor,16,A2"),

@@ -61,7 +61,7 @@ fn wrong_tables_are_refused_with_their_place() {
     for (path, told) in [
         (mistyped.as_path(), "line 2, column 4 (speed_mm_s): `fast`"),
         (columns.as_path(), "counted_from"),
-        (alone.as_path(), "give the figures of more teams"),
+        (alone.as_path(), "give the tables of more teams"),
         (stranger.as_path(), "none of the 2 published figures"),
         (empty.as_path(), "is empty"),
         (Path::new("missing/speeds.csv"), "missing/speeds.csv: cannot be read"),

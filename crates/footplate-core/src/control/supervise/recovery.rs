@@ -29,6 +29,8 @@ pub(super) const STANDS_WITHIN: TimeSpan = TimeSpan::from_s(30.0);
 const FOUND_WITHIN: TimeSpan = TimeSpan::from_s(75.0);
 /// ... and one speed, or one stop.
 pub(super) const MEASURED_WITHIN: TimeSpan = TimeSpan::from_s(45.0);
+/// A recovery reverses a train once to locate it, and once more where its track ends while it is measured.
+const MOST_REVERSALS: u8 = 2;
 /// A train that is lost this often while it is being found needs a person.
 const MOST_LOST: u8 = 3;
 /// Any train is at rest this long after its stop command (the longest published stop).
@@ -49,7 +51,8 @@ pub(super) struct Recovery {
     pub(super) ratios: Vec<MeasuredRatio>,
     pub(super) change: Rescaling,
     pub(super) lesson: usize,
-    has_turned: bool,
+    /// How often it has reversed the train.
+    reversals: u8,
     lost: u8,
 }
 
@@ -101,7 +104,7 @@ impl Recovery {
             ratios: Vec::new(),
             change: Rescaling::of(Vec::new()),
             lesson: 0,
-            has_turned: false,
+            reversals: 0,
             lost: 0,
         }
     }
@@ -223,7 +226,7 @@ impl Watchdog {
     fn creep_back(&mut self, now: Timestamp, train: TrainId, seen: Option<NodeId>) {
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let step = recovery.steps.crawl;
-        recovery.has_turned = true;
+        recovery.reversals += 1;
         recovery.phase = Phase::Turning { step, seen };
         recovery.by = now + STANDS_WITHIN;
         // Behind it is where it came from.
@@ -377,7 +380,8 @@ impl Watchdog {
             Phase::Crawling { seen, .. } => seen.map(|node| node.reverse()),
             _ => None,
         };
-        if recovery.has_turned {
+        let most = if matches!(recovery.phase, Phase::Measuring { .. }) { MOST_REVERSALS } else { 1 };
+        if recovery.reversals >= most {
             return self.need_person(now, train);
         }
         self.creep_back(now, train, seen);

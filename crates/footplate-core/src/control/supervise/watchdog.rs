@@ -374,20 +374,13 @@ impl Watchdog {
                 if self.own.remove(&finished.order).is_some() {
                     return self.recovering_done(now, finished.train, finished.order, None);
                 }
-                let goes_on = |order: &Order| {
-                    matches!(
-                        order,
-                        Order::Speed { .. }
-                            | Order::Hold { .. }
-                            | Order::Follow { .. }
-                            | Order::Reverse { .. }
-                    )
+                // These orders last until another replaces them.
+                let ends = |(id, order): &(OrderId, Order)| {
+                    use Order::{Follow, Hold, Reverse, Speed};
+                    let lasts = matches!(order, Speed { .. } | Hold { .. } | Follow { .. } | Reverse { .. });
+                    *id == finished.order && !lasts
                 };
-                if self
-                    .standing
-                    .get(&finished.train)
-                    .is_some_and(|(id, order)| *id == finished.order && !goes_on(order))
-                {
+                if self.standing.get(&finished.train).is_some_and(ends) {
                     self.standing.remove(&finished.train);
                 }
             }
