@@ -22,6 +22,8 @@ const FRICTION: usize = 10;
 const STOP_NODES: usize = 11;
 const NODES: usize = 8;
 const SPEEDS: usize = STOP_NODES + 2 * NODES;
+/// Numbers of the shapes of starts and stops, behind the hysteresis by step. They stay zero: the residuals at rest are known.
+const SHAPES: usize = 4;
 /// The spacing of the nodes over speed, in m/s.
 const NODE_SPACING: f64 = 0.1;
 /// The speed below which hysteresis shrinks in proportion, as in the model, in m/s.
@@ -49,7 +51,7 @@ pub(crate) fn known(
     let highest = usize::from(numbers.highest.get());
     // A change of the parameter order must not go unnoticed.
     anyhow::ensure!(
-        numbers.values.len() == SPEEDS + 2 * highest,
+        numbers.values.len() == SPEEDS + 2 * highest + SHAPES,
         "the places of the model's numbers have moved"
     );
     for value in &mut numbers.values[..SPEEDS] {
