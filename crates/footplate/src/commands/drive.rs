@@ -53,7 +53,7 @@ use crate::recorded::Recorded;
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
 
-/// Drive trains: set speeds and turnouts, stop at a place, move by a distance, follow another train.
+/// Drive trains: speeds, turnouts, exact stops, moves, following.
 ///
 /// Without `--script`, commands are read from standard input, one a line; at a terminal there is a prompt, and a new
 /// command replaces the train's previous one. `help` lists the commands. The program prints each detection beside its
