@@ -207,7 +207,11 @@ export function calibrationPage(root, live, number) {
     train = next;
     look();
     stored();
-    marks().catch(() => { $("#marked").hidden = true; });
+    marks().catch(() => {
+      // The answer may come after the page was left.
+      const list = $("#marked");
+      if (list) list.hidden = true;
+    });
   }
 
   select.addEventListener("change", () => { location.hash = `#/calibration/${select.value}`; });
