@@ -335,15 +335,13 @@ impl Dispatcher {
             self.follow(now);
             while let Some(output) = self.watchdog.poll_output() {
                 match output {
-                    Output::Command(command) => self.outputs.push_back(Output::Command(command)),
-                    Output::HoldLine(until) => self.outputs.push_back(Output::HoldLine(until)),
-                    Output::Watch(sensor) => self.outputs.push_back(Output::Watch(sensor)),
                     // A journey is resumed by the dispatcher.
                     Output::Notice(Notice::Cancelled { train, .. }) if self.journey(train).is_some() => {}
                     Output::Notice(notice) => {
                         self.say(notice.clone());
                         self.hear(now, &notice);
                     }
+                    for_the_line => self.outputs.push_back(for_the_line),
                 }
             }
             self.go_on(now);

@@ -344,9 +344,8 @@ impl Watchdog {
                     }
                     self.command(command);
                 }
-                Output::HoldLine(until) => self.queue.push_back(Output::HoldLine(until)),
-                Output::Watch(sensor) => self.queue.push_back(Output::Watch(sensor)),
                 Output::Notice(notice) => self.hear(now, notice),
+                for_the_line => self.queue.push_back(for_the_line),
             }
         }
     }
