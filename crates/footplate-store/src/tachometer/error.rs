@@ -78,6 +78,23 @@ pub enum TachometerError {
         /// What is wrong.
         problem: String,
     },
+    /// A column of a Parquet file that would unpack to more memory than its values can need.
+    #[error(
+        "{file}, column {column}: its {values} values would unpack to {bytes} bytes; at most {most} are read; write the \
+         column again with values of its own length"
+    )]
+    ParquetSize {
+        /// The file.
+        file: String,
+        /// The column.
+        column: String,
+        /// Its number of values in one row group.
+        values: i64,
+        /// What they unpack to (bytes).
+        bytes: i64,
+        /// The most that is read (bytes).
+        most: i64,
+    },
     /// A column of a Parquet file with a type that cannot hold what it should.
     #[error("{file}, column {column}: its type is {found}; it should be {expected}")]
     ParquetType {

@@ -57,7 +57,7 @@ impl ParquetReader {
         if rows == 0 {
             return Err(TachometerError::NoRows { file: file.to_owned() });
         }
-        check_sizes(reader.metadata(), &used).map_err(unreadable)?;
+        check_sizes(file, reader.metadata(), &used)?;
         let notes = oddities.into_iter().map(|oddity| TachometerNote { place: None, oddity }).collect();
         Ok(Self {
             file: file.to_owned(),
@@ -152,21 +152,24 @@ fn check_places(about: &ParquetMetaData) -> Result<(), ParquetError> {
 
 /// Whether no column unpacks to more than its values can need: the decoder allocates what headers say. The longest values are
 /// names of runs.
-fn check_sizes(about: &ParquetMetaData, used: &[ParquetColumn]) -> Result<(), ParquetError> {
+fn check_sizes(file: &str, about: &ParquetMetaData, used: &[ParquetColumn]) -> Result<(), TachometerError> {
     /// The longest value that is read, on average over a column: a name of a run.
     const PER_VALUE: i64 = 1_024;
     /// Headers and a dictionary besides.
     const BESIDES: i64 = 1 << 20;
     for group in about.row_groups() {
         for column in used.iter().filter_map(|column| group.columns().get(column.leaf())) {
-            let most = column.num_values().saturating_mul(PER_VALUE).saturating_add(BESIDES);
-            if column.uncompressed_size() > most {
-                return Err(ParquetError::General(format!(
-                    "column `{}` says that its {} values unpack to {} bytes; more than {most} are not read",
-                    column.column_path().string(),
-                    column.num_values(),
-                    column.uncompressed_size()
-                )));
+            let (values, bytes) = (column.num_values(), column.uncompressed_size());
+            let most = values.saturating_mul(PER_VALUE).saturating_add(BESIDES);
+            if bytes > most {
+                let column = column.column_path().string();
+                return Err(TachometerError::ParquetSize {
+                    file: file.to_owned(),
+                    column,
+                    values,
+                    bytes,
+                    most,
+                });
             }
         }
     }

@@ -113,7 +113,7 @@ async fn forward_body(body: Body, most: usize, parts: &mpsc::Sender<BodyPart>) -
             return Err(Rejection(StatusCode::PAYLOAD_TOO_LARGE, why));
         }
         if parts.send(BodyPart::Bytes(part)).await.is_err() {
-            // The child has stopped reading; its status why why.
+            // The child has stopped reading; its status says why.
             return Ok(());
         }
     }
@@ -155,7 +155,7 @@ fn answered(
     };
     let output = std::thread::spawn(move || text_of(output, LONGEST_ANSWER));
     let errors = std::thread::spawn(move || text_of(errors, MAX_ERROR_TEXT));
-    // A child that stops reading why why; its status is checked below.
+    // A child that stops reading says why by its status, which is checked below.
     let mut is_reading = writeln!(input, "{}", serde_json::to_string(question)?).is_ok();
     while let Some(part) = passed.blocking_recv().filter(|_| is_reading) {
         match part {
