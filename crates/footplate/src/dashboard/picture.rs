@@ -67,7 +67,7 @@ pub(super) struct TrainPicture {
     if_stopped: Option<RestPicture>,
 }
 
-/// MotionAt a train would come to rest if it were commanded to stop now.
+/// Where a train would come to rest if it were commanded to stop now.
 #[derive(Debug, Serialize)]
 struct RestPicture {
     at: Option<String>,
