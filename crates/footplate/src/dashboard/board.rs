@@ -172,7 +172,7 @@ impl Board {
     }
 
     /// The motion model of a train.
-    pub(super) fn model(&self, train: TrainId) -> Option<Arc<MotionModel>> {
+    pub(crate) fn model(&self, train: TrainId) -> Option<Arc<MotionModel>> {
         lock(&self.models).get(&train).cloned()
     }
 
