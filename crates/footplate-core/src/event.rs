@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::ids::{SensorId, SpeedStep, TrainId, TurnoutId};
+use crate::ids::{FunctionNumber, SensorId, SpeedStep, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
 
@@ -87,6 +87,15 @@ pub enum Command {
         /// `true` for the diverging leg.
         curved: bool,
     },
+    /// Switch a function of a train.
+    Function {
+        /// The train.
+        train: TrainId,
+        /// The function.
+        function: FunctionNumber,
+        /// On or off.
+        on: bool,
+    },
     /// Switch track power off.
     PowerOff,
     /// Switch track power on.
@@ -100,6 +109,9 @@ impl fmt::Display for Command {
             Self::Reverse { train } => write!(f, "turn around, train {train}"),
             Self::Turnout { turnout, curved } => {
                 write!(f, "turnout {turnout} {}", if *curved { "curved" } else { "straight" })
+            }
+            Self::Function { train, function, on } => {
+                write!(f, "{function} {} for train {train}", if *on { "on" } else { "off" })
             }
             Self::PowerOff => f.write_str("power off"),
             Self::PowerOn => f.write_str("power on"),

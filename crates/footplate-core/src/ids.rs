@@ -74,3 +74,39 @@ impl core::fmt::Display for SpeedStep {
         self.0.fmt(f)
     }
 }
+
+/// A function of a decoder, F0 to F28; F0 is the headlight.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(transparent))]
+pub struct FunctionNumber(u8);
+
+impl FunctionNumber {
+    /// F0, the headlight.
+    pub const LIGHT: Self = Self(0);
+    /// The highest function of any decoder that every station can switch (NMRA S-9.2.1: function groups one and two, and expansion to F28).
+    pub const HIGHEST: u8 = 28;
+
+    /// The function, or `None` above [`HIGHEST`](Self::HIGHEST).
+    #[must_use]
+    pub const fn new(number: u8) -> Option<Self> {
+        if number <= Self::HIGHEST { Some(Self(number)) } else { None }
+    }
+
+    /// The number of the function.
+    #[must_use]
+    pub const fn get(self) -> u8 {
+        self.0
+    }
+
+    /// The bit of this function in a set with F0 in the lowest bit.
+    #[must_use]
+    pub const fn bit(self) -> u32 {
+        1 << self.0
+    }
+}
+
+impl core::fmt::Display for FunctionNumber {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "F{}", self.0)
+    }
+}

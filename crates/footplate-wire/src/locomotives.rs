@@ -14,6 +14,8 @@ pub(crate) struct Locomotive {
     pub(crate) forward: Option<bool>,
     /// The step of the last command.
     pub(crate) step: SpeedStep,
+    /// Functions that are on, F0 in the lowest bit, as the station reported last; `None` where it has not, or never does.
+    pub(crate) functions: Option<u32>,
     /// Whether a speed was ever written for it, so that the end must stop it.
     pub(crate) is_driven: bool,
     /// Whether the station has confirmed step 0 since the last other step.
@@ -37,7 +39,14 @@ impl Locomotives {
     pub(crate) fn know(&mut self, train: TrainId) {
         if self.get(train).is_none() {
             let step = SpeedStep::STAND;
-            self.0.push(Locomotive { train, forward: None, step, is_driven: false, is_stopped: false });
+            self.0.push(Locomotive {
+                train,
+                forward: None,
+                step,
+                functions: None,
+                is_driven: false,
+                is_stopped: false,
+            });
         }
     }
 

@@ -51,6 +51,10 @@ impl Queue {
                 );
                 self.push_usual(command)?;
             }
+            Command::Function { .. } => {
+                self.usual.retain(|waiting| !switches_same(&command, waiting));
+                self.push_usual(command)?;
+            }
             Command::PowerOn => {
                 self.usual.retain(|waiting| *waiting != Command::PowerOn);
                 self.push_usual(command)?;
@@ -78,6 +82,7 @@ impl Queue {
         self.iter().any(|waiting| match (command, waiting) {
             (Command::Speed { train, .. }, waiting) => concerns(waiting, train),
             (Command::Turnout { turnout, .. }, Command::Turnout { turnout: other, .. }) => turnout == *other,
+            (Command::Function { .. }, waiting) => switches_same(&command, waiting),
             (Command::PowerOff | Command::PowerOn, waiting) => {
                 matches!(waiting, Command::PowerOff | Command::PowerOn)
             }
@@ -125,12 +130,14 @@ impl Queue {
 /// The train that a command is for.
 pub(crate) const fn train_of(command: &Command) -> Option<TrainId> {
     match command {
-        Command::Speed { train, .. } | Command::Reverse { train } => Some(*train),
+        Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. } => {
+            Some(*train)
+        }
         _ => None,
     }
 }
 
-/// The recording's entry for a command that is sent for the nth time. Power has none; a repeated reversal sets the same direction
+/// The recording's entry for a command that is sent for the nth time. Power and functions have none; a repeated reversal sets the same direction
 /// again and has none either.
 pub(crate) const fn entry_of(command: &Command, nth: u8) -> Option<EventKind> {
     match *command {
@@ -139,6 +146,15 @@ pub(crate) const fn entry_of(command: &Command, nth: u8) -> Option<EventKind> {
         Command::Turnout { turnout, curved } => Some(EventKind::Turnout { turnout, curved }),
         _ => None,
     }
+}
+
+/// Whether both switch the same function of the same train.
+fn switches_same(command: &Command, other: &Command) -> bool {
+    let switched = |command: &Command| match *command {
+        Command::Function { train, function, .. } => Some((train, function)),
+        _ => None,
+    };
+    switched(command).is_some() && switched(command) == switched(other)
 }
 
 fn is_speed_of(command: &Command, of: TrainId) -> bool {

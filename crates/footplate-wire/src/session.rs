@@ -5,7 +5,9 @@ use alloc::vec::Vec;
 use core::fmt::{Display, Formatter, Result as FmtResult};
 use core::ops::RangeInclusive;
 
-use footplate_core::{Command, Event, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{
+    Command, Event, FunctionNumber, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+};
 
 use crate::marklin_serial::ModuleReads;
 
@@ -232,6 +234,13 @@ pub enum CommandError {
         /// The highest.
         highest: u8,
     },
+    /// The function is above the highest that this link can switch.
+    Function {
+        /// The function.
+        function: FunctionNumber,
+        /// The highest.
+        highest: u8,
+    },
     /// This link has no such turnout address.
     Turnout {
         /// The turnout.
@@ -271,6 +280,9 @@ impl Display for CommandError {
             }
             Self::Step { step, highest } => {
                 write!(f, "step {step} is beyond the decoder; steps are 0 to {highest}")
+            }
+            Self::Function { function, highest } => {
+                write!(f, "{function} cannot be switched over this link; functions are F0 to F{highest}")
             }
             Self::Turnout { turnout, addresses: (first, last) } => {
                 write!(f, "turnout {turnout} has no address here; addresses are {first} to {last}")
@@ -384,6 +396,9 @@ impl Display for Said {
             Command::Reverse { train } => write!(f, "train {train} reverse"),
             Command::Turnout { turnout, curved } => {
                 write!(f, "turnout {turnout} {}", if curved { "curved" } else { "straight" })
+            }
+            Command::Function { train, function, on } => {
+                write!(f, "train {train} {function} {}", if on { "on" } else { "off" })
             }
             Command::PowerOff => f.write_str("power off"),
             Command::PowerOn => f.write_str("power on"),

@@ -1,6 +1,6 @@
 //! The answers to requests to the board, and when to repeat them.
 
-use footplate_core::{TimeSpan, TrainId, TurnoutId};
+use footplate_core::{FunctionNumber, TimeSpan, TrainId, TurnoutId};
 
 use super::reply::Reply;
 use super::request::{Request, Throttle};
@@ -20,6 +20,8 @@ pub(super) enum Awaited {
     Locomotive(TrainId),
     /// That a train has this state.
     Driven(TrainId, Throttle, bool),
+    /// That a function of a train is on, or off.
+    Function(TrainId, FunctionNumber, bool),
     Power(bool),
     Turnout(TurnoutId, bool),
 }
@@ -44,6 +46,9 @@ impl AwaitedAnswer for Awaited {
                 Self::Driven(train, throttle, forward),
                 Reply::Locomotive { cab, throttle: at, forward: to, .. },
             ) => train.0 == *cab && throttle == *at && forward == *to,
+            (Self::Function(train, function, on), Reply::Locomotive { cab, functions, .. }) => {
+                train.0 == *cab && (functions & function.bit() != 0) == on
+            }
             (Self::Power(on), reply) => reply.main_power() == Some(on),
             (Self::Turnout(turnout, curved), Reply::Turnout { id, thrown }) => {
                 turnout.0 == *id && curved == *thrown
@@ -56,6 +61,9 @@ impl AwaitedAnswer for Awaited {
         match (self, other) {
             (Self::Power(_), Self::Power(_)) => true,
             (Self::Turnout(one, _), Self::Turnout(other, _)) => one == other,
+            (Self::Function(one, function, _), Self::Function(other, of_other, _)) => {
+                (one, function) == (other, of_other)
+            }
             _ => self.train().map_or(self == other, |train| other.train() == Some(train)),
         }
     }

@@ -5,7 +5,7 @@ mod hearing;
 use alloc::string::ToString;
 use alloc::vec::Vec;
 
-use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{Command, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use super::framing::Framing;
 use super::opening::Opening;
@@ -75,6 +75,10 @@ impl Client {
         }
         while let Some(next) = self.next(now) {
             self.dialogue.write(next.request.to_string().into_bytes());
+            if let (Request::Function { cab, .. }, 2..) = (next.request, next.tries) {
+                // The first request may have been obeyed and its answer lost: a second one then changes nothing, and has none.
+                self.dialogue.write(Request::Locomotive { cab }.to_string().into_bytes());
+            }
             self.dialogue.sent(now, next);
         }
     }
@@ -150,6 +154,7 @@ impl Client {
             Command::Speed { train, step } => self.drive(train, step, false),
             Command::Reverse { train } => self.drive(train, SpeedStep::STAND, true),
             Command::Turnout { turnout, curved } => self.throw(turnout, curved),
+            Command::Function { train, function, on } => self.switch(train, function, on),
             Command::PowerOff | Command::PowerOn => {
                 let on = command == Command::PowerOn;
                 self.dialogue.power = on;
@@ -164,6 +169,14 @@ impl Client {
         let forward = self.dialogue.commanded(train, step, reverses);
         let throttle = Throttle::Speed(speed_of(step).unwrap_or_default());
         (Request::Drive { cab: train.0, throttle, forward }, Some(Awaited::Driven(train, throttle, forward)))
+    }
+
+    /// The board answers only when the state changes.
+    fn switch(&self, train: TrainId, function: FunctionNumber, on: bool) -> (Request, Option<Awaited>) {
+        let known = self.dialogue.locomotives.get(train).and_then(|known| known.functions);
+        let changes = known.is_none_or(|functions| (functions & function.bit() != 0) != on);
+        let request = Request::Function { cab: train.0, function: function.get(), on };
+        (request, changes.then_some(Awaited::Function(train, function, on)))
     }
 
     fn throw(&self, turnout: TurnoutId, curved: bool) -> (Request, Option<Awaited>) {
@@ -208,7 +221,7 @@ impl Session for Client {
             Command::Speed { step, .. } if speed_of(step).is_none() => {
                 return Err(CommandError::Step { step, highest: HIGHEST_STEP });
             }
-            Command::Speed { train, .. } | Command::Reverse { train } => {
+            Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. } => {
                 CommandError::check_train(train, &CABS)?;
             }
             Command::Turnout { turnout, .. } => {

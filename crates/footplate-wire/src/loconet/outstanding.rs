@@ -32,6 +32,8 @@ pub(super) enum Awaited {
     Locomotive(TrainId),
     /// That it is driven so.
     Driven(TrainId, u8, bool),
+    /// That these of its functions F0 to F4 are on.
+    Functions(TrainId, u8),
     /// That a turnout's output was commanded on the bus: nothing else confirms it.
     Turnout(TurnoutId, Message),
 }
@@ -63,6 +65,9 @@ impl AwaitedAnswer for Awaited {
             (Self::Driven(train, speed, forward), Answer::Slot(data)) => {
                 (train.0, speed, forward) == (data.address, data.speed, data.forward) && data.slot > 0
             }
+            (Self::Functions(train, functions), Answer::Slot(data)) => {
+                (train.0, functions) == (data.address, data.functions) && data.slot > 0
+            }
             (Self::Interrogation(nth), Answer::Sent(message)) => {
                 Request::Interrogate(nth).messages().contains(message)
             }
@@ -75,6 +80,7 @@ impl AwaitedAnswer for Awaited {
         match (self, other) {
             (Self::Power(_), Self::Power(_)) => true,
             (Self::Turnout(one, _), Self::Turnout(other, _)) => one == other,
+            (Self::Functions(one, _), Self::Functions(other, _)) => one == other,
             _ => self.train().map_or(self == other, |train| other.train() == Some(train)),
         }
     }

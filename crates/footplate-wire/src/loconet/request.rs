@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 use core::ops::RangeInclusive;
 
-use footplate_core::SpeedStep;
+use footplate_core::{FunctionNumber, SpeedStep};
 
 use super::message::Message;
 
@@ -21,6 +21,17 @@ pub const SPEED_PER_STEP: u8 = 9;
 
 /// The program's highest step on this link.
 pub(super) const HIGHEST_STEP: u8 = 126 / SPEED_PER_STEP;
+
+/// The highest function of a slot that this client switches: F0 to F4 are beside the direction.
+pub(super) const HIGHEST_FUNCTION: u8 = 4;
+
+/// The bit of a function beside the direction: F0 is above F1 to F4.
+pub(super) const fn function_bit(function: FunctionNumber) -> u8 {
+    match function.get() {
+        0 => 0x10,
+        number => 1 << (number - 1),
+    }
+}
 
 /// The speed of an emergency stop; the decoder's steps lie above it.
 const EMERGENCY_STOP: u8 = 1;
@@ -61,6 +72,12 @@ pub(super) enum Request {
         speed: u8,
         direction: Option<(bool, u8)>,
     },
+    /// Direction and functions F0 to F4 of a slot's locomotive.
+    Functions {
+        slot: u8,
+        forward: bool,
+        functions: u8,
+    },
     Switch {
         address: u16,
         closed: bool,
@@ -93,6 +110,10 @@ impl Request {
                 messages.extend(before);
                 messages.push(Message::Speed { slot, speed });
                 messages.extend(after);
+                messages.push(Message::ReadSlot { slot });
+            }
+            Self::Functions { slot, forward, functions } => {
+                messages.push(Message::Direction { slot, forward, functions });
                 messages.push(Message::ReadSlot { slot });
             }
             Self::Switch { address, closed, on } => {

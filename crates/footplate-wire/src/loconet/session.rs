@@ -5,13 +5,17 @@ mod hearing;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use footplate_core::{Command, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{
+    Command, EventKind, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+};
 
 use super::line::{Line, Lines};
 use super::message::Message;
 use super::outbox::{Outbox, SENT_WITHIN, SENT_WITHIN_AT_END};
 use super::outstanding::Awaited;
-use super::request::{HIGHEST_STEP, INTERROGATIONS, LOCOMOTIVES, Request, speed_of};
+use super::request::{
+    HIGHEST_FUNCTION, HIGHEST_STEP, INTERROGATIONS, LOCOMOTIVES, Request, function_bit, speed_of,
+};
 use super::settings::Settings;
 use super::slot::DrivenSlots;
 use crate::dialogue::{Dialogue, Opening, Repeat};
@@ -250,6 +254,7 @@ impl Client {
                 self.drive(now, train, SpeedStep::STAND)
             }
             Command::Turnout { turnout, curved } => self.throw(now, turnout, curved),
+            Command::Function { train, function, on } => self.switch(train, function, on),
             Command::PowerOff | Command::PowerOn => {
                 let on = command == Command::PowerOn;
                 self.dialogue.power = on;
@@ -270,6 +275,19 @@ impl Client {
             Some(slot) => (Request::Drive { slot, speed, direction }, awaited),
             None => (Request::Locomotive(train.0), awaited),
         }
+    }
+
+    /// One message sets all of F0 to F4: a newer request includes what an earlier one switched.
+    fn switch(&mut self, train: TrainId, function: FunctionNumber, on: bool) -> (Request, Option<Awaited>) {
+        let Some(slot) = self.slots.of_mut(train) else { return (Request::Locomotive(train.0), None) };
+        let bit = function_bit(function);
+        slot.functions = if on { slot.functions | bit } else { slot.functions & !bit };
+        let (forward, functions) = (slot.forward, slot.functions);
+        let request = match slot.number {
+            Some(slot) => Request::Functions { slot, forward, functions },
+            None => Request::Locomotive(train.0),
+        };
+        (request, Some(Awaited::Functions(train, functions)))
     }
 
     fn throw(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) -> (Request, Option<Awaited>) {
@@ -338,10 +356,13 @@ impl Session for Client {
 
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
         match command {
+            Command::Function { function, .. } if function.get() > HIGHEST_FUNCTION => {
+                return Err(CommandError::Function { function, highest: HIGHEST_FUNCTION });
+            }
             Command::Speed { step, .. } if speed_of(step).is_none() => {
                 return Err(CommandError::Step { step, highest: HIGHEST_STEP });
             }
-            Command::Speed { train, .. } | Command::Reverse { train } => {
+            Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. } => {
                 CommandError::check_train(train, &LOCOMOTIVES)?;
             }
             Command::Turnout { turnout, .. } => {

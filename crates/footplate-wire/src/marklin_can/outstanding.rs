@@ -1,6 +1,6 @@
 //! The answers to requests to the station, and when to repeat them.
 
-use footplate_core::{SpeedStep, TimeSpan, TrainId, TurnoutId};
+use footplate_core::{FunctionNumber, SpeedStep, TimeSpan, TrainId, TurnoutId};
 
 use super::message::{Direction, Message};
 use super::speed::step_of;
@@ -36,6 +36,8 @@ pub(super) enum Awaited {
     /// The direction of a locomotive, whatever it is.
     AnyDirection(TrainId, Uid),
     Direction(TrainId, Uid, bool),
+    /// That a function of a locomotive is on, or off.
+    Function(TrainId, Uid, FunctionNumber, bool),
     /// That a turnout's coil is powered, or not.
     Accessory(TurnoutId, Uid, u8, u8),
 }
@@ -74,6 +76,10 @@ impl AwaitedAnswer for Awaited {
                 uid == of && to == Direction::of(forward)
             }
             (
+                Self::Function(_, uid, function, on),
+                Message::Function { uid: of, function: number, value: Some(value) },
+            ) => uid == of && function.get() == number && (value != 0) == on,
+            (
                 Self::Accessory(_, uid, position, current),
                 Message::Accessory { uid: of, position: to, current: flows, .. },
             ) => uid == of && (position, current) == (to, flows),
@@ -88,6 +94,9 @@ impl AwaitedAnswer for Awaited {
             | (Self::Speed(one, ..), Self::Speed(other, ..))
             | (Self::AnyDirection(one, _), Self::AnyDirection(other, _))
             | (Self::Direction(one, ..), Self::Direction(other, ..)) => one == other,
+            (Self::Function(one, _, function, _), Self::Function(other, _, of_other, _)) => {
+                (one, function) == (other, of_other)
+            }
             (Self::Accessory(one, ..), Self::Accessory(other, ..)) => one == other,
             _ => self == other,
         }

@@ -238,7 +238,9 @@ impl Session for Client {
             Command::Speed { step, .. } if speed_of(step).is_none() => {
                 return Err(CommandError::Step { step, highest: HIGHEST_STEP });
             }
-            Command::Speed { train, .. } | Command::Reverse { train } if self.roster.uid(train).is_none() => {
+            Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. }
+                if self.roster.uid(train).is_none() =>
+            {
                 CommandError::check_train(train, &self.settings.locomotives.addresses())?;
             }
             Command::Turnout { turnout, .. } => {

@@ -7,6 +7,7 @@
 //! - [`Interface`] is the session: it knows what is on the line and what comes next.
 
 mod codec;
+mod decoders;
 mod exchange;
 mod farewell;
 mod line;

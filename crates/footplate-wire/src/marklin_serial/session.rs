@@ -8,6 +8,7 @@ use alloc::vec::Vec;
 use footplate_core::{Command, Event, EventKind, SensorId, TimeSpan, Timestamp};
 
 use super::codec::{EncodeError, Message};
+use super::decoders::{Decoders, HIGHEST_FUNCTION};
 use super::exchange::{Awaited, Exchange, Purpose, Quiet, Reply, SILENCE, Sending};
 use super::farewell::Farewell;
 use super::module_reads::ModuleReads;
@@ -46,6 +47,7 @@ pub struct Interface {
     silence: Silence,
     reply_time: ReplyTime,
     recovery: Recovery,
+    decoders: Decoders,
     /// A stop is said before the line has fallen silent; it goes on to wait for that afterwards.
     is_overtaken: bool,
     /// Commands since the last complete reply.
@@ -84,6 +86,7 @@ impl Interface {
             silence: Silence::default(),
             reply_time: ReplyTime::new(settings.reply_allowance),
             recovery: Recovery::default(),
+            decoders: Decoders::new(settings.light),
             is_overtaken: false,
             unanswered: Vec::new(),
             farewell: Farewell::default(),
@@ -182,7 +185,7 @@ impl Interface {
             return Some((Message::SolenoidOff, Purpose::Release));
         }
         if let Some(command) = self.waiting.next_urgent(|_| true) {
-            return Some((self.message(command), Purpose::Told(command)));
+            return Some((self.decoders.message(command), Purpose::Told(command)));
         }
         if core::mem::take(&mut self.is_overtaken) {
             self.recovery.cancel();
@@ -196,7 +199,7 @@ impl Interface {
             return Some((Message::SolenoidOff, Purpose::Release));
         }
         if let Some(command) = self.waiting.next_usual(|waiting| self.solenoid.lets(waiting)) {
-            return Some((self.message(command), Purpose::Told(command)));
+            return Some((self.decoders.message(command), Purpose::Told(command)));
         }
         if core::mem::take(&mut self.disturbed) {
             self.recovery.begin(self.power_word());
@@ -215,17 +218,6 @@ impl Interface {
             return may_release.then_some((Message::SolenoidOff, Purpose::Release));
         }
         (!self.farewell.is_over()).then_some((Message::Stop, Purpose::PowerAtClose))
-    }
-
-    fn message(&self, command: Command) -> Message {
-        let light = self.settings.light;
-        match command {
-            Command::Speed { train, step } => Message::Drive { train, step, light },
-            Command::Reverse { train } => Message::Reverse { train, light },
-            Command::Turnout { turnout, curved } => Message::Turnout { turnout, curved },
-            Command::PowerOff => Message::Stop,
-            Command::PowerOn => Message::Go,
-        }
     }
 
     /// Writes the next byte of the frame on its way, if there is one.
@@ -288,6 +280,7 @@ impl Interface {
     }
 
     fn told(&mut self, at: Timestamp, command: Command) {
+        self.decoders.sent(command);
         let kind = match command {
             Command::Speed { train, step } => {
                 self.farewell.told(train, step);
@@ -298,6 +291,7 @@ impl Interface {
                 self.solenoid.power(turnout, at);
                 Some(EventKind::Turnout { turnout, curved })
             }
+            Command::Function { .. } => None,
             Command::PowerOff | Command::PowerOn => {
                 self.power = command == Command::PowerOn && !self.farewell.begun;
                 None
@@ -360,7 +354,12 @@ impl Session for Interface {
         if self.farewell.begun {
             return Err(CommandError::Closed);
         }
-        self.message(command).encode()?;
+        if let Command::Function { function, .. } = command
+            && function.get() > HIGHEST_FUNCTION
+        {
+            return Err(CommandError::Function { function, highest: HIGHEST_FUNCTION });
+        }
+        self.decoders.message(command).encode()?;
         if let Command::Speed { train, step } = command {
             self.farewell.will_tell(train, step);
         }

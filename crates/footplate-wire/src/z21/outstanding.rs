@@ -1,6 +1,6 @@
 //! The answers to requests to the station, and when to repeat them.
 
-use footplate_core::{TimeSpan, TrainId, TurnoutId};
+use footplate_core::{FunctionNumber, TimeSpan, TrainId, TurnoutId};
 
 use super::broadcasts::Broadcasts;
 use super::reply::Reply;
@@ -29,6 +29,8 @@ pub(super) enum Awaited {
     Locomotive(TrainId),
     /// That a train has this state.
     Driven(TrainId, Steps, Throttle, bool),
+    /// That a function of a train is on, or off.
+    Function(TrainId, FunctionNumber, bool),
     /// That a turnout at an address lies by its second output, or its first.
     Turnout(TurnoutId, u16, bool),
 }
@@ -36,7 +38,7 @@ pub(super) enum Awaited {
 impl Awaited {
     /// Whether trains may not run before the answer.
     pub(super) const fn is_question(&self) -> bool {
-        !matches!(self, Self::Locomotive(_) | Self::Driven(..) | Self::Turnout(..))
+        !matches!(self, Self::Locomotive(_) | Self::Driven(..) | Self::Function(..) | Self::Turnout(..))
     }
 }
 
@@ -65,6 +67,9 @@ impl AwaitedAnswer for Awaited {
                 let as_fast = state.throttle.is_like(state.steps, throttle, steps);
                 train.0 == state.address && as_fast && forward == state.forward
             }
+            (Self::Function(train, function, on), Reply::Locomotive(state)) => {
+                train.0 == state.address && (state.functions & function.bit() != 0) == on
+            }
             (Self::Power(on), reply) => reply.power() == Some(on),
             (Self::Turnout(_, address, second), Reply::Turnout { address: of, position }) => {
                 address == *of && *position == TurnoutPosition::Output { second }
@@ -77,6 +82,9 @@ impl AwaitedAnswer for Awaited {
         match (self, other) {
             (Self::Power(_), Self::Power(_)) | (Self::Broadcasts(_), Self::Broadcasts(_)) => true,
             (Self::Turnout(one, ..), Self::Turnout(other, ..)) => one == other,
+            (Self::Function(one, function, _), Self::Function(other, of_other, _)) => {
+                (one, function) == (other, of_other)
+            }
             _ => self.train().map_or(self == other, |train| other.train() == Some(train)),
         }
     }

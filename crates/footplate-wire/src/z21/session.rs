@@ -10,7 +10,7 @@ use footplate_core::{Command, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId
 
 use super::broadcasts::Broadcasts;
 use super::outstanding::Awaited;
-use super::request::{LOCOMOTIVES, Request};
+use super::request::{FunctionSwitch, LOCOMOTIVES, Request};
 use super::sensors::Sensors;
 use super::settings::Settings;
 use super::speed::{HIGHEST_STEP, Throttle};
@@ -188,6 +188,11 @@ impl Client {
             Command::Speed { train, step } => self.drive(train, step, false),
             Command::Reverse { train } => self.drive(train, SpeedStep::STAND, true),
             Command::Turnout { turnout, curved } => self.throw(now, turnout, curved),
+            Command::Function { train, function, on } => {
+                let switch = if on { FunctionSwitch::On } else { FunctionSwitch::Off };
+                let request = Request::Function { address: train.0, function: function.get(), switch };
+                (request, Awaited::Function(train, function, on))
+            }
             Command::PowerOff | Command::PowerOn => {
                 let on = command == Command::PowerOn;
                 self.dialogue.power = on;
@@ -241,7 +246,9 @@ impl Client {
 /// The question in the same datagram, whose answer confirms a request even without a broadcast.
 const fn question_with(request: Request) -> Option<Request> {
     match request {
-        Request::Drive { address, .. } => Some(Request::Locomotive { address }),
+        Request::Drive { address, .. } | Request::Function { address, .. } => {
+            Some(Request::Locomotive { address })
+        }
         Request::SetTurnout { address, activate: true, .. } => Some(Request::Turnout { address }),
         Request::SetBroadcasts(_) => Some(Request::Broadcasts),
         _ => None,
@@ -274,7 +281,7 @@ impl Session for Client {
             Command::Speed { step, .. } if self.settings.steps.throttle_of(step).is_none() => {
                 return Err(CommandError::Step { step, highest: HIGHEST_STEP });
             }
-            Command::Speed { train, .. } | Command::Reverse { train } => {
+            Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. } => {
                 CommandError::check_train(train, &LOCOMOTIVES)?;
             }
             Command::Turnout { turnout, .. } => {

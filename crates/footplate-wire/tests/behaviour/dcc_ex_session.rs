@@ -4,7 +4,7 @@ use footplate_core::{Command, Event, EventKind, Report, SensorId, SpeedStep, Tim
 use footplate_wire::dcc_ex::{Client, Settings, TurnoutRequests};
 use footplate_wire::{CommandError, LinkNotice, Session};
 
-use crate::desk::{Station, T24, T58, ms, speed};
+use crate::desk::{Station, T24, T58, function, ms, speed};
 
 /// A board that answers what a table says, and nothing else.
 struct Board {
@@ -360,4 +360,32 @@ fn what_the_board_does_not_know_is_refused() {
     for (command, reason) in refusals {
         assert_eq!(desk.client.handle_command(desk.now, command).unwrap_err().to_string(), reason);
     }
+}
+
+#[test]
+fn a_function_is_switched_and_confirmed_and_is_no_event() {
+    let mut desk = Desk::opened();
+    desk.station.answers.push(("<F 24 0 1>", "<l 24 0 0 1>\n"));
+    desk.command(function(T24, 0, true));
+    desk.run_for(400);
+    assert_eq!(desk.texts(), ["<t 24>", "<F 24 0 1>"], "confirmed at once");
+    // The board does not answer a request that changes nothing: none is awaited.
+    desk.station.answers.pop();
+    desk.command(function(T24, 0, true));
+    desk.run_for(400);
+    assert_eq!(desk.texts()[2..].iter().filter(|text| **text != "<#>").count(), 1, "{:?}", desk.texts());
+    assert_eq!((&desk.events[..], &desk.notices[1..]), (&[][..], &[][..]));
+}
+
+#[test]
+fn a_function_whose_answer_was_lost_is_asked_for() {
+    let mut desk = Desk::opened();
+    desk.command(function(T24, 28, true));
+    desk.run_for(100);
+    // The board obeyed, and its answer is lost.
+    desk.station.answers.retain(|(request, _)| *request != "<t 24>");
+    desk.station.answers.push(("<t 24>", "<l 24 0 0 268435456>\n"));
+    desk.run_for(1_000);
+    assert_eq!(desk.texts().into_iter().filter(|text| text.starts_with("<F 24 28 1>")).count(), 2);
+    assert!(!desk.notices.iter().any(|notice| matches!(notice, LinkNotice::Unconfirmed { .. })));
 }

@@ -1,6 +1,8 @@
 //! A session, the station it speaks with, and the line between them.
 
-use footplate_core::{Command, Event, EventKind, Report, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{
+    Command, Event, EventKind, FunctionNumber, Report, SpeedStep, TimeSpan, Timestamp, TrainId,
+};
 use footplate_wire::{LinkNotice, Session, Transmit};
 
 pub(crate) const T24: TrainId = TrainId(24);
@@ -12,6 +14,10 @@ pub(crate) fn ms(ms: i64) -> Timestamp {
 
 pub(crate) fn speed(train: TrainId, step: u8) -> Command {
     Command::Speed { train, step: SpeedStep::new(step).unwrap() }
+}
+
+pub(crate) fn function(train: TrainId, number: u8, on: bool) -> Command {
+    Command::Function { train, function: FunctionNumber::new(number).unwrap(), on }
 }
 
 /// The station's side of a line.

@@ -6,7 +6,7 @@ use footplate_core::{Command, EventKind, SensorId, TimeSpan, TrainId, TurnoutId}
 use footplate_wire::loconet::{Client, LAST_WILL, Line, Lines, Message, Settings, SlotData, SlotUse};
 use footplate_wire::{CommandError, LinkNotice, Session};
 
-use crate::desk::{Station, T24, T58, ms, speed};
+use crate::desk::{Station, T24, T58, function, ms, speed};
 
 /// A server and a command station that answer as the protocols say.
 struct Server {
@@ -400,4 +400,23 @@ fn what_the_bus_has_no_address_for_is_refused() {
     assert!(matches!(refuse(speed(T24, 15)), CommandError::Step { highest: 14, .. }));
     let turnout = Command::Turnout { turnout: TurnoutId(2_049), curved: true };
     assert!(matches!(refuse(turnout), CommandError::Turnout { addresses: (1, 2_048), .. }));
+}
+
+#[test]
+fn functions_keep_the_direction_and_one_another() {
+    let mut desk = Desk::opened();
+    desk.command(Command::Reverse { train: T24 });
+    desk.run_for(600);
+    for (number, on) in [(0, true), (2, true), (4, true), (2, false)] {
+        desk.command(function(T24, number, on));
+    }
+    desk.run_for(1_000);
+    let slot = desk.station.slots[&1];
+    assert_eq!((slot.forward, slot.functions), (false, 0x18), "F0 is above F1 to F4");
+    desk.command(Command::Reverse { train: T24 });
+    desk.run_for(600);
+    let slot = desk.station.slots[&1];
+    assert_eq!((slot.forward, slot.functions), (true, 0x18));
+    let refused = desk.client.handle_command(desk.now, function(T24, 5, true)).unwrap_err();
+    assert_eq!(refused.to_string(), "F5 cannot be switched over this link; functions are F0 to F4");
 }

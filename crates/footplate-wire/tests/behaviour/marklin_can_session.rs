@@ -6,7 +6,7 @@ use footplate_wire::marklin_can::{
 };
 use footplate_wire::{CommandError, LinkNotice, Session};
 
-use crate::desk::{Station, T24, T58, ms, speed};
+use crate::desk::{Station, T24, T58, function, ms, speed};
 
 /// The hash of a real track box, which the published formula does not yield.
 const FOREIGN: u16 = 0x9346;
@@ -425,4 +425,17 @@ fn what_the_station_does_not_know_is_refused() {
     for (command, reason) in refusals {
         assert_eq!(desk.client.handle_command(desk.now, command).unwrap_err().to_string(), reason);
     }
+}
+
+#[test]
+fn functions_are_switched_one_by_one() {
+    let mut desk = Desk::opened();
+    desk.command(function(T24, 0, true));
+    desk.command(function(T24, 28, false));
+    desk.run_for(600);
+    let switched = |function, value| Message::Function { uid: Uid(24), function, value: Some(value) };
+    let functions: Vec<Message> =
+        desk.messages().into_iter().filter(|message| matches!(message, Message::Function { .. })).collect();
+    assert_eq!(functions, [switched(0, 1), switched(28, 0)], "both are confirmed");
+    assert_eq!(desk.events, []);
 }

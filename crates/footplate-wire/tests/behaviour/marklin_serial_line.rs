@@ -1,7 +1,7 @@
 //! Polls and commands share the line: each report says since when its contact may have been closed, commands go first,
 //! and nothing is written that the interface would not take.
 
-use footplate_core::{Command, EventKind, SensorId, SpeedStep, TimeSpan, TrainId};
+use footplate_core::{Command, EventKind, FunctionNumber, SensorId, SpeedStep, TimeSpan, TrainId};
 use footplate_wire::Session;
 use footplate_wire::marklin_serial::{BYTE_TIME, Interface, Pace, Settings};
 use proptest::prelude::{prop_assert, prop_assert_eq, proptest};
@@ -205,4 +205,43 @@ fn what_the_interface_does_not_know_is_refused_at_once() {
     assert_eq!(refused.to_string(), "train 81 has no address here; addresses are 1 to 80");
     let refused = bench.session.handle_command(bench.now, speed(24, 15)).unwrap_err();
     assert_eq!(refused.to_string(), "step 15 is beyond the decoder; steps are 0 to 14");
+}
+
+#[test]
+fn functions_keep_the_speed_and_speeds_keep_the_light() {
+    let mut bench = Bench::with_cts();
+    bench.run_for(300);
+    let switch = |number, on| {
+        let function = FunctionNumber::new(number).unwrap();
+        Command::Function { train: TrainId(24), function, on }
+    };
+    let wanted = [
+        speed(24, 8),
+        switch(0, false),
+        switch(1, true),
+        switch(4, true),
+        speed(24, 9),
+        reverse(24),
+        switch(0, true),
+    ];
+    for command in wanted {
+        bench.say(command);
+        bench.run_for(300);
+    }
+    let said = bench.said();
+    let to_train: Vec<&str> =
+        said.iter().map(String::as_str).filter(|said| said.starts_with("train")).collect();
+    let expected = [
+        "train 24 step 8 light on",
+        "train 24 step 8 light off",
+        "train 24 f1 on f2 off f3 off f4 off",
+        "train 24 f1 on f2 off f3 off f4 on",
+        "train 24 step 9 light off",
+        "train 24 reverse light off",
+        "train 24 step 0 light on",
+    ];
+    assert_eq!(to_train, expected);
+    assert_eq!(bench.events.iter().filter(|event| matches!(event.kind, EventKind::Speed { .. })).count(), 2);
+    let refused = bench.session.handle_command(bench.now, switch(5, true)).unwrap_err();
+    assert_eq!(refused.to_string(), "F5 cannot be switched over this link; functions are F0 to F4");
 }

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use footplate_core::TimeSpan;
 use footplate_wire::z21::{
-    Broadcasts, CentralState, Client, Datasets, Firmware, Lock, LocomotiveState, Reply, Request, Settings,
-    Steps, Throttle, TurnoutPosition,
+    Broadcasts, CentralState, Client, Datasets, Firmware, FunctionSwitch, Lock, LocomotiveState, Reply,
+    Request, Settings, Steps, Throttle, TurnoutPosition,
 };
 use footplate_wire::{LinkNotice, Session};
 
@@ -63,7 +63,19 @@ impl Station {
             Request::Feedback { group } => Reply::Feedback { group, inputs: self.inputs },
             Request::Locomotive { address } => Reply::Locomotive(self.locomotive(address)),
             Request::Drive { address, throttle, forward, .. } => {
-                self.locomotives.insert(address, state(address, throttle, forward));
+                let functions = self.locomotive(address).functions;
+                let driven = LocomotiveState { functions, ..state(address, throttle, forward) };
+                self.locomotives.insert(address, driven);
+                return None;
+            }
+            Request::Function { address, function, switch } => {
+                let mut switched = self.locomotive(address);
+                match switch {
+                    FunctionSwitch::On => switched.functions |= 1 << function,
+                    FunctionSwitch::Off => switched.functions &= !(1 << function),
+                    FunctionSwitch::Toggle => switched.functions ^= 1 << function,
+                }
+                self.locomotives.insert(address, switched);
                 return None;
             }
             Request::SetTurnout { address, second, activate: true, .. } => {

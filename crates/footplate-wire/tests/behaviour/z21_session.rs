@@ -2,12 +2,12 @@
 
 use footplate_core::{Command, EventKind, SensorId, TrainId, TurnoutId};
 use footplate_wire::z21::{
-    Broadcasts, CanDetection, Feedback, Lock, LocoNetDetection, Reply, Request, Settings, Steps, Throttle,
-    TurnoutPosition,
+    Broadcasts, CanDetection, Feedback, FunctionSwitch, Lock, LocoNetDetection, Reply, Request, Settings,
+    Steps, Throttle, TurnoutPosition,
 };
 use footplate_wire::{CommandError, LinkNotice, Session};
 
-use crate::desk::{T24, T58, ms, speed};
+use crate::desk::{T24, T58, function, ms, speed};
 use crate::z21_desk::{Desk, state};
 
 fn drive(address: u16, throttle: Throttle, forward: bool) -> Request {
@@ -416,4 +416,24 @@ fn what_the_station_does_not_know_is_refused() {
     for (command, reason) in refusals {
         assert_eq!(desk.client.handle_command(desk.now, command).unwrap_err().to_string(), reason);
     }
+}
+
+#[test]
+fn functions_are_switched_one_by_one_and_confirmed_by_the_state() {
+    let mut desk = Desk::opened();
+    for (number, on) in [(0, true), (28, true), (0, false)] {
+        desk.command(function(T24, number, on));
+        desk.run_for(200);
+    }
+    assert_eq!(desk.station.locomotive(24).functions, 1 << 28);
+    // A lost datagram is repeated.
+    desk.station.answers = false;
+    desk.command(function(T24, 3, true));
+    desk.run_for(50);
+    desk.station.answers = true;
+    desk.run_for(300);
+    assert_eq!(desk.station.locomotive(24).functions, 1 << 28 | 1 << 3);
+    let switched = Request::Function { address: 24, function: 3, switch: FunctionSwitch::On };
+    assert_eq!(desk.written.iter().filter(|(_, request)| *request == switched).count(), 2);
+    assert_eq!(desk.events, []);
 }

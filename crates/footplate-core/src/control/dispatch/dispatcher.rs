@@ -7,7 +7,7 @@ use crate::control::drive::{Driver, Order, OrderId, Refusal};
 use crate::control::supervise::{LinkNews, Watchdog};
 use crate::control::{Machine, Output};
 use crate::event::Event;
-use crate::ids::{SpeedStep, TrainId, TurnoutId};
+use crate::ids::{FunctionNumber, SpeedStep, TrainId, TurnoutId};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Position;
@@ -217,6 +217,12 @@ impl Dispatcher {
     /// A person switches the track power off or on; see [`Watchdog::switch_power`].
     pub fn switch_power(&mut self, now: Timestamp, on: bool) {
         self.watchdog.switch_power(now, on);
+        self.settle(now);
+    }
+
+    /// Switches a function of a train; see [`Watchdog::switch_function`].
+    pub fn switch_function(&mut self, now: Timestamp, train: TrainId, function: FunctionNumber, on: bool) {
+        self.watchdog.switch_function(train, function, on);
         self.settle(now);
     }
 

@@ -153,7 +153,7 @@ impl<'l> ScriptedTrain<'l> {
                 }
                 Some(EventKind::Turnout { turnout, curved })
             }
-            Command::PowerOff | Command::PowerOn => None,
+            Command::Function { .. } | Command::PowerOff | Command::PowerOn => None,
         }
     }
 

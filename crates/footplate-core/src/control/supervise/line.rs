@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use crate::control::drive::Order;
 use crate::event::Command;
-use crate::ids::{SpeedStep, TrainId};
+use crate::ids::{FunctionNumber, SpeedStep, TrainId};
 use crate::time::Timestamp;
 
 use super::alarm::Alarm;
@@ -66,6 +66,11 @@ impl Watchdog {
             self.cut_power(now);
         }
         self.act(now);
+    }
+
+    /// Switches a function of a train, such as its light. It changes nothing in how the train moves.
+    pub fn switch_function(&mut self, train: TrainId, function: FunctionNumber, on: bool) {
+        self.command(Command::Function { train, function, on });
     }
 
     /// Whether the track has power, as commanded.

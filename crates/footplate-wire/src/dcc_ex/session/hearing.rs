@@ -43,7 +43,10 @@ impl Client {
         }
         match reply {
             Reply::Identity(identity) => self.identified(now, identity.trim(), answered.is_some()),
-            Reply::Locomotive { cab, register, throttle, forward, .. } => {
+            Reply::Locomotive { cab, register, throttle, forward, functions } => {
+                if let Some(locomotive) = self.dialogue.locomotive(TrainId(cab)) {
+                    locomotive.functions = Some(functions);
+                }
                 let driven =
                     matches!(answered, Some(answered) if matches!(answered.awaited, Awaited::Driven(..)));
                 self.hear_of_locomotive(TrainId(cab), Driven { register, throttle, forward }, driven);

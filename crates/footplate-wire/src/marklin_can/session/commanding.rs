@@ -118,6 +118,11 @@ impl Client {
                 let message = Message::Accessory { uid, position, current: 1, time: None };
                 (message, Awaited::Accessory(turnout, uid, position, 1))
             }
+            Command::Function { train, function, on } => {
+                let uid = self.uid(train);
+                let message = Message::Function { uid, function: function.get(), value: Some(u8::from(on)) };
+                (message, Awaited::Function(train, uid, function, on))
+            }
             Command::PowerOff | Command::PowerOn => {
                 let on = command == Command::PowerOn;
                 self.dialogue.power = on;

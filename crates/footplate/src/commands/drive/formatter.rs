@@ -29,6 +29,7 @@ pub(super) const fn verb(instruction: &Instruction) -> &'static str {
         Instruction::Order(Order::Arrive { .. }) => "arrive",
         Instruction::Place(..) => "place",
         Instruction::Length(..) => "length",
+        Instruction::Function(..) => "function",
         Instruction::Halt => "halt",
         Instruction::PowerOn => "power",
         Instruction::Where(_) => "where",

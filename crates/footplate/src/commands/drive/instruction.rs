@@ -2,7 +2,7 @@
 
 use footplate_core::control::{Journey, Order, TrainLengths};
 use footplate_core::track::Landmark;
-use footplate_core::{SensorId, TimeSpan, TrainId};
+use footplate_core::{FunctionNumber, SensorId, TimeSpan, TrainId};
 
 /// One line of a script or of the prompt.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,6 +17,8 @@ pub(super) enum Instruction {
     Place(TrainId, Landmark),
     /// The operator states the lengths of a train.
     Length(TrainId, TrainLengths),
+    /// Switch a function of a train on or off.
+    Function(TrainId, FunctionNumber, bool),
     /// Stop all trains and switch the track power off, at once.
     Halt,
     /// Switch the track power on.
@@ -63,6 +65,8 @@ follow 58 behind 24 by 1.5s       keep 1.5 s behind train 24, sensor by sensor (
 arrive 24 at D5+40mm in 12s       come to rest there in 12 s
 place 24 at C13+120mm             train 24 is there: you put it there, or you see it there
 length 24 pickup 45mm overhang 110mm   length of train 24: its pickup, and from there to its further end
+light 24 on                       switch the light of train 24 on (or off); the same as function 24 0 on
+function 24 2 on                  switch function F2 of train 24 on (or off)
 halt                              emergency stop: stop all trains, switch the track power off
 power on                          switch the track power on
 where [24]                        position and speed of the train, with intervals

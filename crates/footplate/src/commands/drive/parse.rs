@@ -1,15 +1,15 @@
 //! Parses lines of a script or the prompt; an error names the column and suggests a correction.
 
-use footplate_core::SpeedStep;
 use footplate_core::control::{Aim, Gap, Journey, Order, StopOrder, TrainLengths};
+use footplate_core::{FunctionNumber, SpeedStep};
 
 use super::instruction::{Instruction, Until};
 use super::reader::{Known, Words};
 use super::words::{Mistake, meant, words};
 
-const VERBS: [&str; 16] = [
+const VERBS: [&str; 18] = [
     "speed", "reverse", "turnout", "stop", "go", "move", "hold", "follow", "arrive", "place", "length",
-    "halt", "power", "where", "wait", "help",
+    "light", "function", "halt", "power", "where", "wait", "help",
 ];
 
 /// Parses one line; `None` for an empty line or a comment.
@@ -73,6 +73,15 @@ pub(super) fn parse(line: &str, known: Known<'_>) -> Result<Option<Instruction>,
             let pickup = words.distance()?;
             words.expect("overhang")?;
             Instruction::Length(train, TrainLengths { overhang: words.distance()?, pickup })
+        }
+        "light" => {
+            let train = words.train()?;
+            Instruction::Function(train, FunctionNumber::LIGHT, words.on_or_off()?)
+        }
+        "function" => {
+            let train = words.train()?;
+            let function = words.function()?;
+            Instruction::Function(train, function, words.on_or_off()?)
         }
         "halt" => Instruction::Halt,
         "power" => {

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use footplate_core::track::{Landmark, Layout, TurnoutStates, WayError};
-use footplate_core::{Length, Ratio, SensorId, Speed, SpeedStep, TimeSpan, TrainId, TurnoutId};
+use footplate_core::{
+    FunctionNumber, Length, Ratio, SensorId, Speed, SpeedStep, TimeSpan, TrainId, TurnoutId,
+};
 
 use super::words::{Mistake, Word, meant};
 
@@ -86,6 +88,24 @@ impl<'t> Words<'_, 't, '_> {
             self.known.layout.name(),
             all.join(", ")
         )))
+    }
+
+    pub(super) fn function(&mut self) -> Result<FunctionNumber, Mistake> {
+        let wanted = format!("a function from 0 (the light) to {}", FunctionNumber::HIGHEST);
+        let (word, number) = self.number(&wanted)?;
+        FunctionNumber::new(number).ok_or_else(|| word.mistake(format!("should be {wanted}")))
+    }
+
+    pub(super) fn on_or_off(&mut self) -> Result<bool, Mistake> {
+        let word = self.next("`on` or `off`")?;
+        match word.text {
+            "on" => Ok(true),
+            "off" => Ok(false),
+            other => {
+                let near = meant(other, ["on", "off"].into_iter(), "");
+                Err(word.mistake(format!("should be `on` or `off`{near}")))
+            }
+        }
     }
 
     pub(super) fn leg(&mut self) -> Result<bool, Mistake> {

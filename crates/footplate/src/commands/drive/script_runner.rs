@@ -244,6 +244,9 @@ impl ScriptRunner {
                      {behind:.0} mm behind it"
                 ));
             }
+            Instruction::Function(train, function, on) => {
+                self.dispatcher.switch_function(now, train, function, on);
+            }
             Instruction::Halt => self.halt(now),
             Instruction::PowerOn => self.dispatcher.switch_power(now, true),
             Instruction::Where(Some(train)) => {
