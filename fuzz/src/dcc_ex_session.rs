@@ -1,9 +1,11 @@
 //! Any bytes and any commands in any order on the session's line with a DCC-EX board: it always goes on, never writes faster than
 //! the board reads, and comes to its end once the board answers.
 
-use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{TimeSpan, Timestamp};
 use footplate_wire::dcc_ex::{Client, Framing, Reply, Request, Settings, TurnoutRequests};
 use footplate_wire::{Session, Transmit};
+
+use crate::command::command;
 
 /// Longer than any end takes: as many trains as bytes can name, at 20 requests a second.
 const END: TimeSpan = TimeSpan::from_ms(60_000);
@@ -65,18 +67,6 @@ impl Witness {
             }
         }
         self.now = self.now.max(end);
-    }
-}
-
-fn command(kind: u8, number: u8) -> Command {
-    let (train, turnout) = (TrainId(number.into()), TurnoutId(number.into()));
-    match kind % 6 {
-        0 => Command::Speed { train, step: SpeedStep::STAND },
-        1 => Command::Speed { train, step: SpeedStep::new(kind % 16).unwrap_or_default() },
-        2 => Command::Reverse { train },
-        3 => Command::Turnout { turnout, curved: kind > 127 },
-        4 => Command::PowerOff,
-        _ => Command::PowerOn,
     }
 }
 

@@ -11,6 +11,7 @@
     reason = "a target panics where it finds something"
 )]
 
+mod command;
 mod dcc_ex;
 mod dcc_ex_session;
 mod layout_file;

@@ -1,9 +1,11 @@
 //! Any bytes, any commands, any hand-shake in any order on the session's line: it always goes on, never writes while an
 //! answer is due, never powers a second solenoid before the first is released, and comes to its end.
 
-use footplate_core::{Command, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{SensorId, TimeSpan, Timestamp};
 use footplate_wire::marklin_serial::{BYTE_TIME, Interface, Message, Pace, Settings};
 use footplate_wire::{Session, Transmit};
+
+use crate::command::command;
 
 /// Longer than any end takes: eighty trains to be told with careful gaps, after a babble of a second.
 const END: TimeSpan = TimeSpan::from_ms(30_000);
@@ -47,18 +49,6 @@ impl Witness {
             self.take();
         }
         self.now = self.now.max(end);
-    }
-}
-
-fn command(kind: u8, number: u8) -> Command {
-    let (train, turnout) = (TrainId(number.into()), TurnoutId(number.into()));
-    match kind % 6 {
-        0 => Command::Speed { train, step: SpeedStep::STAND },
-        1 => Command::Speed { train, step: SpeedStep::new(kind % 16).unwrap_or_default() },
-        2 => Command::Reverse { train },
-        3 => Command::Turnout { turnout, curved: kind > 127 },
-        4 => Command::PowerOff,
-        _ => Command::PowerOn,
     }
 }
 

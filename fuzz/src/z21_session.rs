@@ -1,12 +1,14 @@
 //! Any datagrams and any commands in any order on the session's line with a Z21: it always goes on, keeps its pace, and comes to its
 //! end once the station answers.
 
-use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{TimeSpan, Timestamp};
 use footplate_wire::z21::{
     Broadcasts, CentralState, Client, Datasets, Feedback, LocomotiveState, Reply, Request, Settings, Steps,
     Throttle,
 };
 use footplate_wire::{Session, Transmit};
+
+use crate::command::command;
 
 /// Longer than any end takes: as many trains as bytes can name, at 50 requests a second.
 const END: TimeSpan = TimeSpan::from_ms(60_000);
@@ -73,18 +75,6 @@ impl Witness {
             }
         }
         self.now = self.now.max(end);
-    }
-}
-
-fn command(kind: u8, number: u8) -> Command {
-    let (train, turnout) = (TrainId(number.into()), TurnoutId(number.into()));
-    match kind % 6 {
-        0 => Command::Speed { train, step: SpeedStep::STAND },
-        1 => Command::Speed { train, step: SpeedStep::new(kind % 16).unwrap_or_default() },
-        2 => Command::Reverse { train },
-        3 => Command::Turnout { turnout, curved: kind > 127 },
-        4 => Command::PowerOff,
-        _ => Command::PowerOn,
     }
 }
 

@@ -113,7 +113,16 @@ impl Client {
             return;
         }
         let commanded = self.slots.of(train).and_then(|slot| slot.commanded);
+        // The answer to an older request does not undo what a newer one switched.
+        let is_switching =
+            |awaited: &Awaited| matches!(awaited, Awaited::Functions(switched, _) if *switched == train);
+        let switched = self.slots.of(train).map(|slot| slot.functions);
         self.slots.found(train, data, now);
+        if let (true, Some(functions), Some(slot)) =
+            (self.dialogue.outstanding.any(is_switching), switched, self.slots.of_mut(train))
+        {
+            slot.functions = functions;
+        }
         self.without_slot.retain(|other| *other != train);
         if data.slot_use() != SlotUse::InUse && !self.unused.iter().any(|(other, _)| *other == train) {
             self.unused.push((train, data.slot));

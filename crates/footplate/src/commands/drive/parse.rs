@@ -257,6 +257,9 @@ mod tests {
             read("length 24 pickup 45mm overhang 11cm"),
             Ok(Some(Instruction::Length(train, lengths)))
         );
+        let function = |number| FunctionNumber::new(number).expect("a function");
+        assert_eq!(read("light 24 off"), Ok(Some(Instruction::Function(train, function(0), false))));
+        assert_eq!(read("function 24 28 on"), Ok(Some(Instruction::Function(train, function(28), true))));
         assert_eq!(read("halt"), Ok(Some(Instruction::Halt)));
         assert_eq!(read("power on"), Ok(Some(Instruction::PowerOn)));
         assert_eq!(read("turnout all straight"), Ok(Some(Instruction::Straighten)));
@@ -297,6 +300,8 @@ mod tests {
             ("go 24 at D5", "column 7: `at` should be `to`"),
             ("go 24 to D5 facin", "column 13: `facin` is not allowed here: did you mean `facing`?"),
             ("length 24 110mm", "column 11: `110mm` should be `pickup`"),
+            ("function 24 29 on", "column 13: `29` should be a function from 0 (the light) to 28"),
+            ("light 24 onn", "column 10: `onn` should be `on` or `off`: did you mean `on`?"),
             ("power off", "column 7: `off` should be `on`"),
             ("wait", "a time such as 2s, or a train such as 24 is missing after `wait`"),
             ("wait 24 at C99", "column 12: `C99` is not a sensor of track-a"),
