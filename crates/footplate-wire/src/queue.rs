@@ -246,4 +246,20 @@ mod tests {
         assert_eq!(queue.push(REVERSE), Err(LONGEST));
         assert_eq!(queue.push(speed(T24, 0)), Ok(()), "a stop is always taken");
     }
+
+    #[test]
+    fn a_newer_switch_replaces_a_waiting_one_of_the_same_function() {
+        let switch = |train, number, on| {
+            let function = footplate_core::FunctionNumber::new(number).unwrap();
+            Command::Function { train, function, on }
+        };
+        let mut queue = Queue::default();
+        for command in [switch(T24, 0, true), switch(T24, 1, true), switch(TrainId(58), 0, true)] {
+            assert_eq!(queue.push(command), Ok(()));
+        }
+        assert_eq!(queue.push(switch(T24, 0, false)), Ok(()));
+        assert!(queue.outdates(switch(T24, 0, true)) && !queue.outdates(switch(TrainId(58), 1, true)));
+        let left: Vec<Command> = queue.iter().copied().collect();
+        assert_eq!(left, [switch(T24, 1, true), switch(TrainId(58), 0, true), switch(T24, 0, false)]);
+    }
 }

@@ -388,7 +388,7 @@ proptest! {
                         Command::Speed { train, step } => EventKind::Speed { train, step },
                         Command::Reverse { train } => EventKind::Reverse { train },
                         Command::Turnout { turnout, curved } => EventKind::Turnout { turnout, curved },
-                        Command::PowerOff | Command::PowerOn => continue,
+                        Command::Function { .. } | Command::PowerOff | Command::PowerOn => continue,
                     };
                     dog.handle_event(now, &Event { time: now, kind });
                 }
