@@ -20,6 +20,7 @@ mod queue;
 mod sensors;
 mod session;
 mod silence;
+pub mod withrottle;
 pub mod z21;
 
 pub use session::{Closing, CommandError, Confirmation, LinkNotice, Session, Transmit};

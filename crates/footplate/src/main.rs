@@ -10,11 +10,11 @@ mod guardian;
 mod layout_check;
 mod link;
 mod live_lines;
+mod phones;
 mod progress;
 mod reading;
-mod runtime;
-
 mod recorded;
+mod runtime;
 mod session_journal;
 mod spread;
 mod tally;

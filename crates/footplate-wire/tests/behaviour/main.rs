@@ -23,6 +23,7 @@ mod marklin_serial_recovery;
 mod marklin_serial_round_trip;
 mod marklin_serial_transcript;
 mod marklin_serial_vectors;
+mod withrottle;
 mod z21_desk;
 mod z21_round_trip;
 mod z21_session;

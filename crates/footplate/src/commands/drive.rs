@@ -48,7 +48,10 @@ use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
 use crate::dashboard::{Board, Dashboard, LayoutPicture, ServedAt};
 use crate::layout_check::LayoutWatch;
-use crate::link::{Address, Link, MeasuredLine, ObservedLink, Speed, open, open_session, open_simulated};
+use crate::link::{
+    Address, Link, MeasuredLine, ObservedLink, SharedTallies, Speed, open, open_session, open_simulated,
+};
+use crate::phones::{Phones, PhonesAt};
 use crate::recorded::Recorded;
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
@@ -112,6 +115,10 @@ pub(crate) struct Railway {
     /// The position of a turnout when the session begins, such as 6=straight; may be repeated.
     #[arg(long = "turnout", value_name = "N=LEG", value_parser = turnout_state)]
     turnouts: Vec<(TurnoutId, Leg)>,
+    /// Let phones drive (WiThrottle, Engine Driver and the like): on a port of this machine (default 12090), or on an address. The
+    /// protocol has no token: everyone who can reach the port can drive.
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "")]
+    phones: Option<PhonesAt>,
 }
 
 impl Railway {
@@ -280,13 +287,17 @@ impl Arguments {
         dashboard: Option<&Dashboard>,
         output: &mut dyn Write,
     ) -> anyhow::Result<Outcome> {
-        let link = ObservedLink::new(link, dashboard.map(|dashboard| Arc::clone(&dashboard.line)));
+        let line = dashboard.map(|dashboard| Arc::clone(&dashboard.line));
+        let line = line.or_else(|| self.railway.phones.map(|_| SharedTallies::default()));
+        let link = ObservedLink::new(link, line.clone());
         let mut session = open_session(&self.railway.link, &link, layout)?;
         session.expect_delays(self.railway.link.excess(self.railway.line()?.as_ref()));
         let sits_at_terminal = self.is_drawn();
-        let drawn = || Board::new(now().as_ns());
+        let is_shown = sits_at_terminal || self.railway.phones.is_some();
         let board = dashboard.map(|dashboard| Arc::clone(&dashboard.board));
-        let board = board.or_else(|| sits_at_terminal.then(drawn));
+        let board = board.or_else(|| is_shown.then(|| Board::new(now().as_ns())));
+        let phones = self.railway.phones.zip(board.as_ref()).zip(line.as_ref());
+        let _phones = phones.map(|((at, board), line)| Phones::serve(at, board, line)).transpose()?;
         let asks = self.script.is_none() && !self.is_headless() && !sits_at_terminal;
         let mut console = Console::new(asks.then(lines_of_stdin), self.json, board.as_ref());
         let mut terminal = None;

@@ -172,7 +172,7 @@ impl Board {
     }
 
     /// The motion model of a train.
-    pub(super) fn model(&self, train: TrainId) -> Option<Arc<MotionModel>> {
+    pub(crate) fn model(&self, train: TrainId) -> Option<Arc<MotionModel>> {
         lock(&self.models).get(&train).cloned()
     }
 
@@ -226,7 +226,7 @@ impl Board {
         let log = lock(&self.log);
         let first = log.happened.front().map_or(log.next, |happening| happening.number);
         let lost = first.saturating_sub(number);
-        // Numbers are consecutive, so that the index display_only from the number.
+        // Numbers are consecutive, so that the index follows from the number.
         let from =
             usize::try_from(number.saturating_sub(first)).unwrap_or(usize::MAX).min(log.happened.len());
         (log.happened.range(from..).cloned().collect(), lost)

@@ -54,6 +54,8 @@ pub(super) struct TrainPicture {
     at: Option<String>,
     half_mm: Option<f64>,
     at_rest: bool,
+    /// Whether its direction is the opposite of that at the begin of the session.
+    reversed: bool,
     /// Distance travelled since it was located.
     way_mm: Option<f64>,
     body: Vec<Span>,
@@ -67,7 +69,7 @@ pub(super) struct TrainPicture {
     if_stopped: Option<RestPicture>,
 }
 
-/// MotionAt a train would come to rest if it were commanded to stop now.
+/// Where a train would come to rest if it were commanded to stop now.
 #[derive(Debug, Serialize)]
 struct RestPicture {
     at: Option<String>,
@@ -117,6 +119,7 @@ pub(super) fn paint_train(
         at: located.and_then(|located| name(driver, train, located.at)),
         half_mm: half.map(|half| tenths(half.as_mm())),
         at_rest: located.is_some_and(|located| located.at_rest),
+        reversed: driver.is_reversed(train),
         way_mm: travelled.map(|length| tenths(length.as_mm())),
         body: around(TAIL, NOSE),
         haze: half.map_or_else(Vec::new, |half| around(TAIL + half, NOSE + half)),

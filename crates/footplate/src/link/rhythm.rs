@@ -33,6 +33,12 @@ pub(crate) struct PowerCommand {
     has_answered: bool,
 }
 
+impl PowerCommand {
+    pub(crate) const fn is_on(self) -> bool {
+        self.is_on
+    }
+}
+
 /// Sensors were asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Request {

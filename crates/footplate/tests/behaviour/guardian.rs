@@ -85,7 +85,7 @@ impl Line {
         Some(after[at].0)
     }
 
-    fn await_words(&self, words: &[u8], since: Instant) -> Instant {
+    pub(crate) fn await_words(&self, words: &[u8], since: Instant) -> Instant {
         let began = Instant::now();
         loop {
             if let Some(at) = self.time_of(words, since) {
@@ -250,15 +250,21 @@ pub(crate) fn signal(name: &str, process: u32) {
     assert!(sent.expect("kill").success());
 }
 
-/// A train that runs over a line to a board.
-pub(crate) fn running(name: &str) -> (Standing, Line, Driven, Instant) {
+/// A program that drives a calibrated train over a line to a board.
+pub(crate) fn over_a_board(name: &str, more: &[&str]) -> (Standing, Line, Driven) {
     let folder = calibrated(name, 7);
     let board = Standing::with("tcp:127.0.0.1:0", "1", &["--protocol", "dcc-ex", "--seed", "7"]);
     let of_board = board.address.strip_prefix("dcc-ex:tcp://").expect(&board.address);
-    let (at, more) = of_board.split_once('?').unwrap_or((of_board, ""));
+    let (at, settings) = of_board.split_once('?').unwrap_or((of_board, ""));
     let line = Line::to(Some(at));
-    let driven =
-        Driven::over(&format!("dcc-ex:tcp://{}?{more}", line.place), &folder.join("railway.db"), &[]);
+    let link = format!("dcc-ex:tcp://{}?{settings}", line.place);
+    let driven = Driven::over(&link, &folder.join("railway.db"), more);
+    (board, line, driven)
+}
+
+/// The same, with the train running.
+pub(crate) fn running(name: &str) -> (Standing, Line, Driven, Instant) {
+    let (board, line, driven) = over_a_board(name, &[]);
     let began = Instant::now();
     driven.order("speed 24 8");
     line.await_words(b"<t 24 72", began);

@@ -24,6 +24,7 @@ mod odometer_on_scenarios;
 mod odometry;
 mod odometry_report;
 mod other_layouts;
+mod phones;
 mod placed_rides;
 mod plot;
 mod position_series;

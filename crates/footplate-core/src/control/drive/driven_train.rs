@@ -45,6 +45,8 @@ pub(super) struct DrivenTrain {
     pub(super) task: Option<Task>,
     /// The step commanded last, sent or not.
     pub(super) commanded: SpeedStep,
+    /// Whether its direction is the opposite of that at the begin of the session.
+    pub(super) is_reversed: bool,
     /// The command that has not been sent yet, and since when it waits.
     unsent: Option<(Command, Timestamp)>,
     /// What should be reported next.
@@ -71,6 +73,7 @@ impl DrivenTrain {
             model,
             task: None,
             commanded: SpeedStep::STAND,
+            is_reversed: false,
             unsent: None,
             expected: Expectation::default(),
             end_of_authority: None,
@@ -228,6 +231,7 @@ impl DrivenTrain {
                 self.step_sent(context, now, step, out);
             }
             EventKind::Reverse { .. } => {
+                self.is_reversed = !self.is_reversed;
                 let rest = self.located_at_rest(context, event.time);
                 self.locator.handle_command(context, &self.model, event);
                 if matches!(self.unsent, Some((Command::Reverse { .. }, _))) {

@@ -50,6 +50,12 @@ impl Driver {
         self.trains.get(&train)?.widest_stop
     }
 
+    /// Whether the direction of a train is the opposite of that at the begin of the session.
+    #[must_use]
+    pub fn is_reversed(&self, train: TrainId) -> bool {
+        self.trains.get(&train).is_some_and(|train| train.is_reversed)
+    }
+
     /// A sensor that should have reported the train since its last detection and did not: the train may be far behind
     /// its estimate.
     #[must_use]

@@ -1,0 +1,308 @@
+//! Phones as throttles: a WiThrottle server on a thread of its own.
+//!
+//! Phones give orders in the words of the prompt through the board of the dashboard, like browsers: they are checked,
+//! reserved for and recorded in the same way. The protocol knows no token: who can reach the port can drive.
+
+use std::collections::BTreeMap;
+use std::net::{Ipv4Addr, SocketAddr};
+use std::str::FromStr;
+use std::sync::{Arc, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use anyhow::Context;
+use footplate_core::track::Leg;
+use footplate_core::{Approach, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_wire::withrottle::{
+    LONGEST_LINE, Phone, PhoneOrder, PhoneOutput, Railway, RosterTrain, ThrottleKey, TrainState,
+};
+use mdns_sd::{ServiceDaemon, ServiceInfo};
+use serde::Deserialize;
+use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader};
+use tokio::net::tcp::OwnedWriteHalf;
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Semaphore;
+use tokio::time::{interval, sleep, timeout};
+
+use crate::clock::Stopwatch;
+use crate::dashboard::{Answer, Board, Request};
+use crate::link::{PowerCommand, SharedTallies};
+
+/// JMRI's port, at which phones look first.
+const USUAL_PORT: u16 = 12_090;
+/// Phones at the same time: more than a club has operators.
+const MOST_PHONES: usize = 32;
+/// How often a phone's display follows the railway.
+const DISPLAY_INTERVAL: Duration = Duration::from_millis(200);
+/// The longest wait for the control loop, which reads requests every few hundredths of a second.
+const LOOP_TIMEOUT: Duration = Duration::from_secs(2);
+/// A phone that does not read for so long is gone.
+const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
+/// Pause after a connection failed for lack of descriptors.
+const RETRY_PAUSE: Duration = Duration::from_millis(50);
+/// The longest address without its meaning in the key: DCC's short ones go up to 127.
+const LONGEST_SHORT: u16 = 127;
+
+/// The address to serve phones at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct PhonesAt(SocketAddr);
+
+impl FromStr for PhonesAt {
+    type Err = anyhow::Error;
+
+    fn from_str(text: &str) -> anyhow::Result<Self> {
+        let any = |port| SocketAddr::from((Ipv4Addr::UNSPECIFIED, port));
+        if text.is_empty() {
+            return Ok(Self(any(USUAL_PORT)));
+        }
+        let address = text.parse::<u16>().map(any).or_else(|_| text.parse());
+        let says =
+            || format!("`{text}` is no address for phones: use a port such as 12090, or 192.168.0.7:12090");
+        Ok(Self(address.with_context(says)?))
+    }
+}
+
+/// The server; the program's end closes it.
+pub(crate) struct Phones {
+    /// Announces the server on the network; nothing where that is not possible.
+    _announcement: Option<ServiceDaemon>,
+}
+
+impl Phones {
+    /// Serves phones until the program ends, and says where.
+    ///
+    /// # Errors
+    /// The address is in use.
+    pub(crate) fn serve(at: PhonesAt, board: &Arc<Board>, line: &SharedTallies) -> anyhow::Result<Self> {
+        let listener = std::net::TcpListener::bind(at.0)
+            .with_context(|| format!("phones cannot be served at {}: name another port", at.0))?;
+        listener.set_nonblocking(true)?;
+        let bound = listener.local_addr()?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
+        let station = Station { board: Arc::clone(board), line: Arc::clone(line), clock: Stopwatch::start() };
+        thread::Builder::new().name("phones".to_owned()).spawn(move || {
+            runtime.block_on(async move {
+                match TcpListener::from_std(listener) {
+                    Ok(listener) => station.accept(listener).await,
+                    Err(error) => eprintln!("phones are not served: {error}"),
+                }
+            });
+        })?;
+        let reach =
+            if bound.ip().is_loopback() { "programs on this machine" } else { "everyone on this network" };
+        eprintln!("phones (WiThrottle, Engine Driver) connect to {bound}; {reach} can drive");
+        Ok(Self { _announcement: announced(bound) })
+    }
+}
+
+/// Announces the server, so that phones find it by themselves. Without a network they are told the address.
+fn announced(bound: SocketAddr) -> Option<ServiceDaemon> {
+    if bound.ip().is_loopback() {
+        return None;
+    }
+    let announce = || -> Result<ServiceDaemon, mdns_sd::Error> {
+        let service = ServiceInfo::new(
+            "_withrottle._tcp.local.",
+            "Footplate",
+            "footplate.local.",
+            "",
+            bound.port(),
+            None,
+        )?;
+        let daemon = ServiceDaemon::new()?;
+        daemon.register(service.enable_addr_auto())?;
+        Ok(daemon)
+    };
+    announce()
+        .map_err(|error| eprintln!("the network does not announce it to phones ({error}): type the address"))
+        .ok()
+}
+
+/// The railway as phones reach it.
+#[derive(Clone)]
+struct Station {
+    board: Arc<Board>,
+    line: SharedTallies,
+    clock: Stopwatch,
+}
+
+/// The part of the dashboard's picture that phones show.
+#[derive(Deserialize)]
+struct Shown {
+    trains: Vec<ShownTrain>,
+    turnouts: BTreeMap<u16, Option<String>>,
+}
+
+#[derive(Deserialize)]
+struct ShownTrain {
+    train: u16,
+    step: u8,
+    reversed: bool,
+}
+
+impl Station {
+    async fn accept(self, listener: TcpListener) {
+        let room = Arc::new(Semaphore::new(MOST_PHONES));
+        loop {
+            let Ok((stream, _)) = listener.accept().await else {
+                sleep(RETRY_PAUSE).await;
+                continue;
+            };
+            // Without room the connection is closed at once.
+            let Ok(place) = Arc::clone(&room).try_acquire_owned() else { continue };
+            let station = self.clone();
+            tokio::spawn(async move {
+                station.converse(stream).await;
+                drop(place);
+            });
+        }
+    }
+
+    fn now(&self) -> Timestamp {
+        Timestamp::ZERO + TimeSpan::from_s(self.clock.elapsed().as_secs_f64())
+    }
+
+    /// The railway; `None` before the session shows its first picture.
+    fn railway(&self) -> Option<Railway> {
+        let text = Arc::clone(&self.board.pictures().borrow());
+        let shown: Shown = serde_json::from_str(&text).ok()?;
+        let trains = shown.trains.iter().map(|shown| TrainState {
+            train: TrainId(shown.train),
+            step: SpeedStep::new(shown.step).unwrap_or_default(),
+            forward: !shown.reversed,
+            functions: 0,
+        });
+        let leg = |name: &String| if name == "curved" { Leg::Curved } else { Leg::Straight };
+        let power = self.line.lock().unwrap_or_else(PoisonError::into_inner).power;
+        Some(Railway {
+            power: power.map(PowerCommand::is_on),
+            trains: trains.collect(),
+            turnouts: shown
+                .turnouts
+                .iter()
+                .map(|(number, name)| (TurnoutId(*number), name.as_ref().map(leg)))
+                .collect(),
+        })
+    }
+
+    /// The trains with their speeds by step; `None` before the session shows its motion models.
+    fn roster(&self, railway: &Railway) -> Option<Vec<RosterTrain>> {
+        let of_train = |state: &TrainState| {
+            let train = state.train;
+            let model = self.board.model(train)?;
+            let steps = (0..=model.highest().get()).filter_map(SpeedStep::new);
+            Some(RosterTrain {
+                key: ThrottleKey { is_long: train.0 > LONGEST_SHORT, train },
+                name: format!("train {train}"),
+                speeds: steps.map(|step| model.speed(step, Approach::Below).value.as_m_per_s()).collect(),
+            })
+        };
+        railway.trains.iter().map(of_train).collect()
+    }
+
+    /// One phone, from its first to its last line. However it ends, its trains are stopped.
+    async fn converse(&self, stream: TcpStream) {
+        let _ = stream.set_nodelay(true);
+        let (read, mut write) = stream.into_split();
+        let mut read = BufReader::new(read);
+        let mut display = interval(DISPLAY_INTERVAL);
+        let (roster, railway) = loop {
+            display.tick().await;
+            let shown = self.railway().and_then(|railway| Some((self.roster(&railway)?, railway)));
+            if let Some(shown) = shown {
+                break shown;
+            }
+        };
+        let mut phone = Phone::connected(self.now(), roster, railway);
+        let mut line = Vec::new();
+        while self.carry_out(&mut phone, &mut write).await {
+            let silent_at = phone.next_timeout().map(|at| (at - self.now()).as_s().max(0.0));
+            let silence = async {
+                match silent_at {
+                    Some(seconds) => sleep(Duration::from_secs_f64(seconds)).await,
+                    None => std::future::pending().await,
+                }
+            };
+            tokio::select! {
+                ended = next_line(&mut read, &mut line) => {
+                    if ended.is_none() {
+                        break;
+                    }
+                    let text = String::from_utf8_lossy(&line).trim().to_owned();
+                    line.clear();
+                    phone.handle_line(self.now(), &text);
+                }
+                _ = display.tick() => {
+                    if let Some(railway) = self.railway() {
+                        phone.handle_railway(self.now(), railway);
+                    }
+                }
+                () = silence => phone.handle_timeout(self.now()),
+            }
+        }
+        phone.handle_closed();
+        self.carry_out(&mut phone, &mut write).await;
+    }
+
+    /// Sends the lines and carries out the orders of a phone. Returns whether the conversation goes on.
+    async fn carry_out(&self, phone: &mut Phone, write: &mut OwnedWriteHalf) -> bool {
+        let mut goes_on = true;
+        while let Some(output) = phone.poll_output() {
+            match output {
+                PhoneOutput::Line(line) => {
+                    let text = format!("{line}\n");
+                    // A phone that is gone still has trains to stop.
+                    goes_on &=
+                        matches!(timeout(WRITE_TIMEOUT, write.write_all(text.as_bytes())).await, Ok(Ok(())));
+                }
+                PhoneOutput::Order(order) => {
+                    if let Err(why) = self.order(order).await {
+                        phone.handle_refusal(self.now(), &why);
+                    }
+                }
+                PhoneOutput::Close => goes_on = false,
+            }
+        }
+        goes_on
+    }
+
+    async fn order(&self, order: PhoneOrder) -> Result<(), String> {
+        let request = match order {
+            PhoneOrder::Speed { train, step } => Request::Line(format!("speed {train} {step}")),
+            PhoneOrder::Reverse { train } => Request::Line(format!("reverse {train}")),
+            PhoneOrder::Function { train, number, on } => {
+                Request::Line(format!("function {train} {number} {}", if on { "on" } else { "off" }))
+            }
+            PhoneOrder::Turnout { turnout, leg } => {
+                let leg = if leg == Leg::Curved { "curved" } else { "straight" };
+                Request::Line(format!("turnout {turnout} {leg}"))
+            }
+            PhoneOrder::EmergencyStop => Request::EmergencyStop,
+            PhoneOrder::PowerOn => Request::Line("power on".to_owned()),
+        };
+        let answered = self.board.ask(request).map_err(|_| "too many orders wait: try again".to_owned())?;
+        match timeout(LOOP_TIMEOUT, answered).await {
+            Ok(Ok(Answer::Taken)) => Ok(()),
+            Ok(Ok(Answer::Refused(why))) => Err(why),
+            _ => Err("the control loop did not answer: is the link in order?".to_owned()),
+        }
+    }
+}
+
+/// Reads to the next line end; `line` keeps what has arrived so far when the wait is given up. `None` at the end of the
+/// connection, or of a line that is too long.
+async fn next_line(read: &mut BufReader<tokio::net::tcp::OwnedReadHalf>, line: &mut Vec<u8>) -> Option<()> {
+    loop {
+        let available = read.fill_buf().await.ok().filter(|bytes| !bytes.is_empty())?;
+        let end = available.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+        let taken = end.unwrap_or(available.len());
+        line.extend_from_slice(&available[..taken]);
+        read.consume(end.map_or(taken, |end| end + 1));
+        if line.len() > LONGEST_LINE {
+            return None;
+        }
+        if end.is_some() && !line.is_empty() {
+            return Some(());
+        }
+    }
+}
