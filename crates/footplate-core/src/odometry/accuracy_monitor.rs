@@ -2,7 +2,7 @@
 //!
 //! Source: SUBSET-026-3, 3.6.8, with the values of A.3.1. The amounts by which the odometer may have read too long and
 //! too short over the last 5000 m are each held against two lines. Beyond 250 m (5 %) accuracy is impaired and the
-//! driver is told, until another 5000 m were run within 5 m + 5 %. Beyond 1500 m (30 %) it is a system failure.
+//! driver is informed, until another 5000 m were run within 5 m + 5 %. Beyond 1500 m (30 %) it is a system failure.
 //!
 //! The amounts are looked at in every period, so that a train whose wheels are locked, and whose odometer therefore
 //! does not move on, is judged as well. What they were 5000 m ago is remembered every 50 m: the window is at least
@@ -30,7 +30,7 @@ pub enum OdometerAccuracy {
     /// As accurate as ETCS demands.
     #[default]
     Sound,
-    /// Not accurate enough over the last 5000 m, or not long enough since: the driver is to be told.
+    /// Not accurate enough over the last 5000 m, or not long enough since: the driver has to be informed.
     Impaired,
     /// So inaccurate that the on-board unit has failed. It stays failed.
     Failed,

@@ -1,19 +1,19 @@
-//! What a balise says of the distance, whether it can be true, and what is known of the distance after it.
+//! Checks the position of each balise against the distance interval, and corrects the distance by it.
 //!
-//! A balise lies at a known place, give or take a bound. The train is between its own bounds. Where the two overlap the
-//! train is for certain; without an overlap the balise is unexpected and changes nothing. Two unexpected balises in a row
-//! that agree with each other say that it was the odometer that was wrong, and are believed.
+//! A balise has a known position within a stated bound, and the train is within its distance interval. If the two overlap,
+//! the train is in the overlap. Otherwise the balise is unexpected and changes nothing. Two consecutive unexpected balises
+//! that agree with each other show that the odometer was wrong, and are accepted.
 //!
-//! Linking (SUBSET-026-3, 3.4.4) says where the next balise lies, so that one that is not there is noticed too: it is due
-//! within a window, and missed when the train is past it for certain.
+//! Linking (SUBSET-026-3, 3.4.4) announces the position of the next balise, so that a missing balise is detected, too. It is
+//! expected within a window, and missed once the whole distance interval lies beyond that.
 
 use super::diameter::BaliseAccuracy;
 use crate::units::Length;
 
-/// The square of a width over the variance of what is even over it.
+/// Squared width of a uniform distribution over its variance.
 const EVEN: f64 = 12.0;
 
-/// A distance and between which bounds it lies.
+/// A distance and its bounds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DistanceInterval {
     /// The best estimate.
@@ -24,74 +24,74 @@ pub struct DistanceInterval {
     pub high: Length,
 }
 
-/// What came of a balise that was passed.
+/// The result of checking a balise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum BaliseVerdict {
-    /// It can lie where it says; this is the distance now.
+    /// Its position is possible. This is the corrected distance.
     Accepted(DistanceInterval),
-    /// It cannot lie where it says. The distance stays as it was.
+    /// Its position is impossible. The distance is unchanged.
     Unexpected {
-        /// Where it says it lies.
+        /// Its stated position.
         place: Length,
-        /// By the odometer it lies at least here ...
+        /// The least position by the odometer ...
         low: Length,
-        /// ... and at most here.
+        /// ... and the largest.
         high: Length,
     },
-    /// It cannot lie where it says, but it agrees with the unexpected balise before it: the bounds were wrong. This is the
-    /// distance now.
+    /// Its position is impossible, but agrees with the unexpected balise before it: the bounds were wrong. This is the
+    /// corrected distance.
     Contradicts(DistanceInterval),
 }
 
-/// A linked balise that the train passed without hearing it.
+/// A linked balise that the train passed without reading it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MissedBalise {
-    /// Where it should be.
+    /// Its expected position.
     pub place: Length,
-    /// The train is at least here.
+    /// The least distance of the train.
     pub low: Length,
 }
 
-/// Pairs what balises say with what the odometer knows. Places count from where the distance is 0.
+/// Compares balises with the odometer. Positions are measured from where the distance is 0.
 #[derive(Debug, Clone)]
 pub struct BaliseLink {
     accuracy: BaliseAccuracy,
     linked: Option<Length>,
-    /// The latest unexpected balise since one that was accepted, and the bounds when it was passed.
+    /// The latest unexpected balise since the last accepted one, and the bounds when the train passed it.
     unexpected: Option<(Length, DistanceInterval)>,
 }
 
 impl BaliseLink {
-    /// Nothing is linked yet.
+    /// Without a linked balise.
     #[must_use]
     pub fn new(accuracy: BaliseAccuracy) -> Self {
         Self { accuracy, linked: None, unexpected: None }
     }
 
-    /// The next balise lies here, ahead of the train.
+    /// Sets the position of the next balise, ahead of the train.
     pub fn link(&mut self, place: Length) {
         self.linked = Some(place);
     }
 
-    /// How far the train runs from now until it hears the linked balise: at least and at most.
+    /// The least and largest distance from here to the linked balise.
     #[must_use]
     pub fn due(&self, now: &DistanceInterval) -> Option<[Length; 2]> {
         let place = self.linked?;
         Some([place - self.accuracy.bound - now.high, place + self.accuracy.bound - now.low])
     }
 
-    /// Whether the train is past the linked balise for certain. To be asked in every period; says so once.
+    /// The linked balise, once the train is certainly past it. Call it every period; it reports each balise once.
     pub fn missed(&mut self, now: &DistanceInterval) -> Option<MissedBalise> {
         let place = self.linked.filter(|place| now.low > *place + self.accuracy.bound)?;
         self.linked = None;
         Some(MissedBalise { place, low: now.low })
     }
 
-    /// Judges a balise that was passed within the period that has just ended, in which the train ran at most so far, and says
-    /// what is known of the distance at its end.
+    /// Checks a balise that the train passed within the last period, and returns the distance at the end of that period. The
+    /// train ran no further than `ran` in it.
     pub fn pass(&mut self, place: Length, ran: Length, now: &DistanceInterval) -> BaliseVerdict {
         let bound = self.accuracy.bound;
-        // Forward or backward, it lies somewhere on the way of the period.
+        // Forward or backward, it lies somewhere within the distance run in the period.
         let [least, most] = [place - bound + ran.min(Length::ZERO), place + bound + ran.max(Length::ZERO)];
         let (low, high) = (now.low.max(least), now.high.min(most));
         if place.is_finite() && ran.is_finite() && low <= high {
@@ -121,8 +121,7 @@ impl BaliseLink {
         self.linked = self.linked.filter(|linked| (place - *linked).abs() > 2.0 * self.accuracy.bound);
     }
 
-    /// Weighs the place against the estimate. Of that no more is known here than its bounds, between which every distance
-    /// is as likely.
+    /// Combines the position with the estimate, whose error is taken as uniform within its bounds.
     fn between(
         &self,
         place: Length,
@@ -140,7 +139,7 @@ impl BaliseLink {
     }
 }
 
-/// Whether a way between two balises is one that the train can have run between two moments.
+/// Whether the train can have run the distance between two balises.
 fn agree(way: Length, bound: Length, then: &DistanceInterval, now: &DistanceInterval) -> bool {
     let [least, most] = [now.low - then.low, now.high - then.high];
     way >= least - 2.0 * bound && way <= most + 2.0 * bound
@@ -166,7 +165,7 @@ mod tests {
         let verdict = link().pass(Length::from_m(1512.0), Length::ZERO, &interval(1500.0, 1485.0, 1513.0));
         let BaliseVerdict::Accepted(now) = verdict else { panic!("{verdict:?}") };
         assert_eq!((now.low.as_m(), now.high.as_m()), (1510.0, 1513.0));
-        // Even over 28 m is a deviation of 8.1 m, 16 times that of the balise: 12 m shrink to 5 cm.
+        // Uniform over 28 m is a deviation of 8.1 m, 16 times that of the balise: 12 m shrink to 5 cm.
         assert!((now.estimate.as_m() - 1511.95).abs() < 0.01, "{now:?}");
     }
 
@@ -221,7 +220,7 @@ mod tests {
     fn a_linked_balise_that_was_heard_is_not_missed() {
         let mut link = link();
         link.link(Length::from_m(2000.0));
-        // Another one before it is not the one that is due.
+        // Another balise before it is not the expected one.
         link.pass(Length::from_m(1990.0), Length::ZERO, &interval(1992.0, 1980.0, 2005.0));
         assert!(link.due(&interval(1990.0, 1988.0, 1992.0)).is_some());
         link.pass(Length::from_m(2001.0), Length::ZERO, &interval(2000.0, 1990.0, 2010.0));
@@ -229,8 +228,8 @@ mod tests {
     }
 
     proptest! {
-        /// Bounds that held the truth hold it after every balise within its bound, wherever in its period it was passed, and are
-        /// no wider.
+        /// Bounds that contained the true distance still contain it after each balise within its bound, wherever in the period
+        /// the train passed it, and are no wider.
         #[test]
         fn bounds_go_on_holding_the_truth(
             passages in prop::collection::vec(

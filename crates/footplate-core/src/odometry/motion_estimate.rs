@@ -62,9 +62,9 @@ pub enum WheelState {
     Rolling,
     /// Traction turns it faster than the train moves.
     Spin,
-    /// The brake holds it back.
+    /// It slides: the brake turns it slower than the train.
     Slide,
-    /// Its tachometer is not believed.
+    /// Its tachometer is excluded.
     Excluded,
 }
 
@@ -80,6 +80,6 @@ pub enum Mode {
     Correction,
     /// Nothing has carried it for too long: the bounds hold, the estimate is a guess.
     Ambiguous,
-    /// A tachometer is missing or not believed.
+    /// A tachometer is missing or excluded.
     Degraded,
 }

@@ -1,4 +1,4 @@
-//! What balises say: where the train is, and how large its wheels are.
+//! Corrects the distance and the diameters by balises.
 
 use super::balise_link::{BaliseLink, BaliseVerdict, DistanceInterval};
 use super::diameter::{BaliseAccuracy, WheelDiameters};
@@ -14,16 +14,16 @@ const LITTLE_EFFORT: f64 = 0.1;
 pub(super) struct Places {
     diameters: WheelDiameters,
     link: BaliseLink,
-    /// Ways by pulses and believed diameters (m).
+    /// Distances by pulses and assumed diameters (m).
     counted: [f64; 2],
 }
 
-/// What one wheel did in a period.
+/// The motion of one wheel in a period.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rolled {
-    /// How far by its pulses and the diameter it is believed to have (m, negative backwards).
+    /// Distance by its pulses and its assumed diameter (m, negative backwards).
     pub(super) nominal: f64,
-    /// It was counted and neither slipped nor slid.
+    /// It was read and rolls.
     pub(super) rolls: bool,
 }
 
@@ -36,12 +36,12 @@ impl Places {
         }
     }
 
-    /// What is known of the diameters.
+    /// The estimated diameters.
     pub(super) fn diameters(&self) -> &WheelDiameters {
         &self.diameters
     }
 
-    /// Takes in what both wheels did in a period.
+    /// Adds the motion of both wheels in a period.
     pub(super) fn roll(&mut self, time: Timestamp, wheels: [Rolled; 2], effort: Option<f64>) {
         for (counted, wheel) in self.counted.iter_mut().zip(wheels) {
             *counted += wheel.nominal;
@@ -51,8 +51,8 @@ impl Places {
         self.diameters.roll(time, self.counted.map(Length::from_m), rolling, little);
     }
 
-    /// A balise was passed in the period just taken in, in which the train ran `ran`; where the train is now, if that is
-    /// believed.
+    /// Checks a balise that the train passed in the last period, in which it ran `ran`. Returns the corrected distance if the
+    /// balise is accepted.
     pub(super) fn pass(
         &mut self,
         time: Timestamp,
@@ -67,7 +67,7 @@ impl Places {
         }
     }
 
-    /// True over believed diameter of each wheel: the best estimate, and between which bounds it lies.
+    /// True over assumed diameter of each wheel: the estimate and its bounds.
     pub(super) fn scales(&self) -> [(f64, Range); 2] {
         self.diameters
             .scales()

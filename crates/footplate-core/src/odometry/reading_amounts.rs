@@ -1,8 +1,8 @@
 //! Distance travelled, over-reading and under-reading: three sums that never decrease.
 //!
 //! An ETCS on-board unit subtracts two readings of such sums to know the confidence interval of any distance between
-//! them (SUBSET-026-3, 3.6.4). Over- and under-reading are kept apart, and running forward and backward both add
-//! (3.6.8.1.1): an error that running back would undo cannot be told from one that it would double.
+//! them (SUBSET-026-3, 3.6.4). Over- and under-reading are separate sums, and both directions of travel add to them
+//! (3.6.8.1.1): an error that reversing cancels cannot be distinguished from one that it doubles.
 
 use crate::units::Length;
 
@@ -12,16 +12,16 @@ use crate::units::Length;
 pub struct ReadingAmounts {
     /// Estimated distance travelled, forward plus backward.
     pub travelled: Length,
-    /// Over-reading: how much longer than the true distance it can be at most.
+    /// Over-reading: the largest amount by which it can exceed the true distance.
     pub over: Length,
-    /// Under-reading: how much shorter than the true distance it can be at most.
+    /// Under-reading: the largest amount by which it can fall short of the true distance.
     pub under: Length,
 }
 
 impl ReadingAmounts {
-    /// Adds a period: its estimated distance, negative backwards, and the least and largest that the true one can be.
+    /// Adds a period: its estimated distance (negative backwards) and the bounds of the true one.
     ///
-    /// An interval without the estimate adds to one side only. NaN adds nothing.
+    /// If the estimate lies outside the bounds, only one side grows. NaN adds nothing.
     pub fn add(&mut self, distance: Length, low: Length, high: Length) {
         let too_far_forward = (distance - low).max(Length::ZERO);
         let too_far_backward = (high - distance).max(Length::ZERO);
@@ -35,7 +35,7 @@ impl ReadingAmounts {
         self.under += under;
     }
 
-    /// What was added since an earlier reading.
+    /// Returns the amounts since an earlier reading.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
         Self {
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_adds_nothing() {
+    fn nan_adds_nothing() {
         assert_eq!(added(f64::NAN, f64::NAN, f64::NAN), ReadingAmounts::default());
     }
 

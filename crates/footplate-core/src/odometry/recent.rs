@@ -1,8 +1,8 @@
-//! The largest value of the last moments, in fixed memory.
+//! A moving maximum in constant memory.
 
 use super::wheels::larger;
 
-/// The extreme of a number within the last moments, from two halves that take turns.
+/// The maximum over the current and the previous half of a moving window.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Recent {
     now: f64,
@@ -16,7 +16,7 @@ impl Recent {
         Self { now: value, before: value, age: 0.0, half }
     }
 
-    /// For how long a value counts at least (s).
+    /// The least time for which a value counts (s).
     pub(super) const fn half(&self) -> f64 {
         self.half
     }
@@ -25,7 +25,7 @@ impl Recent {
         larger(self.now, self.before)
     }
 
-    /// Takes in a value, larger ones count.
+    /// Adds the value of a period of `t` seconds. Returns the maximum.
     pub(super) fn push(&mut self, value: f64, t: f64) -> f64 {
         self.age += t;
         if self.age > self.half {

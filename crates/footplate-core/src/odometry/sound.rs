@@ -1,16 +1,16 @@
-//! Numbers that can be reckoned with, whatever a sensor or a file made of them.
+//! Limits numbers from sensors and files to finite ranges.
 
-/// After a longer time (s) an odometer begins again; until then, what follows stays finite.
+/// The longest period (s). An odometer begins again after a much shorter gap; this keeps everything finite until then.
 const LONGEST_PERIOD_S: f64 = 60.0;
 
-/// The value if it lies within, the nearer bound if not, and the lower one for what is no number: unlike
-/// [`f64::clamp`], which hands that on. One instruction a bound.
+/// Returns the value clamped to both bounds, and the lower one for NaN, which [`f64::clamp`] would return. One instruction
+/// for each bound.
 pub(super) fn sound(value: f64, least: f64, most: f64) -> f64 {
     let at_least = if value > least { value } else { least };
     if at_least < most { at_least } else { most }
 }
 
-/// A period (s): not negative, not absurd; what is no number is no time.
+/// Returns a period (s) between 0 and [`LONGEST_PERIOD_S`], and 0 for NaN.
 pub(super) fn sound_period(period: f64) -> f64 {
     sound(period, 0.0, LONGEST_PERIOD_S)
 }
@@ -20,7 +20,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_number_is_the_least() {
+    fn nan_becomes_the_lower_bound() {
         assert_eq!(
             [f64::NAN, -3.0, 0.25, f64::INFINITY].map(|value| sound(value, 0.0, 1.0)),
             [0.0, 0.0, 0.25, 1.0]

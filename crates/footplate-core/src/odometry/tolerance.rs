@@ -30,7 +30,7 @@ pub fn speed_tolerance(true_speed: Speed) -> Speed {
     Speed::from_m_per_s((LEVEL_KM_PER_H + rise * beyond) / KM_PER_H_PER_M_PER_S)
 }
 
-/// By how much a distance may be over or under the way that was travelled: ±(5 m + 5 %). The direction does not matter.
+/// By how much a distance may be over or under the distance travelled: ±(5 m + 5 %). The direction does not matter.
 #[must_use]
 pub fn distance_tolerance(travelled: Length) -> Length {
     Length::from_m(DISTANCE_FIXED_M) + travelled.abs() * DISTANCE_PART

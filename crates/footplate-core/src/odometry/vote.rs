@@ -1,4 +1,4 @@
-//! The bound on which all wheels that bound one side agree.
+//! The loosest of the bounds that several wheels set on one side.
 
 /// The loosest bound of all wheels that have one, so that one faulty sensor cannot break it.
 #[derive(Debug, Clone, Copy)]

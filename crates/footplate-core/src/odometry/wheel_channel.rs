@@ -166,7 +166,7 @@ impl WheelChannel {
         Some(turn.pulses * self.pitch / t)
     }
 
-    /// The speeds that the train can have if this wheel rolls; any while its count is in doubt.
+    /// The speeds that the train can have if this wheel rolls; any while its count is uncertain.
     pub(super) fn turns(&self, acceleration: Range) -> Range {
         if self.doubt.is_infinite() {
             return Range::ANY;

@@ -8,7 +8,7 @@ use crate::units::Length;
 pub struct BaliseAccuracy {
     /// One standard deviation.
     pub deviation: Length,
-    /// No passage is further off than this, either way. Everything that is guaranteed rests on it.
+    /// Largest error of a passage, forward or backward. Every guarantee rests on it.
     pub bound: Length,
 }
 

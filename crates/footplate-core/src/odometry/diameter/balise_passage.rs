@@ -1,4 +1,4 @@
-//! Where a train passed a balise, by the balise and by its wheels, and the ways from one balise to another.
+//! Passages of balises, and the distances between them by position and by wheels.
 
 use super::scale_interval::ScaleInterval;
 use crate::units::Length;
@@ -7,7 +7,7 @@ use crate::units::Length;
 /// curves included. Chosen: 0.1 % for curves and 0.2 % for creepage.
 const CREEPAGE_BOUND: f64 = 3e-3;
 
-/// Where a balise was passed.
+/// One passage of a balise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Passage {
     /// Where it lies.
@@ -20,21 +20,21 @@ pub(super) struct Passage {
     pub(super) rolled: [bool; 2],
 }
 
-/// The way from one balise to another by one wheelset.
+/// The distance from one balise to another by one wheelset.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PairedWay {
-    /// By the balises, negative if the wheels turned the other way.
+    /// By the balises, negative if the wheels turned backwards.
     pub(super) said: Length,
     /// By the wheelset.
     pub(super) counted: Length,
-    /// By how much that is open, because balises are passed at any time of a period.
+    /// Uncertainty of that, because balises are passed at any time of a period.
     pub(super) within: Length,
-    /// Whether it was counted and rolled all the way.
+    /// Whether it was read and rolled throughout.
     pub(super) rolled: bool,
 }
 
 impl Passage {
-    /// The ways to a later passage by both wheelsets.
+    /// The distances to a later passage by both wheelsets.
     pub(super) fn ways_to(&self, later: &Self) -> [PairedWay; 2] {
         let [first, second] = ways(self.counted, later.counted);
         let [first_from, second_from] = self.counted;

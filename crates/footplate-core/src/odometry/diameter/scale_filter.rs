@@ -1,4 +1,4 @@
-//! The best estimate of the scales of two wheelsets, from ways that are known and from each other.
+//! Estimates the scales of two wheelsets from known distances and from each other.
 //!
 //! Letters: `k` the natural logarithms of the two scales, `p` their covariance, `h` which of them a measurement sees,
 //! `y` innovation, `r` the measurement's variance, `s` the innovation's, `g` gain.
@@ -112,7 +112,7 @@ mod tests {
         let mut filter = ScaleFilter::new([1.0, 1.0], [0.02, 0.02]);
         filter.measure([1.0, 0.0], 0.03, 1e-8);
         assert!((filter.k[0] - LONGEST_STEP).abs() < 1e-12);
-        // A quarter of the way: three quarters of the deviation are left.
+        // A quarter of the step: three quarters of the deviation are left.
         assert!((sqrt(filter.p[0][0]) - 0.015).abs() < 1e-5);
     }
 

@@ -1,8 +1,8 @@
-//! Between which bounds the scale of a wheelset lies for certain.
+//! Guaranteed bounds of the scale of a wheelset.
 //!
-//! The scale is the true way that belongs to a counted way of 1. Bounds know no probabilities: what is assumed gives a
+//! The scale is the true distance for a counted distance of 1. Bounds have no probabilities: the assumptions give a
 //! set of possible scales, every measurement another, and the truth lies in all of them (set membership, Schweppe,
-//! 1968). An empty intersection says that an assumption is wrong, and is handed back instead of being taken in.
+//! 1968). An empty intersection shows that an assumption is wrong; it is returned and not used.
 
 use crate::units::Length;
 
@@ -17,13 +17,13 @@ pub struct ScaleInterval {
 }
 
 impl ScaleInterval {
-    /// The scales of a wheel whose diameter lies within this part of the believed one.
+    /// The scales of a wheel whose diameter lies within this part of the assumed one.
     #[must_use]
     pub fn of_tolerance(tolerance: f64) -> Self {
         Self { low: 1.0 - tolerance, high: 1.0 + tolerance }
     }
 
-    /// The scales that a way between these bounds allows when a way between those was counted; `None` when nothing was
+    /// The scales that a true distance and a counted one within these bounds allow; `None` when nothing was
     /// counted for certain.
     #[must_use]
     pub fn of_way(
@@ -35,14 +35,14 @@ impl ScaleInterval {
             .then_some(interval)
     }
 
-    /// What lies in both; `None` if nothing does.
+    /// The intersection; `None` if it is empty.
     #[must_use]
     pub fn meet(self, other: Self) -> Option<Self> {
         let both = Self { low: self.low.max(other.low), high: self.high.min(other.high) };
         (both.low <= both.high).then_some(both)
     }
 
-    /// The same after the scale may have changed by this part of itself, either way.
+    /// The same after the scale may have changed by this part of itself, up or down.
     #[must_use]
     pub fn widened(self, part: f64) -> Self {
         Self { low: self.low * (1.0 - part), high: self.high * (1.0 + part) }

@@ -318,7 +318,7 @@ impl WheelDiameters {
             let Some(way) = origin.and_then(|origin| origin.ways_to(to).into_iter().nth(wheel)) else {
                 continue;
             };
-            // The scale has changed on the way.
+            // The scale has changed between the two.
             let changed = CHANGES_PER_KM * way.counted.as_m() / 1000.0;
             let allowed = way.allows(off, wheelset.pulse_pitch()).map(|allowed| allowed.widened(changed));
             // Where nothing is left, the balises agree in pairs and not over all: one bound was broken by little. Pairs win.
@@ -363,7 +363,7 @@ impl WheelDiameters {
     }
 }
 
-/// What the pulses at both ends of a way leave open of its logarithm.
+/// Uncertainty of the logarithm of a distance by the pulses at both ends.
 fn pulse_variance(pulse_over_way: f64) -> f64 {
     2.0 * PULSE_VARIANCE * pulse_over_way * pulse_over_way
 }

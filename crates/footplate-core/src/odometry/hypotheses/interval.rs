@@ -1,4 +1,4 @@
-//! The interval that holds the speed with a stated probability.
+//! The interval that contains the speed with a stated probability.
 //!
 //! Each hypothesis may leave out an equal part of the risk. One of probability `w` with Gaussian errors leaves out no
 //! more than `risk` if it is given `k` deviations either side with `w exp(−k²/2) ≤ risk`.

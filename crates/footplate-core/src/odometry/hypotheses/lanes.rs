@@ -1,14 +1,14 @@
-//! Numbers side by side, one for each hypothesis: what is written once is worked out for all of them.
+//! One number for each hypothesis, so that a formula written once is calculated for all of them.
 //!
-//! Every operation is done entry by entry and without a branch, so that a processor with wide registers takes several
-//! at a time and gets the same bits as one that has none.
+//! Every operation works element by element and without a branch. A processor with wide registers calculates several
+//! elements at a time and gets the same bits as a scalar one.
 
 use core::array;
 use core::ops::{Add, AddAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 use crate::odometry::wheels::{larger, smaller};
 
-/// As many numbers as there are hypotheses.
+/// The number of hypotheses.
 pub(super) const WIDTH: usize = 8;
 
 /// One number for each hypothesis.
@@ -52,32 +52,32 @@ impl Neg for Lanes {
 }
 
 impl Lanes {
-    /// The same number everywhere.
+    /// The same number for all hypotheses.
     #[inline]
     pub(super) const fn all(value: f64) -> Self {
         Self([value; WIDTH])
     }
 
-    /// The larger of each two.
+    /// Element by element, the larger of the number and `least`.
     #[inline]
     pub(super) fn at_least(self, least: f64) -> Self {
         Self(self.0.map(|value| larger(value, least)))
     }
 
-    /// The smaller of each two.
+    /// Element by element, the smaller of the number and `most`.
     #[inline]
     pub(super) fn at_most(self, most: f64) -> Self {
         Self(self.0.map(|value| smaller(value, most)))
     }
 
-    /// One over each.
+    /// The reciprocals.
     #[inline]
     pub(super) fn inverse(self) -> Self {
         Self(self.0.map(|value| 1.0 / value))
     }
 
-    /// Likelihoods of which these are the logarithms, none above 0 and taken for −25 below that: within 5e-4 near 0, and
-    /// too small by a quarter at −25, where nothing hangs on it. Ten squarings take no branch and no table.
+    /// Exponentials of logarithms that are at most 0; those below −25 count as −25. The error is 5e-4 near 0 and a quarter
+    /// at −25, where it does not matter. Ten squarings need no branch and no table.
     #[inline]
     pub(super) fn likelihoods(self) -> Self {
         const SQUARINGS: u32 = 10;
@@ -89,7 +89,7 @@ impl Lanes {
         power
     }
 
-    /// All of them together, added up in pairs.
+    /// Their sum, added in pairs.
     #[inline]
     pub(super) fn sum(self) -> f64 {
         let [a, b, c, d, e, f, g, h] = self.0;
@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_entry_is_worked_out_by_itself() {
+    fn operations_work_element_by_element() {
         let counted = Lanes([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
         let squares = counted * counted - counted * 0.5;
         assert_eq!(squares.0[5], 22.5);

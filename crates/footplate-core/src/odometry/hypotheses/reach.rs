@@ -21,7 +21,7 @@ const UNSEEN_RATE: f64 = 0.8;
 /// roll.
 const TOUCHED_S: f64 = 3.0;
 const ROLLS: f64 = 0.01;
-/// The same of wheelsets that are braked independently: no converter holds both.
+/// The same of wheelsets that are braked independently: no converter feeds both.
 const UNSEEN_INDEPENDENT: f64 = 0.04;
 /// A command of less acceleration than this is carried by what ice leaves of adhesion (m/s²).
 const SLIDES_BY: f64 = 0.2;

@@ -1,11 +1,11 @@
-//! One period of both wheelsets and the command: what every hypothesis has to explain.
+//! One period of both wheelsets and of the command: the observations that each hypothesis explains.
 
 use crate::odometry::wheels::Range;
 
 /// One wheelset in one period, in the direction of travel.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct WheelScene {
-    /// How far it turned (m), and how much of that was not read in the period.
+    /// Distance that it turned (m), and the part of that not read in the period.
     pub(in super::super) counted: f64,
     pub(in super::super) late: f64,
     /// Its count was read.
@@ -22,9 +22,9 @@ pub(in super::super) struct WheelScene {
     pub(in super::super) pitch: f64,
     /// The true diameter lies within this part of the assumed one.
     pub(in super::super) tolerance: f64,
-    /// A brake can hold it back.
+    /// It has a brake.
     pub(in super::super) braked: bool,
-    /// A motor can turn it faster.
+    /// It has a motor.
     pub(in super::super) driven: bool,
 }
 
@@ -37,7 +37,7 @@ pub(in super::super) struct Scene {
     pub(in super::super) rolling: Range,
     /// The commanded acceleration (m/s²); none if the command is not recorded.
     pub(in super::super) commanded: Option<f64>,
-    /// How much of the full brake may act, 0 to 1, and how much of full traction.
+    /// Fractions of the full brake and of full traction that may act, 0 to 1.
     pub(in super::super) brake: f64,
     pub(in super::super) traction: f64,
     /// Slides and slips are possible at all.

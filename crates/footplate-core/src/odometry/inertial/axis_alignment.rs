@@ -1,4 +1,4 @@
-//! Which way is forward for an accelerometer that lies somehow in a train.
+//! Finds the forward direction of an accelerometer of unknown orientation in a train.
 //!
 //! A train that leaves a stop accelerates forward and does nothing else: it is too slow for curves and for the track to
 //! shake it. So forward is the mean direction of what is read in the first seconds after departures, less what was read
@@ -70,7 +70,7 @@ impl AxisAlignment {
     }
 }
 
-/// Which way is forward.
+/// The forward direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ForwardAxis {
     /// The unit vector.

@@ -1,4 +1,4 @@
-//! Between which bounds the speed lies when only an accelerometer is believed.
+//! Bounds of the speed from an accelerometer alone.
 //!
 //! The reading is the acceleration plus a bias between bounds plus gravity on a gradient between bounds. While the wheels
 //! bound the speed, the change of speed and the sum of the readings over a stretch bound the bias; stretches are
@@ -18,13 +18,13 @@ const MINUTE_S: f64 = 60.0;
 /// What is assumed of an accelerometer and of the line. Bounds, not standard deviations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InertialLimits {
-    /// The bias is never larger, either way, gravity on a sensor that is not level included.
+    /// The magnitude of the bias is never larger, gravity on a sensor that is not level included.
     pub bias: Acceleration,
     /// The bias changes by no more than this in a minute, and by its part in less.
     pub bias_in_a_minute: Acceleration,
-    /// Gravity on the steepest gradient of the line, either way: 0.1 m/s² for each 10 mm/m.
+    /// Gravity on the steepest gradient of the line: ±0.1 m/s² for each 10 mm/m.
     pub gradient: Acceleration,
-    /// What vibration and noise add up to over any stretch, either way.
+    /// Largest integral of vibration and noise over any stretch, positive or negative.
     pub vibration: Speed,
 }
 
@@ -96,7 +96,7 @@ impl InertialBounds {
 
     /// Takes in bounds of the speed that hold for certain, by wheels that roll or because the train stands; one of them may
     /// be infinite, as a sliding wheel bounds the speed from below only. `false` when they contradict these: then one of the
-    /// assumptions is wrong, and the wheels are believed.
+    /// assumptions is wrong, and the wheels count.
     pub fn hold(&mut self, low: Speed, high: Speed) -> bool {
         let [low, high] = [low, high].map(Speed::as_m_per_s);
         if !(low <= high && low < f64::INFINITY && high > f64::NEG_INFINITY) {

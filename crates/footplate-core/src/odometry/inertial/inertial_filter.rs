@@ -4,9 +4,9 @@
 //! reads = acceleration + `b` + `l` + noise, `h` which states a measurement sees, `y` innovation, `r` the measurement's variance,
 //! `s` the innovation's, `g` gain, `t` the time of one reading.
 //!
-//! The bias walks at random with time; the leak forgets with the way, because gradients belong to the line, and stands
-//! still with the train. Wheels that roll show both together; over the way they come apart, because only one of them
-//! stays.
+//! The bias is a random walk over time; the leak decays over distance, because gradients belong to the line, and stays
+//! constant at standstill. Wheels that roll measure the sum; over distance the two separate, because only the bias
+//! persists.
 
 #![expect(clippy::indexing_slicing, reason = "3 × 3 matrices with constant bounds")]
 
@@ -32,7 +32,7 @@ pub struct InertialNoise {
     pub bias_in_a_minute: Acceleration,
     /// Of what gravity adds on gradients: 0.1 m/s² for each 10 mm/m.
     pub leak: Acceleration,
-    /// After so much way a gradient says little about the next.
+    /// Correlation length of gradients along the line.
     pub leak_lasts: Length,
 }
 

@@ -1,4 +1,4 @@
-//! Whether a train stands, from its accelerometer alone.
+//! Detects standstill from an accelerometer alone.
 //!
 //! A running train trembles, a standing one does not; but how much depends on the car, the track and where the sensor lies.
 //! So the tremor of one and a half seconds, after a straight line is taken out of each axis, is compared with what is usual
@@ -76,7 +76,7 @@ impl Default for StandstillThresholds {
     }
 }
 
-/// Whether the train stands.
+/// Whether the train is at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Standing {
     /// Too little was seen to say.
@@ -126,7 +126,7 @@ impl StandstillDetector {
         }
     }
 
-    /// Takes in a block and says whether the train stands at its end.
+    /// Takes in a block and returns whether the train is at rest at its end.
     pub fn take(&mut self, block: AccelerationBlock) -> Standing {
         self.blocks.rotate_left(1);
         if let Some(newest) = self.blocks.last_mut() {
@@ -152,7 +152,7 @@ impl StandstillDetector {
         self.standing
     }
 
-    /// What the acceleration along the track reads while the train stands (m/s²).
+    /// What the acceleration along the track reads at standstill (m/s²).
     pub(super) fn offset(&self) -> f64 {
         self.offset
     }

@@ -113,13 +113,13 @@ impl TripRecorder {
         }
     }
 
-    /// The trip that is under way.
+    /// The current trip.
     #[must_use]
     pub fn running(&self) -> Option<RunningTrip> {
         self.running
     }
 
-    /// Whether the train stands, and what says so.
+    /// Whether the train is at rest, and the evidence.
     #[must_use]
     pub fn detector(&self) -> &StandstillDetector {
         &self.detector

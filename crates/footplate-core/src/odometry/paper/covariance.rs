@@ -59,7 +59,7 @@ impl Covariance {
         if difference > least { difference } else { least }
     }
 
-    /// The information that belongs to a covariance, and the other way round.
+    /// The information matrix of a covariance, and the inverse.
     #[must_use]
     pub fn inverse(self) -> Self {
         let scale = 1.0 / self.determinant();

@@ -1,4 +1,4 @@
-//! Three local filters and a master that fuses them, in the ways in which this can be read.
+//! Three local filters and a master that fuses them, in the variants that the published text allows.
 //!
 //! The local filters follow the two wheelsets and the virtual sensor; the master has no measurement of its own. With
 //! shares β_i that add up to 1 the published filter (after Carlson, 1990) resets, filters and fuses in every period:
@@ -11,7 +11,7 @@
 //! Taken literally, the shares have no effect: the prior of filter i is P⁻/β_i, so the information of all of them
 //! after their measurements is Σ β_i (P⁻)⁻¹ + Σ HᵀH/r_i, that of the one central filter whatever the shares. A
 //! wheelset that slides by 2 m/s pulls the estimate along by half of it even at a share of 1e-6. The measurement has
-//! to be coupled to the share; [`Fusion`] lists the ways.
+//! to be coupled to the share; [`Fusion`] lists the variants.
 
 use super::covariance::Covariance;
 use super::local_filter::{Innovation, LocalFilter, MeasuredSpeed};
@@ -22,7 +22,7 @@ use crate::odometry::sound::sound;
 const LEAST_SHARE: f64 = 1e-12;
 
 /// A free-running filter with a smaller share follows the train: far above any floor of shares that makes sense,
-/// far below any share of a wheelset that is believed.
+/// far below any share of a trusted wheelset.
 const LEAST_SHARE_OF_ITS_OWN: f64 = 0.01;
 
 /// How shares work.
@@ -118,7 +118,7 @@ impl FederatedFilter {
         [b1, b2, b3]: [f64; 3],
     ) -> [Innovation; 3] {
         let mut sum = Sum::about(step.state(self.master.state));
-        // Worked on as values and stored once: what is read back while half of it is on its way to memory waits.
+        // Worked on as values and stored once: reading back a partly stored value stalls.
         let [mut first, mut second, mut third] = self.locals;
         let mut one = |local: &mut LocalFilter, measured, share| {
             local.predict(step);
@@ -129,8 +129,8 @@ impl FederatedFilter {
         let innovations = [one(&mut first, z1, b1), one(&mut second, z2, b2), one(&mut third, z3, b3)];
         self.master = sum.fused();
         self.locals = [first, second, third];
-        // A filter that has nothing of its own, or that nobody believes, follows the train: it is ready to begin
-        // where the train is, and does not bring a slide back when its wheelset is believed again.
+        // A filter without a reading or without trust follows the train: it is ready to begin
+        // where the train is, and does not bring a slide back when its wheelset is trusted again.
         for ((local, innovation), share) in self.locals.iter_mut().zip(&innovations).zip([b1, b2, b3]) {
             if !innovation.taken || share < LEAST_SHARE_OF_ITS_OWN {
                 follow(local, &self.master);

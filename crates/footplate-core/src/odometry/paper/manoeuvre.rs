@@ -5,8 +5,8 @@
 //! σ² = (r₀ − β r₁)/(1 − β²), which is r₀ itself. What the model needs of β is tanh(αT/2) = (r₀ − r₁)/(r₀ + r₁).
 //!
 //! Because r₀ − r₁ is half the mean square of a_k − a_{k−1}, the noise that follows is the mean square step of the
-//! filter's own estimate: a closed loop of gain one, which any noise satisfies. Told too much measurement noise it
-//! comes to rest at no gain at all; told too little it takes its own noise for manoeuvres and rises without end. Four
+//! filter's own estimate: a closed loop of gain one, which any noise satisfies. With too large a measurement noise it
+//! ends at zero gain; with too small a one it takes its own noise for manoeuvres and rises without end. Four
 //! things keep it in between: a window instead of the mean over everything that ever was, a floor and an upper bound
 //! for the jerk, and a covariance in which an error of acceleration does not decay with e^−αT, because the mean is
 //! made of the state's own accelerations. What it costs to leave them out is shown by

@@ -18,7 +18,7 @@ const LOCKED_S: f64 = 0.15;
 const NEARLY_STANDING: f64 = 0.1;
 /// What was so longer ago says nothing of the beginning of a slide (s).
 const CALM_S: f64 = 1.5;
-/// Without a command, an acceleration of the estimate beyond this says which way wheels can lose their grip (m/s²).
+/// Without a command, an acceleration of the estimate beyond this shows whether wheels can slip or slide (m/s²).
 const BY_ITSELF: f64 = 0.1;
 
 /// What came out of a period.

@@ -1,4 +1,4 @@
-//! Which wheelsets slip or slide by the published rules, in the two ways in which they can be read.
+//! Which wheelsets slip or slide by the published rules, in both possible readings.
 //!
 //! With the speed `v` and acceleration `a` of the train, those of wheelset i, and limits of acceleration `a_min`, `a_max`,
 //! of the creepage `λ` and of the difference of both wheelsets `Δv`:

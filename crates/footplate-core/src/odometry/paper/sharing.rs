@@ -1,7 +1,7 @@
-//! Who is believed how much: the shares of the information that the local filters get.
+//! The shares of information that the local filters get.
 //!
-//! Each of them claims a speed v_i and says whether it may be believed, S_i; the virtual sensor may where no
-//! wheelset may, S₃ = (1 − S₁)(1 − S₂). The shares are
+//! Each has a speed v_i and a flag S_i, 1 if it is trusted; the virtual sensor is trusted where no
+//! wheelset is, S₃ = (1 − S₁)(1 − S₂). The shares are
 //!
 //! ```text
 //! β_i = S_i |v_i|^p / Σ S_j |v_j|^p
@@ -12,7 +12,7 @@
 //! dangerous error for supervision of speed. With p = 1, the published form, that last preference is slight: 20.0
 //! and 20.5 m/s get 0.494 and 0.506. Safety is the work of the bounds, not of a skewed mean.
 //!
-//! Nobody gets nothing at all, for covariances are divided by shares: a floor keeps every filter alive.
+//! No share is zero, because covariances are divided by shares: a floor keeps every filter alive.
 
 use crate::odometry::sound::sound;
 
@@ -22,7 +22,7 @@ const SLOWEST: f64 = 0.1;
 /// Speeds above this (m/s) count as this: beyond any train.
 const FASTEST: f64 = 1e3;
 
-/// How shares follow from claims.
+/// The rule for shares.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sharing {
     floor: f64,
@@ -41,7 +41,7 @@ impl Sharing {
     pub const PAPER: Self = Self { floor: 1e-3, exponent: 1 };
 
     /// Shares with this floor, between 1e-12 and a third, and this exponent, up to 64: 0 shares evenly among those
-    /// who are believed, large ones give all to the fastest.
+    /// that are trusted, large ones give all to the fastest.
     #[must_use]
     pub fn new(floor: f64, exponent: u32) -> Self {
         Self {
@@ -51,7 +51,7 @@ impl Sharing {
     }
 
     /// The shares of the two wheelsets and the virtual sensor, from the speeds (m/s) they claim and from whether
-    /// each wheelset is believed. They add up to 1, and none is much below the floor.
+    /// each wheelset is trusted. They add up to 1, and none is much below the floor.
     #[must_use]
     pub fn shares(&self, speeds: [f64; 3], believed: [bool; 2]) -> [f64; 3] {
         let [first, second] = believed;

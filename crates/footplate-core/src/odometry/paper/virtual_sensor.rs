@@ -22,7 +22,7 @@ impl VirtualSensor {
         Self { kind, speed, elapsed: 0.0, thresholds, max_traction }
     }
 
-    /// How long nothing else has told the speed (s).
+    /// Time since another source measured the speed (s).
     pub(super) fn elapsed(&self) -> f64 {
         self.elapsed
     }

@@ -106,7 +106,7 @@ impl CountWindows {
         self.good = 1;
     }
 
-    /// Counts the other way from now on.
+    /// Counts in the opposite direction from now on.
     pub fn reverse(&mut self) {
         for reading in &mut self.readings {
             core::mem::swap(&mut reading.back, &mut reading.forth);
@@ -155,7 +155,7 @@ impl CountWindows {
 }
 
 /// How many pulses a wheel can have turned at most in a window, backwards and forwards; the one is negative that it
-/// certainly turned the other way.
+/// certainly turned backwards.
 #[derive(Debug, Clone, Copy)]
 struct Turned {
     back: f64,
@@ -166,7 +166,7 @@ impl Turned {
     /// How far the wheel rolled at most, backwards and forwards (m).
     #[inline]
     fn ways(self, pitch: Range) -> [f64; 2] {
-        // A wheel that runs, forward and beyond doubt.
+        // A wheel that certainly turns forward.
         if self.back <= -SHAKEN {
             return [self.back * pitch.low, self.forth * pitch.high];
         }
@@ -177,7 +177,7 @@ impl Turned {
     #[cold]
     #[inline(never)]
     fn little_ways(self, pitch: Range) -> [f64; 2] {
-        // A tooth that stands at the edge and is shaken over it to and fro is no motion.
+        // Vibration of a tooth at the edge of the sensor is no motion.
         let shaken = 0.5 * (self.forth - self.back).abs() < SHAKEN;
         // A negative count is longest with the longest pitch.
         [self.back, self.forth].map(|most| {
@@ -270,7 +270,7 @@ mod tests {
         let mut seed = 11_u64;
         for reading in 0..4000 {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            // From full speed over standstill, trembling, to a run backwards; now and then in doubt.
+            // From full speed through a trembling standstill to running backwards, with some uncertain counts.
             let tremor = (seed >> 60) as f64 - 7.5;
             let pulses = libm::round(40.0 - f64::from(reading) / 60.0 + 0.2 * tremor);
             let doubt = if seed >> 58 == 0 { 3.0 } else { 0.0 };

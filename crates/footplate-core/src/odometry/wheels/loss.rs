@@ -5,6 +5,6 @@
 pub enum Loss {
     /// Traction turns it faster than the train moves.
     Spin,
-    /// The brake holds it back.
+    /// It slides: the brake turns it slower than the train.
     Slide,
 }

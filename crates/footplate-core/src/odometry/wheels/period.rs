@@ -43,7 +43,7 @@ impl Period {
 pub struct WheelReading {
     /// The pulses.
     pub count: Count,
-    /// Which way the wheel turned.
+    /// The direction in which the wheel turned.
     pub direction: Direction,
     /// When the last pulse of the period came, where the hardware stamps it.
     pub last_edge: Option<Timestamp>,
@@ -71,14 +71,14 @@ pub enum Count {
     Counter(i64),
 }
 
-/// Which way a wheel turned, where the phases of its sensor tell.
+/// The direction in which a wheel turned, where the phases of its sensor tell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Direction {
     /// The sensor does not tell.
     #[default]
     Unknown,
-    /// The way in which distance grows.
+    /// The direction in which distance grows.
     Forward,
-    /// The other way.
+    /// The opposite direction.
     Backward,
 }

@@ -35,7 +35,7 @@ impl Range {
         Self { low: value, high: value }
     }
 
-    /// A number known to within a part of it, either way.
+    /// A number with a relative tolerance.
     #[inline]
     #[must_use]
     pub const fn around(value: f64, part: f64) -> Self {
@@ -49,7 +49,7 @@ impl Range {
         Self { low: larger(self.low, other.low), high: smaller(self.high, other.high) }
     }
 
-    /// The shortest that holds both.
+    /// The shortest range that contains both.
     #[inline]
     #[must_use]
     pub const fn or(self, other: Self) -> Self {

@@ -364,7 +364,7 @@ mod tests {
         for _ in 0..CONTRADICTIONS {
             assert_eq!(tachometer.read(&reading, 1.0, FORWARD, &CALM).pulses, 20.0);
         }
-        // At standstill it is now read the right way round.
+        // At standstill it is now read in the right direction.
         assert_eq!(tachometer.read(&reading, 1.0, Heading { certain: false, ..FORWARD }, &CALM).pulses, 20.0);
     }
 

@@ -30,7 +30,7 @@ pub struct Thresholds {
     pub difference_ratio: f64,
     /// Below this speed there is no test of ratios.
     pub slowest_ratio: Speed,
-    /// How long a sign has to last to be believed.
+    /// How long a symptom has to last to count.
     pub raise_after: TimeSpan,
     /// How long a wheelset has to roll to be trusted again.
     pub clear_after: TimeSpan,

@@ -43,14 +43,14 @@ pub struct Vehicle {
     pub thresholds: Thresholds,
 }
 
-/// What the train does when it is told to brake and the rail carries it.
+/// The deceleration that a brake command causes where adhesion suffices.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BrakeCommand {
     /// Deceleration at effort −1 on level track; proportional below.
     pub full: Acceleration,
-    /// The true deceleration lies within this part of it, either way.
+    /// The true deceleration lies within this part of it, above or below.
     pub tolerance: f64,
-    /// Acceleration by gradients, either way, that the line may add.
+    /// Largest acceleration by gradients, uphill or downhill.
     pub gradient: Acceleration,
     /// What running resistance adds to braking at most; it never drives.
     pub resistance: Acceleration,
@@ -64,7 +64,7 @@ pub struct BrakeCommand {
 /// What the slide and slip protection of a train is claimed to do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SlideProtection {
-    /// At least one of the two measured wheelsets has no more creepage than this, whichever way ...
+    /// At least one of the two measured wheelsets has no more creepage than this, in either direction ...
     pub creepage: f64,
     /// ... but for times no longer than this.
     pub longest: TimeSpan,

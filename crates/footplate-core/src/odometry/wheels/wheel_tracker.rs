@@ -95,7 +95,7 @@ impl WheelTracker {
         self.gains.speed_deviation
     }
 
-    /// Turns the other way from now on.
+    /// Turns in the opposite direction from now on.
     pub fn reverse(&mut self) {
         self.speed = -self.speed;
         self.acceleration = -self.acceleration;

@@ -35,9 +35,9 @@ impl Axle {
 pub struct Wheelset {
     /// Pulses per revolution.
     pub teeth: u32,
-    /// The diameter it is believed to have.
+    /// Its assumed diameter.
     pub diameter: Length,
-    /// The true diameter lies within this part of the believed one, either way.
+    /// The true diameter lies within this part of the assumed one.
     pub diameter_tolerance: f64,
     /// What can make it slip or slide.
     pub axle: Axle,
