@@ -1,7 +1,7 @@
 //! Phones as throttles: a WiThrottle server on a thread of its own.
 //!
 //! Phones give orders in the words of the prompt through the board of the dashboard, like browsers: they are checked,
-//! reserved for and recorded in the same way. The protocol knows no token: who can reach the port can drive.
+//! reserved for and recorded alike. The protocol has no token: everyone who can reach the port can drive.
 
 use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -95,7 +95,7 @@ impl Phones {
     }
 }
 
-/// Announces the server, so that phones find it by themselves. Without a network they are told the address.
+/// Announces the server, so that phones find it by themselves. Without a network people type the address.
 fn announced(bound: SocketAddr) -> Option<ServiceDaemon> {
     if bound.ip().is_loopback() {
         return None;
@@ -138,6 +138,7 @@ struct ShownTrain {
     train: u16,
     step: u8,
     reversed: bool,
+    functions: Vec<u8>,
 }
 
 impl Station {
@@ -170,7 +171,10 @@ impl Station {
             train: TrainId(shown.train),
             step: SpeedStep::new(shown.step).unwrap_or_default(),
             forward: !shown.reversed,
-            functions: 0,
+            functions: shown
+                .functions
+                .iter()
+                .fold(0, |set, number| set | 1_u32.checked_shl((*number).into()).unwrap_or(0)),
         });
         let leg = |name: &String| if name == "curved" { Leg::Curved } else { Leg::Straight };
         let power = self.line.lock().unwrap_or_else(PoisonError::into_inner).power;

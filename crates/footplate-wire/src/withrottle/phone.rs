@@ -23,7 +23,7 @@ pub const HEARTBEAT: TimeSpan = TimeSpan::from_ms(10_000);
 /// 20 s.)
 pub const SILENCE_LIMIT: TimeSpan = TimeSpan::from_ms(12_000);
 
-/// Until then a command may be on its way, and the phone shows what it commanded.
+/// The railway may not have carried out a command before this time; the phone shows what it commanded.
 const CARRIED_OUT_WITHIN: TimeSpan = TimeSpan::from_ms(1_500);
 /// A reversal stops the train first: it takes as long as the longest stop.
 const REVERSED_WITHIN: TimeSpan = TimeSpan::from_ms(20_000);
@@ -344,7 +344,7 @@ impl Phone {
         self.say(ServerLine::StepMode(throttle, key));
     }
 
-    /// Nobody else may drive the train: it is stopped.
+    /// Stops a train that has no driver any more.
     fn release(&mut self, throttle: char, key: Option<ThrottleKey>) {
         for key in self.keys(throttle, key) {
             self.driven.remove(&(throttle, key));

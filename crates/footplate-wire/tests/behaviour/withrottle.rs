@@ -96,7 +96,7 @@ fn the_phone_shows_what_the_train_does_by_itself() {
     phone.handle_line(at(1.0), "MTAS24<;>V126");
     assert_eq!(outputs(&mut phone), ["> speed 24 7"]);
     phone.handle_railway(at(1.2), railway(0, true));
-    assert_eq!(outputs(&mut phone), Vec::<String>::new(), "the command is on its way");
+    assert_eq!(outputs(&mut phone), Vec::<String>::new(), "the command was not carried out yet");
     phone.handle_railway(at(1.4), railway(7, true));
     // The end of the movement authority stops the train.
     phone.handle_railway(at(9.0), railway(0, true));

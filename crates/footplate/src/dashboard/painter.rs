@@ -9,7 +9,7 @@ use footplate_core::model::MotionModel;
 use footplate_core::track::Layout;
 use footplate_core::tracking::DriftTest;
 use footplate_core::tracking::{DueContact, PassedContact, WayPoint};
-use footplate_core::{HALF_95, Length, SensorId, TimeSpan, Timestamp, TrainId};
+use footplate_core::{FunctionNumber, HALF_95, Length, SensorId, TimeSpan, Timestamp, TrainId};
 use serde::Serialize;
 
 use super::alarm::{Alarm, Grade};
@@ -99,6 +99,11 @@ struct DuePicture<'l> {
     half_ms: f64,
 }
 
+/// The numbers of the bits that are set.
+fn numbers(functions: u32) -> Vec<u8> {
+    (0..=FunctionNumber::HIGHEST).filter(|number| functions >> number & 1 == 1).collect()
+}
+
 impl Painter {
     pub(crate) fn new(board: &Arc<Board>) -> Self {
         Self {
@@ -170,11 +175,12 @@ impl Painter {
         &mut self,
         dispatcher: &Dispatcher,
         tasks: &BTreeMap<TrainId, TrainTask>,
+        functions: &BTreeMap<TrainId, u32>,
         now: Timestamp,
         began: Timestamp,
     ) {
         let reserved = |train| dispatcher.holds(train).map_or_else(Vec::new, reserved_spans);
-        self.paint_driven(dispatcher.driver(), reserved, tasks, now, began);
+        self.paint_driven(dispatcher.driver(), reserved, tasks, functions, now, began);
     }
 
     /// Publishes trains without a dispatcher, which have no reservations.
@@ -185,7 +191,7 @@ impl Painter {
         now: Timestamp,
         began: Timestamp,
     ) {
-        self.paint_driven(driver, |_| Vec::new(), tasks, now, began);
+        self.paint_driven(driver, |_| Vec::new(), tasks, &BTreeMap::new(), now, began);
     }
 
     fn paint_driven(
@@ -193,6 +199,7 @@ impl Painter {
         driver: &Driver,
         reserved: impl Fn(TrainId) -> Vec<Span>,
         tasks: &BTreeMap<TrainId, TrainTask>,
+        functions: &BTreeMap<TrainId, u32>,
         now: Timestamp,
         began: Timestamp,
     ) {
@@ -208,15 +215,10 @@ impl Painter {
             let travelled = located.map(|located| self.travelled(driver, train, located.at));
             let commanded =
                 located.filter(|_| self.display_only).map_or_else(|| driver.commanded(train), |at| at.step);
-            trains.push(paint_train(
-                driver,
-                train,
-                tasks.get(&train),
-                now,
-                commanded,
-                travelled,
-                reserved(train),
-            ));
+            let task = tasks.get(&train);
+            let mut picture = paint_train(driver, train, task, now, commanded, travelled, reserved(train));
+            picture.functions = functions.get(&train).copied().map_or_else(Vec::new, numbers);
+            trains.push(picture);
             if is_sampled {
                 let sample = Sample::of((now - began).as_s(), commanded, located.as_ref(), travelled);
                 self.samples.push((train, sample));

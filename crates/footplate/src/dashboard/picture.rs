@@ -56,6 +56,8 @@ pub(super) struct TrainPicture {
     at_rest: bool,
     /// Whether its direction is the opposite of that at the begin of the session.
     reversed: bool,
+    /// The functions that were switched on.
+    pub(super) functions: Vec<u8>,
     /// Distance travelled since it was located.
     way_mm: Option<f64>,
     body: Vec<Span>,
@@ -120,6 +122,7 @@ pub(super) fn paint_train(
         half_mm: half.map(|half| tenths(half.as_mm())),
         at_rest: located.is_some_and(|located| located.at_rest),
         reversed: driver.is_reversed(train),
+        functions: Vec::new(),
         way_mm: travelled.map(|length| tenths(length.as_mm())),
         body: around(TAIL, NOSE),
         haze: half.map_or_else(Vec::new, |half| around(TAIL + half, NOSE + half)),

@@ -56,6 +56,11 @@ fn a_phone_drives_and_no_train_runs_on_without_it() {
     let since = Instant::now();
     phone.send("MTAS24<;>V126");
     line.await_words(b"<t 24 126", since);
+    // A key switches the light; the phone shows it.
+    let since = Instant::now();
+    phone.send("MTAS24<;>F10");
+    line.await_words(b"<F 24 0 1>", since);
+    phone.await_line("MTAS24<;>F10");
     // What the train cannot do is shown with its reason.
     phone.send("PTATFT99");
     assert!(phone.await_line("HM").contains("`99` is not a turnout of track-a"));
@@ -63,7 +68,7 @@ fn a_phone_drives_and_no_train_runs_on_without_it() {
     drop(phone);
     let stop = line.await_words(b"<t 24 0", since) - since;
     assert!(stop < WITHIN, "the phone is gone: {stop:?}");
-    // The next phone is silent. It is told so, and its train stopped after twelve seconds.
+    // The next phone is silent: it shows why its train stops after twelve seconds.
     let mut phone = Handset::connect(place);
     phone.await_line("PPA");
     phone.send("MT+S24<;>S24");

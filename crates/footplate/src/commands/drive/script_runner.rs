@@ -70,6 +70,8 @@ pub(crate) struct ScriptRunner {
     unreliable: BTreeSet<TrainId>,
     /// When each journey was requested.
     journeys: BTreeMap<OrderId, Timestamp>,
+    /// The functions of each train that were switched on, one bit each.
+    functions: BTreeMap<TrainId, u32>,
     /// The last stop of each train.
     rests: BTreeMap<TrainId, Finished>,
     outputs: VecDeque<Output<SessionMessage>>,
@@ -101,6 +103,7 @@ impl ScriptRunner {
             changed: BTreeSet::new(),
             unreliable: BTreeSet::new(),
             journeys: BTreeMap::new(),
+            functions: BTreeMap::new(),
             rests: BTreeMap::new(),
             outputs: VecDeque::new(),
             began: None,
@@ -245,6 +248,8 @@ impl ScriptRunner {
                 ));
             }
             Instruction::Function(train, function, on) => {
+                let functions = self.functions.entry(train).or_default();
+                *functions = if on { *functions | function.bit() } else { *functions & !function.bit() };
                 self.dispatcher.switch_function(now, train, function, on);
             }
             Instruction::Halt => self.halt(now),
@@ -337,7 +342,7 @@ impl ScriptRunner {
             Some((train, TrainTask { text: step.text.clone(), target, promise }))
         };
         let tasks = self.trains.keys().copied().filter_map(task).collect();
-        painter.paint(&self.dispatcher, &tasks, now, self.began.unwrap_or(now));
+        painter.paint(&self.dispatcher, &tasks, &self.functions, now, self.began.unwrap_or(now));
     }
 
     /// Takes in the position of a train at rest from the operator.
