@@ -18,8 +18,6 @@ const END_OF_STOP_TIME: f64 = 0.08;
 const END_OF_STOP_SPEED: f64 = 0.1;
 /// Standard deviation of a law's shape in the middle of a change, as part of its displacement: no shape fits all decoders.
 pub(super) const SHAPE_ERROR: f64 = 0.04;
-/// Standard deviation of where a sensor trips, from one passage to the next (m): some repeat within 2 mm, others within 15 mm.
-pub(crate) const CONTACT_SCATTER: f64 = 0.003;
 /// Path lengths differ from surveyed lengths by some per cent because of curves and slopes (published section means: 1 to
 /// 3 %).
 pub(crate) const FELT: f64 = 0.02;

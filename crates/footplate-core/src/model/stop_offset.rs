@@ -12,9 +12,8 @@ use crate::linalg::Gaussian;
 const FRICTION_SPEED: f64 = 0.03;
 /// Offsets are those of stops from this speed (m/s), a middle one.
 const REFERENCE_SPEED: f64 = 0.3;
-/// Least prior standard deviation of an offset (m): a gradient of a few tenths of a per cent, which no layout states. With half
-/// a millimetre, the stops of a calibration were too few for offsets to grow on layouts with gradients of up to 2 %.
-const LEAST_DEVIATION: f64 = 0.006;
+/// Least prior standard deviation of an offset (m), so that offsets can still grow on a layout that seemed level.
+const LEAST_DEVIATION: f64 = 0.0005;
 /// A priori, half of the unexplained variance of stops (m²) comes from where they end; ...
 const BY_PLACE: f64 = 0.5;
 /// ... this prior weighs as much as four hops.

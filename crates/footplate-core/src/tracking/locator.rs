@@ -13,11 +13,13 @@ use crate::event::{Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::linalg::Gaussian;
 use crate::link::{ContactWindow, TruncatedNormal};
-use crate::model::{CONTACT_SCATTER, MotionModel};
+use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::HopId;
 use crate::units::{Length, Speed};
 
+/// Standard deviation of where a sensor closes, from one passage to the next (m).
+pub(super) const CONTACT_SCATTER_M: f64 = 0.0015;
 /// Standard deviation of the position of a lost train (m).
 const ANYWHERE_M: f64 = 30.0;
 /// A sensor that is this many standard deviations behind the train was missed.
@@ -194,7 +196,7 @@ impl Locator {
         let time = self.seconds(window.middle());
         let place = self.filter.place(model, time);
         let speed = self.filter.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
-        let noise = CONTACT_SCATTER * CONTACT_SCATTER + speed * speed * window.variance_s2();
+        let noise = CONTACT_SCATTER_M * CONTACT_SCATTER_M + speed * speed * window.variance_s2();
         let short = |reach: &PathReach| Gaussian {
             mean: reach.length.mean - place.mean,
             variance: place.variance + reach.length.variance + noise,
@@ -239,13 +241,13 @@ impl Locator {
             // Lost until now, or no path leads here: the train is here all the same, at the speed it had.
             self.filter.doubt_place(ANYWHERE_M * ANYWHERE_M);
             self.filter.shift(-self.filter.place(model, time).mean, 0.0);
-            let here = Gaussian { mean: 0.0, variance: CONTACT_SCATTER * CONTACT_SCATTER };
+            let here = Gaussian { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
             self.filter.pass(model, time, window.variance_s2(), here);
             self.node = Some(node);
             return known;
         };
         let speed = self.filter.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
-        let scatter = CONTACT_SCATTER * CONTACT_SCATTER;
+        let scatter = CONTACT_SCATTER_M * CONTACT_SCATTER_M;
         let contradicts = short.mean * short.mean > GATE * GATE * short.variance;
         let mut at = window.middle();
         if !contradicts {
@@ -286,7 +288,7 @@ impl Locator {
         let time = due.clamp(after, until.max(after));
         let place = self.filter.place(model, time);
         let speed = self.filter.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
-        let scatter = CONTACT_SCATTER * CONTACT_SCATTER;
+        let scatter = CONTACT_SCATTER_M * CONTACT_SCATTER_M;
         let short = TruncatedNormal {
             mean: reach.length.mean - place.mean,
             variance: place.variance + reach.length.variance + scatter,
@@ -331,7 +333,7 @@ impl Locator {
         let node = self.node?;
         let time = self.seconds(now);
         let here = self.filter.place(model, time);
-        let mut way = Gaussian { mean: 0.0, variance: CONTACT_SCATTER * CONTACT_SCATTER };
+        let mut way = Gaussian { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
         for hop in context.hops_ahead(node).take(MOST_HOPS) {
             let reach = hop_length(context, model, &hop);
             way = Gaussian { mean: way.mean + reach.mean, variance: way.variance + reach.variance };

@@ -4,7 +4,7 @@ use super::locator::WayPoint;
 use super::track_context::TrackContext;
 use crate::ids::{NodeId, SensorId};
 use crate::linalg::Gaussian;
-use crate::model::{CONTACT_SCATTER, FELT, MotionModel};
+use crate::model::{FELT, MotionModel};
 use crate::track::{Hop, Landmark, Layout, Position, Reach};
 use crate::units::Length;
 
@@ -189,10 +189,7 @@ fn taped(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> [Landm
         let scale = if felt > 0.0 && left > 0.0 { length.mean / felt } else { 1.0 };
         let relative = if length.mean > 0.0 { libm::sqrt(length.variance) / length.mean } else { 0.0 };
         let offset = Length::from_m(left * scale);
-        // A sensor that the train has still to pass will trip elsewhere than on average.
-        let ahead = if from == at.node { 0.0 } else { CONTACT_SCATTER };
-        let doubt = Length::from_m(libm::hypot(offset.as_m() * relative, ahead));
-        return [Landmark { node: from, offset }, Landmark { node: from, offset: doubt }];
+        return [Landmark { node: from, offset }, Landmark { node: from, offset: offset.abs() * relative }];
     }
     [Landmark { node: from, offset: Length::from_m(left) }, Landmark { node: from, offset: Length::ZERO }]
 }

@@ -10,11 +10,14 @@ use super::unknowns::Columns;
 use crate::model::parameters::{
     Answers, NODES, SHAPES, START_NODES, STOP_NODES, count, hysteresis_at, nodes_about, shape_at, speed_at,
 };
-use crate::model::priors::{CONTACT_SCATTER, FELT, SHAPE_ERROR, TRIP_DEVIATION, WANDER, change_error};
+use crate::model::priors::SHAPE_ERROR;
+use crate::model::priors::{FELT, TRIP_DEVIATION, WANDER, change_error};
 use crate::model::scatter::Scatter;
 use crate::model::segment::Segment;
 use crate::model::stop_offset::stop_offset_share;
 
+/// Standard deviation of where a sensor closes, from one passage to the next (m).
+const SENSOR_SCATTER: f64 = 0.0015;
 /// A tape read to the centimetre beside a train: one standard deviation (m).
 const TAPE: f64 = 0.005;
 /// Standard deviation of a place of rest after the train has settled (m).
@@ -169,7 +172,7 @@ impl Point<'_> {
             let mut terms = terms_of(&|outcome| outcome.at[index]);
             subtract(&mut terms, &sections);
             let Error { speed, law, systematic, step } = errors[index];
-            let own = speed * speed * contact.variance + CONTACT_SCATTER * CONTACT_SCATTER;
+            let own = speed * speed * contact.variance + SENSOR_SCATTER * SENSOR_SCATTER;
             let variance = own + systematic * systematic * law * law;
             let residual = at.own.place + here.at[index] - surveyed - longer;
             if with_slopes {
