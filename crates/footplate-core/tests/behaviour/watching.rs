@@ -326,6 +326,32 @@ fn the_first_train_asked_waits_for_the_answer() {
     assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
 }
 
+#[test]
+fn a_train_lost_again_on_reserved_track_does_not_creep_on() {
+    let mut watched = Watched::one();
+    // Given a train under a dispatcher that is located and measured again,
+    watched.dog.ask_before_crawling();
+    watched.go(FIRST, 8);
+    watched.run(6.0);
+    watched.dog.distrust(watched.world.now, FIRST);
+    watched.run(30.0);
+    watched.dog.permit(watched.world.now, FIRST);
+    let is_located =
+        |watched: &Watched| watched.notices.iter().any(|notice| matches!(notice, Notice::Located { .. }));
+    assert!(watched.run_until(60.0, is_located), "{:#?}", watched.notices);
+    watched.run(1.0);
+    let from = watched.commanded.len();
+    // when its position is lost,
+    watched.dog.lose(watched.world.now, FIRST);
+    watched.run(0.5);
+    // then it reverses towards the sensor that it ran over, instead of creeping on into track that may end.
+    let first = watched.commanded.get(from).map(|(_, command)| *command);
+    assert_eq!(first, Some(Command::Speed { train: FIRST, step: SpeedStep::STAND }));
+    assert!(watched.run_until(10.0, |watched| {
+        watched.commanded.iter().skip(from).any(|(_, command)| matches!(command, Command::Reverse { .. }))
+    }));
+}
+
 /// One input of a watchdog.
 #[derive(Debug, Clone)]
 enum Happening {

@@ -6,8 +6,9 @@
 use std::borrow::Cow;
 
 use footplate_core::Timestamp;
-use rusqlite::{Row, Transaction};
+use rusqlite::{Row, ToSql, Transaction};
 
+use super::checksum;
 use super::error::StoreError;
 use super::file::Store;
 use super::recordings::RecordingKey;
@@ -156,15 +157,16 @@ pub(super) fn insert(
     machine: MachineKey,
     traced: &Traced,
 ) -> rusqlite::Result<()> {
-    let sql = match traced.side {
-        Side::Input => {
-            "INSERT INTO inputs (machine, number, time_ns, kind, text) VALUES (?1, ?2, ?3, ?4, ?5)"
-        }
-        Side::Decision => {
-            "INSERT INTO decisions (machine, number, time_ns, kind, text) VALUES (?1, ?2, ?3, ?4, ?5)"
-        }
+    let table = match traced.side {
+        Side::Input => "inputs",
+        Side::Decision => "decisions",
     };
-    let row = (machine.0, traced.number, traced.time.as_ns(), traced.kind.as_ref(), traced.text.as_str());
-    transaction.prepare_cached(sql)?.execute(row)?;
-    Ok(())
+    let sql = format!(
+        "INSERT INTO {table} (machine, number, time_ns, kind, text, {}) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
+        checksum::COLUMN
+    );
+    let values: [&dyn ToSql; 5] =
+        [&machine.0, &traced.number, &traced.time.as_ns(), &traced.kind.as_ref(), &traced.text];
+    let mut statement = transaction.prepare_cached(&sql)?;
+    checksum::insert(&mut statement, table, &values)
 }

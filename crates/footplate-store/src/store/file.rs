@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior};
 
+use super::checksum;
 use super::error::StoreError;
 
 /// Marks the file as ours for tools that look: `Foot` in ASCII (`PRAGMA application_id`).
@@ -17,6 +18,7 @@ const MIGRATIONS: &[&str] = &[
     include_str!("migrations/2_motion.sql"),
     include_str!("migrations/3_decisions.sql"),
     include_str!("migrations/4_replays.sql"),
+    include_str!("migrations/5_checksums.sql"),
 ];
 
 /// How long we wait for another process to finish writing, chosen: an import of a million events takes less.
@@ -78,7 +80,7 @@ impl Store {
         MIGRATIONS
     }
 
-    /// Looks at every page and every reference, and says what is wrong. Takes as long as reading the file.
+    /// Checks every page, every reference and the checksum of every row. Takes as long as reading the file.
     pub fn check(&self) -> Result<(), StoreError> {
         let check = || {
             let mut statement = self.connection.prepare("PRAGMA integrity_check(1)")?;
@@ -91,9 +93,31 @@ impl Store {
         let what = match orphan {
             _ if found != "ok" => found.replace('\n', ", "),
             Some(table) => format!("rows of {table} belong to nothing"),
-            None => return Ok(()),
+            None => match self.changed_row().map_err(|error| self.error(error))? {
+                Some((table, row)) => {
+                    format!("row {row} of {table} is not as it was written: its checksum differs")
+                }
+                None => return Ok(()),
+            },
         };
         Err(StoreError::Damaged { file: self.path.clone(), what })
+    }
+
+    /// The first row whose checksum differs, with its table.
+    fn changed_row(&self) -> rusqlite::Result<Option<(&'static str, i64)>> {
+        for table in checksum::TABLES {
+            let rows = format!("SELECT * FROM {table} WHERE {} IS NOT NULL", checksum::COLUMN);
+            let mut statement = self.connection.prepare(&rows)?;
+            let last = statement.column_count() - 1;
+            let mut rows = statement.query([])?;
+            while let Some(row) = rows.next()? {
+                let values = (1..last).map(|at| row.get_ref(at)).collect::<rusqlite::Result<Vec<_>>>()?;
+                if i64::from(checksum::of(table, values)) != row.get::<_, i64>(last)? {
+                    return Ok(Some((table, row.get(0)?)));
+                }
+            }
+        }
+        Ok(None)
     }
 
     fn open_with(path: &Path, flags: OpenFlags, migrations: &[&str]) -> Result<Self, StoreError> {

@@ -13,11 +13,13 @@
 //! marks         excluding events and restoring them
 //! calibrations  keeping them and finding the one in force
 //! replays       how far a replay of all sessions came, so that the next one goes on from there
+//! checksum      of each row, so that a changed value is noticed
 //! unfinished    the session that was running when the program died
 //! salvage       what can still be read of a damaged file, into a new one
 //! ```
 
 mod calibrations;
+mod checksum;
 mod decisions;
 mod error;
 mod file;

@@ -4,8 +4,9 @@ use footplate_core::{
     Event, EventKind, Length, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
 };
 use rusqlite::types::Type;
-use rusqlite::{Error, Row, Statement, named_params};
+use rusqlite::{Error, Row, Statement, ToSql};
 
+use super::checksum;
 use super::recordings::RunKey;
 use crate::recording::RawEvent;
 
@@ -13,10 +14,10 @@ use crate::recording::RawEvent;
 pub(super) const COLUMNS: &str =
     "line, time_ns, kind, sensor, poll_interval_ns, train, step, turnout, curved, offset_m";
 
-/// Appends an event.
+/// Appends an event. The columns are in the order of the table, as its checksum needs them.
 pub(super) const INSERT: &str = "INSERT INTO events (run, line, stored_at_ns, time_ns, kind, sensor, \
-     poll_interval_ns, train, step, turnout, curved, offset_m) VALUES (:run, :line, :stored_at_ns, :time_ns, :kind, \
-     :sensor, :poll_interval_ns, :train, :step, :turnout, :curved, :offset_m)";
+     poll_interval_ns, train, step, turnout, curved, offset_m, crc32) \
+     VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)";
 
 /// Executes [`INSERT`] for one event. `line` is that of its file, if it came from one.
 pub(super) fn insert(
@@ -54,21 +55,21 @@ pub(super) fn insert(
             "stopped"
         }
     };
-    statement.execute(named_params! {
-        ":run": run.0,
-        ":line": line.and_then(|line| i64::try_from(line).ok()),
-        ":stored_at_ns": stored_at.as_ns(),
-        ":time_ns": event.time.as_ns(),
-        ":kind": kind,
-        ":sensor": columns.sensor,
-        ":poll_interval_ns": columns.poll_interval_ns,
-        ":train": columns.train,
-        ":step": columns.step,
-        ":turnout": columns.turnout,
-        ":curved": columns.curved,
-        ":offset_m": columns.offset_m,
-    })?;
-    Ok(())
+    let values: [&dyn ToSql; 12] = [
+        &run.0,
+        &line.and_then(|line| i64::try_from(line).ok()),
+        &stored_at.as_ns(),
+        &event.time.as_ns(),
+        &kind,
+        &columns.sensor,
+        &columns.poll_interval_ns,
+        &columns.train,
+        &columns.step,
+        &columns.turnout,
+        &columns.curved,
+        &columns.offset_m,
+    ];
+    checksum::insert(statement, "events", &values)
 }
 
 /// What only some kinds of event have.

@@ -15,6 +15,7 @@ use rusqlite::{Connection, Statement, Transaction, params_from_iter};
 
 use self::leaf_pages::Pages;
 use self::strays::Strays;
+use super::checksum;
 use super::error::StoreError;
 use super::file::Store;
 
@@ -251,7 +252,7 @@ fn copy_table(
         Err(_) => i64::try_from(most).unwrap_or(i64::MAX),
     };
 
-    let mut copy = TableCopy { select, columns: columns.len(), insert, into, parent, table: empty };
+    let mut copy = TableCopy { select, columns, insert, into, parent, table: empty };
     let mut next = 1;
     let mut last_known = newest.ok().flatten().unwrap_or(0);
     while next <= last {
@@ -282,7 +283,7 @@ fn columns_of(connection: &Connection, table: &str) -> Vec<String> {
 struct TableCopy<'a> {
     /// Reads the rows from a number on, in order.
     select: Statement<'a>,
-    columns: usize,
+    columns: Vec<String>,
     insert: Statement<'a>,
     into: &'a Transaction<'a>,
     /// Where the rows belong, and in which column they say so.
@@ -312,7 +313,7 @@ impl TableCopy<'_> {
                 Err(_) => return Ok(stretch),
             };
             let values: rusqlite::Result<Vec<Value>> =
-                (0..self.columns).map(|column| row.get(column)).collect();
+                (0..self.columns.len()).map(|column| row.get(column)).collect();
             let Ok(values) = values else { return Ok(stretch) };
             let Some(Value::Integer(id)) = values.first() else { return Ok(stretch) };
             // Rows come in the order of their ids; in damaged pages they may come round again, for ever.
@@ -325,7 +326,8 @@ impl TableCopy<'_> {
             {
                 self.table.stand_ins += u64::from(stand_in(self.into, parent, *key)?);
             }
-            self.table.rows += u64::from(accepted(&mut self.insert, &values)?);
+            let is_whole = checksum::holds(self.table.name, &self.columns, &values);
+            self.table.rows += u64::from(is_whole && accepted(&mut self.insert, &values)?);
         }
     }
 }

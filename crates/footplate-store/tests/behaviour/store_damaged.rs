@@ -88,6 +88,27 @@ fn a_bent_page_is_noticed_and_the_rest_salvaged() {
 }
 
 #[test]
+fn a_value_that_was_changed_into_another_possible_one_is_noticed() {
+    let shelf = Shelf::new();
+    full(&shelf);
+    let connection = rusqlite::Connection::open(shelf.path()).unwrap();
+    connection
+        .execute_batch(
+            "DROP TRIGGER events_are_not_changed; UPDATE events SET time_ns = time_ns + 1 WHERE id = 700;",
+        )
+        .unwrap();
+    drop(connection);
+    let error = looked_at(&shelf.path()).unwrap_err();
+    assert!(error.to_string().contains("row 700 of events is not as it was written"), "{error}");
+    let into = shelf.file("new.db");
+    let salvaged = salvage(&shelf.path(), &into).unwrap();
+    let events = salvaged.tables.iter().find(|table| table.name == "events").unwrap();
+    assert_eq!((events.rows, events.lost), (2367, 1));
+    assert!(!salvaged.is_all());
+    assert_eq!(looked_at(&into).unwrap(), 2367);
+}
+
+#[test]
 fn a_file_without_its_first_page_still_has_its_events() {
     let shelf = Shelf::new();
     let mut headless = full(&shelf);

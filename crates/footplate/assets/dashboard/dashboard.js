@@ -19,6 +19,8 @@ const PAGES = {
   layout: layoutPage, train: trainPage, calibration: calibrationPage, health: healthPage, recordings: recordingsPage, odometry: odometryPage,
   editor: editorPage,
 };
+/** The header says how far the session is on disk when that is further back than this (s): a usual commit takes 0.02 s. */
+const LATE_ON_DISK_S = 1;
 const COLOURS = { connecting: "amber", connected: "green", lost: "red" };
 
 const $ = (id) => document.getElementById(id);
@@ -70,6 +72,13 @@ function state() {
   shown.textContent = isAlarmed ? say("connected-alarmed", alarmed.dangers) : say(live.state);
 }
 
+/** How far the session is on disk, when that lags. */
+function written({ t_s, written_until_s }) {
+  const behind = written_until_s == null ? 0 : t_s - written_until_s;
+  $("written").hidden = behind < LATE_ON_DISK_S;
+  $("written").textContent = behind < LATE_ON_DISK_S ? "" : say("written-until", behind.toFixed(0));
+}
+
 async function begin() {
   translate(document);
   await live.begin();
@@ -80,6 +89,7 @@ async function begin() {
     $("page").focus();
   });
   live.addEventListener("picture", ({ detail }) => links(detail));
+  live.addEventListener("picture", ({ detail }) => written(detail));
   live.addEventListener("state", state);
   alarmed.addEventListener("alarms", state);
   for (const kind of ["picture", "line", "passed", "ended", "alarm", "gap", "anew"]) {

@@ -358,10 +358,17 @@ impl Watchdog {
         if recovery.lost >= MOST_LOST {
             return self.need_person(now, train);
         }
-        let crawl = recovery.steps.crawl;
+        let (crawl, reversals) = (recovery.steps.crawl, recovery.reversals);
         recovery.ratios.clear();
         recovery.by = now + FOUND_WITHIN;
-        self.crawl(now, train, crawl, None);
+        if self.permits_all {
+            return self.crawl(now, train, crawl, None);
+        }
+        // Ahead the track may end or be reserved for others; the train ran over the track behind it.
+        match self.behind.get(&train).map(|node| node.reverse()) {
+            seen @ Some(_) if reversals < MOST_REVERSALS => self.creep_back(now, train, seen),
+            _ => self.need_person(now, train),
+        }
     }
 
     fn turn_or_decide(&mut self, now: Timestamp, train: TrainId) {

@@ -5,6 +5,7 @@ use rusqlite::{Connection, Transaction, params_from_iter};
 
 use super::leaf_pages::{FoundRow, Pages};
 use super::{Parent, SalvagedTable, TABLES, accepted, columns_of, stand_in};
+use crate::store::checksum;
 use crate::store::file::Store;
 
 /// All rows of a file by its pages, and an empty store to try them in.
@@ -93,7 +94,7 @@ impl<'a> Strays<'a> {
         let (Some((name, _)), columns) = (TABLES.get(at), self.columns_for(at, row)) else {
             return Ok(false);
         };
-        if columns.len() != row.values.len() {
+        if columns.len() != row.values.len() || !checksum::holds(name, columns, &values_of(row)) {
             return Ok(false);
         }
         let mut insert = self.trial.prepare_cached(&insertion(name, columns))?;

@@ -29,8 +29,14 @@ impl Interface {
     /// step, and say again what it may have missed.
     pub(super) fn put_in_doubt(&mut self, now: Timestamp, heard: Timestamp) {
         // What was being said may have come half. A release is said again by itself.
-        if let Exchange::Sending(Sending { purpose: Purpose::Told(command), .. }) = self.exchange {
+        if let Exchange::Sending(sending @ Sending { purpose: Purpose::Told(command), .. }) = self.exchange {
             self.unanswered.push(command);
+            // All its bytes may have arrived: the solenoid is released before another is powered.
+            if let Command::Turnout { turnout, .. } = command
+                && sending.next_byte().is_none()
+            {
+                self.solenoid.power(turnout, now);
+            }
         }
         (self.disturbed, self.is_overtaken) = (false, false);
         self.exchange = Exchange::Quiet(Quiet::begin(now, heard, true));

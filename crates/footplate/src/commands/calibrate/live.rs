@@ -169,7 +169,8 @@ impl Session<'_> {
         let at = runtime.link().now();
         let closing = runtime.close();
         drop(runtime);
-        let calibrator = calibrator.end(at);
+        // A session whose stops were not confirmed has no end in the store: the next start stops all trains first.
+        let calibrator = if closing.is_complete() { calibrator.end(at) } else { calibrator.into_machine() };
         watcher.end();
         if !closing.is_complete() {
             eprintln!("{closing}");

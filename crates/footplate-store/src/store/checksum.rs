@@ -1,0 +1,69 @@
+//! The checksum of a row: damage that turns a value into another possible one is noticed.
+
+use crc32fast::Hasher;
+use rusqlite::types::{ToSqlOutput, Value, ValueRef};
+use rusqlite::{Statement, ToSql, params_from_iter};
+
+/// The tables whose rows have a checksum. It is the last column of each; rows of older programs have none there.
+pub(super) const TABLES: [&str; 3] = ["events", "inputs", "decisions"];
+/// The column of the checksum.
+pub(super) const COLUMN: &str = "crc32";
+
+/// Returns the CRC-32 of a table's name and the values of a row, in the order of the table's columns, without the row's number and the
+/// checksum itself. Types and lengths are included, so that no two rows are the same bytes.
+pub(super) fn of<'v>(table: &str, values: impl IntoIterator<Item = ValueRef<'v>>) -> u32 {
+    let mut hasher = Hasher::new();
+    hasher.update(table.as_bytes());
+    for value in values {
+        match value {
+            ValueRef::Null => hasher.update(&[0]),
+            ValueRef::Integer(number) => {
+                hasher.update(&[1]);
+                hasher.update(&number.to_le_bytes());
+            }
+            ValueRef::Real(number) => {
+                hasher.update(&[2]);
+                // SQLite keeps whole numbers as integers, which have no negative zero.
+                hasher.update(&(number + 0.0).to_le_bytes());
+            }
+            ValueRef::Text(bytes) | ValueRef::Blob(bytes) => {
+                hasher.update(&[3]);
+                hasher.update(&(bytes.len() as u64).to_le_bytes());
+                hasher.update(bytes);
+            }
+        }
+    }
+    hasher.finalize()
+}
+
+/// Inserts a row whose checksum is the last parameter of the statement. `values` are those before it, in the order of the table's
+/// columns.
+pub(super) fn insert(
+    statement: &mut Statement<'_>,
+    table: &str,
+    values: &[&dyn ToSql],
+) -> rusqlite::Result<()> {
+    let written = values.iter().copied().map(ToSql::to_sql).collect::<rusqlite::Result<Vec<_>>>()?;
+    let refs = written.iter().filter_map(|value| match value {
+        ToSqlOutput::Borrowed(value) => Some(*value),
+        ToSqlOutput::Owned(value) => Some(ValueRef::from(value)),
+        _ => None,
+    });
+    let checksum = of(table, refs);
+    let last: &dyn ToSql = &checksum;
+    statement.execute(params_from_iter(values.iter().copied().chain([last])))?;
+    Ok(())
+}
+
+/// Whether a row of a table is as it was written, as far as its checksum shows; `values` begin with its number. Only a whole row of one
+/// of [`TABLES`] has a checksum.
+pub(super) fn holds(table: &str, columns: &[String], values: &[Value]) -> bool {
+    match values {
+        [_, values @ .., Value::Integer(written)]
+            if TABLES.contains(&table) && columns.last().is_some_and(|last| last == COLUMN) =>
+        {
+            i64::from(of(table, values.iter().map(ValueRef::from))) == *written
+        }
+        _ => true,
+    }
+}
