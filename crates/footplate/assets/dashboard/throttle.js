@@ -1,13 +1,16 @@
-// The throttle of a train: step, stop and reverse, large enough for a thumb, and lockable to this train.
+// The throttle of a train: step, stop, reverse, light and functions, large enough for a thumb, and lockable to this train.
 
 import { put } from "./dom.js";
 import { orderAtOnce } from "./server.js";
 import { say } from "./words.js";
 
+/** The functions that every station can switch: the light, which is F0, and F1 to F4. */
+const FUNCTIONS = [0, 1, 2, 3, 4];
+
 export class Throttle {
   /** Whether the slider is being moved. */
   isDragged = false;
-  #slider; #shown; #train; #lock; #give; #step = 0;
+  #slider; #shown; #train; #lock; #give; #functions; #step = 0;
 
   /** `give` sends a command and shows its result beside the throttle. */
   constructor(root, train, give) {
@@ -20,6 +23,18 @@ export class Throttle {
     $("#faster").addEventListener("click", () => this.#runAt(Number(slider.value) + 1));
     $("#stop").addEventListener("click", () => give(`stop ${train}`));
     $("#reverse").addEventListener("click", () => give(`reverse ${train}`));
+    this.#functions = FUNCTIONS.map((number) => {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.textContent = number === 0 ? say("light") : `F${number}`;
+      button.setAttribute("aria-pressed", "false");
+      button.addEventListener("click", () => {
+        const isOn = button.getAttribute("aria-pressed") === "true";
+        give(`function ${train} ${number} ${isOn ? "off" : "on"}`);
+      });
+      return button;
+    });
+    $("#functions").append(...this.#functions);
     this.#lock.addEventListener("click", () => this.#lockTo(!this.isLocked));
     document.addEventListener("visibilitychange", this.#left);
     put(this.#lock, say("lock"));
@@ -47,8 +62,9 @@ export class Throttle {
     if (document.hidden && this.isLocked && this.#step > 0) orderAtOnce(`stop ${this.#train}`);
   };
 
-  show({ step }, highest) {
+  show({ step, functions }, highest) {
     this.#step = step;
+    FUNCTIONS.forEach((number) => this.#functions[number].setAttribute("aria-pressed", String(functions.includes(number))));
     if (highest) this.#slider.max = String(highest);
     if (this.isDragged) return;
     if (document.activeElement !== this.#slider) this.#slider.value = String(step);

@@ -97,6 +97,13 @@ test("a throttle is locked to its train on a phone, and the train stops when the
   assert.ok(await page.locator("#stop").isVisible());
   for (const gone of ["nav", ".charts", ".orders", "#track"]) assert.ok(await page.locator(gone).isHidden(), gone);
   for (const button of ["#slower", "#faster", "#stop", "#reverse"]) assert.ok((await page.locator(button).boundingBox()).height >= 64, button);
+  // The light is shown as switched, on this page and on every other.
+  const light = page.locator("#functions button").first();
+  assert.equal(await light.textContent(), "Light");
+  await light.click();
+  await until(page, () => document.querySelector("#functions button").getAttribute("aria-pressed") === "true");
+  await light.click();
+  await until(page, () => document.querySelector("#functions button").getAttribute("aria-pressed") === "false");
   for (let step = 0; step < 6; step++) await page.click("#faster");
   await until(page, () => /^Runs at \d+ mm\/s \(\d+ km\/h\), step 6\.$/.test(document.querySelector("#now").textContent));
   assert.deepEqual(await findings(page), []);
