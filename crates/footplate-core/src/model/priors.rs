@@ -9,13 +9,10 @@ use super::parameters::{
 use super::survey::SectionIndex;
 use crate::linalg::NormalEquations;
 
-/// A sum of a stop and the next start is observed, never the stop alone: a stop that is longer and a start that is later by the
-/// same distance fit as well. The laws decide, and trains whose laws differ came to rest elsewhere than estimated, by 5 to 8 mm
-/// in two other simulators and by 12 mm (rms over trains, 80 to 260 mm/s) in a third, less at creep speed. Hence one standard
-/// deviation as a time (s) at the speed that a train has before the end of its stop, ...
-const END_OF_STOP_TIME: f64 = 0.08;
-/// ... which is at most this (m/s).
-const END_OF_STOP_SPEED: f64 = 0.1;
+/// No sensor observes the last centimetres of a stop. Dry friction and gears end it elsewhere than any law, the same way each
+/// time, and a start that seems later compensates. Healthy trains of two simulators with other equations came to rest 5 to 8 mm
+/// beyond the estimate (m).
+pub(crate) const END_OF_STOP: f64 = 0.0035;
 /// Standard deviation of a law's shape in the middle of a change, as part of its displacement: no shape fits all decoders.
 pub(super) const SHAPE_ERROR: f64 = 0.04;
 /// Path lengths differ from surveyed lengths by some per cent because of curves and slopes (published section means: 1 to
@@ -44,11 +41,6 @@ pub(crate) fn section_variance(sections: &SectionIndex, section: usize) -> f64 {
 /// Standard deviation of the distance that a change adds to its law (m), by its change of speed (m/s).
 pub(crate) fn change_error(change: f64) -> f64 {
     CHANGE_ERROR * USUAL_DELAY * change.abs() + LEAST_CHANGE_ERROR
-}
-
-/// Standard deviation (m) of where a stop from a speed (m/s) ends, beyond the uncertainty of the fit: see [`END_OF_STOP_TIME`].
-pub(crate) fn end_of_stop(speed: f64) -> f64 {
-    END_OF_STOP_TIME * speed.clamp(0.0, END_OF_STOP_SPEED)
 }
 
 /// Variance of ln speed between runs. A speed without uncertainty was given to an oracle for this very run.
