@@ -74,11 +74,12 @@ impl Client {
             self.opening = Opening::Identity;
         }
         while let Some(next) = self.next(now) {
-            self.dialogue.write(next.request.to_string().into_bytes());
-            if let (Request::Function { cab, .. }, 2..) = (next.request, next.tries) {
-                // The first request may have been obeyed and its answer lost: a second one then changes nothing, and has none.
-                self.dialogue.write(Request::Locomotive { cab }.to_string().into_bytes());
-            }
+            let request = match next.request {
+                // The first request may have been obeyed and its answer lost: a second one changes nothing then, and has none.
+                Request::Function { cab, .. } if next.tries % 2 == 0 => Request::Locomotive { cab },
+                request => request,
+            };
+            self.dialogue.write(request.to_string().into_bytes());
             self.dialogue.sent(now, next);
         }
     }

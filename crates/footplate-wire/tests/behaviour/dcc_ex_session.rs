@@ -387,6 +387,6 @@ fn a_function_whose_answer_was_lost_is_asked_for() {
     desk.station.answers.retain(|(request, _)| *request != "<t 24>");
     desk.station.answers.push(("<t 24>", "<l 24 0 0 268435456>\n"));
     desk.run_for(1_000);
-    assert_eq!(desk.texts().into_iter().filter(|text| text.starts_with("<F 24 28 1>")).count(), 2);
+    assert_eq!(desk.texts().into_iter().filter(|text| text.starts_with("<F 24 28 1>")).count(), 1);
     assert!(!desk.notices.iter().any(|notice| matches!(notice, LinkNotice::Unconfirmed { .. })));
 }
