@@ -25,7 +25,7 @@ use tokio::sync::Semaphore;
 use tokio::time::{interval, sleep, timeout};
 
 use crate::clock::Stopwatch;
-use crate::dashboard::{Answer, Board, Request};
+use crate::dashboard::{Board, Request};
 use crate::link::{PowerCommand, SharedTallies};
 
 /// JMRI's port, at which phones look first.
@@ -34,8 +34,6 @@ const USUAL_PORT: u16 = 12_090;
 const MOST_PHONES: usize = 32;
 /// How often a phone's display follows the railway.
 const DISPLAY_INTERVAL: Duration = Duration::from_millis(200);
-/// The longest wait for the control loop, which reads requests every few hundredths of a second.
-const LOOP_TIMEOUT: Duration = Duration::from_secs(2);
 /// A phone that does not read for so long is gone.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
 /// Pause after a connection failed for lack of descriptors.
@@ -284,12 +282,7 @@ impl Station {
             PhoneOrder::EmergencyStop => Request::EmergencyStop,
             PhoneOrder::PowerOn => Request::Line("power on".to_owned()),
         };
-        let answered = self.board.ask(request).map_err(|_| "too many orders wait: try again".to_owned())?;
-        match timeout(LOOP_TIMEOUT, answered).await {
-            Ok(Ok(Answer::Taken)) => Ok(()),
-            Ok(Ok(Answer::Refused(why))) => Err(why),
-            _ => Err("the control loop did not answer: is the link in order?".to_owned()),
-        }
+        self.board.ask_and_wait(request).await.map_err(|not_done| not_done.says().to_owned())
     }
 }
 

@@ -12,7 +12,7 @@ use alloc::vec::Vec;
 use alloc::{format, vec};
 
 use footplate_core::track::Leg;
-use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use super::client_line::{Action, ClientLine, ThrottleKey, TurnoutAction};
 use super::server_line::{FULL_SPEED, ServerLine};
@@ -440,9 +440,7 @@ fn changed_functions(
     before: u32,
     after: u32,
 ) -> impl Iterator<Item = ServerLine> {
-    /// F0 to F28, as far as DCC goes.
-    const FUNCTIONS: u8 = 29;
-    (0..FUNCTIONS)
+    (0..=FunctionNumber::HIGHEST)
         .filter(move |number| is_on(before, *number) != is_on(after, *number))
         .map(move |number| ServerLine::Function(throttle, key, number, is_on(after, number)))
 }

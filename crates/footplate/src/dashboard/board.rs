@@ -68,6 +68,31 @@ impl PendingRequest {
     }
 }
 
+/// The longest wait for the control loop, which reads requests every few hundredths of a second.
+const LOOP_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Why a request was not carried out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum NotDone {
+    /// Too many requests wait.
+    TooMany,
+    /// Rejected, with the reason.
+    Refused(String),
+    /// The control loop has not answered in time.
+    NoAnswer,
+}
+
+impl NotDone {
+    /// The reason, for people.
+    pub(crate) fn says(&self) -> &str {
+        match self {
+            Self::TooMany => "too many orders wait: ask again in a moment",
+            Self::Refused(why) => why,
+            Self::NoAnswer => "the control loop did not answer: is the link in order?",
+        }
+    }
+}
+
 /// Rejected: too many requests are waiting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct TooMany;
@@ -193,6 +218,16 @@ impl Board {
             Request::Line(_) => return Err(TooMany),
         }
         Ok(answered)
+    }
+
+    /// Adds a request and waits for the control loop's answer.
+    pub(crate) async fn ask_and_wait(&self, request: Request) -> Result<(), NotDone> {
+        let answered = self.ask(request).map_err(|TooMany| NotDone::TooMany)?;
+        match tokio::time::timeout(LOOP_TIMEOUT, answered).await {
+            Ok(Ok(Answer::Taken)) => Ok(()),
+            Ok(Ok(Answer::Refused(why))) => Err(NotDone::Refused(why)),
+            _ => Err(NotDone::NoAnswer),
+        }
     }
 
     pub(crate) fn pictures(&self) -> watch::Receiver<Arc<str>> {

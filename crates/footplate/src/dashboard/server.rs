@@ -35,7 +35,7 @@ use serde_json::json;
 use tokio::net::TcpListener;
 
 use super::assets::asset;
-use super::board::{self, Answer, Board};
+use super::board::{self, Board, NotDone};
 use super::connections::{LastRequest, Limits, serve};
 use super::guard::{Denied, Guard};
 use super::model_picture::ModelPicture;
@@ -48,8 +48,6 @@ use crate::link::{LineTallies, SharedTallies};
 
 /// The largest request body, in bytes: longer than any command.
 const MAX_BODY: usize = 4 << 10;
-/// The longest wait for the control loop, which reads requests every few hundredths of a second.
-const LOOP_TIMEOUT: Duration = Duration::from_secs(2);
 /// The time in which the last answer reaches the browser, even on a busy machine.
 const LAST_ANSWER_TIME: Duration = Duration::from_millis(300);
 /// The default port.
@@ -299,15 +297,15 @@ async fn emergency_stop(State(shared): State<Shared>) -> Response {
 }
 
 async fn ask(board: &Board, request: board::Request) -> Response {
-    let answer = |status: StatusCode, error: &str| (status, Json(json!({ "error": error }))).into_response();
-    let Ok(answered) = board.ask(request) else {
-        return answer(StatusCode::TOO_MANY_REQUESTS, "too many orders wait: ask again in a moment");
+    let Err(not_done) = board.ask_and_wait(request).await else {
+        return (StatusCode::ACCEPTED, Json(json!({ "taken": true }))).into_response();
     };
-    match tokio::time::timeout(LOOP_TIMEOUT, answered).await {
-        Ok(Ok(Answer::Taken)) => (StatusCode::ACCEPTED, Json(json!({ "taken": true }))).into_response(),
-        Ok(Ok(Answer::Refused(why))) => answer(StatusCode::UNPROCESSABLE_ENTITY, &why),
-        _ => answer(StatusCode::GATEWAY_TIMEOUT, "the control loop did not answer: is the link in order?"),
-    }
+    let status = match not_done {
+        NotDone::TooMany => StatusCode::TOO_MANY_REQUESTS,
+        NotDone::Refused(_) => StatusCode::UNPROCESSABLE_ENTITY,
+        NotDone::NoAnswer => StatusCode::GATEWAY_TIMEOUT,
+    };
+    (status, Json(json!({ "error": not_done.says() }))).into_response()
 }
 
 #[cfg(test)]
