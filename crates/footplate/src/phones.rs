@@ -251,12 +251,13 @@ impl Station {
         let mut goes_on = true;
         while let Some(output) = phone.poll_output() {
             match output {
-                PhoneOutput::Line(line) => {
+                PhoneOutput::Line(line) if goes_on => {
                     let text = format!("{line}\n");
-                    // A phone that is gone still has trains to stop.
-                    goes_on &=
+                    goes_on =
                         matches!(timeout(WRITE_TIMEOUT, write.write_all(text.as_bytes())).await, Ok(Ok(())));
                 }
+                // The trains of a phone that does not read are stopped without more waiting.
+                PhoneOutput::Line(_) => {}
                 PhoneOutput::Order(order) => {
                     if let Err(why) = self.order(order).await {
                         phone.handle_refusal(self.now(), &why);
