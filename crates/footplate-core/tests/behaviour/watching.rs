@@ -37,6 +37,16 @@ impl Watched {
         Self { world, dog, notices: Vec::new(), commanded: Vec::new() }
     }
 
+    fn asking() -> Self {
+        let mut watched = Self::one();
+        watched.dog.ask_before_crawling();
+        watched.go(FIRST, 8);
+        watched.run(6.0);
+        watched.dog.distrust(watched.world.now, FIRST);
+        watched.run(30.0);
+        watched
+    }
+
     /// The same, with train 58 half a lap ahead.
     fn two() -> Self {
         let mut world = ToyRailway::new(24, "D1", 300.0);
@@ -313,12 +323,7 @@ fn orders_waiting_for_a_placed_train_are_reported_as_cancelled() {
 
 #[test]
 fn the_first_train_asked_waits_for_the_answer() {
-    let mut watched = Watched::one();
-    watched.dog.ask_before_crawling();
-    watched.go(FIRST, 8);
-    watched.run(6.0);
-    watched.dog.distrust(watched.world.now, FIRST);
-    watched.run(30.0);
+    let mut watched = Watched::asking();
     let asked = |notice: &Notice| matches!(notice, Notice::AsksToCreep { train: FIRST });
     assert_eq!(watched.notices.iter().filter(|notice| asked(notice)).count(), 1);
     assert!(watched.world.trains[0].speed_mm_per_s < 1.0);
@@ -328,13 +333,8 @@ fn the_first_train_asked_waits_for_the_answer() {
 
 #[test]
 fn a_train_lost_again_on_reserved_track_does_not_creep_on() {
-    let mut watched = Watched::one();
     // Given a train under a dispatcher that is located and measured again,
-    watched.dog.ask_before_crawling();
-    watched.go(FIRST, 8);
-    watched.run(6.0);
-    watched.dog.distrust(watched.world.now, FIRST);
-    watched.run(30.0);
+    let mut watched = Watched::asking();
     watched.dog.permit(watched.world.now, FIRST);
     let is_located =
         |watched: &Watched| watched.notices.iter().any(|notice| matches!(notice, Notice::Located { .. }));
