@@ -5,7 +5,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::parameters::{Answers, HYSTERESIS, hysteresis_at, prior_means, speed_prior};
-use super::priors::END_OF_STOP;
+use super::priors::end_of_stop;
 use super::priors::section_variance;
 use super::scatter::Scatter;
 use super::segment::{Pace, Segment, SpeedCommand};
@@ -250,7 +250,7 @@ impl MotionModel {
             distance: Length::from_m(distance.max(0.0)),
             doubt: Length::from_m(libm::hypot(
                 self.deviation_with_scale(|answers| stop(answers).0),
-                END_OF_STOP,
+                end_of_stop(speed),
             )),
             scatter: Length::from_m(libm::hypot(
                 self.scatter(speed),
