@@ -1,9 +1,9 @@
-//! What a train may do at most, and why a profile within that cannot be had.
+//! Limits of speed, acceleration and jerk, and why no profile within them reaches a target.
 
 use super::motion::MotionState;
 use crate::units::{Acceleration, Jerk, Length, Speed};
 
-/// The most that a profile uses; every limit is a size without a sign, above zero.
+/// Upper limits of a profile; each is a magnitude above zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Limits {
@@ -17,35 +17,35 @@ pub struct Limits {
     pub jerk: Jerk,
 }
 
-/// Why there is no profile from here to there.
+/// Why there is no profile from the current state to the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum ProfileError {
     /// A limit is zero, negative or not a number.
     NoLimit {
-        /// Its name in [`Limits`].
+        /// The name of its field in [`Limits`].
         limit: &'static str,
-        /// What was given, in SI units.
+        /// The value given, in SI units.
         found: f64,
     },
     /// A distance, speed or acceleration is not finite.
     NotFinite {
-        /// The state that holds it.
+        /// The state that contains it.
         found: MotionState,
     },
-    /// The target's speed is above the limit, or leads back to where the train comes from.
+    /// The target's speed is above the limit, or points back to the current position.
     TargetSpeed {
-        /// What was asked.
+        /// The speed requested.
         found: Speed,
         /// The limit.
         highest: Speed,
     },
-    /// A jerk-limited profile ends without acceleration.
+    /// The target has an acceleration, but a jerk-limited profile ends without one.
     TargetAcceleration {
-        /// What was asked.
+        /// The acceleration requested.
         found: Acceleration,
     },
-    /// The train runs away from the target and has to stop first.
+    /// The train moves away from the target and has to stop first.
     RunsAway {
         /// Its speed.
         found: Speed,
@@ -60,7 +60,7 @@ pub enum ProfileError {
         /// Its acceleration.
         found: Acceleration,
     },
-    /// The target is nearer than the train can reach its speed.
+    /// The target is too near for the train to reach its speed.
     TooNear {
         /// The remaining distance.
         found: Length,

@@ -1,20 +1,20 @@
-//! A stretch of constant jerk, counted from its slow end.
+//! A phase of constant jerk, counted from its slow end.
 //!
-//! Counting a stop from the standstill at its end instead of from the speed at its beginning keeps the digits where
-//! the train is slow: speed and remaining distance go to zero together, without a difference of large numbers.
+//! A stop is counted back from standstill, not forward from its initial speed. This keeps precision where the train is
+//! slow: speed and remaining distance go to zero together, without a difference of large numbers.
 
 use super::slow_end::SlowEnd;
 
 /// Distance, speed and acceleration in m, m/s and m/s².
 pub(super) type Triple = (f64, f64, f64);
 
-/// To multiply with, which is quicker than to divide by six.
+/// Multiplication is faster than division by six.
 pub(super) const SIXTH: f64 = 1.0 / 6.0;
 
-/// Motion of constant jerk, as a polynomial in the time from its slow end, which is its beginning where the
-/// train speeds up or cruises and its end where it slows down.
+/// Motion of constant jerk, as a polynomial in the time from its slow end: its beginning if the train speeds up or
+/// cruises, its end if it slows down.
 ///
-/// In the order in which a profile's samples use them; SI units throughout.
+/// Fields are in the order in which sampling a profile uses them; SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Phase {
     /// Time of the slow end.
@@ -46,13 +46,13 @@ impl Phase {
     /// The time at a distance within the phase, whose duration is `longest`.
     #[inline(always)]
     pub(super) fn time_at(&self, distance: f64, longest: f64) -> f64 {
-        let way = distance - self.distance;
+        let distance = distance - self.distance;
         let end = SlowEnd {
             speed: self.speed,
             half_acceleration: self.half_acceleration.abs(),
             sixth_jerk: self.sixth_jerk,
             quartic: 0.0,
         };
-        self.time + end.time_to_cover(way.abs(), longest).copysign(way)
+        self.time + end.time_to_cover(distance.abs(), longest).copysign(distance)
     }
 }

@@ -1,4 +1,4 @@
-//! How long a train that leaves the slow end of a phase takes to get a given way off.
+//! Time that a train takes from the slow end of a phase to a given distance from it.
 //!
 //! Counted from its slow end, forwards when the train speeds up and backwards when it slows down, every
 //! phase of every law is a polynomial
@@ -7,9 +7,9 @@
 //! d(t) = v t + h t² + k t³ + q t⁴        v ≥ 0, and d″ ≥ 0 throughout the phase
 //! ```
 //!
-//! which grows ever faster, so that one root-finder serves all of them: a start within 11 % of the root,
-//! then two steps of Halley's method (third order), which leave less than 3e-12 of the time. That is the same
-//! work whatever the numbers, so that the processor overlaps neighbouring calls.
+//! whose slope never falls, so one root-finder serves all of them: an initial value within 11 % of the root,
+//! then two steps of Halley's method (third order), which leave less than 3e-12 of the time. The amount of work does
+//! not depend on the numbers, so the processor overlaps neighbouring calls.
 
 /// The polynomial of a phase, counted from its slow end.
 #[derive(Debug, Clone, Copy)]
@@ -25,50 +25,50 @@ pub(super) struct SlowEnd {
 }
 
 impl SlowEnd {
-    /// The time (s) to move by `way` metres within a phase of `longest` seconds; 0 for no distance.
+    /// The time (s) to move by `distance` metres within a phase of `longest` seconds; 0 for no distance.
     //
-    // Always inlined: passed through memory, its argument would be written by halves and read as a whole, which
-    // makes the processor finish one call before it begins the next.
+    // Always inlined: an argument passed through memory would be written in halves and read as a whole, so the
+    // processor would finish one call before it begins the next.
     #[inline(always)]
-    pub(super) fn time_to_cover(&self, way: f64, longest: f64) -> f64 {
+    pub(super) fn time_to_cover(&self, distance: f64, longest: f64) -> f64 {
         let Self { speed: v, half_acceleration: h, sixth_jerk: k, quartic: q } = *self;
         // Where the cubic term grows, it alone gives an initial value; where it fades, the square term does.
         let growing = k > 0.0;
-        let ratio = way / if growing { k } else { h };
+        let ratio = distance / if growing { k } else { h };
         let first = least(if growing { rough_cube_root(ratio) } else { rough_square_root(ratio) }, longest);
         // The higher powers at that value add to an effective square term: one quadratic equation.
         let square = h + first * (k + first * q);
-        let mut time = least(2.0 * way / (v + libm::sqrt(v * v + 4.0 * way * square)), longest);
+        let mut time = least(2.0 * distance / (v + libm::sqrt(v * v + 4.0 * distance * square)), longest);
         for _ in 0..2 {
             let t2 = time * time;
-            let excess = time * ((v + time * h) + t2 * (k + time * q)) - way;
+            let excess = time * ((v + time * h) + t2 * (k + time * q)) - distance;
             let slope = (v + time * (2.0 * h)) + t2 * (3.0 * k + time * (4.0 * q));
             let half_bend = (h + time * (3.0 * k)) + t2 * (6.0 * q);
             time -= excess * slope / (slope * slope - excess * half_bend);
         }
-        if way > 0.0 { least(time, longest) } else { 0.0 }
+        if distance > 0.0 { least(time, longest) } else { 0.0 }
     }
 
     /// The same within 11 %, for an unbounded phase whose acceleration only grows.
     #[inline(always)]
-    pub(super) fn rough_time_to_cover(&self, way: f64) -> f64 {
+    pub(super) fn rough_time_to_cover(&self, distance: f64) -> f64 {
         let Self { speed: v, half_acceleration: h, sixth_jerk: k, .. } = *self;
-        let square = h + k * rough_cube_root(way / k);
-        if way > 0.0 { 2.0 * way / (v + libm::sqrt(v * v + 4.0 * way * square)) } else { 0.0 }
+        let square = h + k * rough_cube_root(distance / k);
+        if distance > 0.0 { 2.0 * distance / (v + libm::sqrt(v * v + 4.0 * distance * square)) } else { 0.0 }
     }
 }
 
-/// Seconds from the slow end of a phase of constant acceleration to a place `off` metres away, before it (below
-/// zero) or behind it.
+/// Seconds from the slow end of a phase of constant acceleration to a point `off` metres away, before it (negative)
+/// or beyond it.
 #[inline(always)]
 pub(super) fn even_time(off: f64, speed: f64, acceleration: f64) -> f64 {
     // v t + a t²/2 = d has no cancellation as t = 2d / (v + √(v² + 2ad)).
-    let way = off.abs();
-    let sum = speed + libm::sqrt(speed * speed + 2.0 * acceleration.abs() * way);
-    if way > 0.0 { 2.0 * off / sum } else { 0.0 }
+    let distance = off.abs();
+    let sum = speed + libm::sqrt(speed * speed + 2.0 * acceleration.abs() * distance);
+    if distance > 0.0 { 2.0 * off / sum } else { 0.0 }
 }
 
-/// The smaller of two, or the second where the first is not a number: one instruction, which `f64::min` is not.
+/// The smaller of two, or the second if the first is not a number: one instruction, unlike `f64::min`.
 #[inline(always)]
 fn least(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
@@ -92,8 +92,8 @@ fn rough_square_root(x: f64) -> f64 {
 
 /// Cube root of a number that is not negative, to two units in the last place.
 ///
-/// The one of `libm` is right to the last digit, for which it multiplies and adds in one step: slow where the
-/// processor cannot be relied upon to do that.
+/// `libm`'s is correct to the last digit, but uses fused multiply-add, which is slow on targets without that
+/// instruction.
 #[inline]
 pub(super) fn cube_root(x: f64) -> f64 {
     if x <= 0.0 {
@@ -139,12 +139,12 @@ mod tests {
         })
     }
 
-    fn way(end: &SlowEnd, t: f64) -> f64 {
+    fn distance(end: &SlowEnd, t: f64) -> f64 {
         t * (end.speed + t * (end.half_acceleration + t * (end.sixth_jerk + t * end.quartic)))
     }
 
     #[test]
-    fn the_time_to_cover_a_way_is_found_on_every_kind_of_phase() {
+    fn the_time_to_cover_a_distance_is_found_on_every_kind_of_phase() {
         let quartics = (0..100).map(|percent| {
             let share = 0.01 * f64::from(percent);
             SlowEnd { speed: 1.0 - share, half_acceleration: 0.0, sixth_jerk: 2.0 * share, quartic: -share }
@@ -153,7 +153,7 @@ mod tests {
             for step in 0..400 {
                 // Every order of magnitude down to 1e-4 of the phase, and both ends.
                 let time = 10.0_f64.powf(-0.01 * f64::from(step));
-                let found = end.time_to_cover(way(&end, time), 1.0);
+                let found = end.time_to_cover(distance(&end, time), 1.0);
                 assert!((found - time).abs() <= 1e-11 * time + 1e-15, "{end:?}: {found} and not {time}");
             }
             assert_eq!(end.time_to_cover(0.0, 1.0), 0.0);

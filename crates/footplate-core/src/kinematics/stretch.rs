@@ -1,22 +1,22 @@
-//! The shape of a profile in words: where it speeds up, cruises and slows down.
+//! The shape of a profile: when it speeds up, cruises and slows down.
 
 use crate::time::TimeSpan;
 
-/// What a train does with its speed.
+/// How the speed of a train changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Running {
     /// Getting faster.
     Accelerating,
-    /// Holding its speed.
+    /// Keeping its speed.
     Cruising,
     /// Getting slower.
     Decelerating,
 }
 
-/// A stretch of time in which a train does one of these.
+/// An interval of a profile with one sign of acceleration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stretch {
-    /// What it does.
+    /// How the speed changes.
     pub running: Running,
     /// Since the start of the profile.
     pub start: TimeSpan,
@@ -24,8 +24,8 @@ pub struct Stretch {
     pub end: TimeSpan,
 }
 
-/// Stretches from phases in order of time, each with its end and the sign of its acceleration: phases without
-/// duration are left out, and neighbours that do the same are one.
+/// Stretches from phases in order of time, each given as its end and its acceleration (only the sign counts). Phases
+/// without duration are omitted; neighbours of the same sign are merged.
 pub(super) fn stretches(phases: impl Iterator<Item = (f64, f64)>) -> impl Iterator<Item = Stretch> {
     let mut start = TimeSpan::ZERO;
     let mut phases = phases

@@ -1,4 +1,4 @@
-//! A profile played back at a steady period, for controllers that ask once in every cycle.
+//! A profile sampled at a constant period, for cyclic controllers.
 
 #![expect(clippy::indexing_slicing, reason = "phases are counted up to the last, which never ends")]
 
@@ -7,7 +7,7 @@ use crate::kinematics::motion::{MotionState, seconds};
 use crate::kinematics::phase::Phase;
 use crate::time::TimeSpan;
 
-/// The states of a profile, one every period from its start on, for ever.
+/// The states of a profile, one every period from its start, without end.
 #[derive(Debug, Clone)]
 pub struct Playback<'p> {
     profile: &'p SCurve,

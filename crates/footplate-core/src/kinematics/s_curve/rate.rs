@@ -1,14 +1,14 @@
 //! A limit of acceleration and the limit of jerk that leads up to it.
 
-/// Both limits, and what every ramp asks of them; SI units.
+/// Both limits, and the values that every ramp derives from them; SI units.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rate {
     pub(super) limit: f64,
     pub(super) jerk: f64,
-    /// One over the jerk, and over the limit.
+    /// Reciprocals of jerk and limit.
     pub(super) per_jerk: f64,
     per_limit: f64,
-    /// Time to build the limit up.
+    /// Time to build up to the limit.
     full_build_up: f64,
     /// Speed gained while acceleration builds up to the limit and fades again at once.
     least_gain: f64,
@@ -28,13 +28,13 @@ impl Rate {
         }
     }
 
-    /// Whether a gain of speed is large enough for the limit to be reached.
+    /// Whether a gain of speed is large enough to reach the limit.
     #[inline(always)]
     pub(super) fn is_reached_by(&self, gain: f64) -> bool {
         gain >= self.least_gain
     }
 
-    /// Peak acceleration, how long it takes to build up, and how long it is held, for a gain of speed.
+    /// Peak acceleration for a gain of speed, with the times to build it up and to hold it.
     #[inline(always)]
     pub(super) fn peak_for(&self, gain: f64) -> (f64, f64, f64) {
         if self.is_reached_by(gain) {
@@ -45,9 +45,10 @@ impl Rate {
         }
     }
 
-    /// The distance of a gain from a speed, and its derivative by the gain; a gain below zero is rounding.
+    /// Distance of a ramp from `low` by a gain of speed, and its derivative with respect to the gain; a gain below
+    /// zero is rounding.
     #[inline]
-    pub(super) fn way_and_slope(&self, low: f64, gain: f64) -> (f64, f64) {
+    pub(super) fn distance_and_slope(&self, low: f64, gain: f64) -> (f64, f64) {
         let gain = gain.max(0.0);
         let (_, build_up, hold) = self.peak_for(gain);
         let (time, mean) = (2.0 * build_up + hold, low + 0.5 * gain);

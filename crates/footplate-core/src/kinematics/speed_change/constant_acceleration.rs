@@ -1,4 +1,4 @@
-//! The schoolbook law: speed changes evenly.
+//! The schoolbook law: constant acceleration.
 
 use super::ends::Ends;
 use crate::kinematics::motion::{Motion, MotionState};
@@ -6,18 +6,18 @@ use crate::kinematics::slow_end::even_time;
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
 
-/// Speed as a straight line over time: two unknowns, and a jerk without limit at both ends.
+/// Speed as a straight line over time: two unknowns, and infinite jerk at both ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConstantAcceleration {
     ends: Ends,
-    /// Time, distance and speed of the slow end, from which all is counted, so that a stop ends in a speed of
-    /// exactly zero.
+    /// Time, distance and speed of the slow end, the origin of all calculations: a stop ends at a speed of exactly
+    /// zero.
     origin: (f64, f64, f64),
     acceleration: f64,
 }
 
 impl ConstantAcceleration {
-    /// From a speed to another within a duration; one that is negative counts as zero.
+    /// From one speed to another within a duration; a negative one counts as zero.
     #[inline]
     #[must_use]
     pub fn new(from: Speed, to: Speed, duration: TimeSpan) -> Self {
@@ -28,8 +28,8 @@ impl ConstantAcceleration {
         Self { ends, origin, acceleration }
     }
 
-    /// From a speed to another with an acceleration, of which only the size counts; zero takes for ever, which
-    /// is as long as a [`TimeSpan`] can be.
+    /// From one speed to another with an acceleration, whose sign is ignored; zero takes the longest possible
+    /// [`TimeSpan`].
     #[must_use]
     pub fn with_acceleration(from: Speed, to: Speed, acceleration: Acceleration) -> Self {
         let difference = (to - from).abs();
@@ -53,7 +53,7 @@ impl Motion for ConstantAcceleration {
     #[inline]
     fn time_at(&self, distance: Length) -> Option<TimeSpan> {
         let Self { origin: (start, origin, speed), acceleration, .. } = *self;
-        self.ends.time_at(distance, |way| start + even_time(way - origin, speed, acceleration))
+        self.ends.time_at(distance, |distance| start + even_time(distance - origin, speed, acceleration))
     }
 
     fn duration(&self) -> TimeSpan {

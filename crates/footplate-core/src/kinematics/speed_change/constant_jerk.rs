@@ -1,4 +1,4 @@
-//! The S-curve: acceleration grows evenly until half of the change is done, then fades as evenly.
+//! The S-curve: acceleration grows at a constant rate to the middle of the change, then falls at the same rate.
 
 use super::ends::Ends;
 use crate::kinematics::motion::{Motion, MotionState};
@@ -6,24 +6,24 @@ use crate::kinematics::phase::Phase;
 use crate::time::TimeSpan;
 use crate::units::{Jerk, Length, Speed};
 
-/// Speed as a parabola in and a parabola out, so that acceleration has no step.
+/// Speed as two parabolas, so acceleration has no step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConstantJerk {
     ends: Ends,
     half: f64,
     halves: [Phase; 2],
-    /// Distance at half of the time.
+    /// Distance at half the time.
     distance_at_half: f64,
 }
 
 impl ConstantJerk {
-    /// From a speed to another within a duration; one that is negative counts as zero.
+    /// From one speed to another within a duration; a negative one counts as zero.
     #[must_use]
     pub fn new(from: Speed, to: Speed, duration: TimeSpan) -> Self {
         let ends = Ends::symmetric(from, to, duration);
         let half = 0.5 * ends.duration;
         let middle = 0.5 * (ends.from + ends.to);
-        // v₂ − v₁ = j (Δ/2)² and the largest acceleration, at half of the time, is j Δ/2.
+        // v₂ − v₁ = j (Δ/2)² and the largest acceleration, at half the time, is j Δ/2.
         let half_peak = ends.per_duration(ends.to - ends.from);
         let sixth_jerk = 2.0 / 3.0 * ends.per_duration(half_peak);
         let distance_at_half = half * (ends.from + 1.0 / 6.0 * (ends.to - ends.from));
@@ -46,8 +46,7 @@ impl ConstantJerk {
         Self { ends, half, halves, distance_at_half }
     }
 
-    /// From a speed to another with a jerk, of which only the size counts; zero takes for ever, which is as long
-    /// as a [`TimeSpan`] can be.
+    /// From one speed to another with a jerk, whose sign is ignored; zero takes the longest possible [`TimeSpan`].
     #[must_use]
     pub fn with_jerk(from: Speed, to: Speed, jerk: Jerk) -> Self {
         let difference = (to - from).abs();
@@ -68,8 +67,8 @@ impl Motion for ConstantJerk {
     #[inline]
     fn time_at(&self, distance: Length) -> Option<TimeSpan> {
         let [first, second] = &self.halves;
-        self.ends.time_at(distance, |way| {
-            if way < self.distance_at_half { first } else { second }.time_at(way, self.half)
+        self.ends.time_at(distance, |distance| {
+            if distance < self.distance_at_half { first } else { second }.time_at(distance, self.half)
         })
     }
 

@@ -1,12 +1,12 @@
-//! The crudest law: the old speed for half of the time, then the new one.
+//! The crudest law: the old speed for half the time, then the new one.
 
 use super::ends::Ends;
 use crate::kinematics::motion::{Motion, MotionState};
 use crate::time::TimeSpan;
 use crate::units::{Length, Speed};
 
-/// A step at the middle of the interval: good enough where it does not matter what happens during the change,
-/// because the distance over the whole of it is that of the mean speed.
+/// A step at the middle of the interval: sufficient where the course of the change does not matter, because its total
+/// distance is that of the mean speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MidStep {
     ends: Ends,
@@ -14,7 +14,7 @@ pub struct MidStep {
 }
 
 impl MidStep {
-    /// From a speed to another within a duration; one that is negative counts as zero.
+    /// From one speed to another within a duration; a negative one counts as zero.
     #[must_use]
     pub fn new(from: Speed, to: Speed, duration: TimeSpan) -> Self {
         let ends = Ends::symmetric(from, to, duration);
@@ -35,10 +35,10 @@ impl Motion for MidStep {
     #[inline]
     fn time_at(&self, distance: Length) -> Option<TimeSpan> {
         let Self { ends: Ends { from, to, .. }, half } = *self;
-        self.ends.time_at(distance, |way| {
-            let beyond = way - from * half;
+        self.ends.time_at(distance, |distance| {
+            let beyond = distance - from * half;
             if beyond <= 0.0 && from > 0.0 {
-                way / from
+                distance / from
             } else if beyond > 0.0 {
                 half + beyond / to
             } else {

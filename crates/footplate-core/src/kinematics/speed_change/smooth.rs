@@ -1,4 +1,4 @@
-//! The smooth law: what a decoder's programmer writes once and uses everywhere.
+//! The smooth law: the cubic that decoder firmware uses.
 
 use super::ends::Ends;
 use crate::kinematics::motion::{Motion, MotionState};
@@ -20,15 +20,15 @@ pub struct Smooth {
 }
 
 impl Smooth {
-    /// From a speed to another within a duration; one that is negative counts as zero.
+    /// From one speed to another within a duration; a negative one counts as zero.
     #[must_use]
     pub fn new(from: Speed, to: Speed, duration: TimeSpan) -> Self {
         let ends = Ends::symmetric(from, to, duration);
         let gained = ends.to - ends.from;
         let square = ends.per_duration(ends.per_duration(gained));
         let fourth = -0.5 * ends.per_duration(square);
-        // The law is its own mirror image: backwards from its end it is the law from v₂ to v₁, and v₁ − v₂ is
-        // the gain. Turning time and distance back turns the coefficient of the even power once more.
+        // The law is symmetric: backwards from its end it is the law from v₂ to v₁ with a gain of v₁ − v₂. Mirroring
+        // time and distance changes the sign of the even power's coefficient once more.
         if gained < 0.0 {
             let origin = (ends.duration, ends.distance, ends.to);
             Self { ends, origin, cubic: -square, quartic: fourth }
@@ -56,8 +56,8 @@ impl Motion for Smooth {
     #[inline]
     fn time_at(&self, distance: Length) -> Option<TimeSpan> {
         let Self { origin: (start, origin, speed), cubic, quartic, .. } = *self;
-        self.ends.time_at(distance, |way| {
-            let off = way - origin;
+        self.ends.time_at(distance, |distance| {
+            let off = distance - origin;
             let end = SlowEnd { speed, half_acceleration: 0.0, sixth_jerk: cubic, quartic: -quartic.abs() };
             start + end.time_to_cover(off.abs(), self.ends.duration).copysign(off)
         })

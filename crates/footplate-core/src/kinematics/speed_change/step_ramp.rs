@@ -1,4 +1,4 @@
-//! Momentum as a DCC decoder does it (CV 3 and CV 4): so many milliseconds for every throttle step.
+//! Momentum of a DCC decoder (CV 3 and CV 4): a fixed time per throttle step.
 
 use super::ends::Ends;
 use super::step_table::StepTable;
@@ -7,7 +7,7 @@ use crate::kinematics::motion::{Motion, MotionState};
 use crate::time::TimeSpan;
 use crate::units::Length;
 
-/// A ramp that is linear in the throttle step, so that its speed follows the train's own table of speeds.
+/// A ramp that is linear in the throttle step; its speed follows the train's speed table.
 ///
 /// Between two steps the speed is taken as a straight line: motor and train smooth the decoder's staircase.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,8 +21,8 @@ pub struct StepRamp<'t> {
 }
 
 impl<'t> StepRamp<'t> {
-    /// From a step to another, with a time for each step; one that is negative counts as zero. Steps above the
-    /// table's last count as the last.
+    /// From one step to another, with a time per step; a negative one counts as zero. Steps above the table's last
+    /// count as the last.
     #[must_use]
     pub fn new(table: &'t StepTable, from: SpeedStep, to: SpeedStep, per_step: TimeSpan) -> Self {
         let (from, to) = (table.index(from) as f64, table.index(to) as f64);
@@ -50,8 +50,9 @@ impl Motion for StepRamp<'_> {
 
     fn time_at(&self, distance: Length) -> Option<TimeSpan> {
         let (_, start, _) = self.table.at(self.from);
-        self.ends.time_at(distance, |way| {
-            let step = self.table.step_at_area(start + self.sense * self.per_step(way), self.sense < 0.0);
+        self.ends.time_at(distance, |distance| {
+            let step =
+                self.table.step_at_area(start + self.sense * self.per_step(distance), self.sense < 0.0);
             (self.per_step * (step - self.from).abs()).min(self.ends.duration)
         })
     }

@@ -1,4 +1,4 @@
-//! The speed of a train at each throttle step, with what a ramp through the steps needs in order to be cheap.
+//! The speed of a train at each throttle step, with the integrals that make a ramp through the steps cheap.
 #![expect(clippy::indexing_slicing, reason = "every index is clamped to the table's last step")]
 
 use crate::ids::SpeedStep;
@@ -7,7 +7,7 @@ use crate::units::Speed;
 /// One entry for standstill and one for each speed of a decoder.
 const MOST_STEPS: usize = SpeedStep::HIGHEST as usize + 1;
 
-/// Speeds by throttle step, from step 0 on without a gap, in between on straight lines.
+/// Speeds by throttle step, from step 0 on without a gap, interpolated linearly.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepTable {
     /// In m/s, not negative.
@@ -17,7 +17,7 @@ pub struct StepTable {
     last: usize,
 }
 
-/// Why some speeds are no table.
+/// Why a speed table is invalid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum StepTableError {
@@ -26,7 +26,7 @@ pub enum StepTableError {
         /// How many speeds there were.
         found: usize,
     },
-    /// Speeds in a table are finite and not negative; the direction is not the table's business.
+    /// Speeds in a table are finite and not negative; they have no direction.
     NoSpeed {
         /// The step in question.
         step: usize,
@@ -85,7 +85,7 @@ impl StepTable {
         SpeedStep::new(self.last as u8).unwrap_or_default()
     }
 
-    /// The speed at a step; above the last that of the last.
+    /// The speed at a step; a step above the last counts as the last.
     #[must_use]
     pub fn speed(&self, step: SpeedStep) -> Speed {
         Speed::from_m_per_s(self.speeds[self.index(step)])
@@ -110,8 +110,8 @@ impl StepTable {
         (self.speeds[lower] + part * slope, area, slope)
     }
 
-    /// The fractional step at which the area since step 0 is reached. Where steps have no speed, several have
-    /// the same area: the lowest of them, or the highest when the steps are counted `down`.
+    /// The fractional step at which the area since step 0 is reached. Steps with zero speed share one area: the
+    /// result is the lowest of them, or the highest if the ramp runs `down`.
     pub(super) fn step_at_area(&self, area: f64, down: bool) -> f64 {
         let reached =
             self.areas[1..=self.last].partition_point(|&there| there < area || (down && there == area));
@@ -128,7 +128,7 @@ impl StepTable {
     }
 }
 
-/// How far into an interval a line that starts at `low` and rises by `rise` covers an area.
+/// The fraction of an interval over which a line from `low` with rise `rise` covers an area.
 fn part_at_area(low: f64, rise: f64, area: f64) -> f64 {
     let sum = low + libm::sqrt(low * low + 2.0 * rise * area);
     if area > 0.0 { (2.0 * area / sum).min(1.0) } else { 0.0 }
