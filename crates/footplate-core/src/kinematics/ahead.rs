@@ -75,7 +75,7 @@ impl Ahead {
             }
         }
         if self.speed < 0.0 {
-            return Err(ProfileError::RunsAway { found: current.speed });
+            return Err(ProfileError::MovesAway { found: current.speed });
         }
         if !(0.0..=limits.speed.as_m_per_s()).contains(&self.target_speed) {
             return Err(ProfileError::TargetSpeed { found: target.speed, highest: limits.speed });

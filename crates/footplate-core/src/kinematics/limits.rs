@@ -46,7 +46,7 @@ pub enum ProfileError {
         found: Acceleration,
     },
     /// The train moves away from the target and has to stop first.
-    RunsAway {
+    MovesAway {
         /// Its speed.
         found: Speed,
     },
@@ -56,7 +56,7 @@ pub enum ProfileError {
         found: Acceleration,
     },
     /// The train brakes so hard that it is at rest before the jerk limit allows it to ease off.
-    StandsFirst {
+    AtRestFirst {
         /// Its acceleration.
         found: Acceleration,
     },
@@ -89,9 +89,9 @@ impl core::fmt::Display for ProfileError {
                 let found = found.as_m_per_s2();
                 write!(f, "the acceleration at the target should be zero, not {found} m/s²")
             }
-            Self::RunsAway { found } => {
+            Self::MovesAway { found } => {
                 let found = found.as_m_per_s();
-                write!(f, "the train runs away from the target at {found} m/s: stop it first")
+                write!(f, "the train moves away from the target at {found} m/s: stop it first")
             }
             Self::BeyondLimits { found } => {
                 let found = found.as_m_per_s2();
@@ -100,7 +100,7 @@ impl core::fmt::Display for ProfileError {
                     "the train's acceleration of {found} m/s² is beyond the limits already: wait, or widen them"
                 )
             }
-            Self::StandsFirst { found } => {
+            Self::AtRestFirst { found } => {
                 let found = found.as_m_per_s2();
                 write!(
                     f,

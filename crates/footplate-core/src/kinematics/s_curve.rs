@@ -7,23 +7,16 @@
 
 #![expect(clippy::indexing_slicing, reason = "a phase's index is the number of knots passed")]
 
-mod knot;
-mod opening;
 mod peak;
 mod plan;
-mod playback;
 mod ramp;
-mod rate;
 
-pub use playback::Playback;
-
-use self::knot::Knot;
 use self::plan::{Plan, Planner};
+use self::ramp::Knot;
 use super::ahead::{Ahead, grain};
 use super::limits::{Limits, ProfileError};
-use super::motion::{Motion, MotionState, seconds, span_of};
+use super::motion::{Motion, MotionState, Stretch, seconds, span_of, stretches};
 use super::phase::{Phase, SIXTH, Triple};
-use super::stretch::{Stretch, stretches};
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
 
@@ -204,5 +197,46 @@ impl Motion for SCurve {
     fn distance(&self) -> Length {
         let [.., distance] = self.distances;
         Length::from_m(self.direction * distance)
+    }
+}
+
+/// The states of a profile, one every period from its start, without end.
+#[derive(Debug, Clone)]
+pub struct Playback<'p> {
+    profile: &'p SCurve,
+    period: TimeSpan,
+    next: TimeSpan,
+    number: usize,
+    phase: Phase,
+    /// When the next phase begins.
+    until: f64,
+}
+
+impl<'p> Playback<'p> {
+    fn new(profile: &'p SCurve, period: TimeSpan) -> Self {
+        let mut playback =
+            Self { profile, period, next: TimeSpan::ZERO, number: 0, phase: profile.phase(0), until: 0.0 };
+        playback.turn_to(0);
+        playback
+    }
+
+    fn turn_to(&mut self, number: usize) {
+        self.number = number;
+        self.phase = self.profile.phase(number);
+        self.until = if number < PHASES { self.profile.times[number + 1] } else { f64::INFINITY };
+    }
+}
+
+impl Iterator for Playback<'_> {
+    type Item = MotionState;
+
+    #[inline]
+    fn next(&mut self) -> Option<MotionState> {
+        let time = seconds(self.next);
+        while time >= self.until {
+            self.turn_to(self.number + 1);
+        }
+        self.next += self.period;
+        Some(self.profile.turned(self.phase.state_at(time)))
     }
 }

@@ -16,22 +16,14 @@
 //! every time and every distance. A change between speeds of opposite signs can be evaluated but has no inverse: a
 //! reversal is a stop and a start.
 
-mod constant_acceleration;
-mod constant_jerk;
 mod ends;
 mod lag;
-mod mid_step;
-mod smooth;
 mod step_ramp;
-mod step_table;
+mod symmetric;
 
-pub use constant_acceleration::ConstantAcceleration;
-pub use constant_jerk::ConstantJerk;
 pub use lag::Lag;
-pub use mid_step::MidStep;
-pub use smooth::Smooth;
-pub use step_ramp::StepRamp;
-pub use step_table::{StepTable, StepTableError};
+pub use step_ramp::{StepRamp, StepTable, StepTableError};
+pub use symmetric::{ConstantAcceleration, ConstantJerk, MidStep, Smooth};
 
 use super::motion::{Motion, MotionState};
 use crate::time::TimeSpan;

@@ -4,9 +4,8 @@
 
 use super::ahead::{Ahead, grain};
 use super::limits::{Limits, ProfileError};
-use super::motion::{Motion, MotionState, seconds, span_of};
-use super::slow_end::even_time;
-use super::stretch::{Stretch, stretches};
+use super::motion::{Motion, MotionState, Stretch, seconds, span_of, stretches};
+use super::phase::even_time;
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
 
@@ -29,7 +28,7 @@ pub struct Trapezoid {
 /// Speeding up or slowing down to the highest speed, cruising at it, and slowing down.
 const PHASES: usize = 3;
 
-/// A phase of constant acceleration, counted from its slow end (see `slow_end.rs`).
+/// A phase of constant acceleration, counted from its slow end (see `phase.rs`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct EvenPhase {
     time: f64,

@@ -1,7 +1,7 @@
 //! The highest speed of a jerk-limited run that is too short to cruise.
 
-use super::rate::Rate;
-use crate::kinematics::slow_end::{SlowEnd, cube_root};
+use super::ramp::Rate;
+use crate::kinematics::phase::{SlowEnd, cube_root};
 
 /// Most steps of Newton's method. Two or three are usual; the bound only keeps the loop finite.
 const MOST_STEPS: u32 = 30;

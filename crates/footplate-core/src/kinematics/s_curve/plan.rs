@@ -9,10 +9,8 @@
 //! A train that already brakes has a case between 2 and 3: it eases off, but not to zero, and brakes on. A train
 //! above the speed limit decelerates to it instead of accelerating, or only as far as the distance allows.
 
-use super::opening::{Level, Opening};
 use super::peak::{Gains, Run, peak_from_rest_to_rest};
-use super::ramp::Ramp;
-use super::rate::Rate;
+use super::ramp::{Level, Opening, Ramp, Rate};
 use crate::kinematics::ahead::{Ahead, ROUNDINGS};
 use crate::kinematics::bracket::crossing;
 use crate::kinematics::limits::{Limits, ProfileError};
@@ -117,7 +115,7 @@ impl Planner {
         }
         self.ahead.acceleration = acceleration.max(-braking).min(speeding);
         if self.leveled < -ROUNDING * speed {
-            return Err(ProfileError::StandsFirst { found });
+            return Err(ProfileError::AtRestFirst { found });
         }
         self.leveled = self.leveled.max(0.0);
         self.level.speed = if acceleration < 0.0 { self.leveled } else { self.level.speed };
