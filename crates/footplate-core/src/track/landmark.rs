@@ -5,7 +5,7 @@ use alloc::string::String;
 use core::fmt;
 
 use crate::ids::NodeId;
-use crate::track::{Layout, Position, TurnoutStates, WayError};
+use crate::track::{Layout, Position, TurnoutStates, PathError};
 use crate::units::Length;
 
 /// A place given by a node and the distance beyond it, in the direction of travel of the node.
@@ -91,8 +91,8 @@ impl Layout {
     /// The position of a landmark with the turnouts in these positions.
     ///
     /// # Errors
-    /// [`WayError`] if the path from the node cannot be followed that far.
-    pub fn locate(&self, landmark: Landmark, turnouts: &TurnoutStates) -> Result<Position, WayError> {
+    /// [`PathError`] if the path from the node cannot be followed that far.
+    pub fn locate(&self, landmark: Landmark, turnouts: &TurnoutStates) -> Result<Position, PathError> {
         let Landmark { node, offset } = landmark;
         let ahead = self.edge_ahead(node, turnouts);
         match ahead.map(|edge| Position { edge, offset: Length::ZERO }) {
@@ -103,7 +103,7 @@ impl Layout {
                 let edge = self.edge_ahead(node.reverse(), turnouts);
                 let edge = edge.map_err(|stop| stop.after(-offset))?;
                 let behind = self.advance(Position { edge, offset: Length::ZERO }, -offset, turnouts)?;
-                let position = self.reversed(behind).ok_or(WayError::NotOnLayout)?;
+                let position = self.reversed(behind).ok_or(PathError::NotOnLayout)?;
                 self.advance(position, Length::ZERO, turnouts)
             }
         }

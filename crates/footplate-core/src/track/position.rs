@@ -24,7 +24,7 @@ pub struct Position {
 /// Why a path cannot be followed to its end.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub enum WayError {
+pub enum PathError {
     /// A node or edge of another layout.
     NotOnLayout,
     /// The distance is not a finite number.
@@ -45,7 +45,7 @@ pub enum WayError {
     },
 }
 
-impl fmt::Display for WayError {
+impl fmt::Display for PathError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotOnLayout => f.write_str("the position is not on this layout"),
@@ -63,7 +63,7 @@ impl fmt::Display for WayError {
     }
 }
 
-impl core::error::Error for WayError {}
+impl core::error::Error for PathError {}
 
 impl Layout {
     /// The same point in the opposite direction of travel; `None` for a position of another layout.
@@ -79,27 +79,27 @@ impl Layout {
     /// track ends there or a turnout is unknown. A distance of zero normalises.
     ///
     /// # Errors
-    /// [`WayError`] if the path cannot be followed to its end.
+    /// [`PathError`] if the path cannot be followed to its end.
     pub fn advance(
         &self,
         position: Position,
         distance: Length,
         turnouts: &TurnoutStates,
-    ) -> Result<Position, WayError> {
+    ) -> Result<Position, PathError> {
         if !distance.is_finite() || !position.offset.is_finite() {
-            return Err(WayError::NotFinite);
+            return Err(PathError::NotFinite);
         }
         if distance < Length::ZERO {
-            let behind = self.reversed(position).ok_or(WayError::NotOnLayout)?;
+            let behind = self.reversed(position).ok_or(PathError::NotOnLayout)?;
             let behind = self.advance(behind, -distance, turnouts)?;
-            let position = self.reversed(behind).ok_or(WayError::NotOnLayout)?;
+            let position = self.reversed(behind).ok_or(PathError::NotOnLayout)?;
             // In the other direction it may be at the start of an edge, and so at the end of this one.
             return self.advance(position, Length::ZERO, turnouts);
         }
         let (mut id, mut left) = (position.edge, position.offset + distance);
         let mut passed = 0;
         loop {
-            let edge = self.edge(id).ok_or(WayError::NotOnLayout)?;
+            let edge = self.edge(id).ok_or(PathError::NotOnLayout)?;
             if left < edge.length {
                 return Ok(Position { edge: id, offset: left });
             }
@@ -182,11 +182,11 @@ pub(crate) enum Stop<'l> {
 
 impl Stop<'_> {
     /// The error for a path with this remaining distance.
-    pub(crate) fn after(self, left: Length) -> WayError {
+    pub(crate) fn after(self, left: Length) -> PathError {
         match self {
-            Self::NotOnLayout => WayError::NotOnLayout,
-            Self::TurnoutUnknown(turnout) => WayError::TurnoutUnknown { turnout, left },
-            Self::TrackEnds(node) => WayError::TrackEnds { node: node.to_owned(), left },
+            Self::NotOnLayout => PathError::NotOnLayout,
+            Self::TurnoutUnknown(turnout) => PathError::TurnoutUnknown { turnout, left },
+            Self::TrackEnds(node) => PathError::TrackEnds { node: node.to_owned(), left },
         }
     }
 }
@@ -257,9 +257,9 @@ mod tests {
             "the position of turnout 1, 30 mm before the end of the path, is unknown: throw it first"
         );
         assert!(layout.advance(start, Length::from_mm(100.0), &unknown).is_ok(), "up to it is known");
-        assert_eq!(layout.advance(start, Length::from_m(f64::NAN), &unknown), Err(WayError::NotFinite));
+        assert_eq!(layout.advance(start, Length::from_m(f64::NAN), &unknown), Err(PathError::NotFinite));
         let elsewhere = Position { edge: EdgeId(999), offset: Length::ZERO };
-        assert_eq!(layout.advance(elsewhere, Length::ZERO, &unknown), Err(WayError::NotOnLayout));
+        assert_eq!(layout.advance(elsewhere, Length::ZERO, &unknown), Err(PathError::NotOnLayout));
         assert_eq!(layout.reversed(elsewhere), None);
     }
 

@@ -5,7 +5,7 @@ use core::fmt;
 
 use crate::ids::{SpeedStep, TrainId, TurnoutId};
 use crate::time::TimeSpan;
-use crate::track::WayError;
+use crate::track::PathError;
 use crate::units::{Length, Ratio, Speed};
 
 use super::order::Gap;
@@ -47,7 +47,7 @@ pub enum Refusal {
         found: Length,
     },
     /// The place cannot be located with the turnouts as they are.
-    Place(WayError),
+    Place(PathError),
     /// No path leads there with the turnouts as they are.
     NoWay {
         /// The target.
