@@ -10,8 +10,8 @@ use crate::ids::{EdgeId, NodeId, TurnoutId};
 use crate::track::hop::Hops;
 use crate::track::survey::surveyed_distances;
 use crate::track::{
-    Edge, Layout, LayoutError, LayoutPlan, Leg, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Node, NodeKind, Place,
-    PlannedZone, StretchLength, Survey, Ways,
+    Edge, Layout, LayoutError, LayoutPlan, Leg, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Node, NodeKind,
+    OutgoingEdges, Place, PlannedZone, StretchLength, Survey,
 };
 use crate::units::Length;
 
@@ -88,7 +88,7 @@ impl Layout {
         let counted = self.nodes().zip(&reached_by).map(|((node, _), count)| (node, *count));
         let mut free: Vec<NodeId> = counted.filter(|(_, count)| *count == 0).map(|(node, _)| node).collect();
         while let Some(node) = free.pop() {
-            for edge in self.ways(node).edges().filter_map(spot) {
+            for edge in self.outgoing(node).edges().filter_map(spot) {
                 if let Some(count) = reached_by.get_mut(usize::from(edge.to.0)) {
                     *count -= 1;
                     if *count == 0 {
@@ -101,7 +101,8 @@ impl Layout {
         let mut node = self.nodes().map(|(node, _)| node).find(|node| stays(*node))?;
         // Every remaining node is reached from another one: as many steps back as there are nodes end on a loop.
         for _ in &self.nodes {
-            let mut before = self.ways(node.reverse()).edges().filter_map(spot).map(|edge| edge.to.reverse());
+            let mut before =
+                self.outgoing(node.reverse()).edges().filter_map(spot).map(|edge| edge.to.reverse());
             node = before.find(|node| stays(*node))?;
         }
         Some(node)
@@ -265,15 +266,15 @@ fn join(plan: &LayoutPlan, places: &Places) -> Result<(Vec<Node>, Vec<Edge>), La
     }
     let nodes = places.nodes.iter().zip(&leaving).zip(0_u16..).map(|(((name, kind), edges), number)| {
         let open = |leg| LayoutError::RailEndOpen { place: NodeId(number).pair(), node: name.clone(), leg };
-        let ways = match (kind, *edges) {
-            (NodeKind::Exit, _) => Ways::Ended,
-            (NodeKind::Branch(_), [Some(straight), Some(curved)]) => Ways::Legs { straight, curved },
+        let outgoing = match (kind, *edges) {
+            (NodeKind::Exit, _) => OutgoingEdges::Ended,
+            (NodeKind::Branch(_), [Some(straight), Some(curved)]) => OutgoingEdges::Legs { straight, curved },
             (NodeKind::Branch(_), [None, _]) => return Err(open(Some(Leg::Straight))),
             (NodeKind::Branch(_), [_, None]) => return Err(open(Some(Leg::Curved))),
-            (_, [Some(edge), _]) => Ways::Ahead(edge),
+            (_, [Some(edge), _]) => OutgoingEdges::Ahead(edge),
             (_, [None, _]) => return Err(open(None)),
         };
-        Ok(Node { name: name.clone(), kind: *kind, ways })
+        Ok(Node { name: name.clone(), kind: *kind, outgoing })
     });
     Ok((nodes.collect::<Result<_, _>>()?, edges))
 }

@@ -54,7 +54,7 @@ pub struct Node {
     /// What it is.
     pub kind: NodeKind,
     /// The edges that leave it.
-    pub ways: Ways,
+    pub outgoing: OutgoingEdges,
 }
 
 /// The kind of a node.
@@ -74,7 +74,7 @@ pub enum NodeKind {
 
 /// The edges that leave a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ways {
+pub enum OutgoingEdges {
     /// One edge.
     Ahead(EdgeId),
     /// One edge for each leg of a turnout.
@@ -88,7 +88,7 @@ pub enum Ways {
     Ended,
 }
 
-impl Ways {
+impl OutgoingEdges {
     /// The edges, the straight leg before the curved one.
     pub fn edges(self) -> impl DoubleEndedIterator<Item = EdgeId> {
         let (first, second) = match self {
@@ -278,7 +278,7 @@ impl Layout {
     /// The edge from one node to another, if one leads there directly; the shorter one of two legs.
     #[must_use]
     pub fn edge_between(&self, from: NodeId, to: NodeId) -> Option<EdgeId> {
-        self.ways(from)
+        self.outgoing(from)
             .edges()
             .filter_map(|id| Some((id, self.edge(id)?)))
             .filter(|(_, edge)| edge.to == to)
@@ -289,8 +289,8 @@ impl Layout {
     /// The edges that leave a node.
     #[inline]
     #[must_use]
-    pub fn ways(&self, node: NodeId) -> Ways {
-        self.node(node).map_or(Ways::Ended, |node| node.ways)
+    pub fn outgoing(&self, node: NodeId) -> OutgoingEdges {
+        self.node(node).map_or(OutgoingEdges::Ended, |node| node.outgoing)
     }
 }
 
@@ -312,7 +312,7 @@ mod tests {
             assert_eq!((twin.from, twin.to), (edge.to.reverse(), edge.from.reverse()));
             assert_eq!(twin.length, edge.length);
             assert_eq!(id.stretch(), id.twin().stretch());
-            assert!(layout.ways(edge.from).edges().any(|leaving| leaving == id));
+            assert!(layout.outgoing(edge.from).edges().any(|leaving| leaving == id));
         }
         assert!((layout.total_length().as_mm() - 1_540.0).abs() < 1e-9, "{:?}", layout.total_length());
     }
@@ -342,6 +342,6 @@ mod tests {
         assert_eq!(layout.sensor_named("BR2"), None);
         assert_eq!(layout.node_named("b2"), None);
         assert_eq!(layout.sensor_name(SensorId(u16::MAX)), "?");
-        assert_eq!(layout.ways(NodeId(u16::MAX)), Ways::Ended);
+        assert_eq!(layout.outgoing(NodeId(u16::MAX)), OutgoingEdges::Ended);
     }
 }

@@ -129,7 +129,7 @@ impl Hops {
         for (node, _) in layout.nodes() {
             walk.mark(node, true);
             let mut open: Vec<(usize, EdgeId)> = vec![];
-            open.extend(layout.ways(node).edges().rev().map(|edge| (0, edge)));
+            open.extend(layout.outgoing(node).edges().rev().map(|edge| (0, edge)));
             while let Some((depth, id)) = open.pop() {
                 let Some(edge) = layout.edge(id) else { continue };
                 work += 1;
@@ -139,7 +139,7 @@ impl Hops {
                     walk.path.push((id, None));
                     work += hops.push(layout, node, &walk.path);
                 } else if walk.enter(id, edge.to) {
-                    open.extend(layout.ways(edge.to).edges().rev().map(|edge| (depth + 1, edge)));
+                    open.extend(layout.outgoing(edge.to).edges().rev().map(|edge| (depth + 1, edge)));
                 }
                 if work > MAX_TABLE_WORK {
                     return Err(node);

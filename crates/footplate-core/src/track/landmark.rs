@@ -5,7 +5,7 @@ use alloc::string::String;
 use core::fmt;
 
 use crate::ids::NodeId;
-use crate::track::{Layout, Position, TurnoutStates, PathError};
+use crate::track::{Layout, PathError, Position, TurnoutStates};
 use crate::units::Length;
 
 /// A place given by a node and the distance beyond it, in the direction of travel of the node.

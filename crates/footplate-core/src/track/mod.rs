@@ -28,11 +28,11 @@ mod zone;
 
 pub use circuit::Circuit;
 pub use error::{LayoutError, PlanEntry};
-pub use graph::{Edge, Layout, Node, NodeKind, Ways};
+pub use graph::{Edge, Layout, Node, NodeKind, OutgoingEdges};
 pub use hop::{Hop, HopId};
 pub use landmark::{Landmark, LandmarkError};
 pub use plan::{LayoutPlan, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Place, PlannedZone, RailEnd, Stretch};
-pub use position::{Position, PathError};
+pub use position::{PathError, Position};
 pub use reach::{MAX_MISSED, Reach, Reaches};
 pub use route::{Route, RouteError};
 pub use sequence_test::{SequenceTest, SequenceVerdict, StrayReport};

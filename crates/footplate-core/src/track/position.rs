@@ -5,7 +5,7 @@ use alloc::string::String;
 use core::fmt;
 
 use crate::ids::{EdgeId, NodeId, TurnoutId};
-use crate::track::{Edge, Layout, Leg, NodeKind, TurnoutStates, Ways};
+use crate::track::{Edge, Layout, Leg, NodeKind, OutgoingEdges, TurnoutStates};
 use crate::units::Length;
 
 /// Sums of lengths are rounded; a path that is longer than the track by no more than this ends at the end of the track.
@@ -141,13 +141,15 @@ impl Layout {
     /// The edge that leaves a node with the turnouts in these positions.
     pub(crate) fn edge_ahead(&self, node: NodeId, turnouts: &TurnoutStates) -> Result<EdgeId, Stop<'_>> {
         let node = self.node(node).ok_or(Stop::NotOnLayout)?;
-        match (node.ways, node.kind) {
-            (Ways::Ahead(edge), _) => Ok(edge),
-            (Ways::Legs { straight, curved }, NodeKind::Branch(turnout)) => match turnouts.get(turnout) {
-                Some(Leg::Straight) => Ok(straight),
-                Some(Leg::Curved) => Ok(curved),
-                None => Err(Stop::TurnoutUnknown(turnout)),
-            },
+        match (node.outgoing, node.kind) {
+            (OutgoingEdges::Ahead(edge), _) => Ok(edge),
+            (OutgoingEdges::Legs { straight, curved }, NodeKind::Branch(turnout)) => {
+                match turnouts.get(turnout) {
+                    Some(Leg::Straight) => Ok(straight),
+                    Some(Leg::Curved) => Ok(curved),
+                    None => Err(Stop::TurnoutUnknown(turnout)),
+                }
+            }
             _ => Err(Stop::TrackEnds(&node.name)),
         }
     }

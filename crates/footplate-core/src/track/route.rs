@@ -37,7 +37,7 @@ pub enum RouteError {
         node: NodeId,
     },
     /// No path leads there without reversing.
-    NoWay {
+    NoPath {
         /// The name of the node it should begin at.
         from: String,
         /// The name of the node it should end at.
@@ -51,12 +51,12 @@ impl fmt::Display for RouteError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::UnknownNode { node } => write!(f, "node {node} is not part of this layout"),
-            Self::NoWay { from, to, reverse: Some(reverse) } => write!(
+            Self::NoPath { from, to, reverse: Some(reverse) } => write!(
                 f,
                 "no path from `{from}` to `{to}` with the turnouts in their present positions, but \
                  there is one to `{reverse}`, the same place in the other direction"
             ),
-            Self::NoWay { from, to, reverse: None } => write!(
+            Self::NoPath { from, to, reverse: None } => write!(
                 f,
                 "no path from `{from}` to `{to}` with the turnouts in their present positions and \
                  without reversing"
@@ -82,7 +82,7 @@ impl Layout {
             let name = |node| self.node_name(node).to_owned();
             let reverse = to.reverse();
             let reverse = self.shortest(from, reverse, turnouts).map(|_| name(reverse));
-            return Err(RouteError::NoWay { from: name(from), to: name(to), reverse });
+            return Err(RouteError::NoPath { from: name(from), to: name(to), reverse });
         };
         let needs = edges.iter().flat_map(|edge| self.needs_of(*edge)).collect();
         Ok(Route { from, to, edges, length, needs })
@@ -104,7 +104,7 @@ impl Layout {
             if node == to {
                 return Some((arrivals.path_to(self, node), length));
             }
-            for id in self.ways(node).edges() {
+            for id in self.outgoing(node).edges() {
                 let Some(edge) = self.edge(id) else { continue };
                 let is_open = self.needs_of(id).all(|need| turnouts.allow(need));
                 if is_open && (edge.leg.is_none() || self.is_legal_after(&arrivals, node, id)) {

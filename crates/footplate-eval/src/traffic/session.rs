@@ -255,7 +255,7 @@ impl<'l> Session<'l> {
         let sensors: Vec<NodeId> = self.layout.sensors().map(|(_, node)| node).collect();
         for _ in 0..TRIES {
             let Some(node) = self.choice.of(&sensors).copied() else { return };
-            let length = self.layout.ways(node).edges().next().and_then(|edge| self.layout.edge(edge));
+            let length = self.layout.outgoing(node).edges().next().and_then(|edge| self.layout.edge(edge));
             let offset =
                 Length::from_mm(self.choice.between(0.0, length.map_or(0.0, |edge| edge.length.as_mm())));
             let journey = Journey::to(Landmark { node, offset });

@@ -44,7 +44,7 @@ impl Blocks {
                 [node, node.reverse()].into_iter().any(|node| layout.sensor_at(node).is_some())
             };
             for node in [edge.from, edge.to].into_iter().filter(|node| !is_sensor(*node)) {
-                let edges = [node, node.reverse()].into_iter().flat_map(|node| layout.ways(node).edges());
+                let edges = [node, node.reverse()].into_iter().flat_map(|node| layout.outgoing(node).edges());
                 open.extend(edges.filter(|next| !self.of.contains_key(&next.stretch())));
             }
         }

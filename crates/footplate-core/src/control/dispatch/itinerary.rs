@@ -155,12 +155,12 @@ impl<'a> Search<'a> {
             // The needs of the run so far matter only where it needs more.
             let asks = |edge| self.layout.needs_of(edge).next().is_some();
             let is_merge = self.is_merge(next.node);
-            let needs = if is_merge || ahead.is_none() || self.layout.ways(next.node).edges().any(asks) {
+            let needs = if is_merge || ahead.is_none() || self.layout.outgoing(next.node).edges().any(asks) {
                 reached.needs_until(next.node)
             } else {
                 Vec::new()
             };
-            for id in self.layout.ways(next.node).edges() {
+            for id in self.layout.outgoing(next.node).edges() {
                 let Some(edge) = self.layout.edge(id).filter(|_| self.agrees(&needs, id)) else { continue };
                 if let Some(cost) = self.seconds(id, Length::ZERO, edge.length) {
                     let by = By::Edge(next.node, id);
@@ -211,7 +211,7 @@ impl<'a> Search<'a> {
                 break;
             }
             let seen = is_seen_before || is_seen(&path);
-            for id in self.layout.ways(node).edges() {
+            for id in self.layout.outgoing(node).edges() {
                 let Some(edge) = self.layout.edge(id).filter(|_| self.agrees(needs, id)) else { continue };
                 // Backing away, it runs over turnouts only beyond a sensor, which reports where it is.
                 if !is_sure && !seen && !self.is_plain(id) {

@@ -51,7 +51,7 @@ fn path(layout: &Layout, from: EdgeId, to: EdgeId) -> Option<Vec<EdgeId>> {
         let mut longer = Vec::new();
         for path in open {
             let node = layout.edge(*path.last()?)?.to;
-            for next in layout.ways(node).edges() {
+            for next in layout.outgoing(node).edges() {
                 let path: Vec<EdgeId> = path.iter().copied().chain([next]).collect();
                 if next == to {
                     return Some(path.into_iter().skip(1).collect());

@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use crate::ids::{EdgeId, NodeId};
-use crate::track::{Layout, Leg, NodeKind, Position, TurnoutNeed, TurnoutStates, Ways};
+use crate::track::{Layout, Leg, NodeKind, OutgoingEdges, Position, TurnoutNeed, TurnoutStates};
 use crate::units::Length;
 
 use super::occupied_path::OccupiedPath;
@@ -171,14 +171,14 @@ fn next_edge(layout: &Layout, turnouts: &TurnoutStates, edge: EdgeId) -> Option<
 /// The edge ahead of a node as the turnouts lie; straight on over those of unknown position.
 pub(super) fn edge_from(layout: &Layout, turnouts: &TurnoutStates, node: NodeId) -> Option<EdgeId> {
     let node = layout.node(node)?;
-    match (node.ways, node.kind) {
-        (Ways::Ahead(next), _) => Some(next),
-        (Ways::Legs { curved, .. }, NodeKind::Branch(turnout))
+    match (node.outgoing, node.kind) {
+        (OutgoingEdges::Ahead(next), _) => Some(next),
+        (OutgoingEdges::Legs { curved, .. }, NodeKind::Branch(turnout))
             if turnouts.get(turnout) == Some(Leg::Curved) =>
         {
             Some(curved)
         }
-        (Ways::Legs { straight, .. }, _) => Some(straight),
-        (Ways::Ended, _) => None,
+        (OutgoingEdges::Legs { straight, .. }, _) => Some(straight),
+        (OutgoingEdges::Ended, _) => None,
     }
 }

@@ -25,7 +25,7 @@ pub(super) fn turnouts_within(layout: &Layout, from: NodeId, way: Length) -> BTr
         {
             found.insert(turnout);
         }
-        for edge in layout.ways(node).edges().filter_map(|id| layout.edge(id)) {
+        for edge in layout.outgoing(node).edges().filter_map(|id| layout.edge(id)) {
             let length = edge.known.shortest();
             if length <= left {
                 open.push((edge.to, left - length));

@@ -10,7 +10,7 @@ use crate::control::{Machine, Output};
 use crate::event::{Command, Event, EventKind, Report};
 use crate::ids::{EdgeId, NodeId, SensorId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Layout, Leg, TurnoutStates, Ways};
+use crate::track::{Layout, Leg, OutgoingEdges, TurnoutStates};
 
 const TICK_MS: i64 = 1;
 const POLL_MS: i64 = 62;
@@ -185,10 +185,10 @@ impl<'l> ScriptedTrain<'l> {
     }
 
     fn next_edge(&self, node: NodeId) -> Option<EdgeId> {
-        match self.layout.ways(node) {
-            Ways::Ahead(edge) => Some(edge),
-            Ways::Ended => None,
-            Ways::Legs { straight, curved } => {
+        match self.layout.outgoing(node) {
+            OutgoingEdges::Ahead(edge) => Some(edge),
+            OutgoingEdges::Ended => None,
+            OutgoingEdges::Legs { straight, curved } => {
                 let turnout = self.layout.turnouts().find(|(_, branch)| *branch == node)?.0;
                 Some(if self.legs.get(turnout) == Some(Leg::Curved) { curved } else { straight })
             }

@@ -40,7 +40,7 @@ fn walk(layout: &Layout, from: Position, reach: Length) -> BTreeSet<EdgeId> {
         let Some(known) = layout.edge(edge) else { continue };
         let rest = left - known.length;
         if rest > Length::ZERO {
-            open.extend(layout.ways(known.to).edges().map(|next| (next, rest)));
+            open.extend(layout.outgoing(known.to).edges().map(|next| (next, rest)));
         }
     }
     found

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::track::{Landmark, Layout, TurnoutStates, PathError};
+use footplate_core::track::{Landmark, Layout, PathError, TurnoutStates};
 use footplate_core::{
     FunctionNumber, Length, Ratio, SensorId, Speed, SpeedStep, TimeSpan, TrainId, TurnoutId,
 };
