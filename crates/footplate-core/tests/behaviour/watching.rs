@@ -39,7 +39,7 @@ impl Watched {
 
     fn asking() -> Self {
         let mut watched = Self::one();
-        watched.dog.ask_before_crawling();
+        watched.dog.ask_before_creeping();
         watched.go(FIRST, 8);
         watched.run(6.0);
         watched.dog.distrust(watched.world.now, FIRST);

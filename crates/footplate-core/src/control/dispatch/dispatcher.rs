@@ -73,7 +73,7 @@ impl Dispatcher {
     #[must_use]
     pub fn watched(now: Timestamp, driver: Driver) -> Self {
         let mut watchdog = Watchdog::new(driver, now);
-        watchdog.ask_before_crawling();
+        watchdog.ask_before_creeping();
         Self::over(now, watchdog)
     }
 
