@@ -93,8 +93,9 @@ impl Traffic {
     /// Every commanded turnout is reserved for exactly one train.
     fn check_turnout(&mut self, command: Command) {
         let Command::Turnout { turnout, .. } = command else { return };
-        let has_reserved =
-            |train: &&TrainId| self.dispatcher.holds(**train).is_some_and(|reserved| reserved.takes(turnout));
+        let has_reserved = |train: &&TrainId| {
+            self.dispatcher.reservation(**train).is_some_and(|reserved| reserved.takes(turnout))
+        };
         if TRAINS.iter().filter(has_reserved).count() != 1 {
             self.wrongs
                 .push(format!("turnout {turnout} was thrown without being reserved for exactly one train"));
@@ -133,7 +134,7 @@ impl Traffic {
 
     /// The track under each train is reserved for it, and no track is reserved twice.
     fn check_reservations(&mut self) {
-        let [one, two] = TRAINS.map(|train| self.dispatcher.holds(train).expect("dispatched"));
+        let [one, two] = TRAINS.map(|train| self.dispatcher.reservation(train).expect("dispatched"));
         let mut wrongs = Vec::new();
         if one.meets(two) {
             wrongs.push("two trains hold the same track".to_owned());

@@ -132,7 +132,7 @@ impl<'l> Session<'l> {
                     continue;
                 }
                 let dispatcher = dispatcher(&rehearsal, asked.by_blocks);
-                let holds = |train: &TrainId| dispatcher.holds(*train);
+                let holds = |train: &TrainId| dispatcher.reservation(*train);
                 let is_apart = trains[..nth].iter().all(|other| {
                     holds(other).zip(holds(&trains[nth])).is_some_and(|(one, two)| !one.meets(two))
                 });
@@ -358,7 +358,7 @@ pub fn is_on_reserved_track(
     train: TrainId,
 ) -> bool {
     let truth = world.truth();
-    let Some(held) = dispatcher.holds(train) else { return false };
+    let Some(held) = dispatcher.reservation(train) else { return false };
     truth.under(train).all(|(id, part)| {
         let Some(edge) = layout.edge(id) else { return false };
         let scale = edge.length.as_mm() / truth.track().length(id).as_mm().max(1e-9);

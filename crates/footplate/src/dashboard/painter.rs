@@ -179,7 +179,7 @@ impl Painter {
         now: Timestamp,
         began: Timestamp,
     ) {
-        let reserved = |train| dispatcher.holds(train).map_or_else(Vec::new, reserved_spans);
+        let reserved = |train| dispatcher.reservation(train).map_or_else(Vec::new, reserved_spans);
         self.paint_driven(dispatcher.driver(), reserved, tasks, functions, now, began);
     }
 
