@@ -8,7 +8,7 @@ use footplate_core::control::{
 };
 use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg, Position, TurnoutStates};
-use footplate_core::tracking::WayPoint;
+use footplate_core::tracking::PathPoint;
 use footplate_core::{Command, EdgeId, Length, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
 use proptest::collection::vec;
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
@@ -60,7 +60,12 @@ impl Traffic {
         for (train, (name, mm)) in TRAINS.into_iter().zip(starts) {
             let node = world.layout.node_named(name).expect("a node");
             driver.add_train(model(train));
-            driver.place(world.now, train, WayPoint { node, way: Length::from_mm(mm) }, Length::from_mm(2.0));
+            driver.place(
+                world.now,
+                train,
+                PathPoint { node, distance: Length::from_mm(mm) },
+                Length::from_mm(2.0),
+            );
             world.put(train.0, name, mm);
         }
         let mut dispatcher = dispatch(world.now, driver);
@@ -302,7 +307,12 @@ fn no_train_is_dispatched_while_the_position_of_another_is_unknown() {
     let mut driver = Driver::new(traffic.world.layout.clone(), straight());
     TRAINS.into_iter().for_each(|train| driver.add_train(model(train)));
     let node = traffic.world.layout.node_named("D1").expect("a node");
-    driver.place(traffic.world.now, TRAINS[0], WayPoint { node, way: Length::ZERO }, Length::from_mm(2.0));
+    driver.place(
+        traffic.world.now,
+        TRAINS[0],
+        PathPoint { node, distance: Length::ZERO },
+        Length::from_mm(2.0),
+    );
     let mut dispatcher = Dispatcher::new(traffic.world.now, driver);
     let journey = Journey::to(traffic.world.layout.landmark("C1+150mm").expect("a place"));
     let [known, other] = TRAINS;

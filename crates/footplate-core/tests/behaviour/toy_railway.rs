@@ -409,7 +409,7 @@ pub(crate) fn add_train(driver: &mut Driver, world: &ToyRailway, train: u16, pla
     driver.add_train(MotionModel::from_numbers(&numbers).expect("the same numbers"));
     if let Some((node, mm)) = place {
         let node = world.layout.node_named(node).expect("a node");
-        let at = footplate_core::tracking::WayPoint { node, way: Length::from_mm(mm) };
+        let at = footplate_core::tracking::PathPoint { node, distance: Length::from_mm(mm) };
         driver.place(world.now, TrainId(train), at, Length::from_mm(2.0));
     }
 }
@@ -422,7 +422,7 @@ pub(crate) fn driver_of(world: &ToyRailway, node: &str, mm: f64) -> Driver {
     let train = model.train();
     driver.add_train(model);
     let node = world.layout.node_named(node).expect("a node");
-    let at = footplate_core::tracking::WayPoint { node, way: Length::from_mm(mm) };
+    let at = footplate_core::tracking::PathPoint { node, distance: Length::from_mm(mm) };
     driver.place(world.now, train, at, Length::from_mm(2.0));
     driver
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::bail;
 use footplate_core::control::{Dispatcher, Finished, Journey, Notice, Span, TrainLengths};
 use footplate_core::track::{Landmark, Layout, Position};
-use footplate_core::tracking::WayPoint;
+use footplate_core::tracking::PathPoint;
 use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LivingLayout, LivingSwitches, Mishap};
 use footplate_wire::LinkNotice;
@@ -374,12 +374,12 @@ pub fn is_on_reserved_track(
 
 /// Where a person who looks at a train would say that it is, in lengths of the surveyed layout.
 #[must_use]
-pub fn place_by_hand(layout: &Layout, world: &LivingLayout<'_>, train: TrainId) -> Option<WayPoint> {
+pub fn place_by_hand(layout: &Layout, world: &LivingLayout<'_>, train: TrainId) -> Option<PathPoint> {
     let truth = world.truth();
     let position = truth.train(train)?.position?;
     let edge = layout.edge(position.edge)?;
     let scale = edge.length.as_mm() / truth.track().length(position.edge).as_mm().max(1e-9);
-    Some(WayPoint { node: edge.from, way: position.offset * scale })
+    Some(PathPoint { node: edge.from, distance: position.offset * scale })
 }
 
 fn dispatcher(rehearsal: &PreparedTrains<'_>, by_blocks: bool) -> Dispatcher {

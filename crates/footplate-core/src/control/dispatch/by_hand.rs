@@ -70,7 +70,7 @@ impl Dispatcher {
         let layout = self.watchdog.driver().layout();
         let envelope = self.envelope(now, train);
         let ahead = self.watchdog.driver().rest_if_stopped(id, now + REACTION).map_or(AHEAD[1], |rest| {
-            let runs_on = rest.way - located.at.way + self.overrun(id, located.uncertainty);
+            let runs_on = rest.distance - located.at.distance + self.overrun(id, located.uncertainty);
             runs_on.max(AHEAD[0]).min(AHEAD[1])
         });
         let (path, at) = Path::around(
@@ -118,8 +118,8 @@ impl Dispatcher {
         let limit = (end < reach).then(|| {
             let limit = path
                 .place(end)
-                .and_then(|place| self.watchdog.driver().way_point(id, located.at.node, place));
-            limit.filter(|limit| limit.way >= located.at.way).unwrap_or(located.at)
+                .and_then(|place| self.watchdog.driver().path_point(id, located.at.node, place));
+            limit.filter(|limit| limit.distance >= located.at.distance).unwrap_or(located.at)
         });
         self.watchdog.set_end_of_authority(now, id, limit);
         if let Some(train) = self.trains.get_mut(&id)

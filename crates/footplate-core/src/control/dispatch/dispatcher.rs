@@ -11,7 +11,7 @@ use crate::ids::{FunctionNumber, SpeedStep, TrainId, TurnoutId};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Position;
-use crate::tracking::WayPoint;
+use crate::tracking::PathPoint;
 use crate::units::Length;
 
 use super::dispatched_train::{Assignment, DispatchedTrain, Journey, State};
@@ -169,7 +169,7 @@ impl Dispatcher {
     }
 
     /// Sets the position of a train, as an operator entered it.
-    pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
+    pub fn place(&mut self, now: Timestamp, train: TrainId, at: PathPoint, uncertainty: Length) {
         self.watchdog.place(now, train, at, uncertainty);
         if let Some(known) = self.trains.get_mut(&train) {
             known.state = State::Resting;

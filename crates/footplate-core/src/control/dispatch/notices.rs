@@ -121,7 +121,8 @@ impl Dispatcher {
         let layout = self.watchdog.driver().layout();
         let rest = self.watchdog.driver().rest_if_stopped(id, now + TimeSpan::from_ms(100));
         let located = self.watchdog.driver().locate(id, now);
-        let runs_on = rest.zip(located).map_or(Length::ZERO, |(rest, located)| rest.way - located.at.way);
+        let runs_on =
+            rest.zip(located).map_or(Length::ZERO, |(rest, located)| rest.distance - located.at.distance);
         let ahead = envelope.ahead + runs_on.max(Length::ZERO) + MORE;
         let (path, at) = Path::around(
             layout,

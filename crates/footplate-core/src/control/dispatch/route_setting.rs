@@ -224,7 +224,7 @@ impl Dispatcher {
     pub(super) fn unknown_turnout_ahead(&self, now: Timestamp, train: TrainId) -> Option<UnknownTurnout> {
         let driver = self.watchdog.driver();
         let located = driver.locate(train, now).filter(|_| driver.position(train, now).is_none())?;
-        let front = located.at.way + self.envelope(now, self.trains.get(&train)?).ahead;
+        let front = located.at.distance + self.envelope(now, self.trains.get(&train)?).ahead;
         let (layout, turnouts) = (driver.layout(), driver.turnouts());
         let (mut node, mut distance) = (located.at.node, Length::ZERO);
         for _ in 0..layout.edges().len() {

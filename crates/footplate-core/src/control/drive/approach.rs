@@ -6,7 +6,7 @@ use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::model::StepUse;
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::{Located, TrackContext, WayPoint};
+use crate::tracking::{Located, PathPoint, TrackContext};
 use crate::units::{Length, Speed};
 
 use super::command_time::{CommandTime, command_time, spread};
@@ -148,14 +148,14 @@ impl DrivenTrain {
         &self,
         context: TrackContext<'_>,
         located: &Located,
-        at: WayPoint,
+        at: PathPoint,
         step: SpeedStep,
     ) -> bool {
         let speed = self.model.speed(step, Approach::Below).value;
         let stop = self.model.stop(step, Approach::Below);
         // A start never runs faster than its final speed.
-        let settled = located.at.way + speed * self.model.settles_within(SpeedStep::STAND, step);
-        let last = at.way - stop.distance - stop.doubt * STOP_MARGIN - speed * self.link.reaction;
+        let settled = located.at.distance + speed * self.model.settles_within(SpeedStep::STAND, step);
+        let last = at.distance - stop.distance - stop.doubt * STOP_MARGIN - speed * self.link.reaction;
         at.node == located.at.node
             && sensors_within(context, &self.model, at.node, last).any(|(_, distance)| distance > settled)
     }
@@ -164,7 +164,7 @@ impl DrivenTrain {
         &self,
         context: TrackContext<'_>,
         now: Timestamp,
-        at: WayPoint,
+        at: PathPoint,
         step: SpeedStep,
         destination: &Destination,
     ) -> CommandTime {

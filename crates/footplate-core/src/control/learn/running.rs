@@ -228,7 +228,7 @@ impl Calibrator<'_> {
         let mut rest_distance = None;
         for hop in context.hops_ahead(node).take(2 * MAX_AHEAD) {
             if hop.from == rest.at.node && rest_distance.is_none() {
-                rest_distance = Some(begins + rest.at.way);
+                rest_distance = Some(begins + rest.at.distance);
             }
             begins += model.length(&self.sections, &hop)[0];
             if let Some(rest_distance) = rest_distance {
@@ -318,7 +318,7 @@ impl Calibrator<'_> {
     fn distance_to_next_sensor(&self, now: Timestamp) -> Option<Length> {
         let at = self.locator.locate(self.context(), self.model(), now)?.at;
         let hop = self.context().hop_from(at.node)?;
-        Some(self.model().length(&self.sections, &hop)[0] - at.way)
+        Some(self.model().length(&self.sections, &hop)[0] - at.distance)
     }
 
     /// An experiment has ended.

@@ -132,8 +132,8 @@ impl Watchdog {
             let edges = hops.flat_map(|hop| hop.edges.iter().copied());
             let blocked = edges.into_iter().find(|edge| taken.contains(&rails(*edge)))?;
             let begin = Position { edge: blocked, offset: Length::ZERO };
-            let mut at = self.driver.way_point(train, located.at.node, begin)?;
-            at.way += -(BODY + CLEAR);
+            let mut at = self.driver.path_point(train, located.at.node, begin)?;
+            at.distance += -(BODY + CLEAR);
             Some(at)
         });
         self.driver.set_end_of_authority(now, train, limit);
@@ -188,7 +188,10 @@ impl Watchdog {
             }
             self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
             if let Some(located) = located.filter(|_| moved) {
-                let at = crate::tracking::WayPoint { way: located.at.way + STOP_WITHOUT_POWER, ..located.at };
+                let at = crate::tracking::PathPoint {
+                    distance: located.at.distance + STOP_WITHOUT_POWER,
+                    ..located.at
+                };
                 let [estimate, stop] = [located.uncertainty, STOP_WITHOUT_POWER_DEVIATION].map(Length::as_m);
                 self.driver.place(now, train, at, Length::from_m(libm::hypot(estimate, stop)));
             }

@@ -10,7 +10,7 @@ use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Position;
-use crate::tracking::{Locator, WayPoint};
+use crate::tracking::{Locator, PathPoint};
 use crate::units::Length;
 
 use super::alarm::{Alarm, ConsistencyMonitor};
@@ -135,7 +135,7 @@ impl Watchdog {
     }
 
     /// See [`Driver::set_end_of_authority`]. A train in danger keeps the limits of its recovery.
-    pub fn set_end_of_authority(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
+    pub fn set_end_of_authority(&mut self, now: Timestamp, train: TrainId, limit: Option<PathPoint>) {
         if !self.dangers.contains_key(&train) {
             self.driver.set_end_of_authority(now, train, limit);
             self.drain(now);
@@ -145,7 +145,7 @@ impl Watchdog {
     /// Sets the position of a train, as an operator entered it. A train that could not be recovered is trusted again,
     /// with its earlier model. If no train is in danger any more, held trains are released and their orders
     /// cancelled.
-    pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
+    pub fn place(&mut self, now: Timestamp, train: TrainId, at: PathPoint, uncertainty: Length) {
         self.trust_again(train);
         self.driver.place(now, train, at, uncertainty);
         self.monitors.entry(train).or_default().place();
