@@ -1,4 +1,4 @@
-//! A normal forecast of a quantity that is then known to lie between two bounds: what a report does to a forecast.
+//! A normal prediction of a quantity that is then known to be between two bounds: a prediction given a report.
 //!
 //! Letters: forecast N(m, s²), bounds a and b in standard deviations: α = (a − m)/s, β = (b − m)/s; Z = Φ(β) − Φ(α).
 //!
@@ -8,7 +8,7 @@
 //! ```
 //!
 //! (Johnson, Kotz and Balakrishnan, Continuous Univariate Distributions 1, 1994, section 10.1.) A window that is much
-//! wider than the forecast is uncertain says nothing and moves nothing, wherever its middle lies.
+//! wider than the uncertainty of the prediction contains no information, wherever its middle is.
 
 use super::uniform_normal::{normal_cdf, normal_density};
 

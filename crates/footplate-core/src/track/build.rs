@@ -68,7 +68,7 @@ impl Layout {
         }
         self.hops = Hops::of(&self).map_err(|node| {
             let (place, node) = place_and_name(&self, node);
-            LayoutError::TooManyWays { place, node }
+            LayoutError::TooManyHops { place, node }
         })?;
         self.distances = surveyed_distances(&self)?;
         Ok(self)

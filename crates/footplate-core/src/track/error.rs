@@ -170,7 +170,7 @@ pub enum LayoutError {
         node: String,
     },
     /// Too many paths from a node to the next sensors for the table of hops.
-    TooManyWays {
+    TooManyHops {
         /// The place.
         place: usize,
         /// The node.
@@ -250,7 +250,7 @@ impl LayoutError {
             | Self::TurnoutPlacedTwice { place, .. }
             | Self::RailEndOpen { place, .. }
             | Self::LoopWithoutLength { place, .. }
-            | Self::TooManyWays { place, .. } => PlanEntry::Place(place),
+            | Self::TooManyHops { place, .. } => PlanEntry::Place(place),
             Self::UnknownNode { stretch, .. }
             | Self::LegMissing { stretch, .. }
             | Self::LegWithoutTurnout { stretch, .. }
@@ -360,7 +360,7 @@ impl fmt::Display for LayoutError {
             Self::LoopWithoutLength { node, .. } => {
                 write!(f, "the edges from `{node}` come back to it after 0 mm: at least one must be longer")
             }
-            Self::TooManyWays { node, .. } => write!(
+            Self::TooManyHops { node, .. } => write!(
                 f,
                 "there are too many paths from `{node}` to the next sensors: put sensors between the \
                  turnouts"

@@ -97,6 +97,6 @@ fn private_words_only_become_fewer() {
 fn a_word_is_found_in_every_spelling() {
     let private =
         |line| words(line).iter().filter(|word| instead(word).is_some()).cloned().collect::<Vec<_>>();
-    assert_eq!(private("let is_told = self.isTold(PathPoint, always);"), ["told", "told", "way"]);
+    assert_eq!(private("let is_told = self.isTold(WayPoint, always);"), ["told", "told", "way"]);
     assert_eq!(private("/// Contacts that nobody closed."), ["contacts", "nobody"]);
 }

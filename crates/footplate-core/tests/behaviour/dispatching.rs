@@ -335,7 +335,7 @@ fn a_journey_goes_on_after_a_person_switched_the_power_off_and_on() {
     assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
 }
 
-/// The same two trains, where nobody has set any turnout.
+/// The same two trains with all turnouts unknown.
 fn with_unknown_turnouts(starts: [(&str, f64); 2]) -> Traffic {
     Traffic::with(
         |now, driver| {
@@ -352,7 +352,7 @@ fn with_unknown_turnouts(starts: [(&str, f64); 2]) -> Traffic {
 }
 
 #[test]
-fn turnouts_that_nobody_has_set_are_set_for_a_journey() {
+fn unknown_turnouts_are_set_for_a_journey() {
     let mut traffic = with_unknown_turnouts([("A1", 50.0), ("B1", 300.0)]);
     traffic.go(TRAINS[0], "C1+100mm");
     traffic.run(60.0);

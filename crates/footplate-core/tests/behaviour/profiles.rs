@@ -182,9 +182,9 @@ fn a_change_of_speed_has_its_exact_distance() {
     // From 10 m/s at a 1 m/s² to standstill: it comes to 10.5 m/s first.
     let stop = SCurve::to_speed(state(5.0, 10.0, 1.0), Speed::ZERO, limits).unwrap();
     assert_eq!(shape(stop.stretches()), [Accelerating, Decelerating]);
-    let same_by_way =
+    let same_by_distance =
         SCurve::between(state(5.0, 10.0, 1.0), at_rest(5.0 + stop.distance().as_m()), limits).unwrap();
-    assert!((stop.duration() - same_by_way.duration()).abs() < TimeSpan::from_us(1));
+    assert!((stop.duration() - same_by_distance.duration()).abs() < TimeSpan::from_us(1));
 }
 
 #[test]
