@@ -70,6 +70,14 @@ pub struct Rest {
     pub time: Timestamp,
 }
 
+impl Rest {
+    /// One standard deviation of the place.
+    #[must_use]
+    pub fn deviation(&self) -> Length {
+        Length::from_m(libm::hypot(self.doubt.as_m(), self.scatter.as_m()))
+    }
+}
+
 /// The next sensor and when its detection is due.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DueContact {

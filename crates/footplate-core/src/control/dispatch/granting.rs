@@ -346,10 +346,7 @@ impl Dispatcher {
         let model = self.watchdog.driver().model(id)?;
         let speed = |step: SpeedStep| model.speed(step, Approach::Below).value;
         let usable = || steps(model).filter(|step| speed(*step) >= CREEP && speed(*step) <= FASTEST);
-        let spread = |step: SpeedStep| {
-            let stop = model.stop(step, Approach::Below);
-            Length::from_m(libm::hypot(stop.doubt.as_m(), stop.scatter.as_m()))
-        };
+        let spread = |step: SpeedStep| model.stop(step, Approach::Below).deviation();
         let fits = |step: SpeedStep| {
             let stop = model.stop(step, Approach::Below).distance;
             let starts = speed(step) * model.settles_within(SpeedStep::STAND, step);

@@ -473,9 +473,5 @@ impl DrivenTrain {
 fn widest_stop(model: &MotionModel) -> Option<Length> {
     let steps = (1..=model.highest().get()).filter_map(SpeedStep::new);
     let moves = steps.filter(|step| model.uses(*step) == StepUse::Moves);
-    let spread = |step| {
-        let stop = model.stop(step, Approach::Below);
-        Length::from_m(libm::hypot(stop.doubt.as_m(), stop.scatter.as_m()))
-    };
-    moves.map(spread).reduce(Length::max)
+    moves.map(|step| model.stop(step, Approach::Below).deviation()).reduce(Length::max)
 }

@@ -8,7 +8,7 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{Located, PathPoint, Rest, TrackContext, distance_to_landmark, landmark_of};
 use crate::units::Length;
 
-use super::command_time::{CommandTime, command_time, spread};
+use super::command_time::{CommandTime, command_time};
 use super::driven_train::DrivenTrain;
 use super::order::{Aim, OrderId, StopOrder};
 use super::outputs::Outputs;
@@ -376,7 +376,7 @@ impl DrivenTrain {
     /// The rest relative to the target, with its 95 % interval.
     pub(super) fn promise(&self, context: TrackContext<'_>, rest: &Rest, at: PathPoint) -> Option<Promise> {
         let median = self.beyond(context, rest.at, at)?;
-        let half = spread(rest) * HALF_95;
+        let half = rest.deviation() * HALF_95;
         Some(Promise { median, low: median - half, high: median + half })
     }
 
@@ -388,7 +388,7 @@ impl DrivenTrain {
         at: PathPoint,
         aim: Aim,
     ) -> Option<Length> {
-        Some(self.beyond(context, rest.at, at)? + spread(rest) * aim.margin())
+        Some(self.beyond(context, rest.at, at)? + rest.deviation() * aim.margin())
     }
 
     /// How far one point of the path lies beyond another.

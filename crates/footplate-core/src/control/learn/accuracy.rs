@@ -34,7 +34,7 @@ impl StepAccuracy {
     /// Half the 95 % interval of the place of rest.
     #[must_use]
     pub fn stop_within(&self) -> Length {
-        Length::from_m(HALF_95 * libm::hypot(self.stop.doubt.as_m(), self.stop.scatter.as_m()))
+        HALF_95 * self.stop.deviation()
     }
 
     /// Half the 95 % interval of the speed, as a fraction of it.

@@ -120,6 +120,5 @@ fn expected_information(model: &MotionModel, experiment: &Experiment) -> Expecte
 /// How far past a sensor to come to rest so that the train passes it while braking.
 pub(super) fn past_by(model: &MotionModel, step: SpeedStep, approach: Approach) -> Length {
     let stop = model.stop(step, approach);
-    let sigma = Length::from_m(libm::hypot(stop.doubt.as_m(), stop.scatter.as_m()));
-    (PAST_PART * stop.distance).max(LEAST_PAST).max(PAST_BY * sigma)
+    (PAST_PART * stop.distance).max(LEAST_PAST).max(PAST_BY * stop.deviation())
 }

@@ -219,10 +219,9 @@ impl Calibrator<'_> {
         if speed <= Speed::ZERO {
             return None;
         }
-        let sigma = libm::hypot(rest.doubt.as_m(), rest.scatter.as_m());
         let short = match self.trial()?.experiment {
             Experiment::Stop { step, approach, is_past: true } => -past_by(model, step, approach),
-            _ => (LEAST_SHORT + Length::from_m(SHORT_BY * sigma)).min(MOST_SHORT),
+            _ => (LEAST_SHORT + SHORT_BY * rest.deviation()).min(MOST_SHORT),
         };
         let mut begins = Length::ZERO;
         let mut rest_distance = None;

@@ -4,7 +4,7 @@ use alloc::boxed::Box;
 use alloc::string::ToString;
 use alloc::vec::Vec;
 
-use crate::control::drive::command_time::{CommandTime, spread};
+use crate::control::drive::command_time::CommandTime;
 use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::order::{Aim, OrderId};
 use crate::control::drive::outputs::Outputs;
@@ -224,7 +224,7 @@ impl DrivenTrain {
             CommandTime::At(stop, rest) => {
                 let rest_time =
                     self.standing_time(&rest_times, [now + self.link.command, stop], step, &rest)?;
-                Some((step, rest_time - now, spread(&rest)))
+                Some((step, rest_time - now, rest.deviation()))
             }
             _ => None,
         });

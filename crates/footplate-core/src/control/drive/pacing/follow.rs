@@ -11,7 +11,6 @@
 use alloc::collections::BTreeMap;
 
 use crate::control::Notice;
-use crate::control::drive::command_time::spread;
 use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::driver::Driver;
 use crate::control::drive::order::{Aim, Gap, OrderId};
@@ -255,7 +254,7 @@ impl DrivenTrain {
         let rest = rest.filter(|_| !leader.is_position_uncertain(context, now));
         let past = rest.map_or(Length::ZERO, |rest| {
             let short_of =
-                rest.at.distance - spread(&rest) * Aim::NotBeyond(LEADER_SHORT_PROBABILITY).margin();
+                rest.at.distance - rest.deviation() * Aim::NotBeyond(LEADER_SHORT_PROBABILITY).margin();
             short_of.max(Length::ZERO)
         });
         let from = rest.map_or(seen, |rest| rest.at.node);
