@@ -158,7 +158,7 @@ impl TwoSensorRun {
     ///
     /// # Errors
     ///
-    /// If the run cannot say anything whatever its sensors saw.
+    /// If no readings of the sensors in this run could contain information.
     pub fn verdict(&self) -> Result<TwoSensorVerdict, TwoSensorError> {
         self.check()?;
         let (t, delay) = (self.time.value.as_s(), self.command_delay.value.as_s());

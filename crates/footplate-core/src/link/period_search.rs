@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn every_trial_stands_where_turning_took_it() {
+    fn rotated_phasors_equal_computed_ones_at_every_trial() {
         // The height after many turns is that of sines and cosines taken there at once.
         let gaps = gaps(45, 0.0614, 0.004);
         let (first, step) = (1.0 / LONGEST_PERIOD_S, 0.05);

@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wide_window_moves_no_good_forecast_wherever_its_middle_lies() {
+    fn a_wide_window_does_not_change_a_good_forecast_wherever_its_middle_is() {
         // 0.8 s of a lost reply at 500 mm/s, the forecast good to 8 mm and 60 mm from the end of the window.
         let (mean, variance) = of(0.0, 8.0, -340.0, 60.0).moments();
         assert!(mean.abs() < 1e-6 && (variance - 64.0).abs() < 0.4, "{mean} {variance}");

@@ -245,7 +245,7 @@ impl Layout {
         })
     }
 
-    /// Whether turnouts met at the toe would have to lie curved that may not both do so.
+    /// Whether facing turnouts would need both turnouts of a pair curved.
     pub(crate) fn needs_both_curved(&self, needs: &[TurnoutNeed]) -> bool {
         let curved = || needs.iter().filter(|need| need.facing && need.leg == Leg::Curved);
         curved().any(|need| {
@@ -279,7 +279,7 @@ mod tests {
         assert_eq!(hops(&layout, "A1", &turnouts), ["B1 300", "C1 320"]);
         turnouts.set(TurnoutId(1), Leg::Curved);
         assert_eq!(hops(&layout, "A1", &turnouts), ["C1 320"]);
-        // Through a turnout from a leg it does not matter how it lies.
+        // A trailed turnout may be in either position.
         turnouts.set(TurnoutId(2), Leg::Curved);
         assert_eq!(hops(&layout, "B1", &turnouts), ["D1 300"]);
     }

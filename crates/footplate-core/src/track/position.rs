@@ -15,7 +15,7 @@ const ROUNDING: Length = Length::from_mm(1e-6);
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Position {
-    /// The edge it lies on.
+    /// Its edge.
     pub edge: EdgeId,
     /// Distance from the start of the edge, from zero to its length.
     pub offset: Length,

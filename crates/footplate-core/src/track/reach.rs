@@ -218,7 +218,7 @@ mod tests {
         let node = |name| layout.node_named(name).unwrap();
         let edge = layout.edge_between(node("BR1"), node("C1")).unwrap();
         let position = Position { edge, offset: Length::from_mm(50.0) };
-        // It is on the curved leg, however the turnout lies by now.
+        // It is on the curved leg, whatever the turnout position since.
         let straight: TurnoutStates = [(TurnoutId(1), Leg::Straight)].into_iter().collect();
         let reached: Vec<_> = layout
             .reaches_ahead(position, &straight, 1)

@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turnout_that_lies_otherwise_makes_the_route_longer() {
+    fn a_turnout_in_another_position_makes_the_route_longer() {
         let layout = oval();
         let straight = [(TurnoutId(1), Leg::Straight)].into_iter().collect();
         assert!((route(&layout, "A1", "D1", &straight).unwrap().length.as_mm() - 600.0).abs() < 1e-9);

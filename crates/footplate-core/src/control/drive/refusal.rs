@@ -280,7 +280,7 @@ impl fmt::Display for Refusal {
             ),
             Self::TurnoutUnknown { turnout, train } => write!(
                 f,
-                "the position of turnout {turnout} is unknown and train {train} may be on it: enter how it lies, for \
+                "the position of turnout {turnout} is unknown and train {train} may be on it: enter its position, for \
                  example `turnout {turnout} straight`, or run the train over the next sensor"
             ),
             Self::NotArrived { train, within } => write!(

@@ -341,7 +341,7 @@ impl Machine for Calibrator<'_> {
         self.begin(now);
         match event.kind {
             EventKind::Speed { train, step } if train == self.train => {
-                self.handle_speed_sent(now, event, step)
+                self.handle_speed_sent(now, event, step);
             }
             EventKind::Reverse { train } if train == self.train => self.handle_reversed(now, event),
             EventKind::Turnout { turnout, curved } => {

@@ -79,7 +79,7 @@ impl Watchdog {
         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 
-    /// Whether a train could meet one in danger, wherever that one may be.
+    /// Whether a train could meet one in danger, whose position may be uncertain.
     pub(super) fn could_meet(&self, now: Timestamp, train: TrainId) -> bool {
         let Some(own) = self.own_reach(now, train) else { return !self.dangers.is_empty() };
         let mut dangers = self.dangers.keys().filter(|danger| **danger != train);

@@ -377,7 +377,7 @@ impl Watchdog {
     fn reverse_or_conclude(&mut self, now: Timestamp, train: TrainId) {
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         if recovery.ratios.iter().any(|one| one.deviation.is_finite()) {
-            // The speeds measured so far stand for the others.
+            // The speeds measured so far are used for the others.
             let Steps { middle, low, high, .. } = recovery.steps;
             for step in [middle, low, high] {
                 if recovery.ratios.iter().all(|one| one.step != step) {
