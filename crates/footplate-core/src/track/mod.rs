@@ -6,7 +6,7 @@
 //! - [`Layout::hops_from`]: the sensors that a train may reach next, in nanoseconds, from a table made once;
 //! - [`Layout::reaches`]: the same if up to [`MAX_MISSED`] sensors on the path stay silent;
 //! - [`Layout::route`]: the shortest path between two nodes; [`Layout::circuit_from`]: a path that leads back;
-//! - [`Layout::greatest_speed`]: the speed limit of a path;
+//! - [`Layout::zone`]: the speed restriction of an edge;
 //! - [`Position`] and [`Landmark`]: points on the rails, and their names.
 
 mod build;

@@ -1,7 +1,7 @@
 //! Tests whether reports can come from a layout: a sensor reports after another only if rails lead from one to the
 //! other.
 //!
-//! Turnouts may be in any position, up to [`LOOK_PAST`] sensors in a row may stay silent, sensors report without a
+//! Turnouts may be in any position, up to [`MAX_SILENT`] sensors in a row may stay silent, sensors report without a
 //! train now and then, and people lift trains. So a single stray report proves nothing. The layout is contradicted if
 //! more reports are stray than the right layout would show by chance (a one-sided binomial test). Reports while all
 //! trains are at rest are no evidence: no train caused them.
@@ -18,7 +18,7 @@ use crate::track::{Layout, TurnoutStates};
 const STOPS_WITHIN: TimeSpan = TimeSpan::from_s(5.0);
 
 /// Most silent sensors in a row.
-const LOOK_PAST: usize = 2;
+const MAX_SILENT: usize = 2;
 
 /// Largest share of stray reports on the right layout (1 % in the real logs, 0.2 % in the simulator; chosen for layouts
 /// in a worse state).
@@ -128,7 +128,7 @@ impl SequenceTest {
         };
         let unknown = TurnoutStates::unknown();
         let leads_here =
-            |from: &NodeId| layout.reaches(*from, &unknown, LOOK_PAST).any(|reach| reach.to == node);
+            |from: &NodeId| layout.reaches(*from, &unknown, MAX_SILENT).any(|reach| reach.to == node);
         if let Some(train) = self.places.iter().position(leads_here) {
             self.followed += 1;
             self.places.remove(train);

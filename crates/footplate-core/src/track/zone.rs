@@ -34,12 +34,6 @@ impl Layout {
         self.zones.get(*self.restricted.get(&edge.stretch())?)
     }
 
-    /// The speed limit of a path: the lowest limit of its edges. `None` if it is not restricted.
-    pub fn greatest_speed(&self, path: impl IntoIterator<Item = EdgeId>) -> Option<Speed> {
-        let limits = path.into_iter().filter_map(|edge| Some(self.zone(edge)?.limit));
-        limits.reduce(Speed::min)
-    }
-
     /// Restricts the speed on some stretches, in both directions. A stretch is in one zone at most.
     ///
     /// # Errors
@@ -101,17 +95,16 @@ mod tests {
     }
 
     #[test]
-    fn the_limit_of_a_path_is_that_of_its_slowest_edge_in_both_directions() {
+    fn a_zone_restricts_its_stretches_in_both_directions() {
         let plain = oval();
         let (siding, neck) = (edge(&plain, "BR1", "C1"), edge(&plain, "A1", "BR1"));
         let layout = plain
             .with_zone(zone("siding", 150.0), [siding.stretch()])
             .and_then(|layout| layout.with_zone(zone("neck", 200.0), [neck.stretch()]))
             .unwrap();
-        let limit = |path: &[EdgeId]| layout.greatest_speed(path.iter().copied()).map(Speed::as_mm_per_s);
-        assert_eq!(limit(&[neck, siding]), Some(150.0));
-        assert_eq!(limit(&[neck.twin()]), Some(200.0));
-        assert_eq!(limit(&[edge(&layout, "D1", "A1")]), None);
+        let limit = |edge| layout.zone(edge).map(|zone| zone.limit.as_mm_per_s());
+        assert_eq!([siding, neck.twin()].map(limit), [Some(150.0), Some(200.0)]);
+        assert_eq!(limit(edge(&layout, "D1", "A1")), None);
         assert_eq!(layout.zone(siding.twin()).unwrap().name, "siding");
         assert_eq!(
             layout.zones().iter().map(|zone| zone.name.as_str()).collect::<Vec<_>>(),

@@ -233,14 +233,6 @@ impl Watchdog {
         self.act(now);
     }
 
-    /// Stops and holds a further train that could meet one in danger, as the caller knows.
-    pub fn also_hold(&mut self, now: Timestamp, train: TrainId) {
-        if !self.dangers.is_empty() && !self.is_held(train) && self.driver.model(train).is_some() {
-            self.hold(now, train);
-            self.act(now);
-        }
-    }
-
     /// Carries out an order; see [`Driver::order`].
     ///
     /// # Errors
