@@ -48,6 +48,14 @@ pub struct StopForecast {
     pub count: u32,
 }
 
+impl StopForecast {
+    /// One standard deviation of the next stop.
+    #[must_use]
+    pub fn deviation(&self) -> Length {
+        Length::from_m(libm::hypot(self.doubt.as_m(), self.scatter.as_m()))
+    }
+}
+
 /// How one train answers its commands on one layout.
 ///
 /// All distances are path lengths: a hop is as long as speed times time of the train over it ([`length`](Self::length)), curves
