@@ -18,6 +18,7 @@ use alloc::vec::Vec;
 use super::motion_fit::MotionFit;
 use super::robust::RobustWeight;
 use crate::linalg::{NormalEquations, Solution};
+use crate::model::motion_model::MotionModel;
 use crate::model::parameters::{BEND, DOWN, START_NODES, STOP_NODES, UP, count, speed_at};
 use crate::model::priors::independent_nodes;
 use crate::model::spread::Spread;
@@ -152,23 +153,8 @@ impl MotionFit {
     ///
     /// Steps count as untried after this: only a run shows that a step moves the train.
     pub fn take_stated(&mut self, stated: &StatedMotion) -> Vec<Option<StatedFit>> {
-        let highest = usize::from(self.model().highest().get());
-        let mut equations = self.prior.equations.clone();
-        for (first, time) in [(UP, stated.speeding_up), (DOWN, stated.slowing_down)] {
-            let by_step = time.map_or(0.0, |time| time.as_s() / highest.max(1) as f64);
-            if by_step > 0.0 && by_step.is_finite() {
-                let deviation = MOMENTUM * by_step;
-                equations.add(&[(first + RHO, 1.0)], by_step, deviation * deviation);
-            }
-        }
-        let scale_column = equations.unknowns();
-        let row = |(at, one): (usize, &StatedSpeed)| Row::of(one, highest, scale_column).map(|row| (at, row));
-        let mut table = Table {
-            rows: stated.speeds.iter().enumerate().filter_map(row).collect(),
-            fits: vec![None; stated.speeds.len()],
-            inflation: 1.0,
-        };
-        table.weigh(&equations);
+        let highest = usize::from(self.model.highest().get());
+        let (equations, mut table) = self.weighed(stated);
         let Some(mut all) = table.with_rows(&equations) else { return table.fits };
         if all.eliminate_last().is_none() {
             return table.fits;
@@ -178,7 +164,35 @@ impl MotionFit {
             self.model.values = solution.values.get(..count(highest)).unwrap_or_default().to_vec();
             (self.model.spread, self.model.scale) = Spread::of(&solution, highest, &[]);
         }
-        table.fits
+        core::mem::take(&mut table.fits)
+    }
+
+    /// Compares other entries of the same table with what `known` predicts for them, and takes nothing.
+    #[must_use]
+    pub fn compare_stated(&self, known: &StatedMotion, others: &[StatedSpeed]) -> Vec<Option<StatedFit>> {
+        let (equations, known) = self.weighed(known);
+        let mut compared = Table::of(others, &self.model, equations.unknowns());
+        compared.inflation = known.inflation;
+        if let Some(solution) = known.solved(&equations, true) {
+            compared.refit(&solution, false);
+        }
+        compared.fits
+    }
+
+    /// The prior with the decoder's momentum, and the table with its weights.
+    fn weighed(&self, stated: &StatedMotion) -> (NormalEquations, Table) {
+        let highest = usize::from(self.model.highest().get());
+        let mut equations = self.prior.equations.clone();
+        for (first, time) in [(UP, stated.speeding_up), (DOWN, stated.slowing_down)] {
+            let by_step = time.map_or(0.0, |time| time.as_s() / highest.max(1) as f64);
+            if by_step > 0.0 && by_step.is_finite() {
+                let deviation = MOMENTUM * by_step;
+                equations.add(&[(first + RHO, 1.0)], by_step, deviation * deviation);
+            }
+        }
+        let mut table = Table::of(&stated.speeds, &self.model, equations.unknowns());
+        table.weigh(&equations);
+        (equations, table)
     }
 }
 
@@ -193,6 +207,16 @@ fn closed(equations: &NormalEquations) -> Option<NormalEquations> {
 }
 
 impl Table {
+    fn of(speeds: &[StatedSpeed], model: &MotionModel, scale_column: usize) -> Self {
+        let highest = usize::from(model.highest().get());
+        let row = |(at, one)| Row::of(one, highest, scale_column).map(|row| (at, row));
+        Self {
+            rows: speeds.iter().enumerate().filter_map(row).collect(),
+            fits: vec![None; speeds.len()],
+            inflation: 1.0,
+        }
+    }
+
     /// The equations with one more unknown, the common factor, and all rows by their weights.
     fn with_rows(&self, equations: &NormalEquations) -> Option<NormalEquations> {
         let mut all = equations.clone();
