@@ -106,12 +106,12 @@ impl MotionReplay {
     pub fn with_profile(
         layout: &Layout,
         store: &Store,
-        profile: &SpeedProfile,
+        profile: Option<&SpeedProfile>,
         train: TrainId,
         highest: SpeedStep,
         as_of: Timestamp,
     ) -> Result<Self, StoreError> {
-        let mut replay = Self::beginning(train, highest, Some(profile));
+        let mut replay = Self::beginning(train, highest, profile);
         let sections = SectionIndex::of(layout);
         for stored in Self::stored_runs(layout, store, as_of)? {
             replay.take_stored(layout, &sections, &stored);

@@ -27,6 +27,18 @@ pub struct HoldOut {
 }
 
 impl HoldOut {
+    /// Adds the score of another profile.
+    pub fn add(&mut self, other: &Self) {
+        let both = (self.predicted + other.predicted).max(1) as f64;
+        let sum = self.half_width * self.predicted as f64 + other.half_width * other.predicted as f64;
+        *self = Self {
+            predicted: self.predicted + other.predicted,
+            inside: self.inside + other.inside,
+            gross: self.gross + other.gross,
+            half_width: sum / both,
+        };
+    }
+
     /// Scores a profile for a decoder with this highest step.
     #[must_use]
     pub fn of(profile: &SpeedProfile, highest: SpeedStep) -> Self {

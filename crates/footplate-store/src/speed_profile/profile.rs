@@ -1,7 +1,7 @@
 //! Speeds of one locomotive by throttle setting, as another program measured them.
 
-use footplate_core::model::{StatedMotion, StatedSpeed};
-use footplate_core::{Speed, TimeSpan, TrainId};
+use footplate_core::model::{MotionFit, MotionModel, StatedMotion, StatedSpeed};
+use footplate_core::{Speed, SpeedStep, TimeSpan, TrainId};
 use serde::{Deserialize, Serialize};
 
 /// No model train is faster (mm/s): more than 900 km/h in H0, 1700 km/h in N. Programs that learn by themselves from bouncing
@@ -127,6 +127,14 @@ impl SpeedProfile {
     pub(super) fn is_other_unit(&self) -> bool {
         let too_fast = self.notes.iter().filter(|note| matches!(note, ProfileNote::TooFast { .. }));
         self.speeds.is_empty() && too_fast.count() >= OTHER_UNIT_FROM
+    }
+
+    /// The motion model of a train that begins with this profile and has not run yet.
+    #[must_use]
+    pub fn beginning(&self, train: TrainId, highest: SpeedStep) -> MotionModel {
+        let mut fit = MotionFit::new(train, highest);
+        fit.take_stated(&self.stated().0);
+        fit.model().clone()
     }
 
     /// The measurements for a motion fit, and which entry each is of. A motion model has one speed for both directions, so forward
