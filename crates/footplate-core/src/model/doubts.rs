@@ -6,7 +6,7 @@
 
 use super::motion_model::MotionModel;
 use super::parameters::{
-    Answers, DOWN, FRICTION, START_DELAY, START_NODES, STOP_NODES, UP, nodes_about, speed_at,
+    Answers, DOWN, FRICTION, START_DELAY, START_NODES, STOP_NODES, UP, nodes_about, speed_at, start_nodes_about,
 };
 use super::priors::END_OF_STOP;
 
@@ -50,7 +50,7 @@ impl MotionModel {
 
     /// The same for the place of a train that has started to a speed, without the delay of the start.
     pub(crate) fn start_doubt(&self, speed: f64) -> f64 {
-        let [(low, left), (high, right)] = nodes_about(speed);
+        let [(low, left), (high, right)] = start_nodes_about(speed);
         let [_, lag, kappa, rho] = self.law_slopes(UP, 0.0, speed);
         let slopes = [lag, kappa, rho, (START_NODES + low, left), (START_NODES + high, right)];
         libm::sqrt(self.spread.variance_along(&slopes))

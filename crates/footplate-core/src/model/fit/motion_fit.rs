@@ -19,7 +19,7 @@ pub use refit::Refit;
 
 use super::chain::Chain;
 use super::marginal_prior::MarginalPrior;
-use super::rows::{Point, Source, TripAt};
+use super::rows::{Linear, Point, Source, TripAt};
 use super::trip::{Own, Trip};
 use super::unknowns::Columns;
 use crate::event::{Event, EventKind};
@@ -313,25 +313,34 @@ impl MotionFit {
         self.prior.scatter = scatter;
     }
 
-    /// How far stops and starts scatter, as the first so many kept trips and those before show.
+    /// The scatter of stops and starts, by the first `count` kept trips and those before.
     ///
-    /// A stop and the start behind it are seen as a sum, of which each is given its likely part: what scatters little in
-    /// both is found to scatter less than it does. So few of them count for less than what is usual.
+    /// One step of expectation and maximisation (Dempster, Laird and Rubin, 1977). A sensor measures the sum of a stop and the
+    /// next start, of which the fit gives each its likely part. That part is smaller than the error itself; the square that is
+    /// expected is its square plus the variance that remains.
     fn scatter_of(&self, columns: &Columns, values: &Values, count: usize) -> ScatterSums {
         let mut sums = self.prior.scatter;
         let point = self.point(columns, &values.lasting);
         for place in 0..count {
-            let Some(at) = self.trip_at(values, place) else { continue };
-            for row in point.rows(at, false) {
-                let square = row.residual * row.residual / row.variance;
-                match row.source {
-                    Source::Stop => sums.stops.take(square * point.scatter.stops * point.scatter.stops),
-                    Source::Start if at.trip.continues && !at.trip.contacts.is_empty() => {
-                        sums.starts.take(square * point.scatter.starts * point.scatter.starts);
-                    }
-                    _ => {}
-                }
-            }
+            let (Some(at), Some(next)) = (self.trip_at(values, place), self.trip_at(values, place + 1)) else {
+                continue;
+            };
+            let rows = [at, next].map(|at| point.rows(at, false));
+            let of = |nth: usize, source| rows.get(nth)?.iter().find(|row| row.source == source);
+            let (Some(stop), Some(start)) = (of(0, Source::Stop), of(1, Source::Start)) else { continue };
+            let Some(first) = point.first_sensor(next) else { continue };
+            let expected = |row: &Linear, own: f64, other: f64| {
+                row.residual * row.residual + own * other / (own + other)
+            };
+            let late = first.speed * first.speed * start.variance;
+            let found = expected(stop, stop.variance, first.variance + late);
+            // The train's own scatter is this share of the variance of a stop; offsets and the floor are the rest.
+            let share = stop.once / stop.variance;
+            let own = share * found / stop.variance + 1.0 - share;
+            sums.stops.take(own * point.scatter.stops * point.scatter.stops);
+            let other = (first.variance + stop.variance) / (first.speed * first.speed);
+            let found = expected(start, start.variance, other);
+            sums.starts.take(found / start.variance * point.scatter.starts * point.scatter.starts);
         }
         sums
     }
