@@ -59,8 +59,8 @@ const KEPT_TRIPS: usize = 30;
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotionFit {
-    model: MotionModel,
-    prior: MarginalPrior,
+    pub(super) model: MotionModel,
+    pub(super) prior: MarginalPrior,
     chain: Chain,
     /// Follows from the layout; made when first needed.
     #[cfg_attr(feature = "serde", serde(skip))]
