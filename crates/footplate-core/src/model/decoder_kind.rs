@@ -20,7 +20,7 @@
 use alloc::vec::Vec;
 
 use super::motion_model::MotionModel;
-use super::parameters::{DOWN, NODES, PRIOR, SPEEDS, STOP_NODES};
+use super::parameters::{DOWN, PRIOR, SPEEDS, STOP_NODES};
 use super::priors::{SHAPE_ERROR, independent_nodes};
 
 /// Places of lag, `κ` and `ρ` on the way down.
