@@ -9,15 +9,21 @@ import { healthPage } from "./health_page.js";
 import { layoutPage } from "./layout_page.js";
 import { Live } from "./live.js";
 import { odometryPage } from "./odometry_page.js";
+import { get } from "./server.js";
 import { recordingsPage } from "./recordings_page.js";
+import { setupPage } from "./setup_page.js";
 import { trainPage } from "./train_page.js";
 import { say, translate } from "./words.js";
 
 /** Interval between attempts to reach the server (ms). */
 const AGAIN_MS = 3000;
+/** Interval between two looks at who serves a railway that was set up here, and while another program takes over (ms). */
+const MODE_MS = [3000, 300];
+/** The pages that need no session. */
+const WITHOUT_SESSION = ["setup", "editor"];
 const PAGES = {
   layout: layoutPage, train: trainPage, calibration: calibrationPage, health: healthPage, recordings: recordingsPage, odometry: odometryPage,
-  editor: editorPage,
+  editor: editorPage, setup: setupPage,
 };
 /** The header says how far the session is on disk when that is further back than this (s): a usual commit takes 0.02 s. */
 const LATE_ON_DISK_S = 1;
@@ -31,7 +37,8 @@ let open;
 /** The page in the address, and its subject. */
 function wanted() {
   const [name, what] = location.hash.replace(/^#\/?/, "").split("/");
-  return Object.hasOwn(PAGES, name) ? [name, what] : ["layout"];
+  if (live.setUp.mode === "setting-up" && !WITHOUT_SESSION.includes(name)) return ["setup"];
+  return Object.hasOwn(PAGES, name) && (name !== "setup" || live.setUp.mode !== "fixed") ? [name, what] : ["layout"];
 }
 
 function turn() {
@@ -79,10 +86,26 @@ function written({ t_s, written_until_s }) {
   $("written").textContent = behind < LATE_ON_DISK_S ? "" : say("written-until", behind.toFixed(0));
 }
 
+/** Opens the pages again once another program serves them: the set-up, a calibration or a driving session. */
+async function followMode() {
+  const { instance } = await get("/api/setup").catch(() => ({}));
+  if (instance && instance !== live.setUp.instance) location.reload();
+  else setTimeout(followMode, MODE_MS[live.awaitsMode || live.state === "lost" ? 1 : 0]);
+}
+
 async function begin() {
   translate(document);
-  await live.begin();
-  $("layout-name").textContent = live.layout.name;
+  live.setUp = await get("/api/setup");
+  const { mode } = live.setUp;
+  $("setup-link").hidden = mode === "fixed";
+  if (mode !== "fixed") setTimeout(followMode, MODE_MS[1]);
+  if (mode === "setting-up") {
+    document.body.classList.add("setting-up");
+    $("connection").hidden = true;
+  } else {
+    await live.begin();
+    $("layout-name").textContent = live.layout.name;
+  }
   turn();
   addEventListener("hashchange", () => {
     turn();

@@ -16,6 +16,8 @@ function keep(list, item) {
  * when another session has begun and earlier data is void.
  */
 export class Live extends EventTarget {
+  /** Who serves the pages, and whether another program is about to. */
+  setUp; awaitsMode = false;
   layout; picture; state = "connecting"; lines = []; passed = []; ended = []; alarms = [];
   #session; #drawing = false;
 

@@ -22,6 +22,8 @@ use crate::link::Address;
 pub(crate) use answer_queue::{AnswerForm, AnswerQueue};
 pub(crate) use archive::{StoreQuery, archive_routes};
 pub(crate) use odometry_pages::odometry_routes;
+#[cfg(test)]
+pub(crate) use set_up::set_up_paths;
 pub(crate) use set_up::{SetUpMode, SetUpRoute};
 pub(crate) use slides::slide_routes;
 

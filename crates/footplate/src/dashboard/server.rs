@@ -372,7 +372,9 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::commands::{AnswerQueue, WrittenLayout, archive_routes, odometry_routes, slide_routes};
+    use crate::commands::{
+        AnswerQueue, WrittenLayout, archive_routes, odometry_routes, set_up_paths, slide_routes,
+    };
 
     #[test]
     fn the_description_of_the_interface_has_every_route_and_no_other() {
@@ -381,7 +383,7 @@ mod tests {
         let answer_queue = AnswerQueue::new();
         let of_files = archive_routes(None, &layout, &answer_queue).and(odometry_routes(&answer_queue));
         let routes = own_routes(shared).and(of_files).and(slide_routes());
-        let there: BTreeSet<&str> = routes.paths().iter().copied().collect();
+        let there: BTreeSet<&str> = routes.paths().iter().copied().chain(set_up_paths()).collect();
         let described: serde_json::Value = serde_json::from_str(OPENAPI).expect("JSON");
         let described: BTreeSet<&str> =
             described["paths"].as_object().expect("paths").keys().map(String::as_str).collect();

@@ -18,6 +18,8 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 
 use self::routes::Pages;
+#[cfg(test)]
+pub(crate) use self::routes::set_up_paths;
 pub(crate) use self::routes::{SetUpMode, SetUpRoute};
 use self::set_up_file::{SetUp, StepResult, file_beside};
 use crate::commands::Outcome;

@@ -21,12 +21,14 @@ use axum::extract::{DefaultBodyLimit, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
+use footplate_core::Timestamp;
 use footplate_store::{BUILT_IN, write_whole};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::set_up_file::{NamedTrain, SetUp};
 use super::{Next, check_link};
+use crate::clock::now;
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::Routes;
 use crate::link::find_stations;
@@ -53,18 +55,29 @@ pub(crate) enum SetUpMode {
 pub(crate) struct SetUpRoute {
     file: Option<PathBuf>,
     mode: SetUpMode,
+    instance: Instance,
+}
+
+/// Distinguishes one server at an address from the next: browsers open the page again when it changes.
+#[derive(Debug, Clone, Serialize)]
+struct Instance(String);
+
+impl Instance {
+    fn new() -> Self {
+        Self((now() - Timestamp::ZERO).as_ns().to_string())
+    }
 }
 
 impl SetUpRoute {
     /// The route of a session that its command line describes.
-    pub(crate) const fn fixed() -> Self {
-        Self { file: None, mode: SetUpMode::Fixed }
+    pub(crate) fn fixed() -> Self {
+        Self { file: None, mode: SetUpMode::Fixed, instance: Instance::new() }
     }
 
     /// The route of a session; without a file it was not set up in the browser.
     pub(crate) fn of_session(file: Option<PathBuf>, mode: SetUpMode) -> Self {
         let mode = if file.is_some() { mode } else { SetUpMode::Fixed };
-        Self { file, mode }
+        Self { file, mode, instance: Instance::new() }
     }
 
     pub(crate) fn routes(self) -> Routes {
@@ -86,7 +99,7 @@ impl SetUpRoute {
 
 async fn state_of_session(State(route): State<SetUpRoute>) -> Response {
     let trains = route.file.as_deref().and_then(|file| SetUp::read(file).ok()).unwrap_or_default().trains;
-    answer(Ok(json!({ "mode": route.mode, "trains": trains })))
+    answer(Ok(json!({ "mode": route.mode, "instance": route.instance, "trains": trains })))
 }
 
 async fn again(State(route): State<SetUpRoute>) -> Response {
@@ -105,6 +118,7 @@ struct Shared {
     /// Why the last drive could not begin.
     problem: Option<String>,
     chosen: SyncSender<Next>,
+    instance: Instance,
     /// One check of the link at a time: a station takes one program.
     checking: tokio::sync::Semaphore,
 }
@@ -144,7 +158,16 @@ impl Pages {
         chosen: SyncSender<Next>,
     ) -> Self {
         let checking = tokio::sync::Semaphore::new(1);
-        Self { shared: Arc::new(Shared { set_up: Mutex::new(set_up), store, problem, chosen, checking }) }
+        Self {
+            shared: Arc::new(Shared {
+                set_up: Mutex::new(set_up),
+                store,
+                problem,
+                chosen,
+                instance: Instance::new(),
+                checking,
+            }),
+        }
     }
 
     pub(super) fn routes(self) -> Routes {
@@ -179,7 +202,7 @@ impl Pages {
             })
         });
         Ok(json!({
-            "mode": SetUpMode::SettingUp, "store": self.shared.store, "layouts": BUILT_IN, "problem": self.shared.problem,
+            "mode": SetUpMode::SettingUp, "instance": self.shared.instance, "store": self.shared.store, "layouts": BUILT_IN, "problem": self.shared.problem,
             "link": set_up.link, "speed": set_up.speed, "layout": set_up.layout, "line": set_up.line,
             "trains": trains.collect::<Vec<_>>(),
         }))
@@ -319,4 +342,12 @@ async fn calibrate(State(pages): State<Pages>, body: Result<Json<ToCalibrate>, J
 
 async fn drive(State(pages): State<Pages>) -> Response {
     answer(pages.drive())
+}
+
+/// The paths of the set-up, for the test of the description.
+#[cfg(test)]
+pub(crate) fn set_up_paths() -> Vec<&'static str> {
+    let (chosen, _) = std::sync::mpsc::sync_channel(1);
+    let pages = Pages::new(SetUp::default(), PathBuf::new(), None, chosen);
+    pages.routes().paths().iter().chain(SetUpRoute::fixed().routes().paths()).copied().collect()
 }
