@@ -120,6 +120,14 @@ async function begin() {
   }
 }
 
+// Browsers keep pages only of secure origins: of this machine, not of another one over plain HTTP.
+if ("serviceWorker" in navigator) {
+  navigator.serviceWorker.register("worker.js").then(() => navigator.serviceWorker.ready).then(({ active }) => {
+    const loaded = performance.getEntriesByType("resource").map(({ name }) => name);
+    active.postMessage([`${location.origin}/`, `${location.origin}/index.html`, ...loaded]);
+  }).catch(() => {});
+}
+
 begin().catch(() => {
   live.state = "lost";
   state();

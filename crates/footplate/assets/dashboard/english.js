@@ -10,7 +10,7 @@ export const ENGLISH = {
   "halt-heard": "power-off sent, and the station has answered since; a 6051 does not report track power: NOT CONFIRMED, check that all trains have stopped",
   "written-until": "recorded on disk until {0} s ago; a power cut would lose the rest",
   "halt-failed": "emergency stop NOT accepted: {0}",
-  "chart-keys": "Use the arrow keys to step through the values.", "skip": "To the page",
+  "chart-csv": "Save the data of this chart as CSV: {0}", "chart-keys": "Use the arrow keys to step through the values.", "skip": "To the page",
   "connected-alarmed": "live, alarms: {0}", "act-place": "Click where train {0} stands", "act-train": "Show train {0}", "act-line": "Check the link",
   "act-health": "Show the alarms", "end-alarm": "Done", "end-alarm-of": "Done: {0}", "more-alarms": "{0} more alarms",
   "place-hint": "Click the track where train {0} stands, then confirm in which direction it faces.",
