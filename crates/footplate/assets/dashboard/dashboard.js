@@ -64,7 +64,7 @@ function links({ trains }) {
   $("pages").querySelectorAll("[data-train]").forEach((link) => link.remove());
   let after = $("pages").querySelector("a");
   for (const { train } of trains) {
-    const link = make("a", { href: `#/train/${train}`, "data-train": String(train) }, say("train", train));
+    const link = make("a", { href: `#/train/${train}`, "data-train": String(train) }, live.called(train));
     if (location.hash === link.hash) link.setAttribute("aria-current", "page");
     after.after(link);
     after = link;
