@@ -102,6 +102,8 @@ async function begin() {
   if (mode === "setting-up") {
     document.body.classList.add("setting-up");
     $("connection").hidden = true;
+    // The page stays the set-up when another program takes over.
+    if (wanted()[0] === "setup" && !location.hash.startsWith("#/setup")) history.replaceState(null, "", "#/setup");
   } else {
     await live.begin();
     $("layout-name").textContent = live.layout.name;

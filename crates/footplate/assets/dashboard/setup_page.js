@@ -115,7 +115,7 @@ export function setupPage(root, live, wanted) {
       });
       search();
       return [make("ul", { class: "plain cards" }, simulated), make("h3", {}, say("setup-found")), found,
-        make("div", { class: "does" }, button(say("setup-search"), search, { id: "search" })), make("h3", {}, say("setup-typed")), typed];
+        make("div", { class: "does search" }, button(say("setup-search"), search, { id: "search" })), make("h3", {}, say("setup-typed")), typed];
     },
 
     layout() {
@@ -214,7 +214,7 @@ export function setupPage(root, live, wanted) {
     const nth = STEPS.indexOf(step);
     $("#setup-before").hidden = !isSettingUp || nth === 0;
     if (nth > 0) $("#setup-before").href = `#/setup/${STEPS[nth - 1]}`;
-    put($("#setup-chosen"), isSettingUp ? [setUp().link && say("setup-has-link", setUp().link), setUp().layout && say("setup-has-layout", setUp().layout)].filter(Boolean).join(" · ") : "");
+    put($("#setup-chosen"), isSettingUp ? [setUp().link && say("setup-has-link", setUp().link === "sim" ? say("setup-simulated") : setUp().link), setUp().layout && say("setup-has-layout", setUp().layout)].filter(Boolean).join(" · ") : "");
     $("#setup-problem").hidden = !setUp().problem;
     put($("#setup-problem"), setUp().problem ? say("setup-problem", setUp().problem) : "");
   }

@@ -22,10 +22,10 @@ use std::time::Duration;
 
 use anyhow::Context;
 use axum::extract::{DefaultBodyLimit, Path, Request, State};
-use axum::http::{HeaderMap, HeaderValue, StatusCode, Uri, header};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{KeepAlive, Sse};
-use axum::response::{IntoResponse, Redirect, Response};
+use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Json, Router};
 use footplate_core::TrainId;
@@ -78,6 +78,19 @@ impl ServedAt {
 }
 
 impl ServedAt {
+    /// The address with a free port in place of 0.
+    ///
+    /// # Errors
+    /// It is in use.
+    pub(crate) fn with_port(&self) -> anyhow::Result<Self> {
+        Ok(Self(self.listen()?.local_addr()?))
+    }
+
+    fn listen(&self) -> anyhow::Result<std::net::TcpListener> {
+        std::net::TcpListener::bind(self.0)
+            .with_context(|| format!("{} cannot be served at: name another port, or 0 for any", self.0))
+    }
+
     /// Whether other machines can reach it.
     pub(crate) const fn needs_token(&self) -> bool {
         !self.0.ip().is_loopback()
@@ -139,7 +152,7 @@ impl Dashboard {
         let board = Board::new(now().as_ns());
         let line = SharedTallies::default();
         let shared = Shared { board: Arc::clone(&board), layout, line: Arc::clone(&line) };
-        let pages = ServedPages::open(at, token, own_routes(shared).and(more), None)?;
+        let pages = ServedPages::open(at, token, own_routes(shared).and(more))?;
         Ok(Self { board, line, url: pages.url.clone(), _pages: pages })
     }
 }
@@ -149,28 +162,20 @@ impl Dashboard {
 pub(crate) struct ServedPages {
     /// The address to open in a browser.
     pub(crate) url: String,
-    /// The address that was bound: with the port that was free, if any was wanted.
-    pub(crate) at: ServedAt,
     /// The end of the server: it runs until this is dropped.
     ends: Option<oneshot::Sender<()>>,
     thread: Option<thread::JoinHandle<()>>,
 }
 
 impl ServedPages {
-    /// Starts a server; `first` is the address of the page that browsers are sent to from `/`.
+    /// Starts a server.
     ///
     /// # Errors
     /// The address is in use, or the token is too short.
-    pub(crate) fn open(
-        at: &ServedAt,
-        token: Option<Token>,
-        routes: Routes,
-        first: Option<&'static str>,
-    ) -> anyhow::Result<Self> {
+    pub(crate) fn open(at: &ServedAt, token: Option<Token>, routes: Routes) -> anyhow::Result<Self> {
         // A chosen token is known to its owner and is not printed.
         let generated = (token.is_none() && at.needs_token()).then(Token::generated).transpose()?;
-        let listener = std::net::TcpListener::bind(at.0)
-            .with_context(|| format!("{} cannot be served at: name another port, or 0 for any", at.0))?;
+        let listener = at.listen()?;
         listener.set_nonblocking(true)?;
         let bound = listener.local_addr()?;
         let shown = generated.as_ref().map(|token| format!("?token={}", token.text()));
@@ -182,7 +187,7 @@ impl ServedPages {
             runtime.block_on(async move {
                 match TcpListener::from_std(listener) {
                     Ok(listener) => tokio::select! {
-                        () = serve(listener, router(guard, routes, first), Limits::USUAL) => {}
+                        () = serve(listener, router(guard, routes), Limits::USUAL) => {}
                         _ = ended => {}
                     },
                     Err(error) => eprintln!("the dashboard is not served: {error}"),
@@ -191,7 +196,7 @@ impl ServedPages {
             // Work that blocks is given up; nobody waits for its answer.
             runtime.shutdown_background();
         })?;
-        Ok(Self { url, at: ServedAt(bound), ends: Some(ends), thread: Some(thread) })
+        Ok(Self { url, ends: Some(ends), thread: Some(thread) })
     }
 }
 
@@ -206,19 +211,9 @@ impl Drop for ServedPages {
     }
 }
 
-fn router(guard: Guard, routes: Routes, first: Option<&'static str>) -> Router {
-    let start = move |uri: Uri| async move {
-        match first {
-            // The token in the address goes along.
-            Some(first) => {
-                let query = uri.query().map(|query| format!("?{query}")).unwrap_or_default();
-                Redirect::to(&format!("/index.html{query}{first}")).into_response()
-            }
-            None => page(Path(String::new())).await,
-        }
-    };
+fn router(guard: Guard, routes: Routes) -> Router {
     Router::new()
-        .route("/", get(start))
+        .route("/", get(|| page(Path(String::new()))))
         .route("/{file}", get(page))
         .merge(routes.into_router())
         .layer(DefaultBodyLimit::max(MAX_BODY))

@@ -57,7 +57,8 @@ fn on_request_all_turnouts_are_set_before_the_train_moves() {
     let mut machine = calibrator(&layout, 120.0);
     machine.settings.sets_turnouts = true;
     train.run(&mut machine, 200.0);
-    let moves = |command: &Command| matches!(command, Command::Speed { step, .. } if *step != SpeedStep::STAND);
+    let moves =
+        |command: &Command| matches!(command, Command::Speed { step, .. } if *step != SpeedStep::STAND);
     let first_move = train.commands.iter().position(|(_, command)| moves(command)).unwrap();
     let set = |turnout| {
         let straight = Command::Turnout { turnout, curved: false };

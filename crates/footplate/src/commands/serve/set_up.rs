@@ -28,8 +28,6 @@ use crate::runtime::StopFlag;
 
 /// The store of a railway that is set up, unless another one is named.
 pub(super) const USUAL_STORE: &str = "railway.db";
-/// The page that browsers are sent to.
-const FIRST_PAGE: &str = "#/setup";
 /// Interval between two looks at the stop flag.
 const LOOK: Duration = Duration::from_millis(50);
 /// The most that is kept of a child's output, in bytes.
@@ -56,6 +54,8 @@ pub(super) fn run(at: ServedAt, store: Option<PathBuf>, restarts: bool) -> anyho
         token = Some(Token::generated()?.text().to_owned());
     }
     let shown = token.as_ref().filter(|_| chosen.is_none()).map(|token| format!("?token={token}"));
+    // All steps are served at the same port.
+    let at = at.with_port()?;
     let stop = StopFlag::install_saying("\nending");
     let mut session = Session { at, store, file, token, restarts, stop, problem: None, is_announced: false };
     loop {
@@ -94,8 +94,7 @@ impl Session {
         let (chosen, next) = sync_channel(1);
         let pages = Pages::new(set_up, self.store.clone(), self.problem.take(), chosen);
         let token = self.token.as_deref().map(Token::chosen).transpose()?;
-        let served = ServedPages::open(&self.at, token, pages.routes(), Some(FIRST_PAGE))?;
-        self.at = served.at.clone();
+        let served = ServedPages::open(&self.at, token, pages.routes())?;
         if !std::mem::replace(&mut self.is_announced, true) {
             eprintln!("the dashboard is at {}{shown}", served.url);
             eprintln!("open it to set up the railway; what you enter is kept in {}", self.file.display());
