@@ -66,7 +66,7 @@ fn on_request_all_turnouts_are_set_before_the_train_moves() {
     };
     assert!(layout.turnouts().len() > 0 && layout.turnouts().all(|(turnout, _)| set(turnout)));
     assert_eq!(machine.ending(), Some(&Ending::Budget), "it is calibrated all the same");
-    assert!(train.has_said(|notice| matches!(notice, CalibrationNotice::Done(_))));
+    assert!(train.has_notified(|notice| matches!(notice, CalibrationNotice::Done(_))));
 }
 
 #[test]
