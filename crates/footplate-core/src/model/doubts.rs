@@ -6,7 +6,8 @@
 
 use super::motion_model::MotionModel;
 use super::parameters::{
-    Answers, DOWN, FRICTION, START_DELAY, START_NODES, STOP_NODES, UP, nodes_about, speed_at, start_nodes_about,
+    Answers, DOWN, FRICTION, START_DELAY, START_NODES, STOP_NODES, UP, nodes_about, speed_at,
+    start_nodes_about,
 };
 use super::priors::END_OF_STOP;
 

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 use footplate_core::model::{MotionModel, StepUse};
 use footplate_core::{Approach, SpeedStep, TrainId};
 use footplate_store::{
-    HoldOut, LARGEST_PROFILE, ModelRow, MotionReplay, ProfileContext, ProfileNote, SpeedProfile, built_in, parse_profile,
-    write_profile_table, write_roster_entry,
+    HoldOut, LARGEST_PROFILE, ModelRow, MotionReplay, ProfileContext, ProfileNote, SpeedProfile, built_in,
+    parse_profile, write_profile_table, write_roster_entry,
 };
 
 use crate::stores::{Shelf, minute};
@@ -72,7 +72,8 @@ fn an_export_changes_nothing_but_its_own_places_and_is_read_back() {
     entries.extend(real_entries().iter().map(|path| fs::read(path).unwrap()));
     for entry in entries {
         for line_end in ["\n", "\r\n"] {
-            let text = String::from_utf8(entry.clone()).unwrap().replace("\r\n", "\n").replace('\n', line_end);
+            let text =
+                String::from_utf8(entry.clone()).unwrap().replace("\r\n", "\n").replace('\n', line_end);
             let written = write_roster_entry("entry.xml", text.as_bytes(), &rows).unwrap();
             let back = parse_profile("entry.xml", &written, &context()).unwrap();
             assert_eq!(back.speeds.len(), rows.len());
@@ -128,9 +129,14 @@ fn errors_name_the_place_the_value_and_what_would_be_right() {
              </locomotive-config>"
         )
     };
-    let speed = |step: &str, forward: &str| entry(&format!("<speed><step>{step}</step><forward>{forward}</forward></speed>"));
+    let speed = |step: &str, forward: &str| {
+        entry(&format!("<speed><step>{step}</step><forward>{forward}</forward></speed>"))
+    };
     for (text, says) in [
-        (speed("1001", "5"), "any.xml, line 3, column 36: <step> is `1001`; it should be a throttle setting from 0 to 1000"),
+        (
+            speed("1001", "5"),
+            "any.xml, line 3, column 36: <step> is `1001`; it should be a throttle setting from 0 to 1000",
+        ),
         (speed("500", "-5"), "<forward> is `-5`; it should be a speed in mm/s, 0 or more"),
         (speed("500", "NaN"), "<forward> is `NaN`"),
         (speed("500", "inf"), "<forward> is `inf`"),
@@ -143,8 +149,14 @@ fn errors_name_the_place_the_value_and_what_would_be_right() {
         ("<locomotive-config/>".to_owned(), "<locomotive-config> lacks <locomotive>"),
         ("<locomotive-config>".to_owned(), "any.xml, line 1"),
         ("step,speed\n1,2\n".to_owned(), "not a speed profile; give a roster entry of JMRI"),
-        ("step,forward_mm_s\n15,20\n".to_owned(), "line 2, column 1 (step): `15` should be a step from 0 to 14"),
-        ("step,forward_mm_s\n5,fast\n".to_owned(), "line 2, column 2 (forward_mm_s): `fast` should be a speed in mm/s"),
+        (
+            "step,forward_mm_s\n15,20\n".to_owned(),
+            "line 2, column 1 (step): `15` should be a step from 0 to 14",
+        ),
+        (
+            "step,forward_mm_s\n5,fast\n".to_owned(),
+            "line 2, column 2 (forward_mm_s): `fast` should be a speed in mm/s",
+        ),
         (String::new(), "the file is empty"),
     ] {
         let refused = read(text.as_bytes()).unwrap_err();
@@ -164,8 +176,9 @@ fn hostile_files_are_refused_without_taking_memory() {
     assert!(read(deep.as_bytes()).is_err());
     assert!(read(&vec![b'<'; LARGEST_PROFILE + 1]).unwrap_err().contains("longer than"));
     let many = "<speed><step>1</step><forward>5</forward></speed>".repeat(1_002);
-    let many =
-        format!("<locomotive-config><locomotive><speedprofile><speeds>{many}</speeds></speedprofile></locomotive></locomotive-config>");
+    let many = format!(
+        "<locomotive-config><locomotive><speedprofile><speeds>{many}</speeds></speedprofile></locomotive></locomotive-config>"
+    );
     assert!(read(many.as_bytes()).unwrap_err().contains("more than 1001 speeds"));
 }
 
@@ -186,7 +199,9 @@ fn a_kept_profile_is_where_a_train_begins_until_it_is_withdrawn() {
     };
     let [before, with, after] = [0, 2, 4].map(&mut speed_at);
     assert_eq!([before.0, with.0, after.0], [false, true, false]);
-    assert!((with.1.value.as_mm_per_s() - 410.0).abs() < 15.0 && with.1.uncertainty < 0.5 * before.1.uncertainty);
+    assert!(
+        (with.1.value.as_mm_per_s() - 410.0).abs() < 15.0 && with.1.uncertainty < 0.5 * before.1.uncertainty
+    );
     assert_eq!(with.1.count, 0, "nothing was measured here");
     assert_eq!(before.1, after.1);
     // The same model as a preview shows.
@@ -198,7 +213,8 @@ fn a_kept_profile_is_where_a_train_begins_until_it_is_withdrawn() {
 #[test]
 fn half_of_real_profiles_is_predicted_by_the_other_half() {
     // Tables of the teams for the trains of our recordings (testdata/published-tables), one profile for each team and train.
-    let mut tables: std::collections::BTreeMap<(String, String), Vec<(String, String, String)>> = Default::default();
+    let mut tables: std::collections::BTreeMap<(String, String), Vec<(String, String, String)>> =
+        Default::default();
     let published = fs::read_to_string(format!(
         "{}/../../testdata/published-tables/speeds.csv",
         env!("CARGO_MANIFEST_DIR")

@@ -322,7 +322,8 @@ impl MotionFit {
         let mut sums = self.prior.scatter;
         let point = self.point(columns, &values.lasting);
         for place in 0..count {
-            let (Some(at), Some(next)) = (self.trip_at(values, place), self.trip_at(values, place + 1)) else {
+            let (Some(at), Some(next)) = (self.trip_at(values, place), self.trip_at(values, place + 1))
+            else {
                 continue;
             };
             let rows = [at, next].map(|at| point.rows(at, false));

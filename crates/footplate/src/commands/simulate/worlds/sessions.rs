@@ -155,8 +155,18 @@ impl Driven<'_, '_> {
             let engine = self.line.station.world().truth().engine(TRAIN);
             for model in &over.0 {
                 let text = serde_json::to_value(model).unwrap();
-                eprintln!("DUMP {} seed {} session {session} true {:?} run {:?} wander {:?} scatter {} scales {} offs {} starts {:?}",
-                    self.scored.name, self.scored.seed, engine.map(|e| e.stop_scatter), engine.map(|e| e.run_deviation), engine.map(|e| e.wander), text["scatter"], text["residual_scales"], text["stop_offsets"]["deviation"], engine.map(|e| e.start_dead_time));
+                eprintln!(
+                    "DUMP {} seed {} session {session} true {:?} run {:?} wander {:?} scatter {} scales {} offs {} starts {:?}",
+                    self.scored.name,
+                    self.scored.seed,
+                    engine.map(|e| e.stop_scatter),
+                    engine.map(|e| e.run_deviation),
+                    engine.map(|e| e.wander),
+                    text["scatter"],
+                    text["residual_scales"],
+                    text["stop_offsets"]["deviation"],
+                    engine.map(|e| e.start_dead_time)
+                );
             }
         }
         Ok(over)
