@@ -7,9 +7,8 @@
 use super::motion_model::MotionModel;
 use super::parameters::{
     Answers, DOWN, FRICTION, START_DELAY, START_NODES, STOP_NODES, UP, nodes_about, speed_at,
-    start_nodes_about,
 };
-use super::priors::END_OF_STOP;
+use super::priors::end_of_stop;
 
 /// Factor on the shape error of a single change in forecasts, for shapes of decoders that the law lacks (chosen on simulated
 /// decoders of six laws, so that 90 % intervals hold nine times in ten).
@@ -46,12 +45,12 @@ impl MotionModel {
         let (lag, friction) = ((lag, by_lag - friction_by_lag), (FRICTION, -by_friction));
         let nodes = [(STOP_NODES + low, left), (STOP_NODES + high, right)];
         let slopes = [delay, lag, kappa, rho, friction, nodes[0], nodes[1]];
-        libm::hypot(libm::sqrt(self.spread.variance_along(&slopes)), END_OF_STOP)
+        libm::hypot(libm::sqrt(self.spread.variance_along(&slopes)), end_of_stop(speed))
     }
 
     /// The same for the place of a train that has started to a speed, without the delay of the start.
     pub(crate) fn start_doubt(&self, speed: f64) -> f64 {
-        let [(low, left), (high, right)] = start_nodes_about(speed);
+        let [(low, left), (high, right)] = nodes_about(speed);
         let [_, lag, kappa, rho] = self.law_slopes(UP, 0.0, speed);
         let slopes = [lag, kappa, rho, (START_NODES + low, left), (START_NODES + high, right)];
         libm::sqrt(self.spread.variance_along(&slopes))

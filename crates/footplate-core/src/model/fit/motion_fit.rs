@@ -92,7 +92,7 @@ struct Reduced {
 #[derive(Debug, Clone)]
 struct Survey {
     /// Sums of what sections and stops are longer that are nothing, with their variance (m²).
-    rows: Vec<(Vec<(usize, f64)>, f64)>,
+    rows: Vec<(Vec<(usize, f64)>, [f64; 2])>,
     scale: Option<f64>,
 }
 
@@ -355,16 +355,16 @@ impl MotionFit {
 
 impl Survey {
     fn of(columns: &Columns, index: &SectionIndex, model: &MotionModel) -> Self {
-        let mut rows: Vec<(Vec<(usize, f64)>, f64)> = columns
+        let mut rows: Vec<(Vec<(usize, f64)>, [f64; 2])> = columns
             .sections
             .iter()
-            .map(|(section, column)| (alloc::vec![(*column, 1.0)], section_variance(index, *section)))
+            .map(|(section, column)| (alloc::vec![(*column, 1.0)], [0.0, section_variance(index, *section)]))
             .collect();
         let offsets = columns.stop_offsets.values();
         let offset_variance = model.stop_offsets.variance();
-        rows.extend(offsets.map(|column| (alloc::vec![(*column, 1.0)], offset_variance)));
+        rows.extend(offsets.map(|column| (alloc::vec![(*column, 1.0)], [0.0, offset_variance])));
         for (first, scale) in [STOP_NODES, START_NODES].into_iter().zip(model.residual_scales) {
-            rows.extend(independent_nodes(first).into_iter().map(|sum| (sum, scale * scale)));
+            rows.extend(independent_nodes(first).map(|(sum, mean)| (sum, [mean, scale * scale])));
         }
         let of_total = index.scale_variance(columns.sections.keys().copied());
         // What all lengths have in common does not keep their total from being a measure.
@@ -372,16 +372,20 @@ impl Survey {
         let is_measure = !rows.is_empty() && of_lengths <= WELL_SURVEYED * WELL_SURVEYED;
         let scale = is_measure.then(|| libm::sqrt(of_total));
         if scale.is_some() {
-            rows.push((columns.sections.values().map(|column| (*column, 1.0)).collect(), TOTAL * TOTAL));
+            rows.push((
+                columns.sections.values().map(|column| (*column, 1.0)).collect(),
+                [0.0, TOTAL * TOTAL],
+            ));
         }
         Self { rows, scale }
     }
 
     fn cost(&self, lasting: &[f64]) -> f64 {
-        let longer = |terms: &[(usize, f64)]| -> f64 {
+        let sum = |terms: &[(usize, f64)]| -> f64 {
             terms.iter().filter_map(|(column, slope)| Some(slope * lasting.get(*column)?)).sum()
         };
-        self.rows.iter().map(|(terms, variance)| longer(terms) * longer(terms) / variance).sum()
+        let square = |by: f64| by * by;
+        self.rows.iter().map(|(terms, [mean, variance])| square(sum(terms) - mean) / variance).sum()
     }
 }
 
@@ -417,8 +421,8 @@ impl Reduced {
     fn closed(self, survey: &Survey) -> Option<Closed> {
         let Self { mut equations, trips } = self;
         let next_place = equations.eliminate_last()?;
-        for (terms, variance) in &survey.rows {
-            equations.add(terms, 0.0, *variance);
+        for (terms, [mean, variance]) in &survey.rows {
+            equations.add(terms, *mean, *variance);
         }
         Some(Closed { equations, next_place, trips })
     }

@@ -9,7 +9,6 @@ use super::trip::{Own, Trip, Walk};
 use super::unknowns::Columns;
 use crate::model::parameters::{
     Answers, NODES, SHAPES, START_NODES, STOP_NODES, count, hysteresis_at, nodes_about, shape_at, speed_at,
-    start_nodes_about,
 };
 use crate::model::priors::SHAPE_ERROR;
 use crate::model::priors::{FELT, TRIP_DEVIATION, WANDER, change_error};
@@ -383,12 +382,12 @@ fn involved(trip: &Trip, segments: &[Segment], highest: usize) -> Vec<usize> {
     };
     for (commanded, segment) in trip.commanded.iter().zip(segments.iter().skip(1)) {
         let nodes = if commanded.to == 0 {
-            Some((STOP_NODES, nodes_about(segment.from.set)))
+            Some((STOP_NODES, segment.from.set))
         } else {
-            commanded.at_rest.then(|| (START_NODES, start_nodes_about(segment.to)))
+            commanded.at_rest.then_some((START_NODES, segment.to))
         };
-        for (node, weight) in nodes.into_iter().flat_map(|(first, nodes)| {
-            nodes.into_iter().map(move |(node, weight)| (first + node.min(NODES - 1), weight))
+        for (node, weight) in nodes.into_iter().flat_map(|(first, speed)| {
+            nodes_about(speed).into_iter().map(move |(node, weight)| (first + node.min(NODES - 1), weight))
         }) {
             if weight != 0.0 {
                 add(node);

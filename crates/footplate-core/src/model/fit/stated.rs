@@ -201,7 +201,7 @@ fn closed(equations: &NormalEquations) -> Option<NormalEquations> {
     let mut closed = equations.clone();
     closed.eliminate_last()?;
     for first in [STOP_NODES, START_NODES] {
-        independent_nodes(first).iter().for_each(|sum| closed.add(sum, 0.0, 1.0));
+        independent_nodes(first).for_each(|(sum, usual)| closed.add(&sum, usual, 1.0));
     }
     Some(closed)
 }

@@ -150,26 +150,7 @@ impl Driven<'_, '_> {
         }
         self.scored.taken += machine.taken;
         self.scored.longest = self.scored.longest.max(machine.longest);
-        let over = machine.script_runner.handed_over();
-        if std::env::var_os("DUMP").is_some() {
-            let engine = self.line.station.world().truth().engine(TRAIN);
-            for model in &over.0 {
-                let text = serde_json::to_value(model).unwrap();
-                eprintln!(
-                    "DUMP {} seed {} session {session} true {:?} run {:?} wander {:?} scatter {} scales {} offs {} starts {:?}",
-                    self.scored.name,
-                    self.scored.seed,
-                    engine.map(|e| e.stop_scatter),
-                    engine.map(|e| e.run_deviation),
-                    engine.map(|e| e.wander),
-                    text["scatter"],
-                    text["residual_scales"],
-                    text["stop_offsets"]["deviation"],
-                    engine.map(|e| e.start_dead_time)
-                );
-            }
-        }
-        Ok(over)
+        Ok(machine.script_runner.handed_over())
     }
 
     /// The script runner of a session; what it knows goes through the text that is kept of it.
