@@ -40,5 +40,5 @@ pub(crate) use picture::LayoutPicture;
 pub(crate) use picture::TrainTask;
 pub(crate) use read_only::{CalibrationFollower, ReadOnlyDashboard};
 pub(crate) use routes::Routes;
-pub(crate) use server::{Dashboard, ServedAt};
+pub(crate) use server::{Dashboard, ServedAt, ServedPages};
 pub(crate) use token::Token;

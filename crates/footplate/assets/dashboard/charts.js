@@ -1,6 +1,7 @@
 // Live charts, drawn with the code of the reports, and drawn again when colours or widths change.
 
 import { chart, colour, rounded } from "./chart.js";
+import { make } from "./dom.js";
 import { say } from "./words.js";
 
 /** Error bars of a chart: points by series, each in its colour. */
@@ -11,6 +12,9 @@ export const upright = (label, name) => ({
   label, stroke: colour(name), fill: colour(name), width: 0, points: { show: false }, paths: uPlot.paths.bars({ size: [0.9, 60] }),
   value: (_, value) => (value == null ? "–" : rounded(value, 0)),
 });
+
+/** A field of a table. */
+const field = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 
@@ -23,6 +27,10 @@ export class LiveChart {
     this.#options = options;
     this.#data = data;
     this.#draw();
+    const { name } = options();
+    const saves = make("button", { type: "button", class: "csv", "aria-label": say("chart-csv", name), title: say("chart-csv", name) }, "CSV");
+    saves.addEventListener("click", () => this.#save());
+    (figure.querySelector("figcaption") ?? figure).append(saves);
     let width = figure.clientWidth;
     this.#watch = new ResizeObserver(() => {
       if (figure.clientWidth === width) return;
@@ -45,9 +53,20 @@ export class LiveChart {
     this.#u.setData(data);
   }
 
+  /** Saves the values that are drawn as a table: a column for the x axis, and one for each series. */
+  #save() {
+    const { name, x, y } = this.#options();
+    const columns = this.#u.series.map(({ label }, nth) => field(nth === 0 ? x.label : [label, y].filter(Boolean).join("; ")));
+    const rows = Array.from(this.#u.data[0], (_, nth) => this.#u.data.map((column) => column[nth] ?? "").join(","));
+    const address = URL.createObjectURL(new Blob([[columns.join(","), ...rows, ""].join("\n")], { type: "text/csv" }));
+    make("a", { href: address, download: `${name.toLowerCase().replace(/[^a-z0-9äöüß]+/g, "-")}.csv` }).click();
+    setTimeout(() => URL.revokeObjectURL(address), 1000);
+  }
+
   close() {
     this.#watch.disconnect();
     dark.removeEventListener("change", this.#again);
+    this.#figure.querySelector(".csv")?.remove();
     this.#u.destroy();
   }
 }

@@ -9,15 +9,21 @@ import { healthPage } from "./health_page.js";
 import { layoutPage } from "./layout_page.js";
 import { Live } from "./live.js";
 import { odometryPage } from "./odometry_page.js";
+import { get } from "./server.js";
 import { recordingsPage } from "./recordings_page.js";
+import { setupPage } from "./setup_page.js";
 import { trainPage } from "./train_page.js";
 import { say, translate } from "./words.js";
 
 /** Interval between attempts to reach the server (ms). */
 const AGAIN_MS = 3000;
+/** Interval between two looks at who serves a railway that was set up here, and while another program takes over (ms). */
+const MODE_MS = [3000, 300];
+/** The pages that need no session. */
+const WITHOUT_SESSION = ["setup", "editor"];
 const PAGES = {
   layout: layoutPage, train: trainPage, calibration: calibrationPage, health: healthPage, recordings: recordingsPage, odometry: odometryPage,
-  editor: editorPage,
+  editor: editorPage, setup: setupPage,
 };
 /** The header says how far the session is on disk when that is further back than this (s): a usual commit takes 0.02 s. */
 const LATE_ON_DISK_S = 1;
@@ -31,7 +37,8 @@ let open;
 /** The page in the address, and its subject. */
 function wanted() {
   const [name, what] = location.hash.replace(/^#\/?/, "").split("/");
-  return Object.hasOwn(PAGES, name) ? [name, what] : ["layout"];
+  if (live.setUp.mode === "setting-up" && !WITHOUT_SESSION.includes(name)) return ["setup"];
+  return Object.hasOwn(PAGES, name) && (name !== "setup" || live.setUp.mode !== "fixed") ? [name, what] : ["layout"];
 }
 
 function turn() {
@@ -57,7 +64,7 @@ function links({ trains }) {
   $("pages").querySelectorAll("[data-train]").forEach((link) => link.remove());
   let after = $("pages").querySelector("a");
   for (const { train } of trains) {
-    const link = make("a", { href: `#/train/${train}`, "data-train": String(train) }, say("train", train));
+    const link = make("a", { href: `#/train/${train}`, "data-train": String(train) }, live.called(train));
     if (location.hash === link.hash) link.setAttribute("aria-current", "page");
     after.after(link);
     after = link;
@@ -79,10 +86,28 @@ function written({ t_s, written_until_s }) {
   $("written").textContent = behind < LATE_ON_DISK_S ? "" : say("written-until", behind.toFixed(0));
 }
 
+/** Opens the pages again once another program serves them: the set-up, a calibration or a driving session. */
+async function followMode() {
+  const { instance } = await get("/api/setup").catch(() => ({}));
+  if (instance && instance !== live.setUp.instance) location.reload();
+  else setTimeout(followMode, MODE_MS[live.awaitsMode || live.state === "lost" ? 1 : 0]);
+}
+
 async function begin() {
   translate(document);
-  await live.begin();
-  $("layout-name").textContent = live.layout.name;
+  live.setUp = await get("/api/setup");
+  const { mode } = live.setUp;
+  $("setup-link").hidden = mode === "fixed";
+  if (mode !== "fixed") setTimeout(followMode, MODE_MS[1]);
+  if (mode === "setting-up") {
+    document.body.classList.add("setting-up");
+    $("connection").hidden = true;
+    // The page stays the set-up when another program takes over.
+    if (wanted()[0] === "setup" && !location.hash.startsWith("#/setup")) history.replaceState(null, "", "#/setup");
+  } else {
+    await live.begin();
+    $("layout-name").textContent = live.layout.name;
+  }
   turn();
   addEventListener("hashchange", () => {
     turn();
@@ -95,6 +120,14 @@ async function begin() {
   for (const kind of ["picture", "line", "passed", "ended", "alarm", "gap", "anew"]) {
     live.addEventListener(kind, ({ detail }) => open[kind]?.(detail));
   }
+}
+
+// Browsers keep pages only of secure origins: of this machine, not of another one over plain HTTP.
+if ("serviceWorker" in navigator) {
+  navigator.serviceWorker.register("worker.js").then(() => navigator.serviceWorker.ready).then(({ active }) => {
+    const loaded = performance.getEntriesByType("resource").map(({ name }) => name);
+    active.postMessage([`${location.origin}/`, `${location.origin}/index.html`, ...loaded]);
+  }).catch(() => {});
 }
 
 begin().catch(() => {

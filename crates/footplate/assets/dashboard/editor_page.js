@@ -4,6 +4,7 @@ import { make, put } from "./dom.js";
 import { Draft } from "./draft.js";
 import { arcOf, LIBRARIES } from "./pieces.js";
 import { written } from "./plan_curve.js";
+import { ask } from "./server.js";
 import { View } from "./view.js";
 import { say } from "./words.js";
 
@@ -22,7 +23,7 @@ function kept() {
   }
 }
 
-export function editorPage(root) {
+export function editorPage(root, live) {
   const $ = (selector) => root.querySelector(selector);
   const before = kept();
   const draft = Draft.of(before.draft);
@@ -73,6 +74,7 @@ export function editorPage(root) {
     const toml = draft.toml($("#draft-name").value);
     $("#draft-says").replaceChildren(...problems.map(({ word, blanks, isError }) => make("li", { class: isError ? "danger" : word === "draft-gap" ? "warning" : "over" }, say(word, ...blanks))));
     $("#draft-save").disabled = !toml;
+    $("#draft-use").disabled = !toml;
     put($("#draft-toml"), toml ?? "");
     $("#draft-written").hidden = !toml;
     $("#draft-undo").disabled = !draft.canUndo;
@@ -135,6 +137,16 @@ export function editorPage(root) {
     put($("#draft-saved"), say("draft-saved", `${name}.toml`));
   }
 
+  /** Takes the drawing as the layout of the set-up. */
+  async function use() {
+    try {
+      live.setUp = await ask("/api/setup", { drawn: { toml: $("#draft-toml").textContent } });
+      location.hash = "#/setup/trains";
+    } catch (error) {
+      put($("#draft-saved"), error.message);
+    }
+  }
+
   $("#library").append(...Object.keys(LIBRARIES).map((name) => new Option(name, name)));
   if (Object.hasOwn(LIBRARIES, before.library)) $("#library").value = before.library;
   $("#joined-at").append(...["draft-toe", "draft-straight-leg", "draft-curved-leg"].map((word, port) => new Option(say(word), String(port))));
@@ -152,6 +164,8 @@ export function editorPage(root) {
     goesOn();
   });
   $("#draft-save").addEventListener("click", save);
+  $("#draft-use").hidden = live.setUp.mode !== "setting-up";
+  $("#draft-use").addEventListener("click", use);
   hand(side);
   list();
   draw();

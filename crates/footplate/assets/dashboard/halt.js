@@ -48,9 +48,9 @@ document.getElementById("halt").addEventListener("click", halt);
 document.addEventListener("keydown", (event) => {
   // In a text field or on a button, the space bar has its usual function.
   const writes = event.target.closest?.("input:not([type=range]), textarea, select, button, summary");
-  if (event.code === "Space" && !writes && !event.repeat) {
+  if (event.code === "Space" && !writes && !event.repeat && !document.body.classList.contains("setting-up")) {
     event.preventDefault();
     halt();
   }
 });
-setInterval(look, LOOKED_EVERY_MS);
+setInterval(() => document.body.classList.contains("setting-up") || look(), LOOKED_EVERY_MS);

@@ -91,7 +91,7 @@ export function healthPage(root, live) {
       const drift = own.at(-1)?.drift ?? 0;
       const level = make("meter", { min: 0, max: 1, low: 0.5, high: 0.8, optimum: 0, value: drift, "aria-label": say("drift-of", train, shown(100 * drift)) });
       return make("tr", {},
-        make("th", { scope: "row" }, make("a", { href: `#/train/${train}` }, say("train", train))),
+        make("th", { scope: "row" }, make("a", { href: `#/train/${train}` }, live.called(train))),
         make("td", { class: "number" }, String(own.length)),
         make("td", { class: "number" }, own.length ? shown(rms, 1) : "–"),
         make("td", { class: "number" }, own.length ? signed(mean, 1) : "–"),

@@ -136,7 +136,7 @@ export function layoutPage(root, live, about) {
     const stopHere = button("stop-here", () => track.place && give(`stop ${train.train} at ${track.place}`, answer));
     const takes = button("take", () => take(train.train), { "aria-pressed": "false" });
     const made = make("article", { class: "train" },
-      make("h3", {}, make("a", { href: `#/train/${train.train}` }, say("train", train.train))),
+      make("h3", {}, make("a", { href: `#/train/${train.train}` }, live.called(train.train))),
       make("dl", {}, make("dt", {}, say("at")), at, make("dt", {}, say("speed")), speed, make("dt", {}, say("busy")), busy),
       make("div", { class: "does" },
         button("stop", () => give(`stop ${train.train}`, answer)), stopHere,

@@ -1,6 +1,7 @@
 // The live data of the session for all pages: pictures and events.
 
 import { get, withToken } from "./server.js";
+import { say } from "./words.js";
 
 /** The most lines, detections and orders kept: as many as the server keeps. */
 const KEPT = 4000;
@@ -16,8 +17,16 @@ function keep(list, item) {
  * when another session has begun and earlier data is void.
  */
 export class Live extends EventTarget {
+  /** Who serves the pages, and whether another program is about to. */
+  setUp; awaitsMode = false;
   layout; picture; state = "connecting"; lines = []; passed = []; ended = []; alarms = [];
   #session; #drawing = false;
+
+  /** A train with the name that its owner gave it in the set-up. */
+  called(train) {
+    const name = this.setUp?.trains.find(({ address }) => address === train)?.name;
+    return name ? `${say("train", train)} · ${name}` : say("train", train);
+  }
 
   async begin() {
     this.layout = await get("/api/layout");

@@ -15,7 +15,7 @@ const LISTED = 40;
 export function trainPage(root, live, number) {
   const train = Number(number);
   const $ = (selector) => root.querySelector(selector);
-  $("h2").textContent = say("train", train);
+  $("h2").textContent = live.called(train);
   const charts = new TrainCharts(root, live, train);
   /** Where the result of the last command is shown: beside its control. */
   let answer = $("#answer");

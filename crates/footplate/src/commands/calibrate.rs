@@ -77,9 +77,16 @@ pub(crate) struct Arguments {
     /// Then a simulated layout keeps real time.
     #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "", requires = "link")]
     serve: Option<ServedAt>,
+    /// The set-up that this calibration is a step of; `footplate serve` gives it.
+    #[arg(long, value_name = "FILE", hide = true, requires = "serve")]
+    set_up: Option<PathBuf>,
     /// Begin from nothing, even if the store knows the train already.
     #[arg(long, requires = "link")]
     afresh: bool,
+    /// Set all turnouts straight before the train moves, so that it runs onto none of unknown position. No train may
+    /// be standing on a turnout.
+    #[arg(long, requires = "link")]
+    set_turnouts: bool,
     /// A built-in layout (track-a, track-b) or a layout file (TOML).
     #[arg(long, value_name = "LAYOUT")]
     layout: Option<String>,
@@ -139,7 +146,9 @@ impl Arguments {
                 train: TrainId(train),
                 budget: self.budget,
                 is_afresh: self.afresh,
+                sets_turnouts: self.set_turnouts,
                 serve: self.serve.as_ref(),
+                set_up: self.set_up.as_ref(),
                 store: self.store.as_deref(),
                 out: self.out.as_deref(),
                 plot: self.plot.as_ref(),

@@ -66,8 +66,8 @@ impl Command {
     pub(crate) fn guarded_line(&self) -> Option<GuardedLine> {
         let (link, restarts) = match self {
             Self::Calibrate(arguments) => (arguments.link()?, false),
-            Self::Drive(arguments) => (arguments.link(), false),
-            Self::Serve(arguments) => (arguments.link(), arguments.restarts()),
+            Self::Drive(arguments) => (arguments.link()?, false),
+            Self::Serve(arguments) => (arguments.link()?, arguments.restarts()),
             _ => return None,
         };
         Some(GuardedLine { cable: link.cable()?, restarts })

@@ -18,7 +18,7 @@ use footplate_store::{Journal, MotionFile, Store, TrainAtStart};
 use serde_json::json;
 
 use super::Outcome;
-use super::serve::open_dashboard;
+use super::serve::{SetUpRoute, open_dashboard};
 use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
 use crate::dashboard::{ReadOnlyDashboard, ServedAt};
@@ -87,11 +87,15 @@ impl Arguments {
         let screen = Screen::new(output, if self.json { Manner::Json } else { Manner::Text });
         let is_watched = screen.is_watched();
         let dashboard = match &self.serve {
-            Some(at) => Some(open_dashboard(at, &written, self.store.clone())?),
+            Some(at) => Some(open_dashboard(at, &written, self.store.clone(), SetUpRoute::fixed())?),
             // Another program may use the default port.
-            None if is_watched => open_dashboard(&ServedAt::USUAL, &written, self.store.clone())
-                .or_else(|_| open_dashboard(&ServedAt::ANY, &written, self.store.clone()))
-                .ok(),
+            None if is_watched => {
+                open_dashboard(&ServedAt::USUAL, &written, self.store.clone(), SetUpRoute::fixed())
+                    .or_else(|_| {
+                        open_dashboard(&ServedAt::ANY, &written, self.store.clone(), SetUpRoute::fixed())
+                    })
+                    .ok()
+            }
             None => None,
         };
         let watched = (is_watched || dashboard.is_some()).then_some(WATCHED_SPEED);

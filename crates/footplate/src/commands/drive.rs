@@ -43,7 +43,7 @@ use self::truth::{GroundTruth, StartOdometers};
 use super::Outcome;
 use super::left_running::stop_left_running;
 use super::predict::turnout_state;
-use super::serve::open_dashboard;
+use super::serve::{SetUpMode, SetUpRoute, open_dashboard};
 use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
 use crate::dashboard::{Board, Dashboard, LayoutPicture, ServedAt};
@@ -63,7 +63,7 @@ use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
 /// prediction, and each stop beside its predicted interval. However the program ends, it first commands all trains to
 /// stop and switches the track power off.
 #[derive(Args)]
-#[command(after_help = "\
+#[command(mut_arg("link", |link| link.required(true)), after_help = "\
 Examples:
   footplate drive --link sim:track-a?seed=7 --store railway.db
   footplate drive --link marklin-serial:/dev/ttyUSB0 --layout track-a --store railway.db --script evening.txt --json")]
@@ -91,6 +91,9 @@ pub(crate) struct Arguments {
     /// No operator at this console, whatever standard input is.
     #[arg(skip)]
     is_headless: bool,
+    /// The set-up that this session runs, if it was made in the browser.
+    #[arg(skip)]
+    set_up: Option<PathBuf>,
 }
 
 /// The railway to drive: command station, layout and trains.
@@ -99,7 +102,7 @@ pub(crate) struct Railway {
     /// The command station: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5,
     /// loconet:192.168.0.20, or tcp://host:port in place of a device.
     #[arg(long, value_name = "URL")]
-    link: Address,
+    link: Option<Address>,
     /// The layout: the name of a built-in layout, or a layout file; not needed for a simulated link.
     #[arg(long)]
     layout: Option<String>,
@@ -122,23 +125,42 @@ pub(crate) struct Railway {
 }
 
 impl Railway {
-    pub(super) const fn link(&self) -> &Address {
-        &self.link
+    pub(super) const fn link(&self) -> Option<&Address> {
+        self.link.as_ref()
+    }
+
+    pub(super) const fn store(&self) -> Option<&PathBuf> {
+        self.store.as_ref()
+    }
+
+    /// Whether the command line names more of the railway than its store.
+    pub(super) const fn is_described(&self) -> bool {
+        self.layout.is_some()
+            || !self.trains.is_empty()
+            || !self.models.is_empty()
+            || !self.turnouts.is_empty()
+    }
+
+    /// The link, which a driving session needs.
+    fn station(&self) -> anyhow::Result<&Address> {
+        self.link.as_ref().ok_or_else(|| {
+            anyhow!("link missing: add `--link sim:track-a?seed=7`, or the address of your command station")
+        })
     }
 
     /// What the doctor measured of the line.
     fn line(&self) -> anyhow::Result<Option<MeasuredLine>> {
-        MeasuredLine::of(&self.link, self.store.as_deref())
+        MeasuredLine::of(self.station()?, self.store.as_deref())
     }
 }
 
 impl Arguments {
-    pub(crate) const fn link(&self) -> &Address {
-        &self.railway.link
+    pub(crate) const fn link(&self) -> Option<&Address> {
+        self.railway.link()
     }
 
     /// A session that only browsers and API clients operate (`footplate serve`).
-    pub(super) const fn served(railway: Railway, at: ServedAt) -> Self {
+    pub(super) const fn served(railway: Railway, at: ServedAt, set_up: Option<PathBuf>) -> Self {
         Self {
             railway,
             script: None,
@@ -147,22 +169,24 @@ impl Arguments {
             serve: Some(at),
             plain: true,
             is_headless: true,
+            set_up,
         }
     }
 
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let address = self.railway.station()?;
         let written = self.layout()?;
         let layout = &written.layout;
         // With an operator the session runs in real time; a simulated script need not.
         let is_watched = self.script.is_none() || self.serve.is_some();
         let pace = if is_watched { Speed::Times(1.0) } else { Speed::Unpaced };
         let mut store = self.railway.store.as_deref().map(Store::open_or_create).transpose()?;
-        let stop = |store: &Store| stop_left_running(&self.railway.link, layout, store, pace);
+        let stop = |store: &Store| stop_left_running(address, layout, store, pace);
         let opened = store.as_ref().map(stop).transpose()?.flatten();
         // A damaged store is not written to: that could overwrite what can still be salvaged.
         store.as_ref().map_or(Ok(()), Store::check)?;
         let mut named: BTreeSet<TrainId> = self.railway.trains.iter().copied().map(TrainId).collect();
-        if let Some(simulated) = self.railway.link.simulated() {
+        if let Some(simulated) = address.simulated() {
             named.extend(&simulated.trains);
         }
         let known = KnownTrains::gather(
@@ -172,7 +196,7 @@ impl Arguments {
         drop(store);
         let beginning = self.beginning(&written, known)?;
         let dashboard = self.dashboard(&written)?;
-        match &self.railway.link {
+        match address {
             Address::Simulated(simulated) => {
                 // The simulator uses the built-in layout; `--layout` may differ from it to study a wrong survey.
                 let real = layout_named(&simulated.layout)?.layout;
@@ -184,7 +208,7 @@ impl Arguments {
             | Address::Z21(_)
             | Address::Can(_)
             | Address::LocoNet(_) => {
-                let link = opened.map_or_else(|| open(&self.railway.link, layout, pace), Ok)?;
+                let link = opened.map_or_else(|| open(address, layout, pace), Ok)?;
                 self.drive(layout, link, beginning, dashboard.as_ref(), output)
             }
         }
@@ -192,7 +216,7 @@ impl Arguments {
 
     /// The named layout, or that of the simulated link.
     fn layout(&self) -> anyhow::Result<WrittenLayout> {
-        let named = match (&self.railway.layout, self.railway.link.simulated()) {
+        let named = match (&self.railway.layout, self.railway.station()?.simulated()) {
             (Some(named), _) => named,
             (None, Some(simulated)) => &simulated.layout,
             (None, None) => {
@@ -235,7 +259,7 @@ impl Arguments {
             script: steps.into_iter().map(|step| step.text).collect(),
             is_complete: self.script.is_some(),
             wait_limit_s: self.wait_limit,
-            link: self.railway.link.time_model(self.railway.line()?.as_ref()),
+            link: self.railway.station()?.time_model(self.railway.line()?.as_ref()),
         })
     }
 
@@ -254,7 +278,8 @@ impl Arguments {
 
     fn dashboard(&self, written: &WrittenLayout) -> anyhow::Result<Option<Dashboard>> {
         let store = || self.railway.store.clone();
-        self.serve.as_ref().map(|at| open_dashboard(at, written, store())).transpose()
+        let set_up = || SetUpRoute::of_session(self.set_up.clone(), SetUpMode::Driving);
+        self.serve.as_ref().map(|at| open_dashboard(at, written, store(), set_up())).transpose()
     }
 
     /// The journal that records the session in the store; the clock of the link reads `at` now.
@@ -274,7 +299,7 @@ impl Arguments {
         journal
             .begin_machine(NewMachine { kind: DriveBeginning::KIND, program: PROGRAM, body: &body }, now)?;
         // A simulated clock can wait for a slow disk; a real railway cannot.
-        let is_simulated = self.railway.link.simulated().is_some();
+        let is_simulated = self.railway.station()?.simulated().is_some();
         let when_full = if is_simulated { WhenFull::Wait } else { WhenFull::Lose };
         Ok(Some(SessionJournal::start(journal, began_at, when_full, IfUnkept::Stop)?))
     }
@@ -287,11 +312,12 @@ impl Arguments {
         dashboard: Option<&Dashboard>,
         output: &mut dyn Write,
     ) -> anyhow::Result<Outcome> {
+        let address = self.railway.station()?;
         let line = dashboard.map(|dashboard| Arc::clone(&dashboard.line));
         let line = line.or_else(|| self.railway.phones.map(|_| SharedTallies::default()));
         let link = ObservedLink::new(link, line.clone());
-        let mut session = open_session(&self.railway.link, &link, layout)?;
-        session.expect_delays(self.railway.link.excess(self.railway.line()?.as_ref()));
+        let mut session = open_session(address, &link, layout)?;
+        session.expect_delays(address.excess(self.railway.line()?.as_ref()));
         let sits_at_terminal = self.is_drawn();
         let is_shown = sits_at_terminal || self.railway.phones.is_some();
         let board = dashboard.map(|dashboard| Arc::clone(&dashboard.board));

@@ -3,11 +3,13 @@
 mod answer_queue;
 mod archive;
 mod odometry_pages;
+mod set_up;
 mod slides;
 
 use std::io::Write;
 use std::path::PathBuf;
 
+use anyhow::bail;
 use clap::Args;
 use footplate_store::parse_layout;
 
@@ -20,15 +22,21 @@ use crate::link::Address;
 pub(crate) use answer_queue::{AnswerForm, AnswerQueue};
 pub(crate) use archive::{StoreQuery, archive_routes};
 pub(crate) use odometry_pages::odometry_routes;
+#[cfg(test)]
+pub(crate) use set_up::set_up_paths;
+pub(crate) use set_up::{SetUpMode, SetUpRoute};
 pub(crate) use slides::slide_routes;
 
 /// Drive trains from browsers and API clients, without a prompt.
 ///
-/// Serves the dashboard and its HTTP interface like `footplate drive --serve`, prints the address, and runs until it
-/// receives `quit` or is interrupted. It then commands all trains to stop and switches the track power off.
+/// Without `--link`, a page in the browser leads from the command station to the first stop; the set-up is kept beside the
+/// store (railway.db unless named), and the next start drives at once. With `--link`, serves the dashboard and its HTTP
+/// interface like `footplate drive --serve`. It prints the address, and runs until it receives `quit` or is interrupted. It
+/// then commands all trains to stop and switches the track power off.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
+  footplate serve
   footplate serve --link sim:track-a?seed=7 --train 24 --store railway.db
   footplate serve 0.0.0.0:8417 --link marklin-serial:/dev/ttyUSB0 --layout track-a --store railway.db")]
 pub(crate) struct Arguments {
@@ -40,6 +48,9 @@ pub(crate) struct Arguments {
     /// trains again.
     #[arg(long)]
     restart: bool,
+    /// The set-up that this session runs; `footplate serve` without a link gives it.
+    #[arg(long, value_name = "FILE", hide = true, requires = "link")]
+    set_up: Option<PathBuf>,
     #[command(flatten)]
     railway: drive::Railway,
 }
@@ -52,20 +63,23 @@ pub(super) fn open_dashboard(
     at: &ServedAt,
     written: &WrittenLayout,
     store: Option<PathBuf>,
+    set_up: SetUpRoute,
 ) -> anyhow::Result<Dashboard> {
     let chosen = std::env::var("FOOTPLATE_TOKEN").ok().filter(|text| !text.is_empty());
     let token = chosen.as_deref().map(Token::chosen).transpose()?;
     let layout = parse_layout(written.layout.name(), written.text.as_bytes())?;
     let answer_queue = AnswerQueue::new();
-    let more =
-        archive_routes(store, written, &answer_queue).and(odometry_routes(&answer_queue)).and(slide_routes());
+    let more = archive_routes(store, written, &answer_queue)
+        .and(odometry_routes(&answer_queue))
+        .and(slide_routes())
+        .and(set_up.routes());
     let dashboard = Dashboard::open(at, token, &layout, more)?;
     eprintln!("the dashboard is at {}", dashboard.url);
     Ok(dashboard)
 }
 
 impl Arguments {
-    pub(crate) const fn link(&self) -> &Address {
+    pub(crate) const fn link(&self) -> Option<&Address> {
         self.railway.link()
     }
 
@@ -74,6 +88,15 @@ impl Arguments {
     }
 
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
-        drive::Arguments::served(self.railway, self.at).run(output)
+        if self.railway.link().is_some() {
+            return drive::Arguments::served(self.railway, self.at, self.set_up).run(output);
+        }
+        if self.railway.is_described() {
+            bail!(
+                "link missing: add `--link sim:track-a?seed=7`, or the address of your command station; to set up the \
+                 railway in the browser, give no more than --store"
+            );
+        }
+        set_up::run(self.at, self.railway.store().cloned(), self.restart)
     }
 }

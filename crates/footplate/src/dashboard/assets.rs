@@ -4,7 +4,7 @@ use axum::http::header;
 use axum::response::{IntoResponse, Response};
 
 /// The content security policy of the pages: they load from this server only.
-const POLICY: &str = "default-src 'none'; connect-src 'self'; img-src 'self' data:; script-src 'self'; style-src 'self'; frame-src 'self'; \
+const POLICY: &str = "default-src 'none'; connect-src 'self'; manifest-src 'self'; img-src 'self' data:; script-src 'self'; style-src 'self'; frame-src 'self'; \
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// A file of the pages.
@@ -37,12 +37,14 @@ pub(super) fn asset(path: &str) -> Option<Asset> {
         _ => files! { path:
             "index.html" "dashboard.css" "dashboard.js" "alarms.js" "server.js" "live.js" "halt.js" "dom.js" "words.js" "english.js"
             "german.js" "charts.js" "layout_page.js" "pick_track.js" "track.js" "view.js" "train_page.js"
-            "train_charts.js" "places.js" "plan.js" "plan_curve.js" "plan_without_points.js" "scale.js" "throttle.js" "doing_now.js" "pieces.js" "draft.js" "editor_page.js" "calibration_page.js" "health_page.js" "recordings_page.js" "odometry_page.js" "slide_view.js"
+            "train_charts.js" "places.js" "plan.js" "plan_curve.js" "plan_without_points.js" "scale.js" "throttle.js" "doing_now.js" "pieces.js" "draft.js" "editor_page.js" "setup_page.js" "worker.js" "icon.svg" "manifest.webmanifest" "calibration_page.js" "health_page.js" "recordings_page.js" "odometry_page.js" "slide_view.js"
         },
     };
     let kind = match path.rsplit_once('.') {
         Some((_, "js")) => "text/javascript; charset=utf-8",
         Some((_, "css")) => "text/css; charset=utf-8",
+        Some((_, "svg")) => "image/svg+xml",
+        Some((_, "webmanifest")) => "application/manifest+json",
         _ => "text/html; charset=utf-8",
     };
     Some(Asset { kind, text })
@@ -56,5 +58,28 @@ impl IntoResponse for Asset {
             (header::CACHE_CONTROL, "no-cache"),
         ];
         (headers, self.text).into_response()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The most that a browser loads for all pages together, in bytes, uncompressed.
+    const HEAVIEST: usize = 500_000;
+
+    #[test]
+    fn all_pages_together_are_light() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/dashboard");
+        let files = std::fs::read_dir(folder).expect("the folder of the pages");
+        let names = files.map(|file| file.expect("a file").file_name().to_string_lossy().into_owned());
+        let names: Vec<String> = names.filter(|name| name != "openapi.json").collect();
+        let shared = ["uplot.js", "uplot.css", "chart.js"].map(str::to_owned);
+        let weight: usize = names
+            .iter()
+            .chain(&shared)
+            .map(|name| asset(name).unwrap_or_else(|| panic!("{name} is not served")).text.len())
+            .sum();
+        assert!(weight <= HEAVIEST, "the pages weigh {weight} bytes");
     }
 }

@@ -33,6 +33,7 @@ use footplate_store::LayoutFile;
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use tokio::net::TcpListener;
+use tokio::sync::oneshot;
 
 use super::assets::asset;
 use super::board::{self, Board, NotDone};
@@ -63,11 +64,37 @@ const WRONG_TOKEN_DELAY: Duration = Duration::from_millis(500);
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct ServedAt(SocketAddr);
 
+impl std::fmt::Display for ServedAt {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
 impl ServedAt {
     /// The default port of this machine.
     pub(crate) const USUAL: Self = Self(SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), USUAL_PORT));
     /// Any free port of this machine.
     pub(crate) const ANY: Self = Self(SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 0));
+}
+
+impl ServedAt {
+    /// The address with a free port in place of 0.
+    ///
+    /// # Errors
+    /// It is in use.
+    pub(crate) fn with_port(&self) -> anyhow::Result<Self> {
+        Ok(Self(self.listen()?.local_addr()?))
+    }
+
+    fn listen(&self) -> anyhow::Result<std::net::TcpListener> {
+        std::net::TcpListener::bind(self.0)
+            .with_context(|| format!("{} cannot be served at: name another port, or 0 for any", self.0))
+    }
+
+    /// Whether other machines can reach it.
+    pub(crate) const fn needs_token(&self) -> bool {
+        !self.0.ip().is_loopback()
+    }
 }
 
 impl FromStr for ServedAt {
@@ -99,6 +126,7 @@ pub(crate) struct Dashboard {
     pub(crate) line: SharedTallies,
     /// The address to open in a browser.
     pub(crate) url: String,
+    _pages: ServedPages,
 }
 
 #[derive(Clone)]
@@ -106,7 +134,6 @@ struct Shared {
     board: Arc<Board>,
     layout: Arc<str>,
     line: SharedTallies,
-    guard: Guard,
 }
 
 impl Dashboard {
@@ -120,48 +147,75 @@ impl Dashboard {
         layout: &LayoutFile,
         more: Routes,
     ) -> anyhow::Result<Self> {
-        // A chosen token is known to its owner and is not printed.
-        let generated = (token.is_none() && !at.0.ip().is_loopback()).then(Token::generated).transpose()?;
-        let listener = std::net::TcpListener::bind(at.0)
-            .with_context(|| format!("{} cannot be served at: name another port, or 0 for any", at.0))?;
-        listener.set_nonblocking(true)?;
-        let bound = listener.local_addr()?;
         let layout = serde_json::to_string(&LayoutPicture::of(layout))?.into();
         // The start time in nanoseconds identifies the session.
         let board = Board::new(now().as_ns());
+        let line = SharedTallies::default();
+        let shared = Shared { board: Arc::clone(&board), layout, line: Arc::clone(&line) };
+        let pages = ServedPages::open(at, token, own_routes(shared).and(more))?;
+        Ok(Self { board, line, url: pages.url.clone(), _pages: pages })
+    }
+}
+
+/// Pages and routes at an address, until they are dropped.
+#[derive(Debug)]
+pub(crate) struct ServedPages {
+    /// The address to open in a browser.
+    pub(crate) url: String,
+    /// The end of the server: it runs until this is dropped.
+    ends: Option<oneshot::Sender<()>>,
+    thread: Option<thread::JoinHandle<()>>,
+}
+
+impl ServedPages {
+    /// Starts a server.
+    ///
+    /// # Errors
+    /// The address is in use, or the token is too short.
+    pub(crate) fn open(at: &ServedAt, token: Option<Token>, routes: Routes) -> anyhow::Result<Self> {
+        // A chosen token is known to its owner and is not printed.
+        let generated = (token.is_none() && at.needs_token()).then(Token::generated).transpose()?;
+        let listener = at.listen()?;
+        listener.set_nonblocking(true)?;
+        let bound = listener.local_addr()?;
         let shown = generated.as_ref().map(|token| format!("?token={}", token.text()));
         let url = format!("http://{bound}/{}", shown.unwrap_or_default());
-        let line = SharedTallies::default();
         let guard = Guard::new(bound, token.or(generated));
-        let shared = Shared { board: Arc::clone(&board), layout, line: Arc::clone(&line), guard };
         let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
-        thread::Builder::new().name("dashboard".to_owned()).spawn(move || {
+        let (ends, ended) = oneshot::channel::<()>();
+        let thread = thread::Builder::new().name("dashboard".to_owned()).spawn(move || {
             runtime.block_on(async move {
                 match TcpListener::from_std(listener) {
-                    Ok(listener) => {
-                        serve(listener, router(shared, more), Limits::USUAL).await;
-                    }
+                    Ok(listener) => tokio::select! {
+                        () = serve(listener, router(guard, routes), Limits::USUAL) => {}
+                        _ = ended => {}
+                    },
                     Err(error) => eprintln!("the dashboard is not served: {error}"),
                 }
             });
+            // Work that blocks is given up; nobody waits for its answer.
+            runtime.shutdown_background();
         })?;
-        Ok(Self { board, line, url })
+        Ok(Self { url, ends: Some(ends), thread: Some(thread) })
     }
 }
 
-/// Waits for the last answer: an emergency stop may end the program before its answer is sent.
-impl Drop for Dashboard {
+/// Waits for the last answer: an emergency stop may end the program before its answer is sent. The address is free
+/// afterwards.
+impl Drop for ServedPages {
     fn drop(&mut self) {
         thread::sleep(LAST_ANSWER_TIME);
+        drop(self.ends.take());
+        // A server that panicked has closed its address, too.
+        let _ = self.thread.take().map(thread::JoinHandle::join);
     }
 }
 
-fn router(shared: Shared, more: Routes) -> Router {
-    let guard = shared.guard.clone();
+fn router(guard: Guard, routes: Routes) -> Router {
     Router::new()
         .route("/", get(|| page(Path(String::new()))))
         .route("/{file}", get(page))
-        .merge(own_routes(shared).and(more).into_router())
+        .merge(routes.into_router())
         .layer(DefaultBodyLimit::max(MAX_BODY))
         .layer(from_fn_with_state(guard, guarded))
 }
@@ -313,18 +367,18 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::commands::{AnswerQueue, WrittenLayout, archive_routes, odometry_routes, slide_routes};
+    use crate::commands::{
+        AnswerQueue, WrittenLayout, archive_routes, odometry_routes, set_up_paths, slide_routes,
+    };
 
     #[test]
     fn the_description_of_the_interface_has_every_route_and_no_other() {
-        let guard = Guard::new(([127, 0, 0, 1], 80).into(), None);
-        let shared =
-            Shared { board: Board::new(0), layout: "".into(), line: SharedTallies::default(), guard };
+        let shared = Shared { board: Board::new(0), layout: "".into(), line: SharedTallies::default() };
         let layout = WrittenLayout::named("track-a").expect("built in");
         let answer_queue = AnswerQueue::new();
         let of_files = archive_routes(None, &layout, &answer_queue).and(odometry_routes(&answer_queue));
         let routes = own_routes(shared).and(of_files).and(slide_routes());
-        let there: BTreeSet<&str> = routes.paths().iter().copied().collect();
+        let there: BTreeSet<&str> = routes.paths().iter().copied().chain(set_up_paths()).collect();
         let described: serde_json::Value = serde_json::from_str(OPENAPI).expect("JSON");
         let described: BTreeSet<&str> =
             described["paths"].as_object().expect("paths").keys().map(String::as_str).collect();

@@ -6,6 +6,7 @@
 //! station_session   the session of any station, as one type
 //! line        what every link can do, and what is heard of it
 //! news        what of that a watchdog wants to know
+//! discovery   serial ports, and stations that answer a call to the network
 //! open  measured  an address becomes a link; what the doctor measured of its line
 //! simulated_station  a simulated layout behind either kind of station
 //! simulated   a virtual station in this process, as fast as it goes or paced
@@ -22,6 +23,7 @@ mod board_address;
 mod cable;
 mod can_address;
 mod datagrams;
+mod discovery;
 mod line;
 mod loconet_address;
 mod measured;
@@ -40,6 +42,7 @@ mod z21_address;
 
 pub(crate) use address::{Address, Quirks, SimulatedAddress, Speed, StationKind, law_named, quirks, trains};
 pub(crate) use cable::{Arrival, Cable, CableLink};
+pub(crate) use discovery::find_stations;
 pub(crate) use line::{Bequest, Guardian, Heard, Link, Lost, PERSON_MS};
 pub(crate) use measured::MeasuredLine;
 pub(crate) use observed::{LineTallies, ObservedLink, SharedTallies};

@@ -62,8 +62,34 @@ impl Calibrator<'_> {
         }
     }
 
+    /// Sets turnouts of unknown position straight while the train is at rest. Returns whether there are any; they are
+    /// commanded again until they are known.
+    fn is_setting_turnouts(&mut self, now: Timestamp) -> bool {
+        if !self.settings.sets_turnouts {
+            return false;
+        }
+        let unknown: alloc::vec::Vec<TurnoutId> = self
+            .layout
+            .turnouts()
+            .filter_map(|(turnout, _)| self.turnouts.get(turnout).is_none().then_some(turnout))
+            .collect();
+        let mut until = now;
+        for turnout in &unknown {
+            until = until + THROWN_WITHIN;
+            self.asked_turnouts.insert(*turnout, (Leg::Straight, now));
+            self.command(Command::Turnout { turnout: *turnout, curved: false });
+        }
+        if !unknown.is_empty() {
+            self.activity = Activity::Listening { until };
+        }
+        !unknown.is_empty()
+    }
+
     /// Runs the lost train to any sensor.
     pub(super) fn find(&mut self, now: Timestamp) {
+        if self.is_setting_turnouts(now) {
+            return;
+        }
         self.tracker.lose();
         self.locator.lose();
         self.circuit = None;

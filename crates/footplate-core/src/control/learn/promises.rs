@@ -4,6 +4,7 @@ use super::calibrator::Calibrator;
 use super::notice::{CalibrationNotice, Ending, Fault};
 use super::scripted_train::ScriptedTrain;
 use super::settings::CalibratorSettings;
+use crate::event::Command;
 use crate::ids::{SpeedStep, TrainId, TurnoutId};
 use crate::model::MotionFit;
 use crate::time::TimeSpan;
@@ -47,6 +48,25 @@ fn a_train_is_found_brought_to_a_circuit_and_stopped_within_the_budget() {
     assert!(train.is_at_rest() && !train.overran);
     assert!(train.has_notified(|notice| matches!(notice, CalibrationNotice::Found { .. })));
     assert!(train.has_notified(|notice| matches!(notice, CalibrationNotice::Done(_))));
+}
+
+#[test]
+fn on_request_all_turnouts_are_set_before_the_train_moves() {
+    let layout = large_oval();
+    let mut train = ScriptedTrain::new(&layout, "D1", "A1", 200.0);
+    let mut machine = calibrator(&layout, 120.0);
+    machine.settings.sets_turnouts = true;
+    train.run(&mut machine, 200.0);
+    let moves =
+        |command: &Command| matches!(command, Command::Speed { step, .. } if *step != SpeedStep::STAND);
+    let first_move = train.commands.iter().position(|(_, command)| moves(command)).unwrap();
+    let set = |turnout| {
+        let straight = Command::Turnout { turnout, curved: false };
+        train.commands[..first_move].iter().any(|(_, command)| *command == straight)
+    };
+    assert!(layout.turnouts().len() > 0 && layout.turnouts().all(|(turnout, _)| set(turnout)));
+    assert_eq!(machine.ending(), Some(&Ending::Budget), "it is calibrated all the same");
+    assert!(train.has_said(|notice| matches!(notice, CalibrationNotice::Done(_))));
 }
 
 #[test]

@@ -15,6 +15,8 @@ pub struct CalibratorSettings {
     pub train_length: Length,
     /// Stretches that other trains occupy or have reserved: no circuit uses them.
     pub avoid: Vec<StretchId>,
+    /// Set every turnout of unknown position straight before the train moves.
+    pub sets_turnouts: bool,
 }
 
 impl Default for CalibratorSettings {
@@ -25,6 +27,7 @@ impl Default for CalibratorSettings {
             // A locomotive with three coaches of 27 cm and a pickup in the middle.
             train_length: Length::from_mm(900.0),
             avoid: Vec::new(),
+            sets_turnouts: false,
         }
     }
 }

@@ -10,7 +10,7 @@ mod told;
 mod watcher;
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
@@ -31,7 +31,7 @@ use crate::clock::now;
 use crate::commands::Outcome;
 use crate::commands::left_running::stop_left_running;
 use crate::commands::plot::PictureFile;
-use crate::commands::serve::open_dashboard;
+use crate::commands::serve::{SetUpMode, SetUpRoute, open_dashboard};
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{ReadOnlyDashboard, ServedAt};
 use crate::link::{Address, Link, MeasuredLine, ObservedLink, Speed, open, open_session, open_simulated};
@@ -71,7 +71,9 @@ pub(super) struct Session<'a> {
     pub(super) train: TrainId,
     pub(super) budget: TimeSpan,
     pub(super) is_afresh: bool,
+    pub(super) sets_turnouts: bool,
     pub(super) serve: Option<&'a ServedAt>,
+    pub(super) set_up: Option<&'a PathBuf>,
     pub(super) store: Option<&'a Path>,
     pub(super) out: Option<&'a Path>,
     pub(super) plot: Option<&'a PictureFile>,
@@ -146,12 +148,22 @@ impl Session<'_> {
     fn drive<L: Link>(&self, on: &WrittenLayout, link: L, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = &on.layout;
         let store = || self.store.map(Path::to_path_buf);
-        let dashboard = self.serve.map(|at| open_dashboard(at, on, store())).transpose()?;
+        let dashboard = self
+            .serve
+            .map(|at| {
+                let set_up = SetUpRoute::of_session(self.set_up.cloned(), SetUpMode::Calibrating);
+                open_dashboard(at, on, store(), set_up)
+            })
+            .transpose()?;
         let link = ObservedLink::new(link, dashboard.as_ref().map(|dashboard| Arc::clone(&dashboard.line)));
         let showing =
             dashboard.as_ref().map(|dashboard| ReadOnlyDashboard::new(dashboard, layout, link.now()));
         let (fit, turnouts) = self.known(layout)?;
-        let settings = CalibratorSettings { budget: self.budget, ..CalibratorSettings::default() };
+        let settings = CalibratorSettings {
+            budget: self.budget,
+            sets_turnouts: self.sets_turnouts,
+            ..CalibratorSettings::default()
+        };
         let beginning = CalibrationBeginning::new(on, settings, fit, &turnouts);
         let mut written = match self.store {
             Some(path) => Some(kept::begin(path, layout, self.train, self.link, link.now(), &beginning)?),

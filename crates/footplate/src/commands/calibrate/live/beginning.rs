@@ -18,6 +18,9 @@ pub(crate) struct CalibrationBeginning {
     budget: TimeSpan,
     train_length: Length,
     avoid: Vec<StretchId>,
+    /// Absent from sessions of older versions, which did not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    sets_turnouts: bool,
     fit: MotionFit,
 }
 
@@ -31,15 +34,16 @@ impl CalibrationBeginning {
         fit: MotionFit,
         turnouts: &TurnoutStates,
     ) -> Self {
-        let CalibratorSettings { budget, train_length, avoid } = settings;
+        let CalibratorSettings { budget, train_length, avoid, sets_turnouts } = settings;
         let turnouts = written.legs(turnouts);
-        Self { layout: written.text.clone(), turnouts, budget, train_length, avoid, fit }
+        Self { layout: written.text.clone(), turnouts, budget, train_length, avoid, sets_turnouts, fit }
     }
 
     /// The calibrator that begins so, on the layout that the text says.
     pub(crate) fn calibrator(self, layout: &Layout) -> Calibrator<'_> {
-        let Self { turnouts, budget, train_length, avoid, fit, .. } = self;
-        let mut calibrator = Calibrator::new(layout, CalibratorSettings { budget, train_length, avoid }, fit);
+        let Self { turnouts, budget, train_length, avoid, sets_turnouts, fit, .. } = self;
+        let mut calibrator =
+            Calibrator::new(layout, CalibratorSettings { budget, train_length, avoid, sets_turnouts }, fit);
         calibrator.set_turnouts(turnouts.into_iter().collect());
         calibrator
     }

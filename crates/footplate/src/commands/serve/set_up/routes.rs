@@ -1,0 +1,353 @@
+//! The HTTP interface of the set-up.
+//!
+//! ```text
+//! GET  /api/setup             the mode of the program, and the set-up as far as it is complete
+//! POST /api/setup             {"link": ..}, {"layout": ..}, {"drawn": ..} or {"trains": ..}: a step
+//! GET  /api/setup/stations    stations that were found
+//! POST /api/setup/doctor      {}: check the link
+//! POST /api/setup/calibrate   {"train": 24, "turnouts_are_clear": true}
+//! POST /api/setup/drive       {}: the set-up is complete
+//! POST /api/setup/again       {}: back to the set-up once this session has ended
+//! ```
+
+use std::path::PathBuf;
+use std::sync::mpsc::SyncSender;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use anyhow::{Context, bail};
+use axum::Json;
+use axum::extract::rejection::JsonRejection;
+use axum::extract::{DefaultBodyLimit, State};
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use footplate_core::Timestamp;
+use footplate_store::{BUILT_IN, write_whole};
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+
+use super::set_up_file::{NamedTrain, SetUp};
+use super::{Next, check_link};
+use crate::clock::now;
+use crate::commands::written_layout::WrittenLayout;
+use crate::dashboard::Routes;
+use crate::link::find_stations;
+
+/// The largest layout that is taken, in bytes: thousands of nodes.
+const LARGEST_LAYOUT: usize = 1 << 20;
+
+/// What the program that answers does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum SetUpMode {
+    /// It drives a railway that its command line describes.
+    Fixed,
+    /// It waits for the owner.
+    SettingUp,
+    /// It calibrates a train of the set-up.
+    Calibrating,
+    /// It drives the railway of the set-up.
+    Driving,
+}
+
+/// The part of the interface that a session offers.
+#[derive(Debug, Clone)]
+pub(crate) struct SetUpRoute {
+    file: Option<PathBuf>,
+    mode: SetUpMode,
+    instance: Instance,
+}
+
+/// Distinguishes one server at an address from the next: browsers open the page again when it changes.
+#[derive(Debug, Clone, Serialize)]
+struct Instance(String);
+
+impl Instance {
+    fn new() -> Self {
+        Self((now() - Timestamp::ZERO).as_ns().to_string())
+    }
+}
+
+impl SetUpRoute {
+    /// The route of a session that its command line describes.
+    pub(crate) fn fixed() -> Self {
+        Self { file: None, mode: SetUpMode::Fixed, instance: Instance::new() }
+    }
+
+    /// The route of a session; without a file it was not set up in the browser.
+    pub(crate) fn of_session(file: Option<PathBuf>, mode: SetUpMode) -> Self {
+        let mode = if file.is_some() { mode } else { SetUpMode::Fixed };
+        Self { file, mode, instance: Instance::new() }
+    }
+
+    pub(crate) fn routes(self) -> Routes {
+        Routes::new(self, [("/api/setup", get(state_of_session)), ("/api/setup/again", post(again))])
+    }
+
+    /// Marks the set-up as incomplete, so that the program returns to it.
+    fn reopen(&self) -> anyhow::Result<Value> {
+        let file = self
+            .file
+            .as_ref()
+            .context("this railway was not set up in the browser: start `footplate serve` without --link")?;
+        let mut set_up = SetUp::read(file)?;
+        set_up.is_complete = false;
+        set_up.write(file)?;
+        Ok(json!({ "taken": true }))
+    }
+}
+
+async fn state_of_session(State(route): State<SetUpRoute>) -> Response {
+    let trains = route.file.as_deref().and_then(|file| SetUp::read(file).ok()).unwrap_or_default().trains;
+    answer(Ok(json!({ "mode": route.mode, "instance": route.instance, "trains": trains })))
+}
+
+async fn again(State(route): State<SetUpRoute>) -> Response {
+    answer(route.reopen())
+}
+
+/// The pages of the set-up, while no other process serves the address.
+#[derive(Clone)]
+pub(super) struct Pages {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    set_up: Mutex<SetUp>,
+    store: PathBuf,
+    /// Why the last drive could not begin.
+    problem: Option<String>,
+    chosen: SyncSender<Next>,
+    instance: Instance,
+    /// One check of the link at a time: a station takes one program.
+    checking: tokio::sync::Semaphore,
+}
+
+/// One step: exactly one of its fields is given.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Step {
+    link: Option<String>,
+    /// Of a simulated railway, beside its link.
+    speed: Option<f64>,
+    layout: Option<String>,
+    drawn: Option<DrawnLayout>,
+    trains: Option<Vec<NamedTrain>>,
+}
+
+/// A layout as text.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DrawnLayout {
+    toml: String,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ToCalibrate {
+    train: u16,
+    /// The owner says that no train is on a turnout: all of them are set straight.
+    turnouts_are_clear: bool,
+}
+
+impl Pages {
+    pub(super) fn new(
+        set_up: SetUp,
+        store: PathBuf,
+        problem: Option<String>,
+        chosen: SyncSender<Next>,
+    ) -> Self {
+        let checking = tokio::sync::Semaphore::new(1);
+        Self {
+            shared: Arc::new(Shared {
+                set_up: Mutex::new(set_up),
+                store,
+                problem,
+                chosen,
+                instance: Instance::new(),
+                checking,
+            }),
+        }
+    }
+
+    pub(super) fn routes(self) -> Routes {
+        let change = post(change).layer(DefaultBodyLimit::max(LARGEST_LAYOUT));
+        Routes::new(
+            self,
+            [
+                ("/api/setup", get(state).merge(change)),
+                ("/api/setup/stations", get(stations)),
+                ("/api/setup/doctor", post(doctor)),
+                ("/api/setup/calibrate", post(calibrate)),
+                ("/api/setup/drive", post(drive)),
+            ],
+        )
+    }
+
+    fn set_up(&self) -> MutexGuard<'_, SetUp> {
+        self.shared.set_up.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn file(&self) -> PathBuf {
+        super::file_beside(&self.shared.store)
+    }
+
+    fn json(&self) -> anyhow::Result<Value> {
+        let set_up = self.set_up();
+        let calibrated = set_up.calibrated(&self.shared.store)?;
+        let trains = set_up.trains.iter().map(|NamedTrain { address, name }| {
+            json!({
+                "address": address, "name": name, "is_calibrated": calibrated.contains(address),
+                "calibration": set_up.calibrations.get(address),
+            })
+        });
+        Ok(json!({
+            "mode": SetUpMode::SettingUp, "instance": self.shared.instance, "store": self.shared.store, "layouts": BUILT_IN, "problem": self.shared.problem,
+            "link": set_up.link, "speed": set_up.speed, "layout": set_up.layout, "line": set_up.line,
+            "trains": trains.collect::<Vec<_>>(),
+        }))
+    }
+
+    /// Changes a copy, so that a rejected step changes nothing.
+    fn change(&self, step: Step) -> anyhow::Result<Value> {
+        let mut changed = self.set_up().clone();
+        match step {
+            Step { link: Some(link), speed, .. } => changed.set_link(&link, speed)?,
+            Step { layout: Some(layout), .. } => changed.set_layout(&layout)?,
+            Step { drawn: Some(drawn), .. } => {
+                changed.set_layout(&self.keep_drawn(&drawn, changed.layout.as_deref())?)?
+            }
+            Step { trains: Some(trains), .. } => changed.set_trains(trains)?,
+            _ => bail!("name a step: `link`, `layout`, `drawn` or `trains`"),
+        }
+        self.write(changed)?;
+        self.json()
+    }
+
+    fn write(&self, changed: SetUp) -> anyhow::Result<()> {
+        changed.write(&self.file())?;
+        *self.set_up() = changed;
+        Ok(())
+    }
+
+    /// Writes a layout to a file beside the store, named after it; returns the path.
+    fn keep_drawn(&self, drawn: &DrawnLayout, present: Option<&str>) -> anyhow::Result<String> {
+        let layout = WrittenLayout::of("the drawn layout", drawn.toml.clone())?.layout;
+        let letters = layout.name().to_lowercase();
+        let words = letters.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
+        let name = words.collect::<Vec<_>>().join("-");
+        if name.is_empty() || BUILT_IN.contains(&name.as_str()) {
+            bail!("give the layout another name, of letters and digits: its file is named after it");
+        }
+        let path = self.shared.store.with_file_name(format!("{name}.toml"));
+        let text =
+            path.to_str().context("the folder of the store has a name that cannot be written in a link")?;
+        // An absolute path holds wherever the program is started next.
+        if path.exists() && present != Some(text) && std::fs::read_to_string(&path)? != drawn.toml {
+            bail!("{text} exists already and is another layout: give this one another name");
+        }
+        write_whole(&path, drawn.toml.as_bytes()).with_context(|| format!("cannot write {text}"))?;
+        Ok(text.to_owned())
+    }
+
+    /// Goes over to another process.
+    fn go_on(&self, next: Next) -> anyhow::Result<Value> {
+        if self.shared.checking.available_permits() == 0 {
+            bail!("the link is still being checked: wait for its result");
+        }
+        // A second click changes nothing: the first one is carried out.
+        let _ = self.shared.chosen.try_send(next);
+        Ok(json!({ "taken": true }))
+    }
+
+    fn calibrate(&self, ToCalibrate { train, turnouts_are_clear }: &ToCalibrate) -> anyhow::Result<Value> {
+        let set_up = self.set_up().clone();
+        set_up.calibration_link()?;
+        set_up.layout()?;
+        if !set_up.trains.iter().any(|named| named.address == *train) {
+            bail!("train {train} is not in the set-up: add it to the trains first");
+        }
+        if !turnouts_are_clear {
+            bail!(
+                "all turnouts are set straight before the train moves: check first that no train is standing on one"
+            );
+        }
+        self.go_on(Next::Calibrate(*train))
+    }
+
+    fn drive(&self) -> anyhow::Result<Value> {
+        let mut changed = self.set_up().clone();
+        changed.link()?;
+        changed.layout()?;
+        if changed.trains.is_empty() {
+            bail!("name a train first");
+        }
+        changed.is_complete = true;
+        self.write(changed)?;
+        self.go_on(Next::Drive)
+    }
+}
+
+/// JSON, or the reason why not.
+fn answer(result: anyhow::Result<Value>) -> Response {
+    let no_store = [(header::CACHE_CONTROL, "no-store")];
+    match result {
+        Ok(json) => (no_store, Json(json)).into_response(),
+        Err(error) => {
+            (StatusCode::UNPROCESSABLE_ENTITY, no_store, Json(json!({ "error": format!("{error:#}") })))
+                .into_response()
+        }
+    }
+}
+
+/// The body of a request, or what is wrong with it.
+fn read<T>(body: Result<Json<T>, JsonRejection>, work: impl FnOnce(T) -> anyhow::Result<Value>) -> Response {
+    match body {
+        Ok(Json(read)) => answer(work(read)),
+        Err(wrong) => (wrong.status(), Json(json!({ "error": wrong.body_text() }))).into_response(),
+    }
+}
+
+async fn state(State(pages): State<Pages>) -> Response {
+    answer(pages.json())
+}
+
+async fn change(State(pages): State<Pages>, body: Result<Json<Step>, JsonRejection>) -> Response {
+    read(body, |step| pages.change(step))
+}
+
+async fn stations() -> Response {
+    let found = tokio::task::spawn_blocking(find_stations).await;
+    answer(found.map_err(anyhow::Error::from).map(|found| json!(found)))
+}
+
+async fn doctor(State(pages): State<Pages>) -> Response {
+    let Ok(_checking) = pages.shared.checking.try_acquire() else {
+        return answer(Err(anyhow::anyhow!("the link is being checked already: wait for its result")));
+    };
+    let (set_up, store) = (pages.set_up().clone(), pages.shared.store.clone());
+    let checked = tokio::task::spawn_blocking(move || check_link(&set_up, &store)).await;
+    let keep = |line| {
+        let mut changed = pages.set_up().clone();
+        changed.line = Some(line);
+        pages.write(changed)?;
+        pages.json()
+    };
+    answer(checked.map_err(anyhow::Error::from).and_then(|line| line).and_then(keep))
+}
+
+async fn calibrate(State(pages): State<Pages>, body: Result<Json<ToCalibrate>, JsonRejection>) -> Response {
+    read(body, |wanted| pages.calibrate(&wanted))
+}
+
+async fn drive(State(pages): State<Pages>) -> Response {
+    answer(pages.drive())
+}
+
+/// The paths of the set-up, for the test of the description.
+#[cfg(test)]
+pub(crate) fn set_up_paths() -> Vec<&'static str> {
+    let (chosen, _) = std::sync::mpsc::sync_channel(1);
+    let pages = Pages::new(SetUp::default(), PathBuf::new(), None, chosen);
+    pages.routes().paths().iter().chain(SetUpRoute::fixed().routes().paths()).copied().collect()
+}

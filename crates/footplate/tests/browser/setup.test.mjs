@@ -1,0 +1,183 @@
+// A new owner starts the program without arguments, and is led in a real browser from nothing to a calibrated train and its first stop.
+
+import assert from "node:assert/strict";
+import { existsSync, mkdtempSync, readFileSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+
+import { findings } from "./axe.mjs";
+import { AT, launch, openQuietly, width } from "./browser.mjs";
+import { PATIENCE, begin, end } from "./railway.mjs";
+
+/** The longest that a calibration takes: five minutes at twenty times real time, on a busy machine. */
+const CALIBRATED_MS = 120_000;
+/** While another program takes over the address, a browser reports that nobody answers. */
+const GOES_OVER = /ERR_CONNECTION_REFUSED|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET|ERR_INCOMPLETE_CHUNKED_ENCODING|ERR_SOCKET_NOT_CONNECTED/;
+
+let browser;
+const running = new Set();
+const folder = mkdtempSync(join(tmpdir(), "footplate-setup-"));
+
+async function started(store, port = 0) {
+  const program = await begin(["serve", String(port), "--store", join(folder, store)]);
+  running.add(program);
+  return program;
+}
+
+async function ended(program) {
+  running.delete(program);
+  return end(program);
+}
+
+before(async () => { browser = await launch(); });
+after(async () => {
+  await browser?.close();
+  await Promise.all([...running].map(end));
+});
+
+const isShown = (page, selector, ms = PATIENCE) => page.waitForSelector(selector, { timeout: ms });
+const heading = (page) => page.locator("#setup-heading").textContent();
+
+test("from nothing to a calibrated train and its first stop", async () => {
+  const program = await started("railway.db");
+  const { page, complaints } = await openQuietly(browser, program.url);
+  await isShown(page, "#use-simulated");
+  assert.match(page.url(), /#\/setup$/);
+  await page.waitForFunction(() => !/searching/.test(document.querySelector("#stations").textContent), null, { timeout: PATIENCE });
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "setup-station.png"), fullPage: true });
+
+  // What cannot be is refused, and says what would be right.
+  await page.click("#use-typed");
+  assert.match(await page.locator("#setup-answer").textContent(), /such as 192\.168/);
+  await page.selectOption("#sim-speed", "4");
+  await page.click("#use-simulated");
+  await isShown(page, "[data-layout='track-a']");
+  await page.screenshot({ path: join(AT, "setup-layout.png"), fullPage: true });
+  await page.click("[data-layout='track-a']");
+  await isShown(page, "#save-trains");
+  await page.fill(".called", "Big Boy");
+  await page.click("#add-train");
+  await page.locator(".address").nth(1).fill("24");
+  await page.click("#save-trains");
+  await page.waitForFunction(() => /used twice/.test(document.querySelector("#setup-answer").textContent));
+  await page.locator(".address").nth(1).fill("58");
+  assert.deepEqual(await findings(page), []);
+  await page.click("#save-trains");
+
+  await isShown(page, "#check-link");
+  await page.click("#check-link");
+  await isShown(page, "#link-next");
+  assert.match(await page.locator("#setup-step pre").textContent(), /sensor modules/);
+  await page.screenshot({ path: join(AT, "setup-link.png"), fullPage: true });
+
+  // Each step is kept: the program is started again, and goes on where it was.
+  assert.equal(await ended(program), 0);
+  const again = await started("railway.db", program.port);
+  await page.goto(`${again.url}#/setup/station`);
+  await page.reload();
+  await isShown(page, "#use-simulated");
+  await page.goto(`${again.url}#/setup`);
+  await isShown(page, "[data-calibrate='24']");
+
+  // No train moves before its owner has looked at the turnouts.
+  await page.click("[data-calibrate='24']");
+  await page.waitForFunction(() => /check first that no train is standing on one/.test(document.querySelector("#setup-answer").textContent));
+  await page.check("#turnouts-clear");
+  await page.click("[data-calibrate='24']");
+  await isShown(page, "#calibrates");
+  await page.waitForFunction(() => document.querySelector("#calibrated")?.value > 0.3, null, { timeout: CALIBRATED_MS });
+  assert.match(await page.locator("#reached").textContent(), /±\d+ mm/);
+  await page.screenshot({ path: join(AT, "setup-calibrating.png"), fullPage: true });
+  await isShown(page, "#turnouts-clear", CALIBRATED_MS);
+  await page.waitForFunction(() => document.querySelector(".cards .card p").textContent === "calibrated", null, { timeout: PATIENCE });
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "setup-calibrated.png"), fullPage: true });
+
+  await page.click("#calibrate-next");
+  await isShown(page, "#drive");
+  await page.click("#drive");
+  await isShown(page, "#all-straight");
+  assert.ok(await page.locator("#first-go").isHidden(), "the turnouts come first");
+  await page.click("#all-straight");
+  await page.waitForSelector("#go:visible", { timeout: PATIENCE });
+  await page.selectOption("#first-place", "C13");
+  await page.click("#go");
+  await page.waitForFunction(() => /stopped at|refused/.test(document.querySelector("#first-result").textContent), null, { timeout: 2 * PATIENCE });
+  const result = await page.locator("#first-result").textContent();
+  assert.match(result, /Train 24 stopped at C13/);
+  const [, low, high] = /95 %: (\S+) to (\S+) mm/.exec(result.replaceAll("−", "-")).map(Number);
+  const [, truth] = /simulation: (\S+) mm/.exec(result.replaceAll("−", "-")).map(Number);
+  assert.ok(low < high && Math.abs(truth) < 100, result);
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "setup-stopped.png"), fullPage: true });
+
+  // The way back, and forth again: the second time the program drives at once.
+  await page.click("#setup-again");
+  await isShown(page, "#setup-steps a");
+  assert.match(await heading(page), /first stop/i);
+  await page.click("#drive");
+  await isShown(page, "#to-layout");
+  await page.click("#to-layout");
+  await isShown(page, "#track .rail");
+  assert.deepEqual(complaints.filter((text) => !GOES_OVER.test(text)), []);
+  await page.close();
+  await ended(again);
+  const third = await started("railway.db");
+  const { page: driven } = await openQuietly(browser, third.url);
+  await isShown(driven, "#track .rail");
+  await driven.close();
+  await ended(third);
+});
+
+test("a drawn layout becomes a file beside the store", async () => {
+  const program = await started("drawn.db");
+  const post = async (path, body) => {
+    const answer = await fetch(`${program.url}${path}`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) });
+    return [answer.status, await answer.json()];
+  };
+  const toml = readFileSync(new URL("../../../footplate-store/layouts/track-b.toml", import.meta.url), "utf8");
+  const [, { error }] = await post("api/setup", { drawn: { toml } });
+  assert.match(error, /another name/, "its name is that of a built-in layout");
+  const renamed = toml.replace(/^name = ".*"$/m, 'name = "My attic"');
+  const [status, setUp] = await post("api/setup", { drawn: { toml: renamed } });
+  assert.equal(status, 200);
+  assert.equal(setUp.layout, join(folder, "my-attic.toml"));
+  assert.equal(readFileSync(setUp.layout, "utf8"), renamed);
+  assert.equal((await post("api/setup", { drawn: { toml: "nodes = 1" } }))[0], 422);
+  assert.equal((await post("api/setup", { link: "nonsense" }))[0], 422);
+  assert.equal((await post("api/setup", { colour: "red" }))[0], 422);
+  assert.match((await post("api/setup/drive", {}))[1].error, /command station first/);
+  assert.ok(existsSync(join(folder, "drawn.setup.json")));
+  await ended(program);
+});
+
+test("a station that is gone leads back to the set-up, with the reason", async () => {
+  const file = join(folder, "gone.setup.json");
+  writeFileSync(file, JSON.stringify({ link: "dcc-ex:tcp://127.0.0.1:1", layout: "track-a", trains: [{ address: 24, name: "" }], is_complete: true }));
+  const program = await started("gone.db");
+  const { page } = await openQuietly(browser, program.url);
+  await page.waitForSelector("#setup-problem:visible", { timeout: PATIENCE });
+  assert.match(await page.locator("#setup-problem").textContent(), /127\.0\.0\.1:1/);
+  await page.close();
+  await ended(program);
+});
+
+test("the set-up fits a phone, in the dark and in German", async () => {
+  const program = await started("phone.db");
+  const { page, complaints } = await openQuietly(browser, program.url, { viewport: { width: 390, height: 800 }, locale: "de-DE", colorScheme: "dark", hasTouch: true });
+  await isShown(page, "#use-simulated");
+  await page.waitForFunction(() => !/gesucht …/.test(document.querySelector("#stations").textContent), null, { timeout: PATIENCE });
+  assert.equal(await width(page), 390);
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "setup-phone.png"), fullPage: true });
+  await page.click("#use-simulated");
+  await page.click("[data-layout='track-b']");
+  await isShown(page, "#save-trains");
+  assert.equal(await width(page), 390);
+  await page.screenshot({ path: join(AT, "setup-phone-trains.png"), fullPage: true });
+  assert.deepEqual(complaints, []);
+  await page.close();
+  await ended(program);
+});
