@@ -372,10 +372,7 @@ impl Survey {
         let is_measure = !rows.is_empty() && of_lengths <= WELL_SURVEYED * WELL_SURVEYED;
         let scale = is_measure.then(|| libm::sqrt(of_total));
         if scale.is_some() {
-            rows.push((
-                columns.sections.values().map(|column| (*column, 1.0)).collect(),
-                [0.0, TOTAL * TOTAL],
-            ));
+            rows.push((columns.sections.values().map(|column| (*column, 1.0)).collect(), [0.0, TOTAL * TOTAL]));
         }
         Self { rows, scale }
     }
