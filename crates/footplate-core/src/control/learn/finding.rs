@@ -76,7 +76,7 @@ impl Calibrator<'_> {
         let mut until = now;
         for turnout in &unknown {
             until = until + THROWN_WITHIN;
-            self.asked_turnouts.insert(*turnout, (Leg::Straight, now));
+            self.requested_turnouts.insert(*turnout, (Leg::Straight, now));
             self.command(Command::Turnout { turnout: *turnout, curved: false });
         }
         if !unknown.is_empty() {
