@@ -22,20 +22,15 @@ pub struct HoldOut {
     pub inside: usize,
     /// Gross errors: more than five standard deviations from the prediction.
     pub gross: usize,
-    /// The mean half width of the interval, as a factor on the speed less one.
-    pub half_width: f64,
 }
 
 impl HoldOut {
     /// Adds the score of another profile.
     pub fn add(&mut self, other: &Self) {
-        let both = (self.predicted + other.predicted).max(1) as f64;
-        let sum = self.half_width * self.predicted as f64 + other.half_width * other.predicted as f64;
         *self = Self {
             predicted: self.predicted + other.predicted,
             inside: self.inside + other.inside,
             gross: self.gross + other.gross,
-            half_width: sum / both,
         };
     }
 
@@ -56,7 +51,6 @@ impl HoldOut {
             }
         }
         let mut score = Self::default();
-        let mut widths = 0.0;
         for held_out in [0, 1] {
             let half = |of: usize| {
                 settings
@@ -73,10 +67,8 @@ impl HoldOut {
                 score.predicted += 1;
                 score.inside += usize::from(compared.sigmas.abs() <= NORMAL_95);
                 score.gross += usize::from(compared.sigmas.abs() > GROSS);
-                widths += libm::expm1(NORMAL_95 * compared.deviation);
             }
         }
-        score.half_width = if score.predicted > 0 { widths / score.predicted as f64 } else { 0.0 };
         score
     }
 }

@@ -32,7 +32,7 @@ impl Arguments {
         let context = self.reading.context();
         let mut total = HoldOut::default();
         if !self.json {
-            writeln!(output, "predicted  inside 95 %  gross errors  half width  profile")?;
+            writeln!(output, "predicted  inside 95 %  gross errors  profile")?;
         }
         for path in &self.files {
             let score = HoldOut::of(&read_profile(path, &context)?, self.reading.highest());
@@ -42,7 +42,6 @@ impl Arguments {
                     "predicted": score.predicted,
                     "inside": score.inside,
                     "gross": score.gross,
-                    "half_width": score.half_width,
                 });
                 writeln!(output, "{report}")?;
             } else {
@@ -58,6 +57,6 @@ impl Arguments {
 }
 
 fn write_row(output: &mut dyn Write, score: &HoldOut, name: &str) -> std::io::Result<()> {
-    let HoldOut { predicted, inside, gross, half_width } = score;
-    writeln!(output, "{predicted:>9} {inside:>12} {gross:>13} {:>9.0} %  {name}", 100.0 * half_width)
+    let HoldOut { predicted, inside, gross } = score;
+    writeln!(output, "{predicted:>9} {inside:>12} {gross:>13}  {name}")
 }
