@@ -50,7 +50,8 @@ impl KnownTrains {
             known.add(layout, &file, &path.display().to_string())?;
         }
         if let Some(store) = sources.store {
-            for train in ADDRESSES.map(TrainId) {
+            let others = sources.named.iter().copied().filter(|train| !ADDRESSES.contains(&train.0));
+            for train in ADDRESSES.map(TrainId).chain(others) {
                 if !known.models.contains_key(&train) {
                     known.add_of_store(layout, store, train, sources.named.contains(&train))?;
                 }
@@ -107,6 +108,12 @@ impl KnownTrains {
         }
         let replay = MotionReplay::of_store(layout, store, train, highest(), at)?;
         if replay.is_empty() {
+            if let (Some(profile), true) = (&replay.profile, !self.models.contains_key(&train)) {
+                eprintln!("train {train} begins with the speeds of {profile}");
+                self.models.insert(train, replay.fit.model().clone());
+                self.fits.push(replay.fit);
+                self.unknown.push(train);
+            }
             return Ok(());
         }
         let mut fit = replay.fit;
