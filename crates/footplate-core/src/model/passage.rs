@@ -1,4 +1,4 @@
-//! From the raw entries of a run to passages: a train passed a contact, within this window, by this way.
+//! From the raw entries of a run to passages: the sensor that a train passed, the window of the detection, and the path.
 //!
 //! Recordings hold more reports than passages: a contact repeats in every poll while the shoe is on it, a
 //! station still remembers a contact from before the start, and now and then a contact stays silent. What
@@ -44,10 +44,10 @@ impl Drive {
     }
 }
 
-/// A train passed a contact.
+/// A passage of a train at a sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Passage {
-    /// The contact.
+    /// The sensor.
     pub sensor: SensorId,
     /// Its node, which tells the direction of travel.
     pub node: NodeId,
