@@ -72,6 +72,8 @@ export function setupPage(root, live, wanted) {
   const goOver = (path, body) => busy(say("setup-goes-over"), async () => {
     await ask(path, body);
     live.awaitsMode = true;
+    // The same step is shown afterwards, with its result.
+    history.replaceState(null, "", `#/setup/${step}`);
     await new Promise(() => {});
   });
 
