@@ -13,7 +13,8 @@ use alloc::vec::Vec;
 
 use super::motion_model::MotionModel;
 use super::parameters::{
-    DOWN, FRICTION, HYSTERESIS, NODES, SPEEDS, START_NODES, STOP_NODES, UP, hysteresis_at, speed_at,
+    DOWN, FRICTION, HYSTERESIS, NODES, SPEEDS, START_NODES, STOP_NODES, UP, hysteresis_at, knots, speed_at,
+    stride,
 };
 use super::spread::Spread;
 use crate::ids::SpeedStep;
@@ -111,6 +112,7 @@ impl MotionModel {
         let ratio = change.ratio.clamp(1.0 / MOST, MOST);
         let stops = change.stops.clamp(1.0 / MOST, MOST);
         let (steps, side) = (self.steps(), self.values.len());
+        let (knots, stride) = (knots(steps), stride(steps));
         let mut scale = vec![1.0; side];
         let mut set = |place: usize, by: f64| {
             if let Some(slot) = scale.get_mut(place) {
@@ -123,7 +125,7 @@ impl MotionModel {
         for place in [FRICTION, HYSTERESIS] {
             set(place, ratio);
         }
-        (1..=steps).for_each(|step| set(hysteresis_at(step, steps), ratio));
+        (1..=knots).for_each(|knot| set(hysteresis_at(knot, steps), ratio));
         let stop_nodes = STOP_NODES..STOP_NODES + NODES;
         let start_nodes = START_NODES..START_NODES + NODES;
         stop_nodes.clone().chain(start_nodes.clone()).for_each(|place| set(place, ratio));
@@ -134,14 +136,16 @@ impl MotionModel {
         let mut values: Vec<f64> = self.values.iter().zip(&scale).map(|(value, by)| value * by).collect();
 
         debug_assert_eq!(speed_at(1), SPEEDS);
-        let measured = |step: usize| change.measured.iter().find(|one| usize::from(one.step.get()) == step);
-        for step in 1..=steps {
-            let by = measured(step).map_or(ratio, |one| one.ratio.clamp(1.0 / MOST, MOST));
-            if let Some(value) = values.get_mut(speed_at(step)) {
+        // A step between two knots counts for the nearest.
+        let knot_of = |step: SpeedStep| ((usize::from(step.get()) + stride / 2) / stride).max(1);
+        let measured = |knot: usize| change.measured.iter().find(|one| knot_of(one.step) == knot);
+        for knot in 1..=knots {
+            let by = measured(knot).map_or(ratio, |one| one.ratio.clamp(1.0 / MOST, MOST));
+            if let Some(value) = values.get_mut(speed_at(knot)) {
                 *value += libm::log(by);
             }
-            if measured(step).is_some()
-                && let Some(slot) = scale.get_mut(speed_at(step))
+            if measured(knot).is_some()
+                && let Some(slot) = scale.get_mut(speed_at(knot))
             {
                 // What was measured anew owes nothing to what was known.
                 *slot = 0.0;
@@ -158,15 +162,15 @@ impl MotionModel {
             doubt
         };
         let mut unmeasured = vec![0.0; side];
-        for step in (1..=steps).filter(|step| measured(*step).is_none()) {
-            if let Some(slot) = unmeasured.get_mut(speed_at(step)) {
+        for knot in (1..=knots).filter(|knot| measured(*knot).is_none()) {
+            if let Some(slot) = unmeasured.get_mut(speed_at(knot)) {
                 *slot = change.deviation;
             }
         }
         // What is not known of steps that were not measured they have once in common, and once each to itself.
         let common = [along(&mut of_stops()), along(&mut of_starts()), unmeasured.clone()];
         let own = |place: usize| {
-            let of_speed = (SPEEDS..SPEEDS + steps).contains(&place).then(|| place + 1 - SPEEDS);
+            let of_speed = (SPEEDS..SPEEDS + knots).contains(&place).then(|| place + 1 - SPEEDS);
             let new = of_speed.and_then(measured).map_or(0.0, |one| one.deviation);
             new * new + at(&unmeasured, place) * at(&unmeasured, place)
         };

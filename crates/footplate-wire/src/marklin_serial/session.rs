@@ -5,9 +5,9 @@ mod hearing;
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
-use footplate_core::{Command, Event, EventKind, SensorId, TimeSpan, Timestamp};
+use footplate_core::{Command, DecoderSteps, Event, EventKind, SensorId, TimeSpan, Timestamp, TrainId};
 
-use super::codec::{EncodeError, Message};
+use super::codec::{EncodeError, Message, TRAINS};
 use super::decoders::{Decoders, HIGHEST_FUNCTION};
 use super::exchange::{Awaited, Exchange, Purpose, Quiet, Reply, SILENCE, Sending};
 use super::farewell::Farewell;
@@ -348,6 +348,14 @@ impl Session for Interface {
         self.recovery.begin_anew(self.power_word());
         self.pacing = Pacing::new(now, self.settings.pace);
         self.go_on(now);
+    }
+
+    fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
+        CommandError::check_train(train, &TRAINS)?;
+        match steps {
+            DecoderSteps::Fourteen => Ok(()),
+            _ => Err(CommandError::Decoder { train, steps }),
+        }
     }
 
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {

@@ -1,11 +1,11 @@
 //! The answers to requests to the station, and when to repeat them.
 
-use footplate_core::{FunctionNumber, TimeSpan, TrainId, TurnoutId};
+use footplate_core::{DecoderSteps, FunctionNumber, TimeSpan, TrainId, TurnoutId};
 
 use super::broadcasts::Broadcasts;
 use super::reply::Reply;
 use super::request::Request;
-use super::speed::{Steps, Throttle};
+use super::speed::Throttle;
 use super::states::TurnoutPosition;
 use crate::outstanding::{Awaited as AwaitedAnswer, Repeats};
 
@@ -28,7 +28,7 @@ pub(super) enum Awaited {
     /// The state of a train, whatever it is.
     Locomotive(TrainId),
     /// That a train has this state.
-    Driven(TrainId, Steps, Throttle, bool),
+    Driven(TrainId, DecoderSteps, Throttle, bool),
     /// That a function of a train is on, or off.
     Function(TrainId, FunctionNumber, bool),
     /// That a turnout at an address lies by its second output, or its first.

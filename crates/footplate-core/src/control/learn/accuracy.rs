@@ -46,13 +46,8 @@ impl StepAccuracy {
     }
 }
 
-/// The steps that the train can be driven at, lowest first.
+/// The steps with numbers of their own that move the train, lowest first.
 #[must_use]
 pub fn usable_steps(model: &MotionModel) -> Vec<SpeedStep> {
-    steps(model).filter(|step| model.uses(*step) == StepUse::Moves).collect()
-}
-
-/// All steps of a train's decoder but 0, lowest first.
-pub(super) fn steps(model: &MotionModel) -> impl DoubleEndedIterator<Item = SpeedStep> + use<> {
-    (1..=model.highest().get()).filter_map(SpeedStep::new)
+    model.knots().filter(|step| model.uses(*step) == StepUse::Moves).collect()
 }

@@ -3,7 +3,7 @@
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec::Vec;
 
-use super::accuracy::{StepAccuracy, steps, usable_steps};
+use super::accuracy::{StepAccuracy, usable_steps};
 use super::activity::Activity;
 use super::notice::{CalibrationNotice, Ending, Mishap, Progress};
 use super::planner::{KNOWN_FROM, Planner, Stance};
@@ -324,7 +324,9 @@ impl<'l> Calibrator<'l> {
 
 /// Steps at which contacts were passed in earlier sessions move the train.
 fn note_what_moved(fit: &mut MotionFit) {
-    let moved: Vec<SpeedStep> = steps(fit.model())
+    let moved: Vec<SpeedStep> = fit
+        .model()
+        .knots()
         .filter(|step| fit.model().uses(*step) == StepUse::Untried)
         .filter(|step| {
             let contacts = |approach| fit.model().speed(*step, approach).count;

@@ -80,13 +80,15 @@ impl Calibrator<'_> {
         let usable = usable_steps(model);
         let slow = |step: &&SpeedStep| model.speed(**step, Approach::Below).value <= FINDING_SPEED;
         let known = usable.iter().rev().find(slow).or(usable.first()).copied();
-        let first = libm::ceil(FINDING_STEP * f64::from(model.highest().get())) as u8;
+        let stride = model.stride();
+        let first = stride * libm::ceil(FINDING_STEP * f64::from(model.highest().get() / stride)) as u8;
         let step = known.or(SpeedStep::new(first)).unwrap_or(model.highest());
-        let slower = step.get().saturating_sub(self.slowed_by()).max(SLOWEST_STEP.min(step.get()));
+        let slower = step.get().saturating_sub(stride * self.slowed_by());
+        let slower = slower.max((stride * SLOWEST_STEP).min(step.get()));
         SpeedStep::new(slower).unwrap_or(step)
     }
 
-    /// By how many steps slower it runs after it was turned around. Where lengths are unknown, a turnout or the end of the
+    /// By how many measured steps slower it runs after it was turned around. Where lengths are unknown, a turnout or the end of the
     /// track may be near; a slower train needs less room for either.
     fn slowed_by(&self) -> u8 {
         if self.layout.is_measured() { 0 } else { self.turns.min(MOST_TURNS) }
@@ -106,7 +108,7 @@ impl Calibrator<'_> {
         let highest = self.model().highest();
         let step = self.asked.map_or(self.stance.step, |(step, _)| step);
         if step < highest {
-            let next = SpeedStep::new(step.get() + 1).unwrap_or(highest);
+            let next = self.model().next_knot(step);
             let patience = if next == highest { GIVE_UP_AFTER } else { PUSH_UP_AFTER };
             self.issue(now, next);
             self.activity = Activity::Finding { push_at: now + patience };

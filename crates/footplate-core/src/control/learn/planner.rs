@@ -6,7 +6,7 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use super::accuracy::{steps, usable_steps};
+use super::accuracy::usable_steps;
 use super::experiment::{Experiment, Why};
 use super::gain::{TYPICAL_HOP, gain, objective, past_by};
 use crate::event::Approach;
@@ -24,7 +24,7 @@ const SLOWEST_CRAWL: Speed = Speed::from_mm_per_s(70.0);
 /// Contacts at a step after which its speed needs no staircase any more.
 pub(super) const KNOWN_FROM: u32 = 2;
 
-/// Steps from which a step is approached from above, or from below: far enough to show, near enough to be quick.
+/// How many measured steps away a step is approached from above, or from below: far enough to show, near enough to be quick.
 const RUN_UP: u8 = 2;
 
 /// Runs of short moves, from what just moves a train to what nearly reaches the speed (`s`).
@@ -122,7 +122,7 @@ impl Planner {
     /// The nearest step ahead, up and then down, at which nothing was measured yet.
     fn staircase(&mut self, model: &MotionModel, stance: Stance) -> Option<Experiment> {
         if !self.goes_down {
-            let up = steps(model).find(|step| {
+            let up = model.knots().find(|step| {
                 *step > stance.step
                     && *step > lowest_start(model)
                     && self.is_new(model, *step, Approach::Below)
@@ -132,8 +132,10 @@ impl Planner {
             }
             self.goes_down = true;
         }
-        let down =
-            steps(model).rev().find(|step| *step < stance.step && self.is_new(model, *step, Approach::Above));
+        let down = model
+            .knots()
+            .rev()
+            .find(|step| *step < stance.step && self.is_new(model, *step, Approach::Above));
         down.map(|step| Experiment::Speed { step, approach: Approach::Above })
     }
 
@@ -167,7 +169,7 @@ impl Planner {
         for step in usable.iter().filter(slow).skip(1).step_by(2) {
             all.extend(MOVES.map(|run| Experiment::Move { step: *step, run: TimeSpan::from_s(run) }));
         }
-        let untried = steps(model).filter(|step| !usable.contains(step));
+        let untried = model.knots().filter(|step| !usable.contains(step));
         let untried = untried.filter(|step| self.is_new(model, *step, Approach::Below));
         all.extend(untried.map(|step| Experiment::Speed { step, approach: Approach::Below }));
         all
@@ -180,7 +182,7 @@ fn is_worth_trying(model: &MotionModel, step: SpeedStep, approach: Approach) -> 
 
 /// The staircase begins above the steps that were found not to move the train.
 fn lowest_start(model: &MotionModel) -> SpeedStep {
-    let bad = steps(model).rev().find(|step| model.uses(*step) == StepUse::Unreliable);
+    let bad = model.knots().rev().find(|step| model.uses(*step) == StepUse::Unreliable);
     bad.unwrap_or(SpeedStep::STAND)
 }
 
@@ -194,10 +196,10 @@ pub(super) fn crawl_step(model: &MotionModel) -> Option<SpeedStep> {
 /// The step from which a step is reached by an approach, when the train does not come from that side anyway.
 pub(super) fn run_up_step(model: &MotionModel, step: SpeedStep, approach: Approach) -> SpeedStep {
     if approach == Approach::Above {
-        let higher = step.get().saturating_add(RUN_UP).min(model.highest().get());
+        let higher = step.get().saturating_add(RUN_UP * model.stride()).min(model.highest().get());
         return SpeedStep::new(higher).unwrap_or(step);
     }
-    let lower = step.get().saturating_sub(RUN_UP);
+    let lower = step.get().saturating_sub(RUN_UP * model.stride());
     let lower = SpeedStep::new(lower).filter(|lower| model.uses(*lower) == StepUse::Moves);
     lower.unwrap_or(SpeedStep::STAND)
 }

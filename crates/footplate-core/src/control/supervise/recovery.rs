@@ -151,7 +151,8 @@ impl Watchdog {
                 }
                 Phase::Waiting { asked } => self.wait(now, train, asked),
                 Phase::Crawling { step, pushed, seen } if now - pushed >= PUSH_AFTER && now < recovery.by => {
-                    let next = SpeedStep::new(step.get() + 1).filter(|next| *next <= recovery.steps.middle);
+                    let next =
+                        Some(recovery.base.next_knot(step)).filter(|next| *next <= recovery.steps.middle);
                     self.crawl(now, train, next.unwrap_or(step), seen);
                 }
                 Phase::LearningStop { until } if until <= now => {

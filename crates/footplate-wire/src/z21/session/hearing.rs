@@ -11,7 +11,6 @@ use super::super::outstanding::Awaited;
 use super::super::reply::{Malformed, Reply};
 use super::super::request::Request;
 use super::super::sensors::Change;
-use super::super::speed::Throttle;
 use super::super::states::{Firmware, Lock, LocomotiveState, TurnoutPosition};
 use super::super::time_model::occupied;
 use super::{Client, DETECTORS_WITHIN};
@@ -155,6 +154,8 @@ impl Client {
     fn hear_of_locomotive(&mut self, state: &LocomotiveState, is_confirmed: bool) {
         let train = TrainId(state.address);
         let is_outstanding = self.dialogue.outstanding.blocks(train, false).is_some();
+        let step = self.dialogue.locomotives.get(train).map_or(SpeedStep::STAND, |known| known.step);
+        let (steps, wanted) = self.throttle(train, step);
         let Some(locomotive) = self.dialogue.locomotive(train) else { return };
         if is_confirmed {
             locomotive.is_stopped = locomotive.step == SpeedStep::STAND;
@@ -164,8 +165,7 @@ impl Client {
             locomotive.forward = Some(state.forward);
             return;
         };
-        let wanted = self.settings.steps.throttle_of(locomotive.step).unwrap_or(Throttle::Stop);
-        let as_fast = state.throttle.is_like(state.steps, wanted, self.settings.steps);
+        let as_fast = state.throttle.is_like(state.steps, wanted, steps);
         if is_outstanding || as_fast && state.forward == forward {
             return self.suspected.retain(|(other, ..)| *other != train);
         }
