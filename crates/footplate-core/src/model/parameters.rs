@@ -297,3 +297,43 @@ impl<'v> Answers<'v> {
         nodes_about(speed).iter().map(|(node, weight)| weight * self.at(first + node)).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_decoder_of_14_steps_has_a_knot_at_each_and_finer_ones_at_as_many() {
+        for (highest, spacing) in [(14, 1), (28, 2), (126, 9), (5, 1)] {
+            assert_eq!((knots(highest), stride(highest)), (highest / spacing, spacing));
+            for knot in 1..=knots(highest) {
+                assert_eq!(knots_about(knot * spacing, highest)[0], (knot, 1.0));
+                assert_eq!(between_knots(knot * spacing, highest), 0.0);
+            }
+        }
+        assert_eq!(count(126), count(14));
+    }
+
+    #[test]
+    fn speed_rises_through_the_knots_and_by_a_power_of_the_step_between_them() {
+        // A straight line, known only at every ninth step.
+        let speed = |step: usize| 0.005 * (step as f64 - 4.0);
+        let mut values = prior_means(126);
+        for knot in 1..=14 {
+            values[speed_at(knot)] = libm::log(speed(9 * knot));
+        }
+        let answers = Answers::new(&values, 126);
+        for step in 1..126 {
+            assert!(answers.speed(step, false) < answers.speed(step + 1, false), "step {step}");
+            assert!((0.0..0.125 * BEND * 7.0).contains(&between_knots(step, 126)), "step {step}");
+        }
+        for step in 18..=126 {
+            let error = answers.speed(step, false) / speed(step) - 1.0;
+            assert!(error.abs() < 0.005, "step {step}: {error}");
+        }
+        for step in (18..=126).step_by(9) {
+            let at = answers.step_at(0, speed(step));
+            assert!((at - step as f64).abs() < 1e-6, "step {step}: {at}");
+        }
+    }
+}

@@ -1,11 +1,11 @@
 //! The model of a train that runs otherwise than it did: the old one, as much faster or slower as was measured.
 //!
 //! Letters: `r` new speed over old. Wheels that slip, a weak supply and a cold motor let everything take the same times
-//! over shorter ways: delays, lags and ramps by step stay, ramps by speed (`κ`, s per m/s) become `κ/r`, and what is left
+//! over shorter distances: delays, lags and ramps by step stay, ramps by speed (`κ`, s per m/s) become `κ/r`, and what is left
 //! over of stops and starts `r` times as long. Decoders that slow down at one rate shorten stops by `r` once more; what
-//! lies between the two is doubt, until a stop is measured.
+//! lies between the two is uncertain, until a stop is measured.
 //!
-//! The numbers are scaled by a diagonal matrix `A` and doubts are added: `Σ′ = A Σ Aᵀ + N`, with `N` a sum of squares, so
+//! The numbers are scaled by a diagonal matrix `A` and variances are added: `Σ′ = A Σ Aᵀ + N`, with `N` a sum of squares, so
 //! that the covariance stays one.
 
 use alloc::vec;
@@ -106,7 +106,7 @@ impl Rescaling {
 }
 
 impl MotionModel {
-    /// The same train changed like this; doubts are as wide as what was measured leaves them.
+    /// The same train changed like this, as uncertain as what was measured leaves it.
     #[must_use]
     pub fn rescaled(&self, change: &Rescaling) -> Self {
         let ratio = change.ratio.clamp(1.0 / MOST, MOST);
@@ -129,7 +129,7 @@ impl MotionModel {
         let stop_nodes = STOP_NODES..STOP_NODES + NODES;
         let start_nodes = START_NODES..START_NODES + NODES;
         stop_nodes.clone().chain(start_nodes.clone()).for_each(|place| set(place, ratio));
-        // Lag and ramps down make the way to rest.
+        // Lag and ramps down make the stopping distance.
         let of_stops = || (DOWN + 1..DOWN + 4).chain(stop_nodes.clone());
         let of_starts = || (UP + 1..UP + 4).chain(start_nodes.clone());
         of_stops().for_each(|place| set(place, stops));

@@ -88,6 +88,20 @@ fn the_direction_is_read_back_and_then_absolute() {
 }
 
 #[test]
+fn a_decoder_of_other_steps_is_driven_in_its_own() {
+    for (steps, step) in [(DecoderSteps::TwentyEight, 17), (DecoderSteps::All, 63)] {
+        let mut desk = Desk::new(Settings { steps: DecoderSteps::Fourteen, ..Settings::default() });
+        desk.run_until(ms(1_000));
+        desk.client.set_decoder(T58, steps).unwrap();
+        desk.command(speed(T58, step));
+        desk.run_for(1_000);
+        let throttle = Throttle::Step(step);
+        let expected = Request::Drive { address: 58, steps, throttle, forward: true };
+        assert_eq!(desk.commands().last(), Some(&expected));
+    }
+}
+
+#[test]
 fn each_number_of_steps_is_driven_in() {
     for (steps, step) in
         [(DecoderSteps::Fourteen, 8), (DecoderSteps::TwentyEight, 16), (DecoderSteps::All, 72)]
