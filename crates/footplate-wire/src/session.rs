@@ -441,7 +441,7 @@ impl Display for Listed<'_> {
 
 impl Display for Closing {
     fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
-        let told = |said| if said { "" } else { "not " };
+        let not = |done| if done { "" } else { "not " };
         if !self.commanded_to_stop.is_empty() {
             write!(f, "commanded to stop: {}; ", Listed(&self.commanded_to_stop))?;
         }
@@ -449,9 +449,9 @@ impl Display for Closing {
             write!(f, "NOT commanded to stop and possibly running: {}; ", Listed(&self.not_commanded))?;
         }
         if let Some(released) = self.solenoids_released {
-            write!(f, "solenoids {}released, ", told(released))?;
+            write!(f, "solenoids {}released, ", not(released))?;
         }
-        write!(f, "track power {}switched off; ", told(self.power_off))?;
+        write!(f, "track power {}switched off; ", not(self.power_off))?;
         f.write_str(match self.confirmation {
             Confirmation::HandShake => {
                 "the station accepted the bytes; this line gives no further \

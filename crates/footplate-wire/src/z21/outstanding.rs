@@ -19,7 +19,7 @@ pub(super) enum Awaited {
     SerialNumber,
     Hardware,
     LockCode,
-    /// That at least this is told.
+    /// At least these broadcasts.
     Broadcasts(Broadcasts),
     Status,
     /// The inputs of a group.
@@ -60,7 +60,7 @@ impl AwaitedAnswer for Awaited {
             | (Self::Hardware, Reply::Hardware { .. })
             | (Self::LockCode, Reply::LockCode(_))
             | (Self::Status, Reply::Status(_)) => true,
-            (Self::Broadcasts(wanted), Reply::Broadcasts(told)) => told.has(wanted),
+            (Self::Broadcasts(wanted), Reply::Broadcasts(reported)) => reported.has(wanted),
             (Self::Feedback(group), Reply::Feedback { group: of, .. }) => group == *of,
             (Self::Locomotive(train), Reply::Locomotive(state)) => train.0 == state.address,
             (Self::Driven(train, steps, throttle, forward), Reply::Locomotive(state)) => {

@@ -69,7 +69,7 @@ pub enum Request {
     },
     /// Stop all locomotives at once; the track keeps its power.
     StopAll,
-    /// The state of a locomotive. Whoever asks is told of its changes from then on.
+    /// The state of a locomotive. From then on the station reports its changes to the client that asked.
     Locomotive {
         /// Its address.
         address: u16,

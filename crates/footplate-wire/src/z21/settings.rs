@@ -51,7 +51,7 @@ impl Settings {
 
     /// What the station is asked before trains are driven: what it is, what it tells this client, where trains are, and the power.
     ///
-    /// `is_subscribed`: whether it was already told what it is to tell this client. Then it is only asked, so that a station that was
+    /// `is_subscribed`: whether this client has already subscribed. Then it only asks, so that a station that was
     /// restarted is recognised by what it has forgotten.
     pub(super) fn questions(&self, wanted: Broadcasts, is_subscribed: bool, power: bool) -> Vec<Request> {
         let broadcasts = if is_subscribed { Request::Broadcasts } else { Request::SetBroadcasts(wanted) };

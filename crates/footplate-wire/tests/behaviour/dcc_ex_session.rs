@@ -1,6 +1,8 @@
 //! The session with a DCC-EX board: its order, its pace, and what it does when something is lost.
 
-use footplate_core::{Command, DecoderSteps, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, TrainId, TurnoutId};
+use footplate_core::{
+    Command, DecoderSteps, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, TrainId, TurnoutId,
+};
 use footplate_wire::dcc_ex::{Client, Settings, TurnoutRequests};
 use footplate_wire::{CommandError, LinkNotice, Session};
 

@@ -1,7 +1,9 @@
 //! Polls and commands share the line: each report says since when its contact may have been closed, commands go first,
 //! and nothing is written that the interface would not take.
 
-use footplate_core::{Command, DecoderSteps, EventKind, FunctionNumber, SensorId, SpeedStep, TimeSpan, TrainId};
+use footplate_core::{
+    Command, DecoderSteps, EventKind, FunctionNumber, SensorId, SpeedStep, TimeSpan, TrainId,
+};
 use footplate_wire::Session;
 use footplate_wire::marklin_serial::{BYTE_TIME, Interface, Pace, Settings};
 use proptest::prelude::{prop_assert, prop_assert_eq, proptest};

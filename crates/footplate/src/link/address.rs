@@ -152,7 +152,7 @@ impl StationKind {
         if self == Self::Marklin && decoder != DecoderSteps::Fourteen {
             return Err(format!(
                 "train {train} has {decoder} speed steps, and {name} commands 14: choose another station, such as \
-                 station=dcc-ex for a simulated layout"
+                 station=dcc-ex or --protocol dcc-ex for a simulated layout"
             ));
         }
         Ok(())
@@ -362,7 +362,7 @@ impl SimulatedAddress {
 }
 
 /// Reads the steps of a decoder.
-pub(super) fn decoder_of(value: &str) -> Result<DecoderSteps, String> {
+pub(crate) fn decoder_of(value: &str) -> Result<DecoderSteps, String> {
     match value {
         "14" => Ok(DecoderSteps::Fourteen),
         "28" => Ok(DecoderSteps::TwentyEight),

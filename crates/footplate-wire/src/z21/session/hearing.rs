@@ -48,7 +48,7 @@ impl Client {
             Reply::SerialNumber(number) => self.serial_number = number,
             Reply::Hardware { kind, firmware } => self.identified(kind, firmware),
             Reply::LockCode(Lock::Locked) => self.dialogue.notify(LinkNotice::Locked),
-            Reply::Broadcasts(told) => self.hear_of_broadcasts(told),
+            Reply::Broadcasts(reported) => self.hear_of_broadcasts(reported),
             Reply::Locomotive(state) => {
                 let driven = |answered: Outstanding<Awaited>| matches!(answered.awaited, Awaited::Driven(..));
                 self.hear_of_locomotive(&state, answered.is_some_and(driven));
@@ -118,8 +118,8 @@ impl Client {
     }
 
     /// The subscription of this client.
-    fn hear_of_broadcasts(&mut self, told: Broadcasts) {
-        if told.has(self.wanted) {
+    fn hear_of_broadcasts(&mut self, reported: Broadcasts) {
+        if reported.has(self.wanted) {
             self.is_subscribed = true;
             return;
         }
@@ -134,8 +134,8 @@ impl Client {
         if asked.tries < Awaited::REPEATS.most_tries {
             return self.dialogue.outstanding.push(asked);
         }
-        let missing = self.wanted.0 & !told.0;
-        self.wanted = Broadcasts(self.wanted.0 & told.0);
+        let missing = self.wanted.0 & !reported.0;
+        self.wanted = Broadcasts(self.wanted.0 & reported.0);
         self.is_subscribed = true;
         self.dialogue.notify(LinkNotice::BroadcastsRefused { missing });
     }
