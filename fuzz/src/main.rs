@@ -22,6 +22,7 @@ mod marklin_serial;
 mod marklin_serial_session;
 mod odometer;
 mod sensor_log;
+mod speed_profile;
 mod tachometer_recording;
 mod trains_and_lines;
 mod vehicle_file;
@@ -65,6 +66,18 @@ const LINES: &[&[u8]] = &[
 ];
 const DATASETS: &[&[u8]] =
     &[b"\x0f\x00\x80\x00", b"\x07\x00\x40\x00\x61", b"\x09\x00\x40\x00\x43", b"\x04\x00\x10\x00"];
+const PROFILE: &[&[u8]] = &[
+    b"<speed><step>500</step><forward>220.0</forward></speed>",
+    b"<attributepairs/>",
+    b"<speedprofile></speedprofile>",
+    b"<!DOCTYPE a [<!ENTITY b \"&b;\">]>",
+    b"&#0;",
+    b"-1",
+    b"1e308",
+    b"NaN",
+    b"]]>",
+    b"<!--",
+];
 const VEHICLE: &[&[u8]] =
     &[odometer::VEHICLE.as_bytes(), b"-1", b"1e309", b"nan", b"axle = ", b"[[wheelset]]\n", b"\""];
 const TACHOMETER: &[&str] = &["testdata/tachometer"];
@@ -89,6 +102,7 @@ const TARGETS: &[Target] = &[
     target("z21", z21::fuzz, &[], DATASETS),
     target("z21_session", z21_session::fuzz, &[], DATASETS),
     target("sensor_log", sensor_log::fuzz, &["testdata/sensor-logs"], TEXT),
+    target("speed_profile", speed_profile::fuzz, &["testdata/profiles"], PROFILE),
     target("layout_file", layout_file::fuzz, &["crates/footplate-store/layouts"], TEXT),
     target("trains_and_lines", trains_and_lines::fuzz, &["testdata/trains", "testdata/lines"], TEXT),
     target("vehicle_file", vehicle_file::fuzz, &[], VEHICLE),

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use footplate_core::track::{Layout, Leg, NodeKind, TurnoutStates, Ways};
+use footplate_core::track::{Layout, Leg, NodeKind, OutgoingEdges, TurnoutStates};
 use footplate_core::{EdgeId, Length, NodeId, SensorId, StretchId, TurnoutId};
 
 use crate::draws::{Draws, Purpose};
@@ -185,9 +185,9 @@ fn walk(layout: &Layout, start: NodeId, mut choose: impl FnMut(TurnoutId) -> Leg
     let mut edges: Vec<EdgeId> = Vec::new();
     let mut node = start;
     for _ in 0..MAX_EDGES {
-        let id = match (layout.ways(node), layout.node(node).map(|node| node.kind)) {
-            (Ways::Ahead(edge), _) => edge,
-            (Ways::Legs { straight, curved }, Some(NodeKind::Branch(turnout))) => {
+        let id = match (layout.outgoing(node), layout.node(node).map(|node| node.kind)) {
+            (OutgoingEdges::Ahead(edge), _) => edge,
+            (OutgoingEdges::Legs { straight, curved }, Some(NodeKind::Branch(turnout))) => {
                 let leg = *turnouts.entry(turnout).or_insert_with(|| choose(turnout));
                 if leg.is_curved() { curved } else { straight }
             }

@@ -26,6 +26,7 @@ pub mod score;
 mod sensor_log;
 mod sensor_names;
 mod session_check;
+mod speed_profile;
 mod store;
 mod table;
 mod tachometer;
@@ -66,6 +67,11 @@ pub use sensor_log::{
 };
 pub use sensor_names::{ModuleLetters, SensorNames};
 pub use session_check::{SessionCheck, SessionFigure, standardised};
+pub use speed_profile::{
+    FASTEST_MM_S, HoldOut, LARGEST_PROFILE, ModelRow, ProfileContext, ProfileError, ProfileNote,
+    ProfileProblem, ProfileSpeed, SpeedProfile, parse_profile, read_profile, write_profile_table,
+    write_roster_entry,
+};
 pub use store::{
     Calibration, Change, EventKey, Import, Journal, JournalEntry, MachineKey, Mark, MarkKind, NewCalibration,
     NewMachine, RecordingKey, RunKey, Salvaged, SalvagedTable, Side, Store, StoreError, StoredEvent,

@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::poll_rhythm::poll_rhythm;
 use crate::recording::Run;
+use crate::speed_profile::SpeedProfile;
 use crate::store::{KeptReplay, Store, StoreError};
 
 /// How often the model is fitted anew on the way, at starts from rest: what is thought of a command depends on whether the
@@ -38,6 +39,9 @@ const ANOTHER_SESSION: TimeSpan = TimeSpan::from_ms(3_600_000);
 pub struct MotionReplay {
     /// What follows from it, fitted.
     pub fit: MotionFit,
+    /// The file of the speed profile that the fit began with, if one was imported.
+    #[serde(default)]
+    pub profile: Option<String>,
     /// How the turnouts lay at the end of the last live session, as far as it was recorded.
     pub turnouts: TurnoutStates,
     /// How those of the recording under way lie, if it was read from a file.
@@ -56,7 +60,8 @@ pub struct MotionReplay {
 
 impl MotionReplay {
     /// Replays everything that a store held at a date of a train on a layout; `highest` is the highest step of its
-    /// decoder. Recordings that were read from files count as well.
+    /// decoder. Recordings that were read from files count as well. The fit begins with the profile of another program, if one was
+    /// imported for the train.
     ///
     /// It goes on from where the last replay of the train came, if nothing of that has changed, and keeps how far it came.
     ///
@@ -69,6 +74,57 @@ impl MotionReplay {
         highest: SpeedStep,
         as_of: Timestamp,
     ) -> Result<Self, StoreError> {
+        let profile = store.profile(train, as_of)?;
+        let runs = Self::stored_runs(layout, store, as_of)?;
+        let mut fingerprint = Fingerprint::of(layout, train, highest, profile.as_ref());
+        let behind: Vec<Fingerprint> = runs
+            .iter()
+            .map(|stored| {
+                fingerprint = fingerprint.with(&stored.recording, &stored.run, stored.rhythm.timing());
+                fingerprint
+            })
+            .collect();
+        let (mut replay, gone) = match Self::kept(store, layout, train, &behind)? {
+            Some(kept) => kept,
+            None => (Self::beginning(train, highest, profile.as_ref()), 0),
+        };
+        let sections = SectionIndex::of(layout);
+        for stored in runs.iter().skip(gone) {
+            replay.take_stored(layout, &sections, stored);
+        }
+        if !replay.is_empty() && gone < runs.len() {
+            replay.keep(store, layout, fingerprint);
+        }
+        replay.end(&sections);
+        Ok(replay)
+    }
+
+    /// The same with another profile in the place of the one in the store, to see what it would change. Writes nothing.
+    ///
+    /// # Errors
+    /// The store cannot be read.
+    pub fn with_profile(
+        layout: &Layout,
+        store: &Store,
+        profile: Option<&SpeedProfile>,
+        train: TrainId,
+        highest: SpeedStep,
+        as_of: Timestamp,
+    ) -> Result<Self, StoreError> {
+        let mut replay = Self::beginning(train, highest, profile);
+        let sections = SectionIndex::of(layout);
+        for stored in Self::stored_runs(layout, store, as_of)? {
+            replay.take_stored(layout, &sections, &stored);
+        }
+        replay.end(&sections);
+        Ok(replay)
+    }
+
+    fn stored_runs(
+        layout: &Layout,
+        store: &Store,
+        as_of: Timestamp,
+    ) -> Result<Vec<StoredReplayRun>, StoreError> {
         let mut runs: Vec<StoredReplayRun> = Vec::new();
         for recording in store.recordings(as_of)?.iter().filter(|stored| stored.layout == layout.name()) {
             let accepted: Vec<Run> =
@@ -82,25 +138,7 @@ impl MotionReplay {
             };
             runs.extend(accepted.into_iter().map(of));
         }
-        let mut fingerprint = Fingerprint::of(layout, train, highest);
-        let behind: Vec<Fingerprint> = runs
-            .iter()
-            .map(|stored| {
-                fingerprint = fingerprint.with(&stored.recording, &stored.run, stored.rhythm.timing());
-                fingerprint
-            })
-            .collect();
-        let (mut replay, gone) =
-            Self::kept(store, layout, train, &behind)?.unwrap_or_else(|| (Self::empty(train, highest), 0));
-        let sections = SectionIndex::of(layout);
-        for stored in runs.iter().skip(gone) {
-            replay.take_stored(layout, &sections, stored);
-        }
-        if !replay.is_empty() && gone < runs.len() {
-            replay.keep(store, layout, fingerprint);
-        }
-        replay.end(&sections);
-        Ok(replay)
+        Ok(runs)
     }
 
     /// Fits to all that was taken in.
@@ -130,8 +168,17 @@ impl MotionReplay {
 
     /// Nothing taken in yet.
     pub(crate) fn empty(train: TrainId, highest: SpeedStep) -> Self {
+        Self::beginning(train, highest, None)
+    }
+
+    fn beginning(train: TrainId, highest: SpeedStep, profile: Option<&SpeedProfile>) -> Self {
+        let mut fit = MotionFit::new(train, highest);
+        if let Some(profile) = profile {
+            fit.take_stated(&profile.stated().0);
+        }
         Self {
-            fit: MotionFit::new(train, highest),
+            fit,
+            profile: profile.map(|profile| profile.source.clone()),
             turnouts: TurnoutStates::unknown(),
             turnouts_of_file: TurnoutStates::unknown(),
             recordings: Vec::new(),

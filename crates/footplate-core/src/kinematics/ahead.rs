@@ -1,10 +1,10 @@
-//! A profile's problem turned so that the train runs forwards from distance 0.
+//! A profile's problem, mirrored so that the train runs forwards from distance 0.
 
 use super::limits::{Limits, ProfileError};
 use super::motion::MotionState;
 use crate::units::{Length, Speed};
 
-/// Where a train is and where it shall be, in plain SI numbers.
+/// Current and target state of a train, in plain SI numbers.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ahead {
     /// 1, or −1 where the target lies at the smaller distance.
@@ -13,35 +13,35 @@ pub(super) struct Ahead {
     pub(super) speed: f64,
     pub(super) acceleration: f64,
     /// Distance to the target, and the speed there.
-    pub(super) way: f64,
+    pub(super) distance: f64,
     pub(super) target_speed: f64,
 }
 
-/// Roundings that a state has gone through at most, in units in the last place.
+/// Largest accumulated rounding of a state, in units in the last place.
 pub(super) const ROUNDINGS: f64 = 16.0;
 
 impl Ahead {
     #[inline(always)]
     pub(super) fn new(current: &MotionState, target: &MotionState) -> Self {
         let difference = (target.distance - current.distance).as_m();
-        // If the target is here, the speeds decide which direction is ahead.
+        // At zero distance, the speeds decide which direction is ahead.
         let back = difference < 0.0 || (difference == 0.0 && current.speed + target.speed < Speed::ZERO);
         let direction = if back { -1.0 } else { 1.0 };
         Self {
             direction,
             speed: direction * current.speed.as_m_per_s(),
             acceleration: direction * current.acceleration.as_m_per_s2(),
-            way: direction * difference,
+            distance: direction * difference,
             target_speed: direction * target.speed.as_m_per_s(),
         }
     }
 
-    /// Whether [`check`](Self::check) would find nothing, at the least cost. No comparison holds for NaN.
+    /// Whether [`check`](Self::check) would succeed, at the least cost. Every comparison with NaN is false.
     #[inline(always)]
     pub(super) fn is_sound(&self, limits: &Limits) -> bool {
         let highest = limits.speed.as_m_per_s();
         let (speeding, braking) = (limits.acceleration.as_m_per_s2(), limits.deceleration.as_m_per_s2());
-        let sum = self.way.abs() + self.speed + self.acceleration.abs() + (highest + speeding + braking);
+        let sum = self.distance.abs() + self.speed + self.acceleration.abs() + (highest + speeding + braking);
         sum < f64::INFINITY
             && highest > 0.0
             && speeding > 0.0
@@ -51,7 +51,7 @@ impl Ahead {
             && self.target_speed <= highest
     }
 
-    /// What is wrong with limits and states for any kind of profile, if anything is.
+    /// Rejects limits and states that no kind of profile accepts.
     pub(super) fn check(
         &self,
         current: &MotionState,
@@ -75,7 +75,7 @@ impl Ahead {
             }
         }
         if self.speed < 0.0 {
-            return Err(ProfileError::RunsAway { found: current.speed });
+            return Err(ProfileError::MovesAway { found: current.speed });
         }
         if !(0.0..=limits.speed.as_m_per_s()).contains(&self.target_speed) {
             return Err(ProfileError::TargetSpeed { found: target.speed, highest: limits.speed });
@@ -83,10 +83,10 @@ impl Ahead {
         Ok(())
     }
 
-    /// The refusal of a target that is nearer than `shortest` by more than a `grain` of rounding.
+    /// Rejects a target that is nearer than `shortest` by more than rounding, the `grain`.
     pub(super) fn refuse_nearer_than(&self, shortest: f64, grain: f64) -> Result<(), ProfileError> {
-        if self.way < shortest - grain {
-            let (found, shortest) = (Length::from_m(self.way), Length::from_m(shortest));
+        if self.distance < shortest - grain {
+            let (found, shortest) = (Length::from_m(self.distance), Length::from_m(shortest));
             return Err(ProfileError::TooNear { found, shortest });
         }
         Ok(())

@@ -1,14 +1,14 @@
-//! Where a continuous function crosses zero between two points on either side of it.
+//! Root of a continuous function between two points of opposite signs.
 
-/// Steps after which the best point so far is returned: bisection alone needs fewer to use up all digits.
+/// Most steps; bisection alone needs fewer to exhaust all digits.
 const MOST_STEPS: u32 = 100;
 
 /// The argument between `low` and `high` at which `f` crosses zero, to a few units in the last place.
 ///
-/// `f(low)` and `f(high)` should have opposite signs; if they have not, the end nearer to zero is given.
+/// `f(low)` and `f(high)` should have opposite signs; otherwise the result is the end whose value is nearer to zero.
 ///
 /// Chandrupatla's method (Advances in Engineering Software 28, 1997): a parabola through three points where it
-/// can be trusted, else the middle; it never leaves the bracket and takes some eight steps on smooth functions.
+/// is reliable, else bisection. It never leaves the bracket, and takes about eight steps on smooth functions.
 pub(super) fn crossing(low: f64, high: f64, f: impl Fn(f64) -> f64) -> f64 {
     let (mut newest, mut across) = ((low, f(low)), (high, f(high)));
     if (newest.1 < 0.0) == (across.1 < 0.0) {

@@ -1,18 +1,20 @@
 //! A stop from a steady speed in integers, for controllers without floating point.
 //!
-//! Lengths are whole units of 0.1 mm, times whole ticks of any length. [`IntegerStop::new`] and [`IntegerStop::with_shape`]
-//! calculate the constants once, with floating point, on a computer or at start; a controller that has none takes them by
-//! [`IntegerStop::from_constants`]. All else, and all of this file, is integers. Letters: `v` speed, `q` delay, `T` ramp, `θ`
-//! lag, `t` time since braking began, `h` and `H` as of [`RampedLag`](super::RampedLag).
+//! Lengths are whole units of 0.1 mm, times whole ticks of any length. [`IntegerStop::new`] and
+//! [`IntegerStop::with_shape`] calculate the constants once, with floating point, on a computer or at start; a
+//! controller without floating point reads them with [`IntegerStop::from_constants`]. Everything else, and all of
+//! this file, uses integers. Letters: `v` speed, `q` delay, `T` ramp, `θ` lag, `t` time since braking began, `h` and
+//! `H` as of [`RampedLag`](super::RampedLag).
 //!
 //! ```text
-//! x = v (q + g(t))        place, counted from the command
+//! x = v (q + g(t))        distance, counted from the command
 //! g = t − H(t)/T          while the set speed falls (t ≤ T), with  H = t²/2 − θ h,  h = t − θ (1 − e^(−t/θ))
 //! g = T/2 + θ − w e^(−(t−T)/θ)      after it, with  w = (θ²/T)(1 − e^(−T/θ))
 //! ```
 //!
-//! Even braking is a ramp without a lag, an exponential a lag without a ramp. `g` is the time for which the train would run as
-//! far steadily: with q + T/2 + θ of it the stopping distance, and the time to command the stop, need nothing else.
+//! Constant deceleration is a ramp without a lag, an exponential a lag without a ramp. `g` is the time in which the
+//! train covers the same distance at constant speed. At the end of the stop, with the delay, it is q + T/2 + θ:
+//! stopping distance and command time need only this.
 
 mod constants;
 mod power_of_half;
@@ -25,14 +27,14 @@ const TIME_BITS: u32 = 30;
 /// Digits kept behind the point of a length in units when a target is taken from it.
 const LENGTH_BITS: u32 = 24;
 
-/// A delay or a ramp is shorter than this (2³¹ ticks), a lag shorter than that (2²⁸ ticks): products fit 128 bits.
+/// Delay and ramp are shorter than 2³¹ ticks, the lag is shorter than 2²⁸ ticks: products fit 128 bits.
 const LONGEST: i64 = 1 << (31 + TIME_BITS);
 const LONGEST_LAG: i64 = 1 << (28 + TIME_BITS);
-/// A ramp that is there is at least so long as a share of the lag, as a power of two: its quotient magnifies roundings.
+/// Shortest ramp as a share of the lag, as a power of two: dividing by a shorter one would magnify rounding.
 const SHORTEST_RAMP_BITS: u32 = 14;
 /// No stop is longer than this many units (107 km).
 const FARTHEST: i128 = 1 << 30;
-/// So long after it began braking (2³⁴ ticks) every train rests.
+/// Every train is at rest this long after it began to brake (2³⁴ ticks).
 const AT_REST: i128 = 1 << (34 + TIME_BITS);
 /// Digits behind the point of a speed: from 2⁻²⁰ to 2¹³ units a tick; and of the rate of a lag.
 const SPEED_POINTS: [i64; 2] = [40, 72];
@@ -40,7 +42,7 @@ const RATE_POINTS: [i64; 2] = [27, 100];
 /// A binary fraction has as many digits as a number in floating point: 53.
 const MANTISSA_BITS: u32 = 53;
 
-/// A train that runs at a steady speed, and its stop, in tenths of a millimetre and ticks.
+/// A train at constant speed, and its stop, in tenths of a millimetre and ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct IntegerStop {
     /// Units a tick.
@@ -56,7 +58,7 @@ pub struct IntegerStop {
     time: i64,
 }
 
-/// `digits` / 2^`point`, exactly what a number in floating point is.
+/// `digits` / 2^`point`, exactly the value of a floating-point number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct BinaryFraction {
     digits: i64,
@@ -70,14 +72,14 @@ impl BinaryFraction {
         is_full && fewest <= self.point && self.point <= most
     }
 
-    /// Times a number with so many digits behind its point, with `kept` digits behind the point, rounded to the nearest.
+    /// The product with a number that has `bits` digits behind its point, rounded to `kept` digits behind the point.
     fn times(self, other: i128, bits: u32, kept: u32) -> i128 {
         let shift = self.point as u32 + bits - kept;
         (i128::from(self.digits) * other + (1 << (shift - 1))) >> shift
     }
 }
 
-/// These constants are none of a stop, or of one beyond what integers of this size can hold.
+/// These constants describe no stop, or one beyond the range of these integers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct UnusableConstants;
 
@@ -93,19 +95,21 @@ impl core::fmt::Display for UnusableConstants {
 impl core::error::Error for UnusableConstants {}
 
 impl IntegerStop {
-    /// All that is known of the stop: print it on a computer, and hand it to [`from_constants`](Self::from_constants) on the
-    /// controller. In order: digits and point of the speed, delay, ramp, lag, tail, digits and point of the rate, time.
+    /// The constants of the stop: print them on a computer, and pass them to [`from_constants`](Self::from_constants)
+    /// on the controller. In order: digits and point of the speed, delay, ramp, lag, tail, digits and point of the
+    /// rate, time.
     #[must_use]
     pub const fn constants(&self) -> [i64; 9] {
         let Self { speed, delay, ramp, lag, tail, rate, time } = *self;
         [speed.digits, speed.point, delay, ramp, lag, tail, rate.digits, rate.point, time]
     }
 
-    /// The stop of constants calculated elsewhere; a `const` where they are known when the controller's program is built.
+    /// The stop with constants calculated elsewhere; `const`, for constants known when the controller's program is
+    /// built.
     ///
     /// # Errors
     ///
-    /// If one of them is beyond its range, so that no question asked later can overflow.
+    /// If a constant is out of range. No later call can overflow.
     pub const fn from_constants(constants: [i64; 9]) -> Result<Self, UnusableConstants> {
         let [speed, speed_point, delay, ramp, lag, tail, rate, rate_point, time] = constants;
         let speed = BinaryFraction { digits: speed, point: speed_point };
@@ -128,39 +132,39 @@ impl IntegerStop {
         stop >> (speed.point as u32 + TIME_BITS) < FARTHEST
     }
 
-    /// How far the train runs steadily in so many ticks.
+    /// Distance at constant speed in a number of ticks.
     #[must_use]
     pub fn run(&self, ticks: i64) -> i32 {
         whole_units(self.speed.times(i128::from(ticks), 0, 0))
     }
 
-    /// Ticks until the train, running steadily, is `distance` ahead; negative if it has passed there.
+    /// Ticks until the train, at constant speed, has covered `distance`; negative for a distance behind it.
     #[must_use]
     pub fn ticks_to(&self, distance: i32) -> i64 {
         whole_ticks(self.time_over(distance))
     }
 
-    /// How far the train still runs if it is commanded to stop now.
+    /// Stopping distance if the stop is commanded now.
     #[must_use]
     pub fn stopping_distance(&self) -> i32 {
         whole_units(self.speed.times(i128::from(self.steady_time()), TIME_BITS, 0))
     }
 
-    /// In how many ticks it rests if it is commanded to stop now.
+    /// Ticks until rest if the stop is commanded now.
     #[must_use]
     pub const fn stopping_time(&self) -> i64 {
         (self.time + (1 << (TIME_BITS - 1))) >> TIME_BITS
     }
 
-    /// Ticks until the stop command, so that the train comes to rest `distance` ahead of where it is now; negative if
-    /// it is too late by as many.
+    /// Ticks until the stop command for which the train comes to rest `distance` ahead of its present position;
+    /// negative if that time has passed.
     #[must_use]
     pub fn command_in(&self, distance: i32) -> i64 {
         whole_ticks(self.time_over(distance) - i128::from(self.steady_time()))
     }
 
-    /// How far the train overruns a place `distance` ahead if it is commanded to stop now; negative if it comes to
-    /// rest before it.
+    /// Overrun of a target `distance` ahead if the stop is commanded now; negative if the train comes to rest before
+    /// it.
     #[must_use]
     pub fn overrun(&self, distance: i32) -> i32 {
         let stop = self.speed.times(i128::from(self.steady_time()), TIME_BITS, LENGTH_BITS);
@@ -168,7 +172,7 @@ impl IntegerStop {
         whole_units((beyond + (1 << (LENGTH_BITS - 1))) >> LENGTH_BITS)
     }
 
-    /// How far it has run so many ticks after the command to stop left.
+    /// Distance covered a number of ticks after the stop command was sent.
     #[must_use]
     pub fn run_since_command(&self, ticks: i64) -> i32 {
         let braking = (i128::from(ticks) << TIME_BITS) - i128::from(self.delay);
@@ -179,12 +183,13 @@ impl IntegerStop {
         whole_units(self.speed.times(steady, TIME_BITS, 0))
     }
 
-    /// The time in which the train would run its stopping distance steadily: q + T/2 + θ.
+    /// Time in which the train covers its stopping distance at constant speed: q + T/2 + θ.
     const fn steady_time(&self) -> i64 {
         self.delay + (self.ramp >> 1) + self.lag
     }
 
-    /// `g`: the time in which it would run as far steadily as since it began braking, a time of up to [`AT_REST`] ago.
+    /// `g`: time in which the train covers, at constant speed, its distance since it began to brake, at most
+    /// [`AT_REST`] ago.
     fn steady_time_of(&self, braking: i128) -> i128 {
         let (ramp, lag) = (i128::from(self.ramp), i128::from(self.lag));
         let whole = i128::from(self.steady_time() - self.delay);
@@ -194,7 +199,7 @@ impl IntegerStop {
         } else {
             whole - part(i128::from(self.tail), self.left(braking - ramp))
         };
-        // Neither `clamp` nor a divisor that may be zero: a controller need not hold the code of their panics.
+        // No `clamp` and no divisor that may be zero: a controller does not need the code of their panics.
         steady.min(whole).max(0)
     }
 
@@ -206,7 +211,7 @@ impl IntegerStop {
         power_of_half(self.rate.times(time, TIME_BITS, EXPONENT_BITS))
     }
 
-    /// Ticks for a distance run steadily, with [`TIME_BITS`] behind the point.
+    /// Ticks for a distance at constant speed, with [`TIME_BITS`] behind the point.
     fn time_over(&self, distance: i32) -> i128 {
         let digits = i128::from(self.speed.digits.max(1));
         let shifted = i128::from(distance) << self.speed.point;
@@ -219,12 +224,12 @@ fn part(time: i128, share: u64) -> i128 {
     (time * i128::from(share)) >> POWER_BITS
 }
 
-/// At the ends of the range beyond them.
+/// Saturates at the ends of the range.
 fn whole_units(length: i128) -> i32 {
     i32::try_from(length).unwrap_or(if length < 0 { i32::MIN } else { i32::MAX })
 }
 
-/// A time with [`TIME_BITS`] behind the point in whole ticks, to the nearest; at the ends of the range beyond them.
+/// A time with [`TIME_BITS`] behind the point, rounded to whole ticks; saturates at the ends of the range.
 fn whole_ticks(time: i128) -> i64 {
     let nearest = (time + (1 << (TIME_BITS - 1))) >> TIME_BITS;
     i64::try_from(nearest).unwrap_or(if nearest < 0 { i64::MIN } else { i64::MAX })

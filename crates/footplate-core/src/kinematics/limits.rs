@@ -1,9 +1,9 @@
-//! What a train may do at most, and why a profile within that cannot be had.
+//! Limits of speed, acceleration and jerk, and why no profile within them reaches a target.
 
 use super::motion::MotionState;
 use crate::units::{Acceleration, Jerk, Length, Speed};
 
-/// The most that a profile uses; every limit is a size without a sign, above zero.
+/// Upper limits of a profile; each is a magnitude above zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Limits {
@@ -17,36 +17,36 @@ pub struct Limits {
     pub jerk: Jerk,
 }
 
-/// Why there is no profile from here to there.
+/// Why there is no profile from the current state to the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum ProfileError {
     /// A limit is zero, negative or not a number.
     NoLimit {
-        /// Its name in [`Limits`].
+        /// The name of its field in [`Limits`].
         limit: &'static str,
-        /// What was given, in SI units.
+        /// The value given, in SI units.
         found: f64,
     },
     /// A distance, speed or acceleration is not finite.
     NotFinite {
-        /// The state that holds it.
+        /// The state that contains it.
         found: MotionState,
     },
-    /// The target's speed is above the limit, or leads back to where the train comes from.
+    /// The target's speed is above the limit, or points back to the current position.
     TargetSpeed {
-        /// What was asked.
+        /// The speed requested.
         found: Speed,
         /// The limit.
         highest: Speed,
     },
-    /// A jerk-limited profile ends without acceleration.
+    /// The target has an acceleration, but a jerk-limited profile ends without one.
     TargetAcceleration {
-        /// What was asked.
+        /// The acceleration requested.
         found: Acceleration,
     },
-    /// The train runs away from the target and has to stop first.
-    RunsAway {
+    /// The train moves away from the target and has to stop first.
+    MovesAway {
         /// Its speed.
         found: Speed,
     },
@@ -56,11 +56,11 @@ pub enum ProfileError {
         found: Acceleration,
     },
     /// The train brakes so hard that it is at rest before the jerk limit allows it to ease off.
-    StandsFirst {
+    AtRestFirst {
         /// Its acceleration.
         found: Acceleration,
     },
-    /// The target is nearer than the train can reach its speed.
+    /// The target is too near for the train to reach its speed.
     TooNear {
         /// The remaining distance.
         found: Length,
@@ -89,9 +89,9 @@ impl core::fmt::Display for ProfileError {
                 let found = found.as_m_per_s2();
                 write!(f, "the acceleration at the target should be zero, not {found} m/s²")
             }
-            Self::RunsAway { found } => {
+            Self::MovesAway { found } => {
                 let found = found.as_m_per_s();
-                write!(f, "the train runs away from the target at {found} m/s: stop it first")
+                write!(f, "the train moves away from the target at {found} m/s: stop it first")
             }
             Self::BeyondLimits { found } => {
                 let found = found.as_m_per_s2();
@@ -100,7 +100,7 @@ impl core::fmt::Display for ProfileError {
                     "the train's acceleration of {found} m/s² is beyond the limits already: wait, or widen them"
                 )
             }
-            Self::StandsFirst { found } => {
+            Self::AtRestFirst { found } => {
                 let found = found.as_m_per_s2();
                 write!(
                     f,

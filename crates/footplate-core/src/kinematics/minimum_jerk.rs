@@ -1,14 +1,14 @@
-//! From one speed to another over a given way in a given time, with minimum jerk.
+//! From one speed to another over a given distance in a given time, with minimum jerk.
 //!
-//! Letters: `d` way, `T` time, `v₁` and `v₂` the speeds at the ends, where the acceleration is nothing; `τ = t/T`. Among all
-//! motions with these ends the integral of the squared jerk is least for (Flash and Hogan, 1985)
+//! Letters: `d` distance, `T` time, `v₁` and `v₂` the speeds at the ends, where the acceleration is zero; `τ = t/T`.
+//! Among all motions with these ends the integral of the squared jerk is least for (Flash and Hogan, 1985)
 //!
 //! ```text
 //! x = v₁ T τ + A τ³ + B τ⁴ + C τ⁵        D = d − v₁ T,  W = (v₂ − v₁) T
 //! A = 10 D − 4 W,  B = −15 D + 7 W,  C = 6 D − 3 W
 //! ```
 //!
-//! From rest to rest that is `d (10τ³ − 15τ⁴ + 6τ⁵)`. The acceleration `(6 A τ + 12 B τ² + 20 C τ³)/T²` is nothing at both
+//! From rest to rest that is `d (10τ³ − 15τ⁴ + 6τ⁵)`. The acceleration `(6 A τ + 12 B τ² + 20 C τ³)/T²` is zero at both
 //! ends and at `τ = 3A/10C`, where the speed is farthest from those at the ends.
 
 use super::bracket::crossing;
@@ -20,7 +20,7 @@ use crate::units::{Acceleration, Length, Speed};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MinimumJerk {
     time: f64,
-    way: f64,
+    distance: f64,
     from: f64,
     to: f64,
     /// `A`, `B` and `C`.
@@ -31,11 +31,17 @@ impl MinimumJerk {
     /// A motion over a distance from one speed to another in a time; with a time of zero or less, an instantaneous
     /// change.
     #[must_use]
-    pub fn new(way: Length, from: Speed, to: Speed, time: TimeSpan) -> Self {
-        let (time, way) = (time.as_s().max(0.0), way.as_m());
+    pub fn new(distance: Length, from: Speed, to: Speed, time: TimeSpan) -> Self {
+        let (time, distance) = (time.as_s().max(0.0), distance.as_m());
         let (from, to) = (from.as_m_per_s(), to.as_m_per_s());
-        let (d, w) = (way - from * time, (to - from) * time);
-        Self { time, way, from, to, powers: [10.0 * d - 4.0 * w, -15.0 * d + 7.0 * w, 6.0 * d - 3.0 * w] }
+        let (d, w) = (distance - from * time, (to - from) * time);
+        Self {
+            time,
+            distance,
+            from,
+            to,
+            powers: [10.0 * d - 4.0 * w, -15.0 * d + 7.0 * w, 6.0 * d - 3.0 * w],
+        }
     }
 
     /// The lowest and the highest speed of the motion.
@@ -64,7 +70,7 @@ impl Motion for MinimumJerk {
         let (place, speed, acceleration) = if t <= 0.0 {
             (self.from * t, self.from, 0.0)
         } else if t >= self.time {
-            (self.way + self.to * (t - self.time), self.to, 0.0)
+            (self.distance + self.to * (t - self.time), self.to, 0.0)
         } else {
             let ([a, b, c], part) = (self.powers, t / self.time);
             let bend = part * (6.0 * a + part * (12.0 * b + part * 20.0 * c)) / (self.time * self.time);
@@ -78,18 +84,20 @@ impl Motion for MinimumJerk {
     }
 
     fn time_at(&self, distance: Length) -> Option<TimeSpan> {
-        let way = distance.as_m();
-        if way == 0.0 {
+        let distance = distance.as_m();
+        if distance == 0.0 {
             return Some(TimeSpan::ZERO);
         }
-        if way < 0.0 {
-            return (self.from > 0.0).then(|| TimeSpan::from_s(way / self.from));
+        if distance < 0.0 {
+            return (self.from > 0.0).then(|| TimeSpan::from_s(distance / self.from));
         }
-        if way > self.way {
-            let since = (way - self.way) / self.to;
+        if distance > self.distance {
+            let since = (distance - self.distance) / self.to;
             return (self.to > 0.0 && since.is_finite()).then(|| span_of(self.time + since));
         }
-        way.is_finite().then(|| span_of(self.time * crossing(0.0, 1.0, |part| self.place(part) - way)))
+        distance
+            .is_finite()
+            .then(|| span_of(self.time * crossing(0.0, 1.0, |part| self.place(part) - distance)))
     }
 
     fn duration(&self) -> TimeSpan {
@@ -97,7 +105,7 @@ impl Motion for MinimumJerk {
     }
 
     fn distance(&self) -> Length {
-        Length::from_m(self.way)
+        Length::from_m(self.distance)
     }
 }
 
@@ -113,7 +121,7 @@ mod tests {
             let there = motion.state_at(TimeSpan::from_s(4.0 * part));
             let expected = 2.0 * (10.0 * part.powi(3) - 15.0 * part.powi(4) + 6.0 * part.powi(5));
             assert!((there.distance.as_m() - expected).abs() < 1e-12);
-            let back = motion.time_at(Length::from_m(expected)).expect("on the way");
+            let back = motion.time_at(Length::from_m(expected)).expect("within the motion");
             assert!((back.as_s() - 4.0 * part).abs() < 1e-4, "{part}");
         }
         // The textbook's fastest speed is 15/8 of the mean.

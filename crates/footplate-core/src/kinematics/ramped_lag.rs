@@ -1,21 +1,21 @@
-//! A change of speed that moves evenly and is followed with a lag: one shape for all decoders and motors.
+//! A linear ramp followed with a lag: one shape of speed change for all decoders and motors.
 //!
-//! A decoder moves its set speed from the old to the new one in a time `T` (zero: it jumps) and the motor follows with a
-//! time constant `θ` (zero: at once). Between the two extremes lie, to within millimetres of way, all laws that model
-//! trains were seen to follow: constant rate (θ → 0), first-order lag (T → 0), eased and rounded ramps (θ stands for the
-//! rounding), and momentum. Letters: `τ` time since the change took effect, `r` share of the change that is done,
-//! `R` its integral over time:
+//! A decoder moves its set speed from the old to the new one in a time `T` (zero: it jumps) and the motor follows
+//! with a time constant `θ` (zero: at once). Between the two extremes lie, to within millimetres of distance, all
+//! laws that model trains follow in recordings: constant rate (θ → 0), first-order lag (T → 0), eased and rounded
+//! ramps (θ models the rounding), and momentum. Letters: `τ` time since the change took effect, `r` share of the
+//! change that is done, `R` its integral over time:
 //!
 //! ```text
-//! h(τ) = τ − θ (1 − e^(−τ/θ))                        integral of a lag's answer to a step
+//! h(τ) = τ − θ (1 − e^(−τ/θ))                        integral of a lag's step response
 //! H(τ) = τ²/2 − θ τ + θ² (1 − e^(−τ/θ))              integral of h
 //! r(τ) = (h(τ) − h(τ − T)) / T                        terms of negative times are zero
 //! R(τ) = (H(τ) − H(τ − T)) / T  →  τ − (T/2 + θ)
 //! ```
 
-/// The shorter a ramp the more digits the differences above lose; this one (s) is a jump at any rate.
+/// Ramps below this (s) are a jump: the shorter a ramp, the more digits the differences above lose.
 const SHORTEST_RAMP: f64 = 1e-3;
-/// A lag below this (s) answers at once.
+/// A lag below this (s) counts as none.
 const SHORTEST_LAG: f64 = 1e-4;
 
 /// The shape of one change.
@@ -27,7 +27,7 @@ pub struct RampedLag {
 }
 
 impl RampedLag {
-    /// From the duration of the ramp and the time constant of the lag behind it, in s; negative ones count as zero.
+    /// From the duration of the ramp and the time constant of the lag, in s; negative values count as zero.
     #[must_use]
     pub const fn new(ramp: f64, lag: f64) -> Self {
         Self { ramp: ramp.max(SHORTEST_RAMP), lag: lag.max(SHORTEST_LAG) }
@@ -63,13 +63,13 @@ impl RampedLag {
         self.lag
     }
 
-    /// Mean time by which the change is late against one at once: T/2 + θ, in s.
+    /// Mean delay against an instantaneous change: T/2 + θ, in s.
     #[must_use]
     pub const fn delay(&self) -> f64 {
         0.5 * self.ramp + self.lag
     }
 
-    /// The time (s) after which no more than this share of the change is left.
+    /// The time (s) after which no more than this share of the change remains.
     #[must_use]
     pub fn settled(&self, left: f64) -> f64 {
         self.ramp + self.lag * libm::log(1.0 / left.clamp(1e-9, 1.0))

@@ -1,9 +1,9 @@
 //! Short moves: "go, wait, stop", with the stop commanded before the speed is reached.
 //!
-//! With the stop commanded after a time T the train has got as far and as fast as its law of starting says,
-//! and from there its law of stopping takes it: a distance that grows with T, first like its square and then
-//! like the speed. Laws fitted to longer runs are a few per cent off here, so that measured moves correct them:
-//! they stretch and squeeze T so that the laws pass through every one of them, and keep their shape in between.
+//! If the stop is commanded after a time T, the starting law gives distance and speed at that time, and the stopping
+//! law adds the rest: the distance grows with T, first quadratically and then linearly. Laws fitted to longer runs
+//! are off by a few per cent here, so measured moves correct them: a piecewise linear map of T makes the laws pass
+//! through every measured move and keeps their shape in between.
 
 #![expect(clippy::indexing_slicing, reason = "every index is below the number of measured moves")]
 
@@ -15,19 +15,19 @@ use super::stopping_law::StoppingLaw;
 use crate::time::TimeSpan;
 use crate::units::{Length, Speed};
 
-/// The distance of a move by the time between its two commands, and back.
+/// The distance of a move as a function of the time between its two commands, and the inverse.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ShortMove<'t> {
     start_delay: TimeSpan,
     start: SpeedChange<'t>,
     stop: StoppingLaw<FromCommand>,
-    /// Times of commands in s, as measured and as the laws would need for the same distance.
+    /// Command times in s: measured, and by the laws for the same distance.
     measured: [f64; ShortMove::MOST_POINTS],
     by_law: [f64; ShortMove::MOST_POINTS],
     points: usize,
 }
 
-/// Why laws or measurements make no model of short moves.
+/// Why laws or measurements give no model of short moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum ShortMoveError {
@@ -38,19 +38,20 @@ pub enum ShortMoveError {
         /// Speed that it leads to.
         to: Speed,
     },
-    /// There are more measured moves than there is room for.
+    /// There are more measured moves than the model can store.
     TooMany {
         /// How many there were.
         found: usize,
     },
-    /// Measured moves are sorted by time, and each gets farther than the one before, the first than nothing.
+    /// Measured moves are sorted by time, and each goes farther than the previous one; the first goes farther than
+    /// zero.
     NotIncreasing {
         /// Time between the commands of the move in question.
         time: TimeSpan,
         /// How far it got.
         distance: Length,
     },
-    /// A measured move got farther than its laws ever get.
+    /// A measured move went farther than its laws ever go.
     OutOfReach {
         /// Time between the commands of the move in question.
         time: TimeSpan,
@@ -94,7 +95,7 @@ impl core::fmt::Display for ShortMoveError {
 impl core::error::Error for ShortMoveError {}
 
 impl ShortMove<'_> {
-    /// Measured moves that can correct the laws: one every quarter of a second up to six seconds.
+    /// Most measured moves that can correct the laws: one every quarter of a second up to six seconds.
     pub const MOST_POINTS: usize = 24;
 }
 
@@ -146,7 +147,7 @@ impl<'t> ShortMove<'t> {
         Ok(corrected)
     }
 
-    /// How far the train gets when the stop is commanded so long after the start.
+    /// The distance of a move whose stop is commanded this long after its start.
     #[must_use]
     pub fn distance(&self, command_time: TimeSpan) -> Length {
         let (measured, by_law) = self.corrections();
@@ -165,7 +166,7 @@ impl<'t> ShortMove<'t> {
         (&self.measured[..self.points], &self.by_law[..self.points])
     }
 
-    /// By the laws alone, with the stop commanded after a time in s.
+    /// By the laws alone, for a stop commanded after a time in s.
     fn law_distance(&self, command_time: f64) -> Length {
         let state = self.start.state_at(TimeSpan::from_s(command_time) - self.start_delay);
         state.distance + self.stop.distance(state.speed).length()
@@ -180,7 +181,7 @@ impl<'t> ShortMove<'t> {
         let settled = (self.start_delay + self.start.duration()).as_s();
         let beyond = distance - self.law_distance(settled);
         let (low, high) = if beyond > Length::ZERO {
-            // At the end of the start, or so nearly that the train only gets faster by as much as no one notices.
+            // At the end of the start, or so near to it that the speed hardly changes any more.
             let speed = self.start.state_at(self.start.duration() + TimeSpan::from_ns(1)).speed;
             (settled, settled + beyond.as_m() / speed.as_m_per_s())
         } else {
@@ -191,7 +192,7 @@ impl<'t> ShortMove<'t> {
     }
 }
 
-/// A time on straight lines from (0, 0) through points in both coordinates, and beyond the last at a slope of 1.
+/// Piecewise linear map of a time from (0, 0) through points; beyond the last its slope is 1.
 fn stretched(time: f64, from: &[f64], to: &[f64]) -> f64 {
     let passed = from.partition_point(|&point| point < time);
     let (low, low_to) = if passed > 0 { (from[passed - 1], to[passed - 1]) } else { (0.0, 0.0) };

@@ -1,43 +1,35 @@
-//! How a train goes from one speed to another: six laws with one set of questions.
+//! Six laws of how a train changes from one speed to another, with one interface.
 //!
-//! Which of them a decoder follows is found out by fitting all of them to what a train did. Distance and speed
-//! have no step in any law (but the crudest, in speed), because no train teleports and no force is infinite.
+//! Fitting all of them to recorded runs shows which one a decoder follows. Distance and speed are continuous in every
+//! law (except speed in the crudest), because no force is infinite.
 //!
 //! | law | speed at the share τ = t/Δ | where it fits |
 //! |---|---|---|
-//! | [`MidStep`] | v₁, then v₂ from τ = ½ on | where it does not matter what happens meanwhile |
+//! | [`MidStep`] | v₁, then v₂ from τ = ½ on | where the course of the change does not matter |
 //! | [`ConstantAcceleration`] | v₁ + (v₂ − v₁) τ | the schoolbook; infinite jerk at the ends |
 //! | [`ConstantJerk`] | a parabola in, a parabola out | acceleration without a step |
 //! | [`Smooth`] | v₁ + (v₂ − v₁)(3τ² − 2τ³) | what a decoder's programmer writes once |
 //! | [`Lag`] | v₂ + (v₁ − v₂) e^(−t/θ) | decoders with load control |
-//! | [`StepRamp`] | through the train's speed table, so many ms per step | DCC momentum, CV 3 and CV 4 |
+//! | [`StepRamp`] | through the train's speed table, a fixed time per step | DCC momentum, CV 3 and CV 4 |
 //!
-//! Starts have v₁ = 0 and stops v₂ = 0. Before the change the train runs at v₁, after it at v₂, so that a law
-//! may be asked about any time and any distance. A change whose two speeds have opposite signs is evaluated,
-//! but has no inverse: a reversal is a stop and a start.
+//! Starts have v₁ = 0 and stops v₂ = 0. Before the change the train runs at v₁, after it at v₂, so a law is defined for
+//! every time and every distance. A change between speeds of opposite signs can be evaluated but has no inverse: a
+//! reversal is a stop and a start.
 
-mod constant_acceleration;
-mod constant_jerk;
 mod ends;
 mod lag;
-mod mid_step;
-mod smooth;
 mod step_ramp;
-mod step_table;
+mod symmetric;
 
-pub use constant_acceleration::ConstantAcceleration;
-pub use constant_jerk::ConstantJerk;
 pub use lag::Lag;
-pub use mid_step::MidStep;
-pub use smooth::Smooth;
-pub use step_ramp::StepRamp;
-pub use step_table::{StepTable, StepTableError};
+pub use step_ramp::{StepRamp, StepTable, StepTableError};
+pub use symmetric::{ConstantAcceleration, ConstantJerk, MidStep, Smooth};
 
 use super::motion::{Motion, MotionState};
 use crate::time::TimeSpan;
 use crate::units::{Length, Speed};
 
-/// The laws that need nothing but two speeds and one time, by name: what a fit tries one after the other.
+/// The laws that need only two speeds and one time, by name: the candidates of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum SpeedLaw {
@@ -54,14 +46,14 @@ pub enum SpeedLaw {
 }
 
 impl SpeedLaw {
-    /// Every one of them, the crudest first.
+    /// All laws, the crudest first.
     pub const ALL: [Self; 5] =
         [Self::MidStep, Self::ConstantAcceleration, Self::ConstantJerk, Self::Smooth, Self::Lag];
 
     /// The change from a speed to another by this law in its `time`.
     ///
     /// Any finite numbers are accepted. Distance, speed and acceleration are as smooth in the three arguments as
-    /// the law is in time, down to the nanosecond in which time is counted.
+    /// the law is in time, down to the resolution of time, 1 ns.
     #[must_use]
     pub fn between(self, from: Speed, to: Speed, time: TimeSpan) -> SpeedChange<'static> {
         match self {
@@ -76,7 +68,7 @@ impl SpeedLaw {
     }
 }
 
-/// A change of speed by whichever law fits the train; distance counts from 0 at its start.
+/// A change of speed by the law that fits the train; distance is 0 at its start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SpeedChange<'t> {
     /// A step at the middle of the interval.
@@ -89,11 +81,11 @@ pub enum SpeedChange<'t> {
     Smooth(Smooth),
     /// Speed as an exponential.
     Lag(Lag),
-    /// Speed as the train's table has it.
+    /// Speed through the train's speed table.
     StepRamp(StepRamp<'t>),
 }
 
-/// The same question to whichever law it is.
+/// The same call on the law of a change.
 macro_rules! ask {
     ($change:expr, $law:ident => $question:expr) => {
         match $change {

@@ -1,4 +1,4 @@
-//! The three distances that people call *the* stopping distance, as three types that do not mix.
+//! The three distances that are called *the* stopping distance, as three types that do not mix.
 //!
 //! ```text
 //! what is known exactly           the distance is counted from      and is
@@ -7,9 +7,9 @@
 //! where a polled report came      FromReport                        v (φ + π/2 + τ₂) + σ₃
 //! ```
 //!
-//! Letters: `v` speed, `σ₃` way of the stopping procedure itself, `τ₂` from the command until the decoder starts
-//! it, `φ` from the reading of a contact until its report is stamped, `π` the interval of the poll that reported
-//! it: the contact closed at any moment of that interval, in the mean half of it before the reading.
+//! Letters: `v` speed, `σ₃` braking distance, `τ₂` from the command until the decoder starts to brake, `φ` from the
+//! reading of a sensor until its report is stamped, `π` the interval of the poll that reported it: the sensor tripped
+//! at any moment of that interval, on average half of it before the reading.
 //!
 //! At 500 mm/s and 65 ms each, the three differ by 32 mm and by 49 mm, several times the scatter of a stop.
 
@@ -26,11 +26,11 @@ pub struct FromBraking;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FromCommand;
 
-/// Counted from the sensor whose report prompts the command, which is sent at once.
+/// Counted from the sensor whose report triggers the command, which is sent at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FromReport;
 
-/// How far a train still runs until it stands, and since when that is counted.
+/// Distance until the train is at rest; the type states from where it is counted.
 ///
 /// ```compile_fail
 /// use footplate_core::kinematics::{FromBraking, FromCommand, StoppingDistance};
@@ -63,7 +63,7 @@ impl<From> StoppingDistance<From> {
 }
 
 impl StoppingDistance<FromBraking> {
-    /// Of a train that runs at `speed` and starts to brake `command_delay` (τ₂) after the command.
+    /// For a train that runs at `speed` and starts to brake `command_delay` (τ₂) after the command.
     #[must_use]
     pub fn counted_from_command(
         self,
@@ -112,7 +112,7 @@ impl StoppingDistance<FromReport> {
     }
 }
 
-/// Mean time from the closing of a sensor to the stamp of its report: φ + π/2.
+/// Mean time from the tripping of a sensor to the stamp of its report: φ + π/2.
 pub(super) fn mean_report_delay(to_stamp: TimeSpan, poll_interval: TimeSpan) -> TimeSpan {
     to_stamp + TimeSpan::from_ns(poll_interval.as_ns() / 2)
 }
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn a_train_that_backs_up_needs_the_same_way() {
+    fn a_train_that_backs_up_needs_the_same_distance() {
         let braking = StoppingDistance::<FromBraking>::new(Length::from_mm(400.0));
         assert_eq!(braking.counted_from_command(-SPEED, DELAY), braking.counted_from_command(SPEED, DELAY));
     }

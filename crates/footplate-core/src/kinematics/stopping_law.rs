@@ -1,11 +1,11 @@
-//! How far and how long a train runs until it stands, as a law of its speed.
+//! Stopping distance and stopping time as functions of speed.
 //!
-//! Every law is a delay, in which the train runs on as before, and a way of braking after it:
+//! Every law is a delay, in which the train keeps its speed, and a kind of braking after it:
 //!
 //! ```text
 //! constant deceleration    d = v²/2a                 with no delay
 //! two terms                d = v τ + v²/2a           the best simple law on real stops of model trains
-//! exponential              d = v t₀ + v θ            decoders with load control; never quite stands
+//! exponential              d = v t₀ + v θ            decoders with load control; never quite at rest
 //! ```
 //!
 //! Letters: `v` speed, `d` stopping distance, `a` deceleration, `τ` and `t₀` delay, `θ` time constant.
@@ -22,14 +22,14 @@ use crate::units::{Acceleration, Length, Speed};
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Braking {
-    /// Evenly, by this much.
+    /// With this constant deceleration.
     Constant(Acceleration),
-    /// By the same share in every time constant; it counts as at rest below [`Lag::SETTLED_WITHIN`], although the
+    /// Exponentially, with this time constant; the train counts as at rest below [`Lag::SETTLED_WITHIN`], although the
     /// full distance takes infinite time.
     Exponential(TimeSpan),
 }
 
-/// A law of stopping, and since when its distances and times are counted.
+/// A stopping law; the type states from when its distances and times are counted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StoppingLaw<From> {
     delay: TimeSpan,
@@ -37,7 +37,7 @@ pub struct StoppingLaw<From> {
     counted_from: PhantomData<From>,
 }
 
-/// Why some numbers make no law of stopping.
+/// Why a stopping law is invalid.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum StoppingError {
@@ -53,7 +53,7 @@ pub enum StoppingError {
     },
     /// Braking cannot begin before the moment from which it is counted.
     NegativeDelay {
-        /// What was given, or what would be left of the delay.
+        /// The delay given, or the delay that would be left.
         found: TimeSpan,
     },
 }
@@ -77,11 +77,11 @@ impl core::fmt::Display for StoppingError {
 impl core::error::Error for StoppingError {}
 
 impl<From> StoppingLaw<From> {
-    /// A law that runs on for a delay and then brakes.
+    /// A law that keeps the speed for a delay and then brakes.
     ///
     /// # Errors
     ///
-    /// If the delay is negative, or the braking would never bring the train to a stand.
+    /// If the delay is negative, or the braking would never bring the train to rest.
     pub fn new(delay: TimeSpan, braking: Braking) -> Result<Self, StoppingError> {
         if delay < TimeSpan::ZERO {
             return Err(StoppingError::NegativeDelay { found: delay });
@@ -97,19 +97,19 @@ impl<From> StoppingLaw<From> {
         }
     }
 
-    /// How long the train runs on as before.
+    /// How long the train keeps its speed.
     #[must_use]
     pub const fn delay(&self) -> TimeSpan {
         self.delay
     }
 
-    /// How it brakes after that.
+    /// The braking after the delay.
     #[must_use]
     pub const fn braking(&self) -> Braking {
         self.braking
     }
 
-    /// The full distance until rest, from a speed in either direction.
+    /// Distance until rest, from a speed in either direction.
     #[must_use]
     pub fn distance(&self, speed: Speed) -> StoppingDistance<From> {
         let speed = speed.abs().as_m_per_s();
@@ -121,13 +121,13 @@ impl<From> StoppingLaw<From> {
         StoppingDistance::new(Length::from_m(speed * self.delay.as_s() + braking))
     }
 
-    /// How long that takes; an exponential stop counts as done at [`Lag::SETTLED_WITHIN`].
+    /// Time until rest; an exponential stop ends at [`Lag::SETTLED_WITHIN`].
     #[must_use]
     pub fn time(&self, speed: Speed) -> TimeSpan {
         self.delay + self.change_from(speed).duration()
     }
 
-    /// The highest speed from which the train stops within a distance; zero for one that is not ahead.
+    /// The highest speed from which the train stops within a distance; zero if the distance is not ahead.
     #[must_use]
     pub fn speed_for(&self, distance: StoppingDistance<From>) -> Speed {
         let distance = distance.length().max(Length::ZERO).as_m();
@@ -191,8 +191,8 @@ impl StoppingLaw<FromCommand> {
         self.earlier(-command_delay)
     }
 
-    /// In the mean, when the command follows at once on a report that is stamped `to_stamp` (φ) after a reading
-    /// that came `poll_interval` (π) after the reading before.
+    /// On average, if the command follows at once on a report that is stamped `to_stamp` (φ) after a reading, and
+    /// `poll_interval` (π) lies between that reading and the previous one.
     ///
     /// # Errors
     ///

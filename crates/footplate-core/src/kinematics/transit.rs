@@ -1,7 +1,7 @@
-//! From one speed to another over a given way in a given time: a change to a speed that is kept, and a change from it.
+//! From one speed to another over a given distance in a given time: a change to a constant speed, and a change from it.
 //!
-//! Letters: `d` way, `T` time, `v₁` and `v₂` the speeds at the ends, `R` the time of each change, `c` the speed kept. Every
-//! symmetric law runs the mean of its two speeds, so that
+//! Letters: `d` distance, `T` time, `v₁` and `v₂` the speeds at the ends, `R` the time of each change, `c` the
+//! constant speed. Every symmetric law has the mean of its two speeds, so
 //!
 //! ```text
 //! d = R (v₁ + c)/2 + (T − 2R) c + R (c + v₂)/2      c = (d − R (v₁ + v₂)/2) / (T − R)
@@ -12,7 +12,7 @@ use super::speed_change::{SpeedChange, SpeedLaw};
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
 
-/// Two changes of speed by one law, and a steady run between them.
+/// Two changes of speed by one law, with a constant speed between them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transit {
     law: SpeedLaw,
@@ -22,7 +22,7 @@ pub struct Transit {
     /// Of each change.
     change: TimeSpan,
     time: TimeSpan,
-    way: Length,
+    distance: Length,
 }
 
 impl Transit {
@@ -30,7 +30,7 @@ impl Transit {
     /// `None` if that is more than half of the time, or for a law without symmetry.
     #[must_use]
     pub fn new(
-        way: Length,
+        distance: Length,
         [from, to]: [Speed; 2],
         time: TimeSpan,
         law: SpeedLaw,
@@ -40,8 +40,8 @@ impl Transit {
             return None;
         }
         let changing = (from + to) * change * 0.5;
-        let kept = (way - changing) / (time - change);
-        Some(Self { law, speeds: [from, to], kept, change, time, way })
+        let kept = (distance - changing) / (time - change);
+        Some(Self { law, speeds: [from, to], kept, change, time, distance })
     }
 
     fn first(&self) -> SpeedChange<'static> {
@@ -57,7 +57,7 @@ impl Transit {
         self.time - self.change
     }
 
-    /// The speed that is kept.
+    /// The constant speed between the two changes.
     #[must_use]
     pub const fn kept(&self) -> Speed {
         self.kept
@@ -65,7 +65,7 @@ impl Transit {
 
     /// Where the second change begins.
     fn left_at(&self) -> Length {
-        self.way - self.last().distance()
+        self.distance - self.last().distance()
     }
 }
 
@@ -98,7 +98,7 @@ impl Motion for Transit {
     }
 
     fn distance(&self) -> Length {
-        self.way
+        self.distance
     }
 }
 
@@ -107,21 +107,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_covers_the_way_in_the_time_by_every_symmetric_law() {
+    fn it_covers_the_distance_in_the_time_by_every_symmetric_law() {
         let speeds = [150.0, 250.0].map(Speed::from_mm_per_s);
-        let (way, time) = (Length::from_m(3.0), TimeSpan::from_s(10.0));
+        let (distance, time) = (Length::from_m(3.0), TimeSpan::from_s(10.0));
         for law in [SpeedLaw::ConstantAcceleration, SpeedLaw::ConstantJerk, SpeedLaw::Smooth] {
-            let transit = Transit::new(way, speeds, time, law, TimeSpan::from_s(2.0)).expect("time enough");
+            let transit =
+                Transit::new(distance, speeds, time, law, TimeSpan::from_s(2.0)).expect("time enough");
             // By hand: (3000 − 2 · 200)/(10 − 2) = 325 mm/s.
             assert!((transit.kept().as_mm_per_s() - 325.0).abs() < 1e-9);
             let end = transit.state_at(time);
-            assert!((end.distance - way).abs() < Length::from_mm(1e-6), "{law:?}");
+            assert!((end.distance - distance).abs() < Length::from_mm(1e-6), "{law:?}");
             assert!((end.speed - speeds[1]).abs() < Speed::from_mm_per_s(1e-6));
             for mm in [1.0, 400.0, 1500.0, 2800.0, 2999.0] {
-                let at = transit.time_at(Length::from_mm(mm)).expect("on the way");
+                let at = transit.time_at(Length::from_mm(mm)).expect("within the transit");
                 assert!((transit.state_at(at).distance.as_mm() - mm).abs() < 1e-3, "{law:?} {mm}");
             }
         }
-        assert_eq!(Transit::new(way, speeds, time, SpeedLaw::Smooth, TimeSpan::from_s(6.0)), None);
+        assert_eq!(Transit::new(distance, speeds, time, SpeedLaw::Smooth, TimeSpan::from_s(6.0)), None);
     }
 }

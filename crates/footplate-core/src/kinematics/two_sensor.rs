@@ -1,26 +1,25 @@
-//! Measuring an acceleration with two sensors: the change of speed is commanded at the first or soon after it, and the
-//! time to the second tells how long it took.
+//! Acceleration from two sensors: the change of speed is commanded at the first sensor or soon after it, and the time
+//! to the second shows how long the change took.
 //!
-//! Letters: `b` from the first sensor to the command, `d` from where the train is at the command to the second sensor, which
-//! is v₁ b less than the distance between the two, `t` the time from the command to the second, `v₁` and `v₂` the speeds before
-//! and after the change, `vₐ` their mean, `τ₂` from the command until the change begins, `a` the acceleration.
-//! While the change runs the train covers vₐ per second, before and after it v₁ and v₂; so either
+//! Letters: `b` from the first sensor to the command, `d` from the train's position at the command to the second
+//! sensor, which is v₁ b less than the distance between the two, `t` the time from the command to the second sensor,
+//! `v₁` and `v₂` the speeds before and after the change, `vₐ` their mean, `τ₂` from the command until the change
+//! begins, `a` the acceleration. During the change the mean speed is vₐ, so either
 //!
 //! ```text
 //! the change was over before the second sensor     a = (v₂ − v₁)² / 2g    g = v₂ (t − τ₂) + v₁ τ₂ − d
 //! or it was not                                    a = 2h / (t − τ₂)²     h = d − v₁ t
 //! ```
 //!
-//! `g` is the way lost to the old speed, `h` the way won over it. Which of the two holds is told by
-//! q = d − v₁ τ₂ − vₐ (t − τ₂): a train that speeds up has got farther than the mean speed takes it if its
-//! change was over. Slowing down mirrors that. At q = 0 both give the same acceleration.
+//! `g` is the distance lost against an instantaneous change, `h` the distance gained over no change. The sign of
+//! q = d − v₁ τ₂ − vₐ (t − τ₂) decides which formula applies: a train that speeds up has covered more than the mean
+//! speed gives if its change was over. Slowing down mirrors that. At q = 0 both give the same acceleration.
 
 use crate::estimate::Estimate;
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
 
-/// How many standard deviations a difference has to have before it decides anything: 95 % of normal errors
-/// are smaller.
+/// Least size of a decisive difference in standard deviations: 95 % of normal errors are smaller.
 const DECISIVE: f64 = 2.0;
 
 /// One change of speed between two sensors, or the mean of several alike.
@@ -66,8 +65,8 @@ pub enum TwoSensorVerdict {
     },
     /// It was too short to be distinguished from an instantaneous change: use sensors that are closer together.
     TooQuick,
-    /// The speed had not noticeably changed by the second sensor: take sensors farther apart. Nor may a change at once
-    /// show over so short a distance.
+    /// The speed had not noticeably changed by the second sensor: use sensors that are farther apart. Over so short a
+    /// distance even an instantaneous change may not show.
     NotNoticed,
 }
 
@@ -159,7 +158,7 @@ impl TwoSensorRun {
     ///
     /// # Errors
     ///
-    /// If the run cannot say anything whatever its sensors saw.
+    /// If no readings of the sensors in this run could contain information.
     pub fn verdict(&self) -> Result<TwoSensorVerdict, TwoSensorError> {
         self.check()?;
         let (t, delay) = (self.time.value.as_s(), self.command_delay.value.as_s());
@@ -207,13 +206,13 @@ impl TwoSensorRun {
             to: -0.5 * changing,
             command_delay: mean - v1,
         };
-        let doubt = DECISIVE * self.deviation(beyond_slopes);
-        Ok(if beyond > doubt {
+        let margin = DECISIVE * self.deviation(beyond_slopes);
+        Ok(if beyond > margin {
             TwoSensorVerdict::Completed {
                 acceleration: if_completed,
                 duration: TimeSpan::from_s(2.0 * lost / gain),
             }
-        } else if beyond < -doubt {
+        } else if beyond < -margin {
             let speed = Speed::from_m_per_s(v1 + unfinished * changing);
             TwoSensorVerdict::Unfinished { acceleration: if_unfinished, speed }
         } else {

@@ -1,17 +1,17 @@
-//! The interval in which a sensor closed, from one report.
+//! The interval of a detection, from one report.
 
 use super::poll_timing::PollTiming;
 use crate::time::{TimeSpan, Timestamp};
 
-/// The contact was open at `after` and closed at `until`.
+/// The interval of a detection: the sensor was free at `after` and occupied at `until`.
 ///
 /// Both are stamps of the host. The time from the reading on the station to the stamp (φ in the literature)
-/// is the same for every report of a link, so it cancels in every difference of reports and is left in.
+/// is the same for every report of a link, so it cancels in every difference of reports and is not subtracted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ContactWindow {
-    /// Stamp of the last reading that saw the sensor open.
+    /// Stamp of the last reading of the free sensor.
     pub after: Timestamp,
-    /// Stamp of the reading that saw it closed: the report.
+    /// Stamp of the first reading of the occupied sensor: the report.
     pub until: Timestamp,
 }
 

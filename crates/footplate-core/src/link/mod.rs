@@ -1,15 +1,14 @@
-//! When things really happened: from the time of a report to the time of the contact.
+//! The time model of a link: from the time of a report to the time of the detection.
 //!
-//! A contact that closed is reported by the first poll that reads it, so the report says only that it closed
-//! within the poll interval before. `poll_timing` finds the poll intervals of a link in the reports
-//! themselves and `poll_rhythm` foresees the next ones, `contact_window` turns a report into
-//! an interval of contact times, `time_model` is what planners need of a link and `round_trips` what a measured line changes in it, `uniform_normal` is the distribution of a report about a forecast, and
-//! `truncated_normal` what a report leaves of a forecast.
+//! A detection is reported by the first poll after it, so its time is only known within the poll interval:
+//! - `poll_timing` estimates the poll intervals of a link from the reports, and predicts the next polls;
+//! - `contact_window` is the interval of a detection, from one report;
+//! - `time_model` is the timing of a link for planners, `round_trips` its correction for a measured line;
+//! - `uniform_normal` is the distribution of a report about its prediction, `truncated_normal` the prediction given a
+//!   report.
 
 mod contact_window;
 mod period_search;
-mod poll_regression;
-mod poll_rhythm;
 mod poll_timing;
 mod round_trips;
 mod time_model;
@@ -17,8 +16,7 @@ mod truncated_normal;
 mod uniform_normal;
 
 pub use contact_window::ContactWindow;
-pub use poll_rhythm::PollRhythm;
-pub use poll_timing::{PollTiming, PollTimingEstimator};
+pub use poll_timing::{PollRhythm, PollTiming, PollTimingEstimator};
 pub use round_trips::{RoundTrips, UsualLine};
 pub use time_model::TimeModel;
 pub use truncated_normal::TruncatedNormal;

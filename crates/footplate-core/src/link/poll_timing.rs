@@ -1,4 +1,4 @@
-//! The polling period of a link and its jitter, found in the reports themselves.
+//! The polls of a link: their period and jitter, estimated from the reports, and the next ones.
 //!
 //! Polls that report nothing leave no trace, but every report is stamped by a poll, so the gaps between
 //! reports are whole numbers of periods: `gap = offset + n · period`. The poll that follows a reporting one
@@ -12,13 +12,13 @@
     reason = "indices stay below the named capacities and lengths beside them"
 )]
 
-use super::period_search::{LINED_UP, LONGEST_GAP_S, MOST_GAPS, SHORTEST_PERIOD_S, longest_aligned_period};
-use super::poll_regression::{PollRegression, alignment};
-use super::poll_rhythm::PollRhythm;
+use super::period_search::{
+    LINED_UP, LONGEST_GAP_S, MOST_GAPS, PollRegression, SHORTEST_PERIOD_S, alignment, longest_aligned_period,
+};
 use crate::estimate::Estimate;
 use crate::time::{TimeSpan, Timestamp};
 
-/// What is known of the rhythm of a polled link.
+/// The timing of a polled link.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PollTiming {
@@ -31,8 +31,8 @@ pub struct PollTiming {
 }
 
 impl PollTiming {
-    /// What is assumed of a link of which nothing is known: five modules polled at 2400 baud, as
-    /// published courses measured it (65 to 100 ms, most near 70 ms).
+    /// The default for an unknown link: five modules polled at 2400 baud, as published courses measured it
+    /// (65 to 100 ms, most near 70 ms).
     pub const ASSUMED: Self = Self {
         period: TimeSpan::from_ms(70),
         after_report: TimeSpan::from_ms(70),
@@ -46,6 +46,37 @@ impl PollTiming {
     }
 }
 
+/// The predicted polls after the last report.
+///
+/// A sensor is reported by the first poll after it was occupied. A report can therefore be predicted better than the
+/// detection: it is stamped by a poll, and polls follow one another regularly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PollRhythm {
+    /// The first poll after the last report.
+    next: Timestamp,
+    /// From poll to poll while nothing is reported.
+    period: TimeSpan,
+    /// Beyond this many polls the uncertainty of the period has grown to a fifth of it, and neighbouring polls can no
+    /// longer be distinguished.
+    reaches: i64,
+}
+
+impl PollRhythm {
+    /// The first poll not before a time; `None` if it can no longer be predicted.
+    #[inline]
+    #[must_use]
+    pub fn poll_after(self, time: Timestamp) -> Option<Timestamp> {
+        let ahead = (time - self.next).as_ns();
+        let period = self.period.as_ns();
+        if period <= 0 {
+            return None;
+        }
+        // Rounded up: a detection between two polls waits for the later one.
+        let polls = ahead.max(0).saturating_add(period - 1) / period;
+        (polls <= self.reaches).then(|| self.next + TimeSpan::from_ns(polls * period))
+    }
+}
+
 /// Gaps kept; a fit over more does not move the period by a microsecond.
 const KEPT: usize = MOST_GAPS;
 /// Fewest gaps from which a period is stated.
@@ -54,7 +85,7 @@ const FEWEST: usize = 8;
 /// costs a hundred times more.
 const CONFIRMED: u32 = 16;
 /// Polls are distinguished while their uncertainty is below this part of the period.
-const TOLD_APART: i64 = 5;
+const DISTINGUISHED: i64 = 5;
 
 /// Learns the rhythm of a link from the stamps of its reports.
 #[derive(Debug, Clone)]
@@ -88,7 +119,7 @@ impl PollTimingEstimator {
         self.last_stamp = None;
     }
 
-    /// A command went before the polls and pushed them back: the gap to the next report is no whole number of
+    /// A command delayed the polls: the gap to the next report is no whole number of
     /// periods.
     pub fn command_sent(&mut self) {
         self.last_stamp = None;
@@ -125,15 +156,15 @@ impl PollTimingEstimator {
         self.fitted
     }
 
-    /// The polls to come, as long as a rhythm was found and no command has pushed them since the last report.
+    /// The next polls, if a rhythm was found and no command has delayed them since the last report.
     #[inline]
     #[must_use]
     pub fn rhythm(&self) -> Option<PollRhythm> {
         let period = self.fitted?;
-        let doubt = period.uncertainty.as_ns().max(1);
-        let tolerated = period.value.as_ns() / TOLD_APART - self.timing.jitter.as_ns();
+        let uncertainty = period.uncertainty.as_ns().max(1);
+        let tolerated = period.value.as_ns() / DISTINGUISHED - self.timing.jitter.as_ns();
         let next = self.last_stamp? + self.timing.after_report;
-        Some(PollRhythm { next, period: period.value, reaches: tolerated / doubt })
+        Some(PollRhythm { next, period: period.value, reaches: tolerated / uncertainty })
     }
 
     /// Fits the rhythm to the gaps kept, now instead of at the next doubling.
@@ -211,5 +242,14 @@ mod tests {
         }
         estimator.fit(Timestamp::ZERO);
         assert!(estimator.timing().period > TimeSpan::ZERO);
+    }
+
+    #[test]
+    fn a_detection_waits_for_the_next_poll() {
+        let rhythm = PollRhythm { next: Timestamp::from_s(1.0), period: TimeSpan::from_ms(60), reaches: 100 };
+        assert_eq!(rhythm.poll_after(Timestamp::ZERO), Some(Timestamp::from_s(1.0)));
+        assert_eq!(rhythm.poll_after(Timestamp::from_s(1.0)), Some(Timestamp::from_s(1.0)));
+        assert_eq!(rhythm.poll_after(Timestamp::from_s(1.001)), Some(Timestamp::from_s(1.06)));
+        assert_eq!(rhythm.poll_after(Timestamp::from_s(100.0)), None);
     }
 }

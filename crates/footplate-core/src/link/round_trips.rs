@@ -1,6 +1,6 @@
-//! How long a line takes from requests to answers, as it was measured, and what that changes in the times of a link.
+//! Measured times from requests to answers on a line, and their effect on the time model of a link.
 //!
-//! A station's [`TimeModel`] holds for a line on which answers come as soon as the makers of the model saw. A slow network delays
+//! A station's [`TimeModel`] applies to a line as fast as the one that it was measured on. A slow network delays
 //! commands and reports alike; a lossy one makes some commands wait until they are repeated.
 
 use crate::link::TimeModel;
@@ -8,12 +8,12 @@ use crate::time::TimeSpan;
 
 /// With fewer answers, the 1 % quantile is not estimated (chosen).
 const FEWEST: usize = 50;
-/// The share of answers that come within the longest time that is counted with.
+/// The share of answers within the longest usual time.
 const WITHIN: f64 = 0.99;
-/// The share of commands that may need more repeats than are counted with.
+/// The share of commands that may need more repeats than allowed for.
 const BEYOND: f64 = 1e-3;
 
-/// A line as a station's time model counts with it.
+/// A line as a station's time model assumes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct UsualLine {
     /// The longest time to an answer that is usual.
@@ -59,7 +59,8 @@ impl RoundTrips {
         f64::from(self.lost) / f64::from((self.answered + self.lost).max(1))
     }
 
-    /// How much later than on a usual line an answer may come: no command and no report is delayed by more, as either is a part of it.
+    /// How much later than on a usual line an answer may come: no command and no report is delayed by more, as either
+    /// is a part of it.
     #[must_use]
     pub fn excess(&self, usual: UsualLine) -> TimeSpan {
         (self.longest_usual - usual.answers_within).max(TimeSpan::ZERO)

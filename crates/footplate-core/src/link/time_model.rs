@@ -1,22 +1,22 @@
-//! How long a link takes, as planners and estimators need to know it of any command station.
+//! The times of a link, for planners and estimators, whatever the command station.
 
 use crate::time::TimeSpan;
 
-/// The times of a link: from a command that is planned to one that has left, and from a detection to a changed plan.
+/// The times of a link: from planning a command until it was sent, and from a detection to a changed plan.
 ///
-/// Each station's session supplies its own; a machine is given it as a value.
+/// Each station's session supplies its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TimeModel {
-    /// From the first bit of a command on the line until it has left.
+    /// From the first to the last bit of a command on the line.
     pub command: TimeSpan,
-    /// How long a command waits in the mean for what is on the line already.
+    /// The mean time that a command waits for other bytes on the line.
     pub usual_wait: TimeSpan,
-    /// How soon a command that is ordered now has surely left: the longest wait and the command itself.
+    /// The longest time until a command that is ordered now was sent: the longest wait and the command itself.
     pub soonest: TimeSpan,
-    /// From a detection until its report can have changed a plan and the new command has left, at the longest.
+    /// The longest time from a detection until its report has changed a plan and the new command was sent.
     pub reaction: TimeSpan,
-    /// How long before its report a detection may have occurred, if the report does not say.
+    /// The longest time from a detection to its report, for reports without an interval.
     pub report_window: TimeSpan,
 }
 
@@ -34,14 +34,14 @@ impl TimeModel {
         report_window: TimeSpan::from_ms(70),
     };
 
-    /// When a command that is decided now usually has left.
+    /// The mean time until a command that is ordered now was sent.
     #[must_use]
     pub fn usually_left(&self) -> TimeSpan {
         self.command + self.usual_wait
     }
 }
 
-/// The most careful one.
+/// The slowest link.
 impl Default for TimeModel {
     fn default() -> Self {
         Self::POLLED_2400_BAUD

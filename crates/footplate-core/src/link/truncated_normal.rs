@@ -1,4 +1,4 @@
-//! A normal forecast of a quantity that is then known to lie between two bounds: what a report does to a forecast.
+//! A normal prediction of a quantity that is then known to be between two bounds: a prediction given a report.
 //!
 //! Letters: forecast N(m, s²), bounds a and b in standard deviations: α = (a − m)/s, β = (b − m)/s; Z = Φ(β) − Φ(α).
 //!
@@ -8,7 +8,7 @@
 //! ```
 //!
 //! (Johnson, Kotz and Balakrishnan, Continuous Univariate Distributions 1, 1994, section 10.1.) A window that is much
-//! wider than the forecast is uncertain says nothing and moves nothing, wherever its middle lies.
+//! wider than the uncertainty of the prediction contains no information, wherever its middle is.
 
 use super::uniform_normal::{normal_cdf, normal_density};
 
@@ -98,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wide_window_moves_no_good_forecast_wherever_its_middle_lies() {
+    fn a_wide_window_does_not_change_a_good_forecast_wherever_its_middle_is() {
         // 0.8 s of a lost reply at 500 mm/s, the forecast good to 8 mm and 60 mm from the end of the window.
         let (mean, variance) = of(0.0, 8.0, -340.0, 60.0).moments();
         assert!(mean.abs() < 1e-6 && (variance - 64.0).abs() < 0.4, "{mean} {variance}");

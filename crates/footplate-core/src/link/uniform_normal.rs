@@ -1,4 +1,5 @@
-//! The distribution of a report about its forecast: normal doubt of the motion, uniform doubt of the poll.
+//! The distribution of a report about its prediction: normal uncertainty of the motion, uniform uncertainty of the
+//! poll.
 //!
 //! Letters: `s` standard deviation of the normal part, `w` width of the uniform part, `F` an antiderivative
 //! of the normal distribution function Φ: F(z) = z Φ(z) + φ(z). The sum of both has

@@ -20,8 +20,8 @@
 use alloc::vec::Vec;
 
 use super::motion_model::MotionModel;
-use super::parameters::{DOWN, NODES, PRIOR, SPEEDS, STOP_NODES};
-use super::priors::{SHAPE_ERROR, whitened};
+use super::parameters::{DOWN, PRIOR, SPEEDS, STOP_NODES};
+use super::priors::{SHAPE_ERROR, independent_nodes};
 
 /// Places of lag, `κ` and `ρ` on the way down.
 const LAG: usize = DOWN + 1;
@@ -87,12 +87,8 @@ impl Supposed {
         for (place, known) in kind.knows() {
             supposed.exchange(&[(place, 1.0)], PRIOR[place], known);
         }
-        for (node, weights) in whitened().iter().enumerate() {
-            let mut sum = [(STOP_NODES, 0.0); NODES];
-            for (place, term) in sum.iter_mut().enumerate().take(node + 1) {
-                *term = (STOP_NODES + place, weights[place]);
-            }
-            supposed.exchange(&sum, (0.0, model.residual_scales[0]), (0.0, LEFT_OVER));
+        for (sum, usual) in independent_nodes(STOP_NODES) {
+            supposed.exchange(&sum, (usual, model.residual_scales[0]), (usual, LEFT_OVER));
         }
         supposed
     }

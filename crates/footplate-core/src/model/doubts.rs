@@ -9,7 +9,7 @@ use super::parameters::{
     Answers, DOWN, FRICTION, HYSTERESIS, START_DELAY, START_NODES, STOP_NODES, UP, between_knots,
     hysteresis_at, knots, knots_about, nodes_about, speed_at, stride,
 };
-use super::priors::END_OF_STOP;
+use super::priors::end_of_stop;
 
 /// Factor on the shape error of a single change in forecasts, for shapes of decoders that the law lacks (chosen on simulated
 /// decoders of six laws, so that 90 % intervals hold nine times in ten).
@@ -56,7 +56,7 @@ impl MotionModel {
         let (lag, friction) = ((lag, by_lag - friction_by_lag), (FRICTION, -by_friction));
         let nodes = [(STOP_NODES + low, left), (STOP_NODES + high, right)];
         let slopes = [delay, lag, kappa, rho, friction, nodes[0], nodes[1]];
-        libm::hypot(libm::sqrt(self.spread.variance_along(&slopes)), END_OF_STOP)
+        libm::hypot(libm::sqrt(self.spread.variance_along(&slopes)), end_of_stop(speed))
     }
 
     /// The same for the place of a train that has started to a speed, without the delay of the start.

@@ -38,7 +38,7 @@ mod variation;
 
 pub(crate) use doubts::OTHER_SHAPES;
 pub use expected_information::ExpectedInformation;
-pub use fit::{MotionFit, Refit};
+pub use fit::{MotionFit, Refit, StatedFit, StatedMotion, StatedSpeed};
 pub use motion_model::{MotionModel, StepUse, StopForecast};
 pub use numbers::{MotionNumbers, NumbersError};
 pub use objective::Objective;

@@ -5,7 +5,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::parameters::{Answers, between_knots, knots, prior_means, speed_prior, stride};
-use super::priors::END_OF_STOP;
+use super::priors::end_of_stop;
 use super::priors::section_variance;
 use super::scatter::Scatter;
 use super::segment::{Pace, Segment, SpeedCommand};
@@ -46,6 +46,14 @@ pub struct StopForecast {
     pub time: TimeSpan,
     /// Stops from this step that were measured.
     pub count: u32,
+}
+
+impl StopForecast {
+    /// One standard deviation of the next stop.
+    #[must_use]
+    pub fn deviation(&self) -> Length {
+        Length::from_m(libm::hypot(self.doubt.as_m(), self.scatter.as_m()))
+    }
 }
 
 /// How one train answers its commands on one layout.
@@ -294,7 +302,7 @@ impl MotionModel {
             distance: Length::from_m(distance.max(0.0)),
             doubt: Length::from_m(libm::hypot(
                 self.with_interpolation(step, self.deviation_with_scale(|answers| stop(answers).0), distance),
-                END_OF_STOP,
+                end_of_stop(speed),
             )),
             scatter: Length::from_m(libm::hypot(
                 self.scatter(speed),

@@ -4,15 +4,18 @@ use alloc::vec::Vec;
 
 use super::parameters::{
     HYSTERESIS_SPREAD, NODES, PRIOR, SHAPE_DEVIATION, SHAPES, bend_deviation, count, hysteresis_at, knots,
-    node_covariance, shape_at, speed_at, speed_prior,
+    node_covariance, shape_at, speed_at, speed_prior, usual_residual,
 };
 use super::survey::SectionIndex;
 use crate::linalg::NormalEquations;
 
-/// No sensor observes the last centimetres of a stop. Dry friction and gears end it elsewhere than any law, the same way each
-/// time, and a start that seems later compensates. Healthy trains of two simulators with other equations came to rest 5 to 8 mm
-/// beyond the estimate (m).
-pub(crate) const END_OF_STOP: f64 = 0.0035;
+/// A sum of a stop and the next start is observed, never the stop alone: a stop that is longer and a start that is later by the
+/// same distance fit as well. The laws decide, and trains whose laws differ came to rest elsewhere than estimated, by 5 to 8 mm
+/// in two other simulators and by 12 mm (rms over trains, 80 to 260 mm/s) in a third, less at creep speed. Hence one standard
+/// deviation as a time (s) at the speed that a train has before the end of its stop, ...
+const END_OF_STOP_TIME: f64 = 0.07;
+/// ... which is at most this (m/s).
+const END_OF_STOP_SPEED: f64 = 0.1;
 /// Standard deviation of a law's shape in the middle of a change, as part of its displacement: no shape fits all decoders.
 pub(super) const SHAPE_ERROR: f64 = 0.04;
 /// Path lengths differ from surveyed lengths by some per cent because of curves and slopes (published section means: 1 to
@@ -41,6 +44,11 @@ pub(crate) fn section_variance(sections: &SectionIndex, section: usize) -> f64 {
 /// Standard deviation of the distance that a change adds to its law (m), by its change of speed (m/s).
 pub(crate) fn change_error(change: f64) -> f64 {
     CHANGE_ERROR * USUAL_DELAY * change.abs() + LEAST_CHANGE_ERROR
+}
+
+/// Standard deviation (m) of where a stop from a speed (m/s) ends, beyond the uncertainty of the fit: see [`END_OF_STOP_TIME`].
+pub(crate) fn end_of_stop(speed: f64) -> f64 {
+    END_OF_STOP_TIME * speed.clamp(0.0, END_OF_STOP_SPEED)
 }
 
 /// Variance of ln speed between runs. A speed without uncertainty was given to an oracle for this very run.
@@ -75,13 +83,14 @@ pub(crate) fn prior(highest: usize) -> NormalEquations {
     equations
 }
 
-/// Sums of the nodes from `first` on that are independent with variance one where laws leave over what is usual: rows of the
-/// inverse Cholesky factor of their covariance.
-pub(super) fn independent_nodes(first: usize) -> Vec<Vec<(usize, f64)>> {
-    let sum = |(node, terms): (usize, &[f64; NODES])| {
-        terms.iter().take(node + 1).enumerate().map(|(i, weight)| (first + i, *weight)).collect()
-    };
-    whitened().iter().enumerate().map(sum).collect()
+/// Sums of the nodes from `first` on that are independent with variance one where laws leave over what is usual, each with its
+/// usual value: rows of the inverse Cholesky factor of their covariance.
+pub(super) fn independent_nodes(first: usize) -> impl Iterator<Item = (Vec<(usize, f64)>, f64)> {
+    whitened().into_iter().enumerate().map(move |(node, terms)| {
+        let terms = terms.into_iter().take(node + 1);
+        let usual = terms.clone().sum::<f64>() * usual_residual(first);
+        (terms.enumerate().map(|(i, weight)| (first + i, weight)).collect(), usual)
+    })
 }
 
 /// The inverse of the lower Cholesky factor of the covariance of the nodes.

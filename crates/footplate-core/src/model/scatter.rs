@@ -38,7 +38,12 @@ impl Scatter {
 
     /// One standard deviation (m) of stops from a speed (m/s).
     pub(super) fn of_stop(self, speed: f64) -> f64 {
-        libm::hypot(self.stops * usual_scatter(speed), self.floor)
+        libm::hypot(self.of_stop_alone(speed), self.floor)
+    }
+
+    /// The same without the floor.
+    pub(super) fn of_stop_alone(self, speed: f64) -> f64 {
+        self.stops * usual_scatter(speed)
     }
 
     /// Standard deviation (s) of how late or early starts are.

@@ -4,7 +4,6 @@ use super::doubts::OTHER_SHAPES;
 use super::expected_information::{start_to, time_of};
 use super::motion_model::MotionModel;
 use super::parameters::Answers;
-use super::priors::END_OF_STOP;
 use super::segment::{Segment, SpeedCommand};
 use crate::ids::SpeedStep;
 use crate::time::TimeSpan;
@@ -47,6 +46,10 @@ pub(super) fn move_way(answers: &Answers<'_>, step: u8, run: f64) -> f64 {
     start.way(effect) + Segment::of(&commanded, answers, start.pace(effect)).way_to_rest()
 }
 
+/// Standard deviation (m) of where a short move ends, by dry friction and gears. The error that stops and starts share with
+/// opposite signs (`end_of_stop`) is not in it: a move is the sum of both.
+const END_OF_MOVE: f64 = 0.0035;
+
 impl MotionModel {
     /// How far the train gets if it is commanded to a step and, after `run`, to stop.
     #[must_use]
@@ -66,7 +69,7 @@ impl MotionModel {
         let shape = OTHER_SHAPES * (start.shape_error(effect) + stop_lasts * start.shape_speed_error(effect));
         ShortMoveForecast {
             distance: Length::from_m(distance),
-            uncertainty: Length::from_m(libm::hypot(libm::hypot(unknown, shape), END_OF_STOP)),
+            uncertainty: Length::from_m(libm::hypot(libm::hypot(unknown, shape), END_OF_MOVE)),
             scatter: Length::from_m(libm::hypot(self.scatter(reached), reached * self.start_scatter())),
         }
     }

@@ -1,4 +1,4 @@
-//! From a plan to a layout: every entry is checked, and the first that is wrong is named.
+//! Builds a layout from a plan: checks every entry, and names the first invalid one.
 
 use alloc::borrow::ToOwned;
 use alloc::collections::BTreeMap;
@@ -10,12 +10,12 @@ use crate::ids::{EdgeId, NodeId, TurnoutId};
 use crate::track::hop::Hops;
 use crate::track::survey::surveyed_distances;
 use crate::track::{
-    Edge, Layout, LayoutError, LayoutPlan, Leg, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Node, NodeKind, Place,
-    PlannedZone, StretchLength, Survey, Ways,
+    Edge, Layout, LayoutError, LayoutPlan, Leg, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Node, NodeKind,
+    OutgoingEdges, Place, PlannedZone, StretchLength, Survey,
 };
 use crate::units::Length;
 
-/// A survey whose lengths may all be double or nothing says nothing.
+/// Largest uncertainty of the common scale: beyond 100 % a survey has no meaning.
 const LARGEST_SCALE: f64 = 1.0;
 
 /// Nodes and edges are numbered by `u16`, two to a place and two to a stretch.
@@ -25,7 +25,7 @@ impl Layout {
     /// Checks a plan and makes the tables.
     ///
     /// # Errors
-    /// The first thing that is wrong, in the order survey, places, stretches, rail ends without a stretch,
+    /// The first invalid entry, in the order survey, places, stretches, rail ends without a stretch,
     /// pairs, loops, zones.
     pub fn build(plan: &LayoutPlan) -> Result<Self, LayoutError> {
         let uncertainty = plan.survey.uncertainty;
@@ -68,16 +68,16 @@ impl Layout {
         }
         self.hops = Hops::of(&self).map_err(|node| {
             let (place, node) = place_and_name(&self, node);
-            LayoutError::TooManyWays { place, node }
+            LayoutError::TooManyHops { place, node }
         })?;
         self.distances = surveyed_distances(&self)?;
         Ok(self)
     }
 
-    /// A node from which edges of 0 mm lead back to it.
+    /// A node on a loop of edges of 0 mm.
     fn loop_without_length(&self) -> Option<NodeId> {
-        // Take away, again and again, the nodes that no remaining edge of 0 mm reaches (Kahn, 1962): what
-        // stays lies on a loop or behind one.
+        // Repeatedly remove nodes that no remaining edge of 0 mm reaches (Kahn, 1962): the rest are on a loop or
+        // behind one.
         let spot = |id: EdgeId| self.edge(id).filter(|edge| edge.length == Length::ZERO);
         let mut reached_by = vec![0_usize; self.nodes.len()];
         for edge in self.edges.iter().filter(|edge| edge.length == Length::ZERO) {
@@ -88,7 +88,7 @@ impl Layout {
         let counted = self.nodes().zip(&reached_by).map(|((node, _), count)| (node, *count));
         let mut free: Vec<NodeId> = counted.filter(|(_, count)| *count == 0).map(|(node, _)| node).collect();
         while let Some(node) = free.pop() {
-            for edge in self.ways(node).edges().filter_map(spot) {
+            for edge in self.outgoing(node).edges().filter_map(spot) {
                 if let Some(count) = reached_by.get_mut(usize::from(edge.to.0)) {
                     *count -= 1;
                     if *count == 0 {
@@ -99,9 +99,10 @@ impl Layout {
         }
         let stays = |node: NodeId| reached_by.get(usize::from(node.0)).is_some_and(|count| *count > 0);
         let mut node = self.nodes().map(|(node, _)| node).find(|node| stays(*node))?;
-        // Every node that stays is reached from another one: as many steps back as there are nodes end on a loop.
+        // Every remaining node is reached from another one: as many steps back as there are nodes end on a loop.
         for _ in &self.nodes {
-            let mut before = self.ways(node.reverse()).edges().filter_map(spot).map(|edge| edge.to.reverse());
+            let mut before =
+                self.outgoing(node.reverse()).edges().filter_map(spot).map(|edge| edge.to.reverse());
             node = before.find(|node| stays(*node))?;
         }
         Some(node)
@@ -120,12 +121,12 @@ pub(super) fn checked(stretch: usize, known: StretchLength, survey: &Survey) -> 
     Ok(length)
 }
 
-/// Neither undefined nor negative nor beyond belief.
+/// Whether a length is finite, not negative and not absurdly large.
 pub(super) fn is_plausible(length: Length) -> bool {
     length >= Length::ZERO && length <= MAX_EDGE_LENGTH
 }
 
-/// The nodes of all places, and who is where.
+/// The nodes of all places, and the node of each name, sensor and turnout.
 #[derive(Default)]
 struct Places {
     nodes: Vec<(String, NodeKind)>,
@@ -161,7 +162,7 @@ fn place_nodes(plan: &[Place]) -> Result<Places, LayoutError> {
 }
 
 impl Places {
-    /// Remembers where a sensor or turnout is, unless it is somewhere else already.
+    /// Records the node of a sensor or turnout, unless it has one already.
     fn take(&mut self, place: usize, node: NodeId, kind: NodeKind) -> Result<(), LayoutError> {
         let name = |node: NodeId| {
             self.nodes.get(usize::from(node.0)).map_or_else(String::new, |(name, _)| name.clone())
@@ -193,7 +194,7 @@ impl Places {
     }
 }
 
-/// The other turnout of each pair, both ways.
+/// The partner of each turnout that is in a pair.
 fn pair_turnouts(
     pairs: &[[TurnoutId; 2]],
     places: &Places,
@@ -210,21 +211,21 @@ fn pair_turnouts(
     Ok(partners)
 }
 
-/// Letters, digits, `_` and `.`: no sign, so that `C13-20mm` can only be a landmark, and no space, so that
-/// `BR6 curved` can only be a leg.
+/// Letters, digits, `_` and `.`: no sign, so `C13-20mm` can only be a landmark, and no space, so `BR6 curved` can only
+/// be a leg.
 fn is_legal_name(name: &str) -> bool {
     (1..=MAX_NAME_CHARACTERS).contains(&name.chars().count())
         && name.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '.'))
 }
 
-/// Turns every stretch into two edges and checks that each rail end has exactly one.
+/// Makes two edges of every stretch, and checks that each rail end has exactly one.
 fn join(plan: &LayoutPlan, places: &Places) -> Result<(Vec<Node>, Vec<Edge>), LayoutError> {
     if plan.stretches.len() > MAX_PAIRS {
         let found = plan.stretches.len();
         return Err(LayoutError::TooMany { what: "stretches", found, limit: MAX_PAIRS });
     }
     let mut edges = Vec::with_capacity(2 * plan.stretches.len());
-    // The edges that leave each node: ahead or straight, and curved.
+    // The edges that leave each node: the only or straight one, and the curved one.
     let mut leaving: Vec<[Option<EdgeId>; 2]> = vec![[None; 2]; places.nodes.len()];
     for (stretch, entry) in plan.stretches.iter().enumerate() {
         let find = |name: &String| {
@@ -254,7 +255,7 @@ fn join(plan: &LayoutPlan, places: &Places) -> Result<(Vec<Node>, Vec<Edge>), La
                 }
                 (_, None) => 0,
             };
-            let Some(taken) = leaving.get_mut(node).and_then(|ways| ways.get_mut(slot)) else { continue };
+            let Some(taken) = leaving.get_mut(node).and_then(|edges| edges.get_mut(slot)) else { continue };
             if let Some(first) = taken {
                 let first = usize::from(first.stretch().0);
                 return Err(LayoutError::RailEndTaken { stretch, first, node: name.clone(), leg: edge.leg });
@@ -263,17 +264,17 @@ fn join(plan: &LayoutPlan, places: &Places) -> Result<(Vec<Node>, Vec<Edge>), La
             edges.push(edge);
         }
     }
-    let nodes = places.nodes.iter().zip(&leaving).zip(0_u16..).map(|(((name, kind), ways), number)| {
+    let nodes = places.nodes.iter().zip(&leaving).zip(0_u16..).map(|(((name, kind), edges), number)| {
         let open = |leg| LayoutError::RailEndOpen { place: NodeId(number).pair(), node: name.clone(), leg };
-        let ways = match (kind, *ways) {
-            (NodeKind::Exit, _) => Ways::Ended,
-            (NodeKind::Branch(_), [Some(straight), Some(curved)]) => Ways::Legs { straight, curved },
+        let outgoing = match (kind, *edges) {
+            (NodeKind::Exit, _) => OutgoingEdges::Ended,
+            (NodeKind::Branch(_), [Some(straight), Some(curved)]) => OutgoingEdges::Legs { straight, curved },
             (NodeKind::Branch(_), [None, _]) => return Err(open(Some(Leg::Straight))),
             (NodeKind::Branch(_), [_, None]) => return Err(open(Some(Leg::Curved))),
-            (_, [Some(edge), _]) => Ways::Ahead(edge),
+            (_, [Some(edge), _]) => OutgoingEdges::Ahead(edge),
             (_, [None, _]) => return Err(open(None)),
         };
-        Ok(Node { name: name.clone(), kind: *kind, ways })
+        Ok(Node { name: name.clone(), kind: *kind, outgoing })
     });
     Ok((nodes.collect::<Result<_, _>>()?, edges))
 }

@@ -1,4 +1,4 @@
-//! Circuits: routes that lead back to their start, on which a train can run without end.
+//! Circuits: closed routes, on which a train can run without end.
 
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec;
@@ -8,28 +8,28 @@ use crate::ids::{NodeId, StretchId, TurnoutId};
 use crate::track::{Hop, HopId, Layout, Leg, TurnoutNeed};
 use crate::units::Length;
 
-/// Hops that one search may try. The built-in layouts take a few thousand; the best circuit of those found by then is
-/// good enough to run on.
+/// Most hops that one search tries. The built-in layouts take a few thousand; at the limit the search returns the best
+/// circuit found so far.
 const MAX_TRIED: usize = 1 << 16;
 
-/// The most sensors on the lead to a circuit. A train that is farther away passes a better start on the way.
+/// Most sensors on the lead to a circuit. A train that is farther away passes a better starting point first.
 const LONGEST_LEAD: usize = 6;
 
 /// A closed route, and the lead onto it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Circuit {
-    /// The hops from the start to the first hop of the lap; none if the start is on the lap.
+    /// The hops from the start to the lap; none if the start is on the lap.
     pub lead: Vec<HopId>,
     /// The hops of the lap, from a sensor back to it.
     pub lap: Vec<HopId>,
     /// The length of one lap.
     pub length: Length,
-    /// The turnouts that the lap needs, each once, with trailed ones: trailed points wear.
+    /// The turnouts that the lap needs, each once. Trailed ones are included, because trailed points wear.
     pub legs: Vec<(TurnoutId, Leg)>,
 }
 
 impl Circuit {
-    /// The hops from the start on, round and round.
+    /// The hops from the start: the lead, then the lap without end.
     pub fn hops(&self) -> impl Iterator<Item = HopId> + '_ {
         self.lead.iter().chain(self.lap.iter().cycle()).copied()
     }
@@ -37,11 +37,11 @@ impl Circuit {
 
 impl Layout {
     /// The best circuit that a train at a node can reach without reversing: the one with the most sensors,
-    /// then the one with the fewest turnouts to be thrown for their curved leg, then the longest; always the same one.
+    /// then the fewest curved legs, then the greatest length. The result is deterministic.
     ///
-    /// No hop of it touches a stretch in `avoid`, and no turnout in `held` has to lie otherwise than given there
-    /// (`None`: its position is unknown, so that it is not passed from its toe). Held turnouts cannot be thrown just now, as a
-    /// train is on them or too near.
+    /// It uses no stretch in `avoid`, and turnouts in `locked` only in the position given there (`None`: unknown
+    /// position, so the circuit does not face it). Locked turnouts cannot be thrown, because a train is on them or
+    /// too near.
     #[must_use]
     pub fn circuit_from(
         &self,
@@ -107,7 +107,7 @@ impl<'l> Search<'l> {
         leads
     }
 
-    /// Whether a hop on its own may be part of a circuit.
+    /// Whether a hop by itself may be part of a circuit.
     fn is_allowed(&self, hop: &Hop<'_>) -> bool {
         hop.sensor.is_some()
             && !hop.edges.iter().any(|edge| self.avoid.contains(&edge.stretch()))
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn of_two_circuits_with_as_many_contacts_the_straight_one_is_taken() {
+    fn of_two_circuits_with_equally_many_sensors_the_straight_one_is_chosen() {
         let found = circuit("A1", &[], &[]).unwrap();
         assert_eq!(names(&oval(), &found.lap), "B1 D1 A1");
         assert!(found.lead.is_empty());
@@ -232,13 +232,17 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_thrown_or_is_taken_is_run_around() {
+    fn a_circuit_avoids_locked_turnouts_and_excluded_stretches() {
         let lap = |held: &[(u16, Option<Leg>)], avoid: &[StretchId]| {
             circuit("A1", held, avoid).map(|found| names(&oval(), &found.lap))
         };
         assert_eq!(lap(&[(1, Some(Leg::Curved))], &[]).as_deref(), Some("C1 D1 A1"));
-        assert_eq!(lap(&[(1, None)], &[]), None, "nobody knows where the train would go");
-        assert_eq!(lap(&[(2, None)], &[]).as_deref(), Some("B1 D1 A1"), "met from a leg it does not decide");
+        assert_eq!(lap(&[(1, None)], &[]), None, "the path of the train would be unknown");
+        assert_eq!(
+            lap(&[(2, None)], &[]).as_deref(),
+            Some("B1 D1 A1"),
+            "a trailed turnout does not decide the path"
+        );
         let layout = oval();
         let node = |name| layout.node_named(name).unwrap();
         let b = layout.edge_between(node("B1"), node("MR2")).unwrap().stretch();

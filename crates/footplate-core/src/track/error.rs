@@ -1,4 +1,4 @@
-//! What can be wrong with a layout, and which entry of the plan is to blame.
+//! Errors of a layout plan, each with the entry at fault.
 
 use alloc::string::String;
 use core::fmt;
@@ -7,7 +7,7 @@ use crate::ids::{SensorId, TurnoutId};
 use crate::track::{Leg, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, MAX_ZONE_LIMIT, MIN_ZONE_LIMIT};
 use crate::units::{Length, Speed};
 
-/// Why a plan is not a layout. Places, stretches, pairs and zones are counted from 0 in the order of the plan.
+/// Why a plan is invalid. Places, stretches, pairs and zones are counted from 0 in the order of the plan.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum LayoutError {
@@ -25,7 +25,7 @@ pub enum LayoutError {
         /// What was given.
         found: Length,
     },
-    /// A name that could not be told from a landmark or from other text.
+    /// A name that could be confused with a landmark or with other text.
     IllegalName {
         /// The place.
         place: usize,
@@ -47,7 +47,7 @@ pub enum LayoutError {
         sensor: SensorId,
         /// The node that has it.
         first: String,
-        /// The node that claims it, too.
+        /// The other node.
         second: String,
     },
     /// One turnout at two places.
@@ -58,24 +58,24 @@ pub enum LayoutError {
         turnout: TurnoutId,
         /// The branch that has it.
         first: String,
-        /// The branch that claims it, too.
+        /// The other branch.
         second: String,
     },
-    /// A stretch ends at a node that is no place's.
+    /// A stretch ends at a node that no place has.
     UnknownNode {
         /// The stretch.
         stretch: usize,
-        /// The name that nothing has.
+        /// The unknown name.
         node: String,
     },
-    /// A stretch joins the legs of a turnout without saying which.
+    /// A stretch joins a turnout without naming the leg.
     LegMissing {
         /// The stretch.
         stretch: usize,
         /// The branch or merge.
         node: String,
     },
-    /// A leg where there is only one way.
+    /// A leg at a node that has none.
     LegWithoutTurnout {
         /// The stretch.
         stretch: usize,
@@ -105,12 +105,12 @@ pub enum LayoutError {
         /// What was given.
         found: Length,
     },
-    /// The factor that all lengths have in common is known to no such part.
+    /// The relative uncertainty of the common scale of all lengths is out of range.
     IllegalScale {
-        /// What was given, as a part.
+        /// What was given, as a fraction.
         found: f64,
     },
-    /// A surveyed distance that is not from a sensor to the next by a single way.
+    /// A surveyed distance that is not from a sensor to the next one over a single path.
     NoDistance {
         /// The distance.
         distance: usize,
@@ -139,14 +139,14 @@ pub enum LayoutError {
     RailEndTaken {
         /// The later stretch.
         stretch: usize,
-        /// The stretch that is there already.
+        /// The stretch that was there before.
         first: usize,
-        /// The node by which a train would leave onto both.
+        /// The node that both would leave.
         node: String,
         /// The leg, at a branch.
         leg: Option<Leg>,
     },
-    /// Nothing leads on from a node that is no exit.
+    /// No edge leaves a node that is not an exit.
     RailEndOpen {
         /// The place.
         place: usize,
@@ -155,28 +155,28 @@ pub enum LayoutError {
         /// The leg, at a branch.
         leg: Option<Leg>,
     },
-    /// A pair that is never both curved names a turnout that is nowhere, or in a pair already.
+    /// A pair of turnouts names a turnout that the layout does not have, or that is in a pair already.
     IllegalPair {
         /// The pair.
         pair: usize,
         /// The turnout.
         turnout: TurnoutId,
     },
-    /// A train could go round and round without getting anywhere.
+    /// A loop of edges of 0 mm.
     LoopWithoutLength {
         /// A place on the loop.
         place: usize,
         /// Its node.
         node: String,
     },
-    /// Too many ways from a node to the next sensors to keep in a table.
-    TooManyWays {
+    /// Too many paths from a node to the next sensors for the table of hops.
+    TooManyHops {
         /// The place.
         place: usize,
         /// The node.
         node: String,
     },
-    /// A zone whose name could not be said in a message.
+    /// A zone's name that does not fit on one line.
     IllegalZoneName {
         /// The zone.
         zone: usize,
@@ -190,7 +190,7 @@ pub enum LayoutError {
         /// The name.
         name: String,
     },
-    /// A limit that restricts nothing, or that no train could keep.
+    /// A limit out of range: it would restrict nothing, or no train could observe it.
     IllegalZoneLimit {
         /// The zone.
         zone: usize,
@@ -203,10 +203,10 @@ pub enum LayoutError {
         zone: usize,
         /// The name of the zone that has it.
         first: String,
-        /// The name of the zone that claims it, too.
+        /// The name of the other zone.
         second: String,
     },
-    /// A zone that restricts nothing.
+    /// A zone without edges.
     ZoneWithoutEdges {
         /// The zone.
         zone: usize,
@@ -250,7 +250,7 @@ impl LayoutError {
             | Self::TurnoutPlacedTwice { place, .. }
             | Self::RailEndOpen { place, .. }
             | Self::LoopWithoutLength { place, .. }
-            | Self::TooManyWays { place, .. } => PlanEntry::Place(place),
+            | Self::TooManyHops { place, .. } => PlanEntry::Place(place),
             Self::UnknownNode { stretch, .. }
             | Self::LegMissing { stretch, .. }
             | Self::LegWithoutTurnout { stretch, .. }
@@ -360,7 +360,7 @@ impl fmt::Display for LayoutError {
             Self::LoopWithoutLength { node, .. } => {
                 write!(f, "the edges from `{node}` come back to it after 0 mm: at least one must be longer")
             }
-            Self::TooManyWays { node, .. } => write!(
+            Self::TooManyHops { node, .. } => write!(
                 f,
                 "there are too many paths from `{node}` to the next sensors: put sensors between the \
                  turnouts"

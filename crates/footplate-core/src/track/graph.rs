@@ -1,8 +1,8 @@
-//! The track graph: nodes in pairs, edges in pairs, and what lies ahead of each node.
+//! The track graph: nodes in pairs, edges in pairs, and the edges that leave each node.
 //!
 //! The two nodes of a place are numbered 2p and 2p + 1, the two edges of a stretch 2s and 2s + 1. So the
-//! reverse of a node and the twin of an edge are one bit away, and exist by construction. Edges may be 0 mm
-//! long: nothing here divides by a length.
+//! reverse of a node and the twin of an edge differ in one bit, and exist by construction. Edges may be 0 mm
+//! long: no formula here divides by a length.
 
 use alloc::collections::BTreeMap;
 use alloc::string::String;
@@ -49,46 +49,46 @@ impl EdgeId {
 /// One direction of travel over one place.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Node {
-    /// What people call it.
+    /// Its name.
     pub name: String,
-    /// What is there.
+    /// What it is.
     pub kind: NodeKind,
-    /// Where it leads.
-    pub ways: Ways,
+    /// The edges that leave it.
+    pub outgoing: OutgoingEdges,
 }
 
-/// What is at a node.
+/// The kind of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum NodeKind {
     /// A sensor.
     Sensor(SensorId),
-    /// A turnout, met at its toe.
+    /// A turnout, approached at its toe.
     Branch(TurnoutId),
-    /// A turnout, met from one of its legs.
+    /// A turnout, approached on one of its legs.
     Merge(TurnoutId),
-    /// The end of a track, on the way in.
+    /// The end of a track, for trains that enter the layout there.
     Enter,
-    /// The end of a track, on the way out.
+    /// The end of a track, for trains that leave the layout there.
     Exit,
 }
 
 /// The edges that leave a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ways {
-    /// One way ahead.
+pub enum OutgoingEdges {
+    /// One edge.
     Ahead(EdgeId),
-    /// The turnout decides.
+    /// One edge for each leg of a turnout.
     Legs {
-        /// The way while it lies straight.
+        /// The edge while the turnout is set straight.
         straight: EdgeId,
-        /// The way while it lies curved.
+        /// The edge while the turnout is set curved.
         curved: EdgeId,
     },
     /// None: the track ends.
     Ended,
 }
 
-impl Ways {
+impl OutgoingEdges {
     /// The edges, the straight leg before the curved one.
     pub fn edges(self) -> impl DoubleEndedIterator<Item = EdgeId> {
         let (first, second) = match self {
@@ -100,22 +100,22 @@ impl Ways {
     }
 }
 
-/// A stretch of rail, run over in one direction.
+/// A stretch of rail in one direction of travel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Edge {
     /// Where it begins.
     pub from: NodeId,
-    /// The leg by which it leaves, when it begins at a branch.
+    /// The leg on which it begins, if it begins at a branch.
     pub leg: Option<Leg>,
     /// Where it ends.
     pub to: NodeId,
-    /// Its most likely length, which may be zero.
+    /// Its estimated length, which may be zero.
     pub length: Length,
-    /// What is known of that.
+    /// The length as surveyed, with its uncertainty.
     pub known: StretchLength,
 }
 
-/// A checked layout. Ids of another layout, or beyond this one's, name nothing: they give `None` or no ways.
+/// A checked layout. Ids that it does not have give `None` or no edges.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     pub(crate) name: String,
@@ -128,18 +128,18 @@ pub struct Layout {
     /// The branch of each turnout.
     pub(crate) turnouts: BTreeMap<TurnoutId, NodeId>,
     pub(crate) never_both_curved: Vec<[TurnoutId; 2]>,
-    /// The other turnout of each pair, both ways.
+    /// The partner of each turnout that is in a pair.
     pub(crate) partners: BTreeMap<TurnoutId, TurnoutId>,
     pub(crate) hops: Hops,
-    /// Hops of which the whole is known better than its edges, in both directions: one standard deviation.
+    /// One standard deviation of hops whose total length is better known than their edges, in both directions.
     pub(crate) distances: BTreeMap<HopId, Length>,
     pub(crate) zones: Vec<Zone>,
-    /// The zone of each restricted stretch, by its place in the list.
+    /// The zone of each restricted stretch, as an index into `zones`.
     pub(crate) restricted: BTreeMap<StretchId, usize>,
 }
 
 impl Layout {
-    /// What people call the layout.
+    /// The name of the layout.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -151,13 +151,13 @@ impl Layout {
         &self.survey
     }
 
-    /// One standard deviation of the length of a hop, where the survey knows it better than its edges.
+    /// One standard deviation of the length of a hop, if the survey knows it better than its edges.
     #[must_use]
     pub fn surveyed_distance(&self, hop: HopId) -> Option<Length> {
         self.distances.get(&hop).copied()
     }
 
-    /// Whether the length of every stretch is known in some way.
+    /// Whether the length of every stretch was measured or estimated.
     #[must_use]
     pub fn is_measured(&self) -> bool {
         self.edges.iter().all(|edge| edge.known != StretchLength::Unknown)
@@ -210,7 +210,7 @@ impl Layout {
         self.sensor_at(self.node_named(name)?)
     }
 
-    /// The name of a sensor, or `?` for a sensor this layout has not.
+    /// The name of a sensor, or `?` for a sensor of another layout.
     #[must_use]
     pub fn sensor_name(&self, sensor: SensorId) -> &str {
         self.sensor_node(sensor).map_or("?", |node| self.node_name(node))
@@ -232,19 +232,19 @@ impl Layout {
         self.turnouts.get(&turnout).copied()
     }
 
-    /// Pairs of turnouts of which at most one may lie for its curved leg.
+    /// Pairs of turnouts of which at most one may be set curved.
     #[must_use]
     pub fn never_both_curved(&self) -> &[[TurnoutId; 2]] {
         &self.never_both_curved
     }
 
-    /// The turnout in the same place that has to lie straight before this one may lie curved.
+    /// The turnout in the same place that has to be set straight before this one may be set curved.
     #[must_use]
     pub fn never_curved_with(&self, turnout: TurnoutId) -> Option<TurnoutId> {
         self.partners.get(&turnout).copied()
     }
 
-    /// A pair of turnouts that are known to lie curved both, which no pair in one place may.
+    /// A pair of turnouts in one place that are both known to be curved, which is illegal.
     #[must_use]
     pub fn illegal_pair(&self, turnouts: &TurnoutStates) -> Option<[TurnoutId; 2]> {
         let is_curved = |turnout: &TurnoutId| turnouts.get(*turnout) == Some(Leg::Curved);
@@ -263,13 +263,13 @@ impl Layout {
         self.edges.iter().enumerate().map(|(number, edge)| (EdgeId(number as u16), edge))
     }
 
-    /// How many stretches there are: edges without their twins.
+    /// Number of stretches: edges without their twins.
     #[must_use]
     pub fn stretch_count(&self) -> usize {
         self.edges.len() / 2
     }
 
-    /// The length of all rails.
+    /// Total length of all rails.
     #[must_use]
     pub fn total_length(&self) -> Length {
         self.edges.iter().map(|edge| edge.length).sum::<Length>() / 2.0
@@ -278,7 +278,7 @@ impl Layout {
     /// The edge from one node to another, if one leads there directly; the shorter one of two legs.
     #[must_use]
     pub fn edge_between(&self, from: NodeId, to: NodeId) -> Option<EdgeId> {
-        self.ways(from)
+        self.outgoing(from)
             .edges()
             .filter_map(|id| Some((id, self.edge(id)?)))
             .filter(|(_, edge)| edge.to == to)
@@ -289,8 +289,8 @@ impl Layout {
     /// The edges that leave a node.
     #[inline]
     #[must_use]
-    pub fn ways(&self, node: NodeId) -> Ways {
-        self.node(node).map_or(Ways::Ended, |node| node.ways)
+    pub fn outgoing(&self, node: NodeId) -> OutgoingEdges {
+        self.node(node).map_or(OutgoingEdges::Ended, |node| node.outgoing)
     }
 }
 
@@ -312,7 +312,7 @@ mod tests {
             assert_eq!((twin.from, twin.to), (edge.to.reverse(), edge.from.reverse()));
             assert_eq!(twin.length, edge.length);
             assert_eq!(id.stretch(), id.twin().stretch());
-            assert!(layout.ways(edge.from).edges().any(|way| way == id));
+            assert!(layout.outgoing(edge.from).edges().any(|leaving| leaving == id));
         }
         assert!((layout.total_length().as_mm() - 1_540.0).abs() < 1e-9, "{:?}", layout.total_length());
     }
@@ -342,6 +342,6 @@ mod tests {
         assert_eq!(layout.sensor_named("BR2"), None);
         assert_eq!(layout.node_named("b2"), None);
         assert_eq!(layout.sensor_name(SensorId(u16::MAX)), "?");
-        assert_eq!(layout.ways(NodeId(u16::MAX)), Ways::Ended);
+        assert_eq!(layout.outgoing(NodeId(u16::MAX)), OutgoingEdges::Ended);
     }
 }

@@ -1,4 +1,4 @@
-//! Hops: the ways from a node to the sensors that may report next, in a table made once for each layout.
+//! Hops: the paths from a node to the sensors that may report next, in a table made once for each layout.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -8,17 +8,17 @@ use crate::ids::{EdgeId, NodeId, SensorId};
 use crate::track::{Layout, Leg, NodeKind, StretchLength, TurnoutNeed, TurnoutStates};
 use crate::units::Length;
 
-/// Work that making the table may cost, counted in edges looked at and edges stored. The built-in layouts take
-/// less than a thousand; a plan that needs this much has turnouts in the hundreds without a sensor between them.
+/// Most work to make the table, counted in edges visited and edges stored. The built-in layouts take less than a
+/// thousand; a plan that needs this much has hundreds of turnouts without a sensor between them.
 const MAX_TABLE_WORK: usize = 1 << 20;
 
-/// A hop by its place in the layout's table.
+/// A hop, as an index into the layout's table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct HopId(pub(crate) u32);
 
 impl HopId {
-    /// Its place as a number, to keep things by hop.
+    /// The index as a number.
     #[inline]
     #[must_use]
     pub const fn index(self) -> usize {
@@ -26,10 +26,10 @@ impl HopId {
     }
 }
 
-/// A way from a node to the first sensor on it, or to the end of the track when there is none before.
+/// A path from a node to the next sensor, or to the end of the track if there is none before it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hop<'l> {
-    /// Its place in the table.
+    /// Its index in the table.
     pub id: HopId,
     /// Where it begins.
     pub from: NodeId,
@@ -46,7 +46,7 @@ pub struct Hop<'l> {
 }
 
 impl Hop<'_> {
-    /// Whether a train can take this way as far as the turnouts are known.
+    /// Whether no turnout on it is known to be in the other position.
     #[inline]
     #[must_use]
     pub fn is_open(&self, turnouts: &TurnoutStates) -> bool {
@@ -55,16 +55,15 @@ impl Hop<'_> {
 }
 
 impl Layout {
-    /// All ways from a node to the next sensors or track ends, whatever the turnouts say. The straight leg
-    /// comes before the curved one. No way passes a node twice.
+    /// All hops from a node, whatever the turnout positions. The straight leg comes before the curved one. No hop
+    /// passes a node twice.
     #[inline]
     pub fn hops_from(&self, node: NodeId) -> impl Iterator<Item = Hop<'_>> {
         let (first, end) = self.hops.range_from(node);
         (first..end).filter_map(|id| self.hop(HopId(id)))
     }
 
-    /// The ways that are open as far as the turnouts are known: one where all are known, both legs where a
-    /// turnout is not.
+    /// The hops that known turnout positions leave open: one if all are known, both legs of a turnout that is not.
     #[inline]
     pub fn open_hops_from<'l>(
         &'l self,
@@ -81,8 +80,8 @@ impl Layout {
         self.hops.get(id)
     }
 
-    /// A length that a hop hardly falls short of. The end of a track that was not measured may be right behind the last
-    /// sensor before it.
+    /// A lower bound of the length of a hop (about two standard deviations). The end of an unmeasured track may be
+    /// directly beyond the last sensor before it.
     #[must_use]
     pub fn least_length(&self, hop: &Hop<'_>) -> Length {
         if let Some(uncertainty) = self.surveyed_distance(hop.id) {
@@ -104,7 +103,7 @@ impl Layout {
 /// All hops of a layout, flat.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Hops {
-    /// For each node the number of its first hop, and one more for the end.
+    /// For each node the index of its first hop, and one more for the end.
     first: Vec<u32>,
     rows: Vec<Row>,
     edges: Vec<EdgeId>,
@@ -122,7 +121,7 @@ struct Row {
 }
 
 impl Hops {
-    /// Makes the table, or names the node at which it grew beyond all sense.
+    /// Makes the table, or returns the node at which it exceeded [`MAX_TABLE_WORK`].
     pub(crate) fn of(layout: &Layout) -> Result<Self, NodeId> {
         let mut hops = Self { first: vec![0], ..Self::default() };
         let mut work = 0;
@@ -130,7 +129,7 @@ impl Hops {
         for (node, _) in layout.nodes() {
             walk.mark(node, true);
             let mut open: Vec<(usize, EdgeId)> = vec![];
-            open.extend(layout.ways(node).edges().rev().map(|edge| (0, edge)));
+            open.extend(layout.outgoing(node).edges().rev().map(|edge| (0, edge)));
             while let Some((depth, id)) = open.pop() {
                 let Some(edge) = layout.edge(id) else { continue };
                 work += 1;
@@ -140,7 +139,7 @@ impl Hops {
                     walk.path.push((id, None));
                     work += hops.push(layout, node, &walk.path);
                 } else if walk.enter(id, edge.to) {
-                    open.extend(layout.ways(edge.to).edges().rev().map(|edge| (depth + 1, edge)));
+                    open.extend(layout.outgoing(edge.to).edges().rev().map(|edge| (depth + 1, edge)));
                 }
                 if work > MAX_TABLE_WORK {
                     return Err(node);
@@ -153,15 +152,15 @@ impl Hops {
         Ok(hops)
     }
 
-    /// Stores a way unless it needs a pair of turnouts to lie as they never may; returns the edges stored.
+    /// Stores a hop unless it needs both turnouts of a pair curved; returns the number of edges stored.
     fn push(&mut self, layout: &Layout, from: NodeId, path: &[(EdgeId, Option<NodeId>)]) -> usize {
         let (first_edge, first_need) = (self.edges.len() as u32, self.needs.len());
         let Some(to) = path.last().and_then(|(id, _)| layout.edge(*id)).map(|edge| edge.to) else { return 0 };
         self.edges.extend(path.iter().map(|(id, _)| *id));
         let needs = path.iter().flat_map(|(id, _)| layout.needs_of(*id));
         self.needs.extend(needs);
-        let way = self.needs.get(first_need..).unwrap_or_default();
-        if layout.needs_both_curved(way) {
+        let needs = self.needs.get(first_need..).unwrap_or_default();
+        if layout.needs_both_curved(needs) {
             self.edges.truncate(first_edge as usize);
             self.needs.truncate(first_need);
             return 0;
@@ -177,7 +176,7 @@ impl Hops {
         path.len()
     }
 
-    /// The numbers of the hops from a node: from the first to before the second.
+    /// The range of indices of the hops from a node; the end is exclusive.
     #[inline]
     pub(crate) fn range_from(&self, node: NodeId) -> (u32, u32) {
         let node = usize::from(node.0);
@@ -200,7 +199,7 @@ impl Hops {
     }
 }
 
-/// The way from a node that is being tried.
+/// The current path of the search from a node.
 struct Walk {
     /// Edges, and the node that each of them entered.
     path: Vec<(EdgeId, Option<NodeId>)>,
@@ -215,7 +214,7 @@ impl Walk {
         }
     }
 
-    /// Goes on over `edge` into `node`, unless the way was there before.
+    /// Extends the path over `edge` to `node`, unless it passed that node before.
     fn enter(&mut self, edge: EdgeId, node: NodeId) -> bool {
         let is_new = self.on_path.get(usize::from(node.0)).is_some_and(|on_path| !*on_path);
         if is_new {
@@ -225,7 +224,7 @@ impl Walk {
         is_new
     }
 
-    /// Takes back all but the first `depth` edges.
+    /// Removes all but the first `depth` edges.
     fn back_to(&mut self, depth: usize) {
         while self.path.len() > depth {
             if let Some((_, Some(node))) = self.path.pop() {
@@ -246,7 +245,7 @@ impl Layout {
         })
     }
 
-    /// Whether turnouts met at the toe would have to lie curved that may not both do so.
+    /// Whether facing turnouts would need both turnouts of a pair curved.
     pub(crate) fn needs_both_curved(&self, needs: &[TurnoutNeed]) -> bool {
         let curved = || needs.iter().filter(|need| need.facing && need.leg == Leg::Curved);
         curved().any(|need| {
@@ -280,7 +279,7 @@ mod tests {
         assert_eq!(hops(&layout, "A1", &turnouts), ["B1 300", "C1 320"]);
         turnouts.set(TurnoutId(1), Leg::Curved);
         assert_eq!(hops(&layout, "A1", &turnouts), ["C1 320"]);
-        // Through a turnout from a leg it does not matter how it lies.
+        // A trailed turnout may be in either position.
         turnouts.set(TurnoutId(2), Leg::Curved);
         assert_eq!(hops(&layout, "B1", &turnouts), ["D1 300"]);
     }
@@ -312,8 +311,8 @@ mod tests {
     }
 
     #[test]
-    fn a_way_over_two_turnouts_that_are_never_both_curved_is_no_hop() {
-        // A chain of two turnouts: the only way to `C1` is curved and curved again.
+    fn a_path_over_two_turnouts_that_are_never_both_curved_is_no_hop() {
+        // A chain of two turnouts: the only path to `C1` needs both curved.
         let mut plan = oval_plan();
         plan.places = ["A", "B", "C"]
             .iter()
@@ -343,7 +342,7 @@ mod tests {
 
     #[test]
     fn a_ladder_of_turnouts_without_sensors_is_refused_instead_of_filling_the_memory() {
-        // Each turnout's legs meet again at the next but one: 2^30 ways from end to end.
+        // The legs of every odd turnout meet again at the next one: 2^30 paths from end to end.
         let mut plan = oval_plan();
         plan.places = (1..=60).map(turnout).chain((1..=2).map(end)).collect();
         plan.stretches = vec![stretch("EN1", "BR1", 1.0), stretch("MR60", "EX2", 1.0)];

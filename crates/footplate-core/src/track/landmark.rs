@@ -1,24 +1,24 @@
-//! Landmarks: known places by the names people give them, such as `C13+120mm`.
+//! Landmarks: places by name, such as `C13+120mm`.
 
 use alloc::borrow::ToOwned;
 use alloc::string::String;
 use core::fmt;
 
 use crate::ids::NodeId;
-use crate::track::{Layout, Position, TurnoutStates, WayError};
+use crate::track::{Layout, PathError, Position, TurnoutStates};
 use crate::units::Length;
 
-/// A place named by a node and how far beyond it, in the direction of travel of the node.
+/// A place given by a node and the distance beyond it, in the direction of travel of the node.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Landmark {
-    /// The node: mostly a sensor, but a turnout or track end has a name, too.
+    /// The node: usually a sensor, but turnouts and track ends have names, too.
     pub node: NodeId,
-    /// How far beyond it; before it if negative.
+    /// The distance beyond it; negative before it.
     pub offset: Length,
 }
 
-/// Why a text names no landmark.
+/// Why a text is not a landmark.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum LandmarkError {
@@ -26,12 +26,12 @@ pub enum LandmarkError {
     UnknownNode {
         /// The name.
         name: String,
-        /// A name that the layout has, to show what one looks like.
+        /// A name of this layout, as an example.
         example: Option<String>,
         /// The layout.
         layout: String,
     },
-    /// What follows the name is no offset.
+    /// The text after the name is not an offset.
     IllegalOffset {
         /// The text, from the sign on.
         found: String,
@@ -65,9 +65,9 @@ impl Layout {
     /// Reads a landmark: a name, or a name and an offset in millimetres as in `C13+120mm` or `C13 - 30.5 mm`.
     ///
     /// # Errors
-    /// What is wrong with the text.
+    /// [`LandmarkError`] with the part of the text at fault.
     pub fn landmark(&self, text: &str) -> Result<Landmark, LandmarkError> {
-        // Names hold no signs.
+        // Names contain no signs.
         let sign = text.find(['+', '-']).unwrap_or(text.len());
         let (name, offset) = text.split_at(sign);
         let name = name.trim();
@@ -82,35 +82,35 @@ impl Layout {
         Ok(Landmark { node, offset })
     }
 
-    /// Shows a landmark as [`landmark`](Self::landmark) reads it, to the nanometre.
+    /// Formats a landmark so that [`landmark`](Self::landmark) reads it back, to the nanometre.
     #[must_use]
     pub fn display(&self, landmark: Landmark) -> impl fmt::Display + '_ {
         Shown { layout: self, landmark }
     }
 
-    /// Where a landmark is while the turnouts lie as they do.
+    /// The position of a landmark with the turnouts in these positions.
     ///
     /// # Errors
-    /// [`WayError`] when the way from the node cannot be followed that far.
-    pub fn locate(&self, landmark: Landmark, turnouts: &TurnoutStates) -> Result<Position, WayError> {
+    /// [`PathError`] if the path from the node cannot be followed that far.
+    pub fn locate(&self, landmark: Landmark, turnouts: &TurnoutStates) -> Result<Position, PathError> {
         let Landmark { node, offset } = landmark;
         let ahead = self.edge_ahead(node, turnouts);
         match ahead.map(|edge| Position { edge, offset: Length::ZERO }) {
             Ok(position) if offset >= Length::ZERO => self.advance(position, offset, turnouts),
             Err(stop) if offset > Length::ZERO => Err(stop.after(offset)),
             _ => {
-                // Back from the node: on from its reverse, seen the other way.
+                // Back from the node: ahead from its reverse, in the other direction of travel.
                 let edge = self.edge_ahead(node.reverse(), turnouts);
                 let edge = edge.map_err(|stop| stop.after(-offset))?;
                 let behind = self.advance(Position { edge, offset: Length::ZERO }, -offset, turnouts)?;
-                let position = self.reversed(behind).ok_or(WayError::NotOnLayout)?;
+                let position = self.reversed(behind).ok_or(PathError::NotOnLayout)?;
                 self.advance(position, Length::ZERO, turnouts)
             }
         }
     }
 }
 
-/// A sign, digits and `mm`, with spaces where people like them.
+/// A sign, digits and `mm`, with optional spaces.
 fn read_offset(text: &str) -> Option<Length> {
     let number = text.trim_end().strip_suffix("mm")?.trim_end();
     let digits = number.strip_prefix(['+', '-'])?.trim_start();
@@ -129,7 +129,7 @@ impl fmt::Display for Shown<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Landmark { node, offset } = self.landmark;
         f.write_str(self.layout.node_name(node))?;
-        // So that the rounding of metres to millimetres does not show.
+        // Hides the rounding of metres to millimetres.
         let mm = libm::round(offset.as_mm() * 1e6) / 1e6;
         if mm == 0.0 { Ok(()) } else { write!(f, "{mm:+}mm") }
     }
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_text_that_names_no_place_is_told_what_would() {
+    fn the_error_for_a_text_that_names_no_place_shows_a_valid_one() {
         let layout = oval();
         for (text, message) in [
             ("Z9", "oval has no place `Z9`: write a name like `A1` or `A1+120mm`"),
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_landmark_beyond_what_is_known_is_no_place() {
+    fn a_landmark_beyond_known_track_has_no_position() {
         let layout = oval();
         let unknown = TurnoutStates::unknown();
         let refused = |text| layout.locate(layout.landmark(text).unwrap(), &unknown).unwrap_err().to_string();

@@ -1,13 +1,13 @@
-//! Where trains can go: a layout as a directed graph, and the ways through it.
+//! Track: a layout as a directed graph, and the paths through it.
 //!
 //! Rails have no direction but trains do, so every place on the rails is a pair of nodes, one for each
-//! direction of travel, and every stretch of rail is a pair of edges. A [`LayoutPlan`] says what a file or a
-//! test says, by name; [`Layout::build`] checks it and answers from then on by small integers:
-//! - [`Layout::hops_from`]: which sensors may come next, in nanoseconds, from a table made once;
-//! - [`Layout::reaches`]: the same when up to [`MAX_MISSED`] sensors on the way stay silent;
-//! - [`Layout::route`]: the shortest way between two nodes; [`Layout::circuit_from`]: a way that leads back;
-//! - [`Layout::greatest_speed`]: how fast trains may be along a way;
-//! - [`Position`] and [`Landmark`]: points on the rails, and the names people give them.
+//! direction of travel, and every stretch of rail is a pair of edges. A [`LayoutPlan`] describes a layout by names, as
+//! layout files do; [`Layout::build`] checks it. A [`Layout`] uses small integers:
+//! - [`Layout::hops_from`]: the sensors that a train may reach next, in nanoseconds, from a table made once;
+//! - [`Layout::reaches`]: the same if up to [`MAX_MISSED`] sensors on the path stay silent;
+//! - [`Layout::route`]: the shortest path between two nodes; [`Layout::circuit_from`]: a path that leads back;
+//! - [`Layout::zone`]: the speed restriction of an edge;
+//! - [`Position`] and [`Landmark`]: points on the rails, and their names.
 
 mod build;
 mod circuit;
@@ -28,11 +28,11 @@ mod zone;
 
 pub use circuit::Circuit;
 pub use error::{LayoutError, PlanEntry};
-pub use graph::{Edge, Layout, Node, NodeKind, Ways};
+pub use graph::{Edge, Layout, Node, NodeKind, OutgoingEdges};
 pub use hop::{Hop, HopId};
 pub use landmark::{Landmark, LandmarkError};
 pub use plan::{LayoutPlan, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Place, PlannedZone, RailEnd, Stretch};
-pub use position::{Position, WayError};
+pub use position::{PathError, Position};
 pub use reach::{MAX_MISSED, Reach, Reaches};
 pub use route::{Route, RouteError};
 pub use sequence_test::{SequenceTest, SequenceVerdict, StrayReport};

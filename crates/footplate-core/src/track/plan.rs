@@ -1,7 +1,7 @@
-//! A layout as people write it down: by name, each place and each stretch of rail once, not yet checked.
+//! An unchecked layout by names, as in a layout file: each place and each stretch of rail once.
 //!
-//! Both directions of travel are implied, so an edge without its twin, a twin of another length or a node
-//! without a reverse cannot be written here at all.
+//! Both directions of travel are implied, so a plan cannot contain an edge without its twin, a twin of another length
+//! or a node without a reverse.
 
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -10,17 +10,17 @@ use crate::ids::{SensorId, StretchId, TurnoutId};
 use crate::track::{Leg, StretchLength, Survey, Zone};
 use crate::units::Length;
 
-/// Longest stretch that is believed. The one published slip of the unit (micrometres read as millimetres)
+/// Longest plausible stretch. The one published mistake of the unit (micrometres read as millimetres)
 /// makes stretches of 185 m and 239 m; no stretch of a model railway without a sensor or turnout is near it.
 pub const MAX_EDGE_LENGTH: Length = Length::from_m(100.0);
 
 /// Longest name of a node.
 pub const MAX_NAME_CHARACTERS: usize = 32;
 
-/// Everything a layout file says about the track.
+/// The track as described by a layout file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LayoutPlan {
-    /// What people call the layout.
+    /// The name of the layout.
     pub name: String,
     /// How well the lengths are known.
     pub survey: Survey,
@@ -28,13 +28,13 @@ pub struct LayoutPlan {
     pub places: Vec<Place>,
     /// The rails between them; the order decides the edge numbers.
     pub stretches: Vec<Stretch>,
-    /// Pairs of turnouts in one place of which at most one may lie for its curved leg.
+    /// Pairs of turnouts in one place of which at most one may be set curved.
     pub never_both_curved: Vec<[TurnoutId; 2]>,
     /// Speed restrictions.
     pub zones: Vec<PlannedZone>,
 }
 
-/// A speed restriction and where it is.
+/// A speed restriction and its stretches.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedZone {
     /// The restriction.
@@ -46,7 +46,7 @@ pub struct PlannedZone {
 /// A place on the rails: a node for each direction of travel.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
-    /// A contact that shows the direction of travel: it reports as one sensor or as the other.
+    /// A direction-sensitive sensor: it reports as one sensor or as the other.
     Sensor {
         /// The names of the two directions.
         names: [String; 2],
@@ -55,14 +55,14 @@ pub enum Place {
     },
     /// A turnout.
     Turnout {
-        /// The name of the branch, met at the toe, and of the merge, met from a leg.
+        /// The name of the branch, approached at the toe, and of the merge, approached on a leg.
         names: [String; 2],
         /// The turnout.
         turnout: TurnoutId,
     },
-    /// A place where the track ends, in a buffer or beyond what is modelled.
+    /// A place where the track ends, at a buffer or at the border of the model.
     End {
-        /// The name of the entry, which leads onto the layout, and of the exit, from which nothing leads.
+        /// The name of the entry, which leads onto the layout, and of the exit, which no edge leaves.
         names: [String; 2],
     },
 }
@@ -77,18 +77,18 @@ impl Place {
     }
 }
 
-/// A stretch of rail between two places, written in one of its two directions.
+/// A stretch of rail between two places, in either of its two directions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stretch {
-    /// The node it leaves; at a branch, by which leg.
+    /// The node it leaves, with the leg at a branch.
     pub from: RailEnd,
-    /// The node it reaches; at a merge, by which leg.
+    /// The node it reaches, with the leg at a merge.
     pub to: RailEnd,
-    /// What is known of its length.
+    /// Its length, with its uncertainty.
     pub length: StretchLength,
 }
 
-/// One end of a stretch: a node, and the leg where the node is a turnout met or left on the side of its legs.
+/// One end of a stretch: a node, and the leg if the stretch joins a turnout on the side of its legs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RailEnd {
     /// The name of the node.

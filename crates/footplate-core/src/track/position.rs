@@ -1,51 +1,51 @@
-//! Positions: points on the rails with a direction of travel, and how to get from one to another.
+//! Positions: points on the rails with a direction of travel, and the distances between them.
 
 use alloc::borrow::ToOwned;
 use alloc::string::String;
 use core::fmt;
 
 use crate::ids::{EdgeId, NodeId, TurnoutId};
-use crate::track::{Edge, Layout, Leg, NodeKind, TurnoutStates, Ways};
+use crate::track::{Edge, Layout, Leg, NodeKind, OutgoingEdges, TurnoutStates};
 use crate::units::Length;
 
-/// Sums of lengths are rounded; a way that is longer than the track by no more than this ends at its end.
+/// Sums of lengths are rounded; a path that is longer than the track by no more than this ends at the end of the track.
 const ROUNDING: Length = Length::from_mm(1e-6);
 
-/// A point on the rails, seen in one direction of travel.
+/// A point on the rails with a direction of travel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Position {
-    /// The edge it lies on.
+    /// Its edge.
     pub edge: EdgeId,
-    /// How far from the start of the edge, from zero to the edge's length.
+    /// Distance from the start of the edge, from zero to its length.
     pub offset: Length,
 }
 
-/// Why a way cannot be followed to its end.
+/// Why a path cannot be followed to its end.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub enum WayError {
+pub enum PathError {
     /// A node or edge of another layout.
     NotOnLayout,
-    /// The way to go is no number.
+    /// The distance is not a finite number.
     NotFinite,
     /// A turnout of unknown position decides where the path leads.
     TurnoutUnknown {
         /// The turnout.
         turnout: TurnoutId,
-        /// How much of the way is left when it is reached.
+        /// The remaining distance at the turnout.
         left: Length,
     },
-    /// The track ends before the way does.
+    /// The track ends before the path does.
     TrackEnds {
         /// The name of the node where it ends.
         node: String,
-        /// How much of the way is left.
+        /// The remaining distance at the end of the track.
         left: Length,
     },
 }
 
-impl fmt::Display for WayError {
+impl fmt::Display for PathError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotOnLayout => f.write_str("the position is not on this layout"),
@@ -63,7 +63,7 @@ impl fmt::Display for WayError {
     }
 }
 
-impl core::error::Error for WayError {}
+impl core::error::Error for PathError {}
 
 impl Layout {
     /// The same point in the opposite direction of travel; `None` for a position of another layout.
@@ -73,34 +73,33 @@ impl Layout {
         Some(Position { edge: position.edge.twin(), offset: (length - position.offset).max(Length::ZERO) })
     }
 
-    /// The point `distance` further on, or back if it is negative, over turnouts as they lie.
+    /// The point `distance` ahead, or behind if it is negative, over turnouts in these positions.
     ///
-    /// The result is in normal form: not at the end of an edge when it could be at the start of the next. Only
-    /// where the track ends, or a turnout is unknown, a point stays at the end of its edge. A distance of zero
-    /// normalises.
+    /// The result is in normal form: at the start of an edge rather than at the end of the previous one, unless the
+    /// track ends there or a turnout is unknown. A distance of zero normalises.
     ///
     /// # Errors
-    /// [`WayError`] when the way cannot be followed to its end.
+    /// [`PathError`] if the path cannot be followed to its end.
     pub fn advance(
         &self,
         position: Position,
         distance: Length,
         turnouts: &TurnoutStates,
-    ) -> Result<Position, WayError> {
+    ) -> Result<Position, PathError> {
         if !distance.is_finite() || !position.offset.is_finite() {
-            return Err(WayError::NotFinite);
+            return Err(PathError::NotFinite);
         }
         if distance < Length::ZERO {
-            let behind = self.reversed(position).ok_or(WayError::NotOnLayout)?;
+            let behind = self.reversed(position).ok_or(PathError::NotOnLayout)?;
             let behind = self.advance(behind, -distance, turnouts)?;
-            let position = self.reversed(behind).ok_or(WayError::NotOnLayout)?;
-            // Seen from behind it may be at the start of an edge, and so at the end of this one.
+            let position = self.reversed(behind).ok_or(PathError::NotOnLayout)?;
+            // In the other direction it may be at the start of an edge, and so at the end of this one.
             return self.advance(position, Length::ZERO, turnouts);
         }
         let (mut id, mut left) = (position.edge, position.offset + distance);
         let mut passed = 0;
         loop {
-            let edge = self.edge(id).ok_or(WayError::NotOnLayout)?;
+            let edge = self.edge(id).ok_or(PathError::NotOnLayout)?;
             if left < edge.length {
                 return Ok(Position { edge: id, offset: left });
             }
@@ -116,14 +115,14 @@ impl Layout {
             }
             passed += 1;
             if passed == self.edges().len() {
-                // As many edges as there are have come by: this is a loop, and whole laps make no difference.
+                // The path has passed as many edges as the layout has: it is a loop, and whole laps cancel.
                 left = Length::from_m(libm::fmod(left.as_m(), self.lap(id, turnouts).as_m()));
             }
         }
     }
 
-    /// The way ahead from one position to another, the shortest over turnouts that lie right or are unknown;
-    /// `None` if none leads there without turning around.
+    /// The distance ahead from one position to another: the shortest over turnouts that are in position or unknown;
+    /// `None` if no path leads there without reversing.
     #[must_use]
     pub fn distance_ahead(&self, from: Position, to: Position, turnouts: &TurnoutStates) -> Option<Length> {
         let (from_edge, to_edge) = (self.edge(from.edge)?, self.edge(to.edge)?);
@@ -139,21 +138,23 @@ impl Layout {
         Some(from_edge.length - from.offset + between + to.offset)
     }
 
-    /// The edge that leaves a node while the turnouts lie as they do.
+    /// The edge that leaves a node with the turnouts in these positions.
     pub(crate) fn edge_ahead(&self, node: NodeId, turnouts: &TurnoutStates) -> Result<EdgeId, Stop<'_>> {
         let node = self.node(node).ok_or(Stop::NotOnLayout)?;
-        match (node.ways, node.kind) {
-            (Ways::Ahead(edge), _) => Ok(edge),
-            (Ways::Legs { straight, curved }, NodeKind::Branch(turnout)) => match turnouts.get(turnout) {
-                Some(Leg::Straight) => Ok(straight),
-                Some(Leg::Curved) => Ok(curved),
-                None => Err(Stop::TurnoutUnknown(turnout)),
-            },
+        match (node.outgoing, node.kind) {
+            (OutgoingEdges::Ahead(edge), _) => Ok(edge),
+            (OutgoingEdges::Legs { straight, curved }, NodeKind::Branch(turnout)) => {
+                match turnouts.get(turnout) {
+                    Some(Leg::Straight) => Ok(straight),
+                    Some(Leg::Curved) => Ok(curved),
+                    None => Err(Stop::TurnoutUnknown(turnout)),
+                }
+            }
             _ => Err(Stop::TrackEnds(&node.name)),
         }
     }
 
-    /// The length of the loop that an edge lies on; no loop is without length.
+    /// The length of the loop of an edge, which is never zero.
     fn lap(&self, start: EdgeId, turnouts: &TurnoutStates) -> Length {
         let (mut id, mut lap) = (start, Length::ZERO);
         while let Some(edge) = self.edge(id) {
@@ -182,12 +183,12 @@ pub(crate) enum Stop<'l> {
 }
 
 impl Stop<'_> {
-    /// The error of a way of which this much is left.
-    pub(crate) fn after(self, left: Length) -> WayError {
+    /// The error for a path with this remaining distance.
+    pub(crate) fn after(self, left: Length) -> PathError {
         match self {
-            Self::NotOnLayout => WayError::NotOnLayout,
-            Self::TurnoutUnknown(turnout) => WayError::TurnoutUnknown { turnout, left },
-            Self::TrackEnds(node) => WayError::TrackEnds { node: node.to_owned(), left },
+            Self::NotOnLayout => PathError::NotOnLayout,
+            Self::TurnoutUnknown(turnout) => PathError::TurnoutUnknown { turnout, left },
+            Self::TrackEnds(node) => PathError::TrackEnds { node: node.to_owned(), left },
         }
     }
 }
@@ -199,7 +200,7 @@ mod tests {
     use std::format;
     use std::string::ToString;
 
-    /// The oval with its turnouts lying so that the loop over B is closed.
+    /// Turnout positions that close the loop over B.
     fn straight() -> TurnoutStates {
         [(TurnoutId(1), Leg::Straight), (TurnoutId(2), Leg::Straight)].into_iter().collect()
     }
@@ -243,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn a_way_ends_where_the_track_does_and_where_a_turnout_is_unknown() {
+    fn a_path_ends_at_the_end_of_the_track_and_at_an_unknown_turnout() {
         let layout = oval();
         let unknown = TurnoutStates::unknown();
         let start = at(&layout, "EN1", "E1", 10.0);
@@ -258,14 +259,14 @@ mod tests {
             "the position of turnout 1, 30 mm before the end of the path, is unknown: throw it first"
         );
         assert!(layout.advance(start, Length::from_mm(100.0), &unknown).is_ok(), "up to it is known");
-        assert_eq!(layout.advance(start, Length::from_m(f64::NAN), &unknown), Err(WayError::NotFinite));
+        assert_eq!(layout.advance(start, Length::from_m(f64::NAN), &unknown), Err(PathError::NotFinite));
         let elsewhere = Position { edge: EdgeId(999), offset: Length::ZERO };
-        assert_eq!(layout.advance(elsewhere, Length::ZERO, &unknown), Err(WayError::NotOnLayout));
+        assert_eq!(layout.advance(elsewhere, Length::ZERO, &unknown), Err(PathError::NotOnLayout));
         assert_eq!(layout.reversed(elsewhere), None);
     }
 
     #[test]
-    fn turning_around_twice_changes_nothing() {
+    fn reversing_twice_changes_nothing() {
         let layout = oval();
         let here = at(&layout, "B1", "MR2", 60.0);
         let there = layout.reversed(here).unwrap();
@@ -286,13 +287,13 @@ mod tests {
         assert_eq!(ahead(a, further, &straight()), Some(10.0));
         assert_eq!(ahead(further, a, &straight()), Some(1_090.0), "once around");
         assert_eq!(ahead(a, at(&layout, "EN1", "E1", 0.0), &straight()), None);
-        // The end of an edge and the starts of those behind it are one point.
+        // The end of an edge and the starts of the next ones are one point.
         let (end, start) = (at(&layout, "A1", "BR1", 100.0), at(&layout, "BR1", "C1", 0.0));
         assert_eq!((ahead(end, start, &straight()), ahead(start, end, &straight())), (Some(0.0), Some(0.0)));
     }
 
     #[test]
-    fn edges_of_no_length_are_passed() {
+    fn edges_of_zero_length_are_passed() {
         let mut plan = oval_plan();
         plan.stretches[1].length = Length::ZERO.into();
         plan.stretches[3].length = Length::ZERO.into();

@@ -1,26 +1,26 @@
-//! Reaches: the sensors that may report next when some on the way stay silent.
+//! Reaches: the sensors that may report next if some before them stay silent.
 //!
-//! A detection is missed now and then: after C15 comes E11, and D12 between them was silent. A reach is one to
+//! Detections are missed now and then: E11 reports after C15, and D12 between them was silent. A reach is one to
 //! [`MAX_MISSED`] + 1 hops in a row; all but its last sensor were missed.
 
 use crate::ids::{EdgeId, NodeId, SensorId};
 use crate::track::{Hop, HopId, Layout, Position, TurnoutStates};
 use crate::units::Length;
 
-/// Most sensors in a row that can be looked past. With one report in a hundred missed, three in a row are one
-/// in a million: beyond that the train is lost and must be found, not predicted.
+/// Most missed sensors in a row. If one report in a hundred is missed, three in a row are one in a million: beyond that
+/// the train is lost and must be relocated, not predicted.
 pub const MAX_MISSED: usize = 3;
 
 const MAX_HOPS: usize = MAX_MISSED + 1;
 
-/// A way to a sensor that may report next, past sensors that did not.
+/// A path to a sensor that may report next, past sensors that stayed silent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reach {
     /// The node of the sensor or track end it reaches.
     pub to: NodeId,
     /// The sensor there; `None` at the end of a track.
     pub sensor: Option<SensorId>,
-    /// How far it is.
+    /// The distance to it.
     pub length: Length,
     hops: [HopId; MAX_HOPS],
     count: u8,
@@ -34,7 +34,7 @@ impl Reach {
         self.hops.get(..usize::from(self.count)).unwrap_or_default()
     }
 
-    /// How many sensors it passes that did not report.
+    /// The number of silent sensors that it passes.
     #[inline]
     #[must_use]
     pub const fn missed(&self) -> usize {
@@ -43,19 +43,17 @@ impl Reach {
 }
 
 impl Layout {
-    /// Every sensor and track end ahead of a node that a train may reach next, with up to `missed` sensors
-    /// in between that stay silent (at most [`MAX_MISSED`]). Depth first: a sensor comes before those behind
-    /// it. A turnout that a way meets twice may be thrown in between, so each meeting stands for itself.
-    /// Allocates nothing.
+    /// Every sensor and track end ahead of a node that a train may reach next, with up to `missed` silent sensors in
+    /// between (at most [`MAX_MISSED`]). Depth first: a sensor comes before those beyond it. A turnout that a path
+    /// passes twice may be thrown in between, so each passage counts by itself. Allocates nothing.
     #[inline]
     #[must_use]
     pub fn reaches<'l>(&'l self, from: NodeId, turnouts: &'l TurnoutStates, missed: usize) -> Reaches<'l> {
         Reaches::new(self, from, None, turnouts, missed)
     }
 
-    /// The same for a train that is under way, with lengths from where it is: every sensor and track end that
-    /// it may reach next. The turnout at the start of its edge has been decided by its being there. A position
-    /// of another layout reaches nothing.
+    /// The same for a train at a position, with distances from there. The edge of its position shows how the turnout
+    /// at the start of that edge was set. A position of another layout gives no reaches.
     #[inline]
     #[must_use]
     pub fn reaches_ahead<'l>(
@@ -64,7 +62,7 @@ impl Layout {
         turnouts: &'l TurnoutStates,
         missed: usize,
     ) -> Reaches<'l> {
-        // No hop of any node begins on an edge that is not there.
+        // No hop begins on an unknown edge.
         let from = self.edge(position.edge).map_or(NodeId(0), |edge| edge.from);
         Reaches::new(self, from, Some(position), turnouts, missed)
     }
@@ -84,18 +82,18 @@ pub struct Reaches<'l> {
     turnouts: &'l TurnoutStates,
     /// The level of the last hop that may be added.
     deepest: usize,
-    /// The edge on which every way begins, if it is given.
+    /// The edge on which every reach begins, if it is given.
     first_edge: Option<EdgeId>,
     levels: [Level; MAX_HOPS],
     level: usize,
 }
 
-/// Where the search stands after so many hops.
+/// State of the search after a number of hops.
 #[derive(Debug, Clone, Copy)]
 struct Level {
-    /// The hops still to be tried here, from the first to before the second.
+    /// The range of hops still to be tried; the end is exclusive.
     open: (u32, u32),
-    /// The way to where they begin.
+    /// The distance to their start.
     length: Length,
     /// The hop tried last.
     last: HopId,
@@ -215,18 +213,18 @@ mod tests {
     }
 
     #[test]
-    fn a_train_under_way_reaches_what_is_ahead_of_it() {
+    fn a_moving_train_reaches_what_is_ahead_of_it() {
         let layout = oval();
         let node = |name| layout.node_named(name).unwrap();
         let edge = layout.edge_between(node("BR1"), node("C1")).unwrap();
         let position = Position { edge, offset: Length::from_mm(50.0) };
-        // It is on the curved leg, however the turnout lies by now.
+        // It is on the curved leg, whatever the turnout position since.
         let straight: TurnoutStates = [(TurnoutId(1), Leg::Straight)].into_iter().collect();
-        let ways: Vec<_> = layout
+        let reached: Vec<_> = layout
             .reaches_ahead(position, &straight, 1)
             .map(|reach| format!("{} {:.0}", layout.node_name(reach.to), reach.length.as_mm()))
             .collect();
-        assert_eq!(ways, ["C1 170", "D1 420"]);
+        assert_eq!(reached, ["C1 170", "D1 420"]);
 
         let edge = layout.edge_between(node("A1"), node("BR1")).unwrap();
         let position = Position { edge, offset: Length::from_mm(90.0) };

@@ -1,4 +1,4 @@
-//! Routes: the shortest way from one node to another in one direction of travel.
+//! Routes: the shortest path from one node to another in one direction of travel.
 
 use alloc::borrow::ToOwned;
 use alloc::collections::BinaryHeap;
@@ -12,14 +12,14 @@ use crate::ids::{EdgeId, NodeId};
 use crate::track::{Layout, TurnoutNeed, TurnoutStates};
 use crate::units::Length;
 
-/// A way from node to node without turning around.
+/// A path from node to node without reversing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Route {
     /// Where it begins.
     pub from: NodeId,
     /// Where it ends.
     pub to: NodeId,
-    /// Its edges in the order of travel; none when it ends where it begins.
+    /// Its edges in the order of travel; none if it ends where it begins.
     pub edges: Vec<EdgeId>,
     /// The sum of its edges.
     pub length: Length,
@@ -36,13 +36,13 @@ pub enum RouteError {
         /// The node.
         node: NodeId,
     },
-    /// No way leads there without turning around.
-    NoWay {
+    /// No path leads there without reversing.
+    NoPath {
         /// The name of the node it should begin at.
         from: String,
         /// The name of the node it should end at.
         to: String,
-        /// The name of the same place in the other direction of travel, if a way leads there.
+        /// The name of the same place in the other direction of travel, if a path leads there.
         reverse: Option<String>,
     },
 }
@@ -51,12 +51,12 @@ impl fmt::Display for RouteError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::UnknownNode { node } => write!(f, "node {node} is not part of this layout"),
-            Self::NoWay { from, to, reverse: Some(reverse) } => write!(
+            Self::NoPath { from, to, reverse: Some(reverse) } => write!(
                 f,
                 "no path from `{from}` to `{to}` with the turnouts in their present positions, but \
                  there is one to `{reverse}`, the same place in the other direction"
             ),
-            Self::NoWay { from, to, reverse: None } => write!(
+            Self::NoPath { from, to, reverse: None } => write!(
                 f,
                 "no path from `{from}` to `{to}` with the turnouts in their present positions and \
                  without reversing"
@@ -68,12 +68,12 @@ impl fmt::Display for RouteError {
 impl core::error::Error for RouteError {}
 
 impl Layout {
-    /// The shortest way between two nodes over turnouts that lie right or are unknown, so that
-    /// [`TurnoutStates::unknown`] leaves the choice of all of them free. Of equally long ways it is always the
-    /// same one. A way never needs both turnouts of a pair that is never both curved.
+    /// The shortest path between two nodes over turnouts that are in position or unknown; [`TurnoutStates::unknown`]
+    /// leaves all of them free. Among equally long paths the choice is deterministic. No path needs both turnouts of
+    /// a pair curved.
     ///
     /// # Errors
-    /// [`RouteError`] when a node is unknown or no way leads there.
+    /// [`RouteError`] if a node is unknown or no path leads there.
     pub fn route(&self, from: NodeId, to: NodeId, turnouts: &TurnoutStates) -> Result<Route, RouteError> {
         if let Some(node) = [from, to].into_iter().find(|node| self.node(*node).is_none()) {
             return Err(RouteError::UnknownNode { node });
@@ -82,13 +82,13 @@ impl Layout {
             let name = |node| self.node_name(node).to_owned();
             let reverse = to.reverse();
             let reverse = self.shortest(from, reverse, turnouts).map(|_| name(reverse));
-            return Err(RouteError::NoWay { from: name(from), to: name(to), reverse });
+            return Err(RouteError::NoPath { from: name(from), to: name(to), reverse });
         };
         let needs = edges.iter().flat_map(|edge| self.needs_of(*edge)).collect();
         Ok(Route { from, to, edges, length, needs })
     }
 
-    /// The edges of the shortest way and their length (Dijkstra, 1959).
+    /// The edges of the shortest path and their total length (Dijkstra, 1959).
     pub(crate) fn shortest(
         &self,
         from: NodeId,
@@ -102,9 +102,9 @@ impl Layout {
                 continue;
             }
             if node == to {
-                return Some((arrivals.way_to(self, node), length));
+                return Some((arrivals.path_to(self, node), length));
             }
-            for id in self.ways(node).edges() {
+            for id in self.outgoing(node).edges() {
                 let Some(edge) = self.edge(id) else { continue };
                 let is_open = self.needs_of(id).all(|need| turnouts.allow(need));
                 if is_open && (edge.leg.is_none() || self.is_legal_after(&arrivals, node, id)) {
@@ -115,26 +115,26 @@ impl Layout {
         None
     }
 
-    /// Whether the way to `node` and the edge after it do without both turnouts of a pair lying curved.
+    /// Whether the path to `node` and the edge after it do not need both turnouts of a pair curved.
     fn is_legal_after(&self, arrivals: &Arrivals, node: NodeId, edge: EdgeId) -> bool {
         if self.never_both_curved().is_empty() {
             return true;
         }
-        let mut way = arrivals.way_to(self, node);
-        way.push(edge);
-        let needs: Vec<TurnoutNeed> = way.into_iter().flat_map(|edge| self.needs_of(edge)).collect();
+        let mut path = arrivals.path_to(self, node);
+        path.push(edge);
+        let needs: Vec<TurnoutNeed> = path.into_iter().flat_map(|edge| self.needs_of(edge)).collect();
         !self.needs_both_curved(&needs)
     }
 }
 
-/// By which edge the shortest way arrives at each node.
+/// The last edge of the shortest path to each node.
 struct Arrivals {
-    /// `Some(None)` is where the way begins.
+    /// `Some(None)` is the start of the path.
     by_node: Vec<Option<Option<EdgeId>>>,
 }
 
 impl Arrivals {
-    /// Notes the first arrival at a node; later ones are no shorter.
+    /// Records the first arrival at a node; later ones are not shorter.
     fn settle(&mut self, node: NodeId, over: Option<EdgeId>) -> bool {
         match self.by_node.get_mut(usize::from(node.0)) {
             Some(arrival @ None) => {
@@ -145,7 +145,7 @@ impl Arrivals {
         }
     }
 
-    fn way_to(&self, layout: &Layout, node: NodeId) -> Vec<EdgeId> {
+    fn path_to(&self, layout: &Layout, node: NodeId) -> Vec<EdgeId> {
         let mut edges = Vec::new();
         let mut node = node;
         while let Some(Some(Some(id))) = self.by_node.get(usize::from(node.0)) {
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turnout_that_lies_otherwise_makes_the_route_longer() {
+    fn a_turnout_in_another_position_makes_the_route_longer() {
         let layout = oval();
         let straight = [(TurnoutId(1), Leg::Straight)].into_iter().collect();
         assert!((route(&layout, "A1", "D1", &straight).unwrap().length.as_mm() - 600.0).abs() < 1e-9);
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_way_the_other_direction_is_named_if_it_helps() {
+    fn without_a_path_the_other_direction_is_named_if_it_helps() {
         let layout = oval();
         let unknown = TurnoutStates::unknown();
         assert_eq!(

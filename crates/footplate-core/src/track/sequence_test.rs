@@ -1,9 +1,10 @@
-//! Whether reports can come from a layout: a sensor follows another only where rails lead from one to the other.
+//! Tests whether reports can come from a layout: a sensor reports after another only if rails lead from one to the
+//! other.
 //!
-//! Turnouts may lie anyhow, up to [`LOOK_PAST`] sensors in a row may stay silent, sensors report without a train now and
-//! then, and people lift trains. So a single report that does not fit proves nothing. The layout is contradicted when more
-//! reports do not fit than the right layout would show by chance (a one-sided binomial test). Reports while all trains are
-//! at rest are no evidence: no train caused them.
+//! Turnouts may be in any position, up to [`MAX_SILENT`] sensors in a row may stay silent, sensors report without a
+//! train now and then, and people lift trains. So a single stray report proves nothing. The layout is contradicted if
+//! more reports are stray than the right layout would show by chance (a one-sided binomial test). Reports while all
+//! trains are at rest are no evidence: no train caused them.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
@@ -16,35 +17,35 @@ use crate::track::{Layout, TurnoutStates};
 /// A train is at rest this long after its stop command (the longest published stop).
 const STOPS_WITHIN: TimeSpan = TimeSpan::from_s(5.0);
 
-/// Sensors in a row that may have stayed silent.
-const LOOK_PAST: usize = 2;
+/// Most silent sensors in a row.
+const MAX_SILENT: usize = 2;
 
-/// On the right layout at most this part of the reports does not follow from those before (one in a hundred reports of the
-/// real logs and 0.2 % of those of the simulator do not; chosen for layouts in a worse state).
+/// Largest share of stray reports on the right layout (1 % in the real logs, 0.2 % in the simulator; chosen for layouts
+/// in a worse state).
 const STRAY: f64 = 0.05;
 
-/// A layout is contradicted when chance alone would show as many stray reports once in so many recordings.
+/// A layout is contradicted if chance alone would show as many stray reports with this probability.
 const SIGNIFICANCE: f64 = 1e-4;
 
-/// A report that no train can have caused by running on.
+/// A report that no train ahead of the sensor can have caused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StrayReport {
     /// The sensor that reported.
     pub seen: SensorId,
-    /// The sensor that a train had passed before; `None` if the layout has no sensor `seen`.
+    /// The sensor that a train had passed before; `None` if the layout does not have the sensor that reported.
     pub after: Option<SensorId>,
-    /// How often that was seen.
+    /// How often this occurred.
     pub times: u32,
 }
 
-/// What the reports say of the layout.
+/// The result of the test.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum SequenceVerdict {
-    /// They do not contradict it, or there are too few of them to tell.
+    /// The reports do not contradict the layout, or are too few.
     Fits,
-    /// They are not of this layout.
+    /// The reports do not come from this layout.
     Contradicts {
-        /// What does not fit, the most frequent first.
+        /// The stray reports, the most frequent first.
         stray: Vec<StrayReport>,
         /// Reports that followed others, stray ones included.
         reports: u32,
@@ -54,11 +55,11 @@ pub enum SequenceVerdict {
 /// Follows the reports of a recording over a layout.
 #[derive(Debug, Clone, Default)]
 pub struct SequenceTest {
-    /// How many trains may be running, ...
+    /// How many trains may be running.
     trains: usize,
-    /// ... and where they were seen last, the latest first.
+    /// Where they were detected last, the latest first.
     places: Vec<NodeId>,
-    /// A report that did not fit: a train may be there after all.
+    /// The last stray report: a train may be there after all.
     elsewhere: Option<NodeId>,
     last: Option<SensorId>,
     /// Trains that have not been commanded yet and may be running.
@@ -70,13 +71,13 @@ pub struct SequenceTest {
 }
 
 impl SequenceTest {
-    /// Begins a run in which `trains` trains may be running already, at unknown places.
+    /// Begins a run in which `trains` trains may already be running, at unknown positions.
     pub fn begin_run(&mut self, trains: usize) {
         self.begin_run_at_rest(trains);
         self.uncommanded = self.trains;
     }
 
-    /// Begins a run with `trains` trains at rest, at unknown places: none runs before a command says so.
+    /// Begins a run with `trains` trains at rest, at unknown positions: none runs before it is commanded to.
     pub fn begin_run_at_rest(&mut self, trains: usize) {
         self.trains = trains.max(1);
         self.uncommanded = 0;
@@ -89,12 +90,12 @@ impl SequenceTest {
         (self.elsewhere, self.last) = (None, None);
     }
 
-    /// The next entry of the run.
+    /// Adds the next event of the run.
     pub fn take(&mut self, layout: &Layout, event: &Event) {
         match event.kind {
             EventKind::Sensor(_) if self.all_at_rest(event.time) => {}
             EventKind::Sensor(report) => self.report(layout, report.sensor),
-            // The places do not say which of them is this train's, and it goes back from there.
+            // The positions do not show which one is this train's, and it reverses there.
             EventKind::Reverse { .. } => self.forget_places(),
             EventKind::Speed { train, step } => {
                 let stop = (step == SpeedStep::STAND).then_some(event.time);
@@ -127,12 +128,12 @@ impl SequenceTest {
         };
         let unknown = TurnoutStates::unknown();
         let leads_here =
-            |from: &NodeId| layout.reaches(*from, &unknown, LOOK_PAST).any(|reach| reach.to == node);
+            |from: &NodeId| layout.reaches(*from, &unknown, MAX_SILENT).any(|reach| reach.to == node);
         if let Some(train) = self.places.iter().position(leads_here) {
             self.followed += 1;
             self.places.remove(train);
         } else if self.elsewhere.as_ref().is_some_and(leads_here) {
-            // It was a train, and it is the one that was seen longest ago.
+            // It was a train: the one detected longest ago.
             self.followed += 1;
             self.places.pop();
         } else if self.places.len() >= self.trains || self.places.contains(&node) {
@@ -149,7 +150,7 @@ impl SequenceTest {
         *self.stray.entry((after, seen)).or_default() += 1;
     }
 
-    /// What all runs so far say.
+    /// The result of all runs so far.
     #[must_use]
     pub fn verdict(&self) -> SequenceVerdict {
         let count: u32 = self.stray.values().sum();
@@ -167,12 +168,12 @@ impl SequenceTest {
     }
 }
 
-/// The chance that at least `count` of `all` reports are stray on the right layout.
+/// The probability that at least `count` of `all` reports are stray on the right layout.
 fn chance_of_as_many(count: u32, all: u32) -> f64 {
-    // From the least count up, each term from the one before: P(k + 1) = P(k) (n − k)/(k + 1) p/(1 − p).
+    // From the lowest count up, each term from the previous one: P(k + 1) = P(k) (n − k)/(k + 1) p/(1 − p).
     let mut term = libm::pow(1.0 - STRAY, f64::from(all));
     if term == 0.0 {
-        // Too many reports for that: the share decides.
+        // Too many reports for this sum: the share decides.
         return if f64::from(count) > 2.0 * STRAY * f64::from(all) { 0.0 } else { 1.0 };
     }
     let mut fewer = 0.0;
@@ -203,7 +204,7 @@ mod tests {
 
     #[test]
     fn silent_sensors_wrong_turnouts_repetitions_and_a_few_stray_reports_fit() {
-        // Round by B, past a silent D, by C, with two reports of nobody, one sensor that hangs and one train lifted.
+        // Round by B, past a silent D, by C, with two reports without a train, one stuck sensor and one train lifted.
         let names =
             ["A1", "B1", "D1", "A1", "A1", "E1", "C1", "D1", "A1", "B1", "A1", "C1", "D1", "B2", "A2", "D2"];
         assert_eq!(walked(1, &names), SequenceVerdict::Fits);

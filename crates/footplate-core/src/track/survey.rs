@@ -1,4 +1,4 @@
-//! What is known of lengths: by a tape, from trains that were driven, or not at all.
+//! Known lengths: measured by tape, estimated from runs of trains, or unknown.
 
 use alloc::collections::BTreeMap;
 use alloc::string::String;
@@ -8,48 +8,47 @@ use crate::track::build::{checked, is_plausible};
 use crate::track::{HopId, Layout, LayoutError};
 use crate::units::Length;
 
-/// How well the lengths of a layout are known, and how that is known.
+/// The uncertainty of the lengths of a layout, and its origin.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Survey {
-    /// One standard deviation of the length of an edge, where the edge does not say otherwise.
+    /// One standard deviation of the length of an edge that has none of its own.
     pub uncertainty: Length,
-    /// Where that figure comes from.
+    /// The origin of that figure.
     pub origin: String,
-    /// One standard deviation of the factor that all lengths have in common, as a part: lengths that trains found hang
-    /// on the few that were measured. Zero where every edge was measured.
+    /// One standard deviation of the common scale of all lengths, as a fraction: lengths estimated from runs depend
+    /// on the few that were measured. Zero if every edge was measured.
     pub scale: f64,
     /// Distances between neighbouring sensors that are known better than the edges between them.
     pub distances: Vec<SurveyedDistance>,
 }
 
 impl Survey {
-    /// Every edge was measured apart, each to one standard deviation.
+    /// Every edge was measured independently, with one standard deviation for all.
     #[must_use]
     pub const fn taped(uncertainty: Length, origin: String) -> Self {
         Self { uncertainty, origin, scale: 0.0, distances: Vec::new() }
     }
 }
 
-/// A distance between two neighbouring sensors: the sum of the edges between them is known, which part of it each edge has
-/// is not.
+/// A distance between two neighbouring sensors: the sum of the edges between them is better known than each edge.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurveyedDistance {
     /// The name of the node it begins at.
     pub from: String,
-    /// The name of the node it ends at; only one way without another sensor leads there.
+    /// The name of the node it ends at; a single path without another sensor leads there.
     pub to: String,
     /// The sum of the edges between them, to a millimetre.
     pub length: Length,
-    /// One standard deviation of it, what all lengths have in common apart.
+    /// One standard deviation of it, without the common scale.
     pub uncertainty: Length,
 }
 
-/// What is known of the length of a stretch of rail.
+/// The length of a stretch of rail and how it is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum StretchLength {
-    /// Measured, as well as the survey of the layout says; zero is legal between turnouts in one place.
+    /// Measured, with the uncertainty of the survey; zero is legal between turnouts in one place.
     Measured(Length),
-    /// Known to a standard deviation of its own.
+    /// Estimated, with an uncertainty of its own.
     Estimated {
         /// The length.
         length: Length,
@@ -70,8 +69,7 @@ impl From<Length> for StretchLength {
 /// long, and short ones are more frequent: those of the built-in layouts are 0 to 875 mm, 248 mm in the mean.
 const USUAL: (Length, Length) = (Length::from_mm(350.0), Length::from_mm(350.0));
 
-/// Two turnouts, or a turnout and a sensor, are seldom nearer to each other (built-in layouts: one edge in ten is shorter,
-/// those of turnouts in one place apart).
+/// Edges are rarely shorter (built-in layouts: one in ten, not counting those between turnouts in one place).
 const SHORTEST_USUAL: Length = Length::from_mm(100.0);
 
 impl StretchLength {
@@ -85,7 +83,7 @@ impl StretchLength {
         }
     }
 
-    /// A length that the stretch hardly falls short of, for stops and throws before its end.
+    /// A lower bound of the length (about two standard deviations), for stops and throws before its end.
     #[must_use]
     pub fn shortest(self) -> Length {
         match self {
@@ -99,10 +97,10 @@ impl StretchLength {
 }
 
 impl Layout {
-    /// The same layout with other lengths, by stretch, and what is known of them.
+    /// The same layout with other lengths, by stretch, and their survey.
     ///
     /// # Errors
-    /// As [`build`](Self::build), of stretches and distances.
+    /// As [`build`](Self::build), for stretches and distances.
     pub fn surveyed(&self, lengths: &[StretchLength], survey: Survey) -> Result<Self, LayoutError> {
         let mut layout = Self { survey, ..self.clone() };
         for (stretch, known) in lengths.iter().enumerate() {
@@ -116,7 +114,7 @@ impl Layout {
     }
 }
 
-/// The distances of a survey by the hops they are of, in both directions.
+/// One standard deviation of each surveyed distance by its hop, in both directions.
 pub(super) fn surveyed_distances(layout: &Layout) -> Result<BTreeMap<HopId, Length>, LayoutError> {
     let mut known = BTreeMap::new();
     for (distance, entry) in layout.survey.distances.iter().enumerate() {
@@ -135,7 +133,7 @@ pub(super) fn surveyed_distances(layout: &Layout) -> Result<BTreeMap<HopId, Leng
                 let (from, to) = (entry.from.clone(), entry.to.clone());
                 return Err(LayoutError::NoDistance { distance, from, to });
             };
-            // Files keep lengths as people write them.
+            // Files contain rounded lengths.
             let off = (hop.length - entry.length).abs();
             if off.as_mm().is_nan() || off > Length::from_mm(1.0) {
                 let (found, edges) = (entry.length, hop.length);
@@ -160,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn an_edge_without_a_length_is_as_long_as_edges_usually_are_and_may_be_short() {
+    fn an_edge_without_a_length_has_the_usual_length_and_may_be_short() {
         let mut plan = oval_plan();
         plan.stretches[6].length = StretchLength::Unknown;
         let layout = Layout::build(&plan).unwrap();
@@ -190,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_distance_that_is_not_that_of_its_edges_is_refused() {
+    fn a_distance_that_is_not_the_sum_of_its_edges_is_rejected() {
         let layout = oval();
         let lengths: Vec<StretchLength> = layout.edges().step_by(2).map(|(_, edge)| edge.known).collect();
         let refusal = |given: SurveyedDistance| {

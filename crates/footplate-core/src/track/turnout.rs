@@ -1,4 +1,4 @@
-//! How turnouts lie, as far as anybody knows, and how a train needs them to lie.
+//! Known turnout positions, and the positions that a path needs.
 
 use alloc::vec::Vec;
 use core::fmt;
@@ -16,7 +16,7 @@ pub enum Leg {
 }
 
 impl Leg {
-    /// The leg named by the flag that events and command stations use.
+    /// The leg for the flag that events and command stations use.
     #[inline]
     #[must_use]
     pub const fn from_curved(curved: bool) -> Self {
@@ -40,35 +40,35 @@ impl fmt::Display for Leg {
     }
 }
 
-/// A turnout on a path, and the leg by which the path runs.
+/// A turnout on a path, and the leg that the path uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct TurnoutNeed {
     /// The turnout.
     pub turnout: TurnoutId,
-    /// The leg by which the way leaves or enters it.
+    /// The leg on which the path leaves or enters it.
     pub leg: Leg,
-    /// Whether it is met at its toe, so that it decides where the train goes. Otherwise the train comes from
-    /// the leg: it gets through however the turnout lies where points give way (as Märklin's do), but it
-    /// derails or does harm elsewhere.
+    /// Whether the train approaches it at its toe (facing), so that it decides the path. Otherwise the train trails it,
+    /// coming from the leg: it passes in either position if the points are sprung (as Märklin's are), but derails or
+    /// does damage elsewhere.
     pub facing: bool,
 }
 
-/// The leg for which each turnout lies, for those of which it is known.
+/// The position of each turnout whose position is known.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TurnoutStates {
-    /// By the turnout's number; what lies beyond the end is unknown.
+    /// By the turnout's number; turnouts beyond the end are unknown.
     legs: Vec<Option<Leg>>,
 }
 
 impl TurnoutStates {
-    /// Nothing is known: every way is open.
+    /// No position is known: every path is open.
     #[must_use]
     pub const fn unknown() -> Self {
         Self { legs: Vec::new() }
     }
 
-    /// Remembers for which leg a turnout lies. Allocates when a number is higher than any before it.
+    /// Sets the position of a turnout. Allocates if its number is the highest so far.
     pub fn set(&mut self, turnout: TurnoutId, leg: Leg) {
         let slot = usize::from(turnout.0);
         if self.legs.len() <= slot {
@@ -79,22 +79,22 @@ impl TurnoutStates {
         }
     }
 
-    /// Forgets how a turnout lies, because a command to it was lost or a train ran through it.
+    /// Forgets the position of a turnout, because its command was lost or a train ran through it.
     pub fn forget(&mut self, turnout: TurnoutId) {
         if let Some(known) = self.legs.get_mut(usize::from(turnout.0)) {
             *known = None;
         }
     }
 
-    /// The leg for which a turnout lies, or `None` while that is unknown.
+    /// The position of a turnout, or `None` while it is unknown.
     #[inline]
     #[must_use]
     pub fn get(&self, turnout: TurnoutId) -> Option<Leg> {
         self.legs.get(usize::from(turnout.0)).copied().flatten()
     }
 
-    /// Whether a train gets past the turnout as `need` says: always when it comes from a leg, and when the
-    /// turnout lies right or may lie right when it comes from the toe.
+    /// Whether a train can pass the turnout as `need` requires: always if it trails the turnout; if it faces it, only
+    /// if the position is right or unknown.
     #[inline]
     #[must_use]
     pub fn allow(&self, need: TurnoutNeed) -> bool {
@@ -125,7 +125,7 @@ mod tests {
         states.set(TurnoutId(6), Leg::Curved);
         assert!(!states.allow(need(Leg::Straight, true)));
         assert!(states.allow(need(Leg::Curved, true)));
-        assert!(states.allow(need(Leg::Straight, false)), "points give way to a train from the other leg");
+        assert!(states.allow(need(Leg::Straight, false)), "a train that trails the turnout moves the points");
 
         states.forget(TurnoutId(6));
         assert_eq!(states.get(TurnoutId(6)), None);

@@ -1,4 +1,4 @@
-//! Speed restrictions: zones of rail in which no part of any train shall be faster than a limit.
+//! Speed restrictions: zones of rail in which no part of a train may exceed a limit.
 
 use alloc::string::String;
 
@@ -6,23 +6,22 @@ use crate::ids::{EdgeId, StretchId};
 use crate::track::{Layout, LayoutError, MAX_NAME_CHARACTERS};
 use crate::units::Speed;
 
-/// The highest limit that is believed: eight times what 200 km/h come to at 1:87. What is written above it is in another
-/// unit, or no restriction.
+/// Highest plausible limit: about eight times 200 km/h at 1:87. A higher value is in another unit, or no restriction.
 pub const MAX_ZONE_LIMIT: Speed = Speed::from_mm_per_s(5_000.0);
-/// The lowest: slower than any train crawls it would close the track.
+/// Lowest limit: below the slowest speed of any train it would close the track.
 pub const MIN_ZONE_LIMIT: Speed = Speed::from_mm_per_s(1.0);
 
 /// A speed restriction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Zone {
-    /// What people call it.
+    /// Its name.
     pub name: String,
-    /// No part of a train that is in it shall be faster.
+    /// The speed that no part of a train in the zone may exceed.
     pub limit: Speed,
 }
 
 impl Layout {
-    /// The speed restrictions, in the order in which they were written.
+    /// The speed restrictions, in the order of the plan.
     #[must_use]
     pub fn zones(&self) -> &[Zone] {
         &self.zones
@@ -35,16 +34,10 @@ impl Layout {
         self.zones.get(*self.restricted.get(&edge.stretch())?)
     }
 
-    /// The greatest speed allowed along a way: the lowest limit of its edges. `None` if it is not restricted.
-    pub fn greatest_speed(&self, way: impl IntoIterator<Item = EdgeId>) -> Option<Speed> {
-        let limits = way.into_iter().filter_map(|edge| Some(self.zone(edge)?.limit));
-        limits.reduce(Speed::min)
-    }
-
     /// Restricts the speed on some stretches, in both directions. A stretch is in one zone at most.
     ///
     /// # Errors
-    /// What is wrong with the zone.
+    /// The invalid name, limit or stretch of the zone.
     pub fn with_zone(
         mut self,
         zone: Zone,
@@ -102,17 +95,16 @@ mod tests {
     }
 
     #[test]
-    fn a_way_allows_what_its_slowest_edge_allows_in_both_directions() {
+    fn a_zone_restricts_its_stretches_in_both_directions() {
         let plain = oval();
         let (siding, neck) = (edge(&plain, "BR1", "C1"), edge(&plain, "A1", "BR1"));
         let layout = plain
             .with_zone(zone("siding", 150.0), [siding.stretch()])
             .and_then(|layout| layout.with_zone(zone("neck", 200.0), [neck.stretch()]))
             .unwrap();
-        let limit = |way: &[EdgeId]| layout.greatest_speed(way.iter().copied()).map(Speed::as_mm_per_s);
-        assert_eq!(limit(&[neck, siding]), Some(150.0));
-        assert_eq!(limit(&[neck.twin()]), Some(200.0));
-        assert_eq!(limit(&[edge(&layout, "D1", "A1")]), None);
+        let limit = |edge| layout.zone(edge).map(|zone| zone.limit.as_mm_per_s());
+        assert_eq!([siding, neck.twin()].map(limit), [Some(150.0), Some(200.0)]);
+        assert_eq!(limit(edge(&layout, "D1", "A1")), None);
         assert_eq!(layout.zone(siding.twin()).unwrap().name, "siding");
         assert_eq!(
             layout.zones().iter().map(|zone| zone.name.as_str()).collect::<Vec<_>>(),
@@ -121,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_zone_is_refused_with_what_is_wrong_with_it() {
+    fn the_error_for_a_zone_names_its_fault() {
         let restricted = || oval().with_zone(zone("siding", 150.0), [StretchId(2)]).unwrap();
         let refusal = |wrong: Zone, stretches: &[u16]| {
             let stretches = stretches.iter().copied().map(StretchId);

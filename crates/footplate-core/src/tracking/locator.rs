@@ -33,18 +33,18 @@ pub(super) const LEAST_SPEED_M_PER_S: f64 = 0.005;
 
 /// A place on the path of a train, in path lengths.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WayPoint {
+pub struct PathPoint {
     /// The node of the sensor from which it counts.
     pub node: NodeId,
-    /// Distance past it, along the path as the turnouts lie.
-    pub way: Length,
+    /// Distance past it, along the path over the turnouts as set.
+    pub distance: Length,
 }
 
 /// Position and speed of a train, with their uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Located {
     /// The most likely place of its pickup.
-    pub at: WayPoint,
+    pub at: PathPoint,
     /// One standard deviation of the distance.
     pub uncertainty: Length,
     /// Its speed.
@@ -61,13 +61,21 @@ pub struct Located {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rest {
     /// The most likely place.
-    pub at: WayPoint,
+    pub at: PathPoint,
     /// One standard deviation of what is unknown: the present place and the stopping distance.
     pub doubt: Length,
     /// One standard deviation of single stops, which no further measurement reduces.
     pub scatter: Length,
     /// When it is predicted to be at rest, at the latest.
     pub time: Timestamp,
+}
+
+impl Rest {
+    /// One standard deviation of the place.
+    #[must_use]
+    pub fn deviation(&self) -> Length {
+        Length::from_m(libm::hypot(self.doubt.as_m(), self.scatter.as_m()))
+    }
 }
 
 /// The next sensor and when its detection is due.
@@ -148,9 +156,9 @@ impl Locator {
     }
 
     /// The train is at rest here, within one standard deviation: placed by hand or measured with a tape.
-    pub fn place(&mut self, now: Timestamp, at: WayPoint, uncertainty: Length) {
+    pub fn place(&mut self, now: Timestamp, at: PathPoint, uncertainty: Length) {
         let sd = uncertainty.as_m();
-        let place = Gaussian { mean: at.way.as_m(), variance: sd * sd };
+        let place = Gaussian { mean: at.distance.as_m(), variance: sd * sd };
         self.filter = MotionFilter::at_rest(self.seconds(now), place);
         self.node = Some(at.node);
     }
@@ -308,7 +316,7 @@ impl Locator {
         let node = self.node?;
         let time = self.seconds(at);
         let place = self.filter.place(model, time);
-        let here = WayPoint { node, way: Length::from_m(place.mean) };
+        let here = PathPoint { node, distance: Length::from_m(place.mean) };
         let taping = taping_doubt(context, model, here);
         let speed = self.filter.speed(model, time);
         let at_rest = self.filter.at(model, time).rests_at(time);
@@ -423,7 +431,7 @@ impl Locator {
         let node = self.node?;
         filter.stop_on(self.stops_on(context, model, &filter));
         let (place, scatter, time) = filter.rest(model)?;
-        let at = WayPoint { node, way: Length::from_m(place.mean) };
+        let at = PathPoint { node, distance: Length::from_m(place.mean) };
         let taping = taping_doubt(context, model, at);
         Some(Rest {
             at,

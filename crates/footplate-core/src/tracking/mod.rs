@@ -33,9 +33,9 @@ mod train_forecaster;
 
 pub use drift_test::{Drift, DriftTest};
 pub use forecast::{Forecast, Phase};
-pub use locator::{DueContact, Located, Locator, PassedContact, Rest, WayPoint};
+pub use locator::{DueContact, Located, Locator, PassedContact, PathPoint, Rest};
 pub(crate) use motion_filter::INTERRUPTED;
-pub use path_length::{landmark_of, place_of, way_to, way_to_landmark};
+pub use path_length::{distance_to, distance_to_landmark, landmark_of, place_of};
 pub use predictor::{Hit, Predictor, Verdict};
 pub(crate) use reachable_set::ReachableSet;
 pub(crate) use rollout::Rollout;

@@ -1,6 +1,6 @@
 //! Path lengths: from sensor to sensor, to a place on the layout, and back.
 
-use super::locator::WayPoint;
+use super::locator::PathPoint;
 use super::track_context::TrackContext;
 use crate::ids::{NodeId, SensorId};
 use crate::linalg::Gaussian;
@@ -69,7 +69,12 @@ pub(super) fn path_reaches<'g>(
 /// The path length from a waypoint's node to a place on the layout, as the turnouts lie; `None` if no path leads there within
 /// one lap.
 #[must_use]
-pub fn way_to(context: TrackContext<'_>, model: &MotionModel, from: NodeId, to: Position) -> Option<Length> {
+pub fn distance_to(
+    context: TrackContext<'_>,
+    model: &MotionModel,
+    from: NodeId,
+    to: Position,
+) -> Option<Length> {
     let mut way = Length::ZERO;
     for (count, hop) in context.hops_ahead(from).take(MOST_HOPS).enumerate() {
         if count > 0 && hop.from == from {
@@ -109,7 +114,7 @@ pub(super) fn taped_length(context: TrackContext<'_>, model: &MotionModel, hop: 
 /// The path length from a waypoint's node to a landmark ahead: so many millimetres past the sensor of its name, whatever the
 /// survey has for the rest of the hop. `None` if no path leads there within one lap.
 #[must_use]
-pub fn way_to_landmark(
+pub fn distance_to_landmark(
     context: TrackContext<'_>,
     model: &MotionModel,
     from: NodeId,
@@ -117,7 +122,7 @@ pub fn way_to_landmark(
 ) -> Option<Length> {
     let Some((base, before)) = way_to_node(context, model, from, to.node) else {
         let position = context.layout.locate(to, context.turnouts).ok()?;
-        return way_to(context, model, from, position);
+        return distance_to(context, model, from, position);
     };
     if to.offset < Length::ZERO {
         return Some(base + to.offset * before);
@@ -162,22 +167,22 @@ fn way_to_node(
 /// A point of the path as people name it and measure it with a tape: from the last sensor before it. Whole laps do not change
 /// the place.
 #[must_use]
-pub fn landmark_of(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> Landmark {
+pub fn landmark_of(context: TrackContext<'_>, model: &MotionModel, at: PathPoint) -> Landmark {
     let [landmark, _] = taped(context, model, at);
     landmark
 }
 
 /// Standard deviation of a point of the path as people name it (m), for a train that knows its position exactly: past a sensor
 /// the ratio of path length to taped length is uncertain.
-pub(super) fn taping_doubt(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> f64 {
+pub(super) fn taping_doubt(context: TrackContext<'_>, model: &MotionModel, at: PathPoint) -> f64 {
     let [_, doubt] = taped(context, model, at);
     doubt.offset.as_m()
 }
 
 /// The landmark of a point on the path, and one standard deviation of its offset in the same form.
-fn taped(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> [Landmark; 2] {
+fn taped(context: TrackContext<'_>, model: &MotionModel, at: PathPoint) -> [Landmark; 2] {
     let mut from = at.node;
-    let mut left = at.way.as_m();
+    let mut left = at.distance.as_m();
     for hop in context.hops_ahead(at.node).take(MOST_HOPS) {
         let felt = hop_length(context, model, &hop).mean;
         if left > felt && hop.sensor.is_some() {
@@ -200,8 +205,8 @@ fn part(of: Length, whole: Length) -> f64 {
 
 /// The place on the layout of a point on the path, as the turnouts lie; for a point behind its node, the node.
 #[must_use]
-pub fn place_of(context: TrackContext<'_>, model: &MotionModel, at: WayPoint) -> Option<Position> {
-    let mut left = at.way.max(Length::ZERO);
+pub fn place_of(context: TrackContext<'_>, model: &MotionModel, at: PathPoint) -> Option<Position> {
+    let mut left = at.distance.max(Length::ZERO);
     for hop in context.hops_ahead(at.node).take(MOST_HOPS) {
         let [felt, _] = model.length(context.sections, &hop);
         if left > felt && hop.sensor.is_some() {

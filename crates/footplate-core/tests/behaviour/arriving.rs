@@ -4,7 +4,7 @@
 use footplate_core::control::{Driver, Notice, Order, Refusal};
 use footplate_core::{TimeSpan, TrainId};
 
-use crate::toy_railway::{ToyRailway, driver_of_both_ways as driver_of, step};
+use crate::toy_railway::{ToyRailway, driver_for_both_approaches as driver_of, step};
 
 const TRAIN: TrainId = TrainId(24);
 

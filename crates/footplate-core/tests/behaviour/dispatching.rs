@@ -8,7 +8,7 @@ use footplate_core::control::{
 };
 use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg, Position, TurnoutStates};
-use footplate_core::tracking::WayPoint;
+use footplate_core::tracking::PathPoint;
 use footplate_core::{Command, EdgeId, Length, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
 use proptest::collection::vec;
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
@@ -60,7 +60,12 @@ impl Traffic {
         for (train, (name, mm)) in TRAINS.into_iter().zip(starts) {
             let node = world.layout.node_named(name).expect("a node");
             driver.add_train(model(train));
-            driver.place(world.now, train, WayPoint { node, way: Length::from_mm(mm) }, Length::from_mm(2.0));
+            driver.place(
+                world.now,
+                train,
+                PathPoint { node, distance: Length::from_mm(mm) },
+                Length::from_mm(2.0),
+            );
             world.put(train.0, name, mm);
         }
         let mut dispatcher = dispatch(world.now, driver);
@@ -93,8 +98,9 @@ impl Traffic {
     /// Every commanded turnout is reserved for exactly one train.
     fn check_turnout(&mut self, command: Command) {
         let Command::Turnout { turnout, .. } = command else { return };
-        let has_reserved =
-            |train: &&TrainId| self.dispatcher.holds(**train).is_some_and(|reserved| reserved.takes(turnout));
+        let has_reserved = |train: &&TrainId| {
+            self.dispatcher.reservation(**train).is_some_and(|reserved| reserved.takes(turnout))
+        };
         if TRAINS.iter().filter(has_reserved).count() != 1 {
             self.wrongs
                 .push(format!("turnout {turnout} was thrown without being reserved for exactly one train"));
@@ -133,7 +139,7 @@ impl Traffic {
 
     /// The track under each train is reserved for it, and no track is reserved twice.
     fn check_reservations(&mut self) {
-        let [one, two] = TRAINS.map(|train| self.dispatcher.holds(train).expect("dispatched"));
+        let [one, two] = TRAINS.map(|train| self.dispatcher.reservation(train).expect("dispatched"));
         let mut wrongs = Vec::new();
         if one.meets(two) {
             wrongs.push("two trains hold the same track".to_owned());
@@ -301,7 +307,12 @@ fn no_train_is_dispatched_while_the_position_of_another_is_unknown() {
     let mut driver = Driver::new(traffic.world.layout.clone(), straight());
     TRAINS.into_iter().for_each(|train| driver.add_train(model(train)));
     let node = traffic.world.layout.node_named("D1").expect("a node");
-    driver.place(traffic.world.now, TRAINS[0], WayPoint { node, way: Length::ZERO }, Length::from_mm(2.0));
+    driver.place(
+        traffic.world.now,
+        TRAINS[0],
+        PathPoint { node, distance: Length::ZERO },
+        Length::from_mm(2.0),
+    );
     let mut dispatcher = Dispatcher::new(traffic.world.now, driver);
     let journey = Journey::to(traffic.world.layout.landmark("C1+150mm").expect("a place"));
     let [known, other] = TRAINS;
@@ -324,7 +335,7 @@ fn a_journey_goes_on_after_a_person_switched_the_power_off_and_on() {
     assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
 }
 
-/// The same two trains, where nobody has set any turnout.
+/// The same two trains with all turnouts unknown.
 fn with_unknown_turnouts(starts: [(&str, f64); 2]) -> Traffic {
     Traffic::with(
         |now, driver| {
@@ -341,7 +352,7 @@ fn with_unknown_turnouts(starts: [(&str, f64); 2]) -> Traffic {
 }
 
 #[test]
-fn turnouts_that_nobody_has_set_are_set_for_a_journey() {
+fn unknown_turnouts_are_set_for_a_journey() {
     let mut traffic = with_unknown_turnouts([("A1", 50.0), ("B1", 300.0)]);
     traffic.go(TRAINS[0], "C1+100mm");
     traffic.run(60.0);

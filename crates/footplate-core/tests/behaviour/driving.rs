@@ -4,7 +4,7 @@
 
 use footplate_core::control::{Aim, Driver, Notice, Order, Refusal, StopOrder};
 use footplate_core::link::TimeModel;
-use footplate_core::tracking::WayPoint;
+use footplate_core::tracking::PathPoint;
 use footplate_core::{Command, Length, Ratio, SensorId, TimeSpan, TrainId, TurnoutId};
 
 use crate::toy_railway::{ToyRailway, driver_of, known_model, step, straight};
@@ -212,7 +212,8 @@ fn a_train_keeps_its_end_of_authority_whatever_is_ordered_or_reported() {
         if is_deaf {
             world.dead.extend(world.layout.sensors().map(|(sensor, _)| sensor));
         }
-        let limit = WayPoint { node: stop_at(&driver, "D1").target.node, way: Length::from_mm(2_000.0) };
+        let limit =
+            PathPoint { node: stop_at(&driver, "D1").target.node, distance: Length::from_mm(2_000.0) };
         driver.set_end_of_authority(world.now, TRAIN, Some(limit));
         driver.order(world.now, Order::Speed { train: TRAIN, step: step(throttle) }).expect("a step");
         world.run(&mut driver, 40.0);
@@ -239,7 +240,7 @@ fn a_stop_beyond_the_end_of_authority_ends_before_it() {
     driver.set_end_of_authority(
         world.now,
         TRAIN,
-        Some(WayPoint { node: stop_at(&driver, "D1").target.node, way: Length::from_mm(1_100.0) }),
+        Some(PathPoint { node: stop_at(&driver, "D1").target.node, distance: Length::from_mm(1_100.0) }),
     );
     driver.order(world.now, Order::Stop(stop)).expect("a path leads there");
     world.run(&mut driver, 20.0);

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 use footplate_core::control::{Aim, Driver, Machine, Notice, Order, Output, Refusal, StopOrder};
 use footplate_core::model::MotionModel;
 use footplate_core::track::Landmark;
-use footplate_core::tracking::WayPoint;
+use footplate_core::tracking::PathPoint;
 use footplate_core::{
     Command, Event, EventKind, Length, NodeId, Ratio, Report, SensorId, Speed, SpeedStep, TimeSpan,
     Timestamp, TrainId, TurnoutId,
@@ -146,7 +146,7 @@ proptest! {
                     driver.handle_timeout(now);
                 }
                 Happening::Placed(node, mm) => {
-                    let at = WayPoint { node: NodeId(node), way: Length::from_mm(mm) };
+                    let at = PathPoint { node: NodeId(node), distance: Length::from_mm(mm) };
                     driver.place(now, TrainId(24), at, Length::from_mm(5.0));
                 }
             }

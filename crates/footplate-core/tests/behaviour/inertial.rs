@@ -222,7 +222,7 @@ proptest! {
             let [least, most] = bounds.bias().map(Acceleration::as_m_per_s2);
             prop_assert!(least <= bias && bias <= most, "{least} to {most}, is {bias}");
         }
-        // A minute with at most 0.62 m/s² either way, where 2.6 m/s² are what the train can do.
+        // A minute with at most 0.62 m/s² in either direction, where 2.6 m/s² are what the train can do.
         let [low, high] = bounds.speed().unwrap();
         prop_assert!((high - low).as_m_per_s() < 2.0 * (0.62 * 60.0 + 0.9 + 0.5));
     }

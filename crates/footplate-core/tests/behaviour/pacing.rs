@@ -6,7 +6,7 @@ use footplate_core::control::{Driver, Notice, Order, PacedLine, Refusal};
 use footplate_core::{Command, Speed, TimeSpan, Timestamp, TrainId};
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 
-use crate::toy_railway::{ToyRailway, driver_of_both_ways as driver_of, step};
+use crate::toy_railway::{ToyRailway, driver_for_both_approaches as driver_of, step};
 
 const TRAIN: TrainId = TrainId(24);
 
@@ -81,7 +81,7 @@ fn another_order_ends_pacing() {
     assert!(world.train().speed_mm_per_s == 0.0 && driver.busy(TRAIN).is_none());
     let count = commanded(&world).len();
     world.run(&mut driver, 20.0);
-    assert_eq!(commanded(&world).len(), count, "nothing is commanded to a train that should stand");
+    assert_eq!(commanded(&world).len(), count, "nothing is commanded to a train that should be at rest");
 }
 
 proptest! {

@@ -182,9 +182,9 @@ fn a_change_of_speed_has_its_exact_distance() {
     // From 10 m/s at a 1 m/s² to standstill: it comes to 10.5 m/s first.
     let stop = SCurve::to_speed(state(5.0, 10.0, 1.0), Speed::ZERO, limits).unwrap();
     assert_eq!(shape(stop.stretches()), [Accelerating, Decelerating]);
-    let same_by_way =
+    let same_by_distance =
         SCurve::between(state(5.0, 10.0, 1.0), at_rest(5.0 + stop.distance().as_m()), limits).unwrap();
-    assert!((stop.duration() - same_by_way.duration()).abs() < TimeSpan::from_us(1));
+    assert!((stop.duration() - same_by_distance.duration()).abs() < TimeSpan::from_us(1));
 }
 
 #[test]
@@ -210,9 +210,9 @@ fn impossible_profiles_are_rejected_with_possible_values() {
     assert_eq!(near.to_string(), "the target is 20 m ahead, and it takes 35 m to get to its speed");
     let fast = refusal(at_rest(0.0), state(50.0, 11.0, 0.0), wide);
     assert!(matches!(fast, ProfileError::TargetSpeed { .. }));
-    assert!(matches!(refusal(state(0.0, -1.0, 0.0), at_rest(5.0), wide), ProfileError::RunsAway { .. }));
+    assert!(matches!(refusal(state(0.0, -1.0, 0.0), at_rest(5.0), wide), ProfileError::MovesAway { .. }));
     assert!(matches!(refusal(state(0.0, 5.0, 1.5), at_rest(50.0), wide), ProfileError::BeyondLimits { .. }));
-    assert!(matches!(refusal(state(0.0, 0.5, -1.5), at_rest(50.0), wide), ProfileError::StandsFirst { .. }));
+    assert!(matches!(refusal(state(0.0, 0.5, -1.5), at_rest(50.0), wide), ProfileError::AtRestFirst { .. }));
     assert!(matches!(
         refusal(at_rest(0.0), state(5.0, 0.0, 0.1), wide),
         ProfileError::TargetAcceleration { .. }
@@ -261,7 +261,7 @@ fn feasible<P>(
                 Err(refused) => panic!("{refused} from {from:?} to {to:?}, as far as had been asked for"),
             }
         }
-        Err(ProfileError::StandsFirst { .. }) => None,
+        Err(ProfileError::AtRestFirst { .. }) => None,
         Err(refused) => panic!("{refused} from {from:?} to {to:?}"),
     }
 }

@@ -6,7 +6,7 @@ use footplate_core::control::{Driver, Gap, Machine, Notice, Order, Refusal, Stop
 use footplate_core::track::Zone;
 use footplate_core::{Command, EdgeId, Length, Speed, SpeedStep, TimeSpan, TrainId};
 
-use crate::toy_railway::{ToyRailway, add_train, driver_of_both_ways as driver_of, step};
+use crate::toy_railway::{ToyRailway, add_train, driver_for_both_approaches as driver_of, step};
 
 const TRAIN: TrainId = TrainId(24);
 /// Default lengths of a train ahead of and behind its pickup (mm).

@@ -352,7 +352,7 @@ pub(crate) fn known_model(train: u16) -> MotionModel {
 }
 
 /// The same after some more minutes, in which every step was reached from below and from above.
-pub(crate) fn known_model_both_ways(train: u16) -> MotionModel {
+pub(crate) fn known_model_both_approaches(train: u16) -> MotionModel {
     let up_and_down: Vec<u8> = (3..=14).chain((3..14).rev()).collect();
     known_after(train, &up_and_down)
 }
@@ -394,11 +394,11 @@ fn known_after(train: u16, steps: &[u8]) -> MotionModel {
     fit.model().clone()
 }
 
-/// A driver of train 24 with the model of [`known_model_both_ways`].
-pub(crate) fn driver_of_both_ways(world: &ToyRailway, node: &str, mm: f64) -> Driver {
+/// A driver of train 24 with the model of [`known_model_both_approaches`].
+pub(crate) fn driver_for_both_approaches(world: &ToyRailway, node: &str, mm: f64) -> Driver {
     static MODEL: OnceLock<MotionModel> = OnceLock::new();
     let mut driver = driver_of(world, node, mm);
-    driver.set_model(MODEL.get_or_init(|| known_model_both_ways(24)).clone());
+    driver.set_model(MODEL.get_or_init(|| known_model_both_approaches(24)).clone());
     driver
 }
 
@@ -409,7 +409,7 @@ pub(crate) fn add_train(driver: &mut Driver, world: &ToyRailway, train: u16, pla
     driver.add_train(MotionModel::from_numbers(&numbers).expect("the same numbers"));
     if let Some((node, mm)) = place {
         let node = world.layout.node_named(node).expect("a node");
-        let at = footplate_core::tracking::WayPoint { node, way: Length::from_mm(mm) };
+        let at = footplate_core::tracking::PathPoint { node, distance: Length::from_mm(mm) };
         driver.place(world.now, TrainId(train), at, Length::from_mm(2.0));
     }
 }
@@ -422,7 +422,7 @@ pub(crate) fn driver_of(world: &ToyRailway, node: &str, mm: f64) -> Driver {
     let train = model.train();
     driver.add_train(model);
     let node = world.layout.node_named(node).expect("a node");
-    let at = footplate_core::tracking::WayPoint { node, way: Length::from_mm(mm) };
+    let at = footplate_core::tracking::PathPoint { node, distance: Length::from_mm(mm) };
     driver.place(world.now, train, at, Length::from_mm(2.0));
     driver
 }

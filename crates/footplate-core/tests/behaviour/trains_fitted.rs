@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use footplate_core::link::ContactWindow;
 use footplate_core::model::MotionModel;
 use footplate_core::model::survey::SectionIndex;
-use footplate_core::tracking::{Locator, TrackContext, WayPoint};
+use footplate_core::tracking::{Locator, PathPoint, TrackContext};
 use footplate_core::{Approach, Command, EventKind, Length, Speed, TimeSpan, TrainId};
 
 use crate::toy_railway::{ToyRailway, known_model, step, straight};
@@ -67,7 +67,7 @@ fn the_rest_predicted_at_the_command_contains_the_true_one() {
     let context = TrackContext { layout: &layout, sections: &sections, turnouts: &turnouts };
     let mut locator = Locator::new(TRAIN);
     let node = layout.node_named("D1").unwrap();
-    locator.place(world.now, WayPoint { node, way: Length::from_mm(300.0) }, Length::from_mm(3.0));
+    locator.place(world.now, PathPoint { node, distance: Length::from_mm(300.0) }, Length::from_mm(3.0));
     world.command(Command::Speed { train: TRAIN, step: step(8) });
     let follow = |world: &mut ToyRailway, locator: &mut Locator, seconds: f64| {
         let (mut inside, mut ticks) = (0, 0);
@@ -105,7 +105,7 @@ fn the_rest_predicted_at_the_command_contains_the_true_one() {
     assert!(follow(&mut world, &mut locator, 6.0) > 0.95);
     // the distance run is within the predicted interval.
     let ran = world.train().travelled_mm - before;
-    let predicted = (rest.at.way - here.at.way).as_mm();
+    let predicted = (rest.at.distance - here.at.distance).as_mm();
     let deviation = rest.doubt.as_mm().hypot(rest.scatter.as_mm());
     assert!(
         (ran - predicted).abs() < 3.0 * deviation,
@@ -125,7 +125,7 @@ fn a_report_behind_a_lost_reply_counts_by_its_real_width() {
         let layout = world.layout.clone();
         let context = TrackContext { layout: &layout, sections: &sections, turnouts: &turnouts };
         let mut locators = [Locator::new(TRAIN), Locator::new(TRAIN)];
-        let at = WayPoint { node: layout.node_named("D1").unwrap(), way: Length::from_mm(300.0) };
+        let at = PathPoint { node: layout.node_named("D1").unwrap(), distance: Length::from_mm(300.0) };
         for locator in &mut locators {
             locator.place(world.now, at, Length::from_mm(3.0));
         }

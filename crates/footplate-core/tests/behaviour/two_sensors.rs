@@ -92,7 +92,7 @@ fn an_undecided_scenario_is_reported() {
 fn a_change_too_quick_or_too_slow_to_see_is_not_measured() {
     assert_eq!(run(1000.0, 2.505, 200.0, 400.0, 0.0).verdict(), Ok(TwoSensorVerdict::TooQuick));
     assert_eq!(run(200.0, 0.998, 200.0, 400.0, 0.0).verdict(), Ok(TwoSensorVerdict::NotNoticed));
-    // Shorter than at the final speed all the way: no acceleration explains that.
+    // Shorter than at the final speed over the whole distance: no acceleration explains that.
     assert_eq!(run(1000.0, 2.0, 200.0, 400.0, 0.0).verdict(), Ok(TwoSensorVerdict::TooQuick));
     assert_eq!(run(1000.0, 6.0, 200.0, 400.0, 0.0).verdict(), Ok(TwoSensorVerdict::NotNoticed));
 }

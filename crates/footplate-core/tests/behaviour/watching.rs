@@ -39,7 +39,7 @@ impl Watched {
 
     fn asking() -> Self {
         let mut watched = Self::one();
-        watched.dog.ask_before_crawling();
+        watched.dog.ask_before_creeping();
         watched.go(FIRST, 8);
         watched.run(6.0);
         watched.dog.distrust(watched.world.now, FIRST);
@@ -101,7 +101,7 @@ impl Watched {
     fn put_first_down(&mut self) {
         self.world.put(24, "D1", 100.0);
         let node = self.world.layout.node_named("D1").expect("a node");
-        let at = footplate_core::tracking::WayPoint { node, way: Length::from_mm(100.0) };
+        let at = footplate_core::tracking::PathPoint { node, distance: Length::from_mm(100.0) };
         self.dog.place(self.world.now, FIRST, at, Length::from_mm(3.0));
     }
 
@@ -435,7 +435,7 @@ proptest! {
                 }
                 Happening::Link(news) => dog.handle_link(now, news),
                 Happening::Placed(node, mm) => {
-                    let at = footplate_core::tracking::WayPoint { node: NodeId(node), way: Length::from_mm(mm) };
+                    let at = footplate_core::tracking::PathPoint { node: NodeId(node), distance: Length::from_mm(mm) };
                     dog.place(now, FIRST, at, Length::from_mm(5.0));
                     // The end of the last danger releases the other trains.
                     must_stand.retain(|train| dog.is_held(*train));

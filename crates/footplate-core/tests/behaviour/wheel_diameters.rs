@@ -7,13 +7,13 @@ use proptest::prelude::*;
 
 use crate::draw::Draw;
 
-const BELIEVED_M: f64 = 0.86;
+const ASSUMED_M: f64 = 0.86;
 const TEETH: u32 = 80;
 
 fn wheelset(tolerance: f64) -> Wheelset {
     Wheelset {
         teeth: TEETH,
-        diameter: Length::from_m(BELIEVED_M),
+        diameter: Length::from_m(ASSUMED_M),
         diameter_tolerance: tolerance,
         axle: Axle::Powered,
     }
@@ -43,10 +43,10 @@ impl Rails {
     }
 
     fn counted(&self) -> [Length; 2] {
-        let believed_pitch = core::f64::consts::PI * BELIEVED_M / f64::from(TEETH);
+        let assumed_pitch = core::f64::consts::PI * ASSUMED_M / f64::from(TEETH);
         let counted = |turned: f64, scale: f64| {
             // A larger wheel turns less; whole pulses only.
-            Length::from_m((turned / (believed_pitch * scale)).floor() * believed_pitch)
+            Length::from_m((turned / (assumed_pitch * scale)).floor() * assumed_pitch)
         };
         let ([first_turned, second_turned], [first_scale, second_scale]) = (self.turned_m, self.scales);
         [counted(first_turned, first_scale), counted(second_turned, second_scale)]
@@ -232,7 +232,7 @@ fn balises_of_one_group_do_not_end_a_pair() {
     }
     rails.roll(&mut learner, 1440.0, false);
     assert_eq!(rails.pass(&mut learner, 0.0), PairVerdict::Accepted);
-    assert!((learner.diameters()[0].value.as_m() - 1.006 * BELIEVED_M).abs() < 1e-3);
+    assert!((learner.diameters()[0].value.as_m() - 1.006 * ASSUMED_M).abs() < 1e-3);
 }
 
 #[test]

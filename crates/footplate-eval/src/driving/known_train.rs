@@ -6,7 +6,7 @@
 
 use anyhow::{Context, anyhow};
 use footplate_core::model::{MotionModel, StepUse};
-use footplate_core::tracking::{Locator, TrackContext, WayPoint};
+use footplate_core::tracking::{Locator, PathPoint, TrackContext};
 use footplate_core::{Approach, Event, EventKind, Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{Law, Train, Truth};
 
@@ -139,10 +139,10 @@ fn distance_after_start(context: TrackContext<'_>, model: &MotionModel, step: Sp
     let train = model.train();
     let (_, node) = context.layout.sensors().next()?;
     let mut locator = Locator::new(train);
-    locator.place(Timestamp::ZERO, WayPoint { node, way: Length::ZERO }, Length::ZERO);
+    locator.place(Timestamp::ZERO, PathPoint { node, distance: Length::ZERO }, Length::ZERO);
     let command = Event { time: Timestamp::ZERO, kind: EventKind::Speed { train, step } };
     locator.handle_command(context, model, &command);
-    Some(locator.locate(context, model, Timestamp::ZERO + STARTED)?.at.way)
+    Some(locator.locate(context, model, Timestamp::ZERO + STARTED)?.at.distance)
 }
 
 /// Path lengths of hops for this train, by section.

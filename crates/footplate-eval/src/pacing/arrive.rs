@@ -159,7 +159,7 @@ impl Trip<'_, '_> {
     fn target(&mut self, far: f64, from_rest: bool) -> Option<(Landmark, f64)> {
         let located = self.counted.driver().locate(self.train, self.now())?;
         let mut at = self.way.nodes.iter().position(|node| *node == located.at.node)?;
-        let mut way = -located.at.way.as_mm();
+        let mut way = -located.at.distance.as_mm();
         loop {
             let node = *self.way.nodes.get(at)?;
             let length = self.layout.open_hops_from(node, &self.stage.turnouts).next()?.length.as_mm();

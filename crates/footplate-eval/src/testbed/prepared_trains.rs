@@ -6,7 +6,7 @@ use anyhow::Context;
 use footplate_core::control::{Driver, Machine};
 use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg, Position, TurnoutStates};
-use footplate_core::tracking::WayPoint;
+use footplate_core::tracking::PathPoint;
 use footplate_core::{Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::living::{End, LivingLayout, LivingSwitches, VirtualStation};
 
@@ -29,7 +29,7 @@ pub struct PreparedTrains<'l> {
     /// The turnout positions: all straight at first.
     pub turnouts: TurnoutStates,
     /// Where trains were put.
-    places: BTreeMap<TrainId, WayPoint>,
+    places: BTreeMap<TrainId, PathPoint>,
 }
 
 impl<'l> PreparedTrains<'l> {
@@ -117,7 +117,7 @@ impl<'l> PreparedTrains<'l> {
         let at = footplate_core::track::Landmark { node, offset };
         let position = self.layout.locate(at, &self.turnouts)?;
         self.line.station.world_mut().place(train, position, End::Nose)?;
-        self.places.insert(train, WayPoint { node, way: offset });
+        self.places.insert(train, PathPoint { node, distance: offset });
         Ok(())
     }
 
@@ -176,7 +176,7 @@ mod tests {
             assert_eq!(located.at.node, node);
             let sensor = layout.sensor_at(node).expect("a sensor");
             let past = prepared.world().truth().felt_past(train, sensor).expect("near");
-            assert!((past - located.at.way).abs() < Length::from_mm(30.0), "{past:?}");
+            assert!((past - located.at.distance).abs() < Length::from_mm(30.0), "{past:?}");
             assert!(driver.is_at_rest(train, prepared.line.now()));
         }
     }

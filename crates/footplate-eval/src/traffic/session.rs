@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::bail;
 use footplate_core::control::{Dispatcher, Finished, Journey, Notice, Span, TrainLengths};
 use footplate_core::track::{Landmark, Layout, Position};
-use footplate_core::tracking::WayPoint;
+use footplate_core::tracking::PathPoint;
 use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LivingLayout, LivingSwitches, Mishap};
 use footplate_wire::LinkNotice;
@@ -132,7 +132,7 @@ impl<'l> Session<'l> {
                     continue;
                 }
                 let dispatcher = dispatcher(&rehearsal, asked.by_blocks);
-                let holds = |train: &TrainId| dispatcher.holds(*train);
+                let holds = |train: &TrainId| dispatcher.reservation(*train);
                 let is_apart = trains[..nth].iter().all(|other| {
                     holds(other).zip(holds(&trains[nth])).is_some_and(|(one, two)| !one.meets(two))
                 });
@@ -255,7 +255,7 @@ impl<'l> Session<'l> {
         let sensors: Vec<NodeId> = self.layout.sensors().map(|(_, node)| node).collect();
         for _ in 0..TRIES {
             let Some(node) = self.choice.of(&sensors).copied() else { return };
-            let length = self.layout.ways(node).edges().next().and_then(|edge| self.layout.edge(edge));
+            let length = self.layout.outgoing(node).edges().next().and_then(|edge| self.layout.edge(edge));
             let offset =
                 Length::from_mm(self.choice.between(0.0, length.map_or(0.0, |edge| edge.length.as_mm())));
             let journey = Journey::to(Landmark { node, offset });
@@ -358,7 +358,7 @@ pub fn is_on_reserved_track(
     train: TrainId,
 ) -> bool {
     let truth = world.truth();
-    let Some(held) = dispatcher.holds(train) else { return false };
+    let Some(held) = dispatcher.reservation(train) else { return false };
     truth.under(train).all(|(id, part)| {
         let Some(edge) = layout.edge(id) else { return false };
         let scale = edge.length.as_mm() / truth.track().length(id).as_mm().max(1e-9);
@@ -374,12 +374,12 @@ pub fn is_on_reserved_track(
 
 /// Where a person who looks at a train would say that it is, in lengths of the surveyed layout.
 #[must_use]
-pub fn place_by_hand(layout: &Layout, world: &LivingLayout<'_>, train: TrainId) -> Option<WayPoint> {
+pub fn place_by_hand(layout: &Layout, world: &LivingLayout<'_>, train: TrainId) -> Option<PathPoint> {
     let truth = world.truth();
     let position = truth.train(train)?.position?;
     let edge = layout.edge(position.edge)?;
     let scale = edge.length.as_mm() / truth.track().length(position.edge).as_mm().max(1e-9);
-    Some(WayPoint { node: edge.from, way: position.offset * scale })
+    Some(PathPoint { node: edge.from, distance: position.offset * scale })
 }
 
 fn dispatcher(rehearsal: &PreparedTrains<'_>, by_blocks: bool) -> Dispatcher {

@@ -252,7 +252,7 @@ impl Ride<'_, '_> {
     fn target_at(&self, far: f64) -> Option<Landmark> {
         let located = self.driver.locate(self.train, self.stage.line.now())?;
         let mut at = self.way.nodes.iter().position(|node| *node == located.at.node)?;
-        let mut way = -located.at.way.as_mm();
+        let mut way = -located.at.distance.as_mm();
         loop {
             let node: NodeId = *self.way.nodes.get(at)?;
             let length = self.layout.open_hops_from(node, &self.stage.turnouts).next()?.length.as_mm();

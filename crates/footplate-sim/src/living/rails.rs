@@ -1,6 +1,6 @@
 //! The true rails of a whole layout, edge by edge, ready to be run over.
 
-use footplate_core::track::{Layout, Leg, NodeKind, Ways};
+use footplate_core::track::{Layout, Leg, NodeKind, OutgoingEdges};
 use footplate_core::{EdgeId, NodeId, SensorId, TurnoutId};
 
 use crate::physics_range::PhysicsRange;
@@ -72,7 +72,7 @@ impl<'l> Rails<'l> {
             .collect();
         for (sensor, node) in layout.sensors() {
             let offset_mm = track.sensor_offset(sensor).as_mm();
-            let after = if offset_mm >= 0.0 { layout.ways(node).edges().next() } else { None };
+            let after = if offset_mm >= 0.0 { layout.outgoing(node).edges().next() } else { None };
             if let Some(rail) = after.and_then(|edge| rails.get_mut(usize::from(edge.0))) {
                 rail.contacts.push((offset_mm.min(rail.length_mm), sensor));
                 continue;
@@ -107,9 +107,11 @@ impl<'l> Rails<'l> {
 }
 
 fn ahead(layout: &Layout, node: NodeId) -> Ahead {
-    match (layout.ways(node), turnout_at(layout, node)) {
-        (Ways::Ahead(edge), _) => Ahead::Edge(edge),
-        (Ways::Legs { straight, curved }, Some(turnout)) => Ahead::Points { turnout, straight, curved },
+    match (layout.outgoing(node), turnout_at(layout, node)) {
+        (OutgoingEdges::Ahead(edge), _) => Ahead::Edge(edge),
+        (OutgoingEdges::Legs { straight, curved }, Some(turnout)) => {
+            Ahead::Points { turnout, straight, curved }
+        }
         _ => Ahead::End,
     }
 }

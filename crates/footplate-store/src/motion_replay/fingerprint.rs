@@ -9,6 +9,7 @@ use footplate_core::{SpeedStep, TrainId};
 use crate::content_hash::ContentHash;
 use crate::motion_file::MOTION_MODEL_VERSION;
 use crate::recording::Run;
+use crate::speed_profile::SpeedProfile;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Fingerprint(ContentHash);
@@ -18,10 +19,16 @@ impl Fingerprint {
     ///
     /// What they are made of is written as programmers see it, which has every number to its last bit. Another compiler may
     /// write it otherwise; then all is replayed once.
-    pub(super) fn of(layout: &Layout, train: TrainId, highest: SpeedStep) -> Self {
+    pub(super) fn of(
+        layout: &Layout,
+        train: TrainId,
+        highest: SpeedStep,
+        profile: Option<&SpeedProfile>,
+    ) -> Self {
         let program = env!("CARGO_PKG_VERSION");
         let all = format!("{MOTION_MODEL_VERSION} {program} {train} {highest} {layout:?}");
-        Self(ContentHash::of(all.as_bytes()))
+        let before = Self(ContentHash::of(all.as_bytes()));
+        profile.map_or(before, |profile| Self(ContentHash::of(format!("{before} {profile:?}").as_bytes())))
     }
 
     /// Behind one more run, whose link was polled in this rhythm.

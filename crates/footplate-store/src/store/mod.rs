@@ -12,6 +12,7 @@
 //! history       reading back what was there at a date, and what changed between two
 //! marks         excluding events and restoring them
 //! calibrations  keeping them and finding the one in force
+//! profiles      speeds of other programs, with which a train begins
 //! replays       how far a replay of all sessions came, so that the next one goes on from there
 //! checksum      of each row, so that a changed value is noticed
 //! unfinished    the session that was running when the program died
@@ -26,6 +27,7 @@ mod file;
 mod history;
 mod journal;
 mod marks;
+mod profiles;
 mod recordings;
 mod replays;
 mod row;

@@ -30,7 +30,7 @@ fn beyond(layout: &Layout, toe: NodeId) -> Vec<Beyond> {
     let mut found = Vec::new();
     let mut open = vec![(toe, 0.0, Vec::new())];
     while let Some((node, at, legs)) = open.pop() {
-        for id in layout.ways(node).edges() {
+        for id in layout.outgoing(node).edges() {
             let edge = layout.edge(id).expect("an edge");
             let mut legs: Vec<(TurnoutId, Leg)> = legs.clone();
             if let (Some(NodeKind::Branch(turnout)), Some(leg)) =
@@ -99,7 +99,7 @@ fn crossings(layout: &Layout) -> Vec<Vec<EdgeId>> {
             found.push(way);
             continue;
         }
-        for next in layout.ways(at).edges() {
+        for next in layout.outgoing(at).edges() {
             open.push([way.clone(), vec![next]].concat());
         }
     }

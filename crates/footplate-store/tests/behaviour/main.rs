@@ -25,6 +25,7 @@ mod recordings;
 mod replays_go_on;
 mod running_times;
 mod scored_loop;
+mod speed_profiles;
 mod store_damaged;
 mod store_of_old_versions;
 mod store_remembers;

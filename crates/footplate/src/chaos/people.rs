@@ -110,7 +110,7 @@ impl<'p, 'l> People<'p, 'l> {
         let sensors: Vec<NodeId> = self.layout.sensors().map(|(_, node)| node).collect();
         for _ in 0..TRIES {
             let Some(node) = self.choice.of(&sensors).copied() else { return };
-            let length = self.layout.ways(node).edges().next().and_then(|edge| self.layout.edge(edge));
+            let length = self.layout.outgoing(node).edges().next().and_then(|edge| self.layout.edge(edge));
             let longest = length.map_or(0.0, |edge| edge.length.as_mm());
             let offset = Length::from_mm(self.choice.between(0.0, longest));
             if dispatcher.go(now, train, Journey::to(Landmark { node, offset })).is_ok() {

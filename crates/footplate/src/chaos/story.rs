@@ -161,10 +161,10 @@ fn put_trains(stage: &Stage<'_>, world: &mut LivingLayout<'_>, choice: &mut Choi
                 continue;
             }
             let dispatcher = dispatcher_of(stage, world, &TRAINS[..=nth]);
-            let held = dispatcher.holds(*train);
-            let is_apart = TRAINS[..nth]
-                .iter()
-                .all(|other| dispatcher.holds(*other).zip(held).is_some_and(|(one, two)| !one.meets(two)));
+            let held = dispatcher.reservation(*train);
+            let is_apart = TRAINS[..nth].iter().all(|other| {
+                dispatcher.reservation(*other).zip(held).is_some_and(|(one, two)| !one.meets(two))
+            });
             if is_apart && held.is_some_and(|held| held.turnouts().next().is_none()) {
                 is_put = true;
                 break;

@@ -4,7 +4,7 @@ use std::io::Write;
 
 use super::{
     calibrate, clerk, compare, completions, convert, demo, doctor, drive, layout, measure, odometry, predict,
-    replay, report, serve, simulate, store,
+    profiles, replay, report, serve, simulate, store,
 };
 
 use crate::link::Cable;
@@ -45,6 +45,7 @@ verbs! {
     Measure: measure,
     Odometry: odometry,
     Predict: predict,
+    Profiles: profiles,
     Replay: replay,
     Report: report,
     Serve: serve,

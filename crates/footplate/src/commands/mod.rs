@@ -20,6 +20,7 @@ mod measure;
 mod odometry;
 mod plot;
 mod predict;
+mod profiles;
 mod replay;
 mod report;
 mod serve;

@@ -1,6 +1,6 @@
 //! Alarms, each with the key of its sentence in the pages.
 
-use footplate_core::control::learn::Mishap;
+use footplate_core::control::learn::Fault;
 use footplate_core::control::{Alarm as Noticed, Notice};
 use footplate_core::track::Layout;
 use footplate_core::tracking::Drift;
@@ -170,24 +170,22 @@ impl Alarm {
     }
 
     /// The alarm of a fault during a calibration.
-    pub(super) fn of_fault(layout: &Layout, train: TrainId, fault: &Mishap) -> Self {
+    pub(super) fn of_fault(layout: &Layout, train: TrainId, fault: &Fault) -> Self {
         let name = |sensor| layout.sensor_name(sensor).to_owned();
         let (grade, what, blanks) = match fault {
-            Mishap::Stalled { step } => (Grade::Warning, "mishap-stalled", vec![step.to_string()]),
-            Mishap::Missed { count, before } => {
+            Fault::Stalled { step } => (Grade::Warning, "mishap-stalled", vec![step.to_string()]),
+            Fault::Missed { count, before } => {
                 (Grade::Warning, "mishap-missed", vec![count.to_string(), name(*before)])
             }
-            Mishap::Unexplained { sensor } => (Grade::Warning, "unexplained", vec![name(*sensor)]),
-            Mishap::WrongLeg { turnout, .. } => {
+            Fault::Unexplained { sensor } => (Grade::Warning, "unexplained", vec![name(*sensor)]),
+            Fault::WrongLeg { turnout, .. } => {
                 (Grade::Warning, "mishap-wrong-leg", vec![turnout.to_string()])
             }
-            Mishap::Moved { to, .. } => {
+            Fault::Moved { to, .. } => {
                 (Grade::Danger, "mishap-moved", vec![layout.node_name(*to).to_owned()])
             }
-            Mishap::Lost { .. } => (Grade::Danger, "mishap-lost", Vec::new()),
-            Mishap::LengthsDiffer { hops } => {
-                (Grade::Warning, "mishap-lengths", vec![hops.len().to_string()])
-            }
+            Fault::Lost { .. } => (Grade::Danger, "mishap-lost", Vec::new()),
+            Fault::LengthsDiffer { hops } => (Grade::Warning, "mishap-lengths", vec![hops.len().to_string()]),
         };
         Self::new(grade, what, train, blanks)
     }

@@ -8,7 +8,7 @@ use footplate_core::control::{Dispatcher, Driver};
 use footplate_core::model::MotionModel;
 use footplate_core::track::Layout;
 use footplate_core::tracking::DriftTest;
-use footplate_core::tracking::{DueContact, PassedContact, WayPoint};
+use footplate_core::tracking::{DueContact, PassedContact, PathPoint};
 use footplate_core::{FunctionNumber, HALF_95, Length, SensorId, TimeSpan, Timestamp, TrainId};
 use serde::Serialize;
 
@@ -179,7 +179,7 @@ impl Painter {
         now: Timestamp,
         began: Timestamp,
     ) {
-        let reserved = |train| dispatcher.holds(train).map_or_else(Vec::new, reserved_spans);
+        let reserved = |train| dispatcher.reservation(train).map_or_else(Vec::new, reserved_spans);
         self.paint_driven(dispatcher.driver(), reserved, tasks, functions, now, began);
     }
 
@@ -252,7 +252,7 @@ impl Painter {
     }
 
     /// The distance that a train has travelled.
-    fn travelled(&mut self, driver: &Driver, train: TrainId, at: WayPoint) -> Length {
+    fn travelled(&mut self, driver: &Driver, train: TrainId, at: PathPoint) -> Length {
         let travelled = self.distances.entry(train).or_insert_with(|| TravelledDistance::from(at));
         travelled.advance_to(driver.layout(), at)
     }
@@ -263,7 +263,7 @@ impl Painter {
         let time = passed.window.middle();
         let since = |time: Timestamp| millis((time - began).as_s());
         let Some(node) = layout.sensor_node(passed.sensor) else { return };
-        let at = WayPoint { node, way: Length::ZERO };
+        let at = PathPoint { node, distance: Length::ZERO };
         let travelled = self.distances.entry(*train).or_insert_with(|| TravelledDistance::from(at));
         let mean = travelled.pass_sensor(layout, node, time);
         let at_sensor = travelled.at_sensor();

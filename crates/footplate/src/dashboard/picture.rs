@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use footplate_core::control::Driver;
 use footplate_core::track::{Landmark, NodeKind};
-use footplate_core::tracking::WayPoint;
+use footplate_core::tracking::PathPoint;
 use footplate_core::{HALF_95, Length, SpeedStep, Timestamp, TrainId};
 use footplate_store::LayoutFile;
 use serde::Serialize;
@@ -137,19 +137,19 @@ pub(super) fn paint_train(
     }
 }
 
-fn if_stopped(driver: &Driver, train: TrainId, from: WayPoint, now: Timestamp) -> Option<RestPicture> {
+fn if_stopped(driver: &Driver, train: TrainId, from: PathPoint, now: Timestamp) -> Option<RestPicture> {
     let rest = driver.stopped_at(train, now)?;
     // Offsets from different nodes cannot be subtracted.
     (rest.at.node == from.node).then(|| RestPicture {
         at: name(driver, train, rest.at),
-        way_mm: tenths((rest.at.way - from.way).as_mm()),
+        way_mm: tenths((rest.at.distance - from.distance).as_mm()),
         half_mm: tenths(HALF_95 * libm::hypot(rest.doubt.as_mm(), rest.scatter.as_mm())),
         in_s: tenths((rest.time - now).as_s()),
     })
 }
 
 /// A place as sensor and offset, rounded to a millimetre.
-fn name(driver: &Driver, train: TrainId, at: WayPoint) -> Option<String> {
+fn name(driver: &Driver, train: TrainId, at: PathPoint) -> Option<String> {
     let landmark = driver.landmark(train, at)?;
     let mm = landmark.offset.as_mm().round();
     let name = driver.layout().node_name(landmark.node);

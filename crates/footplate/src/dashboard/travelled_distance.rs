@@ -1,7 +1,7 @@
 //! The distance that a train has travelled since it was located, as one growing number for charts.
 
 use footplate_core::track::Layout;
-use footplate_core::tracking::WayPoint;
+use footplate_core::tracking::PathPoint;
 use footplate_core::{Length, NodeId, Speed, TimeSpan, Timestamp};
 
 /// The distance of one train: from sensor to sensor by the survey, between sensors by the estimate.
@@ -18,19 +18,19 @@ pub(super) struct TravelledDistance {
 
 impl TravelledDistance {
     /// Starts where the train was located.
-    pub(super) const fn from(at: WayPoint) -> Self {
-        Self { node: at.node, to_node: Length::ZERO, last: at.way, passed: None }
+    pub(super) const fn from(at: PathPoint) -> Self {
+        Self { node: at.node, to_node: Length::ZERO, last: at.distance, passed: None }
     }
 
     /// Moves to a position; returns the distance.
-    pub(super) fn advance_to(&mut self, layout: &Layout, at: WayPoint) -> Length {
+    pub(super) fn advance_to(&mut self, layout: &Layout, at: PathPoint) -> Length {
         if at.node != self.node {
             let hop = layout.hops_from(self.node).find(|hop| hop.to == at.node);
             // After a missed detection or a reversal the distance continues from its last value.
-            self.to_node = hop.map_or(self.last - at.way, |hop| self.to_node + hop.length);
+            self.to_node = hop.map_or(self.last - at.distance, |hop| self.to_node + hop.length);
             self.node = at.node;
         }
-        self.last = self.to_node + at.way;
+        self.last = self.to_node + at.distance;
         self.last
     }
 
@@ -42,7 +42,7 @@ impl TravelledDistance {
         node: NodeId,
         time: Timestamp,
     ) -> Option<(Timestamp, Speed)> {
-        self.advance_to(layout, WayPoint { node, way: Length::ZERO });
+        self.advance_to(layout, PathPoint { node, distance: Length::ZERO });
         let (from, before) = self.passed.replace((node, time))?;
         let hop = layout.hops_from(from).find(|hop| hop.to == node)?;
         let took = time - before;
@@ -72,7 +72,7 @@ mod tests {
         let node = |name| layout.node_named(name).expect("a sensor");
         let hop = layout.hops_from(node("C13")).next().expect("a hop");
         let (to, length) = (hop.to, hop.length);
-        let at = |node, mm| WayPoint { node, way: Length::from_mm(mm) };
+        let at = |node, mm| PathPoint { node, distance: Length::from_mm(mm) };
         let mut travelled = TravelledDistance::from(at(node("C13"), 0.0));
         assert_eq!(travelled.pass_sensor(&layout, node("C13"), Timestamp::from_s(10.0)), None);
         assert_eq!(travelled.advance_to(&layout, at(node("C13"), 120.0)).as_mm().round(), 120.0);

@@ -11,29 +11,29 @@ use super::dispatched_train::State;
 use super::dispatcher::Dispatcher;
 use super::path::Path;
 
-/// How far ahead of a train driven by hand the track is reserved, at least and at most: the length of a locomotive, and more
-/// than any train needs to stop from its highest step (1.2 m) and the next sensor.
+/// The smallest and the largest distance that is reserved ahead of a train driven by hand: the length of a
+/// locomotive, and more than any train needs to stop from its highest step (1.2 m) and the next sensor.
 const AHEAD: [Length; 2] = [Length::from_mm(300.0), Length::from_mm(2_500.0)];
-/// It reserves what it needs to stop on a command after this: in that time it is examined only a few times.
-const TOLD_AFTER: TimeSpan = TimeSpan::from_ms(1_000);
-/// The steps in which less track is tried.
-const EVERY: Length = Length::from_mm(50.0);
+/// It reserves the track to stop on a command after this time, in which it is examined only a few times.
+const REACTION: TimeSpan = TimeSpan::from_ms(1_000);
+/// The end of the free track is searched in steps of this.
+const END_EVERY: Length = Length::from_mm(50.0);
 
 impl Dispatcher {
-    /// A person gives a train plain orders: its journey ends, and the track ahead of it is reserved.
-    pub(super) fn take_over(&mut self, now: Timestamp, id: TrainId) -> Result<(), Refusal> {
+    /// Starts driving a train by hand, with plain orders: ends its journey, and reserves the track ahead of it.
+    pub(super) fn take_by_hand(&mut self, now: Timestamp, id: TrainId) -> Result<(), Refusal> {
         let train = self.trains.get_mut(&id).ok_or(Refusal::UnknownTrain { train: id })?;
-        train.asked = None;
-        train.course.clear();
+        train.assigned = None;
+        train.authorities.clear();
         if !matches!(train.state, State::ByHand | State::Lost | State::InDanger) {
-            train.kept = train.held.clone();
+            train.kept = train.reservation.clone();
             train.state = State::ByHand;
         }
         self.drive_by_hand(now, id);
         Ok(())
     }
 
-    /// A train driven by hand gets a journey: it comes to rest first.
+    /// Stops driving a train by hand, for a journey: it comes to rest first.
     pub(super) fn give_back(&mut self, now: Timestamp, id: TrainId) {
         if self.trains.get(&id).is_some_and(|train| train.state == State::ByHand)
             && !self.rest_by_hand(now, id)
@@ -42,8 +42,8 @@ impl Dispatcher {
         }
     }
 
-    /// A train driven by hand that is at rest without an order reserves no more than the track under it. Returns whether it
-    /// does.
+    /// Reduces the reservation of a train driven by hand to the track under it, if it is at rest without an order.
+    /// Returns whether it is.
     pub(super) fn rest_by_hand(&mut self, now: Timestamp, id: TrainId) -> bool {
         let is_done = self.watchdog.driver().is_at_rest(id, now) && self.watchdog.driver().busy(id).is_none();
         let is_known = self.watchdog.driver().locate(id, now).is_some();
@@ -53,13 +53,13 @@ impl Dispatcher {
         is_done && is_known
     }
 
-    /// A lost train has passed a sensor while it runs.
+    /// A lost train was detected while it runs.
     pub(super) fn found_by_hand(&mut self, now: Timestamp, id: TrainId) {
         self.set_state(id, State::ByHand);
         self.drive_by_hand(now, id);
     }
 
-    /// Reserves more of the track ahead, and releases what is behind.
+    /// Reserves more of the track ahead, and releases the track behind.
     pub(super) fn drive_by_hand(&mut self, now: Timestamp, id: TrainId) {
         let Some(train) = self.trains.get(&id) else { return };
         let (Some(place), Some(located)) =
@@ -68,69 +68,69 @@ impl Dispatcher {
             return;
         };
         let layout = self.watchdog.driver().layout();
-        let room = self.room(now, train);
-        let ahead = self.watchdog.driver().rest_if_stopped(id, now + TOLD_AFTER).map_or(AHEAD[1], |rest| {
-            let runs_on = rest.way - located.at.way + self.overrun(id, located.uncertainty);
+        let envelope = self.envelope(now, train);
+        let ahead = self.watchdog.driver().rest_if_stopped(id, now + REACTION).map_or(AHEAD[1], |rest| {
+            let runs_on = rest.distance - located.at.distance + self.overrun(id, located.uncertainty);
             runs_on.max(AHEAD[0]).min(AHEAD[1])
         });
         let (path, at) = Path::around(
             layout,
             self.watchdog.driver().turnouts(),
             place,
-            &train.came,
-            room.behind,
-            ahead + room.ahead,
+            &train.occupied,
+            envelope.behind,
+            ahead + envelope.ahead,
         );
-        // A train that follows another may run over its track, and so on along the row: the driver keeps gaps safe. It reserves
-        // none of it, or its leader would be stopped before its own follower.
+        // A follower may run over the track of its leader, of that one's leader, and so on: the driver keeps gaps
+        // safe. It reserves none of it; otherwise its leader would be stopped before its own follower.
         let row = self.row_ahead(id);
         let is_free = |end: Length, shared: &[TrainId]| {
-            let taken = self.reserved(path.reservation(layout, at - room.behind, end + room.ahead));
-            // Close behind it, its followers' margins may overlap its own.
-            let ahead = self.reserved(path.reservation(layout, at, end + room.ahead));
+            let taken = self.reserved(path.reservation(layout, at - envelope.behind, end + envelope.ahead));
+            // The margins of its followers, close behind, may overlap its own.
+            let ahead = self.reserved(path.reservation(layout, at, end + envelope.ahead));
             self.trains.values().all(|other| {
                 let taken = if self.row_ahead(other.id).contains(&id) { &ahead } else { &taken };
-                shared.contains(&other.id) || !other.held.meets(taken)
+                shared.contains(&other.id) || !other.reservation.meets(taken)
             })
         };
         let free_until = |from: Length, shared: &[TrainId]| {
             let mut end = from;
             while end > at && !is_free(end, shared) {
-                end -= EVERY;
+                end -= END_EVERY;
             }
             end.max(at)
         };
-        let reach = (path.length() - room.ahead).min(at + ahead);
+        let reach = (path.length() - envelope.ahead).min(at + ahead);
         let end = free_until(reach, &row);
         if !is_free(end, &row) {
-            // Not even the track under it is free: it keeps its reservation, and stays.
+            // Not even the track under it is free: it keeps its reservation, and does not move.
             self.watchdog.set_end_of_authority(now, id, Some(located.at));
             return;
         }
         let own_end = free_until(end, &[id]);
-        let mut held = self.reserved(path.reservation(layout, at - room.behind, own_end + room.ahead));
-        self.take_anchors(now, id, place, &mut held);
+        let mut reservation =
+            self.reserved(path.reservation(layout, at - envelope.behind, own_end + envelope.ahead));
+        self.reserve_anchors(now, id, place, &mut reservation);
         if self.watchdog.driver().is_position_ambiguous(id) {
-            held.add(layout, &train.held);
+            reservation.add(layout, &train.reservation);
         }
-        // Free track up to the horizon is no limit, and neither is a turnout of unknown position: the person who drives sees
-        // it.
+        // Neither the horizon nor a turnout of unknown position is an end of authority: the operator sees them.
         let limit = (end < reach).then(|| {
             let limit = path
                 .place(end)
-                .and_then(|place| self.watchdog.driver().way_point(id, located.at.node, place));
-            limit.filter(|limit| limit.way >= located.at.way).unwrap_or(located.at)
+                .and_then(|place| self.watchdog.driver().path_point(id, located.at.node, place));
+            limit.filter(|limit| limit.distance >= located.at.distance).unwrap_or(located.at)
         });
         self.watchdog.set_end_of_authority(now, id, limit);
         if let Some(train) = self.trains.get_mut(&id)
-            && train.held != held
+            && train.reservation != reservation
         {
-            train.held = held;
-            self.is_stirred = true;
+            train.reservation = reservation;
+            self.has_changed = true;
         }
     }
 
-    /// A train, the one that it follows, the one that this follows, and so on.
+    /// A train, its leader, the leader of that one, and so on.
     fn row_ahead(&self, id: TrainId) -> Vec<TrainId> {
         let mut row = alloc::vec![id];
         let leader = |row: &[TrainId]| self.watchdog.driver().leader(*row.last()?);
@@ -138,5 +138,31 @@ impl Dispatcher {
             row.push(next);
         }
         row
+    }
+}
+
+/// Reservations are searched this far beyond the end of authority: twice [`END_EVERY`].
+const BEYOND: Length = Length::from_mm(100.0);
+
+impl Dispatcher {
+    /// The trains that have reserved the track just beyond a train's end of authority; none if it has no end within the
+    /// horizon.
+    #[must_use]
+    pub fn holders_beyond(&self, train: TrainId, now: Timestamp) -> Vec<TrainId> {
+        let found = || {
+            let known = self.trains.get(&train)?;
+            let limit =
+                self.watchdog.driver().position_at(train, self.watchdog.driver().end_of_authority(train)?)?;
+            let layout = self.watchdog.driver().layout();
+            let envelope = self.envelope(now, known);
+            let ahead = envelope.ahead + BEYOND;
+            let turnouts = self.watchdog.driver().turnouts();
+            let (path, at) = Path::around(layout, turnouts, limit, &known.occupied, Length::ZERO, ahead);
+            let taken = path.reservation(layout, at, at + ahead);
+            let others =
+                self.trains.values().filter(|other| other.id != train && other.reservation.meets(&taken));
+            Some(others.map(|other| other.id).collect())
+        };
+        found().unwrap_or_default()
     }
 }

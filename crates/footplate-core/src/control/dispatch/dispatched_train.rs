@@ -3,26 +3,44 @@
 use alloc::collections::{BTreeSet, VecDeque};
 use alloc::vec::Vec;
 
-use crate::control::drive::OrderId;
+use crate::control::drive::{Aim, OrderId};
 use crate::ids::{TrainId, TurnoutId};
 use crate::time::Timestamp;
-use crate::track::Position;
+use crate::track::{Landmark, Position};
 use crate::units::Length;
 
-use super::journey::{Journey, TrainLengths};
-use super::movement_authority::MovementAuthority;
-use super::occupied_path::OccupiedPath;
+use super::movement_authority::{MovementAuthority, TrainLengths};
+use super::path::OccupiedPath;
 use super::reservation::Reservation;
+
+/// A destination, by any path and with any number of reversals.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Journey {
+    /// The target of the leading end of the pickup.
+    pub target: Landmark,
+    /// The quantile of the predicted rest that shall be there.
+    pub aim: Aim,
+    /// Whether the train has to face in the landmark's direction. Otherwise it arrives from the quicker side.
+    pub faces: bool,
+}
+
+impl Journey {
+    /// A stop with its median at a place, from the quicker side.
+    #[must_use]
+    pub const fn to(target: Landmark) -> Self {
+        Self { target, aim: Aim::Median, faces: false }
+    }
+}
 
 /// A journey that has not ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Asked {
+pub(super) struct Assignment {
     pub(super) order: OrderId,
     pub(super) journey: Journey,
     pub(super) place: Position,
     pub(super) since: Timestamp,
     /// When it joined the queue: trains are examined in this order.
-    pub(super) queues: Timestamp,
+    pub(super) queued_at: Timestamp,
 }
 
 /// Why a train runs.
@@ -38,18 +56,18 @@ pub(super) enum Purpose {
 pub(super) enum State {
     /// At rest, without authority.
     Resting,
-    /// Its route is being set; `ready` is when the points have moved, once all commands have left.
+    /// Its route is being set; `ready` is when the points have moved, once all commands were sent.
     Setting { ready: Option<Timestamp>, since: Timestamp },
     /// It reverses.
-    Turning { order: OrderId },
-    /// It runs. Its rear end has certainly come as far as `rear` on the path; `confirmed`: a sensor has said so.
+    Reversing { order: OrderId },
+    /// It runs. Its rear is certainly beyond `rear` on the path; `confirmed`: a sensor has reported it.
     Running { order: OrderId, rear: Length, confirmed: bool },
-    /// It was commanded to stop, without a plan for afterwards. `confirmed`: a sensor reported it; `strayed`: on track that was
-    /// not reserved for it.
+    /// It was commanded to stop. `confirmed`: a sensor reported it; `strayed`: it is on track that was not reserved
+    /// for it.
     Halting { confirmed: bool, strayed: bool },
-    /// A person drives it.
+    /// An operator drives it.
     ByHand,
-    /// Its place is unknown.
+    /// Its position is unknown.
     Lost,
     /// Its watchdog stopped it, and locates and measures it again.
     InDanger,
@@ -60,49 +78,49 @@ pub(super) enum State {
 pub(super) struct DispatchedTrain {
     pub(super) id: TrainId,
     pub(super) lengths: TrainLengths,
-    pub(super) asked: Option<Asked>,
+    pub(super) assigned: Option<Assignment>,
     pub(super) purpose: Purpose,
-    /// The journey that its runs were authorised for; another may have been ordered since.
-    pub(super) granted_for: Option<OrderId>,
-    /// The last run to its destination, of a train that was stopped before its end.
+    /// The journey that its authorities are for; another may have been ordered since.
+    pub(super) authorised_for: Option<OrderId>,
+    /// The last run to its destination, if it was stopped before its end.
     pub(super) last_run: Option<MovementAuthority>,
-    /// The authorised runs, the present one first.
-    pub(super) course: VecDeque<MovementAuthority>,
+    /// The authorities of its runs, the present one first.
+    pub(super) authorities: VecDeque<MovementAuthority>,
     pub(super) state: State,
     /// Its reservation.
-    pub(super) held: Reservation,
-    /// What it had reserved before and may still be on.
+    pub(super) reservation: Reservation,
+    /// Its earlier reservation, on which it may still be.
     pub(super) kept: Reservation,
-    /// Turnouts that cannot be thrown for its present run because it is on them.
+    /// Turnouts that it trails on its present run, because they cannot be thrown under it.
     pub(super) skipped: BTreeSet<TurnoutId>,
-    /// Places where it can be at rest, each with whether it is clear of all turnouts.
+    /// Places where it can stop, each with whether it is clear of all turnouts there.
     pub(super) parking: Vec<(Position, bool)>,
-    /// The path by which it came.
-    pub(super) came: OccupiedPath,
-    /// How often others have stepped aside for it since it last left, or went to the end of the queue.
-    pub(super) rooms_made: u32,
-    /// No train is moved for it before this: a search failed.
+    /// The edges that it occupies or came over.
+    pub(super) occupied: OccupiedPath,
+    /// How often others have stepped aside for it since it last started, or went to the end of the queue.
+    pub(super) times_aside: u32,
+    /// No train steps aside for it before this time, because a search failed.
     pub(super) no_room_until: Timestamp,
-    /// Whether a sensor has reported it since it reversed, or since a person placed it.
-    pub(super) seen_since_turn: bool,
-    /// Whether a sensor has reported it since it last left. Until then it may still be there: trains get stuck on dirt.
-    pub(super) seen_since_start: bool,
-    /// A sensor did not report it, and no path leads ahead: it looks back.
+    /// Whether a sensor has reported it since it reversed or was placed.
+    pub(super) detected_since_reversal: bool,
+    /// Whether a sensor has reported it since it last started. Until then it may still be there: trains stall on dirt.
+    pub(super) detected_since_start: bool,
+    /// A sensor did not report it, and no path leads ahead: it may run back to be detected.
     pub(super) looks_back: bool,
-    /// It has run a short distance ahead for the same reason since a sensor reported it last.
+    /// It has run a short distance ahead to be detected, since its last detection.
     pub(super) has_looked_ahead: bool,
-    /// The running time from here without other trains, in seconds; `None` until it was calculated.
+    /// The running time without other trains, in seconds; `None` until it was calculated.
     pub(super) unobstructed_s: Option<f64>,
-    /// The factor on its overrun: above 1 after it was stopped at its end of authority.
+    /// The factor on its overrun; above 1 after a stop at its end of authority.
     pub(super) caution: f64,
     /// When it was last examined while it waited.
-    pub(super) looked_at: Timestamp,
-    /// It gets no authority before this.
+    pub(super) examined_at: Timestamp,
+    /// It gets no authority before this time.
     pub(super) not_before: Timestamp,
     /// How many times in a row its authority was withdrawn.
     pub(super) withdrawn: u8,
-    /// Whether a notice has said that it waits.
-    pub(super) waits_said: bool,
+    /// Whether it was reported to wait.
+    pub(super) waiting_reported: bool,
 }
 
 impl DispatchedTrain {
@@ -110,29 +128,29 @@ impl DispatchedTrain {
         Self {
             id,
             lengths,
-            asked: None,
+            assigned: None,
             purpose: Purpose::Journey,
-            granted_for: None,
+            authorised_for: None,
             last_run: None,
-            course: VecDeque::new(),
+            authorities: VecDeque::new(),
             state: State::Resting,
-            held: Reservation::empty(),
+            reservation: Reservation::empty(),
             kept: Reservation::empty(),
             skipped: BTreeSet::new(),
             parking: Vec::new(),
-            came: OccupiedPath::default(),
-            rooms_made: 0,
+            occupied: OccupiedPath::default(),
+            times_aside: 0,
             no_room_until: Timestamp::ZERO,
-            seen_since_turn: false,
-            seen_since_start: true,
+            detected_since_reversal: false,
+            detected_since_start: true,
             looks_back: false,
             has_looked_ahead: false,
             unobstructed_s: None,
             caution: 1.0,
-            looked_at: Timestamp::ZERO,
+            examined_at: Timestamp::ZERO,
             not_before: Timestamp::ZERO,
             withdrawn: 0,
-            waits_said: false,
+            waiting_reported: false,
         }
     }
 
@@ -143,10 +161,10 @@ impl DispatchedTrain {
 
     /// Whether a turnout is reserved for it.
     pub(super) fn keeps(&self, turnout: TurnoutId) -> bool {
-        self.state != State::ByHand && self.held.takes(turnout)
+        self.state != State::ByHand && self.reservation.takes(turnout)
     }
 
-    /// Whether it can be given an authority now.
+    /// Whether it can get an authority now.
     pub(super) fn is_ready(&self, now: Timestamp) -> bool {
         self.rests() && self.not_before <= now
     }

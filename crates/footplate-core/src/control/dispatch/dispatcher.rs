@@ -11,94 +11,93 @@ use crate::ids::{FunctionNumber, SpeedStep, TrainId, TurnoutId};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Position;
-use crate::tracking::WayPoint;
+use crate::tracking::PathPoint;
 use crate::units::Length;
 
-use super::blocks::Blocks;
-use super::dispatched_train::{Asked, DispatchedTrain, State};
-use super::journey::{Journey, TrainLengths};
-use super::movement_authority::{ClearanceEnvelope, standing};
-use super::parking::{PARKED, parking_places};
-use super::reservation::Reservation;
-use super::turnout_command::TurnoutCommand;
+use super::dispatched_train::{Assignment, DispatchedTrain, Journey, State};
+use super::movement_authority::{
+    ClearanceEnvelope, PARKED, TrainLengths, parking_places, standstill_reservation,
+};
+use super::reservation::{Blocks, Reservation};
+use super::route_setting::TurnoutCommand;
 use crate::control::Notice;
 
 /// How often the dispatcher acts while a train waits or runs.
-pub(super) const LOOK: TimeSpan = TimeSpan::from_ms(200);
+pub(super) const ACT_EVERY: TimeSpan = TimeSpan::from_ms(200);
 
-/// Waiting trains are examined again after this, even if nothing has changed.
-const AGAIN: TimeSpan = TimeSpan::from_s(1.0);
+/// Waiting trains are examined again after this time, even if nothing has changed.
+const RECONSIDER_AFTER: TimeSpan = TimeSpan::from_s(1.0);
 
-/// The most rounds of consequences at one moment; the rest waits for the next look.
-const MOST_ROUNDS: usize = 50;
+/// The most rounds of consequences at one time; the rest waits for the next call.
+const MAX_ROUNDS: usize = 50;
 
 /// Keeps trains apart and sends them to their destinations.
 #[derive(Debug, Clone)]
 pub struct Dispatcher {
     pub(super) watchdog: Watchdog,
     /// Trains in danger that wait for clearance to creep.
-    pub(super) crawlers: BTreeSet<TrainId>,
+    pub(super) awaiting_creep: BTreeSet<TrainId>,
     pub(super) trains: BTreeMap<TrainId, DispatchedTrain>,
-    /// How each turnout was set, how often, and when last, since a train showed that it lay otherwise.
+    /// The last commands to each turnout.
     pub(super) commanded: BTreeMap<TurnoutId, TurnoutCommand>,
-    /// Turnouts whose command has not left yet, with the train and the time of the request.
+    /// Turnouts whose command was not sent yet, with the train and the time of the request.
     pub(super) throwing: BTreeMap<TurnoutId, (TrainId, Timestamp)>,
     pub(super) outputs: VecDeque<Output<Notice>>,
     /// Whether anything has changed since trains at rest were last examined.
-    pub(super) is_stirred: bool,
-    /// How often a train was moved only to change the places that a search begins from.
+    pub(super) has_changed: bool,
+    /// How often a train was moved only to give the next search other places to begin from.
     pub(super) shuffled: usize,
-    /// How many thorough searches for moves there were: each waiting train has its turn.
-    pub(super) searched: usize,
+    /// The number of thorough searches for moves so far: waiting trains take turns.
+    pub(super) searches: usize,
     /// When the last thorough search for moves failed.
-    pub(super) thought: Option<Timestamp>,
-    /// How many thorough searches in a row found no move that helps.
-    pub(super) searches_in_vain: u8,
-    /// The blocks that are reserved as a whole; `None` where track is reserved to the millimetre.
+    pub(super) last_failed_search: Option<Timestamp>,
+    /// The number of thorough searches in a row that failed.
+    pub(super) failed_searches: u8,
+    /// The blocks that are reserved as a whole; `None` if track is reserved to the millimetre.
     blocks: Option<Blocks>,
-    looks_at: Option<Timestamp>,
+    next_check: Option<Timestamp>,
     /// When trains at rest were last examined.
-    arranged: Option<Timestamp>,
+    dispatched_at: Option<Timestamp>,
 }
 
 impl Dispatcher {
-    /// Dispatches the trains of a driver. Turnouts are taken to lie as it says, and commanded again before they are used.
+    /// Dispatches the trains of a driver. Its turnout positions are assumed, and commanded again before they are used.
     #[must_use]
     pub fn new(now: Timestamp, driver: Driver) -> Self {
         Self::over(now, Watchdog::unwatched(driver, now))
     }
 
-    /// The same with a [`Watchdog`] over the driver: while a train is in danger no other sets out, and it is located and
+    /// The same with a [`Watchdog`] over the driver: while a train is in danger no other starts, and it is located and
     /// measured again once all others are at rest.
     #[must_use]
     pub fn watched(now: Timestamp, driver: Driver) -> Self {
         let mut watchdog = Watchdog::new(driver, now);
-        watchdog.ask_before_crawling();
+        watchdog.ask_before_creeping();
         Self::over(now, watchdog)
     }
 
     fn over(now: Timestamp, watchdog: Watchdog) -> Self {
         let layout = watchdog.driver().layout();
-        let lies = |turnout| {
+        let is_set = |turnout| {
             Some((turnout, TurnoutCommand::remembered(now, watchdog.driver().turnouts().get(turnout)?)))
         };
-        let commanded = layout.turnouts().filter_map(|(turnout, _)| lies(turnout)).collect();
+        let commanded = layout.turnouts().filter_map(|(turnout, _)| is_set(turnout)).collect();
         let ids: Vec<TrainId> = watchdog.driver().trains().collect();
         let mut dispatcher = Self {
             watchdog,
-            crawlers: BTreeSet::new(),
+            awaiting_creep: BTreeSet::new(),
             trains: BTreeMap::new(),
             commanded,
             throwing: BTreeMap::new(),
             outputs: VecDeque::new(),
-            is_stirred: true,
+            has_changed: true,
             shuffled: 0,
-            searched: 0,
-            thought: None,
-            searches_in_vain: 0,
+            searches: 0,
+            last_failed_search: None,
+            failed_searches: 0,
             blocks: None,
-            looks_at: None,
-            arranged: None,
+            next_check: None,
+            dispatched_at: None,
         };
         for id in ids {
             dispatcher.set_lengths(now, id, TrainLengths::LONG_LOCOMOTIVE);
@@ -111,28 +110,28 @@ impl Dispatcher {
         self.watchdog.driver_mut().set_reach(train, lengths.ahead(), lengths.behind());
         let known = self.trains.entry(train).or_insert_with(|| DispatchedTrain::new(train, lengths));
         known.lengths = lengths;
-        let room = ClearanceEnvelope::of(lengths, PARKED, Length::ZERO);
-        let places = parking_places(self.watchdog.driver().layout(), room);
+        let envelope = ClearanceEnvelope::of(lengths, PARKED, Length::ZERO);
+        let places = parking_places(self.watchdog.driver().layout(), envelope);
         if let Some(known) = self.trains.get_mut(&train) {
             known.parking = places;
         }
         if self.trains.get(&train).is_some_and(DispatchedTrain::rests) {
-            self.stand(now, train);
+            self.reserve_standstill(now, train);
         }
     }
 
-    /// Reserves the track between sensors as a whole from now on, with all turnouts there, as block systems do. Without this
-    /// trains reserve what they need to the millimetre, which is better.
+    /// From now on reserves the track between sensors as a whole, with all its turnouts, as block systems do. By
+    /// default trains reserve track to the millimetre, which lets more of them run.
     pub fn reserve_blocks(&mut self) {
         self.blocks = Some(Blocks::of(self.watchdog.driver().layout()));
     }
 
-    /// Whether no other train has reserved any of this.
+    /// Whether no other train has reserved any of this track.
     pub(super) fn is_free_for(&self, id: TrainId, taken: &Reservation) -> bool {
-        self.trains.values().all(|other| other.id == id || !other.held.meets(taken))
+        self.trains.values().all(|other| other.id == id || !other.reservation.meets(taken))
     }
 
-    /// The reservation for a train that needs this: whole blocks, where blocks are reserved.
+    /// The reservation for the track that a train needs: extended to whole blocks if blocks are reserved.
     pub(super) fn reserved(&self, needed: Reservation) -> Reservation {
         match &self.blocks {
             Some(blocks) => blocks.around(self.watchdog.driver().layout(), &needed),
@@ -154,14 +153,14 @@ impl Dispatcher {
 
     /// The reservation of a train: no other train may enter it.
     #[must_use]
-    pub fn holds(&self, train: TrainId) -> Option<&Reservation> {
-        self.trains.get(&train).map(|train| &train.held)
+    pub fn reservation(&self, train: TrainId) -> Option<&Reservation> {
+        self.trains.get(&train).map(|train| &train.reservation)
     }
 
     /// The journey of a train that has not ended, with its order.
     #[must_use]
     pub fn journey(&self, train: TrainId) -> Option<(OrderId, Journey)> {
-        self.trains.get(&train)?.asked.map(|asked| (asked.order, asked.journey))
+        self.trains.get(&train)?.assigned.map(|assigned| (assigned.order, assigned.journey))
     }
 
     /// See [`Driver::set_model`].
@@ -169,79 +168,80 @@ impl Dispatcher {
         self.watchdog.set_model(model);
     }
 
-    /// A person put a train there, or read its place off.
-    pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
+    /// Sets the position of a train, as an operator entered it.
+    pub fn place(&mut self, now: Timestamp, train: TrainId, at: PathPoint, uncertainty: Length) {
         self.watchdog.place(now, train, at, uncertainty);
         if let Some(known) = self.trains.get_mut(&train) {
             known.state = State::Resting;
-            known.seen_since_turn = false;
-            known.seen_since_start = true;
-            known.course.clear();
+            known.detected_since_reversal = false;
+            known.detected_since_start = true;
+            known.authorities.clear();
             known.unobstructed_s = None;
-            known.held = Reservation::empty();
+            known.reservation = Reservation::empty();
         }
-        self.stand(now, train);
+        self.reserve_standstill(now, train);
     }
 
-    /// Sends a train to a place as soon as a path is free. Its journey so far ends.
+    /// Sends a train to a place as soon as a path is free. Replaces its present journey.
     ///
     /// # Errors
-    /// Why it cannot go there.
+    /// Why the train cannot go there.
     pub fn go(&mut self, now: Timestamp, train: TrainId, journey: Journey) -> Result<OrderId, Refusal> {
         let layout = self.watchdog.driver().layout();
         let place =
             layout.locate(journey.target, self.watchdog.driver().turnouts()).map_err(Refusal::Place)?;
         let Some(known) = self.trains.get(&train) else { return Err(Refusal::UnknownTrain { train }) };
-        let is_nowhere = |known: &DispatchedTrain| {
-            known.held.is_empty() && self.watchdog.driver().locate(known.id, now).is_none()
+        let is_lost = |known: &DispatchedTrain| {
+            known.reservation.is_empty() && self.watchdog.driver().locate(known.id, now).is_none()
         };
-        if is_nowhere(known) {
+        if is_lost(known) {
             return Err(Refusal::Lost { train });
         }
-        if let Some(other) = self.trains.values().find(|other| is_nowhere(other)) {
+        if let Some(other) = self.trains.values().find(|other| is_lost(other)) {
             return Err(Refusal::OtherNowhere { train, other: other.id });
         }
         self.set_unknown_turnouts(now)?;
         self.give_back(now, train);
         let order = self.watchdog.driver_mut().number();
         if let Some(known) = self.trains.get_mut(&train) {
-            known.asked = Some(Asked { order, journey, place, since: now, queues: now });
-            known.waits_said = false;
+            known.assigned = Some(Assignment { order, journey, place, since: now, queued_at: now });
+            known.waiting_reported = false;
             known.unobstructed_s = None;
         }
-        self.is_stirred = true;
-        self.settle(now);
+        self.has_changed = true;
+        self.act(now);
         Ok(order)
     }
 
-    /// A person switches the track power off or on; see [`Watchdog::switch_power`].
+    /// Switches the track power off or on; see [`Watchdog::switch_power`].
     pub fn switch_power(&mut self, now: Timestamp, on: bool) {
         self.watchdog.switch_power(now, on);
-        self.settle(now);
+        self.act(now);
     }
 
     /// Switches a function of a train; see [`Watchdog::switch_function`].
     pub fn switch_function(&mut self, now: Timestamp, train: TrainId, function: FunctionNumber, on: bool) {
         self.watchdog.switch_function(train, function, on);
-        self.settle(now);
+        self.act(now);
     }
 
     /// Takes news of the link; see [`Watchdog::handle_link`].
     pub fn handle_link(&mut self, now: Timestamp, news: LinkNews) {
         self.watchdog.handle_link(now, news);
-        self.settle(now);
+        self.act(now);
     }
 
     /// Cancels the journey of a train. It still runs to its end of authority.
-    pub fn call_off(&mut self, now: Timestamp, train: TrainId) {
+    pub fn cancel_journey(&mut self, now: Timestamp, train: TrainId) {
         if let Some(known) = self.trains.get_mut(&train) {
-            known.asked = None;
+            known.assigned = None;
         }
-        self.settle(now);
+        self.act(now);
     }
 
-    /// Passes an order on to the driver. A turnout reserved for a train is refused, except ahead of one that is driven by hand.
-    /// No train runs beyond its reservation: the track ahead of it is reserved as far as it is free, as the turnouts lie.
+    /// Passes an order on to the driver. Rejects an order for a reserved turnout, unless its train is driven by hand.
+    /// No train runs beyond its reservation: the track ahead of it is reserved as far as it is free, over the
+    /// turnouts as set.
     ///
     /// # Errors
     /// As [`Driver::order`], and if the turnout is reserved.
@@ -252,55 +252,68 @@ impl Dispatcher {
             return Err(Refusal::TurnoutOccupied { turnout, train: holder.id });
         }
         if let Some(train) = order.train() {
-            self.take_over(now, train)?;
+            self.take_by_hand(now, train)?;
         }
         let taken = self.watchdog.order(now, order);
         if let (Order::Reverse { train, .. }, Ok(_)) = (order, &taken) {
-            self.note_turned(train);
+            self.note_reversal(train);
         }
-        self.settle(now);
+        self.act(now);
         taken
     }
 
-    /// The track that a train needs around it, with the present uncertainty of its place.
-    pub(super) fn room(&self, now: Timestamp, train: &DispatchedTrain) -> ClearanceEnvelope {
+    /// The track that a train needs around it, with the present uncertainty of its position.
+    pub(super) fn envelope(&self, now: Timestamp, train: &DispatchedTrain) -> ClearanceEnvelope {
         let located = self.watchdog.driver().locate(train.id, now);
         let uncertainty = located.map_or(Length::ZERO, |located| located.uncertainty);
         ClearanceEnvelope::of(train.lengths, uncertainty, self.overrun(train.id, uncertainty))
     }
 
-    /// Reserves the track under a train at rest at a known place, and the turnouts over which that is counted.
-    pub(super) fn stand(&mut self, now: Timestamp, id: TrainId) {
-        self.free_anchors(now, id);
+    /// Reserves the track under a train at rest, and the turnouts over which its position is measured.
+    pub(super) fn reserve_standstill(&mut self, now: Timestamp, id: TrainId) {
+        self.release_anchors(now, id);
         let Some(train) = self.trains.get(&id) else { return };
         let Some(place) = self.watchdog.driver().position(id, now) else { return };
-        let room = self.room(now, train);
+        let envelope = self.envelope(now, train);
         let layout = self.watchdog.driver().layout();
-        let mut held =
-            self.reserved(standing(layout, self.watchdog.driver().turnouts(), place, &train.came, room));
-        self.take_anchors(now, id, place, &mut held);
-        // A grown uncertainty takes no track of another train: this one is within what it had reserved.
-        let is_free = self.is_free_for(id, &held);
-        if let Some(train) = self.trains.get_mut(&id).filter(|train| is_free || train.held.is_empty()) {
-            train.held = held;
+        let mut reservation = self.reserved(standstill_reservation(
+            layout,
+            self.watchdog.driver().turnouts(),
+            place,
+            &train.occupied,
+            envelope,
+        ));
+        self.reserve_anchors(now, id, place, &mut reservation);
+        // A larger uncertainty takes no track of another train: this train is within its earlier reservation.
+        let is_free = self.is_free_for(id, &reservation);
+        if let Some(train) = self.trains.get_mut(&id).filter(|train| is_free || train.reservation.is_empty())
+        {
+            train.reservation = reservation;
             train.kept = Reservation::empty();
         }
-        self.is_stirred = true;
+        self.has_changed = true;
     }
 
-    /// The place of a train is counted from a node behind it: turnouts in between decide where it is, and are not thrown.
-    pub(super) fn take_anchors(&self, now: Timestamp, id: TrainId, place: Position, held: &mut Reservation) {
+    /// Reserves the turnouts between a train and the node from which its position is measured: thrown, they would
+    /// change it.
+    pub(super) fn reserve_anchors(
+        &self,
+        now: Timestamp,
+        id: TrainId,
+        place: Position,
+        reservation: &mut Reservation,
+    ) {
         let layout = self.watchdog.driver().layout();
-        // Turnouts already requested for it will be thrown, whatever its orders are since.
-        let asked_for =
+        // Turnouts already requested for it will be thrown, whatever its later orders.
+        let requested =
             self.throwing.iter().filter(|(_, (train, _))| *train == id).map(|(turnout, _)| *turnout);
-        let asked_for = asked_for.filter(|turnout| self.is_being_thrown(now, *turnout));
+        let requested = requested.filter(|turnout| self.is_being_thrown(now, *turnout));
         let anchors = self.anchors(now, id, place).into_iter();
-        anchors.chain(asked_for).for_each(|turnout| held.take_turnout(layout, turnout));
+        anchors.chain(requested).for_each(|turnout| reservation.take_turnout(layout, turnout));
     }
 
-    /// Releases the turnouts behind a train at rest that was seen, but for the one whose leg it is on.
-    pub(super) fn free_anchors(&mut self, now: Timestamp, id: TrainId) {
+    /// Releases the turnouts behind a train at rest that was detected, except the one whose leg it is on.
+    pub(super) fn release_anchors(&mut self, now: Timestamp, id: TrainId) {
         let Some(place) = self.watchdog.driver().position(id, now) else { return };
         let own = self.watchdog.driver().layout().needs_of(place.edge).filter(|need| need.facing).count();
         if self.watchdog.driver().missed_sensor(id, now).is_none() && self.anchors(now, id, place).len() > own
@@ -309,7 +322,7 @@ impl Dispatcher {
         }
     }
 
-    /// The turnouts met at their toes on the path to a place, from the node that the train is counted from.
+    /// The facing turnouts on the path to a place from the node from which the train's position is measured.
     pub(super) fn anchors(&self, now: Timestamp, id: TrainId, place: Position) -> BTreeSet<TurnoutId> {
         let layout = self.watchdog.driver().layout();
         let mut anchors = BTreeSet::new();
@@ -328,52 +341,52 @@ impl Dispatcher {
         anchors
     }
 
-    pub(super) fn say(&mut self, notice: Notice) {
+    pub(super) fn notify(&mut self, notice: Notice) {
         self.outputs.push_back(Output::Notice(notice));
     }
 
-    /// Takes all notices of the watchdog, and acts on them until nothing changes any more.
-    pub(super) fn settle(&mut self, now: Timestamp) {
-        if self.arranged.is_none_or(|last| now - last >= AGAIN) {
-            self.is_stirred |= self.trains.values().any(|train| train.rests() && train.asked.is_some());
+    /// Handles all notices of the watchdog, and acts until nothing changes any more.
+    pub(super) fn act(&mut self, now: Timestamp) {
+        if self.dispatched_at.is_none_or(|last| now - last >= RECONSIDER_AFTER) {
+            self.has_changed |= self.trains.values().any(|train| train.rests() && train.assigned.is_some());
         }
-        for _ in 0..MOST_ROUNDS {
-            self.follow(now);
+        for _ in 0..MAX_ROUNDS {
+            self.record_paths(now);
             while let Some(output) = self.watchdog.poll_output() {
                 match output {
                     // A journey is resumed by the dispatcher.
                     Output::Notice(Notice::Cancelled { train, .. }) if self.journey(train).is_some() => {}
                     Output::Notice(notice) => {
-                        self.say(notice.clone());
-                        self.hear(now, &notice);
+                        self.notify(notice.clone());
+                        self.handle_notice(now, &notice);
                     }
                     for_the_line => self.outputs.push_back(for_the_line),
                 }
             }
-            self.go_on(now);
-            if self.let_crawl(now) {
+            self.advance_trains(now);
+            if self.permit_creeping(now) {
                 continue;
             }
-            if core::mem::take(&mut self.is_stirred) && !self.watchdog.has_danger() {
-                self.arranged = Some(now);
-                self.arrange(now);
+            if core::mem::take(&mut self.has_changed) && !self.watchdog.has_danger() {
+                self.dispatched_at = Some(now);
+                self.dispatch_waiting(now);
                 continue;
             }
             break;
         }
-        let waits = self
+        let report_waiting = self
             .trains
             .values()
-            .any(|train| !matches!(train.state, State::Resting | State::Lost) || train.asked.is_some());
-        self.looks_at = waits.then_some(now + LOOK);
+            .any(|train| !matches!(train.state, State::Resting | State::Lost) || train.assigned.is_some());
+        self.next_check = report_waiting.then_some(now + ACT_EVERY);
     }
 
-    /// Records the path by which trains came to where they are.
-    fn follow(&mut self, now: Timestamp) {
+    /// Records the edges that trains come over.
+    fn record_paths(&mut self, now: Timestamp) {
         let layout = self.watchdog.driver().layout();
         for train in self.trains.values_mut() {
             if let Some(place) = self.watchdog.driver().position(train.id, now) {
-                train.came.follow(layout, place);
+                train.occupied.record(layout, place);
             }
         }
     }
@@ -381,15 +394,15 @@ impl Dispatcher {
     /// Commands a train to stop at once.
     pub(super) fn halt(&mut self, now: Timestamp, id: TrainId) {
         let _ = self.watchdog.order(now, Order::Speed { train: id, step: SpeedStep::STAND });
-        self.gives_up(id);
+        self.set_halting(id);
     }
 
-    /// A train has been commanded to stop: it keeps its reservation until it is at rest.
-    pub(super) fn gives_up(&mut self, id: TrainId) {
+    /// After a stop command: the train keeps its reservation until it is at rest.
+    pub(super) fn set_halting(&mut self, id: TrainId) {
         if let Some(train) = self.trains.get_mut(&id) {
             let confirmed = matches!(train.state, State::Running { confirmed: true, .. });
-            train.course.clear();
-            train.kept = train.held.clone();
+            train.authorities.clear();
+            train.kept = train.reservation.clone();
             train.state = State::Halting { confirmed, strayed: false };
         }
     }
@@ -400,12 +413,12 @@ impl Machine for Dispatcher {
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         self.watchdog.handle_event(now, event);
-        self.settle(now);
+        self.act(now);
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
         self.watchdog.handle_timeout(now);
-        self.settle(now);
+        self.act(now);
     }
 
     fn poll_output(&mut self) -> Option<Output<Notice>> {
@@ -413,6 +426,6 @@ impl Machine for Dispatcher {
     }
 
     fn next_timeout(&self) -> Option<Timestamp> {
-        [self.watchdog.next_timeout(), self.looks_at].into_iter().flatten().min()
+        [self.watchdog.next_timeout(), self.next_check].into_iter().flatten().min()
     }
 }

@@ -1,4 +1,5 @@
-//! Movement authorities: the dispatcher reserves all the track to a destination at once, so that no train waits on the way.
+//! Movement authorities: the dispatcher reserves all the track to a destination at once, so that no train waits on
+//! its path.
 
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
@@ -16,39 +17,37 @@ use super::dispatched_train::{DispatchedTrain, Purpose, State};
 use super::dispatcher::Dispatcher;
 use super::itinerary::{Itinerary, Pace, Search};
 use super::movement_authority::{MovementAuthority, Start, granted};
-use super::obstacles::Obstacles;
-use super::occupied_path::OccupiedPath;
-use super::path::Path;
-use super::reservation::Reservation;
+use super::path::{OccupiedPath, Path};
+use super::reservation::{Obstacles, Reservation};
 
-/// Expected wait for a train at rest and for a running one, in seconds: the first has to be sent away, the second leaves by
-/// itself.
+/// Expected wait for a train at rest and for a running one, in seconds: the first has to step aside, the second
+/// leaves by itself.
 const RESTING_S: f64 = 20.0;
 const RUNNING_S: f64 = 8.0;
 /// A detour around other trains is accepted up to this multiple of the unobstructed running time, plus `LONGER_BY_S`.
 const LONGER: f64 = 1.5;
 const LONGER_BY_S: f64 = 10.0;
-/// A train that has waited this long is next: its route is kept free of new reservations.
+/// The path of a train that has waited this long is kept free of new reservations.
 const PATIENCE: TimeSpan = TimeSpan::from_s(45.0);
-/// When every train is at rest and has waited this long, the usual search has failed and a thorough one begins.
+/// If every train is at rest and has waited this long, the usual search has failed and a thorough one begins.
 const STALLED: TimeSpan = TimeSpan::from_s(20.0);
-/// A waiting train is examined no more often than this: most events on the layout do not concern it.
-const LOOK_AGAIN: TimeSpan = TimeSpan::from_ms(800);
+/// A waiting train is examined at most this often: most events on the layout do not concern it.
+const EXAMINE_EVERY: TimeSpan = TimeSpan::from_ms(800);
 /// Reversing takes this long beyond the run itself: until standstill is certain, and the commands, in seconds.
-const TURN_S: f64 = 1.5;
+const REVERSAL_S: f64 = 1.5;
 /// Stops from higher speeds are too uncertain (20 mm at 600 mm/s).
 const FASTEST: Speed = Speed::from_mm_per_s(450.0);
-/// Slower trains stall on dirty rails between sensors, and hold up the others.
-const CRAWL: Speed = Speed::from_mm_per_s(120.0);
+/// Slower trains stall on dirty rails between sensors, and delay the others.
+const CREEP: Speed = Speed::from_mm_per_s(120.0);
 /// The lowest cruising speed that a running time is calculated with.
 const SLOWEST: Speed = Speed::from_mm_per_s(60.0);
-/// A stop may end beyond the reservation once in a thousand times; in standard deviations, with a margin so that the guard
-/// at the end of authority, which has the same limit, seldom cuts a stop short.
+/// The overrun in standard deviations: a stop ends beyond it once in a thousand times. With a margin, so that
+/// supervision of the end of authority, which has the same limit, seldom interrupts a stop.
 const OVERRUN: f64 = 3.09 + 0.5;
-/// Uncertainty of the place where a stop begins, from sensors, survey and speed: one standard deviation.
+/// Uncertainty of the position at which a stop begins, from sensors, survey and speed: one standard deviation.
 const PLACE: Length = Length::from_mm(10.0);
-/// The least and the greatest overrun that is reserved: no stop is known better than the first, and a train that needs more
-/// than the second has unknown stops (with less, its limit would stop it again and again).
+/// The smallest and the largest overrun: no stop is more precise than the first, and a train that needs more than the
+/// second has unknown stops (with less, its end of authority would stop it repeatedly).
 const OVERRUNS: [Length; 2] = [Length::from_mm(40.0), Length::from_mm(1_200.0)];
 
 /// A path to a destination, with the authorities that it needs.
@@ -59,15 +58,15 @@ pub(super) struct Proposal {
 }
 
 impl Proposal {
-    pub(super) fn meets(&self, held: &Reservation) -> bool {
-        self.runs.iter().any(|run| run.taken.meets(held))
+    pub(super) fn meets(&self, reservation: &Reservation) -> bool {
+        self.runs.iter().any(|run| run.taken.meets(reservation))
     }
 }
 
 impl Dispatcher {
-    /// Examines all trains at rest with a journey, the longest waiting first. A train for which others have stepped aside
-    /// again and again in vain goes to the end of the queue.
-    pub(super) fn arrange(&mut self, now: Timestamp) {
+    /// Examines all trains at rest with a journey, the longest waiting first. A train for which others have stepped
+    /// aside several times without success goes to the end of the queue.
+    pub(super) fn dispatch_waiting(&mut self, now: Timestamp) {
         if self.has_unplaced_train(now) {
             return;
         }
@@ -75,20 +74,20 @@ impl Dispatcher {
             .trains
             .values()
             .filter(|train| train.is_ready(now))
-            .filter_map(|train| Some((train.asked?.queues, train.asked?.since, train.id)))
+            .filter_map(|train| Some((train.assigned?.queued_at, train.assigned?.since, train.id)))
             .collect();
         waiting.sort_unstable();
         let mut kept_free: Option<Proposal> = None;
         let mut all_wait = !waiting.is_empty();
-        for (queues, since, id) in waiting.iter().copied() {
-            // It may have been sent aside meanwhile.
+        for (queued_at, since, id) in waiting.iter().copied() {
+            // It may have stepped aside meanwhile.
             if !self.trains.get(&id).is_some_and(|train| train.is_ready(now)) {
                 continue;
             }
             if self
                 .trains
                 .get(&id)
-                .is_some_and(|train| train.waits_said && now - train.looked_at < LOOK_AGAIN)
+                .is_some_and(|train| train.waiting_reported && now - train.examined_at < EXAMINE_EVERY)
             {
                 continue;
             }
@@ -97,18 +96,19 @@ impl Dispatcher {
             let Some(unobstructed) = unobstructed else {
                 if self.watchdog.driver().missed_sensor(id, now).is_none() {
                     self.cannot_go(now, id, self.unreachable(id));
-                } else if !self.begins_to_look_back(id) && !self.looks_ahead(now, id, &start) {
+                } else if !self.look_back(id) && !self.look_ahead(now, id, &start) {
                     self.lose(now, id);
                 }
                 continue;
             };
             let free = self.free_path(id, &start, &targets).filter(|free| {
                 let allowed = unobstructed * LONGER + LONGER_BY_S + (now - since).as_s();
-                // A train that blocks the next one does best to go.
-                let is_in_the_way =
-                    |wish: &Proposal| self.trains.get(&id).is_some_and(|train| wish.meets(&train.held));
+                // A train that blocks the next one should go.
+                let blocks_next = |wish: &Proposal| {
+                    self.trains.get(&id).is_some_and(|train| wish.meets(&train.reservation))
+                };
                 let spares = kept_free.as_ref().is_none_or(|wish| {
-                    is_in_the_way(wish) || !free.runs.iter().any(|run| wish.meets(&run.taken))
+                    blocks_next(wish) || !free.runs.iter().any(|run| wish.meets(&run.taken))
                 });
                 free.itinerary.seconds <= allowed && spares
             });
@@ -117,13 +117,13 @@ impl Dispatcher {
                 continue;
             }
             let Some(wish) = self.wish(id, &start, &targets) else { continue };
-            self.waits(id, &wish);
+            self.report_waiting(id, &wish);
             self.make_room(now, id, &targets, &wish);
-            let mut running = self.trains.values().filter(|train| !train.course.is_empty());
+            let mut running = self.trains.values().filter(|train| !train.authorities.is_empty());
             let room_is_made = running.clone().any(|train| train.purpose == Purpose::Aside(id));
-            // For a train that waits for trains at rest nothing is kept free: they may stay for ever.
-            let another_passes = running.any(|train| wish.meets(&train.held));
-            if kept_free.is_none() && (room_is_made || another_passes && now - queues >= PATIENCE) {
+            // No track is kept free for a train that waits for trains at rest: they may never leave.
+            let another_passes = running.any(|train| wish.meets(&train.reservation));
+            if kept_free.is_none() && (room_is_made || another_passes && now - queued_at >= PATIENCE) {
                 kept_free = Some(wish);
             }
         }
@@ -136,18 +136,18 @@ impl Dispatcher {
         }
     }
 
-    /// Whether a train at rest has no place yet, as a turnout ahead of it is still being set.
+    /// Whether a train at rest has no position yet, because a turnout ahead of it is still being set.
     fn has_unplaced_train(&mut self, now: Timestamp) -> bool {
-        let holds_nothing = |train: &&DispatchedTrain| train.rests() && train.held.is_empty();
+        let has_no_reservation = |train: &&DispatchedTrain| train.rests() && train.reservation.is_empty();
         let unplaced: Vec<TrainId> =
-            self.trains.values().filter(holds_nothing).map(|train| train.id).collect();
-        unplaced.iter().for_each(|id| self.stand(now, *id));
-        // What got lost on the line is commanded again; a train that may be on such a turnout was refused before.
+            self.trains.values().filter(has_no_reservation).map(|train| train.id).collect();
+        unplaced.iter().for_each(|id| self.reserve_standstill(now, *id));
+        // Commands lost on the line are repeated; a train that may be on such a turnout was rejected before.
         let _ = self.set_unknown_turnouts(now);
         self.trains.values().any(|train| train.rests() && self.unknown_turnout_ahead(now, train.id).is_some())
     }
 
-    /// The running time without other trains, in seconds; `None` where no path leads to the destination.
+    /// The running time without other trains, in seconds; `None` if no path leads to the destination.
     fn unobstructed(
         &mut self,
         now: Timestamp,
@@ -160,40 +160,41 @@ impl Dispatcher {
             known.or_else(|| Some(self.propose(start, targets, &Obstacles::default())?.itinerary.seconds));
         if let Some(train) = self.trains.get_mut(&id) {
             train.unobstructed_s = seconds;
-            train.looked_at = now;
+            train.examined_at = now;
         }
         seconds
     }
 
-    /// The places at which the journey ends: facing as asked, or either way.
+    /// The destinations of the journey: in one direction or in both.
     pub(super) fn targets(&self, id: TrainId) -> Option<Vec<Position>> {
-        let asked = self.trains.get(&id)?.asked?;
-        let other = self.watchdog.driver().layout().reversed(asked.place).filter(|_| !asked.journey.faces);
-        Some([Some(asked.place), other].into_iter().flatten().collect())
+        let assigned = self.trains.get(&id)?.assigned?;
+        let other =
+            self.watchdog.driver().layout().reversed(assigned.place).filter(|_| !assigned.journey.faces);
+        Some([Some(assigned.place), other].into_iter().flatten().collect())
     }
 
-    /// Where a train at rest begins, and what it needs from there.
+    /// The start of a path search for a train at rest.
     pub(super) fn start(&self, now: Timestamp, id: TrainId) -> Option<Start> {
         let train = self.trains.get(&id)?;
         let place = self.watchdog.driver().position(id, now)?;
-        let room = self.room(now, train);
-        let as_it_lies = |turnout| {
+        let envelope = self.envelope(now, train);
+        let in_position = |turnout| {
             let leg = self.watchdog.driver().turnouts().get(turnout)?;
             Some(TurnoutNeed { turnout, leg, facing: true })
         };
         let mut near = self.watchdog.driver().turnouts_under(id, now);
         near.extend(self.anchors(now, id, place));
         let looks_back = train.looks_back;
-        if looks_back || !train.seen_since_start {
-            near.extend(train.held.turnouts());
+        if looks_back || !train.detected_since_start {
+            near.extend(train.reservation.turnouts());
         }
-        let frozen = near.into_iter().filter_map(as_it_lies).collect();
-        let is_sure = self.watchdog.driver().missed_sensor(id, now).is_none() || looks_back;
-        let may_turn = is_sure && !self.is_on_points_that_gave_way(now, id);
-        let turned = self.watchdog.driver().reversed_position(id, now).filter(|_| may_turn);
-        let came = train.came.clone();
-        let may_back_away = train.seen_since_turn;
-        Some(Start { place, came, room, pace: self.pace(id), frozen, turned, may_back_away })
+        let frozen = near.into_iter().filter_map(in_position).collect();
+        let is_certain = self.watchdog.driver().missed_sensor(id, now).is_none() || looks_back;
+        let may_reverse = is_certain && !self.is_on_trailed_points(now, id);
+        let reversed = self.watchdog.driver().reversed_position(id, now).filter(|_| may_reverse);
+        let occupied = train.occupied.clone();
+        let may_back_away = train.detected_since_reversal;
+        Some(Start { place, occupied, envelope, pace: self.pace(id), frozen, reversed, may_back_away })
     }
 
     /// The quickest path past obstacles, with its authorities.
@@ -204,16 +205,16 @@ impl Dispatcher {
         obstacles: &Obstacles,
     ) -> Option<Proposal> {
         let search = self.search(start, obstacles);
-        let turned = self.turned(start);
+        let reversed = self.reversed(start);
         let proposed = |search: Search<'_>, ahead: Option<Position>| {
-            let reached = search.from(ahead, turned);
-            // The quickest may need a turnout in both positions at once where another does not.
+            let reached = search.from(ahead, reversed);
+            // The quickest one may need a turnout in both positions at once.
             reached.to(targets).into_iter().find_map(|itinerary| self.proposal(start, itinerary))
         };
         let ahead = Some(start.place);
-        // Where turnouts just ahead lie wrong and cannot be thrown, the train backs away from them first.
+        // If turnouts just ahead are in the wrong position and cannot be thrown, the train backs away from them first.
         proposed(search, ahead)
-            .or_else(|| proposed(Search { points_give_way: false, ..search }, ahead))
+            .or_else(|| proposed(Search { may_trail_frozen: false, ..search }, ahead))
             .or_else(|| start.may_back_away.then(|| proposed(search, None))?)
     }
 
@@ -227,42 +228,42 @@ impl Dispatcher {
     }
 
     pub(super) fn search<'a>(&'a self, start: &'a Start, obstacles: &'a Obstacles) -> Search<'a> {
-        let clears = start.room.rear + start.room.overrun;
+        let clears = start.envelope.rear + start.envelope.overrun;
         Search {
             layout: self.watchdog.driver().layout(),
             pace: start.pace,
             clears,
-            beyond: start.room.overrun + start.room.front,
+            beyond: start.envelope.overrun + start.envelope.front,
             turnouts: self.watchdog.driver().turnouts(),
             obstacles,
             frozen: &start.frozen,
-            points_give_way: true,
+            may_trail_frozen: true,
         }
     }
 
-    /// Where the leading end of the pickup is once the train has reversed; `None` where it would back over points that lie
-    /// for the other leg: it trailed them on arrival and would be derailed by them on departure.
-    pub(super) fn turned(&self, start: &Start) -> Option<Position> {
+    /// The position of the leading end of the pickup once the train has reversed; `None` if it would run back over
+    /// points that are set for the other leg: it trailed them on arrival, and they would derail it on departure.
+    pub(super) fn reversed(&self, start: &Start) -> Option<Position> {
         let layout = self.watchdog.driver().layout();
-        let turned = start.turned?;
+        let reversed = start.reversed?;
         let (path, at) = Path::around(
             layout,
             self.watchdog.driver().turnouts(),
-            turned,
+            reversed,
             &OccupiedPath::default(),
-            start.room.behind,
+            start.envelope.behind,
             Length::ZERO,
         );
-        let lies_otherwise = |need: TurnoutNeed| {
+        let is_set_otherwise = |need: TurnoutNeed| {
             start.frozen.iter().any(|known| known.turnout == need.turnout && known.leg != need.leg)
         };
-        // Its place is counted from the node behind it: a turnout there has to lie for it, too.
-        let own = layout.needs_of(turned.edge);
-        let needs = path.needs(layout, at - start.room.behind, at);
-        (!needs.into_iter().chain(own).any(|need| need.facing && lies_otherwise(need))).then_some(turned)
+        // Its position is measured from the node behind it: a turnout there has to be set for it, too.
+        let own = layout.needs_of(reversed.edge);
+        let needs = path.needs(layout, at - start.envelope.behind, at);
+        (!needs.into_iter().chain(own).any(|need| need.facing && is_set_otherwise(need))).then_some(reversed)
     }
 
-    /// The path that a train would take if others made room in time; lost trains do not.
+    /// The path that a train would take if others stepped aside in time; lost trains do not.
     pub(super) fn wish(&self, id: TrainId, start: &Start, targets: &[Position]) -> Option<Proposal> {
         let mut obstacles = Obstacles::default();
         for other in self.trains.values().filter(|other| other.id != id) {
@@ -271,10 +272,10 @@ impl Dispatcher {
                 State::Lost => f64::INFINITY,
                 _ => RUNNING_S,
             };
-            obstacles.add(&other.held, seconds);
+            obstacles.add(&other.reservation, seconds);
         }
         let wish = self.propose(start, targets, &obstacles);
-        // A lost train is located again some day.
+        // A lost train will be located again.
         wish.or_else(|| self.propose(start, targets, &Obstacles::default()))
     }
 
@@ -283,36 +284,37 @@ impl Dispatcher {
         self.propose(start, targets, &self.obstacles_of_others(id)).filter(|found| self.is_free(id, found))
     }
 
-    /// Reserves a proposal for a train, whose turnouts are set next.
+    /// Grants a proposal to a train and reserves its track; its turnouts are set next.
     pub(super) fn grant(&mut self, now: Timestamp, id: TrainId, purpose: Purpose, proposal: Proposal) {
-        let turns = proposal.runs.iter().filter(|run| run.turns).count();
+        let turns = proposal.runs.iter().filter(|run| run.reverses).count();
         let takes = TimeSpan::from_s(proposal.itinerary.seconds);
         let Some(train) = self.trains.get_mut(&id) else { return };
-        train.kept = core::mem::take(&mut train.held);
-        train.course = VecDeque::from(proposal.runs);
+        train.kept = core::mem::take(&mut train.reservation);
+        train.authorities = VecDeque::from(proposal.runs);
         train.purpose = purpose;
-        train.granted_for = train.asked.filter(|_| purpose == Purpose::Journey).map(|asked| asked.order);
-        train.waits_said = false;
+        train.authorised_for =
+            train.assigned.filter(|_| purpose == Purpose::Journey).map(|assigned| assigned.order);
+        train.waiting_reported = false;
         train.unobstructed_s = None;
         train.looks_back = false;
         if purpose == Purpose::Journey {
-            train.rooms_made = 0;
-            self.searches_in_vain = 0;
+            train.times_aside = 0;
+            self.failed_searches = 0;
         }
         train.last_run = None;
         train.state = State::Setting { ready: None, since: now };
         train.skipped.clear();
-        self.hold(now, id);
-        self.say(Notice::RouteSet { train: id, takes, turns });
+        self.reserve_runs(now, id);
+        self.notify(Notice::RouteSet { train: id, takes, turns });
     }
 
-    fn waits(&mut self, id: TrainId, wish: &Proposal) {
-        let others = self.trains.values().filter(|other| other.id != id && wish.meets(&other.held));
+    fn report_waiting(&mut self, id: TrainId, wish: &Proposal) {
+        let others = self.trains.values().filter(|other| other.id != id && wish.meets(&other.reservation));
         let on: Vec<TrainId> = others.map(|other| other.id).collect();
         if let Some(train) = self.trains.get_mut(&id)
-            && !core::mem::replace(&mut train.waits_said, true)
+            && !core::mem::replace(&mut train.waiting_reported, true)
         {
-            self.say(Notice::Waits { train: id, on });
+            self.notify(Notice::Waits { train: id, on });
         }
     }
 
@@ -323,8 +325,8 @@ impl Dispatcher {
         Refusal::Unreachable { train: id, target }
     }
 
-    /// How far a train may come to rest beyond its stop, exceeded once in a thousand times. Without a sensor on the way its
-    /// place is as uncertain then as now.
+    /// The distance beyond its stop within which a train comes to rest, exceeded once in a thousand times. If no
+    /// sensor is on its path, its position is as uncertain then as now.
     pub(super) fn overrun(&self, id: TrainId, uncertainty: Length) -> Length {
         let place = PLACE.max(uncertainty).as_m();
         let widest = self.watchdog.driver().widest_stop(id);
@@ -333,35 +335,32 @@ impl Dispatcher {
         usual * self.trains.get(&id).map_or(1.0, |train| train.caution)
     }
 
-    /// The step for a run: the fastest that settles within the distance and stops with enough certainty; for a distance too
-    /// short for any, the slowest step above a creep.
+    /// The step for a run: the fastest that settles within the distance and stops precisely enough; if the distance
+    /// is too short for any, the slowest step faster than creeping.
     pub(super) fn step_for(
         &self,
         id: TrainId,
         distance: Length,
-        is_sure: impl Fn(Length) -> bool,
+        is_certain: impl Fn(Length) -> bool,
     ) -> Option<SpeedStep> {
         let model = self.watchdog.driver().model(id)?;
         let speed = |step: SpeedStep| model.speed(step, Approach::Below).value;
-        let usable = || steps(model).filter(|step| speed(*step) >= CRAWL && speed(*step) <= FASTEST);
-        let spread = |step: SpeedStep| {
-            let stop = model.stop(step, Approach::Below);
-            Length::from_m(libm::hypot(stop.doubt.as_m(), stop.scatter.as_m()))
-        };
+        let usable = || steps(model).filter(|step| speed(*step) >= CREEP && speed(*step) <= FASTEST);
+        let spread = |step: SpeedStep| model.stop(step, Approach::Below).deviation();
         let fits = |step: SpeedStep| {
             let stop = model.stop(step, Approach::Below).distance;
             let starts = speed(step) * model.settles_within(SpeedStep::STAND, step);
             starts + stop + PLACE <= distance
         };
-        usable().filter(|step| fits(*step) && is_sure(spread(*step))).last().or_else(|| usable().next())
+        usable().filter(|step| fits(*step) && is_certain(spread(*step))).last().or_else(|| usable().next())
     }
 
-    /// The speed and the times that running times are calculated with.
+    /// The speed and durations for running times.
     fn pace(&self, id: TrainId) -> Pace {
         let Some(model) = self.watchdog.driver().model(id) else {
-            return Pace { cruise: SLOWEST, start_s: 1.0, stop_s: 1.0, turn_s: TURN_S };
+            return Pace { cruise: SLOWEST, start_s: 1.0, stop_s: 1.0, reversal_s: REVERSAL_S };
         };
-        // Stops are most certain from the middle steps.
+        // Stops are most precise from medium steps.
         let usable: Vec<SpeedStep> = steps(model).collect();
         let step = usable.get(usable.len() * 2 / 3).copied().unwrap_or(model.highest());
         let cruise = model.speed(step, Approach::Below).value;
@@ -369,7 +368,7 @@ impl Dispatcher {
         let stop = model.stop(step, Approach::Below);
         let start_s = 0.5 * model.settles_within(SpeedStep::STAND, step).as_s();
         let stop_s = (stop.time.as_s() - (stop.distance / cruise).as_s()).max(0.0);
-        Pace { cruise, start_s, stop_s, turn_s: TURN_S }
+        Pace { cruise, start_s, stop_s, reversal_s: REVERSAL_S }
     }
 }
 

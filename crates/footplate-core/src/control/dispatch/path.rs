@@ -1,21 +1,20 @@
-//! A path over the rails in one direction: consecutive edges, and points by their distance from its start.
+//! Paths over the rails: consecutive edges with distances from the start, and the edges that a train came over.
 
 use alloc::vec::Vec;
 
 use crate::ids::{EdgeId, NodeId};
-use crate::track::{Layout, Leg, NodeKind, Position, TurnoutNeed, TurnoutStates, Ways};
+use crate::track::{Layout, Leg, NodeKind, OutgoingEdges, Position, TurnoutNeed, TurnoutStates};
 use crate::units::Length;
 
-use super::occupied_path::OccupiedPath;
 use super::reservation::Reservation;
 
 /// The most edges of a path: several laps of any layout in use.
-const MOST_EDGES: usize = 1_000;
+const MAX_EDGES: usize = 1_000;
 
 /// Edges in the order of travel.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Path {
-    /// Each with the distance at which it begins.
+    /// Each edge with the distance of its start.
     edges: Vec<(EdgeId, Length)>,
     length: Length,
 }
@@ -45,23 +44,23 @@ impl Path {
         self.edges.iter().map(|(id, _)| *id)
     }
 
-    /// The track behind and ahead of a place: behind it as the train came, and otherwise as the turnouts lie; shorter where
-    /// the track ends. Returns the path and the distance of the place on it.
+    /// The track behind and ahead of a place: the edges that the train came over, and otherwise those for the present
+    /// turnout positions; shorter if the track ends. Returns the path and the distance of the place on it.
     pub(super) fn around(
         layout: &Layout,
         turnouts: &TurnoutStates,
         place: Position,
-        came: &OccupiedPath,
+        occupied: &OccupiedPath,
         behind: Length,
         ahead: Length,
     ) -> (Self, Length) {
         let mut before = Vec::new();
         let mut left = behind - place.offset;
         let mut edge = place.edge;
-        let mut came = came.before(place.edge);
-        while left > Length::ZERO && before.len() < MOST_EDGES {
-            let as_it_lies = |edge: EdgeId| Some(next_edge(layout, turnouts, edge.twin())?.twin());
-            let Some(next) = came.next().or_else(|| as_it_lies(edge)) else { break };
+        let mut occupied = occupied.before(place.edge);
+        while left > Length::ZERO && before.len() < MAX_EDGES {
+            let in_position = |edge: EdgeId| Some(next_edge(layout, turnouts, edge.twin())?.twin());
+            let Some(next) = occupied.next().or_else(|| in_position(edge)) else { break };
             edge = next;
             before.push(edge);
             left -= layout.edge(edge).map_or(Length::ZERO, |edge| edge.length);
@@ -74,10 +73,10 @@ impl Path {
         (path, at)
     }
 
-    /// Extends the path as the turnouts lie, to a length or the end of the track. Turnouts of unknown position count as
-    /// straight.
+    /// Extends the path over the turnouts as set, to a length or the end of the track. Turnouts of unknown position
+    /// count as straight.
     pub(super) fn reach(&mut self, layout: &Layout, turnouts: &TurnoutStates, length: Length) {
-        while self.length <= length && self.edges.len() < MOST_EDGES {
+        while self.length <= length && self.edges.len() < MAX_EDGES {
             let Some(next) = self.edges.last().and_then(|(last, _)| next_edge(layout, turnouts, *last))
             else {
                 break;
@@ -163,22 +162,82 @@ impl Path {
     }
 }
 
-/// The edge that follows an edge as the turnouts lie.
+/// The edge that follows an edge with the present turnout positions.
 fn next_edge(layout: &Layout, turnouts: &TurnoutStates, edge: EdgeId) -> Option<EdgeId> {
     edge_from(layout, turnouts, layout.edge(edge)?.to)
 }
 
-/// The edge ahead of a node as the turnouts lie; straight on over those of unknown position.
+/// The edge ahead of a node with the present turnout positions; straight for unknown ones.
 pub(super) fn edge_from(layout: &Layout, turnouts: &TurnoutStates, node: NodeId) -> Option<EdgeId> {
     let node = layout.node(node)?;
-    match (node.ways, node.kind) {
-        (Ways::Ahead(next), _) => Some(next),
-        (Ways::Legs { curved, .. }, NodeKind::Branch(turnout))
+    match (node.outgoing, node.kind) {
+        (OutgoingEdges::Ahead(next), _) => Some(next),
+        (OutgoingEdges::Legs { curved, .. }, NodeKind::Branch(turnout))
             if turnouts.get(turnout) == Some(Leg::Curved) =>
         {
             Some(curved)
         }
-        (Ways::Legs { straight, .. }, _) => Some(straight),
-        (Ways::Ended, _) => None,
+        (OutgoingEdges::Legs { straight, .. }, _) => Some(straight),
+        (OutgoingEdges::Ended, _) => None,
     }
+}
+
+/// No train occupies more edges, or runs over more between two calls.
+const MAX_OCCUPIED: usize = 16;
+
+/// The edges that a train came over, whatever the turnout positions since, in the order of travel; the leading end of
+/// the pickup is on the last one.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct OccupiedPath {
+    edges: Vec<EdgeId>,
+}
+
+impl OccupiedPath {
+    /// Records the present place of the leading end of the pickup: ahead, reversed, or elsewhere.
+    pub(super) fn record(&mut self, layout: &Layout, place: Position) {
+        let Some(last) = self.edges.last().copied() else {
+            self.edges.push(place.edge);
+            return;
+        };
+        if last == place.edge {
+            return;
+        }
+        if let Some(reversed) = self.edges.iter().rposition(|edge| edge.twin() == place.edge) {
+            let behind = self.edges.iter().skip(reversed).rev().map(|edge| edge.twin());
+            self.edges = behind.collect();
+            return;
+        }
+        match fewest_edges(layout, last, place.edge) {
+            Some(path) => self.edges.extend(path),
+            None => self.edges = alloc::vec![place.edge],
+        }
+        let spare = self.edges.len().saturating_sub(MAX_OCCUPIED);
+        self.edges.drain(..spare);
+    }
+
+    /// The edges before the one that the train is on, the latest first; none if it is not on that edge.
+    pub(super) fn before(&self, edge: EdgeId) -> impl Iterator<Item = EdgeId> {
+        let is_there = self.edges.last() == Some(&edge);
+        self.edges.iter().rev().skip(1).filter(move |_| is_there).copied()
+    }
+}
+
+/// The path with the fewest edges from one edge to another over any legs, without the first edge.
+fn fewest_edges(layout: &Layout, from: EdgeId, to: EdgeId) -> Option<Vec<EdgeId>> {
+    let mut open = alloc::vec![alloc::vec![from]];
+    for _ in 0..MAX_OCCUPIED {
+        let mut longer = Vec::new();
+        for path in open {
+            let node = layout.edge(*path.last()?)?.to;
+            for next in layout.outgoing(node).edges() {
+                let path: Vec<EdgeId> = path.iter().copied().chain([next]).collect();
+                if next == to {
+                    return Some(path.into_iter().skip(1).collect());
+                }
+                longer.push(path);
+            }
+        }
+        open = longer;
+    }
+    None
 }

@@ -1,15 +1,15 @@
-//! Reservations: intervals of stretches, and whole turnouts.
+//! Reservations: intervals of stretches and whole turnouts; blocks, and obstacles to a path search.
 
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 
-use crate::ids::{EdgeId, StretchId, TurnoutId};
+use crate::ids::{EdgeId, NodeId, StretchId, TurnoutId};
 use crate::track::{Layout, NodeKind};
 use crate::units::Length;
 
-/// The fouling point of a turnout, from its toe: nearer, a train on one leg leaves no room for one on the other. On
-/// Märklin's K track it is 180 mm from the toe of a 22.5 degree turnout; a centimetre or two more is for the ends of long
-/// vehicles, which hang out in curves.
+/// The distance of the fouling point of a turnout from its toe: nearer, a train on one leg obstructs the other. On
+/// Märklin's K track it is 180 mm for a 22.5 degree turnout; one or two centimetres are added for the ends of long
+/// vehicles, which overhang in curves.
 pub const CLEARANCE: Length = Length::from_mm(200.0);
 
 /// An interval of a stretch, counted from the start of the first of its two edges.
@@ -22,7 +22,7 @@ pub struct Span {
 }
 
 impl Span {
-    /// Part of an edge, counted from its start; `None` for an edge of another layout, and for nothing.
+    /// Part of an edge, measured from its start; `None` if it is empty or the edge is of another layout.
     pub(super) fn on(layout: &Layout, id: EdgeId, from: Length, to: Length) -> Option<Self> {
         let length = layout.edge(id)?.length;
         let (from, to) = (from.max(Length::ZERO), to.min(length));
@@ -32,7 +32,7 @@ impl Span {
     }
 }
 
-/// Rails and turnouts that are reserved, or are to be.
+/// Track that is or will be reserved: rails and turnouts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Reservation {
     spans: BTreeMap<StretchId, Vec<Span>>,
@@ -40,7 +40,7 @@ pub struct Reservation {
 }
 
 impl Reservation {
-    /// No track.
+    /// An empty reservation.
     #[must_use]
     pub const fn empty() -> Self {
         Self { spans: BTreeMap::new(), turnouts: BTreeSet::new() }
@@ -76,7 +76,9 @@ impl Reservation {
 
     /// Removes a turnout, and the one in the same place.
     pub(super) fn release_turnout(&mut self, layout: &Layout, turnout: TurnoutId) {
-        self.turnouts.retain(|held| *held != turnout && Some(*held) != layout.never_curved_with(turnout));
+        self.turnouts.retain(|reservation| {
+            *reservation != turnout && Some(*reservation) != layout.never_curved_with(turnout)
+        });
     }
 
     /// Adds part of an edge, counted from its start, without turnouts.
@@ -125,7 +127,7 @@ impl Reservation {
         spans.is_some_and(|spans| spans.iter().any(|own| own.from <= span.to && span.from <= own.to))
     }
 
-    /// Whether all of an interval is reserved, but for less than `tolerance` at its ends.
+    /// Whether all of an interval is reserved, except less than `tolerance` at its ends.
     #[must_use]
     pub fn covers(&self, stretch: StretchId, span: Span, tolerance: Length) -> bool {
         let spans = self.spans.get(&stretch);
@@ -156,5 +158,97 @@ fn leg_of(layout: &Layout, id: EdgeId) -> Option<TurnoutId> {
     match layout.node(edge.from)?.kind {
         NodeKind::Branch(turnout) => Some(turnout),
         _ => None,
+    }
+}
+
+/// A shorter reservation in a block does not take the block.
+const TOUCHES: Length = Length::from_mm(1.0);
+
+/// The blocks of a layout: the track between sensors, reserved as a whole with all its turnouts.
+#[derive(Debug, Clone)]
+pub(super) struct Blocks {
+    of: BTreeMap<StretchId, usize>,
+    whole: Vec<Reservation>,
+}
+
+impl Blocks {
+    pub(super) fn of(layout: &Layout) -> Self {
+        let mut blocks = Self { of: BTreeMap::new(), whole: Vec::new() };
+        for (id, _) in layout.edges() {
+            if !blocks.of.contains_key(&id.stretch()) {
+                blocks.add(layout, id);
+            }
+        }
+        blocks
+    }
+
+    /// Adds the block of an edge: all rails that can be reached without passing a sensor.
+    fn add(&mut self, layout: &Layout, first: EdgeId) {
+        let mut whole = Reservation::empty();
+        let mut open = alloc::vec![first];
+        while let Some(id) = open.pop() {
+            let Some(edge) = layout.edge(id) else { continue };
+            if self.of.insert(id.stretch(), self.whole.len()).is_some() {
+                continue;
+            }
+            whole.take(layout, id, Length::ZERO, edge.length);
+            let is_sensor = |node: NodeId| {
+                [node, node.reverse()].into_iter().any(|node| layout.sensor_at(node).is_some())
+            };
+            for node in [edge.from, edge.to].into_iter().filter(|node| !is_sensor(*node)) {
+                let edges = [node, node.reverse()].into_iter().flat_map(|node| layout.outgoing(node).edges());
+                open.extend(edges.filter(|next| !self.of.contains_key(&next.stretch())));
+            }
+        }
+        self.whole.push(whole);
+    }
+
+    /// The reservation extended to whole blocks.
+    pub(super) fn around(&self, layout: &Layout, taken: &Reservation) -> Reservation {
+        let mut around = taken.clone();
+        for (stretch, span) in taken.spans() {
+            let block = self.of.get(&stretch).and_then(|block| self.whole.get(*block));
+            if let Some(block) = block.filter(|_| span.to - span.from >= TOUCHES) {
+                around.add(layout, block);
+            }
+        }
+        around
+    }
+}
+
+/// Reservations of other trains in a path search: track that is closed, or costs waiting time.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Obstacles {
+    /// Intervals with their cost in seconds, which is infinite if closed.
+    spans: BTreeMap<StretchId, Vec<(Span, f64)>>,
+    turnouts: BTreeMap<TurnoutId, f64>,
+}
+
+impl Obstacles {
+    /// Adds a reservation, with a cost in seconds for each stretch and turnout.
+    pub(super) fn add(&mut self, reservation: &Reservation, seconds: f64) {
+        for (stretch, span) in reservation.spans() {
+            self.spans.entry(stretch).or_default().push((span, seconds));
+        }
+        for turnout in reservation.turnouts() {
+            let known = self.turnouts.entry(turnout).or_default();
+            *known = known.max(seconds);
+        }
+    }
+
+    /// The cost of running over part of an edge, in seconds; `None` if it is closed.
+    pub(super) fn cost(&self, layout: &Layout, id: EdgeId, from: Length, to: Length) -> Option<f64> {
+        let mut cost = 0.0;
+        if let Some(spans) = self.spans.get(&id.stretch()) {
+            let span = Span::on(layout, id, from, to)?;
+            let met = spans
+                .iter()
+                .filter(|(reservation, _)| reservation.from <= span.to && span.from <= reservation.to);
+            cost += met.map(|(_, seconds)| *seconds).sum::<f64>();
+        }
+        for turnout in turnouts_near(layout, id, from, to) {
+            cost += self.turnouts.get(&turnout).copied().unwrap_or_default();
+        }
+        cost.is_finite().then_some(cost)
     }
 }

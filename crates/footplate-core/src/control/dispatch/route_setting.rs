@@ -1,4 +1,4 @@
-//! Route setting: each turnout of a run is commanded twice, so that one that fails now and then does not matter.
+//! Route setting: each turnout of a run is commanded twice, so that an occasional failure has no effect.
 
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
@@ -12,16 +12,40 @@ use crate::units::Length;
 use super::dispatched_train::{DispatchedTrain, State};
 use super::dispatcher::Dispatcher;
 use super::path::edge_from;
-use super::turnout_command::{SURE, TurnoutCommand};
+
+/// The number of commands to each turnout. One that fails once in 300 fails twice in a row once in 90 000, if its
+/// failures are independent; others are found when a train takes the other leg.
+pub(super) const SURE: u8 = 2;
+
+/// The last commands to a turnout.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct TurnoutCommand {
+    pub(super) leg: Leg,
+    /// The number of commands to this leg in a row.
+    pub(super) times: u8,
+    pub(super) last: Timestamp,
+}
+
+impl TurnoutCommand {
+    /// A remembered position: the turnout is commanded again before it is used.
+    pub(super) const fn remembered(now: Timestamp, leg: Leg) -> Self {
+        Self { leg, times: 0, last: now }
+    }
+
+    /// A position that a train has shown.
+    pub(super) const fn confirmed(now: Timestamp, leg: Leg) -> Self {
+        Self { leg, times: SURE, last: now }
+    }
+}
 
 /// From the command until the points have moved: solenoids take 0.1 to 0.3 s.
-const MOVES: TimeSpan = TimeSpan::from_ms(350);
-/// A command to a turnout leaves within this: two polls, and the solenoids of a dozen others before it.
-const TOLD_WITHIN: TimeSpan = TimeSpan::from_s(5.0);
-/// The authority is withdrawn when a turnout cannot be thrown for this long: a train is nearer to it than was estimated.
+const POINTS_MOVE: TimeSpan = TimeSpan::from_ms(350);
+/// A turnout command is sent within this time: two polls, and the solenoids of a dozen others before it.
+const SENT_WITHIN: TimeSpan = TimeSpan::from_s(5.0);
+/// An authority is withdrawn if a turnout cannot be thrown for this long: a train is nearer to it than estimated.
 const PATIENCE: TimeSpan = TimeSpan::from_s(8.0);
 
-/// A turnout whose unknown position leaves open where the train before it, or on it, is.
+/// A turnout of unknown position that a train at rest is before or on, so that its position is unknown.
 pub(super) struct UnknownTurnout {
     turnout: TurnoutId,
     train: TrainId,
@@ -30,42 +54,47 @@ pub(super) struct UnknownTurnout {
 }
 
 impl Dispatcher {
-    /// Throws the turnouts of the present run of a train. Returns whether all of them lie right by now.
+    /// Throws the turnouts of the present run of a train. Returns whether all of them are in position.
     pub(super) fn set(&mut self, now: Timestamp, id: TrainId) -> bool {
         let Some(train) = self.trains.get(&id) else { return false };
-        let (Some(run), State::Setting { ready, since }) = (train.course.front(), train.state) else {
+        let (Some(run), State::Setting { ready, since }) = (train.authorities.front(), train.state) else {
             return false;
         };
         let place = self.watchdog.driver().position(id, now);
         let anchors = place.map(|place| self.anchors(now, id, place)).unwrap_or_default();
-        let needs: Vec<TurnoutNeed> =
-            run.needs.iter().filter(|need| !self.gives_way(now, train, need, &anchors)).copied().collect();
+        let needs: Vec<TurnoutNeed> = run
+            .needs
+            .iter()
+            .filter(|need| !self.is_trailed_in_place(now, train, need, &anchors))
+            .copied()
+            .collect();
         let wanted = self.with_partners(&needs);
         let mut frozen = anchors;
-        if !train.seen_since_start {
+        if !train.detected_since_start {
             frozen.extend(train.kept.turnouts());
         }
-        let mut held_down = self.watchdog.driver().turnouts_under(id, now);
-        held_down.extend(&frozen);
-        let lies = |need: &TurnoutNeed| self.watchdog.driver().turnouts().get(need.turnout) == Some(need.leg);
-        // A turnout under the train stays as it is, however sure that is.
-        let stays = |need: &TurnoutNeed| held_down.contains(&need.turnout) && lies(need);
-        let is_missing = |need: &TurnoutNeed| !self.is_sure(*need) && !stays(need);
+        let mut locked = self.watchdog.driver().turnouts_under(id, now);
+        locked.extend(&frozen);
+        let is_set =
+            |need: &TurnoutNeed| self.watchdog.driver().turnouts().get(need.turnout) == Some(need.leg);
+        // A turnout under the train stays in its position, even if that was not confirmed.
+        let stays = |need: &TurnoutNeed| locked.contains(&need.turnout) && is_set(need);
+        let is_missing = |need: &TurnoutNeed| !self.is_certain(*need) && !stays(need);
         let missing: Vec<TurnoutNeed> = wanted.into_iter().filter(is_missing).collect();
         if missing.is_empty() {
-            let ready = ready.unwrap_or(if now == since { now } else { now + MOVES });
+            let ready = ready.unwrap_or(if now == since { now } else { now + POINTS_MOVE });
             if ready > now {
                 self.set_state(id, State::Setting { ready: Some(ready), since });
             }
             return ready <= now;
         }
-        if self.is_in_its_own_way(now, id, &missing, &held_down) {
+        if self.blocks_itself(now, id, &missing, &locked) {
             return false;
         }
         for need in missing {
             // A second command that fails could leave moving points halfway.
             let moves =
-                |commanded: &TurnoutCommand| commanded.leg == need.leg && now - commanded.last < MOVES;
+                |commanded: &TurnoutCommand| commanded.leg == need.leg && now - commanded.last < POINTS_MOVE;
             if self.is_being_thrown(now, need.turnout) || self.commanded.get(&need.turnout).is_some_and(moves)
             {
                 continue;
@@ -81,7 +110,7 @@ impl Dispatcher {
                     self.throwing.insert(need.turnout, (id, now));
                 }
                 // The train is on the points and trails them.
-                Err(_) if !need.facing && held_down.contains(&need.turnout) => {
+                Err(_) if !need.facing && locked.contains(&need.turnout) => {
                     if let Some(train) = self.trains.get_mut(&id) {
                         train.skipped.insert(need.turnout);
                     }
@@ -96,33 +125,34 @@ impl Dispatcher {
         false
     }
 
-    /// Withdraws the authority of a train that is too near to a turnout of its run: waiting does not help, another path may.
-    /// Not while a command to a turnout is under way, which no train would have reserved then.
-    fn is_in_its_own_way(
+    /// Withdraws the authority of a train that is too near to a turnout of its run: another path may help, waiting
+    /// does not. Not while a turnout command is pending, because no train would have reserved that turnout then.
+    fn blocks_itself(
         &mut self,
         now: Timestamp,
         id: TrainId,
         missing: &[TurnoutNeed],
-        held_down: &BTreeSet<TurnoutId>,
+        locked: &BTreeSet<TurnoutId>,
     ) -> bool {
         if missing.iter().any(|need| self.is_being_thrown(now, need.turnout)) {
             return false;
         }
-        let lies = |need: &TurnoutNeed| self.watchdog.driver().turnouts().get(need.turnout) == Some(need.leg);
+        let is_set =
+            |need: &TurnoutNeed| self.watchdog.driver().turnouts().get(need.turnout) == Some(need.leg);
         let blocked =
-            missing.iter().find(|need| need.facing && held_down.contains(&need.turnout) && !lies(need));
+            missing.iter().find(|need| need.facing && locked.contains(&need.turnout) && !is_set(need));
         let Some(turnout) = blocked.map(|need| need.turnout) else { return false };
         self.withdraw(now, id, Some(Refusal::TurnoutOccupied { turnout, train: id }));
         true
     }
 
-    /// Whether a command to a turnout may still be under way. One that was lost on the line is given again.
+    /// Whether a turnout command may still be pending. A command that was lost on the line is repeated.
     pub(super) fn is_being_thrown(&self, now: Timestamp, turnout: TurnoutId) -> bool {
-        self.throwing.get(&turnout).is_some_and(|(_, since)| now - *since < TOLD_WITHIN)
+        self.throwing.get(&turnout).is_some_and(|(_, since)| now - *since < SENT_WITHIN)
     }
 
-    /// Whether a train trails points that cannot be thrown, as it is on them, or on those in the same place.
-    fn gives_way(
+    /// Whether a train trails points that cannot be thrown because it is on them, or on those in the same place.
+    fn is_trailed_in_place(
         &self,
         now: Timestamp,
         train: &DispatchedTrain,
@@ -133,11 +163,11 @@ impl Dispatcher {
             return false;
         }
         let partner = self.partner(need).filter(|partner| !self.watchdog.driver().turnouts().allow(*partner));
-        let is_held_down = |turnout| {
+        let is_locked = |turnout| {
             anchors.contains(&turnout)
                 || self.watchdog.driver().turnouts_under(train.id, now).contains(&turnout)
         };
-        train.skipped.contains(&need.turnout) || partner.is_some_and(|partner| is_held_down(partner.turnout))
+        train.skipped.contains(&need.turnout) || partner.is_some_and(|partner| is_locked(partner.turnout))
     }
 
     /// The need of the turnout in the same place.
@@ -151,19 +181,19 @@ impl Dispatcher {
         Some(TurnoutNeed { turnout, leg: Leg::Straight, facing: true })
     }
 
-    /// The needs of a run, each turnout after the one in the same place that has to lie straight for it.
+    /// The needs of a run, each turnout after the one in the same place that has to be straight for it.
     fn with_partners(&self, needs: &[TurnoutNeed]) -> Vec<TurnoutNeed> {
         needs.iter().flat_map(|need| self.partner(need).into_iter().chain([*need])).collect()
     }
 
-    fn is_sure(&self, need: TurnoutNeed) -> bool {
+    fn is_certain(&self, need: TurnoutNeed) -> bool {
         self.commanded
             .get(&need.turnout)
             .is_some_and(|commanded| commanded.leg == need.leg && commanded.times >= SURE)
     }
 
-    /// Sets turnouts of unknown position that keep trains at rest from having a place: one on the hop that a train is on
-    /// leaves open which track that leads to. Straight does as well as curved.
+    /// Sets turnouts of unknown position on the hops of trains at rest, whose positions would be unknown otherwise.
+    /// Straight is as good as curved.
     ///
     /// # Errors
     /// A train may be on such a turnout.
@@ -183,18 +213,18 @@ impl Dispatcher {
             self.throwing.insert(turnout, (train, now));
             let layout = self.watchdog.driver().layout();
             if let Some(train) = self.trains.get_mut(&train) {
-                train.held.take_turnout(layout, turnout);
+                train.reservation.take_turnout(layout, turnout);
             }
         }
         Ok(())
     }
 
-    /// The first turnout of unknown position on the hop that a train is on; `None` where the train has a place, or none is
-    /// the reason that it has not.
+    /// The first turnout of unknown position on the hop that a train is on; `None` if the position of the train is
+    /// known, or unknown for another reason.
     pub(super) fn unknown_turnout_ahead(&self, now: Timestamp, train: TrainId) -> Option<UnknownTurnout> {
         let driver = self.watchdog.driver();
         let located = driver.locate(train, now).filter(|_| driver.position(train, now).is_none())?;
-        let front = located.at.way + self.room(now, self.trains.get(&train)?).ahead;
+        let front = located.at.distance + self.envelope(now, self.trains.get(&train)?).ahead;
         let (layout, turnouts) = (driver.layout(), driver.turnouts());
         let (mut node, mut distance) = (located.at.node, Length::ZERO);
         for _ in 0..layout.edges().len() {
@@ -214,13 +244,13 @@ impl Dispatcher {
         None
     }
 
-    /// A command to a turnout has left.
-    pub(super) fn turnout_told(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) {
-        let asked_for = self.throwing.remove(&turnout);
+    /// A turnout command was sent.
+    pub(super) fn turnout_commanded(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) {
+        let requested = self.throwing.remove(&turnout);
         if let Some((id, _)) =
-            asked_for.filter(|(id, _)| self.trains.get(id).is_some_and(DispatchedTrain::rests))
+            requested.filter(|(id, _)| self.trains.get(id).is_some_and(DispatchedTrain::rests))
         {
-            self.stand(now, id);
+            self.reserve_standstill(now, id);
         }
         let leg = Leg::from_curved(curved);
         let times = self
@@ -231,9 +261,9 @@ impl Dispatcher {
         self.commanded.insert(turnout, TurnoutCommand { leg, times: times.saturating_add(1), last: now });
     }
 
-    /// A train has shown how a turnout lies.
-    pub(super) fn turnout_shown(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) {
-        self.commanded.insert(turnout, TurnoutCommand::sure(now, Leg::from_curved(curved)));
+    /// A train has shown the position of a turnout.
+    pub(super) fn turnout_observed(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) {
+        self.commanded.insert(turnout, TurnoutCommand::confirmed(now, Leg::from_curved(curved)));
     }
 
     pub(super) fn set_state(&mut self, id: TrainId, state: State) {

@@ -6,10 +6,10 @@ use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::model::StepUse;
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::{Located, TrackContext, WayPoint};
+use crate::tracking::{Located, PathPoint, TrackContext};
 use crate::units::{Length, Speed};
 
-use super::command_time::{CommandTime, command_time, spread};
+use super::command_time::{CommandTime, command_time};
 use super::driven_train::DrivenTrain;
 use super::path::sensors_within;
 use super::refusal::Refusal;
@@ -80,7 +80,7 @@ impl DrivenTrain {
                 |step: SpeedStep| self.model.speed(step, Approach::Below).value >= FINDING_SPEED;
             let precise = || settled.iter().filter(|(_, spread)| *spread <= good_spread);
             let fastest = precise().next_back().filter(|(step, _)| is_fast_enough(*step));
-            // A train does not creep all the way for a few millimetres; it might also stall.
+            // A train does not creep over the whole distance for a few millimetres; it might also stall.
             let fastest =
                 fastest.or(settled.iter().find(|(step, _)| is_fast_enough(*step))).or(precise().next_back());
             return fastest.map(|(step, _)| *step).ok_or_else(out_of_reach);
@@ -93,8 +93,8 @@ impl DrivenTrain {
         for step in steps.into_iter().filter(|step| fastest.is_none_or(|fastest| *step <= fastest)) {
             match self.short_run(context, now, at, step, destination) {
                 CommandTime::At(_, rest) if rest.time - now <= MOVE_LIMIT => {
-                    if most_precise.is_none_or(|(_, least)| spread(&rest) < least) {
-                        most_precise = Some((step, spread(&rest)));
+                    if most_precise.is_none_or(|(_, least)| rest.deviation() < least) {
+                        most_precise = Some((step, rest.deviation()));
                     }
                 }
                 CommandTime::At(_, rest) => {
@@ -139,8 +139,7 @@ impl DrivenTrain {
 
     /// One standard deviation of stops from a settled step.
     fn stop_spread(&self, step: SpeedStep) -> Length {
-        let stop = self.model.stop(step, Approach::Below);
-        Length::from_m(libm::hypot(stop.doubt.as_m(), stop.scatter.as_m()))
+        self.model.stop(step, Approach::Below).deviation()
     }
 
     /// Whether the train passes a sensor at a settled speed, in time before the stop command.
@@ -148,14 +147,14 @@ impl DrivenTrain {
         &self,
         context: TrackContext<'_>,
         located: &Located,
-        at: WayPoint,
+        at: PathPoint,
         step: SpeedStep,
     ) -> bool {
         let speed = self.model.speed(step, Approach::Below).value;
         let stop = self.model.stop(step, Approach::Below);
         // A start never runs faster than its final speed.
-        let settled = located.at.way + speed * self.model.settles_within(SpeedStep::STAND, step);
-        let last = at.way - stop.distance - stop.doubt * STOP_MARGIN - speed * self.link.reaction;
+        let settled = located.at.distance + speed * self.model.settles_within(SpeedStep::STAND, step);
+        let last = at.distance - stop.distance - stop.doubt * STOP_MARGIN - speed * self.link.reaction;
         at.node == located.at.node
             && sensors_within(context, &self.model, at.node, last).any(|(_, distance)| distance > settled)
     }
@@ -164,7 +163,7 @@ impl DrivenTrain {
         &self,
         context: TrackContext<'_>,
         now: Timestamp,
-        at: WayPoint,
+        at: PathPoint,
         step: SpeedStep,
         destination: &Destination,
     ) -> CommandTime {

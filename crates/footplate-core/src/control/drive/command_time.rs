@@ -43,11 +43,6 @@ impl Aim {
     }
 }
 
-/// One standard deviation of a rest: the uncertainty of the model and the variation from stop to stop.
-pub(super) fn spread(rest: &Rest) -> Length {
-    Length::from_m(libm::hypot(rest.doubt.as_m(), rest.scatter.as_m()))
-}
-
 /// Finds the time from `earliest` on at which `beyond` changes its sign. `beyond` predicts the rest after a command
 /// sent at a time, and how far beyond the target the aimed quantile of it lies; `None` where the path ends first. A
 /// later command never leads to a nearer rest, so that a root is bracketed; false position with the Illinois rule

@@ -5,7 +5,7 @@ use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::link::TimeModel;
 use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::{Located, Locator, PassedContact, TrackContext, WayPoint, landmark_of};
+use crate::tracking::{Located, Locator, PassedContact, PathPoint, TrackContext, landmark_of};
 use crate::units::Length;
 
 use super::order::OrderId;
@@ -52,7 +52,7 @@ pub(super) struct DrivenTrain {
     /// What should be reported next.
     pub(super) expected: Expectation,
     /// Where its movement authority ends; `None` without a limit.
-    pub(super) end_of_authority: Option<WayPoint>,
+    pub(super) end_of_authority: Option<PathPoint>,
     /// Its lengths ahead of and behind the leading end of the pickup.
     pub(super) reach: [Length; 2],
     /// The state of its speed supervision.
@@ -120,7 +120,7 @@ impl DrivenTrain {
         &mut self,
         context: TrackContext<'_>,
         now: Timestamp,
-        at: WayPoint,
+        at: PathPoint,
         uncertainty: Length,
     ) {
         self.locator.place(now, at, uncertainty);
@@ -339,7 +339,7 @@ impl DrivenTrain {
         let located =
             self.located(context, middle).filter(|located| located.at.node == node && !located.at_rest);
         let since = located.filter(|located| located.speed.as_m_per_s() > 0.0);
-        let since = since.map_or(TimeSpan::ZERO, |located| located.at.way / located.speed);
+        let since = since.map_or(TimeSpan::ZERO, |located| located.at.distance / located.speed);
         self.passages.note(node, middle - since);
     }
 
@@ -440,7 +440,7 @@ impl DrivenTrain {
         context: TrackContext<'_>,
         located: &Located,
     ) -> Option<SensorId> {
-        let passed = located.at.way - located.uncertainty * SHOULD_HAVE_PASSED;
+        let passed = located.at.distance - located.uncertainty * SHOULD_HAVE_PASSED;
         sensors_within(context, &self.model, located.at.node, passed).last().map(|(sensor, _)| sensor)
     }
 
@@ -450,7 +450,7 @@ impl DrivenTrain {
         context: TrackContext<'_>,
         time: Timestamp,
         order: OrderId,
-        target: Option<WayPoint>,
+        target: Option<PathPoint>,
         promise: Option<Promise>,
         out: &mut Outputs,
     ) {
@@ -473,9 +473,5 @@ impl DrivenTrain {
 fn widest_stop(model: &MotionModel) -> Option<Length> {
     let steps = (1..=model.highest().get()).filter_map(SpeedStep::new);
     let moves = steps.filter(|step| model.uses(*step) == StepUse::Moves);
-    let spread = |step| {
-        let stop = model.stop(step, Approach::Below);
-        Length::from_m(libm::hypot(stop.doubt.as_m(), stop.scatter.as_m()))
-    };
-    moves.map(spread).reduce(Length::max)
+    moves.map(|step| model.stop(step, Approach::Below).deviation()).reduce(Length::max)
 }

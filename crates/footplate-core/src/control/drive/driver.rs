@@ -10,7 +10,7 @@ use crate::link::{ContactWindow, TimeModel};
 use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Layout, Leg, TurnoutStates};
-use crate::tracking::{Located, Locator, WayPoint, landmark_of};
+use crate::tracking::{Located, Locator, PathPoint, landmark_of};
 use crate::units::Length;
 
 use super::ambiguity::Branch;
@@ -125,7 +125,7 @@ impl Driver {
 
     /// A point of a train's path as a landmark and an offset.
     #[must_use]
-    pub fn landmark(&self, train: TrainId, at: WayPoint) -> Option<Landmark> {
+    pub fn landmark(&self, train: TrainId, at: PathPoint) -> Option<Landmark> {
         Some(landmark_of(self.track.context(), &self.trains.get(&train)?.model, at))
     }
 
@@ -155,7 +155,7 @@ impl Driver {
     }
 
     /// Sets the position of a train, as an operator entered it.
-    pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
+    pub fn place(&mut self, now: Timestamp, train: TrainId, at: PathPoint, uncertainty: Length) {
         self.association.forget(train);
         if let Some(train) = self.trains.get_mut(&train) {
             train.place(self.track.context(), now, at, uncertainty);

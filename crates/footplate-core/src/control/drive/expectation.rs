@@ -2,7 +2,7 @@
 
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::{TrackContext, WayPoint};
+use crate::tracking::{PathPoint, TrackContext};
 use crate::units::{Length, Ratio};
 
 use super::command_time::{CommandTime, command_time};
@@ -40,7 +40,7 @@ impl Driver {
     /// time, by the clock if no sensor reports, so that the train comes to rest before it with probability 0.999.
     /// Planned stops end before it, too. After a train is placed or reversed, it may not move until another end is
     /// set. `None` removes the limit.
-    pub fn set_end_of_authority(&mut self, now: Timestamp, train: TrainId, end: Option<WayPoint>) {
+    pub fn set_end_of_authority(&mut self, now: Timestamp, train: TrainId, end: Option<PathPoint>) {
         let context = self.track.context();
         if let Some(train) = self.trains.get_mut(&train) {
             train.set_end_of_authority(context, now, end);
@@ -50,7 +50,7 @@ impl Driver {
 
     /// The end of a train's movement authority.
     #[must_use]
-    pub fn end_of_authority(&self, train: TrainId) -> Option<WayPoint> {
+    pub fn end_of_authority(&self, train: TrainId) -> Option<PathPoint> {
         self.trains.get(&train)?.end_of_authority
     }
 }
@@ -221,8 +221,8 @@ impl DrivenTrain {
 
     fn track_end_stop(&self, context: TrackContext<'_>, now: Timestamp) -> Option<(Timestamp, NodeId)> {
         let located = self.located(context, now).filter(|_| self.commanded > SpeedStep::STAND)?;
-        let (end, way) = track_end(context, &self.model, located.at.node)?;
-        let at = WayPoint { node: located.at.node, way: way - BEFORE_END };
+        let (end, distance) = track_end(context, &self.model, located.at.node)?;
+        let at = PathPoint { node: located.at.node, distance: distance - BEFORE_END };
         Some((self.last_stop_before(context, now, at)?, end))
     }
 
@@ -233,7 +233,7 @@ impl DrivenTrain {
         &self,
         context: TrackContext<'_>,
         now: Timestamp,
-        at: WayPoint,
+        at: PathPoint,
     ) -> Option<Timestamp> {
         if self.commanded == SpeedStep::STAND {
             return None;
@@ -255,7 +255,7 @@ impl DrivenTrain {
         &mut self,
         context: TrackContext<'_>,
         now: Timestamp,
-        end: Option<WayPoint>,
+        end: Option<PathPoint>,
     ) {
         self.end_of_authority = end;
         self.update_authority_stop(context, now);
@@ -273,7 +273,7 @@ impl DrivenTrain {
     pub(super) fn recount_end_of_authority(&mut self, context: TrackContext<'_>, node: NodeId) {
         if let Some(end) = self.end_of_authority {
             let counted = recount_from(context, &self.model, end, node);
-            self.end_of_authority = Some(counted.unwrap_or(WayPoint { node, way: Length::ZERO }));
+            self.end_of_authority = Some(counted.unwrap_or(PathPoint { node, distance: Length::ZERO }));
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::ids::{EdgeId, NodeId, SensorId, TurnoutId};
 use crate::model::MotionModel;
 use crate::model::survey::SectionIndex;
 use crate::track::{Hop, Layout, NodeKind, Position, TurnoutStates, Zone};
-use crate::tracking::{Located, TrackContext, WayPoint, place_of, way_to};
+use crate::tracking::{Located, PathPoint, TrackContext, distance_to, place_of};
 use crate::units::Length;
 
 /// The owner of what a [`TrackContext`] refers to.
@@ -78,11 +78,11 @@ pub(super) fn circuit_length(context: TrackContext<'_>, model: &MotionModel, nod
 pub(super) fn recount_from(
     context: TrackContext<'_>,
     model: &MotionModel,
-    point: WayPoint,
+    point: PathPoint,
     node: NodeId,
-) -> Option<WayPoint> {
+) -> Option<PathPoint> {
     let (_, [_, between]) = hop_ranges(context, model, point.node).find(|(hop, _)| hop.to == node)?;
-    Some(WayPoint { node, way: point.way - between })
+    Some(PathPoint { node, distance: point.distance - between })
 }
 
 /// The sensors ahead of a node up to a distance, with their distances.
@@ -212,19 +212,19 @@ pub(super) fn reversed_location(
     context: TrackContext<'_>,
     model: &MotionModel,
     located: Located,
-) -> Option<(WayPoint, Length)> {
+) -> Option<(PathPoint, Length)> {
     let leading = reversed_position(context, model, located.at)?;
     let behind = context.layout.edge(leading.edge)?.from;
-    let way = way_to(context, model, behind, leading)?;
+    let distance = distance_to(context, model, behind, leading)?;
     let uncertainty = Length::from_m(libm::hypot(located.uncertainty.as_m(), SHOE_DEVIATION.as_m()));
-    Some((WayPoint { node: behind, way }, uncertainty))
+    Some((PathPoint { node: behind, distance }, uncertainty))
 }
 
 /// Where the leading end of the pickup is once a train at rest has reversed.
 pub(super) fn reversed_position(
     context: TrackContext<'_>,
     model: &MotionModel,
-    at: WayPoint,
+    at: PathPoint,
 ) -> Option<Position> {
     context.layout.reversed(trailing_position(context, model, at)?)
 }
@@ -234,10 +234,10 @@ pub(super) fn reversed_position(
 pub(super) fn trailing_position(
     context: TrackContext<'_>,
     model: &MotionModel,
-    at: WayPoint,
+    at: PathPoint,
 ) -> Option<Position> {
-    if at.way >= SHOE_LENGTH {
-        return place_of(context, model, WayPoint { way: at.way - SHOE_LENGTH, ..at });
+    if at.distance >= SHOE_LENGTH {
+        return place_of(context, model, PathPoint { distance: at.distance - SHOE_LENGTH, ..at });
     }
     context.layout.reversed(reversed_on_current_path(context, place_of(context, model, at)?)?)
 }

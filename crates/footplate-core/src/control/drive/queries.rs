@@ -6,7 +6,7 @@ use crate::ids::{NodeId, SensorId, TrainId, TurnoutId};
 use crate::model::MotionFit;
 use crate::time::Timestamp;
 use crate::track::Position;
-use crate::tracking::{PassedContact, Rest, TrackContext, WayPoint, place_of, way_to};
+use crate::tracking::{PassedContact, PathPoint, Rest, TrackContext, distance_to, place_of};
 use crate::units::Length;
 
 use super::driver::Driver;
@@ -24,7 +24,7 @@ impl Driver {
 
     /// The median place of rest if a stop command is sent at a time not before the last event.
     #[must_use]
-    pub fn rest_if_stopped(&self, train: TrainId, at: Timestamp) -> Option<WayPoint> {
+    pub fn rest_if_stopped(&self, train: TrainId, at: Timestamp) -> Option<PathPoint> {
         Some(self.stopped_at(train, at)?.at)
     }
 
@@ -78,7 +78,7 @@ impl Driver {
             let model = &self.trains.get(&train)?.model;
             let trailing = trailing_position(self.track.context(), model, located.at)?;
             let behind = self.track.layout.edge(trailing.edge)?.from;
-            if behind == located.at.node { None } else { self.way_point(train, behind, place) }
+            if behind == located.at.node { None } else { self.path_point(train, behind, place) }
         });
         if let Some(at) = at {
             self.place(now, train, at, located.uncertainty);
@@ -100,20 +100,20 @@ impl Driver {
 
     /// A point of a train's path as a position on the layout, with the turnouts as they are.
     #[must_use]
-    pub fn position_at(&self, train: TrainId, at: WayPoint) -> Option<Position> {
+    pub fn position_at(&self, train: TrainId, at: PathPoint) -> Option<Position> {
         place_of(self.track.context(), &self.trains.get(&train)?.model, at)
     }
 
     /// A position on the layout as a point of a train's path ahead of another point; on a circuit, after one more lap
     /// if need be.
     #[must_use]
-    pub fn way_point_ahead(&self, train: TrainId, from: WayPoint, to: Position) -> Option<WayPoint> {
-        let found = self.way_point(train, from.node, to)?;
-        if found.way > from.way {
+    pub fn path_point_ahead(&self, train: TrainId, from: PathPoint, to: Position) -> Option<PathPoint> {
+        let found = self.path_point(train, from.node, to)?;
+        if found.distance > from.distance {
             return Some(found);
         }
         let lap = circuit_length(self.track.context(), &self.trains.get(&train)?.model, from.node)?;
-        Some(WayPoint { way: found.way + lap, ..found })
+        Some(PathPoint { distance: found.distance + lap, ..found })
     }
 
     /// Where the leading end of the pickup will be once a train at rest has reversed. It is then measured from the
@@ -133,9 +133,9 @@ impl Driver {
     /// A position on the layout as a point of a train's path from a node, with the turnouts as they are; `None` if no
     /// path leads there.
     #[must_use]
-    pub fn way_point(&self, train: TrainId, from: NodeId, to: Position) -> Option<WayPoint> {
-        let way = way_to(self.track.context(), &self.trains.get(&train)?.model, from, to)?;
-        Some(WayPoint { node: from, way })
+    pub fn path_point(&self, train: TrainId, from: NodeId, to: Position) -> Option<PathPoint> {
+        let distance = distance_to(self.track.context(), &self.trains.get(&train)?.model, from, to)?;
+        Some(PathPoint { node: from, distance })
     }
 
     /// Gives up the position of a train that was found to be wrong.
@@ -162,11 +162,11 @@ impl Driver {
         let located = self.locate(train, now)?;
         let context = self.track.context();
         let model = self.model(train)?;
-        let mut way = Length::ZERO;
+        let mut distance = Length::ZERO;
         let hops = context.hops_ahead(located.at.node).take(context.layout.nodes().len());
         for hop in hops {
-            way += model.length(context.sections, &hop)[0];
-            if way > located.at.way {
+            distance += model.length(context.sections, &hop)[0];
+            if distance > located.at.distance {
                 return hop.sensor;
             }
         }

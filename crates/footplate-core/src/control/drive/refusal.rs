@@ -5,7 +5,7 @@ use core::fmt;
 
 use crate::ids::{SpeedStep, TrainId, TurnoutId};
 use crate::time::TimeSpan;
-use crate::track::WayError;
+use crate::track::PathError;
 use crate::units::{Length, Ratio, Speed};
 
 use super::order::Gap;
@@ -47,7 +47,7 @@ pub enum Refusal {
         found: Length,
     },
     /// The place cannot be located with the turnouts as they are.
-    Place(WayError),
+    Place(PathError),
     /// No path leads there with the turnouts as they are.
     NoWay {
         /// The target.
@@ -280,7 +280,7 @@ impl fmt::Display for Refusal {
             ),
             Self::TurnoutUnknown { turnout, train } => write!(
                 f,
-                "the position of turnout {turnout} is unknown and train {train} may be on it: enter how it lies, for \
+                "the position of turnout {turnout} is unknown and train {train} may be on it: enter its position, for \
                  example `turnout {turnout} straight`, or run the train over the next sensor"
             ),
             Self::NotArrived { train, within } => write!(

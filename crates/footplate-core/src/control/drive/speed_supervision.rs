@@ -16,7 +16,7 @@ use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Zone;
-use crate::tracking::{ReachableSet, TrackContext, WayPoint};
+use crate::tracking::{PathPoint, ReachableSet, TrackContext};
 use crate::units::{Length, Ratio, Speed};
 
 use super::driven_train::DrivenTrain;
@@ -114,15 +114,16 @@ impl DrivenTrain {
         &self,
         context: TrackContext<'g>,
         now: Timestamp,
-        at: WayPoint,
+        at: PathPoint,
     ) -> Vec<(RestrictedStretch<'g>, SpeedStep)> {
         if context.layout.zones().is_empty() {
             return Vec::new();
         }
         let lookahead = Lookahead::of(self, now);
         let [_, rear] = lookahead.ends;
-        let mut restrictions = RestrictedStretch::about(context, &self.model, at.node, -rear, at.way.as_m());
-        restrictions.retain(|stretch| stretch.to >= rear && stretch.from <= at.way.as_m());
+        let mut restrictions =
+            RestrictedStretch::about(context, &self.model, at.node, -rear, at.distance.as_m());
+        restrictions.retain(|stretch| stretch.to >= rear && stretch.from <= at.distance.as_m());
         restrictions
             .into_iter()
             .map(|stretch| (stretch, lookahead.within(stretch.zone.limit.as_m_per_s())))

@@ -5,10 +5,10 @@ use alloc::string::{String, ToString};
 use crate::estimate::HALF_95;
 use crate::ids::{NodeId, SpeedStep};
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::{Located, Rest, TrackContext, WayPoint, landmark_of, way_to_landmark};
+use crate::tracking::{Located, PathPoint, Rest, TrackContext, distance_to_landmark, landmark_of};
 use crate::units::Length;
 
-use super::command_time::{CommandTime, command_time, spread};
+use super::command_time::{CommandTime, command_time};
 use super::driven_train::DrivenTrain;
 use super::order::{Aim, OrderId, StopOrder};
 use super::outputs::Outputs;
@@ -110,7 +110,7 @@ impl DrivenTrain {
         if !self.is_at_rest(context, now) {
             return Err(Refusal::StillMoves { train: self.id() });
         }
-        let at = WayPoint { way: located.at.way + distance, ..located.at };
+        let at = PathPoint { distance: located.at.distance + distance, ..located.at };
         let destination = Destination {
             named: None,
             at: Some(at),
@@ -164,22 +164,23 @@ impl DrivenTrain {
         located: &Located,
         destination: &Destination,
         at_rest: bool,
-    ) -> Result<WayPoint, Refusal> {
+    ) -> Result<PathPoint, Refusal> {
         let node = located.at.node;
         let no_path = || self.no_path(context, node, destination);
         let named = destination.named.ok_or_else(no_path)?;
         context.layout.locate(named, context.turnouts).map_err(Refusal::Place)?;
-        let mut way = way_to_landmark(context, &self.model, node, named).ok_or_else(no_path)?;
+        let mut distance = distance_to_landmark(context, &self.model, node, named).ok_or_else(no_path)?;
         let circuit_length = circuit_length(context, &self.model, node);
-        let behind = |way: Length| way < located.at.way - AT_TARGET;
-        if behind(way) {
-            way +=
-                circuit_length.filter(|circuit_length| !behind(way + *circuit_length)).ok_or_else(no_path)?;
+        let behind = |distance: Length| distance < located.at.distance - AT_TARGET;
+        if behind(distance) {
+            distance += circuit_length
+                .filter(|circuit_length| !behind(distance + *circuit_length))
+                .ok_or_else(no_path)?;
         }
         if destination.next_round {
-            way += circuit_length.ok_or_else(no_path)?;
+            distance += circuit_length.ok_or_else(no_path)?;
         }
-        let at = WayPoint { node, way };
+        let at = PathPoint { node, distance };
         if !at_rest {
             let soonest = self.locator.rest_if_stopped(context, &self.model, now + self.link.soonest);
             let reached = soonest
@@ -194,14 +195,14 @@ impl DrivenTrain {
     pub(super) fn too_near(
         &self,
         context: TrackContext<'_>,
-        at: WayPoint,
+        at: PathPoint,
         beyond: Length,
         destination: &Destination,
     ) -> Refusal {
         if destination.named.is_none() {
             return Refusal::MoveTooShort { shortest: beyond };
         }
-        let nearest = landmark_of(context, &self.model, WayPoint { way: at.way + beyond, ..at });
+        let nearest = landmark_of(context, &self.model, PathPoint { distance: at.distance + beyond, ..at });
         let nearest = crate::track::Landmark {
             offset: Length::from_mm(libm::round(nearest.offset.as_mm())),
             ..nearest
@@ -233,8 +234,11 @@ impl DrivenTrain {
         context: TrackContext<'_>,
         node: NodeId,
         destination: &Destination,
-    ) -> Option<WayPoint> {
-        Some(WayPoint { node, way: way_to_landmark(context, &self.model, node, destination.named?)? })
+    ) -> Option<PathPoint> {
+        Some(PathPoint {
+            node,
+            distance: distance_to_landmark(context, &self.model, node, destination.named?)?,
+        })
     }
 
     /// A named target, measured again from the same node: path lengths are learnt and turnouts thrown on the run.
@@ -242,23 +246,23 @@ impl DrivenTrain {
     fn relocate_named_target(
         &self,
         context: TrackContext<'_>,
-        at: WayPoint,
+        at: PathPoint,
         destination: &Destination,
-    ) -> Option<WayPoint> {
+    ) -> Option<PathPoint> {
         let again = self.target_from(context, at.node, destination)?;
         let Some(lap) = circuit_length(context, &self.model, at.node) else { return Some(again) };
-        let laps = libm::round((at.way - again.way) / lap).max(0.0);
-        Some(WayPoint { way: again.way + lap * laps, ..at })
+        let laps = libm::round((at.distance - again.distance) / lap).max(0.0);
+        Some(PathPoint { distance: again.distance + lap * laps, ..at })
     }
 
     /// The target measured from a sensor that the train has passed since; `None` if no path leads there any more.
     pub(super) fn recount_target(
         &self,
         context: TrackContext<'_>,
-        at: WayPoint,
+        at: PathPoint,
         node: NodeId,
         destination: &Destination,
-    ) -> Option<WayPoint> {
+    ) -> Option<PathPoint> {
         let Some(counted) = recount_from(context, &self.model, at, node) else {
             return self.target_from(context, node, destination);
         };
@@ -336,7 +340,7 @@ impl DrivenTrain {
         let passes = trigger.and_then(|sensor| {
             let node = context.node_of(sensor)?;
             let located = self.located(context, plan.leaves)?;
-            let since = located.at.way - distance_between(context, &self.model, located.at.node, node)?;
+            let since = located.at.distance - distance_between(context, &self.model, located.at.node, node)?;
             (located.speed.as_m_per_s() > 0.0).then(|| since / located.speed)
         });
         PlannedStop {
@@ -359,10 +363,10 @@ impl DrivenTrain {
         let (Some(here), Some(there)) = (self.located(context, now), self.located(context, leaves)) else {
             return [None; 2];
         };
-        let last = there.at.way - there.speed * self.link.reaction;
+        let last = there.at.distance - there.speed * self.link.reaction;
         let mut triggers = [None; 2];
         for (sensor, distance) in sensors_within(context, &self.model, here.at.node, last) {
-            if distance > here.at.way {
+            if distance > here.at.distance {
                 triggers = [Some(sensor), triggers[0]];
             }
         }
@@ -370,9 +374,9 @@ impl DrivenTrain {
     }
 
     /// The rest relative to the target, with its 95 % interval.
-    pub(super) fn promise(&self, context: TrackContext<'_>, rest: &Rest, at: WayPoint) -> Option<Promise> {
+    pub(super) fn promise(&self, context: TrackContext<'_>, rest: &Rest, at: PathPoint) -> Option<Promise> {
         let median = self.beyond(context, rest.at, at)?;
-        let half = spread(rest) * HALF_95;
+        let half = rest.deviation() * HALF_95;
         Some(Promise { median, low: median - half, high: median + half })
     }
 
@@ -381,24 +385,24 @@ impl DrivenTrain {
         &self,
         context: TrackContext<'_>,
         rest: &Rest,
-        at: WayPoint,
+        at: PathPoint,
         aim: Aim,
     ) -> Option<Length> {
-        Some(self.beyond(context, rest.at, at)? + spread(rest) * aim.margin())
+        Some(self.beyond(context, rest.at, at)? + rest.deviation() * aim.margin())
     }
 
     /// How far one point of the path lies beyond another.
     pub(super) fn beyond(
         &self,
         context: TrackContext<'_>,
-        point: WayPoint,
-        target: WayPoint,
+        point: PathPoint,
+        target: PathPoint,
     ) -> Option<Length> {
         if let Some(between) = distance_between(context, &self.model, target.node, point.node) {
-            return Some(between + point.way - target.way);
+            return Some(between + point.distance - target.distance);
         }
         let between = distance_between(context, &self.model, point.node, target.node)?;
-        Some(point.way - between - target.way)
+        Some(point.distance - between - target.distance)
     }
 }
 

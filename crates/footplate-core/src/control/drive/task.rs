@@ -5,7 +5,7 @@ use alloc::string::String;
 use crate::ids::{NodeId, SensorId, SpeedStep};
 use crate::time::Timestamp;
 use crate::track::Landmark;
-use crate::tracking::{DueContact, WayPoint};
+use crate::tracking::{DueContact, PathPoint};
 
 use super::order::{Aim, OrderId};
 use crate::control::Promise;
@@ -39,7 +39,7 @@ pub(super) struct Destination {
     /// The landmark; `None` for a move.
     pub(super) named: Option<Landmark>,
     /// The point on the path, measured from the last sensor passed; `None` until the train has been located.
-    pub(super) at: Option<WayPoint>,
+    pub(super) at: Option<PathPoint>,
     pub(super) aim: Aim,
     /// The step to stop from, if the order names one.
     pub(super) step: Option<SpeedStep>,

@@ -75,7 +75,7 @@ fn nodes_within(context: TrackContext<'_>, from: Position, limit: Length, found:
             continue;
         }
         found.push((node, distance));
-        for id in context.layout.ways(node).edges() {
+        for id in context.layout.outgoing(node).edges() {
             if let Some(next) = context.layout.edge(id)
                 && context.layout.needs_of(id).all(|need| context.turnouts.allow(need))
             {

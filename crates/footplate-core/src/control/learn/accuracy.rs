@@ -1,4 +1,4 @@
-//! What has been reached: for each step and approach, the speed, the stop and how well both are known.
+//! The accuracy of a calibration: speed and stop of each step and approach, with their uncertainties.
 
 use alloc::vec::Vec;
 
@@ -8,37 +8,36 @@ use crate::ids::SpeedStep;
 use crate::model::{MotionModel, StepUse, StopForecast};
 use crate::units::{Length, Ratio, Speed};
 
-/// One line of the table of what is known.
+/// The accuracy of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepAccuracy {
     /// The step.
     pub step: SpeedStep,
-    /// From where it is reached.
+    /// The side from which it is reached.
     pub approach: Approach,
     /// The steady speed.
     pub speed: Estimate<Speed>,
     /// The stop from it.
     pub stop: StopForecast,
-    /// Stops made from it in this session.
+    /// Number of stops from it in this session.
     pub stops: u32,
 }
 
 impl StepAccuracy {
-    /// What the model says of a step.
+    /// The accuracy of a step in a model.
     #[must_use]
     pub fn of(model: &MotionModel, step: SpeedStep, approach: Approach, stops: u32) -> Self {
         let (speed, stop) = (model.speed(step, approach), model.stop(step, approach));
         Self { step, approach, speed, stop, stops }
     }
 
-    /// How far from where it is expected a stop may end, in 95 of 100 cases.
+    /// Half the 95 % interval of the place of rest.
     #[must_use]
     pub fn stop_within(&self) -> Length {
-        let (doubt, scatter) = (self.stop.doubt.as_m(), self.stop.scatter.as_m());
-        Length::from_m(HALF_95 * libm::hypot(doubt, scatter))
+        HALF_95 * self.stop.deviation()
     }
 
-    /// How far off the speed may be, in 95 of 100 cases, as a part of it.
+    /// Half the 95 % interval of the speed, as a fraction of it.
     #[must_use]
     pub fn speed_within(&self) -> Ratio {
         let (value, uncertainty) = (self.speed.value.as_m_per_s(), self.speed.uncertainty.as_m_per_s());
@@ -49,5 +48,10 @@ impl StepAccuracy {
 /// The steps with numbers of their own that move the train, lowest first.
 #[must_use]
 pub fn usable_steps(model: &MotionModel) -> Vec<SpeedStep> {
-    model.knots().filter(|step| model.uses(*step) == StepUse::Moves).collect()
+    steps(model).filter(|step| model.uses(*step) == StepUse::Moves).collect()
+}
+
+/// The steps that a calibration measures, lowest first.
+pub(super) fn steps(model: &MotionModel) -> impl DoubleEndedIterator<Item = SpeedStep> + use<> {
+    model.knots()
 }

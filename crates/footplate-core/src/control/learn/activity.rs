@@ -1,43 +1,43 @@
-//! What the calibrator is doing right now.
+//! The activity of the calibrator, and the stage of its experiment.
 
 use super::accuracy::StepAccuracy;
 use super::experiment::Experiment;
 use super::notice::Phase;
 use crate::time::Timestamp;
 
-/// What it is about.
+/// The present activity of the calibrator.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Activity {
-    /// Nothing was said yet.
-    Asleep,
-    /// The train was commanded to stop; contacts that report by themselves show now.
+    /// It has not started.
+    NotStarted,
+    /// The train was commanded to stop; stuck sensors report now.
     Listening { until: Timestamp },
-    /// It runs, and any contact tells where. Without one it is pushed up a step.
+    /// The lost train runs to any sensor. Its step is raised if none reports.
     Finding { push_at: Timestamp },
-    /// It stops, and is turned around when it stands.
-    Turning { at: Timestamp },
-    /// It is on its way to a circuit, or over turnouts that could not be thrown yet.
+    /// The train stops, and reverses when it is at rest.
+    Reversing { at: Timestamp },
+    /// The train runs to a circuit, or over turnouts that could not be thrown yet.
     Joining,
-    /// Something is tried.
+    /// An experiment runs.
     Trying(Trial),
-    /// It stops because a person said so, and waits for them.
+    /// An operator paused the calibration: the train stops.
     Paused,
-    /// It was lost and commanded to stop; it is looked for again from then on.
+    /// The train was lost and commanded to stop; the search begins at this time.
     Waiting { until: Timestamp },
-    /// It stops for good.
+    /// The train stops; the calibration is over then.
     Ending { until: Timestamp },
-    /// It is over.
+    /// The calibration is over.
     Finished,
 }
 
 impl Activity {
-    /// The same for people.
+    /// The phase that notices report.
     pub(super) fn phase(&self) -> Phase {
         match self {
-            Self::Asleep
+            Self::NotStarted
             | Self::Listening { .. }
             | Self::Finding { .. }
-            | Self::Turning { .. }
+            | Self::Reversing { .. }
             | Self::Waiting { .. } => Phase::Finding,
             Self::Joining => Phase::Joining,
             Self::Trying(trial) => Phase::Experiment(trial.experiment),
@@ -48,7 +48,7 @@ impl Activity {
     }
 }
 
-/// An experiment under way.
+/// A running experiment.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Trial {
     pub(super) experiment: Experiment,
@@ -57,25 +57,25 @@ pub(super) struct Trial {
     pub(super) stage: Stage,
 }
 
-/// How far it is.
+/// The stage of an experiment.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Stage {
-    /// To the other side of the step, so that it is reached by the approach that is asked for.
+    /// Runs at a step on the side from which the experiment's step is approached.
     RunUp,
-    /// At the step; this many contacts are still to be passed once it is steady.
-    Steady { contacts: u8 },
-    /// Waiting for the moment to stop, if it is known already.
+    /// Runs at the step; this many sensors remain to be passed at a steady speed.
+    Steady { sensors: u8 },
+    /// Waits for the time to stop, if it is known already.
     Aiming {
         at: Option<Timestamp>,
-        /// Contacts at which it may be worked out anew.
+        /// Number of sensors at which that time may be computed again.
         again: u8,
     },
-    /// Told to stop; rests by then.
+    /// Commanded to stop; at rest by then.
     Braking { until: Timestamp },
-    /// On a short move, to be stopped then.
+    /// Makes a short move, to be stopped at this time.
     Moving { stop_at: Timestamp },
-    /// Told to stop at the end of a short move.
+    /// Commanded to stop at the end of a short move.
     BrakingAgain { until: Timestamp },
-    /// On to the next contact.
-    Crawling,
+    /// Creeps to the next sensor.
+    Creeping,
 }

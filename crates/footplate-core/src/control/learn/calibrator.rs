@@ -1,15 +1,15 @@
-//! The machine: entries in, commands and notices out.
+//! The calibrator: events in, commands and notices out.
 
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec::Vec;
 
-use super::accuracy::{StepAccuracy, usable_steps};
+use super::accuracy::{StepAccuracy, steps, usable_steps};
 use super::activity::Activity;
-use super::notice::{CalibrationNotice, Ending, Mishap, Progress};
-use super::planner::{KNOWN_FROM, Planner, Stance};
+use super::circuits::Passes;
+use super::notice::{CalibrationNotice, Ending, Fault, Progress};
+use super::planner::{KNOWN_FROM, Planner, Throttle};
 use super::settings::CalibratorSettings;
-use super::surveying::Passes;
-use super::tracker::{Tracker, Verdict};
+use super::tracker::{ReportClass, Tracker};
 use crate::control::{Machine, Output};
 use crate::event::{Approach, Command, Event, EventKind, Report};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId, TurnoutId};
@@ -21,16 +21,16 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Circuit, Layout, Leg, TurnoutStates};
 use crate::tracking::{Locator, TrackContext};
 
-/// A command that was asked for and has not left after this is asked for again.
+/// A command that has not been sent after this time is requested again.
 const COMMAND_PATIENCE: TimeSpan = TimeSpan::from_ms(3_000);
 
 /// Calibrates one train on one layout.
 #[derive(Debug, Clone)]
 pub struct Calibrator<'l> {
     pub(super) layout: &'l Layout,
-    /// The layout's lengths as it says them, ...
+    /// The lengths of the layout as surveyed, ...
     pub(super) surveyed: SectionIndex,
-    /// ... and as far as they are believed after what the train made of them.
+    /// ... and with uncertainties corrected by the path lengths of the train.
     pub(super) sections: SectionIndex,
     pub(super) survey_test: SurveyTest,
     pub(super) passes: Passes,
@@ -43,39 +43,39 @@ pub struct Calibrator<'l> {
     pub(super) planner: Planner,
     pub(super) circuit: Option<Circuit>,
     pub(super) activity: Activity,
-    /// What the train was commanded last, since when, and when it is steady at it.
-    pub(super) stance: Stance,
+    /// The command sent last, when it was sent, and when the speed is steady at it.
+    pub(super) throttle: Throttle,
     pub(super) commanded_at: Timestamp,
     pub(super) steady_at: Timestamp,
-    /// A step that was asked for and has not left yet.
-    pub(super) asked: Option<(SpeedStep, Timestamp)>,
-    /// Turnouts that were asked for lately.
-    pub(super) asked_turnouts: BTreeMap<TurnoutId, (Leg, Timestamp)>,
-    /// How often a turnout was found on the other leg than it was told.
+    /// A step that was requested and has not been sent yet.
+    pub(super) requested: Option<(SpeedStep, Timestamp)>,
+    /// Turnouts that were requested recently.
+    pub(super) requested_turnouts: BTreeMap<TurnoutId, (Leg, Timestamp)>,
+    /// How often a turnout was found in another position than commanded.
     pub(super) failures: BTreeMap<TurnoutId, u8>,
-    /// The train has stalled if no contact comes by then.
+    /// The train has stalled if no sensor reports it by then.
     pub(super) due_by: Option<Timestamp>,
-    /// How often it was pushed up since the last contact, and from which step.
+    /// How often its step was raised since the last detection, and from which step.
     pub(super) pushes: u8,
     pub(super) pushed_from: Option<SpeedStep>,
-    /// How often it was turned around without a contact.
-    pub(super) turns: u8,
+    /// How often it reversed without a detection.
+    pub(super) reversals: u8,
     pub(super) started: Option<Timestamp>,
     pub(super) finished: Option<Ending>,
     pub(super) ending: Option<Ending>,
-    /// Hops of which it was said that their lengths differ.
+    /// Number of hops that were reported to have other lengths than surveyed.
     pub(super) odd_lengths: usize,
     watched: Option<SensorId>,
     outputs: VecDeque<Output<CalibrationNotice>>,
 }
 
 impl<'l> Calibrator<'l> {
-    /// A calibration of the train that a fit is about: from nothing, or on from what it knows already. It begins with
-    /// the first `handle_…`.
+    /// A calibration of the train of a fit, which may be empty or from an earlier session. It begins with the first
+    /// `handle_…`.
     #[must_use]
     pub fn new(layout: &'l Layout, settings: CalibratorSettings, mut fit: MotionFit) -> Self {
         let train = fit.model().train();
-        note_what_moved(&mut fit);
+        note_moving_steps(&mut fit);
         Self {
             layout,
             surveyed: SectionIndex::of(layout),
@@ -90,17 +90,17 @@ impl<'l> Calibrator<'l> {
             tracker: Tracker::default(),
             planner: Planner::default(),
             circuit: None,
-            activity: Activity::Asleep,
-            stance: Stance::STANDS,
+            activity: Activity::NotStarted,
+            throttle: Throttle::AT_REST,
             commanded_at: Timestamp::ZERO,
             steady_at: Timestamp::ZERO,
-            asked: None,
-            asked_turnouts: BTreeMap::new(),
+            requested: None,
+            requested_turnouts: BTreeMap::new(),
             failures: BTreeMap::new(),
             due_by: None,
             pushes: 0,
             pushed_from: None,
-            turns: 0,
+            reversals: 0,
             started: None,
             finished: None,
             ending: None,
@@ -110,54 +110,54 @@ impl<'l> Calibrator<'l> {
         }
     }
 
-    /// Tells how the turnouts lie where that is known from before.
+    /// Sets the turnout positions that are known from before.
     pub fn set_turnouts(&mut self, turnouts: TurnoutStates) {
         self.turnouts = turnouts;
     }
 
-    /// How the turnouts lie as far as is known.
+    /// The known turnout positions.
     #[must_use]
     pub const fn turnouts(&self) -> &TurnoutStates {
         &self.turnouts
     }
 
-    /// What is known of the train.
+    /// The fit of the train's motion.
     #[must_use]
     pub const fn fit(&self) -> &MotionFit {
         &self.fit
     }
 
-    /// Gives back what is known of the train.
+    /// Returns the fit of the train's motion.
     #[must_use]
     pub fn into_fit(self) -> MotionFit {
         self.fit
     }
 
-    /// The sections of the layout, with what their lengths are worth after what the train made of them.
+    /// The sections of the layout, with uncertainties corrected by the path lengths of the train.
     #[must_use]
     pub const fn sections(&self) -> &SectionIndex {
         &self.sections
     }
 
-    /// How the lengths of the layout compare with those that the train ran over.
+    /// The comparison of surveyed lengths with path lengths.
     #[must_use]
     pub const fn survey_test(&self) -> &SurveyTest {
         &self.survey_test
     }
 
-    /// Where the train is, for whoever drives it next.
+    /// The position of the train.
     #[must_use]
     pub const fn locator(&self) -> &Locator {
         &self.locator
     }
 
-    /// Why it ended, once the train stands.
+    /// Why the calibration ended; `None` until the train is at rest.
     #[must_use]
     pub const fn ending(&self) -> Option<&Ending> {
         self.finished.as_ref()
     }
 
-    /// How far it is.
+    /// The progress of the calibration.
     #[must_use]
     pub fn progress(&self, now: Timestamp) -> Progress {
         let elapsed = self.started.map_or(TimeSpan::ZERO, |started| now - started);
@@ -165,7 +165,7 @@ impl<'l> Calibrator<'l> {
         Progress { phase: self.activity.phase(), elapsed, left, accuracy: self.accuracy() }
     }
 
-    /// What is known of the steps that move the train, lowest first.
+    /// The accuracy of the steps that move the train, lowest first.
     #[must_use]
     pub fn accuracy(&self) -> Vec<StepAccuracy> {
         let usable = usable_steps(self.model());
@@ -193,20 +193,20 @@ impl<'l> Calibrator<'l> {
         TrackContext { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts }
     }
 
-    pub(super) fn say(&mut self, notice: CalibrationNotice) {
+    pub(super) fn notify(&mut self, notice: CalibrationNotice) {
         self.outputs.push_back(Output::Notice(notice));
     }
 
-    pub(super) fn report_mishap(&mut self, mishap: Mishap) {
-        self.say(CalibrationNotice::Mishap(mishap));
+    pub(super) fn report_fault(&mut self, fault: Fault) {
+        self.notify(CalibrationNotice::Mishap(fault));
     }
 
-    /// Tells the train a step, unless it was told so already.
+    /// Requests a step, unless it was commanded already.
     pub(super) fn issue(&mut self, now: Timestamp, step: SpeedStep) {
-        if self.asked.is_none() && self.stance.step == step && self.commanded_at > Timestamp::ZERO {
+        if self.requested.is_none() && self.throttle.step == step && self.commanded_at > Timestamp::ZERO {
             return;
         }
-        self.asked = Some((step, now));
+        self.requested = Some((step, now));
         self.outputs.push_back(Output::Command(Command::Speed { train: self.train, step }));
     }
 
@@ -218,38 +218,38 @@ impl<'l> Calibrator<'l> {
         self.outputs.push_back(Output::HoldLine(until));
     }
 
-    /// Asks for the contact that comes next, if that is another one than before.
+    /// Asks the line to watch the next sensor, if that has changed.
     pub(super) fn watch_next(&mut self) {
         let next =
             self.tracker.last().and_then(|node| self.context().hop_from(node)).and_then(|hop| hop.sensor);
-        let next = next.filter(|_| self.stance.step > SpeedStep::STAND);
+        let next = next.filter(|_| self.throttle.step > SpeedStep::STAND);
         if next != self.watched {
             self.watched = next;
             self.outputs.push_back(Output::Watch(next));
         }
     }
 
-    /// A command to this train has left.
-    fn handle_told(&mut self, now: Timestamp, event: &Event, step: SpeedStep) {
+    /// A speed command to this train was sent.
+    fn handle_speed_sent(&mut self, now: Timestamp, event: &Event, step: SpeedStep) {
         let context =
             TrackContext { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts };
         self.fit.take(self.layout, &self.turnouts, event);
         self.locator.handle_command(context, self.fit.model(), event);
-        let before = self.stance.step;
+        let before = self.throttle.step;
         self.commanded_at = event.time;
         self.steady_at = event.time + self.model().settles_within(before, step);
-        self.stance = match step.cmp(&before) {
-            core::cmp::Ordering::Equal => self.stance,
-            _ if step == SpeedStep::STAND => Stance::STANDS,
-            core::cmp::Ordering::Greater => Stance { step, approach: Approach::Below },
-            core::cmp::Ordering::Less => Stance { step, approach: Approach::Above },
+        self.throttle = match step.cmp(&before) {
+            core::cmp::Ordering::Equal => self.throttle,
+            _ if step == SpeedStep::STAND => Throttle::AT_REST,
+            core::cmp::Ordering::Greater => Throttle { step, approach: Approach::Below },
+            core::cmp::Ordering::Less => Throttle { step, approach: Approach::Above },
         };
-        if self.asked.is_some_and(|(asked, _)| asked == step) {
-            self.asked = None;
+        if self.requested.is_some_and(|(requested, _)| requested == step) {
+            self.requested = None;
         }
-        self.expect_contact(now);
+        self.expect_detection(now);
         self.watch_next();
-        self.on_told(now);
+        self.on_speed_sent(now);
     }
 
     fn handle_report(&mut self, now: Timestamp, event: &Event, report: Report) {
@@ -259,50 +259,48 @@ impl<'l> Calibrator<'l> {
             TrackContext { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts };
         let model = self.fit.model();
         let before = self.tracker.last();
-        match self.tracker.judge(context, &self.locator, model, report.sensor, window) {
-            Verdict::Again => {}
-            Verdict::First(_) => self.accept(now, event, report.sensor, window),
-            Verdict::Passed(node) => {
+        match self.tracker.classify(context, &self.locator, model, report.sensor, window) {
+            ReportClass::Again => {}
+            ReportClass::First(_) => self.accept(now, event, report.sensor, window),
+            ReportClass::Passed(node) => {
                 self.learn_legs(before, node);
                 self.accept(now, event, report.sensor, window);
             }
-            Verdict::ByOtherLeg { turnout, leg, .. } => {
+            ReportClass::ByOtherLeg { turnout, leg, .. } => {
                 self.took_other_leg(turnout, leg);
                 self.accept(now, event, report.sensor, window);
             }
-            Verdict::Moved { from, to } => {
-                self.report_mishap(Mishap::Moved { from, to });
+            ReportClass::Moved { from, to } => {
+                self.report_fault(Fault::Moved { from, to });
                 self.fit.interrupt();
                 self.locator.lose();
-                if self.stance.step == SpeedStep::STAND {
+                if self.throttle.step == SpeedStep::STAND {
                     self.lose(now);
                 } else {
-                    // Whatever was tried is spoilt: go on from where it is now.
+                    // The experiment is lost: continue from the new position.
                     self.hold_line(None);
                     self.activity = Activity::Joining;
                     self.circuit = None;
                     self.accept(now, event, report.sensor, window);
                 }
             }
-            Verdict::Unexplained => self.report_mishap(Mishap::Unexplained { sensor: report.sensor }),
-            Verdict::WrongLayout { seen, expected } => {
+            ReportClass::Unexplained => self.report_fault(Fault::Unexplained { sensor: report.sensor }),
+            ReportClass::WrongLayout { seen, expected } => {
                 self.fit.interrupt();
                 self.end(now, Ending::WrongLayout { seen, expected });
             }
         }
     }
 
-    /// Where the train went over a turnout of which nobody knew how it lay, it is known now.
+    /// Sets the positions of turnouts that the train passed and that were unknown.
     fn learn_legs(&mut self, from: Option<NodeId>, to: NodeId) {
-        let Some(from) = from else { return };
-        let mut ways = self.layout.hops_from(from).filter(|hop| hop.to == to && hop.is_open(&self.turnouts));
-        let (Some(hop), None) = (ways.next(), ways.next()) else { return };
-        for need in hop.needs.iter().filter(|need| need.facing) {
+        let hop = from.and_then(|from| self.only_hop(from, to));
+        for need in hop.iter().flat_map(|hop| hop.needs).filter(|need| need.facing) {
             self.turnouts.set(need.turnout, need.leg);
         }
     }
 
-    /// The train passed a contact.
+    /// The train passed a sensor.
     fn accept(&mut self, now: Timestamp, event: &Event, sensor: SensorId, window: ContactWindow) {
         let context =
             TrackContext { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts };
@@ -311,9 +309,9 @@ impl<'l> Calibrator<'l> {
         self.fit.take(self.layout, &self.turnouts, event);
         self.note_that_it_moves(now);
         if passed.missed > 0 {
-            self.report_mishap(Mishap::Missed { count: passed.missed, before: sensor });
+            self.report_fault(Fault::Missed { count: passed.missed, before: sensor });
         }
-        self.expect_contact(now);
+        self.expect_detection(now);
         self.watch_next();
         if let Some(node) = self.tracker.last() {
             self.count_passage(node);
@@ -322,15 +320,13 @@ impl<'l> Calibrator<'l> {
     }
 }
 
-/// Steps at which contacts were passed in earlier sessions move the train.
-fn note_what_moved(fit: &mut MotionFit) {
-    let moved: Vec<SpeedStep> = fit
-        .model()
-        .knots()
+/// Steps with detections in earlier sessions move the train.
+fn note_moving_steps(fit: &mut MotionFit) {
+    let moved: Vec<SpeedStep> = steps(fit.model())
         .filter(|step| fit.model().uses(*step) == StepUse::Untried)
         .filter(|step| {
-            let contacts = |approach| fit.model().speed(*step, approach).count;
-            contacts(Approach::Below) + contacts(Approach::Above) >= KNOWN_FROM
+            let detections = |approach| fit.model().speed(*step, approach).count;
+            detections(Approach::Below) + detections(Approach::Above) >= KNOWN_FROM
         })
         .collect();
     for step in moved {
@@ -344,12 +340,14 @@ impl Machine for Calibrator<'_> {
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         self.begin(now);
         match event.kind {
-            EventKind::Speed { train, step } if train == self.train => self.handle_told(now, event, step),
-            EventKind::Reverse { train } if train == self.train => self.handle_turned(now, event),
+            EventKind::Speed { train, step } if train == self.train => {
+                self.handle_speed_sent(now, event, step);
+            }
+            EventKind::Reverse { train } if train == self.train => self.handle_reversed(now, event),
             EventKind::Turnout { turnout, curved } => {
                 self.turnouts.set(turnout, Leg::from_curved(curved));
-                self.asked_turnouts.remove(&turnout);
-                self.expect_contact(now);
+                self.requested_turnouts.remove(&turnout);
+                self.expect_detection(now);
             }
             EventKind::Sensor(report) if self.finished.is_none() => self.handle_report(now, event, report),
             _ => {}
@@ -360,10 +358,10 @@ impl Machine for Calibrator<'_> {
     fn handle_timeout(&mut self, now: Timestamp) {
         self.begin(now);
         self.on_clock(now);
-        if let Some((step, since)) = self.asked
+        if let Some((step, since)) = self.requested
             && now - since >= COMMAND_PATIENCE
         {
-            self.asked = Some((step, now));
+            self.requested = Some((step, now));
             self.command(Command::Speed { train: self.train, step });
         }
     }
@@ -373,7 +371,7 @@ impl Machine for Calibrator<'_> {
     }
 
     fn next_timeout(&self) -> Option<Timestamp> {
-        let patience = self.asked.map(|(_, since)| since + COMMAND_PATIENCE);
+        let patience = self.requested.map(|(_, since)| since + COMMAND_PATIENCE);
         [self.due_activity(), patience].into_iter().flatten().min()
     }
 }

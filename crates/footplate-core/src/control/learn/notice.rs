@@ -1,4 +1,4 @@
-//! What a calibration has to say while it goes on.
+//! Notices of a calibration.
 
 use alloc::vec::Vec;
 
@@ -9,81 +9,81 @@ use crate::time::TimeSpan;
 use crate::track::{Circuit, HopId, Leg};
 use crate::units::Length;
 
-/// Something for people and programs to know.
+/// A notice for operators and programs.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CalibrationNotice {
-    /// The train passed a contact: it is known where it is and which way it faces.
+    /// The train passed a sensor: its position and direction are known.
     Found {
-        /// The node of the contact.
+        /// The node of the sensor.
         node: NodeId,
-        /// The throttle step at which it came.
+        /// The step that was commanded.
         step: SpeedStep,
     },
-    /// It runs on this circuit from now on.
+    /// The train runs on this circuit from now on.
     Circuit(Circuit),
-    /// It faces a track that ends, or one that leads back to nowhere: it stops and turns around.
+    /// No circuit leads ahead of the train, or the track ends: it stops and reverses.
     TurnsAround {
-        /// The node of the contact behind which it does so.
+        /// The node of the sensor that it passed last.
         node: NodeId,
     },
     /// An experiment begins.
     Begins {
-        /// What is tried.
+        /// The experiment.
         experiment: Experiment,
-        /// Why this one.
+        /// Why it was chosen.
         why: Why,
     },
-    /// An experiment has ended, and the model is fitted anew.
+    /// An experiment has ended, and the model was fitted again.
     Done(Done),
-    /// How far it is.
+    /// The progress of the calibration.
     Progress(Progress),
-    /// Something went wrong; the calibration goes on unless it is followed by `Finished`.
-    Mishap(Mishap),
-    /// The train stands and nothing more is coming.
+    /// A fault; the calibration continues unless `Finished` follows. Recorded decisions hold this name, so it stays.
+    Mishap(Fault),
+    /// The train is at rest, and no more notices follow.
     Finished {
         /// Why it ended.
         ending: Ending,
-        /// What has been reached.
+        /// The accuracy reached.
         accuracy: Vec<StepAccuracy>,
     },
 }
 
-/// An experiment and what it brought.
+/// An experiment and its result.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Done {
-    /// What was tried.
+    /// The experiment.
     pub experiment: Experiment,
     /// How long it took.
     pub took: TimeSpan,
-    /// What was known of its step and approach before.
+    /// The accuracy of its step and approach before.
     pub before: StepAccuracy,
-    /// What is known now.
+    /// The accuracy now.
     pub after: StepAccuracy,
 }
 
-/// How far a calibration is.
+/// The progress of a calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Progress {
-    /// What it is about.
+    /// The phase.
     pub phase: Phase,
     /// Track time since its first command.
     pub elapsed: TimeSpan,
-    /// Track time that is left of the budget.
+    /// Remaining track time of the budget.
     pub left: TimeSpan,
-    /// What is known of the steps that move the train.
+    /// The accuracy of the steps that move the train.
     pub accuracy: Vec<StepAccuracy>,
 }
 
-/// What a calibration is about.
+/// The phase of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Phase {
     /// Finding the train.
     Finding,
-    /// On the way to a circuit.
+    /// Running to a circuit.
     Joining,
-    /// Trying something.
+    /// Running an experiment.
     Experiment(Experiment),
-    /// Paused by a person; the train stands or comes to rest.
+    /// Paused by the operator; the train is at rest or stops.
     Paused,
     /// Bringing the train to rest.
     Ending,
@@ -91,48 +91,48 @@ pub enum Phase {
     Finished,
 }
 
-/// What can go wrong without being the end.
+/// A fault that does not end the calibration.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Mishap {
-    /// The train did not start or stopped by itself; it was pushed up a step, and this one is not relied upon.
+pub enum Fault {
+    /// The train did not start, or stopped by itself; its step was raised, and this one counts as unreliable.
     Stalled {
         /// The step.
         step: SpeedStep,
     },
-    /// Contacts that the train passed did not report.
+    /// Sensors that the train passed did not report.
     Missed {
         /// How many in a row.
         count: usize,
-        /// The contact that reported after them.
+        /// The sensor that reported after them.
         before: SensorId,
     },
     /// A report that the train cannot have caused.
     Unexplained {
-        /// The contact.
+        /// The sensor.
         sensor: SensorId,
     },
-    /// The train took the other leg of a turnout: it did not lie as it had been told. It is commanded again.
+    /// The train took the other leg of a turnout, which was not in its commanded position. It is commanded again.
     WrongLeg {
         /// The turnout.
         turnout: TurnoutId,
-        /// The leg it should have lain for.
+        /// The commanded position.
         wanted: Leg,
     },
-    /// The train turned up where it cannot have run to: it was lifted, pushed or turned around.
+    /// The train was detected where it cannot have run: it was lifted, pushed or reversed by hand.
     Moved {
-        /// Where it was seen last.
+        /// Where it was detected before.
         from: Option<NodeId>,
         /// Where it is now.
         to: NodeId,
     },
-    /// No contact for too long: the train is stopped and looked for again.
+    /// No detection for too long: the train stops, and the search begins again.
     Lost {
-        /// Where it was seen last.
+        /// Where it was detected last.
         last: Option<NodeId>,
     },
-    /// Hops take times that their surveyed lengths do not explain: dirty rails, or another layout.
+    /// Running times contradict the surveyed lengths of hops: dirty rails, or another layout.
     LengthsDiffer {
-        /// The hops, with the length on the survey and as the train feels it.
+        /// The hops, with surveyed length and path length.
         hops: Vec<(HopId, Length, Length)>,
     },
 }
@@ -146,15 +146,15 @@ pub enum Ending {
     NothingToGain,
     /// The operator ended it. Recorded decisions hold this name, so it stays.
     Told,
-    /// The train could not be found: no contact reported, at any step and in either direction.
+    /// The train could not be found: no sensor reported it, at any step and in either direction.
     NotFound,
     /// No circuit can be reached from where the train is, in either direction.
     NoCircuit,
-    /// The reports make no sense on this layout: it is another one.
+    /// The reports contradict this layout: it is another one.
     WrongLayout {
-        /// What reported, in order.
+        /// The sensors that reported, in order.
         seen: Vec<SensorId>,
-        /// What might have reported at the first of them.
+        /// The sensors that could have reported instead of the first of them.
         expected: Vec<SensorId>,
     },
 }

@@ -1,77 +1,76 @@
-//! What to try next: the experiment that gains the most for its time.
+//! Chooses the next experiment.
 //!
-//! First a staircase, for nothing can be weighed before it was seen once: each step from below on the way up, from above
-//! on the way down. Then, for the rest of the budget, whatever has the largest [`gain`] per second.
+//! First a staircase, because gains are unknown before a step was measured once: each step from below on the way up,
+//! and from above on the way down. Then, for the rest of the budget, the experiment with the largest [`gain`] per
+//! second.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use super::accuracy::usable_steps;
-use super::experiment::{Experiment, Why};
-use super::gain::{TYPICAL_HOP, gain, objective, past_by};
+use super::accuracy::{steps, usable_steps};
+use super::experiment::{Experiment, TYPICAL_HOP, Why, gain, objective, past_by};
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::model::{MotionModel, StepUse};
 use crate::time::TimeSpan;
 use crate::units::Speed;
 
-/// Below this a hop takes ten seconds, and five minutes bring too few of them: such steps are not tried.
+/// Slower steps are not tried: a hop takes ten seconds, and five minutes have too few of them.
 const SLOWEST_WORTH_TRYING: Speed = Speed::from_mm_per_s(40.0);
 
-/// A crawl is at least this fast: slower steps are those that stall.
-const SLOWEST_CRAWL: Speed = Speed::from_mm_per_s(70.0);
+/// The slowest creeping speed: slower steps often stall.
+const SLOWEST_CREEP: Speed = Speed::from_mm_per_s(70.0);
 
-/// Contacts at a step after which its speed needs no staircase any more.
+/// A step with this many detections is left out of the staircase.
 pub(super) const KNOWN_FROM: u32 = 2;
 
-/// How many measured steps away a step is approached from above, or from below: far enough to show, near enough to be quick.
+/// A step is approached from this many measured steps above or below: enough for an effect, and quick.
 const RUN_UP: u8 = 2;
 
-/// Runs of short moves, from what just moves a train to what nearly reaches the speed (`s`).
+/// Durations of short moves (s), from just moving to nearly the steady speed.
 const MOVES: [f64; 3] = [0.7, 1.2, 2.0];
 
-/// A contact is passed in braking only if at least the rest of the stop lies before it.
+/// A sensor may be passed while braking only if the overshoot is at most this part of the stopping distance.
 const MOST_PAST: f64 = 0.5;
 
-/// Short moves are tried at steps up to this speed.
+/// The fastest step for short moves.
 const FASTEST_MOVE: Speed = Speed::from_mm_per_s(300.0);
 
-/// A speed that so many contacts have told is not run for its own sake any more: what is left of its doubt is the survey's,
-/// which all speeds share and no run narrows.
-const ENOUGH_CONTACTS: u32 = 8;
+/// A speed with this many detections is not measured again: the remaining uncertainty is that of the survey, which all
+/// speeds share and no run reduces.
+const ENOUGH_DETECTIONS: u32 = 8;
 
-/// ... and none is run more often than this.
+/// ... nor is one measured more often than this.
 const MOST_RUNS: u32 = 2;
 
-/// From rest to the next command: reports of the last contact are in by then.
+/// From rest to the next command: the last detection is reported by then.
 const PAUSE: TimeSpan = TimeSpan::from_ms(500);
 
-/// From rest over the better part of a hop, at the step that does it in about this time.
-const LONG_CRAWL: TimeSpan = TimeSpan::from_ms(4_000);
+/// Time from rest over most of a hop, at a suitable step.
+const LONG_CREEP: TimeSpan = TimeSpan::from_ms(4_000);
 
-/// Experiments that gain less than this in a second are not worth wearing the train out: a thousandth of a stop's scatter
-/// squared.
+/// Experiments that gain less than this per second are not worth the wear (in variances of a stop).
 const LEAST_RATE: f64 = 1e-4;
 
-/// How the train goes now.
+/// The commanded step, and the side from which it was reached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Stance {
+pub(super) struct Throttle {
     pub(super) step: SpeedStep,
     pub(super) approach: Approach,
 }
 
-impl Stance {
-    pub(super) const STANDS: Self = Self { step: SpeedStep::STAND, approach: Approach::Below };
+impl Throttle {
+    pub(super) const AT_REST: Self = Self { step: SpeedStep::STAND, approach: Approach::Below };
 }
 
-/// What was chosen.
+/// A chosen experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Choice {
     pub(super) experiment: Experiment,
     pub(super) why: Why,
 }
 
-/// What was tried so far, in which direction the staircase goes.
+/// The experiments so far, and the direction of the staircase.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Planner {
     runs: BTreeMap<(SpeedStep, Approach), u32>,
@@ -80,7 +79,7 @@ pub(super) struct Planner {
 }
 
 impl Planner {
-    /// An experiment has been made, or was tried in vain.
+    /// Counts an experiment, successful or not.
     pub(super) fn note(&mut self, experiment: &Experiment) {
         let (table, key) = match *experiment {
             Experiment::Speed { step, approach } => (&mut self.runs, (step, approach)),
@@ -90,7 +89,7 @@ impl Planner {
         *table.entry(key).or_default() += 1;
     }
 
-    /// Stops made from a step.
+    /// The number of stops from a step.
     pub(super) fn stops(&self, step: SpeedStep, approach: Approach) -> u32 {
         self.stops.get(&(step, approach)).copied().unwrap_or(0)
     }
@@ -99,17 +98,22 @@ impl Planner {
         self.runs.get(&(step, approach)).copied().unwrap_or(0)
     }
 
-    /// The next experiment, if one fits into the time that is left.
-    pub(super) fn choose(&mut self, model: &MotionModel, stance: Stance, left: TimeSpan) -> Option<Choice> {
-        let fits = |experiment: &Experiment| cost(model, stance, experiment) <= left;
-        let stair = self.staircase(model, stance).filter(|experiment| fits(experiment));
+    /// The next experiment that fits into the remaining time.
+    pub(super) fn choose(
+        &mut self,
+        model: &MotionModel,
+        throttle: Throttle,
+        left: TimeSpan,
+    ) -> Option<Choice> {
+        let fits = |experiment: &Experiment| cost(model, throttle, experiment) <= left;
+        let stair = self.staircase(model, throttle).filter(|experiment| fits(experiment));
         if let Some(experiment) = stair {
             return Some(Choice { experiment, why: Why::NeverTried });
         }
         let objective = objective(model);
         let mut best: Option<(f64, Choice)> = None;
         for experiment in self.candidates(model).into_iter().filter(fits) {
-            let takes = cost(model, stance, &experiment);
+            let takes = cost(model, throttle, &experiment);
             let gain = gain(model, &objective, &experiment);
             let rate = gain / takes.as_s().max(0.1);
             if rate > LEAST_RATE && best.is_none_or(|(most, _)| rate > most) {
@@ -119,11 +123,11 @@ impl Planner {
         best.map(|(_, choice)| choice)
     }
 
-    /// The nearest step ahead, up and then down, at which nothing was measured yet.
-    fn staircase(&mut self, model: &MotionModel, stance: Stance) -> Option<Experiment> {
+    /// The nearest step, first upwards and then downwards, that was not measured yet.
+    fn staircase(&mut self, model: &MotionModel, throttle: Throttle) -> Option<Experiment> {
         if !self.goes_down {
-            let up = model.knots().find(|step| {
-                *step > stance.step
+            let up = steps(model).find(|step| {
+                *step > throttle.step
                     && *step > lowest_start(model)
                     && self.is_new(model, *step, Approach::Below)
             });
@@ -132,10 +136,9 @@ impl Planner {
             }
             self.goes_down = true;
         }
-        let down = model
-            .knots()
+        let down = steps(model)
             .rev()
-            .find(|step| *step < stance.step && self.is_new(model, *step, Approach::Above));
+            .find(|step| *step < throttle.step && self.is_new(model, *step, Approach::Above));
         down.map(|step| Experiment::Speed { step, approach: Approach::Above })
     }
 
@@ -158,7 +161,7 @@ impl Planner {
                 if past_by(model, *step, approach) <= MOST_PAST * model.stop(*step, approach).distance {
                     all.push(Experiment::Stop { step: *step, approach, is_past: true });
                 }
-                if model.speed(*step, approach).count < ENOUGH_CONTACTS
+                if model.speed(*step, approach).count < ENOUGH_DETECTIONS
                     && self.runs_at(*step, approach) < MOST_RUNS
                 {
                     all.push(Experiment::Speed { step: *step, approach });
@@ -169,7 +172,7 @@ impl Planner {
         for step in usable.iter().filter(slow).skip(1).step_by(2) {
             all.extend(MOVES.map(|run| Experiment::Move { step: *step, run: TimeSpan::from_s(run) }));
         }
-        let untried = model.knots().filter(|step| !usable.contains(step));
+        let untried = steps(model).filter(|step| !usable.contains(step));
         let untried = untried.filter(|step| self.is_new(model, *step, Approach::Below));
         all.extend(untried.map(|step| Experiment::Speed { step, approach: Approach::Below }));
         all
@@ -180,20 +183,20 @@ fn is_worth_trying(model: &MotionModel, step: SpeedStep, approach: Approach) -> 
     model.uses(step) != StepUse::Unreliable && model.speed(step, approach).value >= SLOWEST_WORTH_TRYING
 }
 
-/// The staircase begins above the steps that were found not to move the train.
+/// The highest step that does not move the train reliably: the staircase begins above it.
 fn lowest_start(model: &MotionModel) -> SpeedStep {
-    let bad = model.knots().rev().find(|step| model.uses(*step) == StepUse::Unreliable);
+    let bad = steps(model).rev().find(|step| model.uses(*step) == StepUse::Unreliable);
     bad.unwrap_or(SpeedStep::STAND)
 }
 
-/// The slowest step that can be relied upon to reach a contact with.
-pub(super) fn crawl_step(model: &MotionModel) -> Option<SpeedStep> {
+/// The slowest step that reliably reaches a sensor.
+pub(super) fn creep_step(model: &MotionModel) -> Option<SpeedStep> {
     let usable = usable_steps(model);
-    let fast_enough = |step: &&SpeedStep| model.speed(**step, Approach::Below).value >= SLOWEST_CRAWL;
+    let fast_enough = |step: &&SpeedStep| model.speed(**step, Approach::Below).value >= SLOWEST_CREEP;
     usable.iter().find(fast_enough).or(usable.last()).copied()
 }
 
-/// The step from which a step is reached by an approach, when the train does not come from that side anyway.
+/// The step to run at first so that a step is reached from the side of an approach.
 pub(super) fn run_up_step(model: &MotionModel, step: SpeedStep, approach: Approach) -> SpeedStep {
     if approach == Approach::Above {
         let higher = step.get().saturating_add(RUN_UP * model.stride()).min(model.highest().get());
@@ -204,58 +207,58 @@ pub(super) fn run_up_step(model: &MotionModel, step: SpeedStep, approach: Approa
     lower.unwrap_or(SpeedStep::STAND)
 }
 
-/// Whether the train has to go by [`run_up_step`] first.
-pub(super) fn needs_run_up(stance: Stance, step: SpeedStep, approach: Approach) -> bool {
-    if stance.step == step {
-        return stance.approach != approach;
+/// Whether the train has to run at [`run_up_step`] first.
+pub(super) fn needs_run_up(throttle: Throttle, step: SpeedStep, approach: Approach) -> bool {
+    if throttle.step == step {
+        return throttle.approach != approach;
     }
-    (approach == Approach::Above) != (stance.step > step)
+    (approach == Approach::Above) != (throttle.step > step)
 }
 
-/// Track time of an experiment, from now to when the next could begin.
-pub(super) fn cost(model: &MotionModel, stance: Stance, experiment: &Experiment) -> TimeSpan {
+/// Track time of an experiment, from now until the next one can begin.
+pub(super) fn cost(model: &MotionModel, throttle: Throttle, experiment: &Experiment) -> TimeSpan {
     match *experiment {
         Experiment::Speed { step, approach } => {
-            reaching(model, stance, step, approach) + hop_time(model, step, approach, 1.5)
+            reaching(model, throttle, step, approach) + hop_time(model, step, approach, 1.5)
         }
         Experiment::Stop { step, approach, is_past } => {
             let stop = model.stop(step, approach).time + PAUSE;
-            let on = if is_past { LONG_CRAWL } else { crawl(model, 0.2) };
-            reaching(model, stance, step, approach) + hop_time(model, step, approach, 1.0) + stop + on
+            let on = if is_past { LONG_CREEP } else { creep(model, 0.2) };
+            reaching(model, throttle, step, approach) + hop_time(model, step, approach, 1.0) + stop + on
         }
         Experiment::Move { step, run } => {
-            let slow = crawl_step(model).unwrap_or(step);
+            let slow = creep_step(model).unwrap_or(step);
             let brake = model.stop(slow, Approach::Below).time + PAUSE;
             let brake_again = model.stop(step, Approach::Below).time + PAUSE;
-            let first_contact = hop_time(model, slow, Approach::Below, 0.5);
-            reaching(model, stance, slow, stance.approach)
-                + first_contact
+            let first_detection = hop_time(model, slow, Approach::Below, 0.5);
+            reaching(model, throttle, slow, throttle.approach)
+                + first_detection
                 + brake
                 + run
                 + brake_again
-                + crawl(model, 0.6)
+                + creep(model, 0.6)
         }
     }
 }
 
-fn reaching(model: &MotionModel, stance: Stance, step: SpeedStep, approach: Approach) -> TimeSpan {
-    if stance.step == step && stance.approach == approach {
+fn reaching(model: &MotionModel, throttle: Throttle, step: SpeedStep, approach: Approach) -> TimeSpan {
+    if throttle.step == step && throttle.approach == approach {
         return TimeSpan::ZERO;
     }
-    if needs_run_up(stance, step, approach) {
+    if needs_run_up(throttle, step, approach) {
         let by = run_up_step(model, step, approach);
-        return model.settles_within(stance.step, by) + model.settles_within(by, step);
+        return model.settles_within(throttle.step, by) + model.settles_within(by, step);
     }
-    model.settles_within(stance.step, step)
+    model.settles_within(throttle.step, step)
 }
 
-/// The time over a part of a typical hop.
+/// The time for a number of typical hops.
 fn hop_time(model: &MotionModel, step: SpeedStep, approach: Approach, hops: f64) -> TimeSpan {
     let speed = model.speed(step, approach).value.max(Speed::from_mm_per_s(10.0));
     hops * TYPICAL_HOP / speed
 }
 
-fn crawl(model: &MotionModel, hops: f64) -> TimeSpan {
-    let step = crawl_step(model).unwrap_or(model.highest());
+fn creep(model: &MotionModel, hops: f64) -> TimeSpan {
+    let step = creep_step(model).unwrap_or(model.highest());
     model.settles_within(SpeedStep::STAND, step) + hop_time(model, step, Approach::Below, hops)
 }

@@ -1,7 +1,7 @@
-//! What a calibrator promises, whatever the train does.
+//! Promises of the calibrator, whatever the train does.
 
 use super::calibrator::Calibrator;
-use super::notice::{CalibrationNotice, Ending, Mishap};
+use super::notice::{CalibrationNotice, Ending, Fault};
 use super::scripted_train::ScriptedTrain;
 use super::settings::CalibratorSettings;
 use crate::ids::{SpeedStep, TrainId, TurnoutId};
@@ -29,29 +29,29 @@ fn calibrator(layout: &Layout, seconds: f64) -> Calibrator<'_> {
     Calibrator::new(layout, settings, MotionFit::new(TrainId(24), SpeedStep::new(14).unwrap()))
 }
 
-fn mishap(notice: &CalibrationNotice) -> Option<&Mishap> {
+fn fault(notice: &CalibrationNotice) -> Option<&Fault> {
     match notice {
-        CalibrationNotice::Mishap(mishap) => Some(mishap),
+        CalibrationNotice::Mishap(fault) => Some(fault),
         _ => None,
     }
 }
 
 #[test]
-fn a_train_is_found_and_put_on_a_circuit_and_stands_within_its_budget() {
+fn a_train_is_found_brought_to_a_circuit_and_stopped_within_the_budget() {
     let layout = large_oval();
     let mut train = ScriptedTrain::new(&layout, "D1", "A1", 200.0);
     let mut machine = calibrator(&layout, 120.0);
     train.run(&mut machine, 200.0);
     assert_eq!(machine.ending(), Some(&Ending::Budget));
     assert!(train.now.as_s() <= 121.0, "{}", train.now.as_s());
-    assert!(train.stands() && !train.overran);
-    assert!(train.has_said(|notice| matches!(notice, CalibrationNotice::Found { .. })));
-    assert!(train.has_said(|notice| matches!(notice, CalibrationNotice::Done(_))));
+    assert!(train.is_at_rest() && !train.overran);
+    assert!(train.has_notified(|notice| matches!(notice, CalibrationNotice::Found { .. })));
+    assert!(train.has_notified(|notice| matches!(notice, CalibrationNotice::Done(_))));
 }
 
 #[test]
-fn a_train_that_faces_the_end_of_its_track_is_turned_around_in_time() {
-    // The track apart, with its one contact far from both of its ends.
+fn a_train_that_faces_the_end_of_its_track_reverses_in_time() {
+    // The separate track, with its one sensor far from both of its ends.
     let mut plan = oval_plan();
     for stretch in plan.stretches.iter_mut().rev().take(2) {
         stretch.length = Length::from_mm(2_000.0).into();
@@ -60,33 +60,33 @@ fn a_train_that_faces_the_end_of_its_track_is_turned_around_in_time() {
     let mut train = ScriptedTrain::new(&layout, "EN1", "E1", 1_500.0);
     let mut machine = calibrator(&layout, 300.0);
     train.run(&mut machine, 300.0);
-    assert!(train.has_said(|notice| matches!(notice, CalibrationNotice::TurnsAround { .. })));
+    assert!(train.has_notified(|notice| matches!(notice, CalibrationNotice::TurnsAround { .. })));
     assert_eq!(machine.ending(), Some(&Ending::NoCircuit));
-    assert!(!train.overran && train.stands());
+    assert!(!train.overran && train.is_at_rest());
 }
 
 #[test]
-fn a_turnout_that_does_not_move_is_told_again_and_then_run_around() {
+fn a_turnout_that_does_not_move_is_commanded_again_and_then_avoided() {
     let layout = large_oval();
     let mut train = ScriptedTrain::new(&layout, "B1", "MR2", 200.0);
     train.legs.set(TurnoutId(1), Leg::Curved);
     train.jammed.push(TurnoutId(1));
     let mut machine = calibrator(&layout, 90.0);
     train.run(&mut machine, 40.0);
-    assert!(train.has_said(|notice| matches!(mishap(notice), Some(Mishap::WrongLeg { .. }))));
-    assert!(train.has_said(|notice| matches!(notice, CalibrationNotice::Done(_))));
+    assert!(train.has_notified(|notice| matches!(fault(notice), Some(Fault::WrongLeg { .. }))));
+    assert!(train.has_notified(|notice| matches!(notice, CalibrationNotice::Done(_))));
 }
 
 #[test]
-fn a_step_at_which_the_train_stalls_is_not_relied_upon() {
+fn a_step_at_which_the_train_stalls_is_unreliable() {
     let layout = large_oval();
     let mut train = ScriptedTrain::new(&layout, "D1", "A1", 200.0);
     let mut machine = calibrator(&layout, 200.0);
     train.run(&mut machine, 30.0);
     train.stuck_below = 4;
     train.run(&mut machine, 170.0);
-    let stalled = train.notices.iter().find_map(|(_, notice)| match mishap(notice) {
-        Some(Mishap::Stalled { step }) => Some(*step),
+    let stalled = train.notices.iter().find_map(|(_, notice)| match fault(notice) {
+        Some(Fault::Stalled { step }) => Some(*step),
         _ => None,
     });
     let step = stalled.expect("it should be noticed");
@@ -94,25 +94,25 @@ fn a_step_at_which_the_train_stalls_is_not_relied_upon() {
 }
 
 #[test]
-fn a_silent_contact_is_looked_past() {
+fn a_silent_sensor_is_tolerated() {
     let layout = large_oval();
     let mut train = ScriptedTrain::new(&layout, "D1", "A1", 200.0);
     train.dead.push(layout.sensor_named("B1").unwrap());
     let mut machine = calibrator(&layout, 90.0);
     train.run(&mut machine, 100.0);
     assert_eq!(machine.ending(), Some(&Ending::Budget));
-    assert!(!train.has_said(|notice| matches!(mishap(notice), Some(Mishap::Lost { .. }))));
+    assert!(!train.has_notified(|notice| matches!(fault(notice), Some(Fault::Lost { .. }))));
 }
 
 #[test]
-fn a_lifted_train_is_stopped_and_looked_for_again() {
+fn a_lifted_train_is_stopped_and_searched_for() {
     let layout = large_oval();
     let mut train = ScriptedTrain::new(&layout, "D1", "A1", 200.0);
     let mut machine = calibrator(&layout, 150.0);
     train.run(&mut machine, 20.0);
     train.is_lifted = true;
     train.run(&mut machine, 45.0);
-    assert!(train.has_said(|notice| matches!(mishap(notice), Some(Mishap::Lost { .. }))));
+    assert!(train.has_notified(|notice| matches!(fault(notice), Some(Fault::Lost { .. }))));
     train.is_lifted = false;
     train.put("B1", "MR2", 50.0);
     let before = train.notices.len();
@@ -122,14 +122,14 @@ fn a_lifted_train_is_stopped_and_looked_for_again() {
 }
 
 #[test]
-fn a_train_that_moves_at_no_step_is_not_found_and_told_to_stand() {
+fn a_train_that_moves_at_no_step_is_not_found_and_commanded_to_stop() {
     let layout = large_oval();
     let mut train = ScriptedTrain::new(&layout, "D1", "A1", 200.0);
     train.stuck_below = 14;
     let mut machine = calibrator(&layout, 600.0);
     train.run(&mut machine, 600.0);
     assert_eq!(machine.ending(), Some(&Ending::NotFound));
-    assert!(train.stands());
+    assert!(train.is_at_rest());
 }
 
 #[test]
@@ -140,12 +140,12 @@ fn a_person_can_pause_it_and_end_it() {
     train.run(&mut machine, 20.0);
     machine.pause(train.now);
     train.run(&mut machine, 10.0);
-    assert!(train.stands());
+    assert!(train.is_at_rest());
     machine.resume(train.now);
     train.run(&mut machine, 20.0);
-    assert!(!train.stands());
+    assert!(!train.is_at_rest());
     machine.stop(train.now);
     train.run(&mut machine, 20.0);
     assert_eq!(machine.ending(), Some(&Ending::Told));
-    assert!(train.stands());
+    assert!(train.is_at_rest());
 }

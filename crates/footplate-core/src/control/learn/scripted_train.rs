@@ -1,5 +1,5 @@
-//! For the tests of this folder: one train on rails, whose speeds and accelerations the test says, and the loop around a
-//! calibrator. It knows no formula of the model that is learnt: it adds up millimetres every millisecond.
+//! For the tests of this folder: one train with speeds and accelerations set by the test, and the loop around a
+//! calibrator. It shares no formula with the model that is learnt: it adds up millimetres every millisecond.
 
 use std::collections::VecDeque;
 use std::vec::Vec;
@@ -10,13 +10,13 @@ use crate::control::{Machine, Output};
 use crate::event::{Command, Event, EventKind, Report};
 use crate::ids::{EdgeId, NodeId, SensorId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Layout, Leg, TurnoutStates, Ways};
+use crate::track::{Layout, Leg, OutgoingEdges, TurnoutStates};
 
 const TICK_MS: i64 = 1;
 const POLL_MS: i64 = 62;
 const COMMAND_MS: i64 = 9;
 
-/// A train that speeds up and slows down evenly.
+/// A train with constant acceleration and braking.
 pub(super) struct ScriptedTrain<'l> {
     pub(super) layout: &'l Layout,
     pub(super) now: Timestamp,
@@ -29,11 +29,11 @@ pub(super) struct ScriptedTrain<'l> {
     pub(super) speed_of: fn(u8) -> f64,
     /// mm/s².
     pub(super) acceleration: f64,
-    /// It stands whatever it is told until a step above this.
+    /// It does not move at this step and below.
     pub(super) stuck_below: u8,
-    /// The train is in somebody's hands.
+    /// The train is lifted off the track.
     pub(super) is_lifted: bool,
-    /// Contacts that never report.
+    /// Sensors that never report.
     pub(super) dead: Vec<SensorId>,
     /// Turnouts that do not move.
     pub(super) jammed: Vec<TurnoutId>,
@@ -73,18 +73,18 @@ impl<'l> ScriptedTrain<'l> {
         }
     }
 
-    /// A person takes the train and puts it down elsewhere.
+    /// Puts the train down elsewhere.
     pub(super) fn put(&mut self, from: &str, to: &str, offset_mm: f64) {
         let node = |name| self.layout.node_named(name).unwrap();
         self.edge = self.layout.edge_between(node(from), node(to)).unwrap();
         self.offset_mm = offset_mm;
     }
 
-    pub(super) fn has_said(&self, what: impl Fn(&CalibrationNotice) -> bool) -> bool {
+    pub(super) fn has_notified(&self, what: impl Fn(&CalibrationNotice) -> bool) -> bool {
         self.notices.iter().any(|(_, notice)| what(notice))
     }
 
-    pub(super) fn stands(&self) -> bool {
+    pub(super) fn is_at_rest(&self) -> bool {
         self.speed == 0.0
     }
 
@@ -185,10 +185,10 @@ impl<'l> ScriptedTrain<'l> {
     }
 
     fn next_edge(&self, node: NodeId) -> Option<EdgeId> {
-        match self.layout.ways(node) {
-            Ways::Ahead(edge) => Some(edge),
-            Ways::Ended => None,
-            Ways::Legs { straight, curved } => {
+        match self.layout.outgoing(node) {
+            OutgoingEdges::Ahead(edge) => Some(edge),
+            OutgoingEdges::Ended => None,
+            OutgoingEdges::Legs { straight, curved } => {
                 let turnout = self.layout.turnouts().find(|(_, branch)| *branch == node)?.0;
                 Some(if self.legs.get(turnout) == Some(Leg::Curved) { curved } else { straight })
             }

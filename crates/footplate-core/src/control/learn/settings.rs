@@ -1,4 +1,4 @@
-//! What a calibration may take, and what it has to keep away from.
+//! The limits of a calibration.
 
 use alloc::vec::Vec;
 
@@ -6,21 +6,21 @@ use crate::ids::StretchId;
 use crate::time::TimeSpan;
 use crate::units::Length;
 
-/// The bounds of one session with one train.
+/// The limits of one session with one train.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibratorSettings {
-    /// Track time that the session may take, from its first command to the train at rest.
+    /// Longest track time of the session, from its first command to the train at rest.
     pub budget: TimeSpan,
-    /// The longest that the train may be behind its pickup: no turnout so near behind it is thrown.
+    /// Longest distance from the pickup to the rear of the train: no turnout closer behind it is thrown.
     pub train_length: Length,
-    /// Rails that others stand on or own: no circuit leads over them.
+    /// Stretches that other trains occupy or have reserved: no circuit uses them.
     pub avoid: Vec<StretchId>,
 }
 
 impl Default for CalibratorSettings {
     fn default() -> Self {
         Self {
-            // The five minutes in which a full calibration should be done.
+            // A full calibration takes five minutes.
             budget: TimeSpan::from_s(300.0),
             // A locomotive with three coaches of 27 cm and a pickup in the middle.
             train_length: Length::from_mm(900.0),

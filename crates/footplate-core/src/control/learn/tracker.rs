@@ -1,5 +1,5 @@
-//! Data association during a calibration: one train runs, but detections are missed or spurious, turnouts fail, and people
-//! lift trains.
+//! Data association during a calibration: one train runs, but detections are missed or spurious, turnouts fail, and
+//! people lift trains.
 
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
@@ -12,40 +12,40 @@ use crate::track::{Layout, Leg, Reach, TurnoutStates};
 use crate::tracking::{Locator, TrackContext};
 use crate::units::{Length, Speed};
 
-/// Missed detections in a row that are accepted. Beyond that the train is somewhere else.
-const LOOK_PAST: usize = 2;
+/// Most missed detections in a row. Beyond that the train is somewhere else.
+const MAX_MISSED: usize = 2;
 
 /// Reports of a sensor that follow each other within this are one detection: a pickup over it, or a sensor that sticks.
-const ONE_CLOSURE: TimeSpan = TimeSpan::from_ms(1_000);
+const ONE_DETECTION: TimeSpan = TimeSpan::from_ms(1_000);
 
 /// No train in the published tables runs faster.
 const FASTEST: Speed = Speed::from_mm_per_s(1_000.0);
 
-/// This many unexplained reports, less the explained ones between them, contradict the layout.
-const TOO_STRANGE: usize = 4;
+/// This many unexplained reports, minus the explained ones between them, contradict the layout.
+const MAX_UNEXPLAINED: usize = 4;
 
 /// A report with a lower density (1/s) is spurious: sensors report by themselves about this often.
 const LEAST_DENSITY: f64 = 1e-4;
 
-/// What a report means.
+/// The class of a report.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Verdict {
+pub(super) enum ReportClass {
     /// The first detection of a lost train.
     First(NodeId),
     /// The train passed it on its path.
     Passed(NodeId),
-    /// It passed it by the other leg of a turnout than the one set.
+    /// The train passed it over the leg of a turnout that was not set.
     ByOtherLeg {
         node: NodeId,
         turnout: TurnoutId,
         /// The leg it took.
         leg: Leg,
     },
-    /// The same detection again.
+    /// A repetition of the same detection.
     Again,
-    /// Not of the train, or not of this layout.
+    /// Not caused by the train, or not part of this layout.
     Unexplained,
-    /// The train is where it cannot have run to.
+    /// The train was detected where it cannot have run.
     Moved { from: Option<NodeId>, to: NodeId },
     /// Too many unexplained reports to continue.
     WrongLayout { seen: Vec<SensorId>, expected: Vec<SensorId> },
@@ -55,10 +55,10 @@ pub(super) enum Verdict {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tracker {
     last: Option<(NodeId, Timestamp)>,
-    /// A sensor that reported where the train cannot have run to; it may have been moved there.
+    /// A sensor that reported where the train cannot have run; it may have been moved there.
     elsewhere: Option<(NodeId, Timestamp)>,
-    closed: BTreeMap<SensorId, Timestamp>,
-    strange: Vec<SensorId>,
+    reported: BTreeMap<SensorId, Timestamp>,
+    unexplained: Vec<SensorId>,
     expected: Vec<SensorId>,
 }
 
@@ -80,78 +80,80 @@ impl Tracker {
     }
 
     /// Classifies a report.
-    pub(super) fn judge(
+    pub(super) fn classify(
         &mut self,
         context: TrackContext<'_>,
         locator: &Locator,
         model: &MotionModel,
         sensor: SensorId,
         window: ContactWindow,
-    ) -> Verdict {
+    ) -> ReportClass {
         let time = window.until;
-        let before = self.closed.insert(sensor, time);
-        if before.is_some_and(|before| time - before < ONE_CLOSURE) {
-            return Verdict::Again;
+        let before = self.reported.insert(sensor, time);
+        if before.is_some_and(|before| time - before < ONE_DETECTION) {
+            return ReportClass::Again;
         }
-        let Some(node) = context.node_of(sensor) else { return self.strange(context, sensor, None, time) };
+        let Some(node) = context.node_of(sensor) else {
+            return self.unexplained(context, sensor, None, time);
+        };
         let Some((last, _)) = self.last else {
             self.take(node, time);
-            return Verdict::First(node);
+            return ReportClass::First(node);
         };
         let is_likely = locator.likelihood(context, model, sensor, window).map_or_else(
             || locator.locate(context, model, time).is_none(),
             |log| log > libm::log(LEAST_DENSITY),
         );
-        // The very next sensor is accepted whenever a train can have reached it: spurious reports come from any sensor, and
-        // predictions of an uncalibrated train are poor.
+        // The very next sensor is accepted whenever a train can have reached it: spurious reports come from any
+        // sensor, and predictions of an uncalibrated train are poor.
         let is_next = leads_to(context.layout, context.turnouts, last, node, 0)
             && self.in_time(context.layout, self.last, node, time);
-        if is_next || is_likely && leads_to(context.layout, context.turnouts, last, node, LOOK_PAST) {
+        if is_next || is_likely && leads_to(context.layout, context.turnouts, last, node, MAX_MISSED) {
             self.take(node, time);
-            return Verdict::Passed(node);
+            return ReportClass::Passed(node);
         }
         if let Some((turnout, leg)) = other_leg(context, last, node)
             && self.in_time(context.layout, self.last, node, time)
         {
             self.take(node, time);
-            return Verdict::ByOtherLeg { node, turnout, leg };
+            return ReportClass::ByOtherLeg { node, turnout, leg };
         }
         if self.in_time(context.layout, self.elsewhere, node, time) {
-            self.strange.push(sensor);
+            self.unexplained.push(sensor);
             self.take(node, time);
-            return Verdict::Moved { from: Some(last), to: node };
+            return ReportClass::Moved { from: Some(last), to: node };
         }
-        self.strange(context, sensor, Some(node), time)
+        self.unexplained(context, sensor, Some(node), time)
     }
 
     /// The train was here: one unexplained report counts less.
     fn take(&mut self, node: NodeId, time: Timestamp) {
-        self.strange.pop();
+        self.unexplained.pop();
         self.last = Some((node, time));
         self.elsewhere = None;
     }
 
-    fn strange(
+    fn unexplained(
         &mut self,
         context: TrackContext<'_>,
         sensor: SensorId,
         node: Option<NodeId>,
         time: Timestamp,
-    ) -> Verdict {
-        if self.strange.is_empty() {
+    ) -> ReportClass {
+        if self.unexplained.is_empty() {
             let from = self.last.map(|(last, _)| last);
             let next = from.into_iter().flat_map(|last| context.layout.hops_from(last));
             self.expected = next.filter_map(|hop| hop.sensor).collect();
         }
-        if !self.strange.contains(&sensor) {
-            self.strange.push(sensor);
+        if !self.unexplained.contains(&sensor) {
+            self.unexplained.push(sensor);
         }
         self.elsewhere = node.map(|node| (node, time));
-        if self.strange.len() < TOO_STRANGE {
-            return Verdict::Unexplained;
+        if self.unexplained.len() < MAX_UNEXPLAINED {
+            return ReportClass::Unexplained;
         }
-        let seen = core::mem::take(&mut self.strange);
-        Verdict::WrongLayout { seen, expected: core::mem::take(&mut self.expected) }
+        let seen = core::mem::take(&mut self.unexplained);
+        ReportClass::WrongLayout { seen, expected: core::mem::take(&mut self.expected) }
     }
 
     /// Whether a train that was at a node then can be at another now, by any leg, with one missed detection.
@@ -164,25 +166,25 @@ impl Tracker {
     ) -> bool {
         let Some((from, then)) = was else { return false };
         let unknown = TurnoutStates::unknown();
-        let reach = (now - then) * FASTEST + Length::from_mm(50.0);
-        let shortest = |way: &Reach| -> Length {
-            way.hops().iter().filter_map(|id| layout.hop(*id)).map(|hop| layout.least_length(&hop)).sum()
+        let farthest = (now - then) * FASTEST + Length::from_mm(50.0);
+        let shortest = |reach: &Reach| -> Length {
+            reach.hops().iter().filter_map(|id| layout.hop(*id)).map(|hop| layout.least_length(&hop)).sum()
         };
-        layout.reaches(from, &unknown, 1).any(|way| way.to == node && shortest(&way) <= reach)
+        layout.reaches(from, &unknown, 1).any(|reach| reach.to == node && shortest(&reach) <= farthest)
     }
 }
 
 fn leads_to(layout: &Layout, turnouts: &TurnoutStates, from: NodeId, to: NodeId, missed: usize) -> bool {
-    layout.reaches(from, turnouts, missed).any(|way| way.to == to)
+    layout.reaches(from, turnouts, missed).any(|reach| reach.to == to)
 }
 
-/// The turnout that must have lain otherwise than it was told for a train to get from one node to another, the first on
-/// the way, and how it lay.
+/// The first turnout that was not in its commanded position if a train ran from one node to another, and its actual
+/// position.
 fn other_leg(context: TrackContext<'_>, from: NodeId, to: NodeId) -> Option<(TurnoutId, Leg)> {
     let unknown = TurnoutStates::unknown();
-    // Without a silent contact between: two things at once that seldom happen are rather a spurious report.
-    let way = context.layout.reaches(from, &unknown, 0).find(|way| way.to == to)?;
-    let hops = way.hops().iter().filter_map(|id| context.layout.hop(*id));
+    // Without a missed detection: two rare faults at once are less likely than a spurious report.
+    let reach = context.layout.reaches(from, &unknown, 0).find(|reach| reach.to == to)?;
+    let hops = reach.hops().iter().filter_map(|id| context.layout.hop(*id));
     let mut needs = hops.flat_map(|hop| hop.needs.iter());
     needs.find(|need| !context.turnouts.allow(**need)).map(|need| (need.turnout, need.leg))
 }
@@ -209,8 +211,8 @@ mod tests {
     }
 
     impl Scene {
-        /// What the tracker says of contacts by name at seconds, with a locator that knows nothing.
-        fn judge(&mut self, seconds: f64, name: &str) -> Verdict {
+        /// Classifies a report of a sensor by name at a time in seconds, with a locator without a position.
+        fn classify(&mut self, seconds: f64, name: &str) -> ReportClass {
             let context =
                 TrackContext { layout: &self.layout, sections: &self.sections, turnouts: &self.turnouts };
             let train = TrainId(24);
@@ -218,7 +220,7 @@ mod tests {
             let window = ContactWindow { after: until - TimeSpan::from_ms(70), until };
             let sensor = self.layout.sensor_named(name).unwrap();
             let model = MotionModel::unknown(train, SpeedStep::new(14).unwrap());
-            self.tracker.judge(context, &Locator::new(train), &model, sensor, window)
+            self.tracker.classify(context, &Locator::new(train), &model, sensor, window)
         }
 
         fn node(&self, name: &str) -> NodeId {
@@ -227,48 +229,48 @@ mod tests {
     }
 
     #[test]
-    fn a_train_is_followed_past_a_silent_contact_and_a_contact_that_hangs() {
+    fn a_train_is_tracked_past_a_silent_sensor_and_a_stuck_one() {
         let mut scene = scene();
         let (a, b, a_again) = (scene.node("A1"), scene.node("B1"), scene.node("A1"));
-        assert_eq!(scene.judge(1.0, "A1"), Verdict::First(a));
-        assert_eq!(scene.judge(1.07, "A1"), Verdict::Again);
-        assert_eq!(scene.judge(3.0, "B1"), Verdict::Passed(b));
-        assert_eq!(scene.judge(8.0, "A1"), Verdict::Passed(a_again), "D1 was missed");
+        assert_eq!(scene.classify(1.0, "A1"), ReportClass::First(a));
+        assert_eq!(scene.classify(1.07, "A1"), ReportClass::Again);
+        assert_eq!(scene.classify(3.0, "B1"), ReportClass::Passed(b));
+        assert_eq!(scene.classify(8.0, "A1"), ReportClass::Passed(a_again), "D1 was missed");
     }
 
     #[test]
     fn a_turnout_that_did_not_move_is_noticed_on_the_other_leg() {
         let mut scene = scene();
         let c = scene.node("C1");
-        scene.judge(1.0, "A1");
-        let verdict = scene.judge(3.0, "C1");
-        assert_eq!(verdict, Verdict::ByOtherLeg { node: c, turnout: TurnoutId(1), leg: Leg::Curved });
+        scene.classify(1.0, "A1");
+        let verdict = scene.classify(3.0, "C1");
+        assert_eq!(verdict, ReportClass::ByOtherLeg { node: c, turnout: TurnoutId(1), leg: Leg::Curved });
     }
 
     #[test]
-    fn one_strange_report_moves_nobody_and_two_that_fit_each_other_do() {
+    fn one_unexplained_report_changes_nothing_and_two_consistent_ones_move_the_train() {
         let mut scene = scene();
         let (a, d, b2) = (scene.node("A1"), scene.node("D1"), scene.node("B2"));
-        assert_eq!(scene.judge(1.0, "A1"), Verdict::First(a));
-        assert_eq!(scene.judge(2.0, "E1"), Verdict::Unexplained);
+        assert_eq!(scene.classify(1.0, "A1"), ReportClass::First(a));
+        assert_eq!(scene.classify(2.0, "E1"), ReportClass::Unexplained);
         let b = scene.node("B1");
-        assert_eq!(scene.judge(3.0, "B1"), Verdict::Passed(b));
-        assert_eq!(scene.judge(5.0, "D1"), Verdict::Passed(d));
-        // Somebody turned it around by hand.
-        assert_eq!(scene.judge(9.0, "D2"), Verdict::Unexplained);
-        assert_eq!(scene.judge(11.0, "B2"), Verdict::Moved { from: Some(d), to: b2 });
+        assert_eq!(scene.classify(3.0, "B1"), ReportClass::Passed(b));
+        assert_eq!(scene.classify(5.0, "D1"), ReportClass::Passed(d));
+        // It was reversed by hand.
+        assert_eq!(scene.classify(9.0, "D2"), ReportClass::Unexplained);
+        assert_eq!(scene.classify(11.0, "B2"), ReportClass::Moved { from: Some(d), to: b2 });
     }
 
     #[test]
-    fn contacts_that_never_fit_are_another_layout() {
+    fn sensors_that_never_fit_are_another_layout() {
         let mut scene = scene();
-        scene.judge(1.0, "A1");
+        scene.classify(1.0, "A1");
         for (at, name) in [(3.0, "E1"), (5.0, "C2"), (7.0, "E2")] {
-            assert_eq!(scene.judge(at, name), Verdict::Unexplained, "{name}");
+            assert_eq!(scene.classify(at, name), ReportClass::Unexplained, "{name}");
         }
         let sensor = |name| scene.layout.sensor_named(name).unwrap();
         let seen = vec![sensor("E1"), sensor("C2"), sensor("E2"), sensor("A2")];
         let expected = vec![sensor("B1"), sensor("C1")];
-        assert_eq!(scene.judge(9.0, "A2"), Verdict::WrongLayout { seen, expected });
+        assert_eq!(scene.classify(9.0, "A2"), ReportClass::WrongLayout { seen, expected });
     }
 }

@@ -1,27 +1,46 @@
-//! Why the future is no longer like the past.
+//! Alarms, and the tests of a train at every sensor that raise them.
 
 use core::fmt;
 
 use crate::ids::SensorId;
-use crate::tracking::Drift;
+use crate::time::{TimeSpan, Timestamp};
+use crate::tracking::{Drift, DriftTest, PassedContact};
 
-/// What was noticed.
+/// The innovation is normalised by its predicted standard deviation and by this fraction of the time since the last
+/// sensor: trains warm up, and runs differ.
+const USUAL_PART: f64 = 0.02;
+/// An innovation of this many standard deviations, ...
+const OUTLIER: f64 = 6.0;
+/// ... and of this fraction of its time, is an outlier; ...
+const OUTLIER_PART: f64 = 0.08;
+/// ... and this many in a row raise the alarm without the drift test.
+const OUTLIERS_IN_A_ROW: u8 = 2;
+/// A single innovation of this many standard deviations raises the alarm for a train that did not start from rest,
+/// ...
+const UNTIMELY: f64 = 8.0;
+/// ... if it is also this fraction of its time, even if later ones fit: another locomotive with the same address may
+/// be as fast, and a lifted train may reach the same sensor.
+const UNTIMELY_PART: f64 = 0.2;
+/// Missed detections, minus those that came in between, that raise the alarm.
+const MAX_MISSES: usize = 4;
+
+/// Why a train is no longer trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Alarm {
-    /// Contacts close later and later than they should, or earlier and earlier.
+    /// Detections come later and later than predicted, or earlier and earlier.
     Drift(Drift),
-    /// The place of the train is unknown.
+    /// The position of the train is unknown.
     Lost,
-    /// A sensor reported the train where it cannot have run to.
+    /// A sensor reported the train where it cannot have run.
     Elsewhere(SensorId),
-    /// A sensor reported the train so early or so late that a person or a fault must have moved or stopped it.
+    /// A sensor reported the train so early or so late that an operator or a fault must have moved or stopped it.
     Untimely(SensorId),
-    /// One sensor after the other did not report the train.
+    /// Several sensors in a row did not report the train.
     Misses,
     /// The station does not answer.
     LinkSilent,
-    /// A command to stop has not left in time.
+    /// A stop command was not sent in time.
     StopUnconfirmed,
     /// The train was commanded to stop, and sensors still report it.
     DoesNotStop(SensorId),
@@ -43,5 +62,66 @@ impl fmt::Display for Alarm {
             Self::DoesNotStop(_) => "it was commanded to stop and sensors still report it",
             Self::Distrusted => "its model no longer fits",
         })
+    }
+}
+
+/// The state of the tests between sensors.
+#[derive(Debug, Clone, Default)]
+pub(super) struct ConsistencyMonitor {
+    /// The train has started from rest and passed no sensor yet: a start is less predictable than a run.
+    starts: bool,
+    drift: DriftTest,
+    outliers: u8,
+    misses: usize,
+    last: Option<Timestamp>,
+    is_located: bool,
+}
+
+impl ConsistencyMonitor {
+    /// The train was located.
+    pub(super) fn place(&mut self) {
+        *self = Self { starts: true, is_located: true, ..Self::default() };
+    }
+
+    /// The train was commanded to stop: a start follows.
+    pub(super) const fn stop(&mut self) {
+        self.starts = true;
+    }
+
+    /// The position of the train is unknown.
+    pub(super) fn lose(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Tests a passage. Returns the alarm that it raises, if any.
+    pub(super) fn pass(&mut self, passed: &PassedContact) -> Option<Alarm> {
+        let before = self.last.replace(passed.window.until);
+        let started = core::mem::take(&mut self.starts);
+        let was_located = core::mem::replace(&mut self.is_located, true);
+        let Some([late, deviation]) = passed.late else {
+            self.outliers = 0;
+            return was_located.then_some(Alarm::Elsewhere(passed.sensor));
+        };
+        self.misses = (self.misses + passed.missed).saturating_sub(usize::from(passed.missed == 0));
+        if self.misses >= MAX_MISSES {
+            self.misses = 0;
+            return Some(Alarm::Misses);
+        }
+        // A start deviates by more than predicted; that is no drift.
+        let took = before.map(|before| passed.window.until - before).unwrap_or(TimeSpan::ZERO).as_s();
+        let standardised = late.as_s() / libm::hypot(deviation.as_s(), USUAL_PART * took);
+        let is_outlier = standardised.abs() >= OUTLIER && late.as_s().abs() >= OUTLIER_PART * took;
+        self.outliers = if is_outlier { self.outliers + 1 } else { 0 };
+        let drift = self.drift.take(standardised);
+        if self.outliers >= OUTLIERS_IN_A_ROW {
+            self.outliers = 0;
+            let drift = if standardised > 0.0 { Drift::Slower } else { Drift::Faster };
+            return Some(Alarm::Drift(drift));
+        }
+        let is_untimely = standardised.abs() >= UNTIMELY && late.as_s().abs() >= UNTIMELY_PART * took;
+        if is_untimely && !started {
+            return Some(Alarm::Untimely(passed.sensor));
+        }
+        drift.map(Alarm::Drift)
     }
 }

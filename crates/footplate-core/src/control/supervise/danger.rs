@@ -1,6 +1,6 @@
-//! Danger: which trains are stopped and held, and when the power goes off.
+//! Danger: the trains that are stopped and held, and when the power goes off.
 
-use alloc::collections::BTreeSet;
+use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 
 use crate::control::drive::Order;
@@ -8,55 +8,56 @@ use crate::event::{Approach, Command};
 use crate::ids::{EdgeId, SpeedStep, TrainId};
 use crate::model::Rescaling;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::Position;
+use crate::track::{Layout, Position};
 use crate::units::Length;
 
 use super::alarm::Alarm;
-use super::meeting::{rails, rails_within};
-use super::recovery::{DOUBTED, Recovery};
+use super::recovery::{Recovery, UNKNOWN_RATIO};
 use super::watchdog::{Power, Watchdog};
 use crate::control::Notice;
 
-/// Trains are at rest this long after the power went off; they need a third of a second from top speed.
-const DEAD_AFTER: TimeSpan = TimeSpan::from_s(2.0);
-/// The median stopping distance without power (no decoder follows a law then, and worm gears do not roll).
-const DEAD_WAY: Length = Length::from_mm(40.0);
-/// See [`DEAD_WAY`]: one standard deviation.
-const DEAD_DOUBT: Length = Length::from_mm(40.0);
-/// A train in danger may be this far from its estimated place, beyond the uncertainty of that, in either direction: a hop.
+/// Trains are at rest this long after the power went off; they take a third of a second from top speed.
+const AT_REST_WITHOUT_POWER: TimeSpan = TimeSpan::from_s(2.0);
+/// The median stopping distance without power (decoders do not control it, and worm gears do not roll).
+const STOP_WITHOUT_POWER: Length = Length::from_mm(40.0);
+/// See [`STOP_WITHOUT_POWER`]: one standard deviation.
+const STOP_WITHOUT_POWER_DEVIATION: Length = Length::from_mm(40.0);
+/// A train in danger may be this far from its estimated position, in addition to its uncertainty, in either
+/// direction: one hop.
 const DANGER_REACH: Length = Length::from_mm(700.0);
-/// A lost train may be this far from where it was seen last: two sensors stayed silent.
+/// A lost train may be this far from its last detection: two sensors stayed silent.
 const LOST_REACH: Length = Length::from_mm(4_000.0);
-/// Sensors that have to come ahead of where a lost train was seen last: two may have stayed silent, and the third reports it.
+/// A lost train needs this many sensors ahead of its last detection: two may have stayed silent, and the third
+/// reports it.
 const SENSORS_AHEAD: usize = 3;
-/// A train reaches this far to either side of its pickup: a long locomotive of the gauge.
+/// A train extends this far to either side of its pickup: a long locomotive of the gauge.
 const BODY: Length = Length::from_mm(250.0);
 /// The gap between trains.
 const CLEAR: Length = Length::from_mm(150.0);
-/// Places are certain to this many standard deviations.
+/// Bound on the error of a position, in standard deviations.
 const CERTAIN: f64 = 3.0;
 /// The longest stop of a train in danger, as a multiple of its model.
 const LONGER_STOP: f64 = 1.5;
 
 impl Watchdog {
-    /// A train does not run as it should: it is stopped, with all that could meet it.
+    /// Raises an alarm for a train: stops it and all trains that it could meet.
     pub(super) fn raise(&mut self, now: Timestamp, train: TrainId, why: Alarm) {
         if self.dangers.contains_key(&train) || !self.is_watching() {
             return;
         }
         let Some(model) = self.driver.model(train).cloned() else { return };
-        let interrupted = self.held.remove(&train).flatten().or_else(|| self.standing.remove(&train));
+        let interrupted = self.held.remove(&train).flatten().or_else(|| self.unfinished.remove(&train));
         // Its speeds and stops are uncertain until it has been measured.
-        self.driver.set_model(model.rescaled(&Rescaling::doubt(DOUBTED)));
+        self.driver.set_model(model.rescaled(&Rescaling::doubt(UNKNOWN_RATIO)));
         self.dangers.insert(train, Recovery::new(now, model, why, interrupted));
-        let stopped = self.hold_what_could_meet(now);
+        let stopped = self.hold_endangered(now);
         let interrupted = interrupted.map(|(_, order)| order);
-        self.say(Notice::Danger { train, why, stopped, interrupted });
+        self.notify(Notice::Danger { train, why, stopped, interrupted });
         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 
-    /// Stops every moving train that could meet one in danger; returns which.
-    pub(super) fn hold_what_could_meet(&mut self, now: Timestamp) -> Vec<TrainId> {
+    /// Stops every moving train that could meet one in danger, and returns them.
+    pub(super) fn hold_endangered(&mut self, now: Timestamp) -> Vec<TrainId> {
         let others: Vec<TrainId> = self.driver.trains().collect();
         let mut stopped = Vec::new();
         for other in others {
@@ -71,14 +72,14 @@ impl Watchdog {
         stopped
     }
 
-    /// A train is stopped and held until the danger is over.
+    /// Stops a train and holds it until the danger is over.
     pub(super) fn hold(&mut self, now: Timestamp, train: TrainId) {
-        let order = self.standing.remove(&train);
+        let order = self.unfinished.remove(&train);
         self.held.insert(train, order);
         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 
-    /// Whether a train could meet one in danger, wherever that may be.
+    /// Whether a train could meet one in danger, whose position may be uncertain.
     pub(super) fn could_meet(&self, now: Timestamp, train: TrainId) -> bool {
         let Some(own) = self.own_reach(now, train) else { return !self.dangers.is_empty() };
         let mut dangers = self.dangers.keys().filter(|danger| **danger != train);
@@ -88,18 +89,18 @@ impl Watchdog {
         })
     }
 
-    /// The rails that a train runs over before it is at rest, if commanded to stop now.
+    /// The rails that a train may occupy until it is at rest, if it is commanded to stop now.
     fn own_reach(&self, now: Timestamp, train: TrainId) -> Option<BTreeSet<EdgeId>> {
         let located = self.driver.locate(train, now)?;
         let place = self.driver.position(train, now)?;
         let step = self.driver.commanded(train).max(located.step);
         let stop = self.driver.model(train)?.stop(step, Approach::Below);
-        let doubt = located.uncertainty * CERTAIN + BODY + CLEAR;
-        let ahead = stop.distance * LONGER_STOP + doubt;
-        Some(rails_within(self.driver.layout(), place, ahead, doubt))
+        let margin = located.uncertainty * CERTAIN + BODY + CLEAR;
+        let ahead = stop.distance * LONGER_STOP + margin;
+        Some(rails_within(self.driver.layout(), place, ahead, margin))
     }
 
-    /// The rails on which a train in danger may be before it is at rest; `None` for everywhere.
+    /// The rails that a train in danger may occupy until it is at rest; `None` for all.
     fn danger_reach(&self, now: Timestamp, train: TrainId) -> Option<BTreeSet<EdgeId>> {
         let layout = self.driver.layout();
         let Some((located, place)) = self.driver.locate(train, now).zip(self.driver.position(train, now))
@@ -109,11 +110,11 @@ impl Watchdog {
         };
         let step = self.driver.commanded(train).max(located.step);
         let stop = self.driver.model(train)?.stop(step, Approach::Below);
-        let doubt = located.uncertainty * CERTAIN + BODY + CLEAR + DANGER_REACH;
-        Some(rails_within(layout, place, stop.distance * LONGER_STOP + doubt, doubt))
+        let margin = located.uncertainty * CERTAIN + BODY + CLEAR + DANGER_REACH;
+        Some(rails_within(layout, place, stop.distance * LONGER_STOP + margin, margin))
     }
 
-    /// Keeps a train that creeps or is measured clear of all trains at rest. The caller lets no other run meanwhile.
+    /// Sets the end of authority of a train in recovery before the next train at rest. No other train runs meanwhile.
     pub(super) fn keep_clear(&mut self, now: Timestamp, train: TrainId) {
         let layout = self.driver.layout();
         let others = self.driver.trains().filter(|other| *other != train);
@@ -131,15 +132,15 @@ impl Watchdog {
             let edges = hops.flat_map(|hop| hop.edges.iter().copied());
             let blocked = edges.into_iter().find(|edge| taken.contains(&rails(*edge)))?;
             let begin = Position { edge: blocked, offset: Length::ZERO };
-            let mut at = self.driver.way_point(train, located.at.node, begin)?;
-            at.way += -(BODY + CLEAR);
+            let mut at = self.driver.path_point(train, located.at.node, begin)?;
+            at.distance += -(BODY + CLEAR);
             Some(at)
         });
         self.driver.set_end_of_authority(now, train, limit);
     }
 
-    /// Whether a train whose place is unknown may creep ahead: from where it was seen last, as the turnouts lie,
-    /// [`SENSORS_AHEAD`] sensors come before the end of the track and before any other train.
+    /// Whether a lost train may creep ahead: from its last detection, over the turnouts as set, [`SENSORS_AHEAD`]
+    /// sensors come before the end of the track and before any other train.
     pub(super) fn is_clear_ahead(&self, now: Timestamp, train: TrainId) -> bool {
         let layout = self.driver.layout();
         let mut taken = BTreeSet::new();
@@ -164,60 +165,118 @@ impl Watchdog {
         false
     }
 
-    /// Switches the track power off: the last means to stop a train.
+    /// Switches the track power off, as the last resort to stop a train.
     pub(super) fn power_off(&mut self, now: Timestamp, for_train: TrainId) {
         if self.power == Power::On {
-            self.say(Notice::PowerOff { train: for_train });
+            self.notify(Notice::PowerOff { train: for_train });
             self.cut_power(now);
         }
     }
 
-    /// Switches the power off, for whatever reason.
+    /// Switches the power off, and holds all moving trains.
     pub(super) fn cut_power(&mut self, now: Timestamp) {
         self.power = Power::Off { since: now };
         self.command(Command::PowerOff);
-        // Decoders forget without power: what is commanded now is what they receive when it is back.
+        // Decoders forget their step without power: they receive these commands when it is back.
         let trains: Vec<TrainId> = self.driver.trains().collect();
         for train in trains {
             let moved = !self.driver.is_at_rest(train, now);
             let located = self.driver.locate(train, now);
             if moved && !self.dangers.contains_key(&train) && !self.held.contains_key(&train) {
-                let order = self.standing.remove(&train);
+                let order = self.unfinished.remove(&train);
                 self.held.insert(train, order);
             }
             self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
             if let Some(located) = located.filter(|_| moved) {
-                let at = crate::tracking::WayPoint { way: located.at.way + DEAD_WAY, ..located.at };
-                let doubt = Length::from_m(libm::hypot(located.uncertainty.as_m(), DEAD_DOUBT.as_m()));
-                self.driver.place(now, train, at, doubt);
+                let at = crate::tracking::PathPoint {
+                    distance: located.at.distance + STOP_WITHOUT_POWER,
+                    ..located.at
+                };
+                let [estimate, stop] = [located.uncertainty, STOP_WITHOUT_POWER_DEVIATION].map(Length::as_m);
+                self.driver.place(now, train, at, Length::from_m(libm::hypot(estimate, stop)));
             }
         }
     }
 
-    /// Switches the power on again once all trains are at rest and commanded to be.
+    /// Switches the power on again once all trains are at rest and their stop commands were sent.
     pub(super) fn power_on_again(&mut self, now: Timestamp) {
         let Power::Off { since } = self.power else { return };
-        let commanded = self.driver.trains().all(|train| !self.stops.waits(train));
-        if now - since >= DEAD_AFTER && commanded && !self.is_silent() && !self.is_switched_off {
+        let commanded = self.driver.trains().all(|train| !self.stops.is_pending(train));
+        if now - since >= AT_REST_WITHOUT_POWER && commanded && !self.is_silent() && !self.is_switched_off {
             self.power = Power::On;
             self.command(Command::PowerOn);
-            self.say(Notice::PowerOn);
+            self.notify(Notice::PowerOn);
             self.release_held();
         }
     }
 
-    /// When the power may come back.
+    /// When the power may be switched on again.
     pub(super) fn power_due(&self) -> Option<Timestamp> {
         match self.power {
-            Power::Off { since } if !self.is_switched_off => Some(since + DEAD_AFTER),
+            Power::Off { since } if !self.is_switched_off => Some(since + AT_REST_WITHOUT_POWER),
             Power::Off { .. } | Power::On => None,
         }
     }
 
-    /// Records the place of a train that was seen.
+    /// Records the position of a train after a detection.
     pub(super) fn note_place(&mut self, now: Timestamp, train: TrainId) {
         if let Some(place) = self.driver.position(train, now) {
             self.seen.insert(train, place);
         }
+    }
+}
+
+/// The rails within distances ahead of and behind a position, over both legs of every turnout: each as the edge with
+/// the lower number.
+fn rails_within(layout: &Layout, place: Position, ahead: Length, behind: Length) -> BTreeSet<EdgeId> {
+    let mut rails = walk(layout, place, ahead);
+    if let Some(back) = layout.reversed(place) {
+        rails.extend(walk(layout, back, behind));
+    }
+    rails
+}
+
+/// The rails of an edge, the same for both directions.
+fn rails(edge: EdgeId) -> EdgeId {
+    edge.min(edge.twin())
+}
+
+fn walk(layout: &Layout, from: Position, reach: Length) -> BTreeSet<EdgeId> {
+    let mut found = BTreeSet::new();
+    // The remaining distance at the start of each edge: a longer one may lead further.
+    let mut best: BTreeMap<EdgeId, Length> = BTreeMap::new();
+    let mut open = alloc::vec![(from.edge, reach + from.offset)];
+    while let Some((edge, left)) = open.pop() {
+        if best.get(&edge).is_some_and(|known| *known >= left) {
+            continue;
+        }
+        best.insert(edge, left);
+        found.insert(rails(edge));
+        let Some(known) = layout.edge(edge) else { continue };
+        let rest = left - known.length;
+        if rest > Length::ZERO {
+            open.extend(layout.outgoing(known.to).edges().map(|next| (next, rest)));
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::example::oval;
+
+    #[test]
+    fn rails_are_found_over_both_legs_in_both_directions_and_no_further_than_the_distance() {
+        let layout = oval();
+        let node = |name| layout.node_named(name).unwrap();
+        let edge = |from, to| layout.edge_between(node(from), node(to)).unwrap();
+        let place = Position { edge: edge("A1", "BR1"), offset: Length::from_mm(50.0) };
+        let near = rails_within(&layout, place, Length::from_mm(10.0), Length::from_mm(10.0));
+        assert_eq!(near, [rails(place.edge)].into());
+        let ahead = rails_within(&layout, place, Length::from_mm(120.0), Length::ZERO);
+        assert!(ahead.contains(&rails(edge("BR1", "B1"))) && ahead.contains(&rails(edge("BR1", "C1"))));
+        let all = rails_within(&layout, place, Length::from_m(50.0), Length::from_m(50.0));
+        assert!(all.len() > ahead.len() && !all.contains(&rails(edge("EN1", "E1"))));
     }
 }

@@ -1,4 +1,4 @@
-//! The link and the track power, as the watchdog handles them.
+//! The link and the track power.
 
 use alloc::vec::Vec;
 
@@ -15,9 +15,9 @@ use super::watchdog::{Power, Watchdog};
 pub enum LinkNews {
     /// The station has not answered for a while, or accepts no bytes.
     Silent,
-    /// It answers, for the first time or again.
+    /// The station answers, for the first time or again.
     Answers,
-    /// It is unknown whether a train has received a command to reverse: it may face either way.
+    /// It is unknown whether a train has received a command to reverse: its direction is unknown.
     ReverseInDoubt {
         /// The train.
         train: TrainId,
@@ -43,7 +43,7 @@ impl Watchdog {
             LinkNews::Silent => {}
             LinkNews::Answers => {
                 if self.silent.take().is_some() {
-                    // Stop commands may have been lost: each train is commanded to stop once more.
+                    // Stop commands may have been lost: stop each train again.
                     let trains: Vec<TrainId> = self.driver.trains().collect();
                     for train in trains {
                         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
@@ -54,7 +54,7 @@ impl Watchdog {
         self.act(now);
     }
 
-    /// A person switches the track power off or on. Power that a person switched off stays off until a person switches it on.
+    /// Switches the track power off or on for an operator. It then stays off until an operator switches it on.
     pub fn switch_power(&mut self, now: Timestamp, on: bool) {
         if on {
             self.is_switched_off = false;
@@ -68,7 +68,7 @@ impl Watchdog {
         self.act(now);
     }
 
-    /// Switches a function of a train, such as its light. It changes nothing in how the train moves.
+    /// Switches a function of a train, such as its light; it does not affect the motion.
     pub fn switch_function(&mut self, train: TrainId, function: FunctionNumber, on: bool) {
         self.command(Command::Function { train, function, on });
     }

@@ -1,27 +1,25 @@
-//! Supervision: if a train does not run as its model says, stop what it could meet, locate it, measure it again.
+//! Supervision: if a train does not run as modelled, stops the trains that it could meet, locates it and measures it
+//! again.
 //!
-//! A [`Watchdog`] owns a [`Driver`](super::Driver) and passes everything on, orders down and notices up, while all is
-//! well. It raises an [`Alarm`] when a train drifts from its model, is lost, is detected elsewhere or is missed by sensors
-//! again and again, when the station is silent, and when a stop is not confirmed. First it does no further harm: the
-//! train and all that could meet it are commanded to stop, and the power goes off if a stop is not confirmed in time or not
-//! obeyed. Then it recovers the train, which creeps to two sensors that fit each other, is measured at
-//! up to three speeds, and has its model scaled accordingly or learnt anew. Each phase has a time limit, after which a
-//! person is needed.
+//! A [`Watchdog`] owns a [`Driver`](super::Driver) and passes orders and notices on while trains run as modelled. It
+//! raises an [`Alarm`] if a train drifts from its model, is lost, is detected elsewhere or is missed by several
+//! sensors, if the station is silent, and if a stop is not confirmed. First it stops the train and all trains that it
+//! could meet, and switches the power off if a stop is not confirmed in time or not obeyed. Then it recovers the
+//! train: the train creeps to two consistent sensors and is measured at up to three speeds; its model is scaled or
+//! learnt from the start. Each phase has a time limit, after which an operator is needed.
 //!
 //! ```text
-//! watchdog  notice           the machine; what it says
-//! alarm  consistency_monitor what it raises; the tests at every sensor
-//! danger  meeting  stops     what is stopped and held; what could meet; stops that have to be confirmed
-//! line                       the link and the track power
-//! recovery                   the recovery of one train
-//! remeasuring  trials        its measurements, and what follows from them
+//! watchdog             the machine
+//! alarm                alarms, and the tests at every sensor that raise them
+//! danger  stops        trains that are stopped and held; stops that have to be confirmed
+//! line                 the link and the track power
+//! recovery             the recovery of one train
+//! remeasuring  trials  its measurements, and the conclusions from them
 //! ```
 
 mod alarm;
-mod consistency_monitor;
 mod danger;
 mod line;
-mod meeting;
 mod recovery;
 mod remeasuring;
 mod stops;

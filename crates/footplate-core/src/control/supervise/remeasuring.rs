@@ -1,4 +1,4 @@
-//! Measuring a train again that is located again: speeds first, then a stop, and everything if it is another one.
+//! Measures a train again after it was located: speeds first, then a stop, and everything if it is another train.
 
 use alloc::vec::Vec;
 
@@ -17,25 +17,25 @@ use super::trials::{SpeedTrial, Steps, is_same};
 use super::watchdog::Watchdog;
 use crate::control::{Notice, Outcome};
 
-/// Ratios that are further apart than this are not of one train that has changed, but of two.
+/// Ratios that differ by more than this factor belong to another train.
 const ANOTHER: f64 = 1.10;
-/// A stop this many standard deviations from its forecast is not of the same train either.
+/// A stop this many standard deviations from its prediction belongs to another train, too.
 const ANOTHER_STOP: f64 = 2.5;
-/// How far before a sensor the checked stop ends.
+/// The checked stop ends this far before a sensor.
 const SHORT_OF: Length = Length::from_mm(120.0);
-/// Hops ahead among which one is looked for that is long enough for that.
+/// The number of hops ahead in which a long enough one is searched for.
 const HOPS_TO_STOP: usize = 8;
 
 impl Watchdog {
-    /// Begins with the next speed, or decides what the train is.
+    /// Begins to measure the next speed, or concludes from the measured ones.
     pub(super) fn measure(&mut self, now: Timestamp, train: TrainId) {
         let commanded = self.driver.commanded(train);
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let Steps { middle, low, high, .. } = recovery.steps;
         let all_same = !recovery.ratios.is_empty() && recovery.ratios.iter().all(is_same);
-        // Only who is said to drift has to show all of its speeds before that is taken back.
+        // An alarm for drift needs all speeds to be refuted; other alarms need one.
         let is_enough = all_same && !matches!(recovery.why, Alarm::Drift(_));
-        // Upwards: a step reached from above is faster, and by how much is not known as well.
+        // Upwards: a step reached from above is faster, by an amount that is less well known.
         let plan = [low, middle, high];
         let next = plan.iter().find(|step| recovery.ratios.iter().all(|one| one.step != **step));
         if let Some(step) = next.filter(|_| !is_enough) {
@@ -57,7 +57,7 @@ impl Watchdog {
             return self.end(now, train, Outcome::AsBefore);
         }
         if all_same {
-            // Another engine may be as fast: its stops will tell.
+            // Another locomotive may be as fast: a stop will distinguish them.
             recovery.change = Rescaling::of(Vec::new());
             let base = recovery.base.clone();
             self.driver.set_model(base);
@@ -67,16 +67,16 @@ impl Watchdog {
         recovery.change = Rescaling::of(measured);
         let changed = recovery.base.rescaled(&recovery.change);
         if recovery.change.measured.is_empty() {
-            return self.need_person(now, train);
+            return self.need_operator(now, train);
         }
         if recovery.change.disagreement() > ANOTHER {
-            return self.next_lesson(now, train);
+            return self.learn_next(now, train);
         }
         self.driver.set_model(changed);
         self.stop_short(now, train);
     }
 
-    /// A step at which the train was not seen is left out.
+    /// Skips a step at which no sensor reported the train.
     pub(super) fn skip(&mut self, now: Timestamp, train: TrainId, step: SpeedStep) {
         if let Some(recovery) = self.dangers.get_mut(&train) {
             recovery.ratios.push(MeasuredRatio { step, ratio: 1.0, deviation: f64::INFINITY });
@@ -88,23 +88,23 @@ impl Watchdog {
     pub(super) fn stop_short(&mut self, now: Timestamp, train: TrainId) {
         let Some(recovery) = self.dangers.get(&train) else { return };
         let step = recovery.steps.middle;
-        let target = self.target_short_of_contact(now, train);
-        let way = self.driver.model(train).map(|model| model.stop(step, Approach::Below).distance);
-        let ordered = target.zip(way).and_then(|(target, way)| {
+        let target = self.target_short_of_sensor(now, train);
+        let distance = self.driver.model(train).map(|model| model.stop(step, Approach::Below).distance);
+        let ordered = target.zip(distance).and_then(|(target, distance)| {
             let stop = StopOrder { step: Some(step), ..StopOrder::at(train, target) };
-            Some((self.issue(now, Order::Stop(stop))?, way))
+            Some((self.issue(now, Order::Stop(stop))?, distance))
         });
         match ordered {
-            Some((order, way)) => {
-                self.set_phase(train, Phase::StoppingShort { order, way }, now + MEASURED_WITHIN);
+            Some((order, distance)) => {
+                self.set_phase(train, Phase::StoppingShort { order, distance }, now + MEASURED_WITHIN);
             }
-            // Where no stop can be checked what is not known of them stays wide.
+            // If no stop can be checked, the uncertainty of stops remains large.
             None => self.end_rescaled(now, train),
         }
     }
 
     /// A place shortly before a sensor, beyond the second one ahead.
-    fn target_short_of_contact(&self, now: Timestamp, train: TrainId) -> Option<Landmark> {
+    fn target_short_of_sensor(&self, now: Timestamp, train: TrainId) -> Option<Landmark> {
         let context = self.driver.context();
         let from = self.driver.locate(train, now)?.at.node;
         let hops = context.hops_ahead(from).skip(2).take(HOPS_TO_STOP);
@@ -112,24 +112,30 @@ impl Watchdog {
         hops.next().map(|hop| Landmark { node: hop.from, offset: hop.length + -SHORT_OF })
     }
 
-    /// How far from its forecast a stop has ended.
-    pub(super) fn check_stop(&mut self, now: Timestamp, train: TrainId, way: Length, passed: &PassedContact) {
+    /// Compares a stop with its prediction, from the time of the next detection.
+    pub(super) fn check_stop(
+        &mut self,
+        now: Timestamp,
+        train: TrainId,
+        distance: Length,
+        passed: &PassedContact,
+    ) {
         let speed = self.driver.locate(train, now).map(|located| located.speed);
         let seen = passed.short.zip(passed.late).zip(speed).filter(|_| passed.missed == 0);
         let Some(((short, [_, uncertain]), speed)) = seen else { return self.end_rescaled(now, train) };
         let deviation = (speed * uncertain).max(Length::from_mm(1.0));
-        self.say(Notice::StopChecked { train, beyond: short, deviation });
+        self.notify(Notice::StopChecked { train, beyond: short, deviation });
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         if short.abs() > deviation * ANOTHER_STOP {
-            return self.next_lesson(now, train);
+            return self.learn_next(now, train);
         }
-        // What is not known of the stop is in the deviation already: only the rest of it is of the measurement.
-        let known = way * recovery.change.stops_deviation;
+        // The deviation includes the uncertainty of the stop: only the rest of it is the measurement's.
+        let known = distance * recovery.change.stops_deviation;
         let measured = Length::from_m(libm::sqrt(
             (deviation.as_m() * deviation.as_m() - known.as_m() * known.as_m()).max(1e-5),
         ));
-        if way > Length::ZERO {
-            recovery.change.take_stop(short / way, measured / way);
+        if distance > Length::ZERO {
+            recovery.change.take_stop(short / distance, measured / distance);
         }
         self.end_rescaled(now, train);
     }
@@ -142,14 +148,14 @@ impl Watchdog {
         self.end(now, train, if is_same { Outcome::AsBefore } else { Outcome::Rescaled { ratio } });
     }
 
-    /// Another engine: one more speed and the stop from it.
-    pub(super) fn next_lesson(&mut self, now: Timestamp, train: TrainId) {
+    /// Another locomotive: learns one more speed and the stop from it.
+    pub(super) fn learn_next(&mut self, now: Timestamp, train: TrainId) {
         let commanded = self.driver.commanded(train);
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
-        let Some(step) = recovery.lessons().get(recovery.lesson).copied() else {
+        let Some(step) = recovery.lessons().get(recovery.lessons_taken).copied() else {
             return self.end(now, train, Outcome::LearntAnew);
         };
-        recovery.lesson += 1;
+        recovery.lessons_taken += 1;
         let trial = SpeedTrial::new(step, commanded);
         self.set_phase(train, Phase::LearningSpeed { trial, from: commanded }, now + MEASURED_WITHIN);
         if commanded == step {

@@ -1,21 +1,22 @@
-//! Stop commands and their confirmation: by the link in time, and by the trains after that.
+//! Stop commands and their confirmation, first by the link, then by the train.
 
 use alloc::collections::BTreeMap;
 
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
 
-/// The power goes off if a stop command has not left after this. On a link that answers it takes a tenth of a second.
+/// The power goes off if a stop command has not been sent after this time; a link that answers needs a tenth of a
+/// second.
 pub(super) const CONFIRMED_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
-/// A train that does not stop reaches the sensor ahead within this after it should be at rest.
+/// A train that does not stop reaches the sensor ahead within this time after it should be at rest.
 pub(super) const WATCHED_FOR: TimeSpan = TimeSpan::from_s(10.0);
 
-/// One train that was commanded to stop.
+/// A stop command to a train.
 #[derive(Debug, Clone, Copy)]
 struct Stop {
-    asked: Timestamp,
-    /// When it should be at rest, once the command has left.
-    stands: Option<Timestamp>,
+    commanded: Timestamp,
+    /// When the train should be at rest, once the command has been sent.
+    at_rest: Option<Timestamp>,
 }
 
 /// All stop commands.
@@ -25,47 +26,47 @@ pub(super) struct Stops {
 }
 
 impl Stops {
-    /// A train is being commanded to stop.
-    pub(super) fn ask(&mut self, train: TrainId, now: Timestamp) {
-        self.stops.insert(train, Stop { asked: now, stands: None });
+    /// A stop was commanded.
+    pub(super) fn command(&mut self, train: TrainId, now: Timestamp) {
+        self.stops.insert(train, Stop { commanded: now, at_rest: None });
     }
 
-    /// The command has left; the train is at rest by a time.
-    pub(super) fn left(&mut self, train: TrainId, stands: Timestamp) {
+    /// The command was sent; the train should be at rest at a time.
+    pub(super) fn sent(&mut self, train: TrainId, at_rest: Timestamp) {
         if let Some(stop) = self.stops.get_mut(&train) {
-            stop.stands.get_or_insert(stands);
+            stop.at_rest.get_or_insert(at_rest);
         }
     }
 
-    /// It is commanded to move again, or the power is off.
+    /// The train was commanded to move again, or the power is off.
     pub(super) fn forget(&mut self, train: TrainId) {
         self.stops.remove(&train);
     }
 
-    /// Whether the stop command of a train has not left yet.
-    pub(super) fn waits(&self, train: TrainId) -> bool {
-        self.stops.get(&train).is_some_and(|stop| stop.stands.is_none())
+    /// Whether the stop command of a train has not been sent yet.
+    pub(super) fn is_pending(&self, train: TrainId) -> bool {
+        self.stops.get(&train).is_some_and(|stop| stop.at_rest.is_none())
     }
 
-    /// When a train is at rest after its stop command; `None` until that has left.
-    pub(super) fn stands(&self, train: TrainId) -> Option<Timestamp> {
-        self.stops.get(&train)?.stands
+    /// When a train should be at rest; `None` until its stop command was sent.
+    pub(super) fn at_rest(&self, train: TrainId) -> Option<Timestamp> {
+        self.stops.get(&train)?.at_rest
     }
 
-    /// Whether a train should be at rest, and for so short a time that a sensor ahead may still show that it is not.
-    pub(super) fn should_stand(&self, train: TrainId, now: Timestamp) -> bool {
-        self.stands(train).is_some_and(|stands| now > stands && now - stands < WATCHED_FOR)
+    /// Whether a train should be at rest, recently enough for a sensor ahead to show that it is not.
+    pub(super) fn should_be_at_rest(&self, train: TrainId, now: Timestamp) -> bool {
+        self.at_rest(train).is_some_and(|at_rest| now > at_rest && now - at_rest < WATCHED_FOR)
     }
 
-    /// A train whose stop command has not left in time.
+    /// A train whose stop command was not sent in time.
     pub(super) fn overdue(&self, now: Timestamp) -> Option<TrainId> {
-        let late = |stop: &Stop| stop.stands.is_none() && now - stop.asked >= CONFIRMED_WITHIN;
+        let late = |stop: &Stop| stop.at_rest.is_none() && now - stop.commanded >= CONFIRMED_WITHIN;
         self.stops.iter().find(|(_, stop)| late(stop)).map(|(train, _)| *train)
     }
 
-    /// When the next stop command has to have left.
+    /// The earliest time by which a stop command has to be sent.
     pub(super) fn next(&self) -> Option<Timestamp> {
-        let open = self.stops.values().filter(|stop| stop.stands.is_none());
-        open.map(|stop| stop.asked + CONFIRMED_WITHIN).min()
+        let open = self.stops.values().filter(|stop| stop.at_rest.is_none());
+        open.map(|stop| stop.commanded + CONFIRMED_WITHIN).min()
     }
 }

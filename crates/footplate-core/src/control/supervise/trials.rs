@@ -1,4 +1,4 @@
-//! What is measured with a train that is located again: its speed at a few steps, and a stop.
+//! The measurements of a recovery: the speeds at a few steps.
 
 use alloc::vec::Vec;
 
@@ -9,25 +9,25 @@ use crate::model::{MeasuredRatio, MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Length, Speed};
 
-/// A train that is being located runs no faster than this, ...
-const CRAWL_UP_TO: Speed = Speed::from_mm_per_s(150.0);
-/// ... and no slower, or it may not start at all.
-const CRAWL_FROM: Speed = Speed::from_mm_per_s(80.0);
-/// Speeds at which it is measured: a low one that it surely has, ...
+/// A train creeps at most at this speed, ...
+const CREEP_AT_MOST: Speed = Speed::from_mm_per_s(150.0);
+/// ... and at least at this one, because slower steps may not start it.
+const CREEP_AT_LEAST: Speed = Speed::from_mm_per_s(80.0);
+/// Speeds at which it is measured: a low one that every train has, ...
 const LOW: Speed = Speed::from_mm_per_s(140.0);
 /// ... and a high one from which it stops within a metre.
 const HIGH: Speed = Speed::from_mm_per_s(430.0);
-/// Hops that a speed is measured over, ...
+/// A speed is measured over this many hops, ...
 const HOPS: u8 = 3;
-/// ... or as few as two, if they are this long.
+/// ... or over two, if they are this long together.
 const LONG_ENOUGH: Length = Length::from_mm(1_200.0);
 /// A ratio this close to 1 is no change: three standard deviations from run to run.
 const SAME: f64 = 0.02;
 /// See [`SAME`]: in standard deviations of the measurement.
 const SAME_DEVIATIONS: f64 = 3.0;
-/// The standard deviation of speeds from run to run, as a part.
+/// The relative standard deviation of speeds from run to run.
 const RUN_DEVIATION: f64 = 0.006;
-/// Changes of speed take a little longer than the model of another train says.
+/// Factor on the predicted duration of speed changes: the model may be that of another train.
 const SETTLES_PART: f64 = 1.3;
 /// See [`SETTLES_PART`].
 const SETTLES_MORE: TimeSpan = TimeSpan::from_ms(400);
@@ -40,7 +40,7 @@ pub(super) fn is_same(measured: &MeasuredRatio) -> bool {
 /// The steps that a recovery uses.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Steps {
-    pub(super) crawl: SpeedStep,
+    pub(super) creep: SpeedStep,
     pub(super) middle: SpeedStep,
     pub(super) low: SpeedStep,
     pub(super) high: SpeedStep,
@@ -56,11 +56,11 @@ impl Steps {
         }
         let first = usable.first().copied().unwrap_or(model.highest());
         let least = |from: Speed| usable.iter().find(|step| speed(**step) >= from).copied().unwrap_or(first);
-        let crawl = Some(least(CRAWL_FROM)).filter(|step| speed(*step) <= CRAWL_UP_TO).unwrap_or(first);
+        let creep = Some(least(CREEP_AT_LEAST)).filter(|step| speed(*step) <= CREEP_AT_MOST).unwrap_or(first);
         let low = least(LOW);
         let high = usable.iter().rev().find(|step| speed(**step) <= HIGH).copied().unwrap_or(low).max(low);
         let between = Speed::from_mm_per_s(libm::sqrt(speed(low).as_mm_per_s() * speed(high).as_mm_per_s()));
-        Self { crawl, middle: least(between).clamp(low, high), low, high }
+        Self { creep, middle: least(between).clamp(low, high), low, high }
     }
 }
 
@@ -72,17 +72,17 @@ pub(super) struct SpeedTrial {
     settled: Option<Timestamp>,
     first: Option<ContactWindow>,
     last: Option<(NodeId, ContactWindow)>,
-    way: Length,
+    distance: Length,
     hops: u8,
 }
 
 impl SpeedTrial {
     pub(super) const fn new(step: SpeedStep, from: SpeedStep) -> Self {
         let approach = if from.get() > step.get() { Approach::Above } else { Approach::Below };
-        Self { step, approach, settled: None, first: None, last: None, way: Length::ZERO, hops: 0 }
+        Self { step, approach, settled: None, first: None, last: None, distance: Length::ZERO, hops: 0 }
     }
 
-    /// The command has left.
+    /// The command was sent.
     pub(super) fn commanded(&mut self, model: &MotionModel, from: SpeedStep, at: Timestamp) {
         let settles = TimeSpan::from_s(model.settles_within(from, self.step).as_s() * SETTLES_PART);
         self.settled = Some(at + settles + SETTLES_MORE);
@@ -95,13 +95,13 @@ impl SpeedTrial {
         }
         match (self.first, hop) {
             (Some(_), Some(hop)) => {
-                self.way += hop;
+                self.distance += hop;
                 self.hops += 1;
             }
-            // The first one, or one that does not follow the last: from here on.
+            // The first passage, or one that does not follow the last: start here.
             _ => {
                 self.first = Some(window);
-                self.way = Length::ZERO;
+                self.distance = Length::ZERO;
                 self.hops = 0;
             }
         }
@@ -114,10 +114,10 @@ impl SpeedTrial {
     }
 
     pub(super) fn is_over(&self) -> bool {
-        self.hops >= HOPS || self.hops >= 2 && self.way >= LONG_ENOUGH
+        self.hops >= HOPS || self.hops >= 2 && self.distance >= LONG_ENOUGH
     }
 
-    /// What it comes to.
+    /// The measured ratio of speeds.
     pub(super) fn ratio(&self, model: &MotionModel) -> Option<MeasuredRatio> {
         let (first, (_, last)) = (self.first?, self.last?);
         let took = (last.middle() - first.middle()).as_s();
@@ -125,8 +125,8 @@ impl SpeedTrial {
         if self.hops == 0 || took <= 0.0 || known <= 0.0 {
             return None;
         }
-        let doubt = libm::sqrt(first.variance_s2() + last.variance_s2()) / took;
-        let ratio = self.way.as_m() / took / known;
-        Some(MeasuredRatio { step: self.step, ratio, deviation: libm::hypot(doubt, RUN_DEVIATION) })
+        let polling = libm::sqrt(first.variance_s2() + last.variance_s2()) / took;
+        let ratio = self.distance.as_m() / took / known;
+        Some(MeasuredRatio { step: self.step, ratio, deviation: libm::hypot(polling, RUN_DEVIATION) })
     }
 }

@@ -1,4 +1,4 @@
-//! The watchdog: monitors the trains of a driver, and recovers those that do not run as they should.
+//! The watchdog: monitors the trains of a driver, and recovers those that do not run as modelled.
 
 use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
 use alloc::vec::Vec;
@@ -10,18 +10,17 @@ use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Position;
-use crate::tracking::{Locator, WayPoint};
+use crate::tracking::{Locator, PathPoint};
 use crate::units::Length;
 
-use super::alarm::Alarm;
-use super::consistency_monitor::ConsistencyMonitor;
+use super::alarm::{Alarm, ConsistencyMonitor};
 use super::recovery::{Phase, Recovery};
 use super::stops::Stops;
 use crate::control::Notice;
 
-/// A time to rest is predicted to this factor, ...
+/// A train should be at rest after its predicted time multiplied by this, ...
 const REST_PART: f64 = 1.3;
-/// ... and this.
+/// ... plus this.
 const REST_MORE: TimeSpan = TimeSpan::from_ms(700);
 /// The time to rest of a train without a valid model (the longest published stop).
 const REST_UNKNOWN: TimeSpan = TimeSpan::from_s(5.0);
@@ -33,7 +32,7 @@ pub(super) enum Power {
     Off { since: Timestamp },
 }
 
-/// A driver and its monitors. For its caller it is a driver that sometimes refuses an order.
+/// A driver with monitors. To its caller it is a driver that sometimes rejects an order.
 #[derive(Debug, Clone)]
 pub struct Watchdog {
     pub(super) driver: Driver,
@@ -45,11 +44,11 @@ pub struct Watchdog {
     pub(super) silent: Option<Timestamp>,
     /// Trains in danger: their recoveries.
     pub(super) dangers: BTreeMap<TrainId, Recovery>,
-    /// Trains that are held until the danger is over, each with its interrupted order.
+    /// Trains that are held until the danger is over, with their interrupted orders.
     pub(super) held: BTreeMap<TrainId, Option<(OrderId, Order)>>,
     /// The last order of each train that has not ended.
-    pub(super) standing: BTreeMap<TrainId, (OrderId, Order)>,
-    /// The place where a sensor reported each train last, or a person put it, facing as the train does.
+    pub(super) unfinished: BTreeMap<TrainId, (OrderId, Order)>,
+    /// The position at which each train was last detected or placed, in its direction.
     pub(super) seen: BTreeMap<TrainId, Position>,
     /// The sensor that reported each train last since it reversed or was placed: it is behind the train.
     pub(super) behind: BTreeMap<TrainId, NodeId>,
@@ -59,11 +58,11 @@ pub struct Watchdog {
     pub(super) permits_all: bool,
     /// Whether it monitors; otherwise it only passes everything on.
     is_watching: bool,
-    /// Whether a person has switched the power off.
+    /// Whether an operator has switched the power off.
     pub(super) is_switched_off: bool,
     pub(super) permitted: BTreeSet<TrainId>,
-    /// The last time that it acted: nothing due until then is due again.
-    looked: Timestamp,
+    /// The last time that it acted: timeouts up to then are handled.
+    acted: Timestamp,
 }
 
 impl Watchdog {
@@ -79,7 +78,7 @@ impl Watchdog {
             silent: None,
             dangers: BTreeMap::new(),
             held: BTreeMap::new(),
-            standing: BTreeMap::new(),
+            unfinished: BTreeMap::new(),
             seen: BTreeMap::new(),
             behind: BTreeMap::new(),
             own: BTreeMap::new(),
@@ -87,7 +86,7 @@ impl Watchdog {
             is_watching: true,
             is_switched_off: false,
             permitted: BTreeSet::new(),
-            looked: now,
+            acted: now,
         };
         let trains: Vec<TrainId> = watchdog.driver.trains().collect();
         for train in trains {
@@ -99,7 +98,7 @@ impl Watchdog {
         watchdog
     }
 
-    /// A driver without monitoring, where a watched one is expected.
+    /// A driver without monitoring.
     #[must_use]
     pub fn unwatched(driver: Driver, now: Timestamp) -> Self {
         Self { is_watching: false, ..Self::new(driver, now) }
@@ -136,16 +135,17 @@ impl Watchdog {
     }
 
     /// See [`Driver::set_end_of_authority`]. A train in danger keeps the limits of its recovery.
-    pub fn set_end_of_authority(&mut self, now: Timestamp, train: TrainId, limit: Option<WayPoint>) {
+    pub fn set_end_of_authority(&mut self, now: Timestamp, train: TrainId, limit: Option<PathPoint>) {
         if !self.dangers.contains_key(&train) {
             self.driver.set_end_of_authority(now, train, limit);
             self.drain(now);
         }
     }
 
-    /// A person put a train there, or read its place off. A train that could not be recovered is trusted again, with its model
-    /// of before. When no train is in danger any more, held trains are released; their orders are dropped, with a notice.
-    pub fn place(&mut self, now: Timestamp, train: TrainId, at: WayPoint, uncertainty: Length) {
+    /// Sets the position of a train, as an operator entered it. A train that could not be recovered is trusted again,
+    /// with its earlier model. If no train is in danger any more, held trains are released and their orders
+    /// cancelled.
+    pub fn place(&mut self, now: Timestamp, train: TrainId, at: PathPoint, uncertainty: Length) {
         self.trust_again(train);
         self.driver.place(now, train, at, uncertainty);
         self.monitors.entry(train).or_default().place();
@@ -155,20 +155,20 @@ impl Watchdog {
         self.drain(now);
     }
 
-    /// Releases held trains once no train is in danger. A person is at the track: their orders are cancelled, so that no
-    /// train starts by itself.
+    /// Releases held trains once no train is in danger. Their orders are cancelled, so that no train starts by itself
+    /// while an operator is at the track.
     pub(super) fn release_held(&mut self) {
         if !self.dangers.is_empty() {
             return;
         }
         for (train, order) in core::mem::take(&mut self.held) {
             if let Some((_, order)) = order {
-                self.say(Notice::Cancelled { train, order });
+                self.notify(Notice::Cancelled { train, order });
             }
         }
     }
 
-    /// The place of a train was wrong: it is unknown from now on. A watched train is stopped and located again.
+    /// Gives up the position of a train that was found to be wrong. A monitored train is stopped and located again.
     pub fn lose(&mut self, now: Timestamp, train: TrainId) {
         self.driver.lose(now, train);
         self.lost(now, train);
@@ -178,7 +178,7 @@ impl Watchdog {
     fn lost(&mut self, now: Timestamp, train: TrainId) {
         self.monitors.entry(train).or_default().lose();
         if self.dangers.get(&train).is_some_and(Recovery::is_active) {
-            self.recovering_lost(now, train);
+            self.recovery_lost(now, train);
         } else {
             self.raise(now, train, Alarm::Lost);
         }
@@ -208,48 +208,40 @@ impl Watchdog {
         self.dangers.contains_key(&train)
     }
 
-    /// Whether orders to a train are refused for something that may end by itself: a recovery, a silent station.
+    /// Whether orders to a train are rejected for a temporary reason: a recovery or a silent station.
     #[must_use]
     pub fn is_interrupted(&self, now: Timestamp, train: TrainId) -> bool {
         let may_end = self.dangers.values().any(|danger| danger.phase != Phase::GivenUp);
         self.is_silent() || may_end && (self.is_held(train) || self.could_meet(now, train))
     }
 
-    /// A dispatcher keeps trains apart: from now on a train in danger asks before it creeps, see [`permit`](Self::permit), and
-    /// no interrupted order resumes by itself.
-    pub const fn ask_before_crawling(&mut self) {
+    /// For a dispatcher: from now on a train in danger waits for [`permit`](Self::permit) before it creeps, and no
+    /// interrupted order resumes by itself.
+    pub const fn ask_before_creeping(&mut self) {
         self.permits_all = false;
     }
 
-    /// A train that asked may creep and be measured.
+    /// Permits a train that asked to creep and to be measured.
     pub fn permit(&mut self, now: Timestamp, train: TrainId) {
         self.permitted.insert(train);
         self.act(now);
     }
 
-    /// The caller does not trust a train any more.
+    /// Raises an alarm for a train that the caller no longer trusts.
     pub fn distrust(&mut self, now: Timestamp, train: TrainId) {
         self.raise(now, train, Alarm::Distrusted);
         self.act(now);
     }
 
-    /// The caller knows of one more train that could meet one in danger: it is stopped and held with the others.
-    pub fn also_hold(&mut self, now: Timestamp, train: TrainId) {
-        if !self.dangers.is_empty() && !self.is_held(train) && self.driver.model(train).is_some() {
-            self.hold(now, train);
-            self.act(now);
-        }
-    }
-
     /// Carries out an order; see [`Driver::order`].
     ///
     /// # Errors
-    /// As [`Driver::order`], and that a train is held, the station silent or the power off.
+    /// As [`Driver::order`], and if the train is held, the station silent or the power off.
     pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
         if let Some(train) = order.train() {
             let stops = matches!(order, Order::Speed { step: SpeedStep::STAND, .. });
             if !stops && matches!(order, Order::Speed { .. }) && self.driver.trains().count() == 1 {
-                // No other train is there: a person lets it run over a sensor, which locates it.
+                // The only train: the operator runs it over a sensor, which locates it.
                 self.trust_again(train);
             }
             if !stops && (self.is_held(train) || self.could_meet(now, train)) {
@@ -265,19 +257,19 @@ impl Watchdog {
         let id = self.driver.order(now, order)?;
         if let Some(train) = order.train() {
             if matches!(order, Order::Speed { step: SpeedStep::STAND, .. }) {
-                self.standing.remove(&train);
+                self.unfinished.remove(&train);
                 if let Some(held) = self.held.get_mut(&train) {
                     *held = None;
                 }
             } else {
-                self.standing.insert(train, (id, order));
+                self.unfinished.insert(train, (id, order));
             }
         }
         self.act(now);
         Ok(id)
     }
 
-    /// A person has checked a train that could not be recovered: its model of before is valid again.
+    /// Restores the earlier model of a train that could not be recovered, after an operator has checked it.
     fn trust_again(&mut self, train: TrainId) {
         let given_up = self.dangers.get(&train).filter(|danger| danger.phase == Phase::GivenUp);
         if let Some(base) = given_up.map(|danger| danger.base().clone()) {
@@ -295,7 +287,7 @@ impl Watchdog {
         Some(id)
     }
 
-    pub(super) fn say(&mut self, notice: Notice) {
+    pub(super) fn notify(&mut self, notice: Notice) {
         self.queue.push_back(Output::Notice(notice));
     }
 
@@ -306,26 +298,26 @@ impl Watchdog {
     fn forget(&mut self, train: TrainId) {
         self.dangers.remove(&train);
         self.held.remove(&train);
-        self.standing.remove(&train);
+        self.unfinished.remove(&train);
         self.stops.forget(train);
         self.monitors.remove(&train);
         self.seen.remove(&train);
         self.behind.remove(&train);
     }
 
-    /// Acts on what has just been received.
+    /// Acts on the outputs and timeouts that are due.
     pub(super) fn act(&mut self, now: Timestamp) {
         self.drain(now);
         if let Some(train) = self.stops.overdue(now).filter(|_| self.is_watching && self.is_powered()) {
             self.raise(now, train, Alarm::StopUnconfirmed);
             self.power_off(now, train);
         }
-        self.looked = now;
+        self.acted = now;
         self.power_on_again(now);
-        self.go_on_recovering(now);
+        self.advance_recoveries(now);
         if self.dangers.values().all(|danger| !danger.is_active()) {
-            // The end of one may let another begin.
-            self.go_on_recovering(now);
+            // The end of one recovery may start another.
+            self.advance_recoveries(now);
         }
         self.drain(now);
     }
@@ -337,30 +329,30 @@ impl Watchdog {
                 Output::Command(command) => {
                     if let Command::Speed { train, step } = command {
                         if step == SpeedStep::STAND {
-                            self.stops.ask(train, now);
+                            self.stops.command(train, now);
                         } else {
                             self.stops.forget(train);
                         }
                     }
                     self.command(command);
                 }
-                Output::Notice(notice) => self.hear(now, notice),
+                Output::Notice(notice) => self.handle_notice(now, notice),
                 for_the_line => self.queue.push_back(for_the_line),
             }
         }
     }
 
-    fn hear(&mut self, now: Timestamp, notice: Notice) {
+    fn handle_notice(&mut self, now: Timestamp, notice: Notice) {
         match &notice {
             Notice::Passed { train, passed, .. } => self.passed(now, *train, &passed.clone()),
             Notice::Lost { train } => {
                 let train = *train;
-                self.say(notice);
+                self.notify(notice);
                 return self.lost(now, train);
             }
             Notice::Unexplained { sensor, .. } if self.is_watching => {
                 let stray = |train: &TrainId| {
-                    self.stops.should_stand(*train, now)
+                    self.stops.should_be_at_rest(*train, now)
                         && self.driver.sensor_ahead(*train, now) == Some(*sensor)
                 };
                 let stray = self.driver.trains().find(stray);
@@ -371,7 +363,7 @@ impl Watchdog {
             }
             Notice::Done(finished) => {
                 if self.own.remove(&finished.order).is_some() {
-                    return self.recovering_done(now, finished.train, finished.order, None);
+                    return self.recovery_order_ended(now, finished.train, finished.order, None);
                 }
                 // These orders last until another replaces them.
                 let ends = |(id, order): &(OrderId, Order)| {
@@ -379,19 +371,19 @@ impl Watchdog {
                     let lasts = matches!(order, Speed { .. } | Hold { .. } | Follow { .. } | Reverse { .. });
                     *id == finished.order && !lasts
                 };
-                if self.standing.get(&finished.train).is_some_and(ends) {
-                    self.standing.remove(&finished.train);
+                if self.unfinished.get(&finished.train).is_some_and(ends) {
+                    self.unfinished.remove(&finished.train);
                 }
             }
             Notice::GivenUp { order, train, why } => {
                 if self.own.remove(order).is_some() {
-                    return self.recovering_done(now, *train, *order, Some(why));
+                    return self.recovery_order_ended(now, *train, *order, Some(why));
                 }
                 // Its order resumes once the train is located.
                 if self.resumes() && matches!(why, Refusal::Lost { .. }) {
                     return;
                 }
-                self.standing.remove(train);
+                self.unfinished.remove(train);
             }
             Notice::Replaced { order, train }
                 if self.own.contains_key(order) || self.resumes() && self.is_held(*train) =>
@@ -402,12 +394,12 @@ impl Watchdog {
             Notice::Planned(planned) if self.own.contains_key(&planned.order) => return,
             Notice::TrackEnds { train, .. } | Notice::AuthorityEnds { train } => {
                 let train = *train;
-                self.standing.remove(&train);
-                self.recovering_blocked(now, train);
+                self.unfinished.remove(&train);
+                self.recovery_blocked(now, train);
             }
             _ => {}
         }
-        self.say(notice);
+        self.notify(notice);
     }
 
     fn passed(&mut self, now: Timestamp, train: TrainId, passed: &crate::tracking::PassedContact) {
@@ -416,16 +408,16 @@ impl Watchdog {
         if let Some(node) = self.driver.node_passed(passed) {
             self.behind.insert(train, node);
         }
-        if self.is_watching && self.stops.should_stand(train, now) {
+        if self.is_watching && self.stops.should_be_at_rest(train, now) {
             self.raise(now, train, Alarm::DoesNotStop(passed.sensor));
             self.power_off(now, train);
         } else if self.dangers.contains_key(&train) {
-            self.recovering_passed(now, train, passed);
+            self.recovery_passed(now, train, passed);
         } else if let Some(why) = alarm {
             self.raise(now, train, why);
         }
         if !self.dangers.is_empty() {
-            let stopped = self.hold_what_could_meet(now);
+            let stopped = self.hold_endangered(now);
             debug_assert!(stopped.iter().all(|train| self.is_held(*train)));
         }
     }
@@ -440,11 +432,11 @@ impl Watchdog {
         self.is_watching
     }
 
-    fn stands_by(&self, train: TrainId, left: Timestamp) -> Timestamp {
+    fn at_rest_by(&self, train: TrainId, left: Timestamp) -> Timestamp {
         let located = self.driver.locate(train, left);
         let model = self.driver.model(train);
-        let doubted = self.dangers.contains_key(&train);
-        let (Some(located), Some(model), false) = (located, model, doubted) else {
+        let is_in_danger = self.dangers.contains_key(&train);
+        let (Some(located), Some(model), false) = (located, model, is_in_danger) else {
             return left + REST_UNKNOWN;
         };
         let stop = model.stop(located.step, crate::event::Approach::Above);
@@ -458,9 +450,9 @@ impl Machine for Watchdog {
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         if let EventKind::Speed { train, step } = event.kind {
             if step == SpeedStep::STAND {
-                let stands = self.stands_by(train, event.time);
-                self.stops.left(train, stands);
-                self.monitors.entry(train).or_default().stand();
+                let at_rest = self.at_rest_by(train, event.time);
+                self.stops.sent(train, at_rest);
+                self.monitors.entry(train).or_default().stop();
             } else {
                 self.stops.forget(train);
             }
@@ -472,7 +464,7 @@ impl Machine for Watchdog {
             }
         }
         self.driver.handle_event(now, event);
-        self.recovering_told(now, event);
+        self.recovery_command_sent(now, event);
         self.act(now);
     }
 
@@ -486,9 +478,9 @@ impl Machine for Watchdog {
     }
 
     fn next_timeout(&self) -> Option<Timestamp> {
-        let waits = self.dangers.keys().filter_map(|train| self.stops.stands(*train));
+        let waits = self.dangers.keys().filter_map(|train| self.stops.at_rest(*train));
         let recovering = self.dangers.values().filter_map(Recovery::next_timeout);
         let own = recovering.chain(waits).chain(self.stops.next()).chain(self.power_due());
-        own.filter(|at| *at > self.looked).chain(self.driver.next_timeout()).min()
+        own.filter(|at| *at > self.acted).chain(self.driver.next_timeout()).min()
     }
 }

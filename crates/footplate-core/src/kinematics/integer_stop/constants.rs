@@ -1,4 +1,4 @@
-//! What makes the constants of a stop in integers: the only part of it that calculates with floating point.
+//! Calculates the constants of an integer stop: its only part with floating point.
 
 use super::{BinaryFraction, IntegerStop, MANTISSA_BITS, RATE_POINTS, SPEED_POINTS, TIME_BITS};
 use crate::kinematics::motion::Motion as _;
@@ -9,11 +9,11 @@ use crate::kinematics::stopping_law::{Braking, StoppingLaw};
 use crate::time::TimeSpan;
 use crate::units::{Length, Speed};
 
-/// Why a stop has no form in integers.
+/// Why a stop cannot be expressed in integers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum IntegerStopError {
-    /// A tick takes some time.
+    /// A tick is longer than zero.
     Tick {
         /// What was given.
         found: TimeSpan,
@@ -25,9 +25,9 @@ pub enum IntegerStopError {
     },
     /// The stop is too long, or its ramp too short for its lag.
     Stop {
-        /// How far it takes.
+        /// Its distance.
         distance: Length,
-        /// How long it takes.
+        /// Its duration.
         time: TimeSpan,
     },
 }
@@ -69,11 +69,11 @@ impl IntegerStop {
     /// One unit of length.
     pub const UNIT: Length = Length::from_mm(0.1);
 
-    /// The constants of a train that runs at a speed and stops by a law, for ticks of this length.
+    /// The constants of a train that runs at a speed and stops by a law, for ticks of a length.
     ///
     /// # Errors
     ///
-    /// If the speed is not ahead, or speed or stop are beyond what the constants can hold.
+    /// If the speed is not ahead, or speed or stop are beyond the range of the constants.
     pub fn new(
         speed: Speed,
         law: &StoppingLaw<FromCommand>,
@@ -87,12 +87,12 @@ impl IntegerStop {
         Self::of_shape(speed, &Shape { delay: law.delay().as_s(), ramp, lag, time }, tick)
     }
 
-    /// The constants of a train whose set speed falls evenly and which follows it with a lag, a delay after the command. It
-    /// counts as being at rest below [`Lag::SETTLED_WITHIN`].
+    /// The constants of a train whose set speed falls linearly, a delay after the command, and which follows it with
+    /// a lag. It counts as at rest below [`Lag::SETTLED_WITHIN`].
     ///
     /// # Errors
     ///
-    /// As of [`new`](Self::new); a negative delay is a stop that integers do not hold.
+    /// As for [`new`](Self::new); also if the delay is negative.
     pub fn with_shape(
         speed: Speed,
         delay: TimeSpan,
@@ -137,7 +137,8 @@ impl BinaryFraction {
     }
 }
 
-/// Ticks with [`TIME_BITS`] behind the point, to the nearest; those beyond 64 bits are the largest, which no stop has.
+/// Ticks with [`TIME_BITS`] behind the point, to the nearest; those beyond 64 bits become the largest, which no stop
+/// has.
 fn fixed(ticks: f64) -> i64 {
     libm::round(libm::ldexp(ticks, TIME_BITS as i32)) as i64
 }

@@ -43,8 +43,8 @@ const ROOTS_OF_HALF: [u64; 32] = [
     4_611_686_017_683_126_786,
 ];
 
-/// 2^−x for x ≥ 0 with [`EXPONENT_BITS`] behind the point: a root of one half for each of the first 32 binary digits that is
-/// set, and 1 − y ln 2 for the rest `y`, which is off by less than 2^−64.
+/// 2^−x for x ≥ 0 with [`EXPONENT_BITS`] behind the point: a root of one half for each of the first 32 binary digits
+/// that is set, and 1 − y ln 2 for the rest `y`, with an error below 2^−64.
 pub(super) fn power_of_half(x: i128) -> u64 {
     let halvings = x >> EXPONENT_BITS;
     if halvings >= i128::from(POWER_BITS) {
@@ -61,7 +61,7 @@ pub(super) fn power_of_half(x: i128) -> u64 {
     power >> halvings
 }
 
-/// Of two numbers of at most one, with [`POWER_BITS`] behind the point.
+/// Product of two numbers of at most one, with [`POWER_BITS`] behind the point.
 fn product(one: u64, other: u64) -> u64 {
     ((u128::from(one) * u128::from(other)) >> POWER_BITS) as u64
 }

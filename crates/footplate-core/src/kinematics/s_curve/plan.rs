@@ -6,22 +6,20 @@
 //! 2. the same with a lower peak and no cruise;
 //! 3. decelerate at once; below that distance the target cannot be reached at its speed.
 //!
-//! A train that brakes already has a case between 2 and 3: it eases off, but not to zero, and brakes on. A train
+//! A train that already brakes has a case between 2 and 3: it eases off, but not to zero, and brakes on. A train
 //! above the speed limit decelerates to it instead of accelerating, or only as far as the distance allows.
 
-use super::opening::{Level, Opening};
-use super::peak::{Gains, Run, peak_between_stands};
-use super::ramp::Ramp;
-use super::rate::Rate;
+use super::peak::{Gains, Run, peak_from_rest_to_rest};
+use super::ramp::{Level, Opening, Ramp, Rate};
 use crate::kinematics::ahead::{Ahead, ROUNDINGS};
 use crate::kinematics::bracket::crossing;
 use crate::kinematics::limits::{Limits, ProfileError};
 use crate::units::Acceleration;
 
-/// How much the present state may be outside of what is possible before it is more than rounding, relative.
+/// Largest relative excess of the present state over its limits that counts as rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// An opening, a cruise at its last speed, and the slowing down after it.
+/// An opening, a cruise at its final speed, and the slowing down after it.
 pub(super) struct Plan {
     pub(super) opening: Opening,
     pub(super) cruises: bool,
@@ -32,10 +30,10 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    /// From standstill to standstill, where nothing is wrong with that: the most common problem of all has a
-    /// path of its own, in which nothing is worked out that is zero.
+    /// From standstill to standstill, if the problem is valid: the most common problem has a path of its own, which
+    /// calculates nothing that is zero.
     #[inline(always)]
-    pub(super) fn between_stands(ahead: &Ahead, limits: &Limits) -> Option<Self> {
+    pub(super) fn from_rest_to_rest(ahead: &Ahead, limits: &Limits) -> Option<Self> {
         let jerk = limits.jerk.as_m_per_s3();
         let stands = ahead.speed == 0.0 && ahead.acceleration == 0.0 && ahead.target_speed == 0.0;
         let per_jerk = 1.0 / jerk;
@@ -44,8 +42,8 @@ impl Plan {
         }
         let speeding = Rate::new(limits.acceleration.as_m_per_s2(), jerk, per_jerk);
         let braking = Rate::new(limits.deceleration.as_m_per_s2(), jerk, per_jerk);
-        let peak = peak_between_stands(ahead.way, limits.speed.as_m_per_s(), &speeding, &braking);
-        let opening = Opening::from_stand(peak, &speeding);
+        let peak = peak_from_rest_to_rest(ahead.distance, limits.speed.as_m_per_s(), &speeding, &braking);
+        let opening = Opening::from_rest(peak, &speeding);
         Some(Self { opening, cruises: true, closing: Ramp::new(0.0, peak, &braking), level: (0.0, 0.0) })
     }
 }
@@ -56,10 +54,10 @@ pub(super) struct Planner {
     highest: f64,
     speeding: Rate,
     braking: Rate,
-    /// Where the present acceleration was or will be zero if the train now eases off from braking or continues to
+    /// The state at which acceleration was or will be zero if the train eases off from braking or continues to
     /// accelerate.
     level: Level,
-    /// Speed when the present acceleration has been brought to zero.
+    /// Speed once the present acceleration has been brought to zero.
     leveled: f64,
 }
 
@@ -71,8 +69,8 @@ impl Planner {
         let per_jerk = 1.0 / jerk;
         let mut level = Level::new(speed, acceleration, per_jerk);
         let mut leveled = speed + 0.5 * acceleration * acceleration.abs() * per_jerk;
-        // A train that is about to arrive levels out at just the target's speed. The smallest difference left
-        // by rounding would take as long as its square root to make up.
+        // A train that is about to arrive reaches acceleration zero exactly at the target's speed. The time to correct
+        // a difference from rounding would grow with its square root.
         let difference = leveled - target_speed;
         if difference.abs() <= ROUNDING * speed {
             level.speed -= difference;
@@ -88,11 +86,11 @@ impl Planner {
         }
     }
 
-    /// Whether it is one of the first two cases, by far the most common, and nothing is wrong. No comparison
-    /// holds for NaN.
+    /// Whether it is a valid problem of the first two cases, by far the most common. Every comparison with NaN is
+    /// false.
     #[inline(always)]
     pub(super) fn is_ordinary(&self) -> bool {
-        let Self { ahead: Ahead { acceleration, way, .. }, highest, leveled, .. } = *self;
+        let Self { ahead: Ahead { acceleration, distance, .. }, highest, leveled, .. } = *self;
         let (speeding, braking) = (self.speeding.limit, self.braking.limit);
         let lowest = self.lowest();
         self.speeding.jerk > 0.0
@@ -101,10 +99,10 @@ impl Planner {
             && -acceleration <= braking
             && leveled >= 0.0
             && leveled <= highest
-            && (lowest == 0.0 || way >= self.shortest(lowest))
+            && (lowest == 0.0 || distance >= self.shortest(lowest))
     }
 
-    /// What is wrong with the problem, if anything is; what is only rounding is put right.
+    /// Rejects an invalid problem, and corrects rounding.
     pub(super) fn checked(mut self, direction: f64) -> Result<Self, ProfileError> {
         let Ahead { acceleration, speed, .. } = self.ahead;
         let (speeding, braking, jerk) = (self.speeding.limit, self.braking.limit, self.speeding.jerk);
@@ -117,7 +115,7 @@ impl Planner {
         }
         self.ahead.acceleration = acceleration.max(-braking).min(speeding);
         if self.leveled < -ROUNDING * speed {
-            return Err(ProfileError::StandsFirst { found });
+            return Err(ProfileError::AtRestFirst { found });
         }
         self.leveled = self.leveled.max(0.0);
         self.level.speed = if acceleration < 0.0 { self.leveled } else { self.level.speed };
@@ -128,7 +126,7 @@ impl Planner {
     #[inline(always)]
     pub(super) fn ordinary(&self) -> Plan {
         let run = self.run();
-        self.speed_up(run.gains_for(self.ahead.way - self.level.way, self.lowest(), self.highest))
+        self.speed_up(run.gains_for(self.ahead.distance - self.level.distance, self.lowest(), self.highest))
     }
 
     /// The plan of any problem, if there is one. Distances are as precise as their `grain`.
@@ -137,7 +135,7 @@ impl Planner {
             return self.slow_down_to_limit(grain);
         }
         let shortest = self.shortest(self.lowest());
-        if self.ahead.way < shortest {
+        if self.ahead.distance < shortest {
             if self.ahead.acceleration < 0.0 && self.ahead.target_speed < self.leveled {
                 return self.ease_off(grain);
             }
@@ -146,13 +144,13 @@ impl Planner {
         Ok(self.ordinary())
     }
 
-    /// The lowest peak there can be.
+    /// The lowest possible peak.
     #[inline(always)]
     fn lowest(&self) -> f64 {
         if self.leveled > self.ahead.target_speed { self.leveled } else { self.ahead.target_speed }
     }
 
-    /// To the target's speed at once, wherever that is reached.
+    /// To the target's speed at once, over whatever distance it takes.
     pub(super) fn at_once(&self) -> Plan {
         let target_speed = self.ahead.target_speed;
         let plan = if target_speed >= self.leveled {
@@ -163,7 +161,7 @@ impl Planner {
         Plan { cruises: false, ..plan }
     }
 
-    /// Speeding up from where the acceleration is level, and slowing down to the target's speed.
+    /// Speeding up from the state of zero acceleration, and slowing down to the target's speed.
     #[inline(always)]
     fn run(&self) -> Run {
         Run {
@@ -178,11 +176,11 @@ impl Planner {
     #[inline(always)]
     fn shortest(&self, lowest: f64) -> f64 {
         let run = self.run();
-        self.level.way + run.way_and_slope(run.gains_to(lowest)).0
+        self.level.distance + run.distance_and_slope(run.gains_to(lowest)).0
     }
 
-    /// The refusal of a target that is nearer than `shortest`, unless by no more than rounding explains: a
-    /// speed to make up for takes as long as its square root, 2√(v/J), even where it is but a rounding.
+    /// Rejects a target that is nearer than `shortest` by more than rounding. The time to correct a difference of
+    /// speed, 2√(v/J), grows with its square root, even if the difference is only rounding.
     fn refuse_nearer_than(&self, shortest: f64, grain: f64) -> Result<(), ProfileError> {
         let speed = self.leveled.max(self.ahead.target_speed);
         let rounding = ROUNDINGS * f64::EPSILON * speed.max(self.ahead.speed);
@@ -205,21 +203,23 @@ impl Planner {
         Plan { opening, cruises: true, closing, level: (0.0, 0.0) }
     }
 
-    /// The train is above the limit of speed, or about to be.
+    /// For a train that is above the speed limit, or will be.
     fn slow_down_to_limit(&self, grain: f64) -> Result<Plan, ProfileError> {
-        let Ahead { speed, acceleration, way, target_speed, .. } = self.ahead;
+        let Ahead { speed, acceleration, distance, target_speed, .. } = self.ahead;
         let level = Level::new(speed, acceleration, -self.braking.per_jerk);
-        let way_by = |lower: f64| {
-            let (first, _) = self.braking.way_and_slope(lower, level.speed - lower);
-            let (second, _) = self.braking.way_and_slope(target_speed, lower - target_speed);
-            level.way + first + second
+        let distance_by = |lower: f64| {
+            let (first, _) = self.braking.distance_and_slope(lower, level.speed - lower);
+            let (second, _) = self.braking.distance_and_slope(target_speed, lower - target_speed);
+            level.distance + first + second
         };
-        if way_by(self.highest) <= way {
+        if distance_by(self.highest) <= distance {
             return Ok(self.slow_down(self.highest));
         }
-        let at_least = way_by(self.leveled);
-        if at_least <= way {
-            return Ok(self.slow_down(crossing(self.highest, self.leveled, |lower| way_by(lower) - way)));
+        let at_least = distance_by(self.leveled);
+        if at_least <= distance {
+            return Ok(
+                self.slow_down(crossing(self.highest, self.leveled, |lower| distance_by(lower) - distance))
+            );
         }
         if acceleration < 0.0 {
             return self.ease_off(grain);
@@ -228,21 +228,21 @@ impl Planner {
         Ok(self.slow_down(self.leveled))
     }
 
-    /// The train brakes, and would run past the target if it eased off altogether.
+    /// For a train that brakes and would overrun the target if it eased off completely.
     fn ease_off(&self, grain: f64) -> Result<Plan, ProfileError> {
-        let Ahead { speed, acceleration, way, target_speed, .. } = self.ahead;
+        let Ahead { speed, acceleration, distance, target_speed, .. } = self.ahead;
         let plan_by = |eased: f64| {
             let opening = Opening::easing_off(speed, -acceleration, eased, &self.braking);
             let level = Level::new(opening.end().speed, -eased, -self.braking.per_jerk);
             let closing = Ramp::new(target_speed, level.speed - target_speed, &self.braking);
-            Plan { opening, cruises: false, closing, level: (level.time, level.way) }
+            Plan { opening, cruises: false, closing, level: (level.time, level.distance) }
         };
-        let way_by = |eased: f64| {
+        let distance_by = |eased: f64| {
             let Plan { opening, closing, level, .. } = plan_by(eased);
-            opening.end().way + level.1 + closing.way
+            opening.end().distance + level.1 + closing.distance
         };
-        let at_least = way_by(-acceleration);
+        let at_least = distance_by(-acceleration);
         self.refuse_nearer_than(at_least, grain)?;
-        Ok(plan_by(crossing(0.0, -acceleration, |eased| way_by(eased) - way)))
+        Ok(plan_by(crossing(0.0, -acceleration, |eased| distance_by(eased) - distance)))
     }
 }

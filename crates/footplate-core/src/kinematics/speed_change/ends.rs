@@ -1,4 +1,4 @@
-//! What all laws of speed change agree on: before the change one steady speed, after it another.
+//! The part that all laws of speed change share: a constant speed before the change, another after it.
 
 use crate::kinematics::motion::{MotionState, seconds, span_of};
 use crate::kinematics::phase::Triple;
@@ -7,7 +7,7 @@ use crate::units::{Acceleration, Length, Speed};
 
 /// The two speeds of a change, its duration and its distance, mirrored so that the train runs forwards.
 ///
-/// Plain numbers in m, m/s and s. A negative duration counts as zero.
+/// SI units. A negative duration counts as zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Ends {
     /// 1, or −1 for a train that runs towards smaller distances.
@@ -16,12 +16,12 @@ pub(super) struct Ends {
     pub(super) to: f64,
     pub(super) duration: f64,
     pub(super) distance: f64,
-    /// Whether the direction changes during the motion, so that distances are passed twice.
+    /// Whether the train reverses during the change, so that it passes distances twice.
     turns_around: bool,
 }
 
 impl Ends {
-    /// For laws that are symmetric in time: their mean speed is the mean of the two speeds.
+    /// For laws that are symmetric in time, whose mean speed is the mean of the two speeds.
     #[inline]
     pub(super) fn symmetric(from: Speed, to: Speed, duration: TimeSpan) -> Self {
         let (from, to) = (from.as_m_per_s(), to.as_m_per_s());
@@ -36,7 +36,7 @@ impl Ends {
         Self { direction, from, to, duration, distance, turns_around: from < 0.0 || to < 0.0 }
     }
 
-    /// `numerator` per second of the change, per second squared …; zero for a change that takes no time.
+    /// `numerator` divided by the duration; zero for a change that takes no time.
     #[inline]
     pub(super) fn per_duration(&self, numerator: f64) -> f64 {
         if self.duration > 0.0 { numerator / self.duration } else { 0.0 }
@@ -58,21 +58,24 @@ impl Ends {
     /// The time at any distance, from the law's own time `inside` the change.
     #[inline(always)]
     pub(super) fn time_at(&self, distance: Length, inside: impl Fn(f64) -> f64) -> Option<TimeSpan> {
-        let way = self.direction * distance.as_m();
+        let distance = self.direction * distance.as_m();
         if self.turns_around {
             None
-        } else if way >= 0.0 && way <= self.distance {
-            Some(span_of(inside(way)))
+        } else if distance >= 0.0 && distance <= self.distance {
+            Some(span_of(inside(distance)))
         } else {
-            self.time_outside(way)
+            self.time_outside(distance)
         }
     }
 
-    /// Before and after the change the train runs at a steady speed, or is at rest.
-    fn time_outside(&self, way: f64) -> Option<TimeSpan> {
-        let seconds =
-            if way < 0.0 { way / self.from } else { self.duration + (way - self.distance) / self.to };
-        (way.is_finite() && seconds.is_finite()).then(|| TimeSpan::from_s(seconds))
+    /// The time at a distance before or after the change, where the speed is constant or zero.
+    fn time_outside(&self, distance: f64) -> Option<TimeSpan> {
+        let seconds = if distance < 0.0 {
+            distance / self.from
+        } else {
+            self.duration + (distance - self.distance) / self.to
+        };
+        (distance.is_finite() && seconds.is_finite()).then(|| TimeSpan::from_s(seconds))
     }
 
     pub(super) fn duration(&self) -> TimeSpan {
@@ -83,7 +86,7 @@ impl Ends {
         Length::from_m(self.direction * self.distance)
     }
 
-    /// Back from forwards to the direction in which the train really runs.
+    /// Mirrors the state back to the train's real direction.
     #[inline]
     fn turned(&self, (distance, speed, acceleration): Triple) -> MotionState {
         MotionState {

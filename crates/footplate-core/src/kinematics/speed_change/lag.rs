@@ -1,13 +1,13 @@
-//! First-order lag: decoders with load control close a fixed share of the difference in every moment.
+//! First-order lag: decoders with load control correct a fixed share of the remaining difference per unit of time.
 
 use crate::kinematics::motion::{Motion, MotionState};
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
 
-/// Speed that approaches its goal exponentially, v₂ + (v₁ − v₂) e^(−t/θ), and strictly never arrives.
+/// Speed that approaches its final value exponentially, v₂ + (v₁ − v₂) e^(−t/θ), and never reaches it.
 ///
-/// "Arrived" is therefore a stated tolerance: [`duration`](Motion::duration) and
-/// [`distance`](Motion::distance) end where the difference left is no more than it. The law itself runs on
+/// The change therefore ends within a tolerance: [`duration`](Motion::duration) and
+/// [`distance`](Motion::distance) end where the remaining difference equals it. The law itself continues
 /// beyond that without a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lag {
@@ -19,20 +19,20 @@ pub struct Lag {
     duration: f64,
 }
 
-/// Steps of Newton's method after which the time at a distance is given as it is. From the start chosen below
-/// it takes three or four; this bound only keeps the loop finite whatever the numbers.
+/// Most steps of Newton's method. From the initial value chosen below it takes three or four; the bound only keeps the
+/// loop finite.
 const MOST_STEPS: u32 = 30;
 
-/// A relative step of this size was the last: what it leaves is about its square.
+/// Newton's method ends after a relative step of this size: the remaining error is about its square.
 const SETTLED: f64 = 1e-9;
 
 impl Lag {
-    /// The difference that counts as none unless stated otherwise: at 1 mm/s a train covers less than 0.1 mm
+    /// The default tolerance: at 1 mm/s a train covers less than 0.1 mm
     /// between two polls of a command station.
     pub const SETTLED_WITHIN: Speed = Speed::from_mm_per_s(1.0);
 
-    /// From a speed towards another with a time constant θ; one that is negative counts as zero, which is a step.
-    /// `settled_within` is the tolerance at which the change counts as done.
+    /// From one speed towards another with a time constant θ; a negative one counts as zero, which is a step.
+    /// `settled_within` is the tolerance at which the change ends.
     #[must_use]
     pub fn new(from: Speed, to: Speed, time_constant: TimeSpan, settled_within: Speed) -> Self {
         let (from, to) = (from.as_m_per_s(), to.as_m_per_s());
@@ -43,8 +43,8 @@ impl Lag {
         Self { direction, from: direction * from, to: direction * to, time_constant, duration }
     }
 
-    /// The share of the difference that is left at a time, e^(−t/θ), and the share that is gone: each to its
-    /// own last digit, at the price of one elementary function.
+    /// The remaining share of the difference at a time, e^(−t/θ), and the share done: each to its own last digit, at
+    /// the cost of one elementary function.
     fn shares(&self, time: f64) -> (f64, f64) {
         if self.time_constant <= 0.0 {
             return if time > 0.0 { (0.0, 1.0) } else { (1.0, 0.0) };
@@ -67,23 +67,23 @@ impl Lag {
     }
 
     /// Seconds to a distance ahead; not finite if it is out of reach.
-    fn seconds_to(&self, way: f64) -> f64 {
+    fn seconds_to(&self, distance: f64) -> f64 {
         let Self { from, to, time_constant: lag, .. } = *self;
         if to == 0.0 {
-            return -lag * libm::log1p(-way / (from * lag));
+            return -lag * libm::log1p(-distance / (from * lag));
         }
         // On a curve that is convex or concave throughout, Newton's method never crosses the root from its right
         // side: start before the root if the distance decelerates, behind it if it accelerates.
         let mut time = if from >= to {
-            way / from
+            distance / from
         } else {
             // Behind the root, because t − θ(1 − e^(−t/θ)) ≥ t²/(2θ + t): solved for t.
-            let b = way - 2.0 * lag * from;
-            (b + libm::sqrt(b * b + 8.0 * lag * way * to)) / (2.0 * to)
+            let b = distance - 2.0 * lag * from;
+            (b + libm::sqrt(b * b + 8.0 * lag * distance * to)) / (2.0 * to)
         };
         for _ in 0..MOST_STEPS {
             let (reached, speed) = self.distance_and_speed(time);
-            let step = (reached - way) / speed;
+            let step = (reached - distance) / speed;
             time -= step;
             if step.abs() <= SETTLED * time {
                 break;
@@ -109,17 +109,17 @@ impl Motion for Lag {
     }
 
     fn time_at(&self, distance: Length) -> Option<TimeSpan> {
-        let way = self.direction * distance.as_m();
+        let distance = self.direction * distance.as_m();
         let turns_around = self.from < 0.0 || self.to < 0.0;
-        if !way.is_finite() || turns_around {
+        if !distance.is_finite() || turns_around {
             return None;
         }
-        let seconds = if way == 0.0 {
+        let seconds = if distance == 0.0 {
             0.0
-        } else if way < 0.0 {
-            way / self.from
+        } else if distance < 0.0 {
+            distance / self.from
         } else {
-            self.seconds_to(way)
+            self.seconds_to(distance)
         };
         seconds.is_finite().then(|| TimeSpan::from_s(seconds))
     }

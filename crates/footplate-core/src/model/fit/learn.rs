@@ -69,8 +69,9 @@ const USUAL_NODES: f64 = 4.0;
 /// By how much more than usual a law leaves over, as its nodes show: one step of expectation and maximisation (Dempster, Laird and
 /// Rubin, 1977). Less than usual is no evidence that the next speed is like those seen.
 fn residual_scale(first: usize, lasting: &[f64], solution: &Solution) -> f64 {
-    let squares = independent_nodes(first).into_iter().map(|sum| {
-        let mean: f64 = sum.iter().filter_map(|(place, slope)| Some(slope * lasting.get(*place)?)).sum();
+    let squares = independent_nodes(first).map(|(sum, usual)| {
+        let found: f64 = sum.iter().filter_map(|(place, slope)| Some(slope * lasting.get(*place)?)).sum();
+        let mean = found - usual;
         let with = |(one, by): &(usize, f64)| -> f64 {
             sum.iter().map(|(other, slope)| by * slope * solution.covariance(*one, *other)).sum()
         };

@@ -14,7 +14,9 @@ mod marginal_prior;
 mod motion_fit;
 mod robust;
 mod rows;
+mod stated;
 mod trip;
 mod unknowns;
 
 pub use motion_fit::{MotionFit, Refit};
+pub use stated::{StatedFit, StatedMotion, StatedSpeed};

@@ -19,7 +19,7 @@ pub use refit::Refit;
 
 use super::chain::Chain;
 use super::marginal_prior::MarginalPrior;
-use super::rows::{Point, Source, TripAt};
+use super::rows::{Linear, Point, Source, TripAt};
 use super::trip::{Own, Trip};
 use super::unknowns::Columns;
 use crate::event::{Event, EventKind};
@@ -59,8 +59,8 @@ const KEPT_TRIPS: usize = 30;
 #[derive(Debug, Clone)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct MotionFit {
-    model: MotionModel,
-    prior: MarginalPrior,
+    pub(super) model: MotionModel,
+    pub(super) prior: MarginalPrior,
     chain: Chain,
     /// Follows from the layout; made when first needed.
     #[cfg_attr(feature = "serde", serde(skip))]
@@ -92,7 +92,7 @@ struct Reduced {
 #[derive(Debug, Clone)]
 struct Survey {
     /// Sums of what sections and stops are longer that are nothing, with their variance (m²).
-    rows: Vec<(Vec<(usize, f64)>, f64)>,
+    rows: Vec<(Vec<(usize, f64)>, [f64; 2])>,
     scale: Option<f64>,
 }
 
@@ -313,25 +313,35 @@ impl MotionFit {
         self.prior.scatter = scatter;
     }
 
-    /// How far stops and starts scatter, as the first so many kept trips and those before show.
+    /// The scatter of stops and starts, by the first `count` kept trips and those before.
     ///
-    /// A stop and the start behind it are seen as a sum, of which each is given its likely part: what scatters little in
-    /// both is found to scatter less than it does. So few of them count for less than what is usual.
+    /// One step of expectation and maximisation (Dempster, Laird and Rubin, 1977). A sensor measures the sum of a stop and the
+    /// next start, of which the fit gives each its likely part. That part is smaller than the error itself; the square that is
+    /// expected is its square plus the variance that remains.
     fn scatter_of(&self, columns: &Columns, values: &Values, count: usize) -> ScatterSums {
         let mut sums = self.prior.scatter;
         let point = self.point(columns, &values.lasting);
         for place in 0..count {
-            let Some(at) = self.trip_at(values, place) else { continue };
-            for row in point.rows(at, false) {
-                let square = row.residual * row.residual / row.variance;
-                match row.source {
-                    Source::Stop => sums.stops.take(square * point.scatter.stops * point.scatter.stops),
-                    Source::Start if at.trip.continues && !at.trip.contacts.is_empty() => {
-                        sums.starts.take(square * point.scatter.starts * point.scatter.starts);
-                    }
-                    _ => {}
-                }
-            }
+            let (Some(at), Some(next)) = (self.trip_at(values, place), self.trip_at(values, place + 1))
+            else {
+                continue;
+            };
+            let rows = [at, next].map(|at| point.rows(at, false));
+            let of = |nth: usize, source| rows.get(nth)?.iter().find(|row| row.source == source);
+            let (Some(stop), Some(start)) = (of(0, Source::Stop), of(1, Source::Start)) else { continue };
+            let Some(first) = point.first_sensor(next) else { continue };
+            let expected = |row: &Linear, own: f64, other: f64| {
+                row.residual * row.residual + own * other / (own + other)
+            };
+            let late = first.speed * first.speed * start.variance;
+            let found = expected(stop, stop.variance, first.variance + late);
+            // The train's own scatter is this share of the variance of a stop; offsets and the floor are the rest.
+            let share = stop.once / stop.variance;
+            let own = share * found / stop.variance + 1.0 - share;
+            sums.stops.take(own * point.scatter.stops * point.scatter.stops);
+            let other = (first.variance + stop.variance) / (first.speed * first.speed);
+            let found = expected(start, start.variance, other);
+            sums.starts.take(found / start.variance * point.scatter.starts * point.scatter.starts);
         }
         sums
     }
@@ -345,16 +355,16 @@ impl MotionFit {
 
 impl Survey {
     fn of(columns: &Columns, index: &SectionIndex, model: &MotionModel) -> Self {
-        let mut rows: Vec<(Vec<(usize, f64)>, f64)> = columns
+        let mut rows: Vec<(Vec<(usize, f64)>, [f64; 2])> = columns
             .sections
             .iter()
-            .map(|(section, column)| (alloc::vec![(*column, 1.0)], section_variance(index, *section)))
+            .map(|(section, column)| (alloc::vec![(*column, 1.0)], [0.0, section_variance(index, *section)]))
             .collect();
         let offsets = columns.stop_offsets.values();
         let offset_variance = model.stop_offsets.variance();
-        rows.extend(offsets.map(|column| (alloc::vec![(*column, 1.0)], offset_variance)));
+        rows.extend(offsets.map(|column| (alloc::vec![(*column, 1.0)], [0.0, offset_variance])));
         for (first, scale) in [STOP_NODES, START_NODES].into_iter().zip(model.residual_scales) {
-            rows.extend(independent_nodes(first).into_iter().map(|sum| (sum, scale * scale)));
+            rows.extend(independent_nodes(first).map(|(sum, mean)| (sum, [mean, scale * scale])));
         }
         let of_total = index.scale_variance(columns.sections.keys().copied());
         // What all lengths have in common does not keep their total from being a measure.
@@ -362,16 +372,20 @@ impl Survey {
         let is_measure = !rows.is_empty() && of_lengths <= WELL_SURVEYED * WELL_SURVEYED;
         let scale = is_measure.then(|| libm::sqrt(of_total));
         if scale.is_some() {
-            rows.push((columns.sections.values().map(|column| (*column, 1.0)).collect(), TOTAL * TOTAL));
+            rows.push((
+                columns.sections.values().map(|column| (*column, 1.0)).collect(),
+                [0.0, TOTAL * TOTAL],
+            ));
         }
         Self { rows, scale }
     }
 
     fn cost(&self, lasting: &[f64]) -> f64 {
-        let longer = |terms: &[(usize, f64)]| -> f64 {
+        let sum = |terms: &[(usize, f64)]| -> f64 {
             terms.iter().filter_map(|(column, slope)| Some(slope * lasting.get(*column)?)).sum()
         };
-        self.rows.iter().map(|(terms, variance)| longer(terms) * longer(terms) / variance).sum()
+        let square = |by: f64| by * by;
+        self.rows.iter().map(|(terms, [mean, variance])| square(sum(terms) - mean) / variance).sum()
     }
 }
 
@@ -407,8 +421,8 @@ impl Reduced {
     fn closed(self, survey: &Survey) -> Option<Closed> {
         let Self { mut equations, trips } = self;
         let next_place = equations.eliminate_last()?;
-        for (terms, variance) in &survey.rows {
-            equations.add(terms, 0.0, *variance);
+        for (terms, [mean, variance]) in &survey.rows {
+            equations.add(terms, *mean, *variance);
         }
         Some(Closed { equations, next_place, trips })
     }

@@ -48,7 +48,8 @@ pub(super) struct Linear {
     pub(super) terms: Vec<(usize, f64)>,
     pub(super) residual: f64,
     pub(super) variance: f64,
-    /// Variance of a single such measurement, without the factor for common errors of a law's shape.
+    /// Variance of a single such measurement, without the factor for common errors of a law's shape; of a stop, that of the
+    /// train's own scatter.
     pub(super) once: f64,
     pub(super) source: Source,
 }
@@ -111,6 +112,15 @@ pub(super) struct Point<'p> {
     pub(super) stop_shape_error: f64,
 }
 
+/// The first sensor of a trip, as a measurement of where the stop before ended and of how late the start was.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FirstSensor {
+    /// Speed there (m/s): by so much a late start moves the train back, per second.
+    pub(super) speed: f64,
+    /// Variance of the train's place there (m²), if place and time of the start were known.
+    pub(super) variance: f64,
+}
+
 /// A trip with its own numbers, and where the next one begins if it continues there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TripAt<'t> {
@@ -140,6 +150,18 @@ impl Point<'_> {
             add_term(&mut terms, *column, 1.0);
         }
         (terms.iter().map(|(column, slope)| slope * self.lasting[*column]).sum(), terms)
+    }
+
+    /// What the first sensor of a trip says of the sum of the stop before and its start.
+    pub(super) fn first_sensor(&self, at: TripAt<'_>) -> Option<FirstSensor> {
+        let TripAt { trip, own, .. } = at;
+        let contact = trip.contacts.first()?;
+        let mut segments = Vec::new();
+        let outcome = outcome(trip, &Answers::new(self.lasting, self.highest), own, &mut segments);
+        let Error { speed, law, .. } = *errors(trip, own, &segments, self.stop_shape_error).first()?;
+        let run = outcome.at.first()? * TRIP_DEVIATION;
+        let timing = speed * speed * contact.variance + SENSOR_SCATTER * SENSOR_SCATTER;
+        Some(FirstSensor { speed, variance: timing + law * law + run * run })
     }
 
     /// The equations of a trip; without slopes only the residuals are set.
@@ -183,6 +205,7 @@ impl Point<'_> {
         }
         let (longer, sections) = self.longer(trip.contacts.iter().flat_map(|contact| &contact.sections));
         let beyond_last = own.place + here.rest - surveyed - longer;
+        let alone = self.scatter.of_stop_alone(stop_speed);
         let scatter = self.scatter.of_stop(stop_speed);
         let scatter = scatter * scatter + REST_SCATTER * REST_SCATTER;
         let next_place = next_place.filter(|_| trip.came_to_rest);
@@ -197,7 +220,7 @@ impl Point<'_> {
             if with_slopes {
                 self.scaled(&mut terms, residual, stop_step);
             }
-            rows.push(row(terms, residual, scatter + free, Source::Stop));
+            rows.push(Linear { once: alone * alone, ..row(terms, residual, scatter + free, Source::Stop) });
         }
         if let Some(rest) = &trip.measured {
             let counted = || trip.contacts.iter().take(rest.contacts);

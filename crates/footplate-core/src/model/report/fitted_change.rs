@@ -1,4 +1,4 @@
-//! A change of speed as the best law of its direction has it, laid through the contacts that were measured.
+//! A change of speed by the best law of its direction, fitted to its detections.
 
 use alloc::vec::Vec;
 
@@ -10,18 +10,18 @@ use crate::model::MotionModel;
 use crate::time::TimeSpan;
 use crate::units::{Acceleration, Length, Speed};
 
-/// A law through the contacts of one change.
+/// A law fitted to the detections of one change.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FittedChange {
-    /// The law at the times asked for; distance counts from the first contact of the change.
+    /// The law at the requested times; distances are from the first detection of the change.
     pub states: Vec<MotionState>,
-    /// How far beyond the law each contact lies.
+    /// The distance of each detection beyond the law.
     pub residuals: Vec<Length>,
 }
 
 impl Review {
-    /// The law that describes the direction of a change best, through its contacts: where the train was at the
-    /// command is fitted (x₀ of the law fit). `times` are since the command. `None` where no law was found.
+    /// The best law of the direction of a change, fitted to its detections: the position of the train at the command is
+    /// fitted (x₀ of the law fit). `times` are since the command. `None` if no law was found.
     #[must_use]
     pub fn fitted_change(
         &self,
@@ -40,7 +40,7 @@ impl Review {
             })
             .collect::<Option<_>>()?;
         let off = residuals(&ways, change);
-        // Every contact has the same x₀; the first tells it.
+        // All detections have the same x₀: take it from the first.
         let (first, (way, _)) = (change.points.first()?, ways.first()?);
         let x0 = Length::from_m(first.way - way - off.first()?.1);
         let placed = |state: MotionState| MotionState { distance: state.distance + x0, ..state };

@@ -1,8 +1,8 @@
 //! Which law a train follows when it changes speed: all of them fitted, compared, the best named.
 //!
 //! Two unknowns a law: `a` = ln of its pace and `q`, the delay from command to effect (s). For a change with
-//! contacts at times `t` and ways `s` the law says the way `X(t)`; where the train was when it was told is not
-//! known, so `x0` is fitted to each change: r = s − x0 − X(t), weighted by 1/w, w = v(t)²·var(t) + doubt². Levenberg and
+//! detections at times `t` and distances `s` the law predicts the distance `X(t)`; the position at the command is
+//! unknown, so `x0` is fitted to each change: r = s − x0 − X(t), weighted by 1/w, w = v(t)²·var(t) + σ². Levenberg and
 //! Marquardt's iteration on a and q with x0 eliminated; derivatives are numerical.
 //!
 //! Laws are compared by Akaike's criterion with unknown variance (n ln(χ²/n) + 2k, corrected for small n;
@@ -63,7 +63,7 @@ pub struct FittedLaw {
     pub freedom: usize,
     /// Akaike's criterion; smaller is better.
     pub criterion: f64,
-    /// Root mean square error on changes held out of the fit (mm of way).
+    /// Root mean square error in distance on changes held out of the fit (mm).
     pub held_out_mm: f64,
 }
 
@@ -286,7 +286,7 @@ fn fitted(kind: LawKind, changes: &[Transient], table: Option<&StepTable>) -> Op
     // The unknowns of the law and the place of each change.
     let unknowns = 2 + changes.len();
     let freedom = n.saturating_sub(unknowns);
-    // Where the law is not quite true the residuals say by how much the doubt has to grow.
+    // If the law is not exact, the residuals show by how much the uncertainty has to grow.
     let grown = (found.chi_square / freedom.max(1) as f64).max(1.0);
     let covariance = found.covariance.map(|line| line.map(|value| value * grown));
     let pace = libm::exp(found.x[0]);

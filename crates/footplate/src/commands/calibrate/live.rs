@@ -260,7 +260,9 @@ impl Session<'_> {
         let mut store = Store::open(path)?;
         let replay = MotionReplay::of_store(layout, &mut store, self.train, highest, now())?;
         if replay.is_empty() {
-            return Ok(nothing);
+            let Some(profile) = replay.profile else { return Ok(nothing) };
+            eprintln!("beginning with the speeds of {profile}; --afresh begins from nothing");
+            return Ok((replay.fit, TurnoutStates::unknown()));
         }
         eprintln!(
             "going on from {} runs of train {} that the store holds; --afresh begins from nothing",

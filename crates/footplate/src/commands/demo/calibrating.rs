@@ -1,7 +1,7 @@
 //! The first half of the demo: calibrates an unknown train.
 
 use footplate_core::control::learn::{
-    CalibrationNotice, CalibratorSettings, Ending, Mishap, Phase, Progress, StepAccuracy,
+    CalibrationNotice, CalibratorSettings, Ending, Fault, Phase, Progress, StepAccuracy,
 };
 use footplate_core::model::MotionFit;
 use footplate_core::model::StepUse;
@@ -152,26 +152,26 @@ fn detail(progress: &Progress, budget: TimeSpan) -> String {
     format!("{about:<32} {bar} {} of {}", minutes(progress.elapsed), minutes(budget))
 }
 
-fn what_happened(layout: &Layout, fault: &Mishap) -> String {
+fn what_happened(layout: &Layout, fault: &Fault) -> String {
     let sensor = |sensor| layout.sensor_name(sensor);
     match fault {
-        Mishap::Stalled { step } => format!("activity not move reliably at step {step}"),
-        Mishap::Missed { count, before } => {
+        Fault::Stalled { step } => format!("activity not move reliably at step {step}"),
+        Fault::Missed { count, before } => {
             format!(
                 "{count} sensor{} before {} did not report",
                 if *count == 1 { "" } else { "s" },
                 sensor(*before)
             )
         }
-        Mishap::Unexplained { sensor: of } => {
+        Fault::Unexplained { sensor: of } => {
             format!("{} reported, but it cannot have passed there", sensor(*of))
         }
-        Mishap::WrongLeg { turnout, .. } => {
+        Fault::WrongLeg { turnout, .. } => {
             format!("turnout {turnout} was not in the commanded position; commanded again")
         }
-        Mishap::Moved { to, .. } => format!("is at {}, where it cannot have run to", layout.node_name(*to)),
-        Mishap::Lost { .. } => "lost its position; it stops and is located again".to_owned(),
-        Mishap::LengthsDiffer { hops } => {
+        Fault::Moved { to, .. } => format!("is at {}, where it cannot have run to", layout.node_name(*to)),
+        Fault::Lost { .. } => "lost its position; it stops and is located again".to_owned(),
+        Fault::LengthsDiffer { hops } => {
             format!("takes times over {} hops that their lengths do not explain", hops.len())
         }
     }

@@ -97,7 +97,7 @@ impl<'l> Tour<'l> {
         let model = self.driver.machine().model(self.train)?;
         // Acceleration takes about as long as braking, and a steady run before the stop makes it more accurate: hence
         // 2.5 stopping distances.
-        let mut least = at.way + model.stop(step, Approach::Below).distance * 2.5;
+        let mut least = at.distance + model.stop(step, Approach::Below).distance * 2.5;
         for _ in 0..MAX_REFUSALS {
             let context = TrackContext {
                 layout: self.layout,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::track::{Landmark, Layout, TurnoutStates, WayError};
+use footplate_core::track::{Landmark, Layout, PathError, TurnoutStates};
 use footplate_core::{
     FunctionNumber, Length, Ratio, SensorId, Speed, SpeedStep, TimeSpan, TrainId, TurnoutId,
 };
@@ -143,7 +143,7 @@ impl<'t> Words<'_, 't, '_> {
             Mistake { column: whole.column, what: format!("{error}{near}") }
         })?;
         match layout.locate(landmark, &TurnoutStates::unknown()) {
-            Err(error @ WayError::TrackEnds { .. }) => {
+            Err(error @ PathError::TrackEnds { .. }) => {
                 Err(whole.mistake(format!("is off the track: {error}")))
             }
             _ => Ok(landmark),

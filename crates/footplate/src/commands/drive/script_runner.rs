@@ -12,7 +12,7 @@ use footplate_core::control::{
 use footplate_core::model::MotionFit;
 use footplate_core::model::MotionModel;
 use footplate_core::track::Landmark;
-use footplate_core::tracking::WayPoint;
+use footplate_core::tracking::PathPoint;
 use footplate_core::{Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 use serde::{Deserialize, Serialize};
 
@@ -348,7 +348,7 @@ impl ScriptRunner {
     /// Takes in the position of a train at rest from the operator.
     fn place(&mut self, now: Timestamp, step: &Step, train: TrainId, at: Landmark) {
         if self.driver().is_at_rest(train, now) {
-            let at = WayPoint { node: at.node, way: at.offset };
+            let at = PathPoint { node: at.node, distance: at.offset };
             self.dispatcher.place(now, train, at, READ_OFF_BY_HAND);
             self.learning.interrupt(train);
             let line = self.formatter().whereabouts(train, now);

@@ -129,6 +129,12 @@ impl KnownTrains {
         };
         let replay = MotionReplay::of_store(layout, store, train, highest, at)?;
         if replay.is_empty() {
+            if let (Some(profile), true) = (&replay.profile, !self.models.contains_key(&train)) {
+                eprintln!("train {train} begins with the speeds of {profile}");
+                self.models.insert(train, replay.fit.model().clone());
+                self.fits.push(replay.fit);
+                self.unknown.push(train);
+            }
             return Ok(());
         }
         let mut fit = replay.fit;

@@ -13,7 +13,7 @@ use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::kinematics::{MinimumJerk, Motion, SpeedLaw, Transit};
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::{TrackContext, WayPoint};
+use crate::tracking::{PathPoint, TrackContext};
 use crate::units::{Length, Speed};
 
 use super::zoned_transit::{SlowPart, ZonedTransit};
@@ -224,7 +224,7 @@ impl DrivenTrain {
         &self,
         context: TrackContext<'_>,
         now: Timestamp,
-        at: WayPoint,
+        at: PathPoint,
         usable: &[SpeedStep],
         slowest: Speed,
     ) -> ArrivalOptions {
@@ -262,14 +262,14 @@ impl DrivenTrain {
 
     /// The zones on the path to a target, with the speed of the fastest step within each limit, by distance before
     /// the target (m).
-    fn slow_parts(&self, context: TrackContext<'_>, now: Timestamp, at: WayPoint) -> Vec<SlowPart> {
+    fn slow_parts(&self, context: TrackContext<'_>, now: Timestamp, at: PathPoint) -> Vec<SlowPart> {
         let restricted = self.restricted_until(context, now, at);
         let [ahead, behind] = self.reach.map(Length::as_m);
         let parts = restricted.into_iter().map(|(stretch, step)| {
             let speed = self.model.steady_speed(step, Approach::Below).as_m_per_s();
             SlowPart {
-                from: at.way.as_m() - (stretch.from - ahead - ENTRY_MARGIN),
-                to: at.way.as_m() - (stretch.to + behind + EXIT_MARGIN + speed * EXIT_DELAY),
+                from: at.distance.as_m() - (stretch.from - ahead - ENTRY_MARGIN),
+                to: at.distance.as_m() - (stretch.to + behind + EXIT_MARGIN + speed * EXIT_DELAY),
                 speed: speed * (1.0 - RESERVE),
             }
         });

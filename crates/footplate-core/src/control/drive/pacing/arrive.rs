@@ -4,7 +4,7 @@ use alloc::boxed::Box;
 use alloc::string::ToString;
 use alloc::vec::Vec;
 
-use crate::control::drive::command_time::{CommandTime, spread};
+use crate::control::drive::command_time::CommandTime;
 use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::order::{Aim, OrderId};
 use crate::control::drive::outputs::Outputs;
@@ -18,7 +18,7 @@ use crate::ids::{NodeId, SpeedStep};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Landmark;
-use crate::tracking::{Located, TrackContext, WayPoint};
+use crate::tracking::{Located, PathPoint, TrackContext};
 use crate::units::{Length, Speed};
 
 use super::arrival_plan::{ArrivalOptions, ArrivalProfile, Beginning, CREEP_SPEED};
@@ -62,7 +62,7 @@ impl Arriving {
         if at.node != node {
             self.destination.at = recount_from(context, model, at, node);
         }
-        let zero = self.destination.at?.way.as_m() - plan.begins.left;
+        let zero = self.destination.at?.distance.as_m() - plan.begins.left;
         let since = now - self.begins();
         let state = |ahead: f64| plan.profile.motion().state_at(since + TimeSpan::from_s(ahead));
         let speeds = [0.0, Reference::SPAN].map(|ahead| state(ahead).speed.as_m_per_s());
@@ -107,7 +107,7 @@ impl DrivenTrain {
         let laps = if lap.is_some() { MAX_LAPS } else { 0 };
         for laps in 0..=laps {
             let further = lap.unwrap_or(Length::ZERO) * f64::from(laps);
-            destination.at = Some(WayPoint { way: at.way + further, ..at });
+            destination.at = Some(PathPoint { distance: at.distance + further, ..at });
             destination.in_time = Some(now + within);
             let found = if at_rest {
                 self.plan_from_rest(context, now, &located, destination, within)
@@ -163,7 +163,7 @@ impl DrivenTrain {
         let lost = || Refusal::Lost { train: self.id() };
         let (at, mut rollout) = (destination.at.ok_or_else(lost)?, self.locator.rollout().ok_or_else(lost)?);
         let [place, speed] = rollout.place_and_speed(&self.model, rollout.seconds(now));
-        let begins = Beginning { after: 0.0, left: at.way.as_m() - place, speed };
+        let begins = Beginning { after: 0.0, left: at.distance.as_m() - place, speed };
         let options = self.options(context, now, at, &self.usable_steps(), CREEP_SPEED);
         match options.plan(begins, within.as_s()) {
             Some(plan) => {
@@ -186,7 +186,7 @@ impl DrivenTrain {
         let usable = self.usable_steps();
         let at = destination.at.ok_or(Refusal::Lost { train: self.id() })?;
         let options = self.options(context, now, at, &usable, MIN_MEAN_SPEED);
-        let left = (at.way - located.at.way).as_m();
+        let left = (at.distance - located.at.distance).as_m();
         let allowed = self.fastest_allowed(context, now);
         let may_start = |step: &SpeedStep| allowed.is_none_or(|allowed| *step <= allowed);
         let starts: Vec<SpeedStep> = usable.iter().copied().filter(may_start).collect();
@@ -224,7 +224,7 @@ impl DrivenTrain {
             CommandTime::At(stop, rest) => {
                 let rest_time =
                     self.standing_time(&rest_times, [now + self.link.command, stop], step, &rest)?;
-                Some((step, rest_time - now, spread(&rest)))
+                Some((step, rest_time - now, rest.deviation()))
             }
             _ => None,
         });
@@ -271,13 +271,13 @@ impl DrivenTrain {
     }
 
     /// The state after a start has settled.
-    fn state_after_start(&self, now: Timestamp, step: SpeedStep, at: WayPoint) -> Option<Beginning> {
+    fn state_after_start(&self, now: Timestamp, step: SpeedStep, at: PathPoint) -> Option<Beginning> {
         let mut rollout = self.locator.rollout()?;
         let after = self.model.settles_within(SpeedStep::STAND, step).as_s();
         let zero = rollout.seconds(now);
         rollout.command(&self.model, zero + self.link.usually_left().as_s(), step);
         let [place, speed] = rollout.place_and_speed(&self.model, zero + after);
-        Some(Beginning { after, left: at.way.as_m() - place, speed })
+        Some(Beginning { after, left: at.distance.as_m() - place, speed })
     }
 
     /// Starts the train before its plan and hands it to stop planning after it. Returns whether the plan applies now.

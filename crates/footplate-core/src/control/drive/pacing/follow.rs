@@ -11,7 +11,6 @@
 use alloc::collections::BTreeMap;
 
 use crate::control::Notice;
-use crate::control::drive::command_time::spread;
 use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::driver::Driver;
 use crate::control::drive::order::{Aim, Gap, OrderId};
@@ -22,7 +21,7 @@ use crate::control::drive::task::{Goal, Task, TaskPhase};
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::{INTERRUPTED, TrackContext, WayPoint};
+use crate::tracking::{INTERRUPTED, PathPoint, TrackContext};
 use crate::units::{Length, Ratio, Speed};
 
 use super::lead_line::LeadLine;
@@ -215,7 +214,7 @@ impl DrivenTrain {
         others: &Others,
     ) -> Option<Reference> {
         let located = self.located(context, now)?;
-        let past = SurveyedPath::ahead(context, &self.model, node).surveyed(located.at.way.as_m());
+        let past = SurveyedPath::ahead(context, &self.model, node).surveyed(located.at.distance.as_m());
         let (mut late, mut behind) = (0.0, 0.0);
         let (mut train, mut following) = (self, following);
         // The first train of the chain, and the sum of the gaps.
@@ -223,7 +222,7 @@ impl DrivenTrain {
             let leader = others.get(&following.leader)?;
             match following.gap {
                 Gap::Time(gap) => late += gap.as_s(),
-                Gap::Way(way) => behind += (way + leader.reach[1] + train.reach[0]).as_m(),
+                Gap::Way(distance) => behind += (distance + leader.reach[1] + train.reach[0]).as_m(),
             }
             match leader.followed() {
                 Some(next) => (train, following) = (leader, *next),
@@ -243,7 +242,7 @@ impl DrivenTrain {
         now: Timestamp,
         leader: &Self,
         stopped: Timestamp,
-    ) -> Option<WayPoint> {
+    ) -> Option<PathPoint> {
         let node = self.locator.rollout()?.node();
         let seen = leader
             .passages
@@ -254,12 +253,13 @@ impl DrivenTrain {
         let rest = leader.locator.rest_if_stopped(context, &leader.model, stopped);
         let rest = rest.filter(|_| !leader.is_position_uncertain(context, now));
         let past = rest.map_or(Length::ZERO, |rest| {
-            let short_of = rest.at.way - spread(&rest) * Aim::NotBeyond(LEADER_SHORT_PROBABILITY).margin();
+            let short_of =
+                rest.at.distance - rest.deviation() * Aim::NotBeyond(LEADER_SHORT_PROBABILITY).margin();
             short_of.max(Length::ZERO)
         });
         let from = rest.map_or(seen, |rest| rest.at.node);
         let between = distance_between(context, &self.model, node, from)?;
-        Some(WayPoint { node, way: between + past - leader.reach[1] - self.reach[0] - SAFE_GAP })
+        Some(PathPoint { node, distance: between + past - leader.reach[1] - self.reach[0] - SAFE_GAP })
     }
 
     /// Whether the train may be far from its estimated position. Sensors miss a train thirty times as often as trains
@@ -273,7 +273,7 @@ impl DrivenTrain {
             return self.commanded > SpeedStep::STAND && speed < CREEP_SPEED;
         }
         let seen = self.passages.iter().next_back().map(|(_, time)| now - time);
-        let has_run = seen.is_some_and(|since| located.speed * since <= located.at.way * MAX_TIME_RATIO);
+        let has_run = seen.is_some_and(|since| located.speed * since <= located.at.distance * MAX_TIME_RATIO);
         !(has_run && speed >= STALL_FREE_SPEED && self.missed_just_one(now))
     }
 

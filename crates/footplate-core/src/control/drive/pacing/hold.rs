@@ -89,8 +89,8 @@ impl DrivenTrain {
         if holding.line.is_some() || now < holding.settled || self.is_speed_limited() {
             return;
         }
-        let distance = SurveyedPath::ahead(context, &self.model, node).surveyed(located.at.way.as_m());
-        let line = IdealLine { node, distance: Length::from_m(distance), time: now, speed: holding.speed };
+        let surveyed = SurveyedPath::ahead(context, &self.model, node).surveyed(located.at.distance.as_m());
+        let line = IdealLine { node, distance: Length::from_m(surveyed), time: now, speed: holding.speed };
         holding.line = Some(line);
         let IdealLine { distance: way, time, speed, .. } = line;
         out.notify(Notice::Paced(PacedLine { order, train: self.id(), node, way, time, speed }));
@@ -107,7 +107,7 @@ impl DrivenTrain {
         };
         let at = self.located(context, now)?.at;
         let line = line.recount_from(context, at.node, now)?;
-        let distance = SurveyedPath::ahead(context, &self.model, at.node).surveyed(at.way.as_m());
+        let distance = SurveyedPath::ahead(context, &self.model, at.node).surveyed(at.distance.as_m());
         Some(Length::from_m(distance - line.place(now)))
     }
 

@@ -4,7 +4,7 @@
 //! The rest of the time can still be corrected: a faster or slower step reaches the stop earlier or later, and its
 //! stop takes its own time. Each step near the present one is predicted as a whole, up to rest.
 
-use crate::control::drive::command_time::{CommandTime, command_time, spread};
+use crate::control::drive::command_time::{CommandTime, command_time};
 use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::task::{Destination, Goal, Task, TaskPhase};
@@ -119,6 +119,6 @@ impl DrivenTrain {
 /// The squared error in time, plus the squared spread in place, in units of the required accuracy.
 fn cost_of(by: Timestamp, rest_times: Timestamp, rest: &Rest) -> f64 {
     let (time_cost, spread_cost) =
-        ((rest_times - by).as_s() / TIME_TOLERANCE, spread(rest).as_m() / PLACE_TOLERANCE);
+        ((rest_times - by).as_s() / TIME_TOLERANCE, rest.deviation().as_m() / PLACE_TOLERANCE);
     time_cost * time_cost + spread_cost * spread_cost
 }

@@ -11,7 +11,7 @@ use crate::control::drive::task::{Destination, Goal};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::link::ContactWindow;
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::{TrackContext, WayPoint};
+use crate::tracking::{PathPoint, TrackContext};
 use crate::units::{Length, Speed};
 
 use super::arrival_plan::ArrivalPlan;
@@ -76,7 +76,7 @@ pub(in crate::control::drive) struct Following {
     /// The follower was stopped because it would have come too close.
     pub(super) is_stopped: bool,
     /// The point before which it must be able to stop, as of the last check, ...
-    pub(super) rear: Option<WayPoint>,
+    pub(super) rear: Option<PathPoint>,
     /// ... and the fastest step that allows it to.
     pub(super) fastest: Option<SpeedStep>,
 }

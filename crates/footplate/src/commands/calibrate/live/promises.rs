@@ -1,7 +1,7 @@
 //! What a calibration promises over the bytes of a simulated station, whatever the train is like and whatever goes wrong.
 
 use footplate_core::control::learn::{
-    CalibrationNotice, Calibrator, CalibratorSettings, Ending, Mishap, StepAccuracy,
+    CalibrationNotice, Calibrator, CalibratorSettings, Ending, Fault, StepAccuracy,
 };
 use footplate_core::model::MotionFit;
 use footplate_core::track::Layout;
@@ -130,7 +130,7 @@ fn a_train_that_is_lifted_and_put_back_is_found_again() {
         place
     };
     railway.go_on(90.0);
-    let lost = |notice: &CalibrationNotice| matches!(notice, CalibrationNotice::Mishap(Mishap::Lost { .. }));
+    let lost = |notice: &CalibrationNotice| matches!(notice, CalibrationNotice::Mishap(Fault::Lost { .. }));
     assert!(railway.count(lost) > 0, "it should be missed");
     let found = |notice: &CalibrationNotice| matches!(notice, CalibrationNotice::Found { .. });
     let before = railway.count(found);

@@ -1,6 +1,6 @@
 //! What a calibration says, in words.
 
-use footplate_core::control::learn::{CalibrationNotice, Done, Experiment, Mishap, Phase, Progress, Why};
+use footplate_core::control::learn::{CalibrationNotice, Done, Experiment, Fault, Phase, Progress, Why};
 use footplate_core::track::Layout;
 
 /// A line that is worth keeping; nothing for what only moves a bar.
@@ -52,28 +52,28 @@ fn measured(done: &Done) -> String {
     }
 }
 
-fn happened(layout: &Layout, mishap: &Mishap) -> String {
+fn happened(layout: &Layout, mishap: &Fault) -> String {
     match mishap {
-        Mishap::Stalled { step } => format!("it stalled at step {step}; this step is not used any more"),
-        Mishap::Missed { count, before } => {
+        Fault::Stalled { step } => format!("it stalled at step {step}; this step is not used any more"),
+        Fault::Missed { count, before } => {
             format!("{count} sensor(s) before {} did not report", layout.sensor_name(*before))
         }
-        Mishap::Unexplained { sensor } => {
+        Fault::Unexplained { sensor } => {
             format!("{} reported, where the train cannot be", layout.sensor_name(*sensor))
         }
-        Mishap::WrongLeg { turnout, wanted } => {
+        Fault::WrongLeg { turnout, wanted } => {
             format!("turnout {turnout} is not {wanted} as commanded; commanded again")
         }
-        Mishap::Moved { from, to } => format!(
+        Fault::Moved { from, to } => format!(
             "it is at {}, where it cannot have run to from {}: was it lifted?",
             layout.node_name(*to),
             from.map_or("?", |from| layout.node_name(from))
         ),
-        Mishap::Lost { last } => format!(
+        Fault::Lost { last } => format!(
             "no sensor report for too long after {}: it is stopped and located again",
             last.map_or("?", |last| layout.node_name(last))
         ),
-        Mishap::LengthsDiffer { hops } => {
+        Fault::LengthsDiffer { hops } => {
             let each = hops.iter().filter_map(|(hop, surveyed, felt)| {
                 let hop = layout.hop(*hop)?;
                 let (from, to) = (layout.node_name(hop.from), layout.node_name(hop.to));

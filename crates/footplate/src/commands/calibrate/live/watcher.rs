@@ -1,6 +1,6 @@
 //! Who watches a calibration: tells it to people, and notices when the layout is another one than they said.
 
-use footplate_core::control::learn::{CalibrationNotice, Calibrator, Mishap};
+use footplate_core::control::learn::{CalibrationNotice, Calibrator, Fault};
 use footplate_core::track::Layout;
 use footplate_core::{Command, TimeSpan, Timestamp, TrainId};
 use footplate_wire::{CommandError, LinkNotice};
@@ -83,7 +83,7 @@ impl<'l> Attendant<Recorded<Calibrator<'l>>> for Watcher<'_> {
         }
         if let CalibrationNotice::Mishap(mishap) = &notice {
             self.mishaps += 1;
-            if let Mishap::LengthsDiffer { hops } = mishap {
+            if let Fault::LengthsDiffer { hops } = mishap {
                 self.other_layout = self.other_layout.or_else(|| layout_with(self.layout, hops));
             }
         }

@@ -36,7 +36,7 @@ impl ScriptRunner {
             if self.journeys.get(&order).is_none_or(|since| now < *since + self.wait_limit) {
                 continue;
             }
-            self.dispatcher.call_off(now, train);
+            self.dispatcher.cancel_journey(now, train);
             if let Some(step) = self.pending.remove(&order) {
                 self.refuse(now, &step, &Refusal::NotArrived { train, within: self.wait_limit });
             }

@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use super::activity::{Activity, Stage};
 use super::calibrator::Calibrator;
-use super::notice::{CalibrationNotice, Ending, Mishap};
+use super::notice::{CalibrationNotice, Ending, Fault};
 use crate::event::Approach;
 use crate::ids::{SpeedStep, TurnoutId};
 use crate::model::StepUse;
@@ -21,19 +21,19 @@ const LATE: TimeSpan = TimeSpan::from_ms(1_500);
 const LATE_PART: f64 = 0.5;
 
 /// A larger uncertainty of the predicted time is not waited for.
-const LONGEST_DOUBT: TimeSpan = TimeSpan::from_ms(4_000);
+const MAX_UNCERTAINTY: TimeSpan = TimeSpan::from_ms(4_000);
 
 /// A train that was pushed up a step reaches the next sensor at this speed at least.
 const PUSHED_SPEED: Speed = Speed::from_mm_per_s(100.0);
 
-/// At a step that is faster than this a train stalls on dirt, not because the step is too low for it: model trains that move
-/// at all stall below some 50 mm/s, and a late report of a faster one says nothing of the step.
+/// At a step that is faster than this a train stalls on dirt, not because the step is too low for it: model trains
+/// that move at all stall below some 50 mm/s, and a late report of a faster one says nothing of the step.
 const SLOW_STEP: Speed = Speed::from_mm_per_s(100.0);
 
 /// After this many pushes without a detection the train counts as lost.
-const MOST_PUSHES: u8 = 2;
+const MAX_PUSHES: u8 = 2;
 
-/// A lost train stands this long before the search: it may have been lifted and is put down meanwhile.
+/// The search for a lost train begins after this time at rest: it may have been lifted, and is put down meanwhile.
 const WAIT_FOR_LOST: TimeSpan = TimeSpan::from_ms(6_000);
 
 /// One hop with another length may be an error of the survey.
@@ -41,7 +41,7 @@ const FEWEST_ODD: usize = 2;
 
 impl Calibrator<'_> {
     /// Sets the time by which the next detection must have come.
-    pub(super) fn expect_contact(&mut self, now: Timestamp) {
+    pub(super) fn expect_detection(&mut self, now: Timestamp) {
         self.due_by = None;
         let runs = match &self.activity {
             Activity::Joining => true,
@@ -51,22 +51,22 @@ impl Calibrator<'_> {
             ),
             _ => false,
         };
-        if !runs || self.stance.step == SpeedStep::STAND {
+        if !runs || self.throttle.step == SpeedStep::STAND {
             return;
         }
         let since = self.tracker.last_time().map_or(self.commanded_at, |last| last.max(self.commanded_at));
         let due = self.locator.next_contact(self.context(), self.model(), now);
         let due_by = match due {
             Some(due) => {
-                let doubt = TimeSpan::from_s(2.0 * due.uncertainty.as_s()).min(LONGEST_DOUBT);
+                let margin = TimeSpan::from_s(2.0 * due.uncertainty.as_s()).min(MAX_UNCERTAINTY);
                 let part = TimeSpan::from_s(LATE_PART * (due.time - since).as_s().max(0.0));
-                due.time + doubt + part + LATE
+                due.time + margin + part + LATE
             }
             None => {
                 // Without a prediction: the time that the hop takes from rest at half the speed.
                 let hop = self.tracker.last().and_then(|node| self.context().hop_from(node));
-                let length = hop.map_or(super::gain::TYPICAL_HOP, |hop| self.longest(&hop));
-                let speed = self.model().speed(self.stance.step, Approach::Below).value;
+                let length = hop.map_or(super::experiment::TYPICAL_HOP, |hop| self.longest(&hop));
+                let speed = self.model().speed(self.throttle.step, Approach::Below).value;
                 let slowest = (0.5 * speed).max(Speed::from_mm_per_s(20.0));
                 self.steady_at.max(since) + length / slowest + LATE
             }
@@ -87,10 +87,10 @@ impl Calibrator<'_> {
     }
 
     /// No detection came by the time it was due at the latest.
-    pub(super) fn miss_contact(&mut self, now: Timestamp) {
+    pub(super) fn miss_detection(&mut self, now: Timestamp) {
         self.due_by = None;
-        let step = self.stance.step;
-        if self.pushes >= MOST_PUSHES || step >= self.model().highest() {
+        let step = self.throttle.step;
+        if self.pushes >= MAX_PUSHES || step >= self.model().highest() {
             self.lose(now);
             return;
         }
@@ -103,7 +103,7 @@ impl Calibrator<'_> {
 
     /// The train is lost: it is commanded to stop, and searched for after a while.
     pub(super) fn lose(&mut self, now: Timestamp) {
-        self.report_mishap(Mishap::Lost { last: self.tracker.last() });
+        self.report_fault(Fault::Lost { last: self.tracker.last() });
         self.fit.interrupt();
         self.locator.lose();
         self.tracker.lose();
@@ -112,11 +112,11 @@ impl Calibrator<'_> {
         self.hold_line(None);
         self.issue(now, SpeedStep::STAND);
         self.activity = Activity::Waiting { until: now + WAIT_FOR_LOST };
-        self.say_progress(now);
+        self.report_progress(now);
     }
 
-    /// A detection after the train was pushed up: of the sensor that was due, it shows that the train had stalled; of a later
-    /// one, that the detection was missed.
+    /// A detection after the train was pushed up: of the sensor that was due, it shows that the train had stalled; of
+    /// a later one, that the detection was missed.
     pub(super) fn note_pushes(&mut self, passed: &PassedContact) {
         let Some(step) = self.pushed_from.take() else { return };
         self.pushes = 0;
@@ -125,7 +125,7 @@ impl Calibrator<'_> {
                 self.fit.note_use(step, StepUse::Unreliable);
             }
             self.fit.interrupt();
-            self.report_mishap(Mishap::Stalled { step });
+            self.report_fault(Fault::Stalled { step });
         }
     }
 
@@ -137,24 +137,24 @@ impl Calibrator<'_> {
 
     /// A step moves the train if the train passed a sensor once it was steady at that step.
     pub(super) fn note_that_it_moves(&mut self, now: Timestamp) {
-        let step = self.stance.step;
+        let step = self.throttle.step;
         let is_steady = now >= self.steady_at && step > SpeedStep::STAND;
         if is_steady && self.model().uses(step) == StepUse::Untried {
             self.fit.note_use(step, StepUse::Moves);
         }
     }
 
-    /// A turnout does not lie as commanded.
+    /// A turnout is not in its commanded position.
     pub(super) fn took_other_leg(&mut self, turnout: TurnoutId, leg: Leg) {
         self.turnouts.set(turnout, leg);
-        self.asked_turnouts.remove(&turnout);
+        self.requested_turnouts.remove(&turnout);
         let failures = self.failures.entry(turnout).or_default();
         *failures = failures.saturating_add(1);
-        self.report_mishap(Mishap::WrongLeg { turnout, wanted: Leg::from_curved(!leg.is_curved()) });
+        self.report_fault(Fault::WrongLeg { turnout, wanted: Leg::from_curved(!leg.is_curved()) });
     }
 
-    /// Fits again and compares the layout's lengths with path lengths. Lengths that contradict each other count for less, and a
-    /// notice names them whenever there are more than before.
+    /// Fits again and compares the layout's lengths with path lengths. Lengths that contradict each other count for
+    /// less, and a notice names them whenever there are more than before.
     pub(super) fn refit(&mut self) {
         self.fit.refit(&self.sections);
         let test = SurveyTest::of(&self.surveyed, self.model().sections());
@@ -167,7 +167,7 @@ impl Calibrator<'_> {
             self.survey_test.odd.iter().filter_map(|odd| self.odd_hop(odd)).collect();
         if hops.len() >= FEWEST_ODD && hops.len() > self.odd_lengths {
             self.odd_lengths = hops.len();
-            self.report_mishap(Mishap::LengthsDiffer { hops });
+            self.report_fault(Fault::LengthsDiffer { hops });
         }
     }
 
@@ -184,11 +184,11 @@ impl Calibrator<'_> {
         }
         self.hold_line(None);
         self.issue(now, SpeedStep::STAND);
-        let stands = now + self.stops_within();
+        let is_at_rest = now + self.stops_within();
         self.ending = Some(ending);
         self.due_by = None;
-        self.activity = Activity::Ending { until: stands };
-        self.say_progress(now);
+        self.activity = Activity::Ending { until: is_at_rest };
+        self.report_progress(now);
     }
 
     /// The train is at rest: the last fit, and the result.
@@ -198,6 +198,6 @@ impl Calibrator<'_> {
         self.activity = Activity::Finished;
         self.finished = Some(ending.clone());
         let accuracy = self.accuracy();
-        self.say(CalibrationNotice::Finished { ending, accuracy });
+        self.notify(CalibrationNotice::Finished { ending, accuracy });
     }
 }

@@ -1,0 +1,82 @@
+//! How well one half of a profile predicts the other half.
+//!
+//! Entries by throttle setting, every second one held out. The motion model's prior and the other half predict each with an
+//! interval that contains the stated speed nineteen times in twenty if the stated uncertainty is true. Then the halves change places.
+
+use footplate_core::model::{MotionFit, StatedMotion, StatedSpeed};
+use footplate_core::{SpeedStep, TrainId};
+
+use super::profile::SpeedProfile;
+
+/// Half the width of the interval that contains 95 % of normal values, in standard deviations.
+const NORMAL_95: f64 = 1.96;
+/// Errors beyond this are gross: other trains, bouncing sensors (as the fit counts them).
+const GROSS: f64 = 5.0;
+
+/// The score of one profile.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct HoldOut {
+    /// Speeds that were predicted.
+    pub predicted: usize,
+    /// Those inside the interval of 95 %.
+    pub inside: usize,
+    /// Gross errors: more than five standard deviations from the prediction.
+    pub gross: usize,
+    /// The mean half width of the interval, as a factor on the speed less one.
+    pub half_width: f64,
+}
+
+impl HoldOut {
+    /// Adds the score of another profile.
+    pub fn add(&mut self, other: &Self) {
+        let both = (self.predicted + other.predicted).max(1) as f64;
+        let sum = self.half_width * self.predicted as f64 + other.half_width * other.predicted as f64;
+        *self = Self {
+            predicted: self.predicted + other.predicted,
+            inside: self.inside + other.inside,
+            gross: self.gross + other.gross,
+            half_width: sum / both,
+        };
+    }
+
+    /// Scores a profile for a decoder with this highest step.
+    #[must_use]
+    pub fn of(profile: &SpeedProfile, highest: SpeedStep) -> Self {
+        let (motion, _) = profile.stated();
+        let mut speeds = motion.speeds.clone();
+        speeds.sort_by(|one, other| one.throttle.total_cmp(&other.throttle));
+        // Forward and reverse of one setting stay together.
+        let mut settings: Vec<Vec<StatedSpeed>> = Vec::new();
+        for speed in speeds {
+            match settings.last_mut() {
+                Some(last) if last.first().is_some_and(|one| one.throttle == speed.throttle) => {
+                    last.push(speed)
+                }
+                _ => settings.push(vec![speed]),
+            }
+        }
+        let mut score = Self::default();
+        let mut widths = 0.0;
+        for held_out in [0, 1] {
+            let half = |of: usize| {
+                settings
+                    .iter()
+                    .enumerate()
+                    .filter(move |(at, _)| at % 2 == of)
+                    .flat_map(|(_, speeds)| speeds)
+                    .copied()
+            };
+            let known = StatedMotion { speeds: half(1 - held_out).collect(), ..motion.clone() };
+            let asked: Vec<StatedSpeed> = half(held_out).collect();
+            let fit = MotionFit::new(TrainId(0), highest);
+            for compared in fit.compare_stated(&known, &asked).into_iter().flatten() {
+                score.predicted += 1;
+                score.inside += usize::from(compared.sigmas.abs() <= NORMAL_95);
+                score.gross += usize::from(compared.sigmas.abs() > GROSS);
+                widths += libm::expm1(NORMAL_95 * compared.deviation);
+            }
+        }
+        score.half_width = if score.predicted > 0 { widths / score.predicted as f64 } else { 0.0 };
+        score
+    }
+}

@@ -1,0 +1,42 @@
+//! Speed profiles that were imported for trains: the newest of each counts, and all of them stay.
+
+use footplate_core::{Timestamp, TrainId};
+use rusqlite::Row;
+use rusqlite::types::Type;
+
+use super::error::StoreError;
+use super::file::Store;
+use crate::speed_profile::SpeedProfile;
+
+impl Store {
+    /// Keeps a profile as the one that counts for a train from now on. `None` withdraws those before it: the train begins
+    /// again with the prior of any train.
+    pub fn keep_profile(
+        &mut self,
+        train: TrainId,
+        profile: Option<&SpeedProfile>,
+        now: Timestamp,
+    ) -> Result<(), StoreError> {
+        let body =
+            profile.map(serde_json::to_string).transpose().map_err(|_| StoreError::NotJson { train })?;
+        let source = profile.map_or("withdrawn", |profile| profile.source.as_str());
+        let sql = "INSERT INTO profiles (train, stored_at_ns, source, body) VALUES (?1, ?2, ?3, ?4)";
+        self.connection
+            .execute(sql, (train.0, now.as_ns(), source, body))
+            .map_err(|error| self.error(error))?;
+        Ok(())
+    }
+
+    /// The profile that counted for a train at a date.
+    pub fn profile(&self, train: TrainId, at: Timestamp) -> Result<Option<SpeedProfile>, StoreError> {
+        let sql =
+            "SELECT body FROM profiles WHERE train = ?1 AND stored_at_ns <= ?2 ORDER BY id DESC LIMIT 1";
+        let read = |row: &Row<'_>| {
+            let body: Option<String> = row.get(0)?;
+            body.map(|body| serde_json::from_str(&body))
+                .transpose()
+                .map_err(|error| rusqlite::Error::FromSqlConversionFailure(0, Type::Text, Box::new(error)))
+        };
+        Ok(self.rows(sql, (train.0, at.as_ns()), read)?.pop().flatten())
+    }
+}
