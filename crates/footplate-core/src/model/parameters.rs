@@ -338,7 +338,8 @@ mod tests {
         }
         for step in 18..=126 {
             let error = answers.speed(step, false) / speed(step) - 1.0;
-            assert!(error.abs() < 0.005, "step {step}: {error}");
+            // Within one of the standard deviations that the model states, and never a hundredth.
+            assert!(error.abs() < (between_knots(step, 126) + 1e-9).min(0.01), "step {step}: {error}");
         }
         for step in (18..=126).step_by(9) {
             let at = answers.step_at(0, speed(step));
