@@ -1,10 +1,9 @@
 //! Any datagrams and any commands in any order on the session's line with a Z21: it always goes on, keeps its pace, and comes to its
 //! end once the station answers.
 
-use footplate_core::{TimeSpan, Timestamp};
+use footplate_core::{DecoderSteps, TimeSpan, Timestamp};
 use footplate_wire::z21::{
-    Broadcasts, CentralState, Client, Datasets, Feedback, LocomotiveState, Reply, Request, Settings, Steps,
-    Throttle,
+    Broadcasts, CentralState, Client, Datasets, Feedback, LocomotiveState, Reply, Request, Settings, Throttle,
 };
 use footplate_wire::{Session, Transmit};
 
@@ -50,7 +49,7 @@ impl Witness {
                 Request::Locomotive { address } => {
                     let known = driven.iter().rfind(|(known, ..)| *known == address);
                     let (_, throttle, forward) = known.copied().unwrap_or((address, Throttle::Stop, true));
-                    let (busy, steps, functions) = (false, Steps::All, 0);
+                    let (busy, steps, functions) = (false, DecoderSteps::All, 0);
                     Reply::Locomotive(LocomotiveState { address, busy, steps, throttle, forward, functions })
                 }
                 _ => continue,
@@ -81,7 +80,8 @@ impl Witness {
 pub(crate) fn fuzz(bytes: &[u8]) {
     let [options, deeds @ ..] = bytes else { return };
     let feedback = [Feedback::RBus, Feedback::Can, Feedback::LocoNet][usize::from(options % 3)];
-    let steps = [Steps::Fourteen, Steps::TwentyEight, Steps::All][usize::from(options / 3 % 3)];
+    let steps =
+        [DecoderSteps::Fourteen, DecoderSteps::TwentyEight, DecoderSteps::All][usize::from(options / 3 % 3)];
     let settings = Settings { feedback, steps, ..Settings::default() };
     let client = Client::new(Timestamp::ZERO, settings);
     let mut witness = Witness { client, now: Timestamp::ZERO, asked: Vec::new() };

@@ -75,6 +75,52 @@ impl core::fmt::Display for SpeedStep {
     }
 }
 
+/// How many speed steps a decoder has (NMRA S-9.2 and S-9.2.1).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum DecoderSteps {
+    /// 14 steps.
+    Fourteen,
+    /// 28 steps.
+    TwentyEight,
+    /// 126 steps; some stations say 128, because they count stop and emergency stop.
+    All,
+}
+
+impl DecoderSteps {
+    /// The kinds of decoders, fewest steps first.
+    pub const EVERY: [Self; 3] = [Self::Fourteen, Self::TwentyEight, Self::All];
+
+    /// The highest step.
+    #[must_use]
+    pub const fn highest(self) -> SpeedStep {
+        SpeedStep(match self {
+            Self::Fourteen => 14,
+            Self::TwentyEight => 28,
+            Self::All => SpeedStep::HIGHEST,
+        })
+    }
+
+    /// The decoder with the fewest steps that has this one.
+    #[must_use]
+    pub fn with(step: SpeedStep) -> Self {
+        Self::EVERY.into_iter().find(|steps| steps.highest() >= step).unwrap_or(Self::All)
+    }
+
+    /// A step on a scale whose highest number is that of the highest step, to the nearest; `None` beyond the highest step.
+    #[must_use]
+    pub fn scaled(self, step: SpeedStep, highest: u8) -> Option<u8> {
+        let own = u16::from(self.highest().get());
+        let scaled = (2 * u16::from(step.get()) * u16::from(highest) + own) / (2 * own);
+        u8::try_from(scaled).ok().filter(|_| step <= self.highest())
+    }
+}
+
+impl core::fmt::Display for DecoderSteps {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        self.highest().fmt(f)
+    }
+}
+
 /// A function of a decoder, F0 to F28; F0 is the headlight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(transparent))]

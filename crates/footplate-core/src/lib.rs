@@ -36,6 +36,8 @@ mod units;
 
 pub use estimate::{Estimate, HALF_95};
 pub use event::{Approach, Command, Event, EventKind, Report};
-pub use ids::{EdgeId, FunctionNumber, NodeId, RunId, SensorId, SpeedStep, StretchId, TrainId, TurnoutId};
+pub use ids::{
+    DecoderSteps, EdgeId, FunctionNumber, NodeId, RunId, SensorId, SpeedStep, StretchId, TrainId, TurnoutId,
+};
 pub use time::{TimeSpan, Timestamp};
 pub use units::{Acceleration, Jerk, Length, Ratio, Speed};

@@ -5,7 +5,7 @@
 //! measures the back EMF every few milliseconds and sets the voltage by a PI controller. Forces are expressed as
 //! accelerations in mm/s², that is, divided by the train's mass.
 
-use footplate_core::{Speed, SpeedStep};
+use footplate_core::{DecoderSteps, Speed, SpeedStep};
 
 use crate::draws::Draws;
 use crate::speed_table::SpeedTable;
@@ -13,8 +13,6 @@ use crate::traits::Session;
 
 /// The step of the integration.
 const STEP_S: f64 = 1e-3;
-/// Throttle steps of the decoder.
-const STEPS: u8 = 14;
 /// Positions of the decoder's counter.
 const COUNTS: f64 = 126.0;
 /// Acceleration of free fall.
@@ -48,6 +46,8 @@ pub struct ElectricEngine {
     period_s: f64,
     /// Relative noise of a back-EMF measurement.
     noise: f64,
+    /// The steps of the decoder.
+    pub(crate) decoder: DecoderSteps,
     /// Set speeds at the lowest, the middle and the highest step, in mm/s (CV 2, 6 and 5).
     curve: [f64; 3],
     /// Seconds for a count up and down (CV 3 and 4).
@@ -73,6 +73,7 @@ impl ElectricEngine {
             integral: draws.uniform(0.8..6.0),
             period_s: draws.uniform(0.008..0.03),
             noise: draws.uniform(0.003..0.02),
+            decoder: DecoderSteps::Fourteen,
             curve: [draws.uniform(8.0..30.0), top * draws.uniform(0.28..0.5), top],
             count_s,
             shorts: draws.chance(0.5),
@@ -84,7 +85,7 @@ impl ElectricEngine {
     pub(crate) fn speed_table(&self) -> SpeedTable {
         let mut draws = Draws::new(0, crate::draws::Purpose::Physics);
         let quiet = Self { noise: 0.0, ..*self };
-        let speeds: Vec<Speed> = (0..=STEPS)
+        let speeds: Vec<Speed> = (0..=self.decoder.highest().get())
             .map(|step| {
                 let mut running = ElectricMotor::at_rest(quiet);
                 running.command(SpeedStep::new(step).unwrap_or(SpeedStep::STAND), &mut draws);
@@ -168,7 +169,8 @@ impl ElectricMotor {
     }
 
     pub(crate) fn command(&mut self, step: SpeedStep, draws: &mut Draws) {
-        let target = (f64::from(step.get()) / f64::from(STEPS) * COUNTS).round();
+        let target =
+            (f64::from(step.get()) / f64::from(self.engine.decoder.highest().get()) * COUNTS).round();
         if target > self.target {
             self.is_cut_off = false;
         }
@@ -279,7 +281,7 @@ mod tests {
     fn speeds_rise_with_the_step_to_those_of_model_trains() {
         for seed in 0..20 {
             let table = drawn(seed).0.speed_table();
-            let speeds: Vec<f64> = (4..=STEPS)
+            let speeds: Vec<f64> = (4..=14)
                 .filter_map(SpeedStep::new)
                 .map(|step| table.speed(step, footplate_core::Approach::Below).as_mm_per_s())
                 .collect();

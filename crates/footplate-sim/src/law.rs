@@ -3,7 +3,7 @@
 //! A law here is a process with a few settings, integrated in small steps by [`motor`](crate::motor). There is no
 //! closed form of speed over time, and none is shared with the estimator under test.
 
-use footplate_core::{Acceleration, TimeSpan};
+use footplate_core::{Acceleration, SpeedStep, TimeSpan};
 
 use crate::draws::Draws;
 use crate::speed_table::Shape;
@@ -105,6 +105,11 @@ pub enum Law {
 
 /// Internal steps of a decoder between two throttle steps: 126 speeds over 14 steps (NMRA S-9.2.1).
 pub(crate) const COUNTS_PER_STEP: u16 = 9;
+
+/// The same for a decoder with this highest step: finer throttle steps are fewer internal steps apart.
+pub(crate) fn counts_per_step(highest: SpeedStep) -> f64 {
+    f64::from(COUNTS_PER_STEP) * 14.0 / f64::from(highest.get().max(14))
+}
 /// Seconds per internal step for each unit of CV 3 or 4: 0.896 s over 128 steps (NMRA S-9.2.2).
 const MOMENTUM_UNIT_S: f64 = 0.896 / 128.0;
 

@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 use footplate_core::{Acceleration, Approach, Speed, SpeedStep, TimeSpan};
 
 use crate::draws::Draws;
-use crate::law::{COUNTS_PER_STEP, Law};
+use crate::law::{Law, counts_per_step};
 use crate::train::Train;
 use crate::traits::Session;
 
@@ -141,7 +141,7 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         let mut motor = Self::at_rest(train);
         motor.aim(step, approach);
         let speed = motor.target;
-        let counts = u16::from(step.get()) * COUNTS_PER_STEP;
+        let counts = motor.counts(step);
         match &mut motor.process {
             Process::Averaged { ramp, window, sum, .. } => {
                 *ramp = speed;
@@ -314,10 +314,15 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         }
     }
 
+    /// The decoder's internal step for a throttle step.
+    fn counts(&self, step: SpeedStep) -> u16 {
+        (f64::from(step.get()) * counts_per_step(self.train.speeds.highest())).round() as u16
+    }
+
     /// The set speed after `dt`.
     fn update_set_speed(&mut self, dt: f64) -> f64 {
         let target = self.target;
-        let counts = u16::from(self.step.get()) * COUNTS_PER_STEP;
+        let counts = self.counts(self.step);
         match &mut self.process {
             Process::Ramp { up, down } => toward(self.set_speed, target, *up * dt, *down * dt),
             Process::Eased { change, lasts, elapsed, .. } => {
@@ -351,7 +356,8 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
                 *until_next = until_next.max(-dt);
                 let taken_up = dt / PLAY_S;
                 *play = toward(*play, above(self.approach), taken_up, taken_up);
-                self.train.speeds.mm_per_s(f64::from(*count) / f64::from(COUNTS_PER_STEP), *play)
+                let speeds = &self.train.speeds;
+                speeds.mm_per_s(f64::from(*count) / counts_per_step(speeds.highest()), *play)
             }
             Process::RampUp { up } => toward(self.set_speed, target, *up * dt, f64::INFINITY),
             Process::Other { phase } => match self.train.traits.other_law {

@@ -4,7 +4,7 @@
 //! linear in the step, and *steep* ones, slow at low steps and steep above. A train's own table is one of them,
 //! scaled, tilted and roughened as much as the same locomotive differs between teams.
 
-use footplate_core::{Approach, Speed, SpeedStep};
+use footplate_core::{Approach, DecoderSteps, Speed, SpeedStep};
 
 use crate::draws::Draws;
 
@@ -107,6 +107,17 @@ impl SpeedTable {
         Self { below_mm_per_s: below, above_mm_per_s: above }
     }
 
+    /// The same engine behind a decoder of other steps: a smooth curve without overshoot through the steps of this one (the
+    /// monotone cubic of Fritsch and Carlson, 1980), as motors have it.
+    #[must_use]
+    pub(crate) fn refined(&self, decoder: DecoderSteps) -> Self {
+        let highest = usize::from(decoder.highest().get());
+        let own = self.below_mm_per_s.len().saturating_sub(1) as f64;
+        let along = |step: usize| step as f64 * own / highest as f64;
+        let column = |speeds: &[f64]| (0..=highest).map(|step| monotone_cubic(speeds, along(step))).collect();
+        Self { below_mm_per_s: column(&self.below_mm_per_s), above_mm_per_s: column(&self.above_mm_per_s) }
+    }
+
     /// The highest step.
     #[must_use]
     pub fn highest(&self) -> SpeedStep {
@@ -138,10 +149,52 @@ impl SpeedTable {
     }
 }
 
+/// A monotone cubic through points at 0, 1, 2 …, with the harmonic mean of the neighbouring rises as slope.
+fn monotone_cubic(points: &[f64], at: f64) -> f64 {
+    let last = points.len().saturating_sub(1);
+    let low = (at as usize).min(last.saturating_sub(1));
+    let point = |index: usize| points.get(index.min(last)).copied().unwrap_or(0.0);
+    let rise = |index: usize| point(index + 1) - point(index);
+    let slope = |index: usize| match (index.checked_sub(1).map(rise), index < last) {
+        (None, _) => rise(0),
+        (Some(before), false) => before,
+        (Some(before), true) if before * rise(index) > 0.0 => {
+            2.0 * before * rise(index) / (before + rise(index))
+        }
+        _ => 0.0,
+    };
+    let t = at - low as f64;
+    let (start, end) = (slope(low), slope(low + 1));
+    let bend = 3.0 * rise(low) - 2.0 * start - end;
+    let twist = start + end - 2.0 * rise(low);
+    point(low) + t * (start + t * (bend + t * twist))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::draws::Purpose;
+
+    #[test]
+    fn finer_steps_run_through_the_speeds_of_the_coarse_ones_and_never_fall() {
+        for seed in 0..100 {
+            let coarse = drawn(seed, if seed % 2 == 0 { Shape::Even } else { Shape::Steep });
+            for decoder in [DecoderSteps::TwentyEight, DecoderSteps::All] {
+                let fine = coarse.refined(decoder);
+                assert_eq!(fine.highest(), decoder.highest());
+                let each = decoder.highest().get() / HIGHEST_STEP;
+                for approach in [Approach::Below, Approach::Above] {
+                    for step in 0..=HIGHEST_STEP {
+                        let (one, other) = (at(&coarse, step, approach), at(&fine, each * step, approach));
+                        assert!((one - other).abs() < 1e-9, "seed {seed} step {step}: {one} and {other}");
+                    }
+                    let speeds: Vec<f64> =
+                        (0..=decoder.highest().get()).map(|step| at(&fine, step, approach)).collect();
+                    assert!(speeds.windows(2).all(|pair| pair[0] <= pair[1]), "seed {seed}: {speeds:?}");
+                }
+            }
+        }
+    }
 
     fn drawn(seed: u64, shape: Shape) -> SpeedTable {
         SpeedTable::draw(shape, &mut Draws::new(seed, Purpose::Train))

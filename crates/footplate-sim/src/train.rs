@@ -1,6 +1,6 @@
 //! The true parameters of one train: everything that an estimator has to find out and must not be given.
 
-use footplate_core::{Acceleration, Approach, Length, Ratio, Speed, SpeedStep, TimeSpan};
+use footplate_core::{Acceleration, Approach, DecoderSteps, Length, Ratio, Speed, SpeedStep, TimeSpan};
 
 use crate::draws::{Draws, Purpose};
 use crate::law::{Law, LawFamily};
@@ -85,6 +85,18 @@ pub struct Train {
 }
 
 impl Train {
+    /// Gives the same engine a decoder of other steps.
+    pub(crate) fn set_decoder(&mut self, decoder: DecoderSteps) {
+        if decoder.highest() == self.speeds.highest() {
+            return;
+        }
+        self.speeds = self.speeds.refined(decoder);
+        if let Some(engine) = &mut self.traits.engine {
+            engine.decoder = decoder;
+            self.speeds = engine.speed_table();
+        }
+    }
+
     /// A random but plausible train with a law: the same for the same seed.
     #[must_use]
     pub fn draw(seed: u64, family: LawFamily) -> Self {

@@ -4,15 +4,14 @@ use footplate_core::link::{PollTiming, PollTimingEstimator};
 use footplate_core::model::report::{Review, RunPassages};
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::track::Layout;
-use footplate_core::{Estimate, Event, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{
+    DecoderSteps, Estimate, Event, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId,
+};
 
 use crate::motion_replay::{MotionReplay, RunBegin};
 use crate::poll_rhythm::poll_rhythm;
 use crate::recording::{Recording, Run};
 use crate::store::{Store, StoreError};
-
-/// The highest steps that decoders have (NMRA S-9.2).
-const DECODERS: [u8; 3] = [14, 28, 126];
 
 /// A run as a batch keeps it: with the place of every event, so that each number can be traced back.
 #[derive(Debug, Clone, PartialEq)]
@@ -258,8 +257,7 @@ fn highest<'r>(runs: impl Iterator<Item = &'r BatchRun>) -> SpeedStep {
         steps.max().unwrap_or_default().max(run.step)
     };
     let seen = runs.map(commanded).max().unwrap_or_default();
-    let has_all = DECODERS.into_iter().find(|highest| *highest >= seen.get());
-    has_all.and_then(SpeedStep::new).unwrap_or(seen)
+    DecoderSteps::with(seen).highest()
 }
 
 fn batch_run(

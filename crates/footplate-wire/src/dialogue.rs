@@ -5,9 +5,11 @@
 
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec::Vec;
+use core::ops::RangeInclusive;
 
 use footplate_core::{
-    Command, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+    Command, DecoderSteps, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId,
+    TurnoutId,
 };
 
 use crate::farewell::Farewell;
@@ -28,6 +30,8 @@ pub(crate) struct Dialogue<A: Awaited> {
     pub(crate) waiting: Queue,
     pub(crate) outstanding: AllOutstanding<A>,
     pub(crate) locomotives: Locomotives,
+    /// Decoders that do not have 14 steps.
+    decoders: BTreeMap<TrainId, DecoderSteps>,
     /// Whether each turnout is set to its curved leg, as the station reported.
     turnouts: BTreeMap<TurnoutId, bool>,
     /// Whether the track should have power, and whether the station reported that it has.
@@ -63,6 +67,7 @@ impl<A: Awaited> Dialogue<A> {
             waiting: Queue::default(),
             outstanding: AllOutstanding::new(),
             locomotives: Locomotives::default(),
+            decoders: BTreeMap::new(),
             turnouts: BTreeMap::new(),
             power: true,
             is_powered: false,
@@ -267,6 +272,33 @@ impl<A: Awaited> Dialogue<A> {
     }
 
     // What the station says.
+
+    /// The steps of a train's decoder.
+    pub(crate) fn decoder(&self, train: TrainId) -> DecoderSteps {
+        self.decoders.get(&train).copied().unwrap_or(DecoderSteps::Fourteen)
+    }
+
+    /// Notes the steps of a train's decoder, if the station has its address.
+    pub(crate) fn set_decoder(
+        &mut self,
+        train: TrainId,
+        addresses: &RangeInclusive<u16>,
+        steps: DecoderSteps,
+    ) -> Result<(), CommandError> {
+        CommandError::check_train(train, addresses)?;
+        self.decoders.insert(train, steps);
+        Ok(())
+    }
+
+    /// Refuses a step that the train's decoder does not have.
+    pub(crate) fn check_step(&self, command: &Command) -> Result<(), CommandError> {
+        match *command {
+            Command::Speed { train, step } if step > self.decoder(train).highest() => {
+                Err(CommandError::Step { step, highest: self.decoder(train).highest().get() })
+            }
+            _ => Ok(()),
+        }
+    }
 
     /// Returns the locomotive of a train that was commanded or is about to be.
     pub(crate) fn locomotive(&mut self, train: TrainId) -> Option<&mut Locomotive> {

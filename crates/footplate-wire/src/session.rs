@@ -6,7 +6,8 @@ use core::fmt::{Display, Formatter, Result as FmtResult};
 use core::ops::RangeInclusive;
 
 use footplate_core::{
-    Command, Event, FunctionNumber, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+    Command, DecoderSteps, Event, FunctionNumber, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId,
+    TurnoutId,
 };
 
 use crate::marklin_serial::ModuleReads;
@@ -25,6 +26,13 @@ pub trait Session {
 
     /// Restarts after the line was lost and opened again: bytes on it are gone, and the station may wait for the rest of them.
     fn handle_reopened(&mut self, now: Timestamp);
+
+    /// Sets how many steps a train's decoder has; 14 unless set. Steps of later commands count in these.
+    ///
+    /// # Errors
+    ///
+    /// When the station has no such address, or cannot command decoders with so many steps.
+    fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError>;
 
     /// Sends a command as soon as the line is free.
     ///
@@ -227,7 +235,14 @@ pub enum CommandError {
         /// The first and the last address.
         addresses: (u16, u16),
     },
-    /// The step is above the highest of this link.
+    /// This link commands no decoders with so many steps.
+    Decoder {
+        /// The train.
+        train: TrainId,
+        /// Its steps.
+        steps: DecoderSteps,
+    },
+    /// The step is above the highest of the train's decoder.
     Step {
         /// The step.
         step: SpeedStep,
@@ -278,6 +293,11 @@ impl Display for CommandError {
             Self::Train { train, addresses: (first, last) } => {
                 write!(f, "train {train} has no address here; addresses are {first} to {last}")
             }
+            Self::Decoder { train, steps } => write!(
+                f,
+                "train {train} has {steps} speed steps, and this station commands 14: leave out its steps, or use another \
+                 station"
+            ),
             Self::Step { step, highest } => {
                 write!(f, "step {step} is beyond the decoder; steps are 0 to {highest}")
             }
@@ -421,7 +441,7 @@ impl Display for Listed<'_> {
 
 impl Display for Closing {
     fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
-        let told = |said| if said { "" } else { "not " };
+        let not = |done| if done { "" } else { "not " };
         if !self.commanded_to_stop.is_empty() {
             write!(f, "commanded to stop: {}; ", Listed(&self.commanded_to_stop))?;
         }
@@ -429,9 +449,9 @@ impl Display for Closing {
             write!(f, "NOT commanded to stop and possibly running: {}; ", Listed(&self.not_commanded))?;
         }
         if let Some(released) = self.solenoids_released {
-            write!(f, "solenoids {}released, ", told(released))?;
+            write!(f, "solenoids {}released, ", not(released))?;
         }
-        write!(f, "track power {}switched off; ", told(self.power_off))?;
+        write!(f, "track power {}switched off; ", not(self.power_off))?;
         f.write_str(match self.confirmation {
             Confirmation::HandShake => {
                 "the station accepted the bytes; this line gives no further \

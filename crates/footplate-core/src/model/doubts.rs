@@ -6,7 +6,8 @@
 
 use super::motion_model::MotionModel;
 use super::parameters::{
-    Answers, DOWN, FRICTION, START_DELAY, START_NODES, STOP_NODES, UP, nodes_about, speed_at,
+    Answers, DOWN, FRICTION, HYSTERESIS, START_DELAY, START_NODES, STOP_NODES, UP, between_knots,
+    hysteresis_at, knots, knots_about, nodes_about, speed_at, stride,
 };
 use super::priors::end_of_stop;
 
@@ -23,13 +24,23 @@ impl MotionModel {
             return 0.0;
         }
         let below = self.answers().speed(place, false);
+        let between = between_knots(place, self.steps());
+        let [low, high] = knots_about(place, self.steps());
+        let of_speed = |(knot, weight): (usize, f64), part: f64| (speed_at(knot), weight * part);
         if !above {
-            return self.spread.variance(speed_at(place));
+            return self.spread.variance_along(&[low, high].map(|knot| of_speed(knot, 1.0)))
+                + between * between;
         }
-        let [hysteresis, own] = self.hysteresis_places(place);
         let part = Answers::hysteresis_part(below) / speed;
-        let slopes = [(speed_at(place), below / speed), (hysteresis, part), (own, part)];
-        self.spread.variance_along(&slopes)
+        let own = |(knot, weight): (usize, f64)| (hysteresis_at(knot, self.steps()), weight * part);
+        let slopes = [
+            of_speed(low, below / speed),
+            of_speed(high, below / speed),
+            (HYSTERESIS, part),
+            own(low),
+            own(high),
+        ];
+        self.spread.variance_along(&slopes) + between * between
     }
 
     /// Variance of the delay of a start (s²).
@@ -70,7 +81,7 @@ impl MotionModel {
             (first, change),
             (first + 1, change),
             (first + 2, change * change.abs()),
-            (first + 3, 0.5 * change * steps.abs()),
+            (first + 3, 0.5 * change * (steps.abs() / stride(self.steps()) as f64)),
         ]
     }
 
@@ -89,6 +100,14 @@ impl MotionModel {
     pub(crate) fn step_near(&self, speed: f64) -> u8 {
         let answers = self.answers();
         let off = |step: &u8| (answers.speed(usize::from(*step), false) - speed).abs();
-        (0..=self.highest().get()).min_by(|one, other| off(one).total_cmp(&off(other))).unwrap_or(0)
+        let (knots, stride) = (knots(self.steps()), stride(self.steps()));
+        let steps = if stride == 1 {
+            0..=self.highest().get()
+        } else {
+            let fast_enough = |knot: &usize| answers.speed(knot * stride, false) >= speed;
+            let above = stride * (1..=knots).find(fast_enough).unwrap_or(knots);
+            (above - stride) as u8..=above as u8
+        };
+        steps.min_by(|one, other| off(one).total_cmp(&off(other))).unwrap_or(0)
     }
 }

@@ -4,7 +4,7 @@ use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::parameters::{Answers, HYSTERESIS, hysteresis_at, prior_means, speed_prior};
+use super::parameters::{Answers, between_knots, knots, prior_means, speed_prior, stride};
 use super::priors::end_of_stop;
 use super::priors::section_variance;
 use super::scatter::Scatter;
@@ -74,7 +74,7 @@ pub struct MotionModel {
     pub(crate) stop_offsets: StopOffsets,
     /// By how much more than usual the laws of stops and of starts leave over: factors on a standard deviation.
     pub(crate) residual_scales: [f64; 2],
-    uses: Vec<StepUse>,
+    pub(super) uses: Vec<StepUse>,
     /// Sensors passed and stops made at each step, from below and from above.
     pub(crate) counts: Vec<[Counts; 2]>,
     /// The scatter of stops and starts.
@@ -139,15 +139,44 @@ impl MotionModel {
         Answers::new(&self.values, self.steps())
     }
 
-    /// Places of what hysteresis at a step is made of.
-    pub(crate) fn hysteresis_places(&self, step: usize) -> [usize; 2] {
-        [HYSTERESIS, hysteresis_at(step, self.steps())]
+    /// The steps that have numbers of their own, lowest first: all 14 of a decoder of 14 steps, every second of 28, every ninth of
+    /// 126. Calibration measures these; between them the model interpolates.
+    pub fn knots(&self) -> impl DoubleEndedIterator<Item = SpeedStep> + use<> {
+        let (knots, stride) = (knots(self.steps()), self.stride());
+        (1..=knots as u8).filter_map(move |knot| SpeedStep::new(knot.saturating_mul(stride)))
+    }
+
+    /// Steps from one of these to the next: 1 for a decoder of 14 steps.
+    #[must_use]
+    pub fn stride(&self) -> u8 {
+        stride(self.steps()) as u8
+    }
+
+    /// The next higher step with numbers of its own; of the highest, itself.
+    pub(crate) fn next_knot(&self, step: SpeedStep) -> SpeedStep {
+        let next = (step.get() / self.stride() + 1).saturating_mul(self.stride());
+        SpeedStep::new(next).unwrap_or(self.highest).min(self.highest)
+    }
+
+    /// The next lower and the next higher step with numbers of their own, if the step has none.
+    fn knots_around(&self, step: SpeedStep) -> Option<[SpeedStep; 2]> {
+        let below = step.get() / self.stride() * self.stride();
+        let around = [SpeedStep::new(below)?, SpeedStep::new(below.checked_add(self.stride())?)?];
+        (below < step.get() && below > 0 && around[1] <= self.highest).then_some(around)
     }
 
     fn counts_at(&self, step: SpeedStep, approach: Approach) -> Counts {
         let from_above = usize::from(approach == Approach::Above);
-        let both = self.counts.get(usize::from(step.get())).copied().unwrap_or_default();
-        both.get(from_above).copied().unwrap_or_default()
+        let at = |step: SpeedStep| {
+            let both = self.counts.get(usize::from(step.get())).copied().unwrap_or_default();
+            both.get(from_above).copied().unwrap_or_default()
+        };
+        let Some([low, high]) = self.knots_around(step) else { return at(step) };
+        let (own, low, high) = (at(step), at(low), at(high));
+        Counts {
+            contacts: own.contacts + low.contacts.min(high.contacts),
+            stops: own.stops + low.stops.min(high.stops),
+        }
     }
 
     /// Its steady speed at a step; the count is of sensors passed at it. An unknown approach counts as from below.
@@ -157,10 +186,20 @@ impl MotionModel {
         let speed = |answers: &Answers<'_>| answers.speed(place, above);
         Estimate {
             value: Speed::from_m_per_s(speed(&self.answers())),
-            uncertainty: Speed::from_m_per_s(self.deviation_with_scale(speed)),
+            uncertainty: Speed::from_m_per_s(self.with_interpolation(
+                step,
+                self.deviation_with_scale(speed),
+                speed(&self.answers()),
+            )),
             count: self.counts_at(step, approach).contacts,
             date: self.date,
         }
+    }
+
+    /// A standard deviation at a step, with that of the interpolated speed added: `by_speed` is the slope in ln speed.
+    fn with_interpolation(&self, step: SpeedStep, deviation: f64, by_speed: f64) -> f64 {
+        let between = between_knots(usize::from(step.get()), self.steps());
+        if between > 0.0 { libm::hypot(deviation, between * by_speed) } else { deviation }
     }
 
     /// The most likely steady speed at a step. Without the uncertainty, whose calculation takes a hundred times as long.
@@ -229,10 +268,15 @@ impl MotionModel {
         })
     }
 
-    /// Whether a step moves the train, by experience.
+    /// Whether a step moves the train, by experience at this step, or at the two that it is interpolated between.
     #[must_use]
     pub fn uses(&self, step: SpeedStep) -> StepUse {
-        self.uses.get(usize::from(step.get())).copied().unwrap_or(StepUse::Unreliable)
+        let at =
+            |step: SpeedStep| self.uses.get(usize::from(step.get())).copied().unwrap_or(StepUse::Unreliable);
+        match (at(step), self.knots_around(step)) {
+            (StepUse::Untried, Some(around)) if around.map(at) == [StepUse::Moves; 2] => StepUse::Moves,
+            (found, _) => found,
+        }
     }
 
     /// Records whether a step moved the train.
@@ -257,7 +301,7 @@ impl MotionModel {
         StopForecast {
             distance: Length::from_m(distance.max(0.0)),
             doubt: Length::from_m(libm::hypot(
-                self.deviation_with_scale(|answers| stop(answers).0),
+                self.with_interpolation(step, self.deviation_with_scale(|answers| stop(answers).0), distance),
                 end_of_stop(speed),
             )),
             scatter: Length::from_m(libm::hypot(

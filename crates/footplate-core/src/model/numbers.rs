@@ -93,7 +93,6 @@ impl MotionModel {
     pub fn numbers(&self) -> MotionNumbers {
         let side = self.values.len();
         let counts = |one: &Counts| (one.contacts, one.stops);
-        let steps = (0..=self.highest().get()).filter_map(SpeedStep::new);
         MotionNumbers {
             train: self.train(),
             highest: self.highest(),
@@ -103,7 +102,7 @@ impl MotionModel {
             stop_offsets: of_places(&self.stop_offsets.of_hop),
             stop_offset_deviation: self.stop_offsets.deviation,
             residual_scales: self.residual_scales,
-            uses: steps.map(|step| self.uses(step)).collect(),
+            uses: self.uses.clone(),
             counts: self.counts.iter().map(|both| both.each_ref().map(counts)).collect(),
             scatter_scale: self.scatter.stops,
             scatter_floor: self.scatter.floor,

@@ -20,7 +20,7 @@ pub(super) const FRICTION: usize = 10;
 pub(super) const STOP_NODES: usize = 11;
 /// The same for starts: how much further the train has run once it is steady.
 pub(super) const START_NODES: usize = STOP_NODES + NODES;
-/// ln of the steady speeds from below, from step 1 on.
+/// ln of the steady speeds from below, from knot 1 on.
 pub(super) const SPEEDS: usize = START_NODES + NODES;
 
 /// Nodes of what laws leave over.
@@ -75,24 +75,67 @@ pub(super) const SHAPES: usize = 2;
 /// braking in two stages and constant power differ by more from their nearest law than published decoders do.
 pub(super) const SHAPE_DEVIATION: f64 = 2.0 * core::f64::consts::SQRT_2 * super::priors::SHAPE_ERROR;
 
-/// How many numbers a train has: the single ones, nodes, speeds, hysteresis by step, shapes.
+/// Decoders of 28 and 126 steps have numbers of their own at this many steps, evenly spread. All published tables are of 14
+/// steps, and a track has no time for more.
+const MOST_KNOTS: usize = 14;
+
+/// How many steps of a decoder have numbers of their own: its knots. Knot `k` is step `k` times [`stride`]; in between, speed is a
+/// power of the step.
+pub(super) const fn knots(highest: usize) -> usize {
+    if highest.is_multiple_of(MOST_KNOTS) && highest > 0 { MOST_KNOTS } else { highest }
+}
+
+/// Steps from one knot to the next: 1 for a decoder of 14 steps, 2 for 28, 9 for 126.
+pub(super) const fn stride(highest: usize) -> usize {
+    match highest.checked_div(knots(highest)) {
+        Some(stride) => stride,
+        None => 1,
+    }
+}
+
+/// The knots at or next to a step, with their weights in ln speed and in hysteresis. Below the first knot, the first counts alone.
+pub(super) fn knots_about(step: usize, highest: usize) -> [(usize, f64); 2] {
+    let stride = stride(highest);
+    let knot = (step / stride).clamp(1, knots(highest).max(1));
+    let at = knot * stride;
+    if step <= at {
+        return [(knot, 1.0), (knot, 0.0)];
+    }
+    let along = |step: usize| libm::log(step as f64 / at as f64);
+    let part = along(step) / along(at + stride);
+    [(knot, 1.0 - part), (knot + 1, part)]
+}
+
+/// Standard deviation of ln speed at a step for being between two knots: a line between two of three points that bend by
+/// [`BEND`] is off by an eighth of it in the middle.
+pub(super) fn between_knots(step: usize, highest: usize) -> f64 {
+    let [(knot, left), (_, right)] = knots_about(step, highest);
+    0.5 * left * right * bend_deviation(knot)
+}
+
+/// How many numbers a train has: the single ones, nodes, speeds and hysteresis by knot, shapes.
 pub(super) const fn count(highest: usize) -> usize {
-    SPEEDS + 2 * highest + 2 * SHAPES
+    SPEEDS + 2 * knots(highest) + 2 * SHAPES
 }
 
 /// Place of the first shape number of starts (`up`) or stops.
 pub(super) const fn shape_at(up: bool, highest: usize) -> usize {
-    SPEEDS + 2 * highest + if up { SHAPES } else { 0 }
+    SPEEDS + 2 * knots(highest) + if up { SHAPES } else { 0 }
 }
 
-/// Place of ln speed from below at a step from 1 on.
-pub(super) const fn speed_at(step: usize) -> usize {
-    SPEEDS + step - 1
+/// Place of ln speed from below at a knot from 1 on.
+pub(super) const fn speed_at(knot: usize) -> usize {
+    SPEEDS + knot - 1
 }
 
-/// Place of the deviation of hysteresis at a step.
-pub(super) const fn hysteresis_at(step: usize, highest: usize) -> usize {
-    SPEEDS + highest + step - 1
+/// Place of the deviation of hysteresis at a knot.
+pub(super) const fn hysteresis_at(knot: usize, highest: usize) -> usize {
+    SPEEDS + knots(highest) + knot - 1
+}
+
+/// Standard deviation of the bend of ln speed at a knot: freer at the lowest.
+pub(super) fn bend_deviation(knot: usize) -> f64 {
+    BEND * (1.0 + 6.0 / (knot * knot) as f64)
 }
 
 /// Prior mean and standard deviation of ln speed at a step.
@@ -107,7 +150,8 @@ pub(super) fn prior_means(highest: usize) -> Vec<f64> {
     let mut means: Vec<f64> = PRIOR.iter().map(|(mean, _)| *mean).collect();
     means.resize(START_NODES, usual_residual(STOP_NODES));
     means.resize(SPEEDS, usual_residual(START_NODES));
-    means.extend((1..=highest).map(|step| speed_prior(step, highest).0));
+    let knots = knots(highest);
+    means.extend((1..=knots).map(|knot| speed_prior(knot, knots).0));
     means.resize(count(highest), 0.0);
     means
 }
@@ -167,12 +211,27 @@ impl<'v> Answers<'v> {
         if step == 0 {
             return 0.0;
         }
-        let below = libm::exp(self.at(speed_at(step)).clamp(-12.0, 3.0));
+        let below = libm::exp(self.ln_speed(step).clamp(-12.0, 3.0));
         if !above {
             return below;
         }
-        let full = self.at(HYSTERESIS) + self.at(hysteresis_at(step, self.highest));
+        let [low, high] = knots_about(step, self.highest)
+            .map(|(knot, weight)| weight * self.at(hysteresis_at(knot, self.highest)));
+        let full = self.at(HYSTERESIS) + (low + high);
         (below + full * Self::hysteresis_part(below)).max(0.5 * below)
+    }
+
+    /// ln of the steady speed from below at a step from 1 on.
+    pub(super) fn ln_speed(&self, step: usize) -> f64 {
+        let first = stride(self.highest);
+        let [low, high] =
+            knots_about(step, self.highest).map(|(knot, weight)| weight * self.at(speed_at(knot)));
+        let ln_speed = low + high;
+        if step < first {
+            ln_speed + SPEED_POWER * libm::log(step.max(1) as f64 / first as f64)
+        } else {
+            ln_speed
+        }
     }
 
     /// The fractional step that corresponds to a set speed (m/s) of a train commanded to `near`. Other steps count with their
@@ -184,11 +243,12 @@ impl<'v> Answers<'v> {
             return near as f64;
         }
         let mut low = (0, 0.0);
-        for step in 1..=self.highest {
+        let stride = stride(self.highest);
+        for step in (1..=knots(self.highest)).map(|knot| knot * stride) {
             let speed = self.speed(step, false);
             if speed >= set {
-                return low.0 as f64
-                    + ((set - low.1) / (speed - low.1).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+                let part = ((set - low.1) / (speed - low.1).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+                return low.0 as f64 + stride as f64 * part;
             }
             low = (step, speed);
         }
@@ -215,14 +275,14 @@ impl<'v> Answers<'v> {
         self.at(FRICTION).max(LEAST_FRICTION)
     }
 
-    /// Lag and ramp (s) of a change by so much speed over so many steps. Either may be negative where the numbers trade off
+    /// Lag and ramp (s) of a change by so much speed over so many steps, of which `ρ` counts from knot to knot. Either may be negative where the numbers trade off
     /// against each other, and counts as such in displacements.
     pub(super) fn lag_and_ramp(&self, up: bool, change: f64, steps: f64) -> (f64, f64) {
         let first = if up { UP } else { DOWN };
         let lag = self.at(first + 1);
         let kappa = self.at(first + 2);
         let rho = self.at(first + 3);
-        (lag, 2.0 * kappa * change.abs() + rho * steps.abs())
+        (lag, 2.0 * kappa * change.abs() + rho * (steps.abs() / stride(self.highest) as f64))
     }
 
     /// What the law leaves over of a stop from a speed (m).
@@ -244,5 +304,46 @@ impl<'v> Answers<'v> {
 
     fn residual(&self, first: usize, speed: f64) -> f64 {
         nodes_about(speed).iter().map(|(node, weight)| weight * self.at(first + node)).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_decoder_of_14_steps_has_a_knot_at_each_and_finer_ones_at_as_many() {
+        for (highest, spacing) in [(14, 1), (28, 2), (126, 9), (5, 1)] {
+            assert_eq!((knots(highest), stride(highest)), (highest / spacing, spacing));
+            for knot in 1..=knots(highest) {
+                assert_eq!(knots_about(knot * spacing, highest)[0], (knot, 1.0));
+                assert_eq!(between_knots(knot * spacing, highest), 0.0);
+            }
+        }
+        assert_eq!(count(126), count(14));
+    }
+
+    #[test]
+    fn speed_rises_through_the_knots_and_by_a_power_of_the_step_between_them() {
+        // A straight line, known only at every ninth step.
+        let speed = |step: usize| 0.005 * (step as f64 - 4.0);
+        let mut values = prior_means(126);
+        for knot in 1..=14 {
+            values[speed_at(knot)] = libm::log(speed(9 * knot));
+        }
+        let answers = Answers::new(&values, 126);
+        for step in 1..126 {
+            assert!(answers.speed(step, false) < answers.speed(step + 1, false), "step {step}");
+            assert!((0.0..0.125 * BEND * 7.0).contains(&between_knots(step, 126)), "step {step}");
+        }
+        for step in 18..=126 {
+            let error = answers.speed(step, false) / speed(step) - 1.0;
+            // Within one of the standard deviations that the model states, and never a hundredth.
+            assert!(error.abs() < (between_knots(step, 126) + 1e-9).min(0.01), "step {step}: {error}");
+        }
+        for step in (18..=126).step_by(9) {
+            let at = answers.step_at(0, speed(step));
+            assert!((at - step as f64).abs() < 1e-6, "step {step}: {at}");
+        }
     }
 }

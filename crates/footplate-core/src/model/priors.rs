@@ -3,8 +3,8 @@
 use alloc::vec::Vec;
 
 use super::parameters::{
-    BEND, HYSTERESIS_SPREAD, NODES, PRIOR, SHAPE_DEVIATION, SHAPES, count, hysteresis_at, node_covariance,
-    shape_at, speed_at, speed_prior, usual_residual,
+    HYSTERESIS_SPREAD, NODES, PRIOR, SHAPE_DEVIATION, SHAPES, bend_deviation, count, hysteresis_at, knots,
+    node_covariance, shape_at, speed_at, speed_prior, usual_residual,
 };
 use super::survey::SectionIndex;
 use crate::linalg::NormalEquations;
@@ -65,18 +65,19 @@ pub(crate) fn prior(highest: usize) -> NormalEquations {
     for place in (shape_at(false, highest)..).take(2 * SHAPES) {
         equations.add(&[(place, 1.0)], 0.0, SHAPE_DEVIATION * SHAPE_DEVIATION);
     }
-    for step in 1..=highest {
-        let (mean, deviation) = speed_prior(step, highest);
-        equations.add(&[(speed_at(step), 1.0)], mean, deviation * deviation);
+    let knots = knots(highest);
+    for knot in 1..=knots {
+        let (mean, deviation) = speed_prior(knot, knots);
+        equations.add(&[(speed_at(knot), 1.0)], mean, deviation * deviation);
         let spread = HYSTERESIS_SPREAD * HYSTERESIS_SPREAD;
-        equations.add(&[(hysteresis_at(step, highest), 1.0)], 0.0, spread);
+        equations.add(&[(hysteresis_at(knot, highest), 1.0)], 0.0, spread);
     }
-    for step in 2..highest {
-        // Over three steps ln speed bends as the usual shape does, give or take; more freely at the lowest steps.
-        let bend = |step: usize| speed_prior(step, highest).0;
-        let usual = bend(step + 1) - 2.0 * bend(step) + bend(step - 1);
-        let deviation = BEND * (1.0 + 6.0 / (step * step) as f64);
-        let terms = [(speed_at(step + 1), 1.0), (speed_at(step), -2.0), (speed_at(step - 1), 1.0)];
+    for knot in 2..knots {
+        // Over three knots ln speed bends as the usual shape does, with this standard deviation.
+        let bend = |knot: usize| speed_prior(knot, knots).0;
+        let usual = bend(knot + 1) - 2.0 * bend(knot) + bend(knot - 1);
+        let deviation = bend_deviation(knot);
+        let terms = [(speed_at(knot + 1), 1.0), (speed_at(knot), -2.0), (speed_at(knot - 1), 1.0)];
         equations.add(&terms, usual, deviation * deviation);
     }
     equations

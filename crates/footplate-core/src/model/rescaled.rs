@@ -1,11 +1,11 @@
 //! The model of a train that runs otherwise than it did: the old one, as much faster or slower as was measured.
 //!
 //! Letters: `r` new speed over old. Wheels that slip, a weak supply and a cold motor let everything take the same times
-//! over shorter ways: delays, lags and ramps by step stay, ramps by speed (`κ`, s per m/s) become `κ/r`, and what is left
+//! over shorter distances: delays, lags and ramps by step stay, ramps by speed (`κ`, s per m/s) become `κ/r`, and what is left
 //! over of stops and starts `r` times as long. Decoders that slow down at one rate shorten stops by `r` once more; what
-//! lies between the two is doubt, until a stop is measured.
+//! lies between the two is uncertain, until a stop is measured.
 //!
-//! The numbers are scaled by a diagonal matrix `A` and doubts are added: `Σ′ = A Σ Aᵀ + N`, with `N` a sum of squares, so
+//! The numbers are scaled by a diagonal matrix `A` and variances are added: `Σ′ = A Σ Aᵀ + N`, with `N` a sum of squares, so
 //! that the covariance stays one.
 
 use alloc::vec;
@@ -13,7 +13,8 @@ use alloc::vec::Vec;
 
 use super::motion_model::MotionModel;
 use super::parameters::{
-    DOWN, FRICTION, HYSTERESIS, NODES, SPEEDS, START_NODES, STOP_NODES, UP, hysteresis_at, speed_at,
+    DOWN, FRICTION, HYSTERESIS, NODES, SPEEDS, START_NODES, STOP_NODES, UP, hysteresis_at, knots, speed_at,
+    stride,
 };
 use super::spread::Spread;
 use crate::ids::SpeedStep;
@@ -105,12 +106,13 @@ impl Rescaling {
 }
 
 impl MotionModel {
-    /// The same train changed like this; doubts are as wide as what was measured leaves them.
+    /// The same train changed like this, as uncertain as what was measured leaves it.
     #[must_use]
     pub fn rescaled(&self, change: &Rescaling) -> Self {
         let ratio = change.ratio.clamp(1.0 / MOST, MOST);
         let stops = change.stops.clamp(1.0 / MOST, MOST);
         let (steps, side) = (self.steps(), self.values.len());
+        let (knots, stride) = (knots(steps), stride(steps));
         let mut scale = vec![1.0; side];
         let mut set = |place: usize, by: f64| {
             if let Some(slot) = scale.get_mut(place) {
@@ -123,25 +125,27 @@ impl MotionModel {
         for place in [FRICTION, HYSTERESIS] {
             set(place, ratio);
         }
-        (1..=steps).for_each(|step| set(hysteresis_at(step, steps), ratio));
+        (1..=knots).for_each(|knot| set(hysteresis_at(knot, steps), ratio));
         let stop_nodes = STOP_NODES..STOP_NODES + NODES;
         let start_nodes = START_NODES..START_NODES + NODES;
         stop_nodes.clone().chain(start_nodes.clone()).for_each(|place| set(place, ratio));
-        // Lag and ramps down make the way to rest.
+        // Lag and ramps down make the stopping distance.
         let of_stops = || (DOWN + 1..DOWN + 4).chain(stop_nodes.clone());
         let of_starts = || (UP + 1..UP + 4).chain(start_nodes.clone());
         of_stops().for_each(|place| set(place, stops));
         let mut values: Vec<f64> = self.values.iter().zip(&scale).map(|(value, by)| value * by).collect();
 
         debug_assert_eq!(speed_at(1), SPEEDS);
-        let measured = |step: usize| change.measured.iter().find(|one| usize::from(one.step.get()) == step);
-        for step in 1..=steps {
-            let by = measured(step).map_or(ratio, |one| one.ratio.clamp(1.0 / MOST, MOST));
-            if let Some(value) = values.get_mut(speed_at(step)) {
+        // A step between two knots counts for the nearest.
+        let knot_of = |step: SpeedStep| ((usize::from(step.get()) + stride / 2) / stride).max(1);
+        let measured = |knot: usize| change.measured.iter().find(|one| knot_of(one.step) == knot);
+        for knot in 1..=knots {
+            let by = measured(knot).map_or(ratio, |one| one.ratio.clamp(1.0 / MOST, MOST));
+            if let Some(value) = values.get_mut(speed_at(knot)) {
                 *value += libm::log(by);
             }
-            if measured(step).is_some()
-                && let Some(slot) = scale.get_mut(speed_at(step))
+            if measured(knot).is_some()
+                && let Some(slot) = scale.get_mut(speed_at(knot))
             {
                 // What was measured anew owes nothing to what was known.
                 *slot = 0.0;
@@ -158,15 +162,15 @@ impl MotionModel {
             doubt
         };
         let mut unmeasured = vec![0.0; side];
-        for step in (1..=steps).filter(|step| measured(*step).is_none()) {
-            if let Some(slot) = unmeasured.get_mut(speed_at(step)) {
+        for knot in (1..=knots).filter(|knot| measured(*knot).is_none()) {
+            if let Some(slot) = unmeasured.get_mut(speed_at(knot)) {
                 *slot = change.deviation;
             }
         }
         // What is not known of steps that were not measured they have once in common, and once each to itself.
         let common = [along(&mut of_stops()), along(&mut of_starts()), unmeasured.clone()];
         let own = |place: usize| {
-            let of_speed = (SPEEDS..SPEEDS + steps).contains(&place).then(|| place + 1 - SPEEDS);
+            let of_speed = (SPEEDS..SPEEDS + knots).contains(&place).then(|| place + 1 - SPEEDS);
             let new = of_speed.and_then(measured).map_or(0.0, |one| one.deviation);
             new * new + at(&unmeasured, place) * at(&unmeasured, place)
         };

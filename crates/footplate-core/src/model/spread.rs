@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 
 use super::parameters::{
     Answers, HYSTERESIS_SPREAD, NODES, PRIOR, SHAPE_DEVIATION, SHAPES, START_NODES, STOP_NODES, count,
-    hysteresis_at, node_covariance, shape_at, speed_at, speed_prior,
+    hysteresis_at, knots, node_covariance, shape_at, speed_at, speed_prior,
 };
 use super::variation::Variation;
 use crate::linalg::Solution;
@@ -40,9 +40,9 @@ impl Spread {
         for place in (shape_at(false, highest)..).take(2 * SHAPES) {
             spread.covariance[place * side + place] = SHAPE_DEVIATION * SHAPE_DEVIATION;
         }
-        for step in 1..=highest {
-            let (_, deviation) = speed_prior(step, highest);
-            let (speed, hysteresis) = (speed_at(step), hysteresis_at(step, highest));
+        for knot in 1..=knots(highest) {
+            let (_, deviation) = speed_prior(knot, knots(highest));
+            let (speed, hysteresis) = (speed_at(knot), hysteresis_at(knot, highest));
             spread.covariance[speed * side + speed] = deviation * deviation;
             spread.covariance[hysteresis * side + hysteresis] = HYSTERESIS_SPREAD * HYSTERESIS_SPREAD;
         }

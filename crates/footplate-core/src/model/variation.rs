@@ -6,8 +6,8 @@
 use alloc::vec::Vec;
 
 use super::parameters::{
-    DOWN, FRICTION, HYSTERESIS, NODES, START_DELAY, START_NODES, STOP_NODES, UP, hysteresis_at, node_speed,
-    speed_at,
+    DOWN, FRICTION, HYSTERESIS, NODES, START_DELAY, START_NODES, STOP_NODES, UP, hysteresis_at, knots,
+    node_speed, speed_at,
 };
 
 /// Standard deviations of changes.
@@ -110,12 +110,12 @@ impl Variation {
                 add(first + node, first + node, squared(self.residual * node_speed(node)));
             }
         }
-        for step in 1..=highest {
-            add(speed_at(step), speed_at(step), squared(self.own_speed) + squared(self.common_speed));
-            for other in 1..step {
-                add(speed_at(step), speed_at(other), squared(self.common_speed));
+        for knot in 1..=knots(highest) {
+            add(speed_at(knot), speed_at(knot), squared(self.own_speed) + squared(self.common_speed));
+            for other in 1..knot {
+                add(speed_at(knot), speed_at(other), squared(self.common_speed));
             }
-            let own = hysteresis_at(step, highest);
+            let own = hysteresis_at(knot, highest);
             add(own, own, 0.25 * squared(self.hysteresis));
         }
     }

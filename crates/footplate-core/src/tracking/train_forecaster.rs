@@ -10,7 +10,7 @@ use super::route_memory::RouteMemory;
 use super::sensor_scatter::SensorScatter;
 use crate::estimate::Estimate;
 use crate::event::{Event, EventKind, Report};
-use crate::ids::{SensorId, SpeedStep, TrainId};
+use crate::ids::{DecoderSteps, SensorId, SpeedStep, TrainId};
 use crate::linalg::Gaussian;
 use crate::link::UniformNormal;
 use crate::model::MotionFit;
@@ -27,8 +27,6 @@ const GATE: f64 = 1e-5;
 const REOPENED: f64 = 0.05;
 /// How much longer a section feels to one train than to another: 8 mm over ten sections and five published trains.
 const OWN_LENGTH_M: f64 = 0.008;
-/// Most published trains have decoders of 14 steps; others 28 or 126.
-const DECODERS: [u8; 3] = [14, 28, SpeedStep::HIGHEST];
 
 /// A train is placed by a report whose window is at most this many poll periods wide.
 const LONGEST_WINDOW: f64 = 4.0;
@@ -62,7 +60,7 @@ pub struct TrainForecaster {
 
 impl TrainForecaster {
     pub(super) fn new(train: TrainId) -> Self {
-        let fit = MotionFit::new(train, decoder_of(SpeedStep::STAND));
+        let fit = MotionFit::new(train, DecoderSteps::with(SpeedStep::STAND).highest());
         let model = fit.model().clone();
         let filter = ArrivalFilter::begin(&model, 0.0, SpeedStep::STAND);
         Self {
@@ -143,7 +141,7 @@ impl TrainForecaster {
     /// A step that its decoder was not thought to have: it has more, and all steps mean another speed.
     fn meet(&mut self, step: SpeedStep) {
         if step > self.model.highest() {
-            self.fit = MotionFit::new(self.train(), decoder_of(step));
+            self.fit = MotionFit::new(self.train(), DecoderSteps::with(step).highest());
             self.model = self.fit.model().clone();
             self.filter = ArrivalFilter::begin(&self.model, 0.0, SpeedStep::STAND);
         }
@@ -309,12 +307,6 @@ impl TrainForecaster {
         let is_changing = !filter.is_settled();
         self.foreseeable(self.forecast_of(sensor, &way, &due, is_changing, Polls::of(tracker.timing())))
     }
-}
-
-/// The steps of the decoder that has a step.
-fn decoder_of(step: SpeedStep) -> SpeedStep {
-    let steps = DECODERS.into_iter().filter_map(SpeedStep::new).find(|highest| *highest >= step);
-    steps.unwrap_or(step)
 }
 
 /// By how much a section is longer than surveyed for a train (m): as its model says, or, where it never was, from the survey and

@@ -1,11 +1,8 @@
-//! The decoders of the simulated locomotives: 14 steps, and the one that is nearest to what a station carries.
+//! The decoders of the simulated locomotives: the step that is nearest to what a station carries.
 
-use footplate_core::{SpeedStep, Timestamp, TrainId};
+use footplate_core::{DecoderSteps, SpeedStep, Timestamp, TrainId};
 
 use crate::living::world::LivingLayout;
-
-/// The steps of the decoders.
-const STEPS: u16 = 14;
 
 /// What a station carries to a decoder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,25 +14,34 @@ pub(crate) enum DecoderSpeed {
 }
 
 impl LivingLayout<'_> {
+    /// The steps of a train's decoder.
+    pub(crate) fn decoder(&self, train: TrainId) -> DecoderSteps {
+        let engine = self.truth().engine(train);
+        engine.map_or(DecoderSteps::Fourteen, |engine| DecoderSteps::with(engine.speeds.highest()))
+    }
+
     /// The track carries a locomotive's direction and speed.
     pub(crate) fn carry(&mut self, train: TrainId, forward: bool, speed: DecoderSpeed, at: Timestamp) {
         if self.runs_forward(train) == Some(!forward) {
             self.turn(train, at);
         }
         match speed {
-            DecoderSpeed::Step { step, highest } => self.tell(train, nearest(step, highest), at),
+            DecoderSpeed::Step { step, highest } => {
+                let own = self.decoder(train).highest().get();
+                self.tell(train, nearest(step, highest, own), at);
+            }
             // What is turned around twice while it runs stops at once and leads with the same end.
             DecoderSpeed::EmergencyStop => (0..2).for_each(|_| self.turn(train, at)),
         }
     }
 }
 
-/// The step of the decoders that is nearest to one of so many; none but 0 stops.
-fn nearest(step: u8, highest: u8) -> SpeedStep {
+/// The step of a decoder, of `own` steps, that is nearest to one of so many; none but 0 stops.
+fn nearest(step: u8, highest: u8, own: u8) -> SpeedStep {
     if step == 0 {
         return SpeedStep::STAND;
     }
     let highest = u16::from(highest.max(1));
-    let nearest = (u16::from(step) * STEPS + highest / 2) / highest;
-    SpeedStep::new(nearest.clamp(1, STEPS) as u8).unwrap_or_default()
+    let nearest = (u16::from(step) * u16::from(own) + highest / 2) / highest;
+    SpeedStep::new(nearest.clamp(1, own.into()) as u8).unwrap_or_default()
 }

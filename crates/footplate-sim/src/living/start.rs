@@ -51,6 +51,7 @@ impl<'l> LivingLayout<'l> {
             let law = switches.law.unwrap_or(laws[(own % laws.len() as u64) as usize]);
             let mut train = Train::draw(own, law);
             switches.physics.shape(own, &mut train);
+            train.set_decoder(switches.decoder);
             let warmth = if switches.physics.includes(PhysicsRange::WarmUp) { 0.0 } else { switches.warmth };
             world.add(*id, train, warmth);
             let sidings = Circuit::sidings(layout, &every, nth);

@@ -1,5 +1,6 @@
 //! How bad a living layout is.
 
+use footplate_core::DecoderSteps;
 use footplate_core::Ratio;
 
 use crate::law::LawFamily;
@@ -25,6 +26,8 @@ pub struct LivingSwitches {
     pub stale_contacts: bool,
     /// What is drawn from wider ranges than usual.
     pub physics: PhysicsRange,
+    /// The decoders of all trains; those of published trains have 14 steps.
+    pub decoder: DecoderSteps,
 }
 
 impl LivingSwitches {
@@ -55,6 +58,7 @@ impl LivingSwitches {
             turnouts_set: false,
             stale_contacts: true,
             physics: PhysicsRange::Usual,
+            decoder: DecoderSteps::Fourteen,
         }
     }
 }

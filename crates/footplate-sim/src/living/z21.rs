@@ -9,10 +9,10 @@ mod obeying;
 use std::collections::VecDeque;
 
 use footplate_core::track::{Layout, Leg};
-use footplate_core::{SensorId, TimeSpan, Timestamp, TrainId};
+use footplate_core::{DecoderSteps, SensorId, TimeSpan, Timestamp, TrainId};
 use footplate_wire::z21::{
     Broadcasts, CanDetection, CentralState, Feedback, GROUP_INPUTS, GROUP_MODULES, LocoNetDetection, RailCom,
-    Reply, Steps, Throttle, TurnoutPosition,
+    Reply, Throttle, TurnoutPosition,
 };
 
 use crate::circuit::CircuitError;
@@ -61,7 +61,7 @@ struct Connected {
 #[derive(Debug, Clone, Copy)]
 struct Slot {
     address: u16,
-    steps: Steps,
+    steps: DecoderSteps,
     throttle: Throttle,
     forward: bool,
     functions: u32,
@@ -109,7 +109,7 @@ impl<'l> VirtualZ21<'l> {
         let now = world.now();
         let known = |train: TrainId| {
             let forward = world.runs_forward(train).unwrap_or(true);
-            let (steps, throttle) = (Steps::All, Throttle::Stop);
+            let (steps, throttle) = (DecoderSteps::All, Throttle::Stop);
             Slot { address: train.0, steps, throttle, forward, functions: 0, received: 0 }
         };
         let slots = world.train_ids().map(known).collect();

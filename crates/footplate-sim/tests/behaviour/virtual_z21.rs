@@ -1,10 +1,10 @@
 //! The virtual Z21 answers as such stations were seen to, to each of its clients, and its world does what it is asked.
 
 use footplate_core::track::{Layout, Leg, Position};
-use footplate_core::{Length, Ratio, TimeSpan, TrainId, TurnoutId};
+use footplate_core::{DecoderSteps, Length, Ratio, TimeSpan, TrainId, TurnoutId};
 use footplate_sim::{End, LawFamily, LivingLayout, LivingSwitches, Train, VirtualZ21, Z21Switches};
 use footplate_wire::z21::{
-    Broadcasts, Datasets, Feedback, FunctionSwitch, Reply, Request, Steps, Throttle, TurnoutPosition,
+    Broadcasts, Datasets, Feedback, FunctionSwitch, Reply, Request, Throttle, TurnoutPosition,
 };
 
 use crate::yard::{TRAIN, two_loops};
@@ -46,7 +46,7 @@ fn ask(station: &mut VirtualZ21<'_>, requests: &[Request]) -> Vec<Reply> {
 
 fn drive(step: u8, forward: bool) -> Request {
     let throttle = if step == 0 { Throttle::Stop } else { Throttle::Step(step) };
-    Request::Drive { address: 24, steps: Steps::All, throttle, forward }
+    Request::Drive { address: 24, steps: DecoderSteps::All, throttle, forward }
 }
 
 fn odometer(station: &VirtualZ21<'_>) -> f64 {
@@ -177,7 +177,9 @@ fn turnouts_obey_however_often_they_are_told_and_trains_stop_at_once_when_all_do
 #[test]
 fn directions_are_absolute_and_every_number_of_steps_is_driven() {
     let layout = two_loops();
-    for (steps, step) in [(Steps::Fourteen, 8), (Steps::TwentyEight, 16), (Steps::All, 72)] {
+    for (steps, step) in
+        [(DecoderSteps::Fourteen, 8), (DecoderSteps::TwentyEight, 16), (DecoderSteps::All, 72)]
+    {
         for leads in [End::Nose, End::Tail] {
             let mut station = station(&layout, leads, Z21Switches::default());
             let throttle = Throttle::Step(step);
@@ -203,7 +205,7 @@ fn a_train_with_a_long_address_is_driven() {
         layout.edge_between(layout.node_named("S0").unwrap(), layout.node_named("B1").unwrap()).unwrap();
     world.place(long, Position { edge, offset: Length::from_mm(100.0) }, End::Nose).unwrap();
     let throttle = Throttle::Step(72);
-    let request = Request::Drive { address: 3_078, steps: Steps::All, throttle, forward: true };
+    let request = Request::Drive { address: 3_078, steps: DecoderSteps::All, throttle, forward: true };
     ask(&mut station, &[Request::Power { on: true }, request]);
     wait(&mut station, 3_000);
     assert!(station.world().truth().train(long).unwrap().odometer.as_mm() > 100.0);

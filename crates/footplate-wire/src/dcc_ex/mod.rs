@@ -17,7 +17,7 @@ mod time_model;
 
 pub use framing::{Framing, LONGEST_DIAGNOSTIC, LONGEST_MESSAGE};
 pub use reply::{Malformed, Reply};
-pub use request::{CABS, Power, Request, SPEED_PER_STEP, Throttle, speed_of};
+pub use request::{CABS, Power, Request, Throttle, speed_of};
 pub use session::Client;
 pub use settings::{Settings, TurnoutRequests};
 pub use time_model::{

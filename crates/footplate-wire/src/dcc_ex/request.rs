@@ -6,20 +6,13 @@ use core::fmt::{Display, Formatter, Result as FmtResult};
 use core::ops::RangeInclusive;
 use core::str::{FromStr, SplitAsciiWhitespace};
 
-use footplate_core::SpeedStep;
+use footplate_core::{DecoderSteps, SpeedStep};
 
 /// Addresses of locomotives (NMRA S-9.2.1: 7-bit and 14-bit addresses up to 10239).
 pub const CABS: RangeInclusive<u16> = 1..=10_239;
 
 /// The highest of the board's speeds.
 const HIGHEST_SPEED: u8 = 126;
-
-/// By how much the board's speed grows with each of the program's 14 throttle steps: 14 × 9 = 126, so that the highest step is
-/// the highest speed and all steps are equally far apart.
-pub const SPEED_PER_STEP: u8 = 9;
-
-/// The program's highest step on this link.
-pub(super) const HIGHEST_STEP: u8 = HIGHEST_SPEED / SPEED_PER_STEP;
 
 /// The functions that a board knows of a locomotive (F0 to F68).
 const FUNCTIONS: RangeInclusive<u8> = 0..=68;
@@ -121,10 +114,11 @@ pub enum Request {
     Sensors,
 }
 
-/// The board's speed for a step of the program: nine times the step; `None` beyond step 14.
+/// The board's speed for a step of a decoder: all steps are equally far apart, and the highest is the highest. `None` beyond the
+/// highest step.
 #[must_use]
-pub const fn speed_of(step: SpeedStep) -> Option<u8> {
-    if step.get() <= HIGHEST_STEP { Some(step.get() * SPEED_PER_STEP) } else { None }
+pub fn speed_of(step: SpeedStep, decoder: DecoderSteps) -> Option<u8> {
+    decoder.scaled(step, HIGHEST_SPEED)
 }
 
 impl Request {

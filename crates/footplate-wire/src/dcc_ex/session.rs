@@ -5,12 +5,14 @@ mod hearing;
 use alloc::string::ToString;
 use alloc::vec::Vec;
 
-use footplate_core::{Command, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{
+    Command, DecoderSteps, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+};
 
 use super::framing::Framing;
 use super::opening::Opening;
 use super::outstanding::Awaited;
-use super::request::{CABS, HIGHEST_STEP, Power, Request, Throttle, speed_of};
+use super::request::{CABS, Power, Request, Throttle, speed_of};
 use super::settings::{Settings, TurnoutRequests};
 use crate::dialogue::{Dialogue, Repeat};
 use crate::outstanding::Outgoing;
@@ -168,8 +170,13 @@ impl Client {
 
     fn drive(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> (Request, Option<Awaited>) {
         let forward = self.dialogue.commanded(train, step, reverses);
-        let throttle = Throttle::Speed(speed_of(step).unwrap_or_default());
+        let throttle = self.throttle(train, step);
         (Request::Drive { cab: train.0, throttle, forward }, Some(Awaited::Driven(train, throttle, forward)))
+    }
+
+    /// The board's speed for a step of a train.
+    fn throttle(&self, train: TrainId, step: SpeedStep) -> Throttle {
+        Throttle::Speed(speed_of(step, self.dialogue.decoder(train)).unwrap_or_default())
     }
 
     /// The board answers only when the state changes.
@@ -217,11 +224,13 @@ impl Session for Client {
         self.go_on(now);
     }
 
+    fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
+        self.dialogue.set_decoder(train, &CABS, steps)
+    }
+
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
+        self.dialogue.check_step(&command)?;
         match command {
-            Command::Speed { step, .. } if speed_of(step).is_none() => {
-                return Err(CommandError::Step { step, highest: HIGHEST_STEP });
-            }
             Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. } => {
                 CommandError::check_train(train, &CABS)?;
             }

@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 use core::ops::RangeInclusive;
 
-use footplate_core::{FunctionNumber, SpeedStep};
+use footplate_core::{DecoderSteps, FunctionNumber, SpeedStep};
 
 use super::message::Message;
 
@@ -15,12 +15,6 @@ pub const LOCOMOTIVES: RangeInclusive<u16> = 1..=9_983;
 
 /// The addresses of turnouts.
 pub const TURNOUTS: RangeInclusive<u16> = 1..=2_048;
-
-/// Steps of the decoder, of 126, for each of the program's.
-pub const SPEED_PER_STEP: u8 = 9;
-
-/// The program's highest step on this link.
-pub(super) const HIGHEST_STEP: u8 = 126 / SPEED_PER_STEP;
 
 /// The highest function of a slot that this client switches: F0 to F4 are beside the direction.
 pub(super) const HIGHEST_FUNCTION: u8 = 4;
@@ -41,13 +35,13 @@ const EMERGENCY_STOP: u8 = 1;
 pub(super) const INTERROGATIONS: u8 = 8;
 const FIRST_INTERROGATION: u16 = 1_017;
 
-/// The speed of a slot for a step of the program; `None` beyond the highest.
+/// The speed of a slot for a step of a decoder: all steps are equally far apart, and the highest is the highest. `None` beyond
+/// the highest step.
 #[must_use]
-pub const fn speed_of(step: SpeedStep) -> Option<u8> {
-    match step.get() {
+pub fn speed_of(step: SpeedStep, decoder: DecoderSteps) -> Option<u8> {
+    match decoder.scaled(step, SpeedStep::HIGHEST)? {
         0 => Some(0),
-        step if step <= HIGHEST_STEP => Some(step * SPEED_PER_STEP + EMERGENCY_STOP),
-        _ => None,
+        step => Some(step + EMERGENCY_STOP),
     }
 }
 

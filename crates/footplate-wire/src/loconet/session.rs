@@ -6,16 +6,14 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use footplate_core::{
-    Command, EventKind, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+    Command, DecoderSteps, EventKind, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
 };
 
 use super::line::{Line, Lines};
 use super::message::Message;
 use super::outbox::{Outbox, SENT_WITHIN, SENT_WITHIN_AT_END};
 use super::outstanding::Awaited;
-use super::request::{
-    HIGHEST_FUNCTION, HIGHEST_STEP, INTERROGATIONS, LOCOMOTIVES, Request, function_bit, speed_of,
-};
+use super::request::{HIGHEST_FUNCTION, INTERROGATIONS, LOCOMOTIVES, Request, function_bit, speed_of};
 use super::settings::Settings;
 use super::slot::DrivenSlots;
 use crate::dialogue::{Dialogue, Opening, Repeat};
@@ -266,7 +264,7 @@ impl Client {
 
     fn drive(&mut self, now: Timestamp, train: TrainId, step: SpeedStep) -> (Request, Option<Awaited>) {
         let forward = self.dialogue.locomotives.get(train).and_then(|known| known.forward).unwrap_or(true);
-        let speed = speed_of(step).unwrap_or_default();
+        let speed = speed_of(step, self.dialogue.decoder(train)).unwrap_or_default();
         let awaited = Some(Awaited::Driven(train, speed, forward));
         let Some(slot) = self.slots.of_mut(train) else { return (Request::Locomotive(train.0), awaited) };
         slot.refreshed = now;
@@ -354,13 +352,15 @@ impl Session for Client {
         self.go_on(now);
     }
 
+    fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
+        self.dialogue.set_decoder(train, &LOCOMOTIVES, steps)
+    }
+
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
+        self.dialogue.check_step(&command)?;
         match command {
             Command::Function { function, .. } if function.get() > HIGHEST_FUNCTION => {
                 return Err(CommandError::Function { function, highest: HIGHEST_FUNCTION });
-            }
-            Command::Speed { step, .. } if speed_of(step).is_none() => {
-                return Err(CommandError::Step { step, highest: HIGHEST_STEP });
             }
             Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. } => {
                 CommandError::check_train(train, &LOCOMOTIVES)?;

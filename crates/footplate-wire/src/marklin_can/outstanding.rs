@@ -1,6 +1,6 @@
 //! The answers to requests to the station, and when to repeat them.
 
-use footplate_core::{FunctionNumber, SpeedStep, TimeSpan, TrainId, TurnoutId};
+use footplate_core::{DecoderSteps, FunctionNumber, SpeedStep, TimeSpan, TrainId, TurnoutId};
 
 use super::message::{Direction, Message};
 use super::speed::step_of;
@@ -31,8 +31,8 @@ pub(super) enum Awaited {
     },
     /// The speed of a locomotive, whatever it is.
     AnySpeed(TrainId, Uid),
-    /// That it runs at a step.
-    Speed(TrainId, Uid, SpeedStep),
+    /// That it runs at a step of its decoder.
+    Speed(TrainId, Uid, SpeedStep, DecoderSteps),
     /// The direction of a locomotive, whatever it is.
     AnyDirection(TrainId, Uid),
     Direction(TrainId, Uid, bool),
@@ -69,8 +69,8 @@ impl AwaitedAnswer for Awaited {
             | (Self::Power(false), Message::Stop(_)) => true,
             (Self::AnySpeed(_, uid), Message::Speed { uid: of, speed: Some(_) })
             | (Self::AnyDirection(_, uid), Message::Direction { uid: of, direction: Some(_) }) => uid == of,
-            (Self::Speed(_, uid, step), Message::Speed { uid: of, speed: Some(speed) }) => {
-                uid == of && step_of(speed) == step
+            (Self::Speed(_, uid, step, decoder), Message::Speed { uid: of, speed: Some(speed) }) => {
+                uid == of && step_of(speed, decoder) == step
             }
             (Self::Direction(_, uid, forward), Message::Direction { uid: of, direction: Some(to) }) => {
                 uid == of && to == Direction::of(forward)

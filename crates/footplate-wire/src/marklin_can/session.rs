@@ -5,7 +5,7 @@ mod hearing;
 
 use alloc::vec::Vec;
 
-use footplate_core::{Command, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Command, DecoderSteps, TimeSpan, Timestamp, TrainId};
 
 use super::contacts::Contacts;
 use super::frame::hash_of;
@@ -16,7 +16,6 @@ use super::outstanding::Awaited;
 use super::roster::{ListedLocomotive, Roster};
 use super::settings::{Settings, Transport};
 use super::solenoid::Solenoid;
-use super::speed::{HIGHEST_STEP, speed_of};
 use super::uid::Uid;
 use crate::dialogue::{Dialogue, Opening};
 use crate::outstanding::Outgoing;
@@ -233,11 +232,14 @@ impl Session for Client {
         self.go_on(now);
     }
 
+    fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
+        // A train may be in the station's list, which comes later: its commands are checked then.
+        self.dialogue.set_decoder(train, &(0..=u16::MAX), steps)
+    }
+
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
+        self.dialogue.check_step(&command)?;
         match command {
-            Command::Speed { step, .. } if speed_of(step).is_none() => {
-                return Err(CommandError::Step { step, highest: HIGHEST_STEP });
-            }
             Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. }
                 if self.roster.uid(train).is_none() =>
             {

@@ -31,7 +31,8 @@ const RESET_MODE_ON: u8 = 192;
 /// Added to the number of the one module to read.
 const READ_MODULE: u8 = 192;
 
-const TRAINS: RangeInclusive<u16> = 1..=80;
+/// The addresses of locomotives.
+pub const TRAINS: RangeInclusive<u16> = 1..=80;
 /// The last one is byte 0.
 const TURNOUTS: RangeInclusive<u16> = 1..=256;
 /// Modules that fit between the reset mode and the next code. The 6051 has one S88 bus of 31.

@@ -33,8 +33,8 @@ pub(super) enum Purpose {
     Recovery,
     /// To release the solenoid.
     Release,
-    /// Somebody commanded it.
-    Told(Command),
+    /// A command.
+    Command(Command),
     /// To read modules.
     Poll(Message),
     /// The last word of a session.

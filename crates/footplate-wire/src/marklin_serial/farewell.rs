@@ -28,13 +28,13 @@ struct Driven {
 
 impl Farewell {
     /// A step is waiting for the line. From now on the train may run: its bytes may be on the line at the end.
-    pub(super) fn will_tell(&mut self, train: TrainId, step: SpeedStep) {
+    pub(super) fn will_command(&mut self, train: TrainId, step: SpeedStep) {
         let stood = self.driven.iter().any(|driven| driven.train == train && driven.stands);
         self.mark(train, stood && step == SpeedStep::STAND);
     }
 
     /// A step has left.
-    pub(super) fn told(&mut self, train: TrainId, step: SpeedStep) {
+    pub(super) fn commanded(&mut self, train: TrainId, step: SpeedStep) {
         self.mark(train, step == SpeedStep::STAND);
     }
 

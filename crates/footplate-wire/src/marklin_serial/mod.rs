@@ -23,7 +23,7 @@ mod settings;
 mod silence;
 mod solenoid;
 
-pub use codec::{EncodeError, Frame, Message};
+pub use codec::{EncodeError, Frame, Message, TRAINS};
 pub use line::{
     BYTE_TIME, REPLY_BYTE_SPACING, SOLENOID_HOLD_LONGEST, SOLENOID_HOLD_SHORTEST, TIME_MODEL, time_on_line,
 };

@@ -5,9 +5,9 @@ mod hearing;
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
-use footplate_core::{Command, Event, EventKind, SensorId, TimeSpan, Timestamp};
+use footplate_core::{Command, DecoderSteps, Event, EventKind, SensorId, TimeSpan, Timestamp, TrainId};
 
-use super::codec::{EncodeError, Message};
+use super::codec::{EncodeError, Message, TRAINS};
 use super::decoders::{Decoders, HIGHEST_FUNCTION};
 use super::exchange::{Awaited, Exchange, Purpose, Quiet, Reply, SILENCE, Sending};
 use super::farewell::Farewell;
@@ -185,7 +185,7 @@ impl Interface {
             return Some((Message::SolenoidOff, Purpose::Release));
         }
         if let Some(command) = self.waiting.next_urgent(|_| true) {
-            return Some((self.decoders.message(command), Purpose::Told(command)));
+            return Some((self.decoders.message(command), Purpose::Command(command)));
         }
         if core::mem::take(&mut self.is_overtaken) {
             self.recovery.cancel();
@@ -199,7 +199,7 @@ impl Interface {
             return Some((Message::SolenoidOff, Purpose::Release));
         }
         if let Some(command) = self.waiting.next_usual(|waiting| self.solenoid.lets(waiting)) {
-            return Some((self.decoders.message(command), Purpose::Told(command)));
+            return Some((self.decoders.message(command), Purpose::Command(command)));
         }
         if core::mem::take(&mut self.disturbed) {
             self.recovery.begin(self.power_word());
@@ -262,7 +262,7 @@ impl Interface {
                 }
                 self.farewell.released = self.farewell.begun;
             }
-            Purpose::Told(command) => self.told(at, command),
+            Purpose::Command(command) => self.commanded(at, command),
             Purpose::Poll(request) => {
                 self.reply.clear();
                 self.silence.asked(at);
@@ -279,11 +279,11 @@ impl Interface {
         }
     }
 
-    fn told(&mut self, at: Timestamp, command: Command) {
+    fn commanded(&mut self, at: Timestamp, command: Command) {
         self.decoders.sent(command);
         let kind = match command {
             Command::Speed { train, step } => {
-                self.farewell.told(train, step);
+                self.farewell.commanded(train, step);
                 Some(EventKind::Speed { train, step })
             }
             Command::Reverse { train } => Some(EventKind::Reverse { train }),
@@ -350,6 +350,14 @@ impl Session for Interface {
         self.go_on(now);
     }
 
+    fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
+        CommandError::check_train(train, &TRAINS)?;
+        match steps {
+            DecoderSteps::Fourteen => Ok(()),
+            _ => Err(CommandError::Decoder { train, steps }),
+        }
+    }
+
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
         if self.farewell.begun {
             return Err(CommandError::Closed);
@@ -361,7 +369,7 @@ impl Session for Interface {
         }
         self.decoders.message(command).encode()?;
         if let Command::Speed { train, step } = command {
-            self.farewell.will_tell(train, step);
+            self.farewell.will_command(train, step);
         }
         self.waiting.push(command).map_err(CommandError::TooManyWaiting)?;
         self.go_on(now);

@@ -28,6 +28,6 @@ pub use reply::{Malformed, Reply};
 pub use request::{FunctionSwitch, LAST_WILL, LOCOMOTIVES, Request, TURNOUTS};
 pub use session::Client;
 pub use settings::Settings;
-pub use speed::{Steps, Throttle};
+pub use speed::Throttle;
 pub use states::{CentralState, Firmware, Lock, LocomotiveState, SystemState, TurnoutPosition};
 pub use time_model::{SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST, TIME_MODEL, USUAL_LINE};

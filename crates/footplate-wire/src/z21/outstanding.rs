@@ -1,11 +1,11 @@
 //! The answers to requests to the station, and when to repeat them.
 
-use footplate_core::{FunctionNumber, TimeSpan, TrainId, TurnoutId};
+use footplate_core::{DecoderSteps, FunctionNumber, TimeSpan, TrainId, TurnoutId};
 
 use super::broadcasts::Broadcasts;
 use super::reply::Reply;
 use super::request::Request;
-use super::speed::{Steps, Throttle};
+use super::speed::Throttle;
 use super::states::TurnoutPosition;
 use crate::outstanding::{Awaited as AwaitedAnswer, Repeats};
 
@@ -19,7 +19,7 @@ pub(super) enum Awaited {
     SerialNumber,
     Hardware,
     LockCode,
-    /// That at least this is told.
+    /// At least these broadcasts.
     Broadcasts(Broadcasts),
     Status,
     /// The inputs of a group.
@@ -28,7 +28,7 @@ pub(super) enum Awaited {
     /// The state of a train, whatever it is.
     Locomotive(TrainId),
     /// That a train has this state.
-    Driven(TrainId, Steps, Throttle, bool),
+    Driven(TrainId, DecoderSteps, Throttle, bool),
     /// That a function of a train is on, or off.
     Function(TrainId, FunctionNumber, bool),
     /// That a turnout at an address lies by its second output, or its first.
@@ -60,7 +60,7 @@ impl AwaitedAnswer for Awaited {
             | (Self::Hardware, Reply::Hardware { .. })
             | (Self::LockCode, Reply::LockCode(_))
             | (Self::Status, Reply::Status(_)) => true,
-            (Self::Broadcasts(wanted), Reply::Broadcasts(told)) => told.has(wanted),
+            (Self::Broadcasts(wanted), Reply::Broadcasts(reported)) => reported.has(wanted),
             (Self::Feedback(group), Reply::Feedback { group: of, .. }) => group == *of,
             (Self::Locomotive(train), Reply::Locomotive(state)) => train.0 == state.address,
             (Self::Driven(train, steps, throttle, forward), Reply::Locomotive(state)) => {

@@ -5,9 +5,11 @@
 use alloc::vec::Vec;
 use core::ops::RangeInclusive;
 
+use footplate_core::DecoderSteps;
+
 use super::broadcasts::Broadcasts;
 use super::dataset::{Dataset, X_BUS};
-use super::speed::{Steps, Throttle};
+use super::speed::Throttle;
 use super::states::{FORWARD, address_bytes, address_of};
 
 /// Addresses of locomotives.
@@ -67,7 +69,7 @@ pub enum Request {
     },
     /// Stop all locomotives at once; the track keeps its power.
     StopAll,
-    /// The state of a locomotive. Whoever asks is told of its changes from then on.
+    /// The state of a locomotive. From then on the station reports its changes to the client that asked.
     Locomotive {
         /// Its address.
         address: u16,
@@ -77,7 +79,7 @@ pub enum Request {
         /// Its address.
         address: u16,
         /// The steps of its decoder.
-        steps: Steps,
+        steps: DecoderSteps,
         /// Its speed.
         throttle: Throttle,
         /// Whether it runs forward; absolute.
@@ -181,9 +183,9 @@ impl Request {
             }
             [0xe4, kind @ (0x10 | 0x12 | 0x13), high, low, speed] => {
                 let steps = match kind {
-                    0x10 => Steps::Fourteen,
-                    0x12 => Steps::TwentyEight,
-                    _ => Steps::All,
+                    0x10 => DecoderSteps::Fourteen,
+                    0x12 => DecoderSteps::TwentyEight,
+                    _ => DecoderSteps::All,
                 };
                 let throttle = Throttle::of_code(speed & !FORWARD, steps);
                 let (address, forward) = (address_of(high, low), speed & FORWARD != 0);
@@ -226,9 +228,9 @@ impl Request {
             Self::Drive { address, steps, throttle, forward } => {
                 let [high, low] = address_bytes(address);
                 let kind = match steps {
-                    Steps::Fourteen => 0x10,
-                    Steps::TwentyEight => 0x12,
-                    Steps::All => 0x13,
+                    DecoderSteps::Fourteen => 0x10,
+                    DecoderSteps::TwentyEight => 0x12,
+                    DecoderSteps::All => 0x13,
                 };
                 let speed = throttle.code(steps) | if forward { FORWARD } else { 0 };
                 Dataset::write_x_bus(&[0xe4, kind, high, low, speed], bytes);

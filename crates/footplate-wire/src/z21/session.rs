@@ -6,14 +6,14 @@ mod hearing;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use footplate_core::{Command, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{Command, DecoderSteps, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use super::broadcasts::Broadcasts;
 use super::outstanding::Awaited;
 use super::request::{FunctionSwitch, LOCOMOTIVES, Request};
 use super::sensors::Sensors;
 use super::settings::Settings;
-use super::speed::{HIGHEST_STEP, Throttle};
+use super::speed::Throttle;
 use super::turnouts::Outputs;
 use crate::dialogue::{Dialogue, Opening, Repeat};
 use crate::outstanding::Outgoing;
@@ -205,10 +205,16 @@ impl Client {
     fn drive(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> (Request, Awaited) {
         self.suspected.retain(|(other, ..)| *other != train);
         let forward = self.dialogue.commanded(train, step, reverses);
-        let steps = self.settings.steps;
-        let throttle = steps.throttle_of(step).unwrap_or(Throttle::Stop);
+        let (steps, throttle) = self.throttle(train, step);
         let request = Request::Drive { address: train.0, steps, throttle, forward };
         (request, Awaited::Driven(train, steps, throttle, forward))
+    }
+
+    /// How a train is commanded to run at a step, and in which steps.
+    fn throttle(&self, train: TrainId, step: SpeedStep) -> (DecoderSteps, Throttle) {
+        let decoder = self.dialogue.decoder(train);
+        let steps = if decoder == DecoderSteps::Fourteen { self.settings.steps } else { decoder };
+        (steps, Throttle::of(step, decoder, steps).unwrap_or(Throttle::Stop))
     }
 
     fn throw(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) -> (Request, Awaited) {
@@ -276,11 +282,13 @@ impl Session for Client {
         self.go_on(now);
     }
 
+    fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
+        self.dialogue.set_decoder(train, &LOCOMOTIVES, steps)
+    }
+
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
+        self.dialogue.check_step(&command)?;
         match command {
-            Command::Speed { step, .. } if self.settings.steps.throttle_of(step).is_none() => {
-                return Err(CommandError::Step { step, highest: HIGHEST_STEP });
-            }
             Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. } => {
                 CommandError::check_train(train, &LOCOMOTIVES)?;
             }

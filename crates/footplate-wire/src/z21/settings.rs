@@ -3,19 +3,18 @@
 use alloc::vec::Vec;
 use core::ops::RangeInclusive;
 
-use footplate_core::{TimeSpan, TurnoutId};
+use footplate_core::{DecoderSteps, TimeSpan, TurnoutId};
 
 use super::broadcasts::Broadcasts;
 use super::detectors::{Feedback, GROUP_INPUTS, GROUPS};
 use super::request::{Request, TURNOUTS};
-use super::speed::Steps;
 use super::time_model::SENSOR_DELAY_LONGEST;
 
 /// Settings of a station.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
-    /// The steps of the decoders.
-    pub steps: Steps,
+    /// In which steps trains of 14 steps are commanded; others are commanded in their own.
+    pub steps: DecoderSteps,
     /// What sensors are connected to.
     pub feedback: Feedback,
     /// The station's number of the layout's sensor 0: 1 for input 1 of module 1.
@@ -33,7 +32,7 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            steps: Steps::default(),
+            steps: DecoderSteps::All,
             feedback: Feedback::default(),
             first_sensor: 1,
             last_sensor: GROUP_INPUTS,
@@ -52,7 +51,7 @@ impl Settings {
 
     /// What the station is asked before trains are driven: what it is, what it tells this client, where trains are, and the power.
     ///
-    /// `is_subscribed`: whether it was already told what it is to tell this client. Then it is only asked, so that a station that was
+    /// `is_subscribed`: whether this client has already subscribed. Then it only asks, so that a station that was
     /// restarted is recognised by what it has forgotten.
     pub(super) fn questions(&self, wanted: Broadcasts, is_subscribed: bool, power: bool) -> Vec<Request> {
         let broadcasts = if is_subscribed { Request::Broadcasts } else { Request::SetBroadcasts(wanted) };

@@ -1,18 +1,6 @@
 //! How fast a locomotive is commanded to run, in each of the three numbers of steps that DCC decoders have.
 
-use footplate_core::SpeedStep;
-
-/// The speed steps of a decoder.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Steps {
-    /// 14 steps.
-    Fourteen,
-    /// 28 steps.
-    TwentyEight,
-    /// 126 steps; the station says 128, because it counts stop and emergency stop.
-    #[default]
-    All,
-}
+use footplate_core::{DecoderSteps, SpeedStep};
 
 /// How fast a locomotive is commanded to run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,51 +17,37 @@ pub enum Throttle {
 const COARSE: u8 = 0x0f;
 /// The bit of a speed byte that tells the upper of two steps of 28.
 const UPPER: u8 = 0x10;
-/// The program's highest step on this link.
-pub(super) const HIGHEST_STEP: u8 = 14;
 
-impl Steps {
-    /// The highest.
-    #[must_use]
-    pub const fn highest(self) -> u8 {
-        match self {
-            Self::Fourteen => 14,
-            Self::TwentyEight => 28,
-            Self::All => SpeedStep::HIGHEST,
-        }
+/// A number of steps as the station's answers name it.
+pub(super) const fn code_of(steps: DecoderSteps) -> u8 {
+    match steps {
+        DecoderSteps::Fourteen => 0,
+        DecoderSteps::TwentyEight => 2,
+        DecoderSteps::All => 4,
     }
+}
 
-    /// The throttle for one of the program's 14 steps: all are equally far apart, and the highest is the highest. `None` beyond
-    /// step 14.
-    #[must_use]
-    pub const fn throttle_of(self, step: SpeedStep) -> Option<Throttle> {
-        match step.get() {
-            0 => Some(Throttle::Stop),
-            step if step <= HIGHEST_STEP => Some(Throttle::Step(step * (self.highest() / HIGHEST_STEP))),
-            _ => None,
-        }
-    }
-
-    /// As the station's answers name them.
-    pub(super) const fn code(self) -> u8 {
-        match self {
-            Self::Fourteen => 0,
-            Self::TwentyEight => 2,
-            Self::All => 4,
-        }
-    }
-
-    pub(super) const fn of_code(code: u8) -> Option<Self> {
-        match code {
-            0 => Some(Self::Fourteen),
-            2 => Some(Self::TwentyEight),
-            4 => Some(Self::All),
-            _ => None,
-        }
+/// The number of steps that an answer names.
+pub(super) const fn steps_of(code: u8) -> Option<DecoderSteps> {
+    match code {
+        0 => Some(DecoderSteps::Fourteen),
+        2 => Some(DecoderSteps::TwentyEight),
+        4 => Some(DecoderSteps::All),
+        _ => None,
     }
 }
 
 impl Throttle {
+    /// The throttle for a step of `steps`, among the steps that a locomotive is commanded in: all are equally far apart, and the
+    /// highest is the highest. `None` beyond the highest step.
+    #[must_use]
+    pub fn of(step: SpeedStep, steps: DecoderSteps, commanded: DecoderSteps) -> Option<Self> {
+        match steps.scaled(step, commanded.highest().get())? {
+            0 => Some(Self::Stop),
+            step => Some(Self::Step(step)),
+        }
+    }
+
     /// Whether a locomotive at this throttle is commanded to stand.
     #[must_use]
     pub const fn is_stop(self) -> bool {
@@ -81,27 +55,27 @@ impl Throttle {
     }
 
     /// The lower seven bits of the speed byte (NMRA S-9.2 and S-9.2.1): 0 stop, 1 emergency stop, 2 step 1.
-    pub(super) const fn code(self, steps: Steps) -> u8 {
+    pub(super) const fn code(self, steps: DecoderSteps) -> u8 {
         match (self, steps) {
             (Self::Stop, _) | (Self::Step(0), _) => 0,
             (Self::EmergencyStop, _) => 1,
-            (Self::Step(step), Steps::Fourteen | Steps::All) => step.saturating_add(1),
-            (Self::Step(step), Steps::TwentyEight) => {
+            (Self::Step(step), DecoderSteps::Fourteen | DecoderSteps::All) => step.saturating_add(1),
+            (Self::Step(step), DecoderSteps::TwentyEight) => {
                 step.div_ceil(2) + 1 + if step.is_multiple_of(2) { UPPER } else { 0 }
             }
         }
     }
 
-    pub(super) const fn of_code(code: u8, steps: Steps) -> Self {
+    pub(super) const fn of_code(code: u8, steps: DecoderSteps) -> Self {
         let coarse = code & COARSE;
         match (steps, code) {
-            (Steps::All, 0) => Self::Stop,
-            (Steps::All, 1) => Self::EmergencyStop,
-            (Steps::All, code) => Self::Step(code - 1),
+            (DecoderSteps::All, 0) => Self::Stop,
+            (DecoderSteps::All, 1) => Self::EmergencyStop,
+            (DecoderSteps::All, code) => Self::Step(code - 1),
             _ if coarse == 0 => Self::Stop,
             _ if coarse == 1 => Self::EmergencyStop,
-            (Steps::Fourteen, _) => Self::Step(coarse - 1),
-            (Steps::TwentyEight, code) => {
+            (DecoderSteps::Fourteen, _) => Self::Step(coarse - 1),
+            (DecoderSteps::TwentyEight, code) => {
                 Self::Step(2 * (coarse - 1) - if code & UPPER == 0 { 1 } else { 0 })
             }
         }
@@ -109,10 +83,11 @@ impl Throttle {
 
     /// Whether it is the same speed as another, said in other steps: some stations keep the number of steps that they have
     /// stored for a locomotive.
-    pub(super) fn is_like(self, steps: Steps, other: Self, other_steps: Steps) -> bool {
+    pub(super) fn is_like(self, steps: DecoderSteps, other: Self, other_steps: DecoderSteps) -> bool {
         match (self, other) {
             (Self::Step(step), Self::Step(other)) => {
-                let (highest, other_highest) = (u16::from(steps.highest()), u16::from(other_steps.highest()));
+                let [highest, other_highest] =
+                    [steps, other_steps].map(|steps| u16::from(steps.highest().get()));
                 let (one, two) = (u16::from(step) * other_highest, u16::from(other) * highest);
                 // As near as the coarser of both can say it.
                 2 * one.abs_diff(two) <= if steps == other_steps { 0 } else { highest.max(other_highest) }
@@ -126,30 +101,33 @@ impl Throttle {
 mod tests {
     use super::*;
 
-    const EVERY: [Steps; 3] = [Steps::Fourteen, Steps::TwentyEight, Steps::All];
-
     #[test]
     fn every_code_is_a_throttle_and_back() {
-        for steps in EVERY {
-            let all =
-                (1..=steps.highest()).map(Throttle::Step).chain([Throttle::Stop, Throttle::EmergencyStop]);
+        for steps in DecoderSteps::EVERY {
+            let all = (1..=steps.highest().get())
+                .map(Throttle::Step)
+                .chain([Throttle::Stop, Throttle::EmergencyStop]);
             for throttle in all {
                 assert_eq!(Throttle::of_code(throttle.code(steps), steps), throttle, "{steps:?}");
             }
         }
         // The upper bit of 28 steps means nothing for stops.
-        assert_eq!(Throttle::of_code(0x10, Steps::TwentyEight), Throttle::Stop);
-        assert_eq!(Throttle::of_code(0x11, Steps::TwentyEight), Throttle::EmergencyStop);
+        assert_eq!(Throttle::of_code(0x10, DecoderSteps::TwentyEight), Throttle::Stop);
+        assert_eq!(Throttle::of_code(0x11, DecoderSteps::TwentyEight), Throttle::EmergencyStop);
     }
 
     #[test]
     fn the_steps_of_the_program_are_spread_over_those_of_the_decoder() {
-        for (steps, each) in [(Steps::Fourteen, 1), (Steps::TwentyEight, 2), (Steps::All, 9)] {
+        for (steps, each) in
+            [(DecoderSteps::Fourteen, 1), (DecoderSteps::TwentyEight, 2), (DecoderSteps::All, 9)]
+        {
+            let throttle = |step, of| Throttle::of(SpeedStep::new(step).unwrap(), of, steps);
             for step in 1..=14 {
-                let throttle = steps.throttle_of(SpeedStep::new(step).unwrap());
-                assert_eq!(throttle, Some(Throttle::Step(step * each)));
+                assert_eq!(throttle(step, DecoderSteps::Fourteen), Some(Throttle::Step(step * each)));
             }
-            assert_eq!(steps.throttle_of(SpeedStep::new(15).unwrap()), None);
+            assert_eq!(throttle(15, DecoderSteps::Fourteen), None);
+            let highest = steps.highest();
+            assert!((1..=highest.get()).all(|step| throttle(step, steps) == Some(Throttle::Step(step))));
         }
     }
 
@@ -158,10 +136,14 @@ mod tests {
         let is_like =
             |one, steps, other, others| Throttle::Step(one).is_like(steps, Throttle::Step(other), others);
         assert!(
-            is_like(72, Steps::All, 8, Steps::Fourteen) && is_like(72, Steps::All, 16, Steps::TwentyEight)
+            is_like(72, DecoderSteps::All, 8, DecoderSteps::Fourteen)
+                && is_like(72, DecoderSteps::All, 16, DecoderSteps::TwentyEight)
         );
-        assert!(!is_like(72, Steps::All, 9, Steps::Fourteen) && !is_like(72, Steps::All, 73, Steps::All));
-        assert!(!Throttle::Stop.is_like(Steps::All, Throttle::Step(1), Steps::Fourteen));
-        assert!(Throttle::Stop.is_like(Steps::All, Throttle::EmergencyStop, Steps::All));
+        assert!(
+            !is_like(72, DecoderSteps::All, 9, DecoderSteps::Fourteen)
+                && !is_like(72, DecoderSteps::All, 73, DecoderSteps::All)
+        );
+        assert!(!Throttle::Stop.is_like(DecoderSteps::All, Throttle::Step(1), DecoderSteps::Fourteen));
+        assert!(Throttle::Stop.is_like(DecoderSteps::All, Throttle::EmergencyStop, DecoderSteps::All));
     }
 }

@@ -2,7 +2,9 @@
 
 use core::fmt::{Display, Formatter, Result as FmtResult};
 
-use super::speed::{Steps, Throttle};
+use footplate_core::DecoderSteps;
+
+use super::speed::{Throttle, code_of, steps_of};
 
 /// Added to the speed byte when a locomotive runs forward.
 pub(super) const FORWARD: u8 = 0x80;
@@ -133,7 +135,7 @@ pub struct LocomotiveState {
     /// Whether another hand-set on the X-BUS drives it.
     pub busy: bool,
     /// The steps of its decoder.
-    pub steps: Steps,
+    pub steps: DecoderSteps,
     /// Its speed.
     pub throttle: Throttle,
     /// Whether it runs forward.
@@ -146,7 +148,7 @@ impl LocomotiveState {
     /// Reads what follows the X-header; longer messages of later firmware are read as far as they are known.
     pub(super) fn read(data: &[u8]) -> Option<Self> {
         let [high, low, kind, speed, functions @ ..] = data else { return None };
-        let steps = Steps::of_code(kind & 0x07)?;
+        let steps = steps_of(kind & 0x07)?;
         let mut on = 0;
         for (at, (byte, first)) in functions.iter().zip(FUNCTION_BYTES).enumerate() {
             // 0 D S L F4 F3 F2 F1: lights are F0.
@@ -172,7 +174,7 @@ impl LocomotiveState {
         // From F5 on eight each: F5 to F12, F13 to F20, F21 to F28, F29 to F31.
         let [after_4, after_12, after_20, after_28] =
             [first >> 5 | second << 3, second >> 5 | third << 3, third >> 5 | fourth << 3, fourth >> 5];
-        let kind = self.steps.code() | if self.busy { 0x08 } else { 0 };
+        let kind = code_of(self.steps) | if self.busy { 0x08 } else { 0 };
         let last = with_f29.then_some(after_28);
         [high, low, kind, speed, group, after_4, after_12, after_20].into_iter().chain(last)
     }

@@ -1,6 +1,8 @@
 //! The session with a DCC-EX board: its order, its pace, and what it does when something is lost.
 
-use footplate_core::{Command, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, TrainId, TurnoutId};
+use footplate_core::{
+    Command, DecoderSteps, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, TrainId, TurnoutId,
+};
 use footplate_wire::dcc_ex::{Client, Settings, TurnoutRequests};
 use footplate_wire::{CommandError, LinkNotice, Session};
 
@@ -360,6 +362,26 @@ fn what_the_board_does_not_know_is_refused() {
     for (command, reason) in refusals {
         assert_eq!(desk.client.handle_command(desk.now, command).unwrap_err().to_string(), reason);
     }
+}
+
+#[test]
+fn a_decoder_of_126_steps_and_a_long_address_is_commanded_in_its_own_steps() {
+    let (long, mut desk) = (TrainId(3_850), Desk::opened());
+    let confirmed = [("<t 3850>", "<l 3850 1 128 0>\n"), ("<t 3850 63 1>", "<l 3850 1 192 0>\n")];
+    desk.station.answers.extend(confirmed);
+    desk.client.set_decoder(long, DecoderSteps::All).unwrap();
+    desk.notices.clear();
+    desk.command(speed(long, 63));
+    desk.command(speed(T58, 9));
+    desk.run_for(1_000);
+    let expected = ["<t 3850>", "<t 58>", "<t 3850 63 1>", "<t 58 81 1>"];
+    assert_eq!(desk.texts()[..4], expected);
+    assert_eq!(desk.notices, [], "the board confirms its own speed");
+    desk.client.set_decoder(T58, DecoderSteps::TwentyEight).unwrap();
+    let refused = desk.client.handle_command(desk.now, speed(T58, 29)).unwrap_err();
+    assert_eq!(refused.to_string(), "step 29 is beyond the decoder; steps are 0 to 28");
+    let refused = desk.client.set_decoder(TrainId(10_240), DecoderSteps::All).unwrap_err();
+    assert_eq!(refused.to_string(), "train 10240 has no address here; addresses are 1 to 10239");
 }
 
 #[test]

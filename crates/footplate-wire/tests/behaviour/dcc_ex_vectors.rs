@@ -1,6 +1,6 @@
 //! The texts in `testdata/wire/dcc_ex.csv` mean what is written beside them, in both directions.
 
-use footplate_core::SpeedStep;
+use footplate_core::{DecoderSteps, SpeedStep};
 use footplate_wire::dcc_ex::{Framing, Reply, Request, speed_of};
 
 const VECTORS: &str = include_str!("../../../../testdata/wire/dcc_ex.csv");
@@ -71,7 +71,7 @@ fn what_the_board_would_refuse_is_not_read() {
 
 #[test]
 fn the_steps_of_the_program_are_spread_over_the_speeds_of_the_board() {
-    let speeds = (0..=15).map(|step| speed_of(SpeedStep::new(step).unwrap()));
+    let speeds = (0..=15).map(|step| speed_of(SpeedStep::new(step).unwrap(), DecoderSteps::Fourteen));
     let expected = (0..=14).map(|step| Some(step * 9)).chain([None]);
     assert!(speeds.eq(expected));
 }

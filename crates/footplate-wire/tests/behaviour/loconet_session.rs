@@ -201,6 +201,15 @@ fn reversing_stops_first_and_keeps_the_functions() {
 }
 
 #[test]
+fn a_decoder_of_126_steps_is_driven_in_each_of_them() {
+    let mut desk = Desk::opened();
+    desk.client.set_decoder(T24, footplate_core::DecoderSteps::All).unwrap();
+    desk.command(speed(T24, 63));
+    desk.run_for(500);
+    assert!(desk.commands().contains(&drives(1, 64)), "{:?}", desk.commands());
+}
+
+#[test]
 fn a_stop_waits_for_one_request_at_most_and_is_written_until_the_station_has_it() {
     let mut desk = Desk::opened();
     for train in [T24, T58] {

@@ -1,7 +1,9 @@
 //! Polls and commands share the line: each report says since when its contact may have been closed, commands go first,
 //! and nothing is written that the interface would not take.
 
-use footplate_core::{Command, EventKind, FunctionNumber, SensorId, SpeedStep, TimeSpan, TrainId};
+use footplate_core::{
+    Command, DecoderSteps, EventKind, FunctionNumber, SensorId, SpeedStep, TimeSpan, TrainId,
+};
 use footplate_wire::Session;
 use footplate_wire::marklin_serial::{BYTE_TIME, Interface, Pace, Settings};
 use proptest::prelude::{prop_assert, prop_assert_eq, proptest};
@@ -205,6 +207,12 @@ fn what_the_interface_does_not_know_is_refused_at_once() {
     assert_eq!(refused.to_string(), "train 81 has no address here; addresses are 1 to 80");
     let refused = bench.session.handle_command(bench.now, speed(24, 15)).unwrap_err();
     assert_eq!(refused.to_string(), "step 15 is beyond the decoder; steps are 0 to 14");
+    let refused = bench.session.set_decoder(TrainId(24), DecoderSteps::All).unwrap_err();
+    assert_eq!(
+        refused.to_string(),
+        "train 24 has 126 speed steps, and this station commands 14: leave out its steps, or use another station"
+    );
+    assert_eq!(bench.session.set_decoder(TrainId(24), DecoderSteps::Fourteen), Ok(()));
 }
 
 #[test]

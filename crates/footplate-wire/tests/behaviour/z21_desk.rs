@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::TimeSpan;
+use footplate_core::{DecoderSteps, TimeSpan};
 use footplate_wire::z21::{
     Broadcasts, CentralState, Client, Datasets, Firmware, FunctionSwitch, Lock, LocomotiveState, Reply,
-    Request, Settings, Steps, Throttle, TurnoutPosition,
+    Request, Settings, Throttle, TurnoutPosition,
 };
 use footplate_wire::{LinkNotice, Session};
 
@@ -13,7 +13,7 @@ use crate::desk::ms;
 
 /// As the station says how a locomotive is driven.
 pub(crate) fn state(address: u16, throttle: Throttle, forward: bool) -> LocomotiveState {
-    LocomotiveState { address, busy: false, steps: Steps::All, throttle, forward, functions: 0 }
+    LocomotiveState { address, busy: false, steps: DecoderSteps::All, throttle, forward, functions: 0 }
 }
 
 /// A station that answers what it is asked, and tells by itself only what a test makes it tell.

@@ -1,19 +1,20 @@
 //! What is written is what is read, and noise is read without a panic.
 
+use footplate_core::DecoderSteps;
 use footplate_wire::z21::{
     Broadcasts, CanDetection, CentralState, Datasets, Firmware, FunctionSwitch, Lock, LocoNetDetection,
-    LocomotiveState, RailCom, Reply, Request, Steps, SystemState, Throttle, TurnoutPosition,
+    LocomotiveState, RailCom, Reply, Request, SystemState, Throttle, TurnoutPosition,
 };
 use proptest::prelude::{Just, Strategy, any, prop_assert, prop_assert_eq, prop_oneof, proptest};
 
-fn steps() -> impl Strategy<Value = Steps> {
-    prop_oneof![Just(Steps::Fourteen), Just(Steps::TwentyEight), Just(Steps::All)]
+fn steps() -> impl Strategy<Value = DecoderSteps> {
+    prop_oneof![Just(DecoderSteps::Fourteen), Just(DecoderSteps::TwentyEight), Just(DecoderSteps::All)]
 }
 
 /// Steps and a throttle that they can say.
-fn throttles() -> impl Strategy<Value = (Steps, Throttle)> {
+fn throttles() -> impl Strategy<Value = (DecoderSteps, Throttle)> {
     (steps(), 0_u8..=126).prop_map(|(steps, step)| {
-        let throttle = match step % (steps.highest() + 1) {
+        let throttle = match step % (steps.highest().get() + 1) {
             0 if step % 2 == 0 => Throttle::Stop,
             0 => Throttle::EmergencyStop,
             step => Throttle::Step(step),

@@ -1,9 +1,9 @@
 //! The session with a Z21: its order, its pace, and what it does when datagrams are lost, come twice or overtake one another.
 
-use footplate_core::{Command, EventKind, SensorId, TrainId, TurnoutId};
+use footplate_core::{Command, DecoderSteps, EventKind, SensorId, TrainId, TurnoutId};
 use footplate_wire::z21::{
     Broadcasts, CanDetection, Feedback, FunctionSwitch, Lock, LocoNetDetection, Reply, Request, Settings,
-    Steps, Throttle, TurnoutPosition,
+    Throttle, TurnoutPosition,
 };
 use footplate_wire::{CommandError, LinkNotice, Session};
 
@@ -11,7 +11,7 @@ use crate::desk::{T24, T58, function, ms, speed};
 use crate::z21_desk::{Desk, state};
 
 fn drive(address: u16, throttle: Throttle, forward: bool) -> Request {
-    Request::Drive { address, steps: Steps::All, throttle, forward }
+    Request::Drive { address, steps: DecoderSteps::All, throttle, forward }
 }
 
 #[test]
@@ -88,8 +88,24 @@ fn the_direction_is_read_back_and_then_absolute() {
 }
 
 #[test]
+fn a_decoder_of_other_steps_is_driven_in_its_own() {
+    for (steps, step) in [(DecoderSteps::TwentyEight, 17), (DecoderSteps::All, 63)] {
+        let mut desk = Desk::new(Settings { steps: DecoderSteps::Fourteen, ..Settings::default() });
+        desk.run_until(ms(1_000));
+        desk.client.set_decoder(T58, steps).unwrap();
+        desk.command(speed(T58, step));
+        desk.run_for(1_000);
+        let throttle = Throttle::Step(step);
+        let expected = Request::Drive { address: 58, steps, throttle, forward: true };
+        assert_eq!(desk.commands().last(), Some(&expected));
+    }
+}
+
+#[test]
 fn each_number_of_steps_is_driven_in() {
-    for (steps, step) in [(Steps::Fourteen, 8), (Steps::TwentyEight, 16), (Steps::All, 72)] {
+    for (steps, step) in
+        [(DecoderSteps::Fourteen, 8), (DecoderSteps::TwentyEight, 16), (DecoderSteps::All, 72)]
+    {
         let mut desk = Desk::new(Settings { steps, ..Settings::default() });
         desk.run_until(ms(1_000));
         desk.command(speed(T58, 8));

@@ -24,7 +24,7 @@ use super::plot::PictureFile;
 use crate::clock::{Moment, now};
 use crate::dashboard::ServedAt;
 use crate::layout_check::check_runs;
-use crate::link::Address;
+use crate::link::{Address, NamedTrain};
 pub(super) use explain::Question;
 pub(crate) use live::CalibrationBeginning;
 pub(super) use live::calibration_line;
@@ -95,7 +95,7 @@ pub(crate) struct Arguments {
     method: Method,
     /// Only this train; also the train of logs that name none.
     #[arg(long, value_name = "N")]
-    train: Option<u16>,
+    train: Option<NamedTrain>,
     /// Keep recordings and calibration in this store, and calibrate from all that it holds of the layout.
     #[arg(long, value_name = "FILE")]
     store: Option<PathBuf>,
@@ -143,7 +143,8 @@ impl Arguments {
             let session = live::Session {
                 link,
                 layout,
-                train: TrainId(train),
+                train: train.train,
+                decoder: train.decoder,
                 budget: self.budget,
                 is_afresh: self.afresh,
                 sets_turnouts: self.set_turnouts,
@@ -157,7 +158,7 @@ impl Arguments {
             return session.run(output);
         }
         let layout = layout_named(layout)?.layout;
-        let train = self.train.map(TrainId);
+        let train = self.train.map(|named| named.train);
         let logs = LogFile::read_all(&self.from, &layout, train)?;
         check_runs(&layout, logs.iter().flat_map(|log| &log.recording.runs))?;
         let (batch, mut store) = match &self.store {

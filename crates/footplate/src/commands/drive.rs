@@ -15,7 +15,7 @@ mod trains;
 mod truth;
 mod words;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -23,7 +23,7 @@ use std::sync::Arc;
 use anyhow::{anyhow, bail};
 use clap::Args;
 use footplate_core::track::{Layout, Leg};
-use footplate_core::{Timestamp, TrainId, TurnoutId};
+use footplate_core::{DecoderSteps, Timestamp, TurnoutId};
 use footplate_store::{Journal, NewMachine, Store, layout_named, parse_layout};
 use footplate_wire::Session as _;
 
@@ -49,7 +49,8 @@ use crate::clock::{local, now};
 use crate::dashboard::{Board, Dashboard, LayoutPicture, ServedAt};
 use crate::layout_check::LayoutWatch;
 use crate::link::{
-    Address, Link, MeasuredLine, ObservedLink, SharedTallies, Speed, open, open_session, open_simulated,
+    Address, Link, MeasuredLine, NamedTrain, ObservedLink, SharedTallies, Speed, open, open_session,
+    open_simulated,
 };
 use crate::phones::{Phones, PhonesAt};
 use crate::recorded::Recorded;
@@ -112,9 +113,9 @@ pub(crate) struct Railway {
     /// A motion model as a file; may be repeated.
     #[arg(long = "model", value_name = "FILE")]
     models: Vec<PathBuf>,
-    /// Also drive this train, even without a motion model; may be repeated.
-    #[arg(long = "train", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=80))]
-    trains: Vec<u16>,
+    /// Also drive this train, even without a motion model; with the steps of its decoder, 3850:126, unless it has 14. May be repeated.
+    #[arg(long = "train", value_name = "N[:STEPS]")]
+    trains: Vec<NamedTrain>,
     /// The position of a turnout when the session begins, such as 6=straight; may be repeated.
     #[arg(long = "turnout", value_name = "N=LEG", value_parser = turnout_state)]
     turnouts: Vec<(TurnoutId, Leg)>,
@@ -185,13 +186,11 @@ impl Arguments {
         let opened = store.as_ref().map(stop).transpose()?.flatten();
         // A damaged store is not written to: that could overwrite what can still be salvaged.
         store.as_ref().map_or(Ok(()), Store::check)?;
-        let mut named: BTreeSet<TrainId> = self.railway.trains.iter().copied().map(TrainId).collect();
-        if let Some(simulated) = address.simulated() {
-            named.extend(&simulated.trains);
-        }
+        let named = address.decoders(&self.railway.trains).map_err(|error| anyhow!(error))?;
+        let station = address.kind();
         let known = KnownTrains::gather(
             layout,
-            Sources { files: &self.railway.models, store: store.as_mut(), named },
+            Sources { files: &self.railway.models, store: store.as_mut(), named, station },
         )?;
         drop(store);
         let beginning = self.beginning(&written, known)?;
@@ -318,6 +317,9 @@ impl Arguments {
         let link = ObservedLink::new(link, line.clone());
         let mut session = open_session(address, &link, layout)?;
         session.expect_delays(address.excess(self.railway.line()?.as_ref()));
+        for model in &beginning.models {
+            session.set_decoder(model.train(), DecoderSteps::with(model.highest()))?;
+        }
         let sits_at_terminal = self.is_drawn();
         let is_shown = sits_at_terminal || self.railway.phones.is_some();
         let board = dashboard.map(|dashboard| Arc::clone(&dashboard.board));

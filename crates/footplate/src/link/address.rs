@@ -1,16 +1,19 @@
 //! What a person writes to say which station is meant.
 //!
-//! `sim:LAYOUT[?seed=7&trains=24,58&speed=20&law=…&faults=…&world=…]` is a simulated one in this process,
+//! `sim:LAYOUT[?seed=7&trains=24,58&steps=126&speed=20&law=…&faults=…&world=…]` is a simulated one in this process,
 //! `marklin-serial:DEVICE` or `marklin-serial:tcp://HOST:PORT` a 6050 or 6051 behind a cable, with
 //! `[?pace=careful&cts=no&modules=5&speed=20]`, `dcc-ex:DEVICE` or `dcc-ex:tcp://HOST:PORT` a DCC-EX board, `z21:HOST` a Z21, `marklin-can:HOST` a
 //! Central Station.
 
+use std::collections::BTreeMap;
 use std::str::FromStr;
 
-use footplate_core::{Ratio, TrainId};
+use footplate_core::{DecoderSteps, Ratio, TrainId};
 use footplate_sim::{
     BoardSwitches, CanSwitches, Delivery, LawFamily, LocoNetSwitches, PhysicsRange, Z21Switches,
 };
+use footplate_wire::marklin_can::LocomotiveProtocol;
+use footplate_wire::{dcc_ex, loconet, marklin_serial, z21};
 
 use super::board_address::BoardAddress;
 use super::cable::Cable;
@@ -60,6 +63,46 @@ impl Address {
 }
 
 impl Address {
+    /// Which station it is.
+    pub(crate) const fn kind(&self) -> StationKind {
+        match self {
+            Self::Simulated(simulated) => simulated.station,
+            Self::Serial(_) => StationKind::Marklin,
+            Self::Board(_) => StationKind::DccEx,
+            Self::Z21(_) => StationKind::Z21,
+            Self::Can(_) => StationKind::MarklinCan,
+            Self::LocoNet(_) => StationKind::LocoNet,
+        }
+    }
+
+    /// The trains that a person named, and those of a simulated layout, with the steps of their decoders where they were said.
+    ///
+    /// # Errors
+    /// What the station does not have, for people.
+    pub(crate) fn decoders(
+        &self,
+        named: &[NamedTrain],
+    ) -> Result<BTreeMap<TrainId, Option<DecoderSteps>>, String> {
+        let simulated = self.simulated().into_iter();
+        let simulated =
+            simulated.flat_map(|world| world.trains.iter().map(|train| (*train, Some(world.decoder))));
+        let mut decoders: BTreeMap<_, _> = named.iter().map(|one| (one.train, one.decoder)).collect();
+        for (train, there) in simulated {
+            let said = decoders.entry(train).or_insert(there);
+            if said.is_some() && *said != there {
+                let there = there.unwrap_or(DecoderSteps::Fourteen);
+                return Err(format!(
+                    "train {train} has {there} speed steps on this simulated layout: add `steps=` to the link"
+                ));
+            }
+            *said = there;
+        }
+        for (train, decoder) in &decoders {
+            self.kind().check(*train, decoder.unwrap_or(DecoderSteps::Fourteen))?;
+        }
+        Ok(decoders)
+    }
+
     /// Returns the line to a station outside this program.
     pub(crate) fn cable(&self) -> Option<Cable> {
         match self {
@@ -90,6 +133,31 @@ pub(crate) enum StationKind {
 }
 
 impl StationKind {
+    /// Whether the station has the address of a train, and commands decoders like its own.
+    ///
+    /// # Errors
+    /// What it does not have, for people.
+    pub(crate) fn check(self, train: TrainId, decoder: DecoderSteps) -> Result<(), String> {
+        let (name, addresses) = match self {
+            Self::Marklin => ("a 6051", marklin_serial::TRAINS),
+            Self::DccEx => ("a DCC-EX board", dcc_ex::CABS),
+            Self::Z21 => ("a Z21", z21::LOCOMOTIVES),
+            Self::MarklinCan => ("a Central Station", LocomotiveProtocol::Mfx.addresses()),
+            Self::LocoNet => ("LocoNet", loconet::LOCOMOTIVES),
+        };
+        if !addresses.contains(&train.0) {
+            let (first, last) = (addresses.start(), addresses.end());
+            return Err(format!("train {train} has no address on {name}; addresses are {first} to {last}"));
+        }
+        if self == Self::Marklin && decoder != DecoderSteps::Fourteen {
+            return Err(format!(
+                "train {train} has {decoder} speed steps, and {name} commands 14: choose another station, such as \
+                 station=dcc-ex or --protocol dcc-ex for a simulated layout"
+            ));
+        }
+        Ok(())
+    }
+
     /// Returns the station with this name.
     ///
     /// # Errors
@@ -117,6 +185,8 @@ pub(crate) struct SimulatedAddress {
     pub(crate) seed: u64,
     /// The trains that stand on it.
     pub(crate) trains: Vec<TrainId>,
+    /// The decoders of all of them.
+    pub(crate) decoder: DecoderSteps,
     /// Their law of speed change; if left out, each train has the next one.
     pub(crate) law: Option<LawFamily>,
     /// Whether sensors and turnouts fail at times.
@@ -186,6 +256,9 @@ impl FromStr for Address {
         if let Some(layout) = place.strip_prefix(SIMULATED) {
             let mut address = SimulatedAddress::of(layout)?;
             pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
+            for train in &address.trains {
+                address.station.check(*train, address.decoder)?;
+            }
             Ok(Self::Simulated(address))
         } else if let Some(port) = place.strip_prefix(SERIAL) {
             let mut address = SerialAddress::of(port)?;
@@ -246,6 +319,7 @@ impl SimulatedAddress {
             layout,
             seed: 1,
             trains: TRAINS.to_vec(),
+            decoder: DecoderSteps::Fourteen,
             law: None,
             faults: true,
             physics: PhysicsRange::Usual,
@@ -261,6 +335,7 @@ impl SimulatedAddress {
             "speed" if value == "max" => self.speed = Some(Speed::Unpaced),
             "speed" => self.speed = Some(Speed::Times(times(value)?)),
             "trains" => self.trains = trains(value)?,
+            "steps" => self.decoder = decoder_of(value)?,
             "law" => self.law = Some(law_named(value)?),
             "world" => self.physics = physics_named(value)?,
             "station" => self.station = StationKind::named(value)?,
@@ -278,11 +353,47 @@ impl SimulatedAddress {
             }
             _ => {
                 return Err(format!(
-                    "a simulated link has no `{key}`; it has seed, speed, trains, law, faults, world, station and quirks"
+                    "a simulated link has no `{key}`; it has seed, speed, trains, steps, law, faults, world, station and quirks"
                 ));
             }
         }
         Ok(())
+    }
+}
+
+/// Reads the steps of a decoder.
+pub(crate) fn decoder_of(value: &str) -> Result<DecoderSteps, String> {
+    match value {
+        "14" => Ok(DecoderSteps::Fourteen),
+        "28" => Ok(DecoderSteps::TwentyEight),
+        "126" | "128" => Ok(DecoderSteps::All),
+        _ => Err(format!("`{value}` is no number of decoder steps; decoders have 14, 28 or 126")),
+    }
+}
+
+/// A train as a person names it, `24`, or `3850:126` with the steps of its decoder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct NamedTrain {
+    /// Its address.
+    pub(crate) train: TrainId,
+    /// The steps of its decoder, if they were said.
+    pub(crate) decoder: Option<DecoderSteps>,
+}
+
+impl FromStr for NamedTrain {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (address, steps) = text.split_once(':').map_or((text, None), |(one, two)| (one, Some(two)));
+        let highest = *LocomotiveProtocol::Mfx.addresses().end();
+        let address = address.trim().parse::<u16>().ok().filter(|address| (1..=highest).contains(address));
+        let wanted = || {
+            format!(
+                "`{text}` is no train: write its address, 1 to {highest}, such as 24, or 3850:126 with its decoder's steps"
+            )
+        };
+        let decoder = steps.map(|steps| decoder_of(steps.trim())).transpose()?;
+        Ok(Self { train: TrainId(address.ok_or_else(wanted)?), decoder })
     }
 }
 
@@ -293,9 +404,6 @@ pub(crate) fn trains(value: &str) -> Result<Vec<TrainId>, String> {
         let train = TrainId(number("train", one.trim(), "24,58").map_err(|_| {
             format!("`{one}` is not a train address: separate addresses with commas, for example 24,58")
         })?);
-        if !(1..=80).contains(&train.0) {
-            return Err(format!("train {train} has no address on a 6051; addresses are 1 to 80"));
-        }
         if trains.contains(&train) {
             return Err(format!("train {train} is listed twice: each train needs its own address"));
         }
@@ -401,6 +509,7 @@ mod tests {
             layout: "track-a".into(),
             seed: 7,
             trains: vec![TrainId(24), TrainId(58), TrainId(74)],
+            decoder: DecoderSteps::Fourteen,
             law: None,
             faults: false,
             physics: PhysicsRange::Usual,

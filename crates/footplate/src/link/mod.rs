@@ -40,7 +40,9 @@ mod tapped;
 mod time_models;
 mod z21_address;
 
-pub(crate) use address::{Address, Quirks, SimulatedAddress, Speed, StationKind, law_named, quirks, trains};
+pub(crate) use address::{
+    Address, NamedTrain, Quirks, SimulatedAddress, Speed, StationKind, decoder_of, law_named, quirks, trains,
+};
 pub(crate) use cable::{Arrival, Cable, CableLink};
 pub(crate) use discovery::find_stations;
 pub(crate) use line::{Bequest, Guardian, Heard, Link, Lost, PERSON_MS};

@@ -70,6 +70,7 @@ pub(crate) fn station<'l>(
     let mut switches = if address.faults { LivingSwitches::well_kept() } else { LivingSwitches::faultless() };
     switches.law = address.law;
     switches.physics = address.physics;
+    switches.decoder = address.decoder;
     if !address.faults {
         switches.turnout_failure = Ratio::ZERO;
     }

@@ -1,6 +1,6 @@
 //! The session that an open line is used with: the one of its kind of station.
 
-use footplate_core::{Command, SensorId, Timestamp};
+use footplate_core::{Command, DecoderSteps, SensorId, Timestamp, TrainId};
 use footplate_wire::marklin_serial::Interface;
 use footplate_wire::{Closing, CommandError, Session, Transmit, dcc_ex, loconet, marklin_can, z21};
 
@@ -80,6 +80,9 @@ impl Session for StationSession {
     }
     fn handle_reopened(&mut self, now: Timestamp) {
         self.any_mut().handle_reopened(now);
+    }
+    fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
+        self.any_mut().set_decoder(train, steps)
     }
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
         self.any_mut().handle_command(now, command)

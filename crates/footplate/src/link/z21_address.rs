@@ -3,9 +3,9 @@
 
 use footplate_core::{Ratio, TimeSpan};
 use footplate_sim::Z21Switches;
-use footplate_wire::z21::{Feedback, Settings, Steps};
+use footplate_wire::z21::{Feedback, Settings};
 
-use super::address::{number, times};
+use super::address::{decoder_of, number, times};
 use super::port::host_and_port;
 
 /// The port at which stations listen.
@@ -40,14 +40,7 @@ impl Z21Address {
 
     pub(super) fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
         match (key, value) {
-            ("steps", "14") => self.settings.steps = Steps::Fourteen,
-            ("steps", "28") => self.settings.steps = Steps::TwentyEight,
-            ("steps", "128" | "126") => self.settings.steps = Steps::All,
-            ("steps", _) => {
-                return Err(format!(
-                    "`{value}` is no number of decoder steps: use steps=14, steps=28 or steps=128"
-                ));
-            }
+            ("steps", _) => self.settings.steps = decoder_of(value)?,
             ("feedback", _) => self.settings.feedback = feedback_named(value)?,
             ("first-sensor", _) => self.settings.first_sensor = number(key, value, "17")?,
             ("first-turnout", _) => self.settings.first_turnout = number(key, value, "4")?,
@@ -138,7 +131,7 @@ mod tests {
         let written = "z21:192.168.0.111?steps=28&feedback=can&first-sensor=17&first-turnout=4&straight=first&sensor-delay=60";
         let Ok(Address::Z21(z21)) = written.parse() else { panic!("a Z21") };
         let expected = Settings {
-            steps: Steps::TwentyEight,
+            steps: footplate_core::DecoderSteps::TwentyEight,
             feedback: Feedback::Can,
             first_sensor: 17,
             first_turnout: 4,

@@ -6,6 +6,7 @@ mod calibrate;
 mod calibrations_are_true;
 mod central_station;
 mod compare;
+mod decoder_steps;
 mod demo;
 #[path = "../../../footplate-store/tests/behaviour/drawn_moments.rs"]
 mod drawn_moments;

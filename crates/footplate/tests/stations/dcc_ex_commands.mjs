@@ -12,7 +12,7 @@ import { createInterface } from "node:readline";
 
 const peer = createRequire(join(process.env.STATIONS_AT, "here.js"))("@cloudthrottle/dcc-ex--commands");
 
-const STATION = "simulate layout --station tcp:127.0.0.1:0 --protocol dcc-ex --quirks chatter,merged --trains 24 --seed 7";
+const STATION = "simulate layout --station tcp:127.0.0.1:0 --protocol dcc-ex --quirks chatter,merged --trains 3850 --steps 126 --seed 7";
 /** How long an answer may take (ms). */
 const PATIENCE = 5000;
 
@@ -45,14 +45,14 @@ try {
 
   const { FORWARD, REVERSE } = peer.Direction;
   for (const [speed, direction] of [[62, FORWARD], [126, FORWARD], [30, REVERSE], [0, REVERSE], [-1, FORWARD]]) {
-    const command = peer.throttleCommand({ cab: 24, speed, direction });
-    const loco = await ask(command, /<l 24 [^>]*>/, peer.locoParser);
-    assert.deepEqual([loco.cabId, loco.speed, loco.direction], [24, speed, direction], command);
+    const command = peer.throttleCommand({ cab: 3850, speed, direction });
+    const loco = await ask(command, /<l 3850 [^>]*>/, peer.locoParser);
+    assert.deepEqual([loco.cabId, loco.speed, loco.direction], [3850, speed, direction], command);
     const register = await ask(command, /<T [^>]*>/, peer.throttleParser);
     assert.deepEqual([register.register, register.speed, register.direction], [1, speed, direction], command);
   }
 
-  const lit = await ask(peer.cabCommand({ cab: 24, func: 2, value: 1 }), /<l 24 [^>]*>/, peer.locoParser);
+  const lit = await ask(peer.cabCommand({ cab: 3850, func: 2, value: 1 }), /<l 3850 [^>]*>/, peer.locoParser);
   assert.equal(lit.functionButtons[2].value, 1);
 
   // It answers only when the state changes: one of the two does.
@@ -62,8 +62,8 @@ try {
 
   const states = await ask(peer.listSensorsStatusCommand(), /<[Qq] 79>/);
   assert.ok(states);
-  await ask(peer.emergencyStopCommand(), /<l 24 0 (1|129) \d+>/, peer.locoParser);
-  await ask(peer.forgetCabCommand({ cab: 24 }), /<- 24>/);
+  await ask(peer.emergencyStopCommand(), /<l 3850 0 (1|129) \d+>/, peer.locoParser);
+  await ask(peer.forgetCabCommand({ cab: 3850 }), /<- 3850>/);
   await ask(peer.powerCommand({ power: 0 }), /<p0>/);
   console.log("dcc-ex--commands built what the board read, and read what it said");
 } finally {

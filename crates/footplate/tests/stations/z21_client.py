@@ -13,7 +13,7 @@ from z21aio import DccThrottleSteps, Loco, Turnout, TurnoutPosition, Z21Station
 from z21aio.messages import BROADCAST_LOCO_INFO, LAN_SET_BROADCASTFLAGS
 from z21aio.packet import Packet
 
-STATION = ["simulate", "layout", "--station", "udp:127.0.0.1:0", "--protocol", "z21", "--trains", "24", "--seed", "7"]
+STATION = ["simulate", "layout", "--station", "udp:127.0.0.1:0", "--protocol", "z21", "--trains", "3850", "--steps", "126", "--seed", "7"]
 # R-BUS changes: z21aio has no words for them, but hands their datasets over.
 R_BUS = 0x02
 R_BUS_CHANGED = 0x80
@@ -56,16 +56,16 @@ async def drive(port):
         await until("power on", lambda: power and power[-1])
         await until("a system state with track voltage", lambda: systems and not systems[-1].is_track_voltage_off)
 
-        engine = await Loco.control(station, 24)
+        engine = await Loco.control(station, 3850)
         engine.subscribe_railcom(rail_com.append)
         await engine.drive(50.0)
-        # 50 % of 128 is the code 64: step 63, as the station says it.
+        # 50 % of 128 is the code 64: step 63, as the station says it. The train has 126 steps and a long address.
         await until("the speed", lambda: states and states[-1].speed_value == 64 and not states[-1].reverse)
         await engine.set_headlights(True)
         await engine.function_on(5)
         await engine.function_toggle(30)
         await until("functions", lambda: all(states[-1].functions[number] for number in (0, 5, 30)))
-        await until("RailCom data", lambda: rail_com and rail_com[-1].loco_address == 24 and rail_com[-1].speed > 0)
+        await until("RailCom data", lambda: rail_com and rail_com[-1].loco_address == 3850 and rail_com[-1].speed > 0)
         # It runs: sensors report by themselves.
         await until("a sensor", lambda: any(any(data[1:]) for data in inputs), seconds=30.0)
         await until("the same sensor, free again", lambda: not any(inputs[-1][1:]), seconds=30.0)
@@ -74,7 +74,7 @@ async def drive(port):
         await until("rest", lambda: rail_com[-1].speed == 0)
 
         for steps, code in ((DccThrottleSteps.STEPS_14, 7), (DccThrottleSteps.STEPS_28, 14)):
-            coarse = await Loco.control(station, 24, steps)
+            coarse = await Loco.control(station, 3850, steps)
             await coarse.drive(50.0, reverse=True)
             await until(steps.name, lambda: states[-1].stepping == steps and states[-1].speed_value == code and states[-1].reverse)
         await coarse.stop(reverse=True)

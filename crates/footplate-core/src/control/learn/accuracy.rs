@@ -45,13 +45,13 @@ impl StepAccuracy {
     }
 }
 
-/// The steps that move the train, lowest first.
+/// The steps with numbers of their own that move the train, lowest first.
 #[must_use]
 pub fn usable_steps(model: &MotionModel) -> Vec<SpeedStep> {
     steps(model).filter(|step| model.uses(*step) == StepUse::Moves).collect()
 }
 
-/// All steps of a train's decoder except 0, lowest first.
+/// The steps that a calibration measures, lowest first.
 pub(super) fn steps(model: &MotionModel) -> impl DoubleEndedIterator<Item = SpeedStep> + use<> {
-    (1..=model.highest().get()).filter_map(SpeedStep::new)
+    model.knots()
 }

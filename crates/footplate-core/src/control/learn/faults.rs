@@ -98,9 +98,7 @@ impl Calibrator<'_> {
         self.pushes += 1;
         // The experiment is lost: the planner continues after the next detection.
         self.activity = Activity::Joining;
-        if let Some(next) = SpeedStep::new(step.get() + 1) {
-            self.issue(now, next);
-        }
+        self.issue(now, self.model().next_knot(step));
     }
 
     /// The train is lost: it is commanded to stop, and searched for after a while.

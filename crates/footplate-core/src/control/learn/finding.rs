@@ -106,13 +106,15 @@ impl Calibrator<'_> {
         let usable = usable_steps(model);
         let slow = |step: &&SpeedStep| model.speed(**step, Approach::Below).value <= FINDING_SPEED;
         let known = usable.iter().rev().find(slow).or(usable.first()).copied();
-        let first = libm::ceil(FINDING_STEP * f64::from(model.highest().get())) as u8;
+        let stride = model.stride();
+        let first = stride * libm::ceil(FINDING_STEP * f64::from(model.highest().get() / stride)) as u8;
         let step = known.or(SpeedStep::new(first)).unwrap_or(model.highest());
-        let slower = step.get().saturating_sub(self.slowed_by()).max(SLOWEST_STEP.min(step.get()));
+        let slower = step.get().saturating_sub(stride * self.slowed_by());
+        let slower = slower.max((stride * SLOWEST_STEP).min(step.get()));
         SpeedStep::new(slower).unwrap_or(step)
     }
 
-    /// The number of steps by which the train runs slower after reversals. If lengths are unknown, a turnout or the
+    /// The number of measured steps by which the train runs slower after reversals. If lengths are unknown, a turnout or the
     /// end of the track may be near, and a slower train needs less distance.
     fn slowed_by(&self) -> u8 {
         if self.layout.is_measured() { 0 } else { self.reversals.min(MAX_REVERSALS) }
@@ -132,7 +134,7 @@ impl Calibrator<'_> {
         let highest = self.model().highest();
         let step = self.requested.map_or(self.throttle.step, |(step, _)| step);
         if step < highest {
-            let next = SpeedStep::new(step.get() + 1).unwrap_or(highest);
+            let next = self.model().next_knot(step);
             let timeout = if next == highest { GIVE_UP_AFTER } else { PUSH_UP_AFTER };
             self.issue(now, next);
             self.activity = Activity::Finding { push_at: now + timeout };

@@ -24,7 +24,7 @@ const SLOWEST_CREEP: Speed = Speed::from_mm_per_s(70.0);
 /// A step with this many detections is left out of the staircase.
 pub(super) const KNOWN_FROM: u32 = 2;
 
-/// A step is approached from this many steps above or below: enough for an effect, and quick.
+/// A step is approached from this many measured steps above or below: enough for an effect, and quick.
 const RUN_UP: u8 = 2;
 
 /// Durations of short moves (s), from just moving to nearly the steady speed.
@@ -199,10 +199,10 @@ pub(super) fn creep_step(model: &MotionModel) -> Option<SpeedStep> {
 /// The step to run at first so that a step is reached from the side of an approach.
 pub(super) fn run_up_step(model: &MotionModel, step: SpeedStep, approach: Approach) -> SpeedStep {
     if approach == Approach::Above {
-        let higher = step.get().saturating_add(RUN_UP).min(model.highest().get());
+        let higher = step.get().saturating_add(RUN_UP * model.stride()).min(model.highest().get());
         return SpeedStep::new(higher).unwrap_or(step);
     }
-    let lower = step.get().saturating_sub(RUN_UP);
+    let lower = step.get().saturating_sub(RUN_UP * model.stride());
     let lower = SpeedStep::new(lower).filter(|lower| model.uses(*lower) == StepUse::Moves);
     lower.unwrap_or(SpeedStep::STAND)
 }

@@ -153,7 +153,8 @@ impl Watchdog {
                 }
                 Phase::Waiting { has_asked } => self.wait(now, train, has_asked),
                 Phase::Locating { step, pushed, seen } if now - pushed >= PUSH_AFTER && now < recovery.by => {
-                    let next = SpeedStep::new(step.get() + 1).filter(|next| *next <= recovery.steps.middle);
+                    let next =
+                        Some(recovery.base.next_knot(step)).filter(|next| *next <= recovery.steps.middle);
                     self.creep(now, train, next.unwrap_or(step), seen);
                 }
                 Phase::LearningStop { until } if until <= now => {

@@ -3,7 +3,7 @@
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::model::MotionModel;
-use crate::model::parameters::{Answers, HYSTERESIS, hysteresis_at, speed_at};
+use crate::model::parameters::{Answers, HYSTERESIS, hysteresis_at, speed_at, stride};
 use crate::model::spread::Spread;
 use crate::units::Speed;
 
@@ -23,14 +23,19 @@ impl MotionModel {
         certain
     }
 
-    /// Sets the steady speed at a step. Speeds that are not positive and steps that the decoder does not have are ignored.
+    /// Sets the steady speed at a step. Speeds that are not positive and steps that have no number of their own
+    /// ([`knots`](Self::knots)) are ignored.
     pub fn tell_speed(&mut self, step: SpeedStep, approach: Approach, speed: Speed) {
-        let (place, speed) = (usize::from(step.get()), speed.as_m_per_s());
-        if !(1..=self.steps()).contains(&place) || speed.is_nan() || speed <= 0.0 {
+        let (place, speed, stride) = (usize::from(step.get()), speed.as_m_per_s(), stride(self.steps()));
+        if !(1..=self.steps()).contains(&place)
+            || !place.is_multiple_of(stride)
+            || speed.is_nan()
+            || speed <= 0.0
+        {
             return;
         }
         if approach != Approach::Above {
-            if let Some(slot) = self.values.get_mut(speed_at(place)) {
+            if let Some(slot) = self.values.get_mut(speed_at(place / stride)) {
                 *slot = libm::log(speed);
             }
             return;
@@ -39,7 +44,7 @@ impl MotionModel {
         let common = self.values.get(HYSTERESIS).copied().unwrap_or(0.0);
         let own = (speed - below) / Answers::hysteresis_part(below).max(f64::MIN_POSITIVE) - common;
         let steps = self.steps();
-        if let Some(slot) = self.values.get_mut(hysteresis_at(place, steps)) {
+        if let Some(slot) = self.values.get_mut(hysteresis_at(place / stride, steps)) {
             *slot = own;
         }
     }

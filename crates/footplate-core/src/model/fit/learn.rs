@@ -6,7 +6,9 @@ use super::trip::Trip;
 use super::unknowns::Columns;
 use crate::linalg::Solution;
 use crate::model::motion_model::{Counts, MotionModel};
-use crate::model::parameters::{DOWN, NODES, SPEEDS, START_DELAY, START_NODES, STOP_NODES, UP, shape_at};
+use crate::model::parameters::{
+    DOWN, NODES, SPEEDS, START_DELAY, START_NODES, STOP_NODES, UP, knots, shape_at,
+};
 use crate::model::priors::independent_nodes;
 use crate::model::scatter::ScatterSums;
 use crate::model::spread::Spread;
@@ -80,7 +82,7 @@ fn residual_scale(first: usize, lasting: &[f64], solution: &Solution) -> f64 {
 
 /// How each number changes with ln of the scale by which lengths are measured.
 fn by_scale(values: &[f64], steps: usize) -> impl Iterator<Item = f64> + '_ {
-    let speeds = SPEEDS..SPEEDS + steps;
+    let speeds = SPEEDS..SPEEDS + knots(steps);
     values.iter().enumerate().map(move |(place, value)| {
         // Of delay, lag, κ and ρ all are times but κ, which is a time by speed.
         let of_change =

@@ -8,7 +8,8 @@ use super::robust::RobustWeight;
 use super::trip::{Own, Trip, Walk};
 use super::unknowns::Columns;
 use crate::model::parameters::{
-    Answers, NODES, SHAPES, START_NODES, STOP_NODES, count, hysteresis_at, nodes_about, shape_at, speed_at,
+    Answers, NODES, SHAPES, START_NODES, STOP_NODES, count, hysteresis_at, knots_about, nodes_about,
+    shape_at, speed_at,
 };
 use crate::model::priors::SHAPE_ERROR;
 use crate::model::priors::{FELT, TRIP_DEVIATION, WANDER, change_error};
@@ -132,7 +133,7 @@ impl Point<'_> {
     /// Steady speed (m/s) of a step from below.
     pub(super) fn speed(&self, step: u8) -> f64 {
         let step = usize::from(step).min(self.highest);
-        if step == 0 { 0.0 } else { libm::exp(self.lasting[speed_at(step)]) }
+        if step == 0 { 0.0 } else { libm::exp(Answers::new(self.lasting, self.highest).ln_speed(step)) }
     }
 
     /// A trip's distance to rest from where it began (m), and to the first sensor.
@@ -257,7 +258,11 @@ impl Point<'_> {
     /// correction, smaller speeds and lengths would fit better by least squares.
     fn scaled(&self, terms: &mut Vec<(usize, f64)>, residual: f64, step: u8) {
         if (1..=self.highest).contains(&usize::from(step)) {
-            add_term(terms, speed_at(usize::from(step)), -residual);
+            for (knot, weight) in knots_about(usize::from(step), self.highest) {
+                if weight > 0.0 {
+                    add_term(terms, speed_at(knot), -residual * weight);
+                }
+            }
         }
     }
 
@@ -397,8 +402,10 @@ fn involved(trip: &Trip, segments: &[Segment], highest: usize) -> Vec<usize> {
     let steps = trip.commanded.iter().flat_map(|commanded| [commanded.from, commanded.to]);
     for step in steps.chain(trip.running.map(|(step, _)| step)).map(usize::from) {
         if (1..=highest).contains(&step) {
-            add(speed_at(step));
-            add(hysteresis_at(step, highest));
+            for (knot, _) in knots_about(step, highest).into_iter().filter(|(_, weight)| *weight > 0.0) {
+                add(speed_at(knot));
+                add(hysteresis_at(knot, highest));
+            }
         }
     }
     for up in [false, true] {

@@ -19,7 +19,7 @@ use super::motion_fit::MotionFit;
 use super::robust::RobustWeight;
 use crate::linalg::{NormalEquations, Solution};
 use crate::model::motion_model::MotionModel;
-use crate::model::parameters::{BEND, DOWN, START_NODES, STOP_NODES, UP, count, speed_at};
+use crate::model::parameters::{BEND, DOWN, START_NODES, STOP_NODES, UP, count, knots, speed_at};
 use crate::model::priors::independent_nodes;
 use crate::model::spread::Spread;
 use crate::time::TimeSpan;
@@ -105,7 +105,7 @@ impl Row {
     fn of(stated: &StatedSpeed, highest: usize, scale_column: usize) -> Option<Self> {
         let speed = stated.speed.as_m_per_s();
         let measured = libm::log(speed);
-        let (terms, variance) = terms_at(stated.throttle, highest)?;
+        let (terms, variance) = terms_at(stated.throttle, knots(highest))?;
         if !measured.is_finite() {
             return None;
         }
@@ -184,7 +184,7 @@ impl MotionFit {
         let highest = usize::from(self.model.highest().get());
         let mut equations = self.prior.equations.clone();
         for (first, time) in [(UP, stated.speeding_up), (DOWN, stated.slowing_down)] {
-            let by_step = time.map_or(0.0, |time| time.as_s() / highest.max(1) as f64);
+            let by_step = time.map_or(0.0, |time| time.as_s() / knots(highest).max(1) as f64);
             if by_step > 0.0 && by_step.is_finite() {
                 let deviation = MOMENTUM * by_step;
                 equations.add(&[(first + RHO, 1.0)], by_step, deviation * deviation);

@@ -160,7 +160,8 @@ impl VirtualCentralStation<'_> {
         if self.world.runs_forward(train) == Some(!slot.forward) {
             self.world.turn(train, self.now);
         }
-        self.world.tell(train, step_of(slot.speed), self.now);
+        let step = step_of(slot.speed, self.world.decoder(train));
+        self.world.tell(train, step, self.now);
     }
 
     /// Sends the list of the locomotives on the layout.

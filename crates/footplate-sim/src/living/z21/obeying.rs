@@ -1,9 +1,9 @@
 //! What the virtual Z21 does with a datagram, and what it says to whom.
 
-use footplate_core::{TimeSpan, Timestamp, TrainId};
+use footplate_core::{DecoderSteps, TimeSpan, Timestamp, TrainId};
 use footplate_wire::z21::{
     Broadcasts, CentralState, Dataset, Datasets, Feedback, Firmware, FunctionSwitch, Lock, LocomotiveState,
-    Reply, Request, Steps, SystemState, Throttle, TurnoutPosition,
+    Reply, Request, SystemState, Throttle, TurnoutPosition,
 };
 
 use super::{ANSWER_S, Connected, FORGOTTEN_AFTER, MOST_CLIENTS, MOST_SUBSCRIBED, Slot, VirtualZ21};
@@ -212,7 +212,7 @@ impl VirtualZ21<'_> {
         if let Some(found) = self.slots.iter().position(|slot| slot.address == address) {
             return found;
         }
-        let (steps, throttle) = (Steps::All, Throttle::Stop);
+        let (steps, throttle) = (DecoderSteps::All, Throttle::Stop);
         self.slots.push(Slot { address, steps, throttle, forward: true, functions: 0, received: 0 });
         self.slots.len() - 1
     }
@@ -220,7 +220,7 @@ impl VirtualZ21<'_> {
     /// The track carries a locomotive's speed and direction, unless all are stopped.
     fn command(&mut self, at: Timestamp, slot: Slot) {
         let is_stopped = self.central.0 & CentralState::STOPPED != 0;
-        let highest = slot.steps.highest();
+        let highest = slot.steps.highest().get();
         let speed = match slot.throttle {
             Throttle::Stop => DecoderSpeed::Step { step: 0, highest },
             Throttle::Step(step) if !is_stopped => DecoderSpeed::Step { step, highest },
@@ -232,7 +232,7 @@ impl VirtualZ21<'_> {
     fn state_of(&self, address: u16) -> LocomotiveState {
         let found = self.slots.iter().find(|slot| slot.address == address);
         let (steps, throttle, forward, functions) = found
-            .map_or((Steps::All, Throttle::Stop, true, 0), |slot| {
+            .map_or((DecoderSteps::All, Throttle::Stop, true, 0), |slot| {
                 (slot.steps, slot.throttle, slot.forward, slot.functions)
             });
         LocomotiveState { address, busy: false, steps, throttle, forward, functions }

@@ -7,7 +7,7 @@ use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId, Turnout
 use super::super::opening::Opening;
 use super::super::outstanding::Awaited;
 use super::super::reply::{Malformed, Reply};
-use super::super::request::{Throttle, speed_of};
+use super::super::request::Throttle;
 use super::super::settings::TurnoutRequests;
 use super::super::time_model::occupied;
 use super::Client;
@@ -110,6 +110,8 @@ impl Client {
     /// Compares a train's state with the commanded one.
     fn hear_of_locomotive(&mut self, train: TrainId, driven: Driven, is_confirmed: bool) {
         let is_outstanding = self.dialogue.outstanding.blocks(train, false).is_some();
+        let step = self.dialogue.locomotives.get(train).map_or(SpeedStep::STAND, |known| known.step);
+        let wanted = self.throttle(train, step);
         let Some(locomotive) = self.dialogue.locomotive(train) else { return };
         if is_confirmed {
             locomotive.is_stopped = locomotive.step == SpeedStep::STAND;
@@ -119,7 +121,6 @@ impl Client {
             locomotive.forward = Some(driven.forward);
             return;
         };
-        let wanted = Throttle::Speed(speed_of(locomotive.step).unwrap_or_default());
         let is_as_commanded = driven.throttle == wanted && driven.forward == forward;
         if is_outstanding || is_as_commanded {
             return;

@@ -127,6 +127,7 @@ impl Client {
         if data.slot_use() != SlotUse::InUse && !self.unused.iter().any(|(other, _)| *other == train) {
             self.unused.push((train, data.slot));
         }
+        let decoder = self.dialogue.decoder(train);
         let Some(locomotive) = self.dialogue.locomotive(train) else { return };
         if matches!(answered, Some(answered) if matches!(answered.awaited, Awaited::Driven(..))) {
             locomotive.is_stopped = locomotive.step == SpeedStep::STAND;
@@ -138,7 +139,8 @@ impl Client {
             }
             return;
         };
-        let is_as_commanded = Some(data.speed) == speed_of(locomotive.step) && data.forward == forward;
+        let is_as_commanded =
+            Some(data.speed) == speed_of(locomotive.step, decoder) && data.forward == forward;
         if is_outstanding || is_as_commanded {
             return;
         }

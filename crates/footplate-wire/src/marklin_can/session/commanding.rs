@@ -103,8 +103,9 @@ impl Client {
             Command::Speed { train, step } => {
                 let uid = self.uid(train);
                 self.commanded(train, step, false);
-                let speed = Some(speed_of(step).unwrap_or_default());
-                (Message::Speed { uid, speed }, Awaited::Speed(train, uid, step))
+                let decoder = self.dialogue.decoder(train);
+                let speed = Some(speed_of(step, decoder).unwrap_or_default());
+                (Message::Speed { uid, speed }, Awaited::Speed(train, uid, step, decoder))
             }
             Command::Reverse { train } => {
                 let uid = self.uid(train);

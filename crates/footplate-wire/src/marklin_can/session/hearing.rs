@@ -85,7 +85,7 @@ impl Client {
             }
             Message::Speed { uid, speed: Some(speed) } => {
                 if let Some(train) = self.train(uid) {
-                    self.hear_of_speed(train, step_of(speed), answered);
+                    self.hear_of_speed(train, step_of(speed, self.dialogue.decoder(train)), answered);
                 }
             }
             Message::Direction { uid, direction: Some(direction) } => {
@@ -173,7 +173,8 @@ impl Client {
     }
 
     fn hear_of_speed(&mut self, train: TrainId, step: SpeedStep, answered: Option<Awaited>) {
-        let is_outstanding = self.dialogue.outstanding.has(&Awaited::Speed(train, Uid::ALL, step));
+        let decoder = self.dialogue.decoder(train);
+        let is_outstanding = self.dialogue.outstanding.has(&Awaited::Speed(train, Uid::ALL, step, decoder));
         let Some(locomotive) = self.dialogue.locomotives.get_mut(train).filter(|known| known.is_driven)
         else {
             return;

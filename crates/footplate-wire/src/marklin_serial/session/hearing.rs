@@ -29,7 +29,8 @@ impl Interface {
     /// step, and say again what it may have missed.
     pub(super) fn put_in_doubt(&mut self, now: Timestamp, heard: Timestamp) {
         // What was being said may have come half. A release is said again by itself.
-        if let Exchange::Sending(sending @ Sending { purpose: Purpose::Told(command), .. }) = self.exchange {
+        if let Exchange::Sending(sending @ Sending { purpose: Purpose::Command(command), .. }) = self.exchange
+        {
             self.unanswered.push(command);
             // All its bytes may have arrived: the solenoid is released before another is powered.
             if let Command::Turnout { turnout, .. } = command

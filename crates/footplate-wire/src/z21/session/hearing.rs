@@ -11,7 +11,6 @@ use super::super::outstanding::Awaited;
 use super::super::reply::{Malformed, Reply};
 use super::super::request::Request;
 use super::super::sensors::Change;
-use super::super::speed::Throttle;
 use super::super::states::{Firmware, Lock, LocomotiveState, TurnoutPosition};
 use super::super::time_model::occupied;
 use super::{Client, DETECTORS_WITHIN};
@@ -49,7 +48,7 @@ impl Client {
             Reply::SerialNumber(number) => self.serial_number = number,
             Reply::Hardware { kind, firmware } => self.identified(kind, firmware),
             Reply::LockCode(Lock::Locked) => self.dialogue.notify(LinkNotice::Locked),
-            Reply::Broadcasts(told) => self.hear_of_broadcasts(told),
+            Reply::Broadcasts(reported) => self.hear_of_broadcasts(reported),
             Reply::Locomotive(state) => {
                 let driven = |answered: Outstanding<Awaited>| matches!(answered.awaited, Awaited::Driven(..));
                 self.hear_of_locomotive(&state, answered.is_some_and(driven));
@@ -119,8 +118,8 @@ impl Client {
     }
 
     /// The subscription of this client.
-    fn hear_of_broadcasts(&mut self, told: Broadcasts) {
-        if told.has(self.wanted) {
+    fn hear_of_broadcasts(&mut self, reported: Broadcasts) {
+        if reported.has(self.wanted) {
             self.is_subscribed = true;
             return;
         }
@@ -135,8 +134,8 @@ impl Client {
         if asked.tries < Awaited::REPEATS.most_tries {
             return self.dialogue.outstanding.push(asked);
         }
-        let missing = self.wanted.0 & !told.0;
-        self.wanted = Broadcasts(self.wanted.0 & told.0);
+        let missing = self.wanted.0 & !reported.0;
+        self.wanted = Broadcasts(self.wanted.0 & reported.0);
         self.is_subscribed = true;
         self.dialogue.notify(LinkNotice::BroadcastsRefused { missing });
     }
@@ -155,6 +154,8 @@ impl Client {
     fn hear_of_locomotive(&mut self, state: &LocomotiveState, is_confirmed: bool) {
         let train = TrainId(state.address);
         let is_outstanding = self.dialogue.outstanding.blocks(train, false).is_some();
+        let step = self.dialogue.locomotives.get(train).map_or(SpeedStep::STAND, |known| known.step);
+        let (steps, wanted) = self.throttle(train, step);
         let Some(locomotive) = self.dialogue.locomotive(train) else { return };
         if is_confirmed {
             locomotive.is_stopped = locomotive.step == SpeedStep::STAND;
@@ -164,8 +165,7 @@ impl Client {
             locomotive.forward = Some(state.forward);
             return;
         };
-        let wanted = self.settings.steps.throttle_of(locomotive.step).unwrap_or(Throttle::Stop);
-        let as_fast = state.throttle.is_like(state.steps, wanted, self.settings.steps);
+        let as_fast = state.throttle.is_like(state.steps, wanted, steps);
         if is_outstanding || as_fast && state.forward == forward {
             return self.suspected.retain(|(other, ..)| *other != train);
         }

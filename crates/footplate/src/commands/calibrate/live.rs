@@ -18,7 +18,7 @@ use footplate_core::control::learn::{Calibrator, CalibratorSettings};
 use footplate_core::model::MotionFit;
 use footplate_core::model::StepUse;
 use footplate_core::track::{Layout, TurnoutStates};
-use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{DecoderSteps, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_store::{MotionFile, MotionReplay, Store, StoredModel, layout_named};
 use footplate_wire::Session as _;
 
@@ -34,13 +34,12 @@ use crate::commands::plot::PictureFile;
 use crate::commands::serve::{SetUpMode, SetUpRoute, open_dashboard};
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{ReadOnlyDashboard, ServedAt};
-use crate::link::{Address, Link, MeasuredLine, ObservedLink, Speed, open, open_session, open_simulated};
+use crate::link::{
+    Address, Link, MeasuredLine, NamedTrain, ObservedLink, Speed, open, open_session, open_simulated,
+};
 use crate::recorded::Recorded;
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::SessionJournal;
-
-/// The highest step of the decoders that a 6051 can talk to.
-const HIGHEST_STEP: u8 = 14;
 
 /// The shortest session that finds a train and learns anything (s) ...
 const SHORTEST_S: f64 = 20.0;
@@ -69,6 +68,8 @@ pub(super) struct Session<'a> {
     pub(super) link: &'a Address,
     pub(super) layout: &'a str,
     pub(super) train: TrainId,
+    /// The steps of its decoder, if they were said.
+    pub(super) decoder: Option<DecoderSteps>,
     pub(super) budget: TimeSpan,
     pub(super) is_afresh: bool,
     pub(super) sets_turnouts: bool,
@@ -159,6 +160,7 @@ impl Session<'_> {
         let showing =
             dashboard.as_ref().map(|dashboard| ReadOnlyDashboard::new(dashboard, layout, link.now()));
         let (fit, turnouts) = self.known(layout)?;
+        let decoder = DecoderSteps::with(fit.model().highest());
         let settings = CalibratorSettings {
             budget: self.budget,
             sets_turnouts: self.sets_turnouts,
@@ -172,6 +174,7 @@ impl Session<'_> {
         let line = MeasuredLine::of(self.link, self.store)?;
         let mut session = open_session(self.link, &link, layout)?;
         session.expect_delays(self.link.excess(line.as_ref()));
+        session.set_decoder(self.train, decoder)?;
         let scribe = written.as_ref().and_then(SessionJournal::scribe);
         let recorder = written.as_mut().map(|written| written as &mut dyn Recorder);
         let mut calibrator = Recorded::new(beginning.calibrator(layout), scribe);
@@ -243,9 +246,25 @@ impl Session<'_> {
         }
     }
 
+    /// The steps of the train's decoder: as named, as the simulated layout has it, as a stored model has it, or 14.
+    fn decoder(&self, layout: &Layout) -> anyhow::Result<DecoderSteps> {
+        let named = NamedTrain { train: self.train, decoder: self.decoder };
+        let decoders = self.link.decoders(&[named]).map_err(|error| anyhow!(error))?;
+        if let Some(decoder) = decoders.get(&self.train).copied().flatten() {
+            return Ok(decoder);
+        }
+        let store =
+            self.store.filter(|path| path.exists() && !self.is_afresh).map(Store::open).transpose()?;
+        let Some(store) = store else { return Ok(DecoderSteps::Fourteen) };
+        Ok(match StoredModel::of_store(layout, &store, self.train, now())? {
+            StoredModel::Model(model) => DecoderSteps::with(model.highest()),
+            StoredModel::Outdated | StoredModel::Nothing => DecoderSteps::Fourteen,
+        })
+    }
+
     /// What is known of the train and the turnouts from earlier sessions, so that this one goes on from there.
     fn known(&self, layout: &Layout) -> anyhow::Result<(MotionFit, TurnoutStates)> {
-        let highest = SpeedStep::new(HIGHEST_STEP).unwrap_or_default();
+        let highest = self.decoder(layout)?.highest();
         let nothing = (MotionFit::new(self.train, highest), TurnoutStates::unknown());
         let Some(path) = self.store.filter(|path| path.exists() && !self.is_afresh) else {
             return Ok(nothing);
@@ -262,9 +281,11 @@ impl Session<'_> {
             replay.runs, self.train
         );
         let mut fit = replay.fit;
-        if let StoredModel::Model(model) = StoredModel::of_store(layout, &store, self.train, now())? {
+        if let StoredModel::Model(model) = StoredModel::of_store(layout, &store, self.train, now())?
+            && model.highest() == highest
+        {
             // Which steps do not move it follows from what was tried, not from the events alone.
-            let steps = (1..=HIGHEST_STEP).filter_map(SpeedStep::new);
+            let steps = (1..=highest.get()).filter_map(SpeedStep::new);
             for step in steps.filter(|step| model.uses(*step) != StepUse::Untried) {
                 fit.note_use(step, model.uses(step));
             }

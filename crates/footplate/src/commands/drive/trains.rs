@@ -8,15 +8,11 @@ use footplate_core::model::MotionFit;
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::model::{MotionModel, StepUse};
 use footplate_core::track::{Layout, TurnoutStates};
-use footplate_core::{SpeedStep, TrainId};
+use footplate_core::{DecoderSteps, SpeedStep, TrainId};
 use footplate_store::{MotionFile, MotionReplay, Store, StoredModel};
 
 use crate::clock::now;
-
-/// Locomotive addresses of a Märklin 6050 or 6051.
-const ADDRESSES: std::ops::RangeInclusive<u16> = 1..=80;
-/// The highest step of their decoders.
-const HIGHEST: u8 = 14;
+use crate::link::StationKind;
 
 /// The trains that a session begins with.
 #[derive(Debug, Default)]
@@ -34,8 +30,10 @@ pub(super) struct Sources<'s> {
     /// Files of motion models.
     pub(super) files: &'s [PathBuf],
     pub(super) store: Option<&'s mut Store>,
-    /// Trains to drive even without a model.
-    pub(super) named: BTreeSet<TrainId>,
+    /// Trains to drive even without a model, with the steps of their decoders where they were said.
+    pub(super) named: BTreeMap<TrainId, Option<DecoderSteps>>,
+    /// The station that commands them.
+    pub(super) station: StationKind,
 }
 
 impl KnownTrains {
@@ -50,20 +48,39 @@ impl KnownTrains {
             known.add(layout, &file, &path.display().to_string())?;
         }
         if let Some(store) = sources.store {
-            let others = sources.named.iter().copied().filter(|train| !ADDRESSES.contains(&train.0));
-            for train in ADDRESSES.map(TrainId).chain(others) {
+            let mut trains: BTreeSet<TrainId> = sources.named.keys().copied().collect();
+            trains.extend(store.calibrated_trains()?);
+            for train in trains {
                 if !known.models.contains_key(&train) {
-                    known.add_of_store(layout, store, train, sources.named.contains(&train))?;
+                    known.add_of_store(layout, store, train, sources.named.get(&train).copied())?;
                 }
             }
         }
-        for train in &sources.named {
-            if !known.models.contains_key(train) {
-                let fit = MotionFit::new(*train, highest());
+        for (train, decoder) in &sources.named {
+            if let Some(model) = known.models.get(train) {
+                let has = DecoderSteps::with(model.highest());
+                if let Some(decoder) = decoder.filter(|decoder| *decoder != has) {
+                    bail!(
+                        "the motion model of train {train} is of a decoder with {has} steps, not {decoder}: calibrate it \
+                         again, with `footplate calibrate --train {train}:{decoder} --afresh`"
+                    );
+                }
+            } else {
+                let fit = MotionFit::new(*train, decoder.unwrap_or(DecoderSteps::Fourteen).highest());
                 known.models.insert(*train, fit.model().clone());
                 known.fits.push(fit);
                 known.unknown.push(*train);
             }
+        }
+        // A store may hold trains that only another station can command.
+        let refused = known.models.values().filter_map(|model| {
+            let decoder = DecoderSteps::with(model.highest());
+            sources.station.check(model.train(), decoder).err().map(|why| (model.train(), why))
+        });
+        for (train, why) in refused.collect::<Vec<_>>() {
+            eprintln!("{why}; it is left out");
+            known.models.remove(&train);
+            known.fits.retain(|fit| fit.model().train() != train);
         }
         if known.models.is_empty() {
             bail!(
@@ -94,7 +111,7 @@ impl KnownTrains {
         layout: &Layout,
         store: &mut Store,
         train: TrainId,
-        is_named: bool,
+        named: Option<Option<DecoderSteps>>,
     ) -> anyhow::Result<()> {
         let at = now();
         match StoredModel::of_store(layout, store, train, at)? {
@@ -103,10 +120,14 @@ impl KnownTrains {
                 "the stored model of train {train} is from another version of the formulas; it is \
                  fitted again from the stored events"
             ),
-            StoredModel::Nothing if is_named => {}
+            StoredModel::Nothing if named.is_some() => {}
             StoredModel::Nothing => return Ok(()),
         }
-        let replay = MotionReplay::of_store(layout, store, train, highest(), at)?;
+        let highest = match self.models.get(&train) {
+            Some(model) => model.highest(),
+            None => named.flatten().unwrap_or(DecoderSteps::Fourteen).highest(),
+        };
+        let replay = MotionReplay::of_store(layout, store, train, highest, at)?;
         if replay.is_empty() {
             if let (Some(profile), true) = (&replay.profile, !self.models.contains_key(&train)) {
                 eprintln!("train {train} begins with the speeds of {profile}");
@@ -120,7 +141,7 @@ impl KnownTrains {
         fit.begin_session(&SectionIndex::of(layout));
         if let Some(model) = self.models.get(&train) {
             // The events alone do not show which steps move the train: the model's experiments do.
-            for step in (1..=HIGHEST).filter_map(SpeedStep::new) {
+            for step in (1..=highest.get()).filter_map(SpeedStep::new) {
                 if model.uses(step) != StepUse::Untried {
                     fit.note_use(step, model.uses(step));
                 }
@@ -148,12 +169,8 @@ impl KnownTrains {
             MotionFile::of(layout, model, Some(at)).keep(&mut store, at, at)?;
             // Digests the events of this session now, while all trains are at rest, instead of at the start of the next
             // session.
-            MotionReplay::of_store(layout, &mut store, model.train(), highest(), at)?;
+            MotionReplay::of_store(layout, &mut store, model.train(), model.highest(), at)?;
         }
         Ok(())
     }
-}
-
-fn highest() -> SpeedStep {
-    SpeedStep::new(HIGHEST).unwrap_or_default()
 }

@@ -4,13 +4,15 @@ use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, anyhow};
+use anyhow::Context;
 use clap::Args;
 use footplate_core::model::MotionModel;
 use footplate_core::model::survey::{SectionIndex, TrackSurvey};
 use footplate_core::track::{Hop, Layout, Survey};
-use footplate_core::{HALF_95, Length, SpeedStep, TrainId};
-use footplate_store::{LayoutFile, MotionReplay, Store, layout_named, write_layout, write_whole};
+use footplate_core::{DecoderSteps, HALF_95, Length, TrainId};
+use footplate_store::{
+    LayoutFile, MotionReplay, Store, StoredModel, layout_named, write_layout, write_whole,
+};
 use serde_json::{Value, json};
 
 use crate::clock::now;
@@ -38,9 +40,6 @@ pub(super) struct Arguments {
     #[arg(long)]
     json: bool,
 }
-
-/// The highest step of the decoders that a 6051 supports.
-const HIGHEST: u8 = 14;
 
 impl Arguments {
     pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
@@ -118,9 +117,12 @@ fn models(layout: &Layout, path: &Path) -> anyhow::Result<Vec<MotionModel>> {
             trains.extend(run.accepted().moving().iter().map(|at_start| at_start.train));
         }
     }
-    let highest = SpeedStep::new(HIGHEST).ok_or_else(|| anyhow!("{HIGHEST} is no step"))?;
     let mut models = Vec::new();
     for train in trains {
+        let highest = match StoredModel::of_store(layout, &store, train, at)? {
+            StoredModel::Model(model) => model.highest(),
+            StoredModel::Outdated | StoredModel::Nothing => DecoderSteps::Fourteen.highest(),
+        };
         let replay = MotionReplay::of_store(layout, &mut store, train, highest, at)?;
         if !replay.is_empty() {
             models.push(replay.fit.model().clone());

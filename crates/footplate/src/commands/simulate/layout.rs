@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow};
 use clap::Args;
-use footplate_core::TrainId;
 use footplate_core::track::Layout;
+use footplate_core::{DecoderSteps, TrainId};
 use footplate_sim::{LawFamily, Railway, Scenario, SimulatedRecording};
 use footplate_store::{layout_named, write_sensor_log, write_whole};
 
 use super::super::Outcome;
 use super::station::{Place, Wanted, place_named, serve};
 use super::{recording, truth};
-use crate::link::{Quirks, StationKind, quirks};
+use crate::link::{Quirks, StationKind, decoder_of, quirks};
 
 /// Let model trains run through a scenario, each on its own.
 ///
@@ -58,6 +58,9 @@ pub(super) struct Arguments {
     /// command station on LocoNet behind a server.
     #[arg(long, value_parser = StationKind::named, default_value = "marklin", requires = "station")]
     protocol: StationKind,
+    /// The steps of the trains' decoders: 14, 28 or 126.
+    #[arg(long, value_parser = decoder_of, default_value = "14", requires = "station")]
+    steps: DecoderSteps,
     /// How a station behaves, with commas between: chatter, merged, split, lossy, silent (DCC-EX); lossy, twice, overtaken,
     /// unsubscribed, strict, wrong-xor, short, first-only, locked, can, loconet (Z21); refused, no-echo, no-version, one-slot, merged,
     /// split (LocoNet).
@@ -117,6 +120,7 @@ impl Arguments {
             seed: self.seed,
             trains,
             law: self.law,
+            decoder: self.steps,
             speed: self.speed,
             protocol: self.protocol,
             quirks: self.quirks.unwrap_or_default(),

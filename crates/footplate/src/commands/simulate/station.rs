@@ -4,6 +4,7 @@ use std::io::Write;
 use std::sync::mpsc::Receiver;
 
 use anyhow::{Context, anyhow, bail};
+use footplate_core::DecoderSteps;
 use footplate_core::track::Layout;
 use footplate_sim::{CanTransport, LawFamily};
 use footplate_wire::z21::Feedback;
@@ -44,6 +45,7 @@ pub(super) struct Wanted<'a> {
     pub(super) seed: u64,
     pub(super) trains: Option<&'a str>,
     pub(super) law: Option<LawFamily>,
+    pub(super) decoder: DecoderSteps,
     pub(super) speed: f64,
     pub(super) protocol: StationKind,
     pub(super) quirks: Quirks,
@@ -59,8 +61,12 @@ pub(super) fn serve(
     let mut address = SimulatedAddress::of(wanted.layout).map_err(|error| anyhow!(error))?;
     (address.seed, address.law) = (wanted.seed, wanted.law);
     (address.station, address.quirks) = (wanted.protocol, wanted.quirks);
+    address.decoder = wanted.decoder;
     if let Some(named) = wanted.trains {
         address.trains = trains(named).map_err(|error| anyhow!(error))?;
+    }
+    for train in &address.trains {
+        address.station.check(*train, address.decoder).map_err(|error| anyhow!(error))?;
     }
     if !(wanted.speed > 0.0 && wanted.speed.is_finite()) {
         bail!("speed {} is no multiple of real time; write --speed 20", wanted.speed);

@@ -29,7 +29,7 @@ const END_WEIGHT: f64 = 0.8;
 const SPEED_WEIGHT: f64 = 0.02;
 /// The cost of a command: an error of 1 mm for one second (m² s).
 const COMMAND_COST: f64 = 1e-6;
-/// Steps searched: those around the desired speed, and one more on either side to catch up or fall back.
+/// Steps searched: those around the desired speed, and one on either side, a measured step further, to catch up or fall back.
 const STEPS: usize = 4;
 
 /// A large error is corrected over about this time (s), with at most this difference in speed (m/s), so that the
@@ -82,8 +82,15 @@ impl<'a> StepSearch<'a> {
             0.5 * (first + last) + (behind / CATCH_UP_TIME).clamp(-MAX_CATCH_UP_SPEED, MAX_CATCH_UP_SPEED);
         let below = |step: &SpeedStep| model.steady_speed(*step, Approach::Below).as_m_per_s() <= wanted;
         let under = usable.iter().take_while(|step| below(step)).count();
-        let from = under.saturating_sub(2).min(usable.len().saturating_sub(STEPS));
-        let steps = core::array::from_fn(|nth| usable.get(from + nth).copied());
+        // With finer steps, the outer ones are as far away as they are with 14.
+        let further = usize::from(model.stride()) - 1;
+        let first = under.saturating_sub(2).min(usable.len().saturating_sub(STEPS));
+        let place = |nth: usize| match nth {
+            0 => first.saturating_sub(further),
+            3 => (first + nth + further).min(usable.len().saturating_sub(1)).max(first + nth),
+            nth => first + nth,
+        };
+        let steps = core::array::from_fn(|nth| usable.get(place(nth)).copied());
         let best = Choice { first: None, cost: f64::INFINITY };
         Self { model, path, reference, now, leaves_after, steps, best }
     }

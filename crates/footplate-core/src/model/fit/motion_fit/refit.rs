@@ -9,7 +9,7 @@ use super::{
 };
 use crate::model::MotionModel;
 use crate::model::fit::unknowns::Columns;
-use crate::model::parameters::SPEEDS;
+use crate::model::parameters::{SPEEDS, knots};
 use crate::model::survey::SectionIndex;
 
 /// A fit under way; see [`MotionFit::begin_refit`].
@@ -98,7 +98,7 @@ impl Refit {
         let Some(now) = now.and_then(|now| now.closed(survey)) else { return false };
         let Some(next) = now.solved(columns, &fit.chain.trips) else { return false };
         let before = fit.cost(columns, values, believes_all) + survey.cost(&values.lasting);
-        let logarithms = SPEEDS..SPEEDS + fit.highest();
+        let logarithms = SPEEDS..SPEEDS + knots(fit.highest());
         let longest = values.lasting.get(logarithms.clone()).unwrap_or_default().iter();
         let longest = longest.zip(next.lasting.get(logarithms).unwrap_or_default());
         let longest = longest.map(|(from, to)| (to - from).abs()).fold(0.0, f64::max);
