@@ -88,7 +88,7 @@ impl Supposed {
             supposed.exchange(&[(place, 1.0)], PRIOR[place], known);
         }
         for (sum, usual) in independent_nodes(STOP_NODES) {
-            supposed.exchange(&sum, (usual, model.residual_scales[0]), (usual, LEFT_OVER));
+            supposed.exchange(&sum, (usual, model.residual_scales[0]), (0.0, LEFT_OVER));
         }
         supposed
     }

@@ -92,7 +92,8 @@ fn after_three_hundred_stops_a_model_is_as_accurate_as_stated() {
             off.abs() < 3.0 * deviation + 2.0 && off.abs() < 6.0,
             "step {number}: off by {off} ± {deviation} mm"
         );
-        assert!(deviation < 6.0, "step {number}: ± {deviation} mm after 300 stops");
+        // The fit leaves 6 mm, and no sum of a stop and a start tells another 7 mm (`END_OF_STOP_TIME`).
+        assert!(deviation < 9.2, "step {number}: ± {deviation} mm after 300 stops");
         let speed = fit.model().speed(step(number), Approach::Below);
         let off = speed.value.as_mm_per_s() / (32.0 * f64::from(number)) - 1.0;
         assert!(off.abs() < 0.01, "step {number}: {off}");

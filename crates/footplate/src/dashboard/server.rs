@@ -193,7 +193,7 @@ impl ServedPages {
                     Err(error) => eprintln!("the dashboard is not served: {error}"),
                 }
             });
-            // Work that blocks is given up; nobody waits for its answer.
+            // Work that blocks is given up: no client waits for its answer any more.
             runtime.shutdown_background();
         })?;
         Ok(Self { url, ends: Some(ends), thread: Some(thread) })

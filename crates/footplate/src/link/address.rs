@@ -12,14 +12,14 @@ use footplate_core::{DecoderSteps, Ratio, TrainId};
 use footplate_sim::{
     BoardSwitches, CanSwitches, Delivery, LawFamily, LocoNetSwitches, PhysicsRange, Z21Switches,
 };
-use footplate_wire::marklin_can::LocomotiveProtocol;
-use footplate_wire::{dcc_ex, loconet, marklin_serial, z21};
 
 use super::board_address::BoardAddress;
 use super::cable::Cable;
 use super::can_address::{self, CanAddress};
 use super::loconet_address::{self, LocoNetAddress};
+use super::named_train::{NamedTrain, decoder_of, trains};
 use super::port::Port;
+use super::station_kind::StationKind;
 use super::z21_address::{QUIRKS, Z21Address, set_quirk};
 
 const SIMULATED: &str = "sim:";
@@ -112,66 +112,6 @@ impl Address {
             Self::Z21(z21) => Some(z21.into()),
             Self::Can(can) => Some(can.into()),
             Self::LocoNet(server) => Some(server.into()),
-        }
-    }
-}
-
-/// Which station a simulated layout is behind.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum StationKind {
-    /// A 6051.
-    #[default]
-    Marklin,
-    /// A DCC-EX board.
-    DccEx,
-    /// A Z21.
-    Z21,
-    /// A Central Station on Märklin's CAN bus.
-    MarklinCan,
-    /// A command station on LocoNet, behind a server.
-    LocoNet,
-}
-
-impl StationKind {
-    /// Whether the station has the address of a train, and commands decoders like its own.
-    ///
-    /// # Errors
-    /// What it does not have, for people.
-    pub(crate) fn check(self, train: TrainId, decoder: DecoderSteps) -> Result<(), String> {
-        let (name, addresses) = match self {
-            Self::Marklin => ("a 6051", marklin_serial::TRAINS),
-            Self::DccEx => ("a DCC-EX board", dcc_ex::CABS),
-            Self::Z21 => ("a Z21", z21::LOCOMOTIVES),
-            Self::MarklinCan => ("a Central Station", LocomotiveProtocol::Mfx.addresses()),
-            Self::LocoNet => ("LocoNet", loconet::LOCOMOTIVES),
-        };
-        if !addresses.contains(&train.0) {
-            let (first, last) = (addresses.start(), addresses.end());
-            return Err(format!("train {train} has no address on {name}; addresses are {first} to {last}"));
-        }
-        if self == Self::Marklin && decoder != DecoderSteps::Fourteen {
-            return Err(format!(
-                "train {train} has {decoder} speed steps, and {name} commands 14: choose another station, such as \
-                 station=dcc-ex or --protocol dcc-ex for a simulated layout"
-            ));
-        }
-        Ok(())
-    }
-
-    /// Returns the station with this name.
-    ///
-    /// # Errors
-    /// The names that exist, if there is no such name.
-    pub(crate) fn named(value: &str) -> Result<Self, String> {
-        match value {
-            "marklin" => Ok(Self::Marklin),
-            "dcc-ex" => Ok(Self::DccEx),
-            "z21" => Ok(Self::Z21),
-            "marklin-can" => Ok(Self::MarklinCan),
-            "loconet" => Ok(Self::LocoNet),
-            _ => Err(format!(
-                "there is no simulated station `{value}`; there are marklin, dcc-ex, z21, marklin-can and loconet"
-            )),
         }
     }
 }
@@ -361,57 +301,6 @@ impl SimulatedAddress {
     }
 }
 
-/// Reads the steps of a decoder.
-pub(crate) fn decoder_of(value: &str) -> Result<DecoderSteps, String> {
-    match value {
-        "14" => Ok(DecoderSteps::Fourteen),
-        "28" => Ok(DecoderSteps::TwentyEight),
-        "126" | "128" => Ok(DecoderSteps::All),
-        _ => Err(format!("`{value}` is no number of decoder steps; decoders have 14, 28 or 126")),
-    }
-}
-
-/// A train as a person names it, `24`, or `3850:126` with the steps of its decoder.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct NamedTrain {
-    /// Its address.
-    pub(crate) train: TrainId,
-    /// The steps of its decoder, if they were said.
-    pub(crate) decoder: Option<DecoderSteps>,
-}
-
-impl FromStr for NamedTrain {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (address, steps) = text.split_once(':').map_or((text, None), |(one, two)| (one, Some(two)));
-        let highest = *LocomotiveProtocol::Mfx.addresses().end();
-        let address = address.trim().parse::<u16>().ok().filter(|address| (1..=highest).contains(address));
-        let wanted = || {
-            format!(
-                "`{text}` is no train: write its address, 1 to {highest}, such as 24, or 3850:126 with its decoder's steps"
-            )
-        };
-        let decoder = steps.map(|steps| decoder_of(steps.trim())).transpose()?;
-        Ok(Self { train: TrainId(address.ok_or_else(wanted)?), decoder })
-    }
-}
-
-/// Reads trains as `24,58`.
-pub(crate) fn trains(value: &str) -> Result<Vec<TrainId>, String> {
-    let mut trains = Vec::new();
-    for one in value.split(',') {
-        let train = TrainId(number("train", one.trim(), "24,58").map_err(|_| {
-            format!("`{one}` is not a train address: separate addresses with commas, for example 24,58")
-        })?);
-        if trains.contains(&train) {
-            return Err(format!("train {train} is listed twice: each train needs its own address"));
-        }
-        trains.push(train);
-    }
-    Ok(trains)
-}
-
 /// How often a board that chatters prints other text before a message.
 const CHATTER: Ratio = Ratio::from_percent(50.0);
 /// How often a lossy line drops a byte: one message in fifty is hit.
@@ -556,7 +445,7 @@ mod tests {
             ("sim:track-a?trains=24,24", "its own address"),
             ("sim:track-a?law=newton", "there are"),
             ("sim:track-a?faults=all", "faults=some"),
-            ("sim:track-a?sped=20", "seed, speed, trains, law, faults, world, station and quirks"),
+            ("sim:track-a?sped=20", "seed, speed, trains, steps, law, faults, world, station and quirks"),
             ("sim:track-a?world=mars", "there are usual, "),
             ("sim:track-a?station=intellibox", "marklin, dcc-ex, z21, marklin-can and loconet"),
             ("sim:track-a?quirks=none", "wrong-xor"),

@@ -3,6 +3,7 @@
 //! ```text
 //! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`; board_address  port
 //! can_address  loconet_address  z21_address   a station on Märklin's CAN bus; a LocoNet server; a Z21
+//! named_train  station_kind   a train by its address; which addresses and decoders a station commands
 //! station_session   the session of any station, as one type
 //! line        what every link can do, and what is heard of it
 //! news        what of that a watchdog wants to know
@@ -27,6 +28,7 @@ mod discovery;
 mod line;
 mod loconet_address;
 mod measured;
+mod named_train;
 mod observed;
 mod open;
 mod port;
@@ -34,24 +36,25 @@ mod rhythm;
 mod served;
 mod simulated;
 mod simulated_station;
+mod station_kind;
 mod station_session;
 mod stream;
 mod tapped;
 mod time_models;
 mod z21_address;
 
-pub(crate) use address::{
-    Address, NamedTrain, Quirks, SimulatedAddress, Speed, StationKind, decoder_of, law_named, quirks, trains,
-};
+pub(crate) use address::{Address, Quirks, SimulatedAddress, Speed, law_named, quirks};
 pub(crate) use cable::{Arrival, Cable, CableLink};
 pub(crate) use discovery::find_stations;
 pub(crate) use line::{Bequest, Guardian, Heard, Link, Lost, PERSON_MS};
 pub(crate) use measured::MeasuredLine;
+pub(crate) use named_train::{NamedTrain, decoder_of, trains};
 pub(crate) use observed::{LineTallies, ObservedLink, SharedTallies};
 pub(crate) use open::{module_count, open, open_session, open_simulated, station};
 pub(crate) use rhythm::{PowerCommand, Rhythm};
 pub(crate) use served::{Incoming, Server, listen_for_datagrams, listen_on, open_pseudo_terminal};
 pub(crate) use simulated::SimulatedLink;
 pub(crate) use simulated_station::{FromSimulated, SimulatedStation};
+pub(crate) use station_kind::StationKind;
 pub(crate) use station_session::StationSession;
 pub(crate) use tapped::{Passed, TappedLink};

@@ -8,8 +8,9 @@ use footplate_sim::living::{
 use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, Interface, Pace, Settings};
 use footplate_wire::{dcc_ex, loconet, marklin_can, z21};
 
-use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed, StationKind};
+use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed};
 use super::can_address::CanAddress;
+use super::station_kind::StationKind;
 use super::{Cable, CableLink, Link, Lost, SimulatedLink, SimulatedStation, StationSession};
 #[cfg(unix)]
 use crate::guardian::WardLink;

@@ -3,7 +3,8 @@
 use footplate_core::link::{TimeModel, UsualLine};
 use footplate_wire::{dcc_ex, loconet, marklin_can, marklin_serial, z21};
 
-use super::address::{Address, StationKind};
+use super::address::Address;
+use super::station_kind::StationKind;
 
 impl Address {
     /// The station behind it.

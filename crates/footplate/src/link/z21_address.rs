@@ -5,7 +5,8 @@ use footplate_core::{Ratio, TimeSpan};
 use footplate_sim::Z21Switches;
 use footplate_wire::z21::{Feedback, Settings};
 
-use super::address::{decoder_of, number, times};
+use super::address::{number, times};
+use super::named_train::decoder_of;
 use super::port::host_and_port;
 
 /// The port at which stations listen.
@@ -148,7 +149,7 @@ mod tests {
             ("z21:", "z21:192.168.0.111"),
             ("z21:host:many", "z21:HOST:21105"),
             ("z21:/dev/ttyUSB0", "z21:HOST:21105"),
-            ("z21:host?steps=27", "steps=28"),
+            ("z21:host?steps=27", "14, 28 or 126"),
             ("z21:host?feedback=s88", "feedback=r-bus"),
             ("z21:host?straight=left", "straight=second"),
             ("z21:host?sensor-delay=0", "between 1 and 2000 ms"),

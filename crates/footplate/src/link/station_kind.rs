@@ -1,0 +1,65 @@
+//! The kinds of command stations: which addresses and decoders each commands.
+
+use footplate_core::{DecoderSteps, TrainId};
+use footplate_wire::marklin_can::LocomotiveProtocol;
+use footplate_wire::{dcc_ex, loconet, marklin_serial, z21};
+
+/// Which station a simulated layout is behind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum StationKind {
+    /// A 6051.
+    #[default]
+    Marklin,
+    /// A DCC-EX board.
+    DccEx,
+    /// A Z21.
+    Z21,
+    /// A Central Station on Märklin's CAN bus.
+    MarklinCan,
+    /// A command station on LocoNet, behind a server.
+    LocoNet,
+}
+
+impl StationKind {
+    /// Whether the station has the address of a train, and commands decoders like its own.
+    ///
+    /// # Errors
+    /// What it does not have, for people.
+    pub(crate) fn check(self, train: TrainId, decoder: DecoderSteps) -> Result<(), String> {
+        let (name, addresses) = match self {
+            Self::Marklin => ("a 6051", marklin_serial::TRAINS),
+            Self::DccEx => ("a DCC-EX board", dcc_ex::CABS),
+            Self::Z21 => ("a Z21", z21::LOCOMOTIVES),
+            Self::MarklinCan => ("a Central Station", LocomotiveProtocol::Mfx.addresses()),
+            Self::LocoNet => ("LocoNet", loconet::LOCOMOTIVES),
+        };
+        if !addresses.contains(&train.0) {
+            let (first, last) = (addresses.start(), addresses.end());
+            return Err(format!("train {train} has no address on {name}; addresses are {first} to {last}"));
+        }
+        if self == Self::Marklin && decoder != DecoderSteps::Fourteen {
+            return Err(format!(
+                "train {train} has {decoder} speed steps, and {name} commands 14: choose another station, such as \
+                 station=dcc-ex or --protocol dcc-ex for a simulated layout"
+            ));
+        }
+        Ok(())
+    }
+
+    /// Returns the station with this name.
+    ///
+    /// # Errors
+    /// The names that exist, if there is no such name.
+    pub(crate) fn named(value: &str) -> Result<Self, String> {
+        match value {
+            "marklin" => Ok(Self::Marklin),
+            "dcc-ex" => Ok(Self::DccEx),
+            "z21" => Ok(Self::Z21),
+            "marklin-can" => Ok(Self::MarklinCan),
+            "loconet" => Ok(Self::LocoNet),
+            _ => Err(format!(
+                "there is no simulated station `{value}`; there are marklin, dcc-ex, z21, marklin-can and loconet"
+            )),
+        }
+    }
+}
