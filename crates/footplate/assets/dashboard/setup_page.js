@@ -181,7 +181,7 @@ export function setupPage(root, live, wanted) {
       if (isSettingUp) {
         return [make("p", {}, say("setup-drive-about")), make("div", { class: "does" }, button(say("setup-drive"), () => goOver("/api/setup/drive", {}), { id: "drive" }))];
       }
-      const sensors = live.layout.nodes.filter(({ kind }) => kind === "sensor").map(({ name }) => name);
+      const sensors = live.layout.nodes.filter(({ kind }) => kind === "contact").map(({ name }) => name);
       const train = make("select", { id: "first-train" }, ...setUp().trains.map((one) => new Option(named(one), String(one.address))));
       const place = make("select", { id: "first-place" }, ...sensors.map((name) => new Option(name, name)));
       const straight = () => busy(say("setup-setting"), () => order("turnout all straight"));
