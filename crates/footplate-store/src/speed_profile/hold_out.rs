@@ -45,7 +45,7 @@ impl HoldOut {
         for speed in speeds {
             match settings.last_mut() {
                 Some(last) if last.first().is_some_and(|one| one.throttle == speed.throttle) => {
-                    last.push(speed)
+                    last.push(speed);
                 }
                 _ => settings.push(vec![speed]),
             }

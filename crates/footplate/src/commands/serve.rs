@@ -97,6 +97,6 @@ impl Arguments {
                  railway in the browser, give no more than --store"
             );
         }
-        set_up::run(self.at, self.railway.store().cloned(), self.restart)
+        set_up::run(&self.at, self.railway.store().cloned(), self.restart)
     }
 }

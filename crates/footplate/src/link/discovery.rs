@@ -120,7 +120,7 @@ fn dcc_ex_boards() -> Vec<FoundStation> {
                 Ok(ServiceEvent::ServiceResolved(service))
                     if service.host.to_ascii_lowercase().starts_with(DCC_EX_NAME) =>
                 {
-                    let addresses = service.addresses.iter().map(|address| address.to_ip_addr());
+                    let addresses = service.addresses.iter().map(mdns_sd::ScopedIp::to_ip_addr);
                     found.extend(addresses.filter(std::net::IpAddr::is_ipv4).map(|address| FoundStation {
                         kind: "dcc-ex",
                         place: format!("dcc-ex:tcp://{address}:{}", service.port),

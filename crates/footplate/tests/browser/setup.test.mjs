@@ -120,7 +120,8 @@ test("from nothing to a calibrated train and its first stop", async () => {
   await isShown(page, "#to-layout");
   await page.click("#to-layout");
   await isShown(page, "#track .rail");
-  assert.deepEqual(complaints.filter((text) => !GOES_OVER.test(text)), []);
+  // The two refusals above are answers with status 422; a session's page asks the set-up once for what only a session has (404).
+  assert.deepEqual(complaints.filter((text) => !GOES_OVER.test(text) && !/status of (422|404)/.test(text)), []);
   await page.close();
   await ended(again);
   const third = await started("railway.db");

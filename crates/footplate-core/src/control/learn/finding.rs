@@ -75,7 +75,7 @@ impl Calibrator<'_> {
             .collect();
         let mut until = now;
         for turnout in &unknown {
-            until = until + THROWN_WITHIN;
+            until += THROWN_WITHIN;
             self.requested_turnouts.insert(*turnout, (Leg::Straight, now));
             self.command(Command::Turnout { turnout: *turnout, curved: false });
         }

@@ -84,6 +84,9 @@ struct Reduced {
     trips: Vec<Vec<Eliminated>>,
 }
 
+/// A sum of unknowns, with its prior mean and variance.
+type SurveyRow = (Vec<(usize, f64)>, [f64; 2]);
+
 /// Priors whose widths a fit learns or the layout gives: lengths of sections, stop offsets, and what laws leave over.
 ///
 /// Speeds and lengths could all be longer by the same part, and no timing would tell: where the survey's scale is known, give
@@ -92,7 +95,7 @@ struct Reduced {
 #[derive(Debug, Clone)]
 struct Survey {
     /// Sums of what sections and stops are longer that are nothing, with their variance (m²).
-    rows: Vec<(Vec<(usize, f64)>, [f64; 2])>,
+    rows: Vec<SurveyRow>,
     scale: Option<f64>,
 }
 
@@ -355,7 +358,7 @@ impl MotionFit {
 
 impl Survey {
     fn of(columns: &Columns, index: &SectionIndex, model: &MotionModel) -> Self {
-        let mut rows: Vec<(Vec<(usize, f64)>, [f64; 2])> = columns
+        let mut rows: Vec<SurveyRow> = columns
             .sections
             .iter()
             .map(|(section, column)| (alloc::vec![(*column, 1.0)], [0.0, section_variance(index, *section)]))

@@ -44,7 +44,7 @@ enum Next {
 ///
 /// # Errors
 /// The address cannot be used, or a file cannot be read or written.
-pub(super) fn run(at: ServedAt, store: Option<PathBuf>, restarts: bool) -> anyhow::Result<Outcome> {
+pub(super) fn run(at: &ServedAt, store: Option<PathBuf>, restarts: bool) -> anyhow::Result<Outcome> {
     let store = store.unwrap_or_else(|| USUAL_STORE.into());
     let file = file_beside(&store);
     // Children need the same token; it is printed once, with the address.

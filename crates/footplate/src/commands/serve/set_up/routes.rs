@@ -215,7 +215,7 @@ impl Pages {
             Step { link: Some(link), speed, .. } => changed.set_link(&link, speed)?,
             Step { layout: Some(layout), .. } => changed.set_layout(&layout)?,
             Step { drawn: Some(drawn), .. } => {
-                changed.set_layout(&self.keep_drawn(&drawn, changed.layout.as_deref())?)?
+                changed.set_layout(&self.keep_drawn(&drawn, changed.layout.as_deref())?)?;
             }
             Step { trains: Some(trains), .. } => changed.set_trains(trains)?,
             _ => bail!("name a step: `link`, `layout`, `drawn` or `trains`"),

@@ -102,13 +102,10 @@ impl SetUp {
     /// # Errors
     /// It is not a link.
     pub(super) fn set_link(&mut self, link: &str, speed: Option<f64>) -> anyhow::Result<()> {
-        if link != SIMULATED {
-            match link.parse::<Address>().map_err(anyhow::Error::msg)? {
-                Address::Simulated(_) => {
-                    bail!("choose the simulated railway in the list instead of an address")
-                }
-                _ => {}
-            }
+        if link != SIMULATED
+            && let Address::Simulated(_) = link.parse::<Address>().map_err(anyhow::Error::msg)?
+        {
+            bail!("choose the simulated railway in the list instead of an address");
         }
         if speed.is_some_and(|speed| !(speed > 0.0 && speed <= CALIBRATION_SPEED)) {
             bail!("a simulated railway runs up to {CALIBRATION_SPEED} times as fast as real");
