@@ -174,6 +174,8 @@ test("every path of the description answers as it says", async () => {
     for (const [method, { parameters = [], responses, requestBody }] of Object.entries(methods)) {
       // An emergency stop would end the other tests, and a stream never ends.
       if (["/api/emergency-stop", "/api/events", "/api/slides/{scenario}"].includes(path)) continue;
+      // A session answers only what tells its mode; the set-up answers the rest (setup.test.mjs).
+      if (path.startsWith("/api/setup") && method !== "get" || path === "/api/setup/stations") continue;
       const filled = path.replace(/\{(\w+)\}/g, (_, name) => encodeURIComponent(parameters.find((one) => one.name === name).example));
       const kind = requestBody && Object.keys(requestBody.content)[0];
       const body = kind === "application/json" ? JSON.stringify({ line: "where" }) : kind ? "t_s\n" : undefined;

@@ -32,7 +32,7 @@ test("a train runs at the step of its slider, and its curves show what contacts 
   const { page, complaints } = await openQuietly(browser, `${running.url}#/train/24`);
   await say(running, "turnout all straight");
   await page.waitForSelector("#pages a[aria-current][data-train='24']");
-  await until(page, () => document.querySelector("#step").max === "14");
+  await until(page, () => document.querySelector("#step")?.max === "14");
   await page.locator("#step").focus();
   for (let step = 0; step < 8; step++) await page.keyboard.press("ArrowRight");
   await until(page, () => document.querySelectorAll("#passed tr").length > 6 && document.querySelector("#step-told").textContent === "8");
@@ -92,7 +92,7 @@ test("it is stopped at a place on the track, and what cannot be done says why", 
 
 test("a throttle is locked to its train on a phone, and the train stops when the page is put away", async () => {
   const { page, complaints } = await openQuietly(browser, `${running.url}#/train/24`, { viewport: { width: 390, height: 800 }, hasTouch: true });
-  await until(page, () => document.querySelector("#step").max === "14");
+  await until(page, () => document.querySelector("#step")?.max === "14");
   await page.click("#lock");
   assert.ok(await page.locator("#stop").isVisible());
   for (const gone of ["nav", ".charts", ".orders", "#track"]) assert.ok(await page.locator(gone).isHidden(), gone);

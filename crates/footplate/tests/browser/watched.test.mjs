@@ -62,7 +62,7 @@ test("a calibration says what it tries and why, and its table is what the progra
   const store = join(folder(), "railway.db");
   const program = await calibrating(store);
   const { page, complaints } = await openQuietly(browser, `${program.url}#/calibration`);
-  await until(page, () => !document.querySelector("#progress").hidden);
+  await until(page, () => document.querySelector("#progress")?.hidden === false);
   await until(page, () => /within|: |step/.test(document.querySelector("#about").textContent) && /^\d+ s of 120 s/.test(document.querySelector("#left").textContent));
   await agree(page, () => text(page, "#about"), async () => (await get(program, "api/picture")).calibration.experiment);
   await agree(page, async () => Number((await text(page, "#left")).split(" ")[0]), async () => Math.round((await get(program, "api/picture")).calibration.left_s));
@@ -102,12 +102,12 @@ test("a calibration says what it tries and why, and its table is what the progra
     assert.ok(Math.abs(Number(way.split(" ± ")[0]) - stop) < 0.6, `step ${step} ${approach}: ${way} beside ${stop}`);
   }
   // And what the store says of the train is there with the number of contacts behind it.
-  await until(later.page, () => !document.querySelector("#of-store").hidden);
+  await until(later.page, () => document.querySelector("#of-store")?.hidden === false);
   // The session of calibrating is walked again: its train goes round, and what is tried is said.
   await later.page.goto(`${driving.url}#/recordings`);
   const box = later.page.locator("#recordings tr", { hasText: "calibration" }).locator("input");
   await box.check({ timeout: PATIENCE });
-  await until(later.page, () => document.querySelectorAll(".session").length === 1 && Number(document.querySelector("#time").max) > 100);
+  await until(later.page, () => document.querySelectorAll(".session").length === 1 && Number(document.querySelector("#time")?.max) > 100);
   await later.page.locator("#time").focus();
   for (let page = 0; page < 5; page++) await later.page.keyboard.press("PageUp");
   await until(later.page, () => /^Train 24: \S+ ± \d+ mm, \d+ mm\/s; (speed at|stop from|short move)/.test(document.querySelector(".where").textContent));
