@@ -10,8 +10,6 @@ use super::profile::SpeedProfile;
 
 /// Half the width of the interval that contains 95 % of normal values, in standard deviations.
 const NORMAL_95: f64 = 1.96;
-/// Errors beyond this are gross: other trains, bouncing sensors (as the fit counts them).
-const GROSS: f64 = 5.0;
 
 /// The score of one profile.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -66,7 +64,7 @@ impl HoldOut {
             for compared in fit.compare_stated(&known, &asked).into_iter().flatten() {
                 score.predicted += 1;
                 score.inside += usize::from(compared.sigmas.abs() <= NORMAL_95);
-                score.gross += usize::from(compared.sigmas.abs() > GROSS);
+                score.gross += usize::from(compared.is_gross());
             }
         }
         score

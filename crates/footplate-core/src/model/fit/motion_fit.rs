@@ -324,20 +324,21 @@ impl MotionFit {
     fn scatter_of(&self, columns: &Columns, values: &Values, count: usize) -> ScatterSums {
         let mut sums = self.prior.scatter;
         let point = self.point(columns, &values.lasting);
-        for place in 0..count {
-            let (Some(at), Some(next)) = (self.trip_at(values, place), self.trip_at(values, place + 1))
-            else {
+        let mut stop_before = None;
+        for place in 0..=count {
+            let Some(at) = self.trip_at(values, place) else { break };
+            let rows = point.rows(at, false);
+            let of = |source| rows.iter().find(|row| row.source == source);
+            let Some(stop) = core::mem::replace(&mut stop_before, of(Source::Stop).cloned()) else {
                 continue;
             };
-            let rows = [at, next].map(|at| point.rows(at, false));
-            let of = |nth: usize, source| rows.get(nth)?.iter().find(|row| row.source == source);
-            let (Some(stop), Some(start)) = (of(0, Source::Stop), of(1, Source::Start)) else { continue };
-            let Some(first) = point.first_sensor(next) else { continue };
+            let Some(start) = of(Source::Start) else { continue };
+            let Some(first) = point.first_sensor(at) else { continue };
             let expected = |row: &Linear, own: f64, other: f64| {
                 row.residual * row.residual + own * other / (own + other)
             };
             let late = first.speed * first.speed * start.variance;
-            let found = expected(stop, stop.variance, first.variance + late);
+            let found = expected(&stop, stop.variance, first.variance + late);
             // The train's own scatter is this share of the variance of a stop; offsets and the floor are the rest.
             let share = stop.once / stop.variance;
             let own = share * found / stop.variance + 1.0 - share;

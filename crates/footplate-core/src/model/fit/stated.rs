@@ -19,9 +19,10 @@ use super::motion_fit::MotionFit;
 use super::robust::RobustWeight;
 use crate::linalg::{NormalEquations, Solution};
 use crate::model::motion_model::MotionModel;
-use crate::model::parameters::{BEND, DOWN, START_NODES, STOP_NODES, UP, count, knots, speed_at};
+use crate::model::parameters::{DOWN, START_NODES, STOP_NODES, UP, bend_deviation, count, knots, speed_at};
 use crate::model::priors::independent_nodes;
 use crate::model::spread::Spread;
+use crate::model::survey::{PER_MEDIAN, median};
 use crate::time::TimeSpan;
 use crate::units::Speed;
 
@@ -41,8 +42,6 @@ const MOMENTUM: f64 = 0.6;
 const LEAST_WEIGHT: f64 = 1e-12;
 /// Iterations of the weights; they settle within ten.
 const ITERATIONS: usize = 20;
-/// 1.48 times the median of absolute normal values is their standard deviation.
-const MEDIAN_TO_DEVIATION: f64 = 1.4826;
 /// Beyond so many standard deviations an entry contradicts the others: one in 300 by chance.
 const CONTRADICTS: f64 = 3.0;
 /// Beyond so many it is a gross error and counts for nothing: a report of another train, a length that was mistyped.
@@ -91,6 +90,12 @@ impl StatedFit {
     pub fn contradicts(&self) -> bool {
         self.sigmas.abs() > CONTRADICTS
     }
+
+    /// Whether it is a gross error, which counts for nothing.
+    #[must_use]
+    pub fn is_gross(&self) -> bool {
+        self.sigmas.abs() > GROSS
+    }
 }
 
 /// One entry as a measurement of the train's numbers.
@@ -135,7 +140,7 @@ fn terms_at(throttle: f64, highest: usize) -> Option<(Vec<(usize, f64)>, f64)> {
         return Some((vec![(speed_at(step), 1.0)], 0.0));
     }
     // A parabola between two steps is farthest from its chord in the middle, by an eighth of its second difference.
-    let bend = BEND * (1.0 + 6.0 / (step * step) as f64) * 0.5 * part * (1.0 - part);
+    let bend = bend_deviation(step) * 0.5 * part * (1.0 - part);
     Some((vec![(speed_at(step), 1.0 - part), (speed_at(step + 1), part)], bend * bend))
 }
 
@@ -237,12 +242,11 @@ impl Table {
             let Some(solution) = self.solved(equations, true) else { return };
             self.refit(&solution, true);
         }
-        let mut sizes: Vec<f64> = self.fits.iter().flatten().map(|fit| fit.sigmas.abs()).collect();
-        sizes.sort_by(f64::total_cmp);
-        let median = sizes.get(sizes.len() / 2).copied().unwrap_or(0.0);
+        let sizes = || self.fits.iter().flatten().map(|fit| fit.sigmas.abs());
         // Few entries say little about how well a table was measured.
-        let share = sizes.len() as f64 / (sizes.len() as f64 + 4.0);
-        let factor = 1.0 + share * (MEDIAN_TO_DEVIATION * median - 1.0).max(0.0);
+        let count = sizes().count() as f64;
+        let share = count / (count + 4.0);
+        let factor = 1.0 + share * (PER_MEDIAN * median(sizes()).unwrap_or(0.0) - 1.0).max(0.0);
         self.inflation = factor * factor;
         if factor > 1.0
             && let Some(solution) = self.solved(equations, true)

@@ -8,4 +8,5 @@ mod track_survey;
 pub use layout_test::LayoutTest;
 pub use section_index::SectionIndex;
 pub use survey_test::{OddSection, SurveyTest};
+pub(super) use survey_test::{PER_MEDIAN, median};
 pub use track_survey::TrackSurvey;

@@ -22,7 +22,7 @@ const ODD: f64 = 4.0;
 const DOUBTED: f64 = 1.8;
 
 /// Of a normal distribution, one standard deviation over the median of the sizes.
-const PER_MEDIAN: f64 = 1.4826;
+pub(in crate::model) const PER_MEDIAN: f64 = 1.4826;
 
 /// A section whose surveyed length contradicts what a train made of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -122,7 +122,8 @@ fn compared(sections: &SectionIndex, felt: impl Iterator<Item = (usize, f64, f64
         .collect()
 }
 
-pub(super) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
+/// The median; the upper one of the two middle values of an even number.
+pub(in crate::model) fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
     let mut values: Vec<f64> = values.collect();
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
