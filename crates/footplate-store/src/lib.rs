@@ -88,5 +88,5 @@ pub use vehicle_file::{
     DEFAULT_VEHICLE, LARGEST_VEHICLE, VehicleFile, VehicleFileError, VehicleProblem, default_vehicle,
     parse_vehicle, read_vehicle, write_vehicle,
 };
-pub use whole_file::{WholeFile, write_whole};
+pub use whole_file::{WholeFile, read_at_most, write_whole};
 pub use written_table::{TableForm, UnknownForm};

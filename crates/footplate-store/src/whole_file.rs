@@ -1,7 +1,7 @@
-//! Writing a file so that whoever looks finds the old one or the new one, never half of it.
+//! Files in one piece: written so that whoever looks finds the old one or the new one, never half of it, and read up to a limit.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// A file that is being written beside the one whose place it will take.
@@ -64,6 +64,16 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> io::Result<()> {
     let mut file = WholeFile::create(path)?;
     file.write_all(contents)?;
     file.finish()
+}
+
+/// Reads at most one byte more of a file than `largest`: its parser sees that it is too large, and no file fills the memory.
+///
+/// # Errors
+/// What the system said.
+pub fn read_at_most(path: &Path, largest: usize) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(largest as u64 + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
 }
 
 #[cfg(test)]

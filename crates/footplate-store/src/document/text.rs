@@ -1,13 +1,12 @@
 //! The bytes of a document, and the syntax its name tells.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 use super::error::DocumentError;
 use super::node::Node;
 use super::{toml_tree, yaml_tree};
 use crate::layout_file::TextPlace;
+use crate::whole_file::read_at_most;
 
 /// The largest description that is read, in bytes: a hundred times the longest line at hand.
 pub const LARGEST_DOCUMENT: usize = 1024 * 1024;
@@ -34,11 +33,8 @@ impl Syntax {
 
 /// The bytes of the file at `path`, one more than are read at most.
 pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, DocumentError> {
-    let mut bytes = Vec::new();
-    File::open(path)
-        .and_then(|input| input.take(LARGEST_DOCUMENT as u64 + 1).read_to_end(&mut bytes))
-        .map_err(|source| DocumentError::Read { file: path.display().to_string(), source })?;
-    Ok(bytes)
+    read_at_most(path, LARGEST_DOCUMENT)
+        .map_err(|source| DocumentError::Read { file: path.display().to_string(), source })
 }
 
 /// The tree of a document, and its syntax, which the end of the file's name tells.

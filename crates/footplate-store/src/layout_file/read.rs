@@ -1,7 +1,5 @@
 //! Reads a layout from TOML.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 use footplate_core::track::{
@@ -15,6 +13,7 @@ use toml::Spanned;
 use super::drawing::{Drawing, LayoutFile};
 use super::error::{LayoutFileError, LayoutProblem, TextPlace};
 use crate::sensor_names::{ModuleLetters, SensorNames};
+use crate::whole_file::read_at_most;
 
 /// The largest layout file, in bytes: a hundred times a built-in layout.
 pub const LARGEST_LAYOUT: usize = 1024 * 1024;
@@ -31,9 +30,7 @@ pub(super) const LARGEST_COORDINATE: f64 = 1e6;
 /// The first error, with file, line and column.
 pub fn read_layout(path: &Path) -> Result<LayoutFile, LayoutFileError> {
     let file = path.display().to_string();
-    let mut bytes = Vec::new();
-    File::open(path)
-        .and_then(|input| input.take(LARGEST_LAYOUT as u64 + 1).read_to_end(&mut bytes))
+    let bytes = read_at_most(path, LARGEST_LAYOUT)
         .map_err(|source| LayoutFileError::Read { file: file.clone(), source })?;
     parse_layout(&file, &bytes)
 }

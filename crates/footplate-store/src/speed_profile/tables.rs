@@ -1,8 +1,6 @@
 //! Reads a profile of any form: XML by its first character, tables by the names of their columns.
 
 use std::borrow::Cow;
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 use footplate_core::SpeedStep;
@@ -12,6 +10,7 @@ use super::jmri;
 use super::profile::{ProfileSpeed, SpeedProfile};
 use crate::layout_file::TextPlace;
 use crate::table::{LastLine, Row, Table, shown};
+use crate::whole_file::read_at_most;
 
 /// The largest file that is read, in bytes: roster entries with thousands of CVs and labels have a tenth of it.
 pub const LARGEST_PROFILE: usize = 4 * 1024 * 1024;
@@ -45,9 +44,7 @@ pub struct ProfileContext {
 /// The first error, with file, line and column; a file without a usable speed.
 pub fn read_profile(path: &Path, context: &ProfileContext) -> Result<SpeedProfile, ProfileError> {
     let file = path.display().to_string();
-    let mut bytes = Vec::new();
-    File::open(path)
-        .and_then(|input| input.take(LARGEST_PROFILE as u64 + 1).read_to_end(&mut bytes))
+    let bytes = read_at_most(path, LARGEST_PROFILE)
         .map_err(|source| ProfileError::Read { file: file.clone(), source })?;
     parse_profile(&file, &bytes, context)
 }

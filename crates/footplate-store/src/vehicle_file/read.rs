@@ -1,7 +1,5 @@
 //! Reads a vehicle from TOML.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 use footplate_core::odometry::wheels::{Axle, SlideProtection, Vehicle, VehicleError, Wheelset};
@@ -13,6 +11,7 @@ use super::entries::{Entries, Fault, Number, kind, table, text};
 use super::error::{VehicleFileError, VehicleProblem};
 use super::keys::{BRAKE_COMMAND, Key, SLIDE_PROTECTION, THRESHOLDS};
 use crate::layout_file::TextPlace;
+use crate::whole_file::read_at_most;
 
 /// The largest file that is read, in bytes: a hundred times the built-in vehicle.
 pub const LARGEST_VEHICLE: usize = 64 * 1024;
@@ -32,9 +31,7 @@ pub struct VehicleFile {
 /// What is wrong with it, with file, line and column.
 pub fn read_vehicle(path: &Path) -> Result<VehicleFile, VehicleFileError> {
     let file = path.display().to_string();
-    let mut bytes = Vec::new();
-    File::open(path)
-        .and_then(|input| input.take(LARGEST_VEHICLE as u64 + 1).read_to_end(&mut bytes))
+    let bytes = read_at_most(path, LARGEST_VEHICLE)
         .map_err(|source| VehicleFileError::Read { file: file.clone(), source })?;
     parse_vehicle(&file, &bytes)
 }

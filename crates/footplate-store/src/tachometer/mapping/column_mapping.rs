@@ -1,7 +1,5 @@
 //! The pairs of a mapping, from the command line and from a file.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 use toml::de::{DeTable, DeValue};
@@ -10,6 +8,7 @@ use super::error::MappingError;
 use super::target::Target;
 use crate::layout_file::TextPlace;
 use crate::table::shown;
+use crate::whole_file::read_at_most;
 
 /// The largest file that is read, in bytes: a hundred times one that names every column.
 const LARGEST: usize = 64 * 1024;
@@ -49,9 +48,7 @@ impl ColumnMapping {
     /// What is wrong with it, with file, line and column.
     pub fn take_file(&mut self, path: &Path) -> Result<(), MappingError> {
         let file = path.display().to_string();
-        let mut bytes = Vec::new();
-        File::open(path)
-            .and_then(|input| input.take(LARGEST as u64 + 1).read_to_end(&mut bytes))
+        let bytes = read_at_most(path, LARGEST)
             .map_err(|source| MappingError::Read { file: file.clone(), source })?;
         self.take_bytes(&file, &bytes)
     }

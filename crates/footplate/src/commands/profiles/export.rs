@@ -1,14 +1,13 @@
 //! `footplate profiles export`: our speeds and stops for other programs.
 
-use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::{Context, bail, ensure};
 use clap::{Args, ValueEnum};
 use footplate_core::TrainId;
 use footplate_store::{
-    LARGEST_PROFILE, ModelRow, Store, write_profile_table, write_roster_entry, write_whole,
+    LARGEST_PROFILE, ModelRow, Store, read_at_most, write_profile_table, write_roster_entry, write_whole,
 };
 
 use super::stored_model;
@@ -77,9 +76,7 @@ impl Arguments {
             ),
             (Format::Jmri, Some(entry)) => {
                 let name = entry.display().to_string();
-                let mut bytes = Vec::new();
-                File::open(entry)
-                    .and_then(|file| file.take(LARGEST_PROFILE as u64 + 1).read_to_end(&mut bytes))
+                let bytes = read_at_most(entry, LARGEST_PROFILE)
                     .with_context(|| format!("{name}: cannot be read"))?;
                 let written = write_roster_entry(&name, &bytes, &rows)?;
                 let out = self.out.as_ref().unwrap_or(entry);
