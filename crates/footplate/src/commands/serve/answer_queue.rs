@@ -41,7 +41,7 @@ const MAX_ERROR_TEXT: u64 = 1 << 16;
 
 /// A rejected request.
 #[derive(Debug)]
-pub(crate) struct Rejection(StatusCode, String);
+pub(super) struct Rejection(pub(super) StatusCode, pub(super) String);
 
 impl IntoResponse for Rejection {
     fn into_response(self) -> Response {

@@ -180,10 +180,7 @@ impl Session {
         };
         let (output, errors) = (text(output), text(errors));
         let report = if output.trim().is_empty() { errors } else { output };
-        Ok(StepResult {
-            status: status.code().unwrap_or(i32::from(crate::BAD_INPUT)),
-            report: report.trim().to_owned(),
-        })
+        Ok(StepResult::of(status, &report))
     }
 }
 
@@ -243,6 +240,5 @@ fn check_link(set_up: &SetUp, store: &Path) -> anyhow::Result<StepResult> {
         .output()
         .context("cannot start `footplate doctor`")?;
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().to_owned();
-    let report = [text(&run.stdout), text(&run.stderr)].join("\n").trim().to_owned();
-    Ok(StepResult { status: run.status.code().unwrap_or(i32::from(crate::BAD_INPUT)), report })
+    Ok(StepResult::of(run.status, &[text(&run.stdout), text(&run.stderr)].join("\n")))
 }

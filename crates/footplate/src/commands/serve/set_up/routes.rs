@@ -26,7 +26,8 @@ use footplate_store::{BUILT_IN, write_whole};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::set_up_file::{NamedTrain, SetUp};
+use super::super::answer_queue::Rejection;
+use super::set_up_file::{SetUp, SetUpTrain};
 use super::{Next, check_link};
 use crate::clock::now;
 use crate::commands::written_layout::WrittenLayout;
@@ -132,7 +133,7 @@ struct Step {
     speed: Option<f64>,
     layout: Option<String>,
     drawn: Option<DrawnLayout>,
-    trains: Option<Vec<NamedTrain>>,
+    trains: Option<Vec<SetUpTrain>>,
 }
 
 /// A layout as text.
@@ -195,7 +196,7 @@ impl Pages {
     fn json(&self) -> anyhow::Result<Value> {
         let set_up = self.set_up();
         let calibrated = set_up.calibrated(&self.shared.store)?;
-        let trains = set_up.trains.iter().map(|NamedTrain { address, name }| {
+        let trains = set_up.trains.iter().map(|SetUpTrain { address, name }| {
             json!({
                 "address": address, "name": name, "is_calibrated": calibrated.contains(address),
                 "calibration": set_up.calibrations.get(address),
@@ -294,8 +295,7 @@ fn answer(result: anyhow::Result<Value>) -> Response {
     match result {
         Ok(json) => (no_store, Json(json)).into_response(),
         Err(error) => {
-            (StatusCode::UNPROCESSABLE_ENTITY, no_store, Json(json!({ "error": format!("{error:#}") })))
-                .into_response()
+            (no_store, Rejection(StatusCode::UNPROCESSABLE_ENTITY, format!("{error:#}"))).into_response()
         }
     }
 }
@@ -304,7 +304,7 @@ fn answer(result: anyhow::Result<Value>) -> Response {
 fn read<T>(body: Result<Json<T>, JsonRejection>, work: impl FnOnce(T) -> anyhow::Result<Value>) -> Response {
     match body {
         Ok(Json(read)) => answer(work(read)),
-        Err(wrong) => (wrong.status(), Json(json!({ "error": wrong.body_text() }))).into_response(),
+        Err(wrong) => Rejection(wrong.status(), wrong.body_text()).into_response(),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::process::ExitStatus;
 
 use anyhow::{Context, bail};
 use footplate_core::TrainId;
@@ -31,7 +32,7 @@ pub(super) fn file_beside(store: &Path) -> PathBuf {
 
 /// A train of the set-up.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct NamedTrain {
+pub(super) struct SetUpTrain {
     pub(super) address: u16,
     #[serde(default)]
     pub(super) name: String,
@@ -43,6 +44,16 @@ pub(super) struct StepResult {
     /// The exit status: 0 done, 1 falls short, 2 not possible.
     pub(super) status: i32,
     pub(super) report: String,
+}
+
+impl StepResult {
+    /// What a process came to; one that a signal ended counts as not possible.
+    pub(super) fn of(status: ExitStatus, report: &str) -> Self {
+        Self {
+            status: status.code().unwrap_or(i32::from(crate::BAD_INPUT)),
+            report: report.trim().to_owned(),
+        }
+    }
 }
 
 /// A railway as far as it is set up.
@@ -58,7 +69,7 @@ pub(super) struct SetUp {
     #[serde(default)]
     pub(super) layout: Option<String>,
     #[serde(default)]
-    pub(super) trains: Vec<NamedTrain>,
+    pub(super) trains: Vec<SetUpTrain>,
     /// The last check of the link.
     #[serde(default)]
     pub(super) line: Option<StepResult>,
@@ -134,7 +145,7 @@ impl SetUp {
     ///
     /// # Errors
     /// An address is impossible or used twice, a name is too long, or a simulated layout has no room for them.
-    pub(super) fn set_trains(&mut self, trains: Vec<NamedTrain>) -> anyhow::Result<()> {
+    pub(super) fn set_trains(&mut self, trains: Vec<SetUpTrain>) -> anyhow::Result<()> {
         if trains.is_empty() {
             bail!("name one train at least: the address of its decoder");
         }
@@ -142,7 +153,7 @@ impl SetUp {
             bail!("{} trains are too many: the set-up takes {MOST_TRAINS}", trains.len());
         }
         let mut addresses = BTreeSet::new();
-        for NamedTrain { address, name } in &trains {
+        for SetUpTrain { address, name } in &trains {
             if !ADDRESSES.contains(address) {
                 bail!("{address} is not an address: use 1 to {}", ADDRESSES.end());
             }
@@ -226,8 +237,8 @@ impl SetUp {
 mod tests {
     use super::*;
 
-    fn train(address: u16) -> NamedTrain {
-        NamedTrain { address, name: String::new() }
+    fn train(address: u16) -> SetUpTrain {
+        SetUpTrain { address, name: String::new() }
     }
 
     #[test]
