@@ -52,7 +52,7 @@ pub use layout_file::{
 pub use line_file::{LineFile, LineFileForm, parse_line, read_line, write_line};
 pub use motion_file::{
     ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionFileError, MotionSectionForm, MotionStepForm,
-    StopOffsetForm, StoredModel, UseForm,
+    SensorScatterForm, StopOffsetForm, StoredModel, UseForm,
 };
 pub use motion_replay::MotionReplay;
 pub use position_series::{PositionSeries, PositionSeriesError};

@@ -8,6 +8,7 @@
 //! motion_model  parameters  priors     what is known of a train, and before it ran
 //! segment  decoder_kind                how it moves after one command
 //! scatter  spread  variation           how single stops, runs and sessions differ
+//! sensor_scatter                       how exactly sensors trip
 //! expected_information  objective      what an experiment would teach
 //! passage                              reports of a run, judged one by one
 //! fit/                                 from trips to a model
@@ -29,6 +30,7 @@ pub mod report;
 mod rescaled;
 mod scatter;
 mod segment;
+mod sensor_scatter;
 mod short_moves;
 mod spread;
 mod standing_times;
@@ -46,5 +48,6 @@ pub use passage::{Drive, Passage, PassageTracker, STALE_WITHIN, Sighting};
 pub(crate) use priors::{FELT, TRIP_DEVIATION, WANDER, change_error, run_variance, section_variance};
 pub use rescaled::{MeasuredRatio, Rescaling};
 pub(crate) use segment::{Pace, Segment, SpeedCommand};
+pub(crate) use sensor_scatter::SensorScatter;
 pub use short_moves::ShortMoveForecast;
 pub(crate) use standing_times::StandingTimes;

@@ -9,13 +9,14 @@ use super::priors::end_of_stop;
 use super::priors::section_variance;
 use super::scatter::Scatter;
 use super::segment::{Pace, Segment, SpeedCommand};
+use super::sensor_scatter::SensorVariances;
 use super::spread::Spread;
 use super::stop_offset::{StopOffsets, stop_offset_share};
 use super::survey::SectionIndex;
 use super::variation::Variation;
 use crate::estimate::Estimate;
 use crate::event::Approach;
-use crate::ids::{SpeedStep, TrainId};
+use crate::ids::{SensorId, SpeedStep, TrainId};
 use crate::linalg::Gaussian;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Hop, HopId};
@@ -79,6 +80,9 @@ pub struct MotionModel {
     pub(crate) counts: Vec<[Counts; 2]>,
     /// The scatter of stops and starts.
     pub(crate) scatter: Scatter,
+    /// The scatter of sensors.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(crate) sensor_variances: SensorVariances,
     /// The change of each number for one standard deviation of the survey's scale.
     pub(crate) scale: Vec<f64>,
     pub(crate) date: Timestamp,
@@ -114,6 +118,7 @@ impl MotionModel {
             uses: vec![StepUse::Untried; steps + 1],
             counts: vec![[Counts::default(); 2]; steps + 1],
             scatter: Scatter::USUAL,
+            sensor_variances: SensorVariances::default(),
             scale: vec![0.0; super::parameters::count(steps)],
             date: Timestamp::ZERO,
         }
@@ -316,6 +321,11 @@ impl MotionModel {
     /// One standard deviation (m) of stops from a speed (m/s).
     pub(crate) fn scatter(&self, speed: f64) -> f64 {
         self.scatter.of_stop(speed)
+    }
+
+    /// Variance (m²) of where a sensor trips about its usual place.
+    pub(crate) fn sensor_variance(&self, sensor: Option<SensorId>) -> f64 {
+        self.sensor_variances.of(sensor)
     }
 
     /// By how much (m) a stop from a speed (m/s) is longer that ends on a hop, or at an unknown place.

@@ -6,9 +6,10 @@ use core::fmt;
 
 use super::motion_model::{Counts, MotionModel, StepUse};
 use super::scatter::Scatter;
+use super::sensor_scatter::SensorVariances;
 use super::spread::Spread;
 use super::stop_offset::StopOffsets;
-use crate::ids::{SpeedStep, TrainId};
+use crate::ids::{SensorId, SpeedStep, TrainId};
 use crate::time::Timestamp;
 
 /// All that a [`MotionModel`] is made of, to the last bit. What it means for a step or a section the model says.
@@ -38,6 +39,10 @@ pub struct MotionNumbers {
     pub scatter_scale: f64,
     /// What stops scatter by besides, whatever their speed (m): slopes, loads, shapes of laws that are none of ours.
     pub scatter_floor: f64,
+    /// Standard deviation (m) of where a sensor trips that the train has not passed often, and of each that it has.
+    pub usual_sensor_scatter: f64,
+    /// See [`usual_sensor_scatter`](Self::usual_sensor_scatter).
+    pub sensor_scatter: Vec<(SensorId, f64)>,
     /// How late or early starts are against what trains usually do.
     pub start_scale: f64,
     /// What each number is off by for one standard deviation of the survey's scale.
@@ -93,6 +98,7 @@ impl MotionModel {
     pub fn numbers(&self) -> MotionNumbers {
         let side = self.values.len();
         let counts = |one: &Counts| (one.contacts, one.stops);
+        let deviation = |(sensor, variance): (&SensorId, &f64)| (*sensor, libm::sqrt(*variance));
         MotionNumbers {
             train: self.train(),
             highest: self.highest(),
@@ -107,6 +113,8 @@ impl MotionModel {
             scatter_scale: self.scatter.stops,
             scatter_floor: self.scatter.floor,
             start_scale: self.scatter.starts,
+            usual_sensor_scatter: libm::sqrt(self.sensor_variances.usual),
+            sensor_scatter: self.sensor_variances.of_sensor.iter().map(deviation).collect(),
             scale: self.scale.clone(),
             date: self.date,
         }
@@ -159,8 +167,10 @@ impl MotionModel {
             numbers.stop_offset_deviation,
             numbers.residual_scales[0],
             numbers.residual_scales[1],
+            numbers.usual_sensor_scatter,
         ];
-        if scatters.iter().any(|scatter| !scatter.is_finite() || *scatter < 0.0) {
+        let sensors = numbers.sensor_scatter.iter().map(|(_, scatter)| scatter);
+        if scatters.iter().chain(sensors).any(|scatter| !scatter.is_finite() || *scatter < 0.0) {
             return wrong("scatters");
         }
         model.values.clone_from(&numbers.values);
@@ -181,6 +191,11 @@ impl MotionModel {
             stops: numbers.scatter_scale,
             floor: numbers.scatter_floor,
             starts: numbers.start_scale,
+        };
+        let variance = |(sensor, scatter): &(SensorId, f64)| (*sensor, scatter * scatter);
+        model.sensor_variances = SensorVariances {
+            usual: numbers.usual_sensor_scatter * numbers.usual_sensor_scatter,
+            of_sensor: numbers.sensor_scatter.iter().map(variance).collect(),
         };
         model.scale.clone_from(&numbers.scale);
         model.date = numbers.date;

@@ -18,8 +18,6 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::HopId;
 use crate::units::{Length, Speed};
 
-/// Standard deviation of where a sensor closes, from one passage to the next (m).
-pub(super) const CONTACT_SCATTER_M: f64 = 0.0015;
 /// Standard deviation of the position of a lost train (m).
 const ANYWHERE_M: f64 = 30.0;
 /// A sensor that is this many standard deviations behind the train was missed.
@@ -204,7 +202,7 @@ impl Locator {
         let time = self.seconds(window.middle());
         let place = self.filter.place(model, time);
         let speed = self.filter.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
-        let noise = CONTACT_SCATTER_M * CONTACT_SCATTER_M + speed * speed * window.variance_s2();
+        let noise = model.sensor_variance(Some(sensor)) + speed * speed * window.variance_s2();
         let short = |reach: &PathReach| Gaussian {
             mean: reach.length.mean - place.mean,
             variance: place.variance + reach.length.variance + noise,
@@ -245,26 +243,26 @@ impl Locator {
         let time = self.seconds(window.middle());
         let known = PassedContact { sensor, window, at: window.middle(), late: None, short: None, missed: 0 };
         let Some(node) = context.node_of(sensor) else { return known };
+        let scatter = model.sensor_variance(Some(sensor));
         let Some((reach, short, _)) = self.best_reach(context, model, sensor, window) else {
             // Lost until now, or no path leads here: the train is here all the same, at the speed it had.
             self.filter.doubt_place(ANYWHERE_M * ANYWHERE_M);
             self.filter.shift(-self.filter.place(model, time).mean, 0.0);
-            let here = Gaussian { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
+            let here = Gaussian { mean: 0.0, variance: scatter };
             self.filter.pass(model, time, window.variance_s2(), here);
             self.node = Some(node);
             return known;
         };
         let speed = self.filter.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
-        let scatter = CONTACT_SCATTER_M * CONTACT_SCATTER_M;
+        let here = Gaussian { mean: 0.0, variance: scatter };
         let contradicts = short.mean * short.mean > GATE * GATE * short.variance;
         let mut at = window.middle();
         if !contradicts {
-            at = self.fuse(model, &reach, window, time + short.mean / speed);
+            at = self.fuse(model, [reach.length, here], window, time + short.mean / speed);
         } else if self.filter.doubt_change(model, time, short.mean) {
             // The innovation exceeds its predicted variance, and a change of speed under way will continue to deviate. The
             // sensor gives the position, however uncertain the path to it is.
             self.filter.shift(-reach.length.mean, reach.length.variance);
-            let here = Gaussian { mean: 0.0, variance: scatter };
             self.filter.pass(model, time, window.variance_s2(), here);
         } else {
             // Model and report contradict each other. An error of the path is not attributed to the train's speed, so that
@@ -274,7 +272,6 @@ impl Locator {
             self.filter.shift(-reach.length.mean, 0.0);
             // The sensor gives the position all the same: the innovation exceeds its predicted variance.
             self.filter.doubt_place(short.mean * short.mean);
-            let here = Gaussian { mean: 0.0, variance: scatter };
             self.filter.pass(model, time, window.variance_s2(), here);
         }
         self.node = Some(node);
@@ -291,21 +288,26 @@ impl Locator {
     /// Updates with a report that agrees with the prediction, by which the train was due at a time (s). The train reached the
     /// sensor within the window; within it, the prediction alone says which times are likely. Distances count from this
     /// sensor from now on. Returns the most likely time of the passage.
-    fn fuse(&mut self, model: &MotionModel, reach: &PathReach, window: ContactWindow, due: f64) -> Timestamp {
+    fn fuse(
+        &mut self,
+        model: &MotionModel,
+        [length, sensor]: [Gaussian; 2],
+        window: ContactWindow,
+        due: f64,
+    ) -> Timestamp {
         let [after, until] = [window.after, window.until].map(|end| self.seconds(end));
         let time = due.clamp(after, until.max(after));
         let place = self.filter.place(model, time);
         let speed = self.filter.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
-        let scatter = CONTACT_SCATTER_M * CONTACT_SCATTER_M;
         let short = TruncatedNormal {
-            mean: reach.length.mean - place.mean,
-            variance: place.variance + reach.length.variance + scatter,
+            mean: length.mean - place.mean,
+            variance: place.variance + length.variance + sensor.variance,
             low: speed * (after - time),
             high: speed * (until - time),
         };
         let (measured, variance) = short.as_measurement();
-        self.filter.shift(-reach.length.mean, reach.length.variance);
-        let here = Gaussian { mean: -measured, variance: scatter + variance };
+        self.filter.shift(-length.mean, length.variance);
+        let here = Gaussian { mean: -measured, variance: sensor.variance + variance };
         self.filter.pass(model, time, 0.0, here);
         self.timestamp(time + short.moments().0 / speed)
     }
@@ -341,16 +343,17 @@ impl Locator {
         let node = self.node?;
         let time = self.seconds(now);
         let here = self.filter.place(model, time);
-        let mut way = Gaussian { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
+        let mut way = Gaussian { mean: 0.0, variance: 0.0 };
         for hop in context.hops_ahead(node).take(MOST_HOPS) {
             let reach = hop_length(context, model, &hop);
             way = Gaussian { mean: way.mean + reach.mean, variance: way.variance + reach.variance };
             let beyond = here.mean - way.mean;
-            if beyond > MISSED_BEYOND * libm::sqrt(here.variance + way.variance) {
+            let at = Gaussian { variance: way.variance + model.sensor_variance(hop.sensor), ..way };
+            if beyond > MISSED_BEYOND * libm::sqrt(here.variance + at.variance) {
                 continue;
             }
             let sensor = hop.sensor?;
-            let (due, doubt) = self.filter.reaches(model, way, time)?;
+            let (due, doubt) = self.filter.reaches(model, at, time)?;
             let speed = self.filter.speed(model, due).mean;
             return Some(DueContact {
                 sensor,

@@ -3,10 +3,11 @@
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::model::{MotionModel, MotionNumbers, NumbersError, StepUse};
 use footplate_core::track::{Hop, Layout};
-use footplate_core::{Approach, Length, SpeedStep, Timestamp};
+use footplate_core::{Approach, Length, SensorId, SpeedStep, Timestamp};
 
 use super::form::{
-    ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, StopOffsetForm, UseForm,
+    ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, SensorScatterForm,
+    StopOffsetForm, UseForm,
 };
 use crate::quantity::Quantity;
 
@@ -31,6 +32,7 @@ impl MotionFile {
                 .map(|(hop, _)| section_form(layout, &sections, model, &hop, measured_at_s))
                 .collect(),
             stop_offsets: layout.hops().filter_map(|hop| stop_offset_form(layout, &numbers, &hop)).collect(),
+            sensors: sensor_forms(layout, &numbers),
             exact: exact(&numbers, measured_at_s),
         }
     }
@@ -55,6 +57,10 @@ impl MotionFile {
             let hop = hop_between(&form.from, &form.to)?;
             Some((hop.id.index(), 1e-3 * form.add.value, 1e-6 * form.add.uncertainty.powi(2)))
         });
+        let sensors = self.sensors.iter().filter_map(|form| {
+            let sensor = layout.sensor_at(layout.node_named(&form.sensor)?)?;
+            Some((sensor, 1e-3 * form.scatter_mm))
+        });
         let exact = &self.exact;
         MotionModel::from_numbers(&MotionNumbers {
             train: self.train,
@@ -74,6 +80,8 @@ impl MotionFile {
             scatter_scale: exact.scatter_scale,
             scatter_floor: exact.scatter_floor,
             start_scale: exact.start_scale,
+            usual_sensor_scatter: exact.usual_sensor_scatter,
+            sensor_scatter: sensors.collect(),
             scale: exact.scale.clone(),
             date: exact.measured_at_s.map_or(Timestamp::ZERO, Timestamp::from_s),
         })
@@ -148,6 +156,14 @@ fn stop_offset_form(layout: &Layout, numbers: &MotionNumbers, hop: &Hop<'_>) -> 
     })
 }
 
+fn sensor_forms(layout: &Layout, numbers: &MotionNumbers) -> Vec<SensorScatterForm> {
+    let form = |(sensor, scatter): &(SensorId, f64)| {
+        let sensor = layout.node_name(layout.sensor_node(*sensor)?).to_owned();
+        Some(SensorScatterForm { sensor, scatter_mm: 1e3 * scatter })
+    };
+    numbers.sensor_scatter.iter().filter_map(form).collect()
+}
+
 fn exact(numbers: &MotionNumbers, measured_at_s: Option<f64>) -> ExactForm {
     let counts = numbers.counts.iter().map(|[below, above]| [below.0, below.1, above.0, above.1]);
     ExactForm {
@@ -157,6 +173,7 @@ fn exact(numbers: &MotionNumbers, measured_at_s: Option<f64>) -> ExactForm {
         stop_offset_deviation: numbers.stop_offset_deviation,
         residual_scales: numbers.residual_scales,
         start_scale: numbers.start_scale,
+        usual_sensor_scatter: numbers.usual_sensor_scatter,
         scale: numbers.scale.clone(),
         counts: counts.collect(),
         uses: numbers.uses.iter().map(|found| UseForm::of(*found)).collect(),

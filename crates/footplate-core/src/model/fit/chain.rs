@@ -101,23 +101,23 @@ impl Chain {
         (self.step, self.above) = (to, to < from);
     }
 
-    /// Takes a report that data association assigned to the train.
+    /// Takes a report that data association assigned to the train. Whether it is a passage.
     pub(super) fn pass(
         &mut self,
         layout: &Layout,
         sections: &SectionIndex,
         turnouts: &TurnoutStates,
         event: &Event,
-    ) {
-        let EventKind::Sensor(report) = event.kind else { return };
-        let Some(node) = layout.sensor_node(report.sensor) else { return };
+    ) -> bool {
+        let EventKind::Sensor(report) = event.kind else { return false };
+        let Some(node) = layout.sensor_node(report.sensor) else { return false };
         if self.last_sensor == Some(report.sensor) {
-            return;
+            return false;
         }
         let interval = report.poll_interval.unwrap_or(USUAL_INTERVAL).abs().as_s();
         let time = self.seconds(event.time) - 0.5 * interval;
         if self.step == 0 && (self.at_rest || self.trips.is_empty()) {
-            return;
+            return false;
         }
         let way = self
             .at
@@ -140,12 +140,22 @@ impl Chain {
         {
             stopped.rest_hop = Some(hop.index());
         }
-        let Some(trip) = self.trips.last_mut() else { return };
+        let Some(trip) = self.trips.last_mut() else { return false };
         let (length, sections) = way.filter(|_| !begins_anew).map_or((0.0, Vec::new()), |way| {
             (way.length.as_m(), way.hops().iter().filter_map(|hop| sections.section(*hop)).collect())
         });
-        trip.pass(TripContact { node, time, variance: interval * interval / 12.0, way: length, sections });
+        let (sensor, variance) = (Some(report.sensor), interval * interval / 12.0);
+        trip.pass(TripContact { node, sensor, time, variance, way: length, sections });
         (self.at, self.last_sensor) = (Some(node), Some(report.sensor));
+        true
+    }
+
+    /// The last passage, with the step, if the train was running steadily then.
+    pub(super) fn steady_pass(&self, answers: &Answers<'_>) -> Option<(&TripContact, SpeedStep)> {
+        let trip = self.trips.last()?;
+        let contact = trip.contacts.last()?;
+        let step = SpeedStep::new(self.step).filter(|step| *step != SpeedStep::STAND)?;
+        (trip.settles_at(answers) <= contact.time).then_some((contact, step))
     }
 
     /// Takes a tape measurement: the train came to rest this far past a sensor.

@@ -15,10 +15,9 @@ use crate::model::priors::SHAPE_ERROR;
 use crate::model::priors::{FELT, TRIP_DEVIATION, WANDER, change_error};
 use crate::model::scatter::Scatter;
 use crate::model::segment::Segment;
+use crate::model::sensor_scatter::SensorVariances;
 use crate::model::stop_offset::stop_offset_share;
 
-/// Standard deviation of where a sensor closes, from one passage to the next (m).
-const SENSOR_SCATTER: f64 = 0.0015;
 /// A tape read to the centimetre beside a train: one standard deviation (m).
 const TAPE: f64 = 0.005;
 /// Standard deviation of a place of rest after the train has settled (m).
@@ -106,6 +105,8 @@ pub(super) struct Point<'p> {
     pub(super) highest: usize,
     /// The scatter of stops and starts.
     pub(super) scatter: Scatter,
+    /// The scatter of sensors.
+    pub(super) sensors: &'p SensorVariances,
     /// Prior variance of stop offsets (m²).
     pub(super) stop_offset_variance: f64,
     /// Standard deviation of a stop's shape in its middle, as part of its displacement.
@@ -160,7 +161,7 @@ impl Point<'_> {
         let outcome = outcome(trip, &Answers::new(self.lasting, self.highest), own, &mut segments);
         let Error { speed, law, .. } = *errors(trip, own, &segments, self.stop_shape_error).first()?;
         let run = outcome.at.first()? * TRIP_DEVIATION;
-        let timing = speed * speed * contact.variance + SENSOR_SCATTER * SENSOR_SCATTER;
+        let timing = speed * speed * contact.variance + self.sensors.of(contact.sensor);
         Some(FirstSensor { speed, variance: timing + law * law + run * run })
     }
 
@@ -195,7 +196,7 @@ impl Point<'_> {
             let mut terms = terms_of(&|outcome| outcome.at[index]);
             subtract(&mut terms, &sections);
             let Error { speed, law, systematic, step } = errors[index];
-            let own = speed * speed * contact.variance + SENSOR_SCATTER * SENSOR_SCATTER;
+            let own = speed * speed * contact.variance + self.sensors.of(contact.sensor);
             let variance = own + systematic * systematic * law * law;
             let residual = at.own.place + here.at[index] - surveyed - longer;
             if with_slopes {

@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use crate::ids::NodeId;
+use crate::ids::{NodeId, SensorId};
 use crate::model::parameters::Answers;
 use crate::model::segment::{Segment, SpeedCommand};
 
@@ -12,6 +12,9 @@ use crate::model::segment::{Segment, SpeedCommand};
 pub(super) struct TripContact {
     /// Its node.
     pub(super) node: NodeId,
+    /// The sensor; `None` in what version 6 of the model wrote.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(super) sensor: Option<SensorId>,
     /// Mean time of the detection (s, on the run's clock) and its variance.
     pub(super) time: f64,
     pub(super) variance: f64,
@@ -160,9 +163,21 @@ impl Trip {
 
     /// When the train rests, if it was commanded to stop last (s).
     pub(super) fn rests_at(&self, answers: &Answers<'_>) -> f64 {
+        self.last_segment(answers).filter(|last| last.to == 0.0).map_or(f64::INFINITY, |last| last.settled())
+    }
+
+    /// When the last change of speed is complete (s).
+    pub(super) fn settles_at(&self, answers: &Answers<'_>) -> f64 {
+        if self.commanded.is_empty() {
+            return self.begins;
+        }
+        self.last_segment(answers).map_or(f64::INFINITY, |last| last.settled())
+    }
+
+    fn last_segment(&self, answers: &Answers<'_>) -> Option<Segment> {
         let mut segments = Vec::new();
         self.segments(answers, &self.start(), &mut segments);
-        segments.last().filter(|last| last.to == 0.0).map_or(f64::INFINITY, Segment::settled)
+        segments.pop()
     }
 
     /// The changes of speed one after the other, the state before the first command included.

@@ -130,6 +130,7 @@ impl Refit {
         let trips = fit.chain.trips.len();
         let scatter = fit.scatter_of(columns, values, trips);
         fit.model.learn(columns, &values.lasting, &solution, survey.scale, scatter, fit.date);
+        fit.model.sensor_variances = fit.steady.variances();
         fit.model.recount(&fit.prior.counts, &fit.chain.trips);
         if trips >= MOST_TRIPS {
             fit.condense(trips - KEPT_TRIPS);
