@@ -51,3 +51,4 @@ pub(crate) use segment::{Pace, Segment, SpeedCommand};
 pub(crate) use sensor_scatter::SensorScatter;
 pub use short_moves::ShortMoveForecast;
 pub(crate) use standing_times::StandingTimes;
+pub(crate) use stop_offset::StopEffect;

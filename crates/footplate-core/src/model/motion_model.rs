@@ -16,10 +16,10 @@ use super::survey::SectionIndex;
 use super::variation::Variation;
 use crate::estimate::Estimate;
 use crate::event::Approach;
-use crate::ids::{SensorId, SpeedStep, TrainId};
+use crate::ids::{EdgeId, SensorId, SpeedStep, TrainId};
 use crate::linalg::Gaussian;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Hop, HopId};
+use crate::track::Hop;
 use crate::units::{Acceleration, Length, Speed};
 
 /// Whether a step moves the train.
@@ -70,7 +70,7 @@ pub struct MotionModel {
     pub(crate) spread: Spread,
     /// By how much sections are longer than surveyed (m), with the variance.
     pub(crate) sections: BTreeMap<usize, (f64, f64)>,
-    /// By how much stops are longer because of where they end.
+    /// By how much stops are longer because of the track that they run over.
     #[cfg_attr(feature = "serde", serde(default))]
     pub(crate) stop_offsets: StopOffsets,
     /// By how much more than usual the laws of stops and of starts leave over: factors on a standard deviation.
@@ -311,7 +311,7 @@ impl MotionModel {
             )),
             scatter: Length::from_m(libm::hypot(
                 self.scatter(speed),
-                libm::sqrt(self.stop_offset(None, speed).variance),
+                libm::sqrt(self.stop_offset(core::iter::empty(), speed).variance),
             )),
             time: TimeSpan::from_s(time.max(LEAST_STOP_S)),
             count: self.counts_at(step, approach).stops,
@@ -328,10 +328,21 @@ impl MotionModel {
         self.sensor_variances.of(sensor)
     }
 
-    /// By how much (m) a stop from a speed (m/s) is longer that ends on a hop, or at an unknown place.
-    pub(crate) fn stop_offset(&self, hop: Option<HopId>, speed: f64) -> Gaussian {
-        let (share, offset) = (stop_offset_share(speed), self.stop_offsets.of(hop.map(HopId::index)));
-        Gaussian { mean: share * offset.mean, variance: share * share * offset.variance }
+    /// By how much (m) a stop from a speed (m/s) is longer that runs over some edges: each with the part of the effect that comes
+    /// from it. What is left of the effect comes from unknown track.
+    pub(crate) fn stop_offset(&self, edges: impl Iterator<Item = (EdgeId, f64)>, speed: f64) -> Gaussian {
+        let mut sum = Gaussian { mean: 0.0, variance: 0.0 };
+        let mut left: f64 = 1.0;
+        for (edge, part) in edges {
+            let offset = self.stop_offsets.of(usize::from(edge.0));
+            sum.mean += part * offset.mean;
+            sum.variance += part * part * offset.variance;
+            left -= part;
+        }
+        let left = left.max(0.0);
+        let share = stop_offset_share(speed);
+        let variance = sum.variance + left * left * self.stop_offsets.variance();
+        Gaussian { mean: share * sum.mean, variance: share * share * variance }
     }
 
     /// One standard deviation of the scatter of stops that the model does not explain, as broken promises show it: loads, wear,

@@ -25,9 +25,9 @@ pub struct MotionNumbers {
     pub covariance: Vec<f64>,
     /// By [section](crate::model::survey::SectionIndex), by how much it is longer than surveyed (m), with the variance.
     pub sections: Vec<(usize, f64, f64)>,
-    /// By [hop](crate::track::HopId) on which stops ended, by how much they are longer there (m), with the variance.
+    /// By [edge](crate::EdgeId) that stops ran over, by how much they are longer there (m), with the variance.
     pub stop_offsets: Vec<(usize, f64, f64)>,
-    /// One standard deviation of that from hop to hop (m).
+    /// One standard deviation of that from edge to edge (m).
     pub stop_offset_deviation: f64,
     /// By how much more than usual the laws of stops and of starts leave over: factors on a standard deviation.
     pub residual_scales: [f64; 2],
@@ -105,7 +105,7 @@ impl MotionModel {
             values: self.values.clone(),
             covariance: (0..side).flat_map(|i| (0..=i).map(move |j| self.spread.between(i, j))).collect(),
             sections: of_places(&self.sections),
-            stop_offsets: of_places(&self.stop_offsets.of_hop),
+            stop_offsets: of_places(&self.stop_offsets.of_edge),
             stop_offset_deviation: self.stop_offsets.deviation,
             residual_scales: self.residual_scales,
             uses: self.uses.clone(),
@@ -177,7 +177,7 @@ impl MotionModel {
         model.spread = Spread::of_lower_triangle(side, &numbers.covariance);
         model.sections = by_place(&numbers.sections);
         model.stop_offsets =
-            StopOffsets { of_hop: by_place(&numbers.stop_offsets), deviation: numbers.stop_offset_deviation };
+            StopOffsets { of_edge: by_place(&numbers.stop_offsets), deviation: numbers.stop_offset_deviation };
         model.residual_scales = numbers.residual_scales;
         for (step, found) in (0..=numbers.highest.get()).filter_map(SpeedStep::new).zip(&numbers.uses) {
             model.note_use(step, *found);
@@ -213,7 +213,7 @@ mod tests {
         model.note_use(SpeedStep::new(1).unwrap(), StepUse::Unreliable);
         model.note_use(SpeedStep::new(9).unwrap(), StepUse::Moves);
         model.sections.insert(3, (0.012, 1e-6));
-        model.stop_offsets.of_hop.insert(5, (-0.02, 1e-5));
+        model.stop_offsets.of_edge.insert(5, (-0.02, 1e-5));
         model.stop_offsets.deviation = 0.015;
         model.counts[9][1] = Counts { contacts: 41, stops: 7 };
         model.scatter = Scatter { stops: 1.25, floor: 0.002, ..Scatter::USUAL };

@@ -15,7 +15,6 @@ use crate::linalg::Gaussian;
 use crate::link::{ContactWindow, TruncatedNormal};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::HopId;
 use crate::units::{Length, Speed};
 
 /// Standard deviation of the position of a lost train (m).
@@ -177,7 +176,7 @@ impl Locator {
         match event.kind {
             EventKind::Speed { train, step } if train == self.train => {
                 self.filter.command(model, self.seconds(event.time), step.get());
-                self.filter.stop_on(self.stops_on(context, model, &self.filter));
+                self.filter.offset_stop(self.stop_offset(context, model, &self.filter));
             }
             // It faces the other direction now; how far its pickup reaches on that side is unknown here.
             EventKind::Reverse { train } if train == self.train => self.lose(),
@@ -405,24 +404,28 @@ impl Locator {
         self.rest_of(context, moved, model)
     }
 
-    /// The hop on which a train that was commanded to stop comes to rest, before stop offsets are applied.
-    fn stops_on(
+    /// By how much (m) the stop of a train that was commanded to stop is longer because of the track that it runs over.
+    fn stop_offset(
         &self,
         context: TrackContext<'_>,
         model: &MotionModel,
         filter: &MotionFilter,
-    ) -> Option<HopId> {
+    ) -> Option<Gaussian> {
         let mut anywhere = *filter;
-        anywhere.stop_on(None);
-        let (rest, ..) = anywhere.rest(model)?;
-        let mut way = 0.0;
-        for hop in context.hops_ahead(self.node?).take(MOST_HOPS) {
-            way += hop_length(context, model, &hop).mean;
-            if rest.mean < way {
-                return Some(hop.id);
-            }
-        }
-        None
+        anywhere.offset_stop(None);
+        let (rest, effect) = anywhere.stop(model)?;
+        let mut begins = 0.0;
+        let edges = context.hops_ahead(self.node?).take(MOST_HOPS).flat_map(|hop| {
+            let length = hop_length(context, model, &hop).mean;
+            let scale = if hop.length > Length::ZERO { length / hop.length.as_m() } else { 0.0 };
+            hop.edges.iter().map(move |edge| (*edge, scale))
+        });
+        let parts = edges.map_while(|(edge, scale)| {
+            let from = begins;
+            begins += scale * context.layout.edge(edge)?.length.as_m();
+            (from < rest).then(|| (edge, effect.between(rest - from, rest - begins)))
+        });
+        Some(model.stop_offset(parts, effect.speed))
     }
 
     fn rest_of(
@@ -432,7 +435,7 @@ impl Locator {
         model: &MotionModel,
     ) -> Option<Rest> {
         let node = self.node?;
-        filter.stop_on(self.stops_on(context, model, &filter));
+        filter.offset_stop(self.stop_offset(context, model, &filter));
         let (place, scatter, time) = filter.rest(model)?;
         let at = PathPoint { node, distance: Length::from_m(place.mean) };
         let taping = taping_doubt(context, model, at);

@@ -10,9 +10,8 @@ use super::arrival::{BISECTIONS, LONGEST_WAIT, SLOWEST};
 use super::filter_state::{B, E, FilterState, H, LATER, N, Z};
 use crate::linalg::Gaussian;
 use crate::model::MotionModel;
-use crate::model::{OTHER_SHAPES, SpeedCommand};
+use crate::model::{OTHER_SHAPES, SpeedCommand, StopEffect};
 use crate::model::{WANDER, change_error, run_variance};
-use crate::track::HopId;
 
 /// Over this time (s) a run's speed wanders by [`WANDER`].
 const WANDERS_IN: f64 = 4.0;
@@ -23,6 +22,9 @@ const LOOKS: usize = 3;
 const BEGUN: f64 = 0.3;
 /// A steady run is counted anew after this long (s): before, the law of its start and its speed are still distinguished.
 const LONG_RUN: f64 = 20.0;
+/// With a larger standard deviation of ln speed a steady run is counted anew at every sensor: the distance so far bends with the
+/// speed, and a line through it would be off by half the square, 2 %.
+const UNSURE_SPEED: f64 = 0.2;
 /// Share of a change from which on the run is steady: what is left is less than a millimetre.
 const STEADY: f64 = 0.995;
 /// A change that begins while another is under way goes another way than the sum of both, by the speed that was still
@@ -49,9 +51,9 @@ pub(crate) struct MotionFilter<const L: usize = N> {
     wandered: f64,
     /// What of the variance of ln of a speed is not believed to be learnt for every single moment.
     local: f64,
-    /// Where a stop would end, as far as its owner knows.
+    /// By how much (m) a stop that has not begun is longer because of the track ahead, as far as its owner knows.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
-    stops_on: Option<HopId>,
+    stop_offset: Option<Gaussian>,
 }
 
 impl<const L: usize> MotionFilter<L> {
@@ -59,7 +61,7 @@ impl<const L: usize> MotionFilter<L> {
     pub(crate) fn at_rest(time: f64, place: Gaussian) -> Self {
         let mut p = [[0.0; L]; L];
         p[B][B] = place.variance;
-        Self { course: FilterState::at_rest(time, place.mean), p, wandered: time, local: 0.0, stops_on: None }
+        Self { course: FilterState::at_rest(time, place.mean), p, wandered: time, local: 0.0, stop_offset: None }
     }
 
     /// Running steadily at a step for long.
@@ -90,9 +92,9 @@ impl<const L: usize> MotionFilter<L> {
         self.course.command(sent, step);
     }
 
-    /// A stop that has not begun yet would end on a hop.
-    pub(crate) const fn stop_on(&mut self, hop: Option<HopId>) {
-        self.stops_on = hop;
+    /// A stop that has not begun yet is longer by so much (m).
+    pub(crate) const fn offset_stop(&mut self, by: Option<Gaussian>) {
+        self.stop_offset = by;
     }
 
     /// Whether a train that was commanded to stop stands by a time.
@@ -156,7 +158,8 @@ impl<const L: usize> MotionFilter<L> {
         self.p[Z][Z] = doubt * doubt + error * error + carried * carried;
         if commanded.to == 0 {
             let speed = speed * self.course.grown();
-            let (scatter, offset) = (model.scatter(speed), model.stop_offset(self.stops_on, speed));
+            let scatter = model.scatter(speed);
+            let offset = self.stop_offset.unwrap_or_else(|| model.stop_offset(core::iter::empty(), speed));
             self.p[Z][Z] += scatter * scatter + offset.variance;
             self.course.x[Z] = offset.mean;
         }
@@ -291,6 +294,14 @@ impl<const L: usize> MotionFilter<L> {
         Some((Gaussian { mean, variance }, scatter, later.course.rest_time()))
     }
 
+    /// Where a train that was commanded to stop comes to rest (m) without what the track adds, and how it stops.
+    pub(super) fn stop(&self, model: &MotionModel) -> Option<(f64, StopEffect)> {
+        let later = self.after_all(model);
+        let (segment, grown) = (later.course.segment, later.course.grown());
+        let effect = StopEffect { speed: grown * segment.from.speed, distance: grown * segment.way_to_rest() };
+        (later.course.step == 0).then(|| (later.way_and_slopes(f64::INFINITY).0, effect))
+    }
+
     /// One standard deviation (m/s) of the speed in the middle of a change.
     fn shape_speed_error(&self, time: f64) -> f64 {
         self.course.segment.shape_speed_error(time)
@@ -383,7 +394,8 @@ impl<const L: usize> MotionFilter<L> {
     fn count_from(&mut self, time: f64) {
         let segment = self.course.segment;
         // What companions share with the way so far, their covariance tells apart.
-        let long = if self.course.apart.is_some() { 0.0 } else { LONG_RUN };
+        let is_unsure = self.p[E][E] > UNSURE_SPEED * UNSURE_SPEED;
+        let long = if self.course.apart.is_some() || is_unsure { 0.0 } else { LONG_RUN };
         let is_steady = segment.share(time) >= STEADY && time - segment.begins > long;
         if self.course.step == 0 || !is_steady {
             return;

@@ -3,7 +3,7 @@
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::model::{MotionModel, MotionNumbers, NumbersError, StepUse};
 use footplate_core::track::{Hop, Layout};
-use footplate_core::{Approach, Length, SensorId, SpeedStep, Timestamp};
+use footplate_core::{Approach, EdgeId, Length, SensorId, SpeedStep, Timestamp};
 
 use super::form::{
     ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, SensorScatterForm,
@@ -31,7 +31,7 @@ impl MotionFile {
                 .filter(|(_, section)| numbers.sections.iter().any(|(known, ..)| known == section))
                 .map(|(hop, _)| section_form(layout, &sections, model, &hop, measured_at_s))
                 .collect(),
-            stop_offsets: layout.hops().filter_map(|hop| stop_offset_form(layout, &numbers, &hop)).collect(),
+            stop_offsets: numbers.stop_offsets.iter().filter_map(|offset| stop_offset_form(layout, offset)).collect(),
             sensors: sensor_forms(layout, &numbers),
             exact: exact(&numbers, measured_at_s),
         }
@@ -54,8 +54,9 @@ impl MotionFile {
             Some((index.section(hop.id)?, 1e-3 * longer_mm, 1e-6 * form.add.uncertainty.powi(2)))
         });
         let offsets = self.stop_offsets.iter().filter_map(|form| {
-            let hop = hop_between(&form.from, &form.to)?;
-            Some((hop.id.index(), 1e-3 * form.add.value, 1e-6 * form.add.uncertainty.powi(2)))
+            let (from, to) = (layout.node_named(&form.from)?, layout.node_named(&form.to)?);
+            let (edge, _) = layout.edges().find(|(_, edge)| (edge.from, edge.to) == (from, to))?;
+            Some((usize::from(edge.0), 1e-3 * form.add.value, 1e-6 * form.add.uncertainty.powi(2)))
         });
         let sensors = self.sensors.iter().filter_map(|form| {
             let sensor = layout.sensor_at(layout.node_named(&form.sensor)?)?;
@@ -140,11 +141,12 @@ fn section_form(
     }
 }
 
-fn stop_offset_form(layout: &Layout, numbers: &MotionNumbers, hop: &Hop<'_>) -> Option<StopOffsetForm> {
-    let (_, offset, variance) = numbers.stop_offsets.iter().find(|(known, ..)| *known == hop.id.index())?;
+fn stop_offset_form(layout: &Layout, offset: &(usize, f64, f64)) -> Option<StopOffsetForm> {
+    let (edge, offset, variance) = offset;
+    let edge = layout.edge(EdgeId(u16::try_from(*edge).ok()?))?;
     Some(StopOffsetForm {
-        from: layout.node_name(hop.from).to_owned(),
-        to: layout.node_name(hop.to).to_owned(),
+        from: layout.node_name(edge.from).to_owned(),
+        to: layout.node_name(edge.to).to_owned(),
         add: Quantity {
             value: 1e3 * offset,
             uncertainty: 1e3 * variance.sqrt(),

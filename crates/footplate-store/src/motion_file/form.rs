@@ -30,7 +30,7 @@ pub struct MotionFile {
     /// Path lengths between sensors, relative to the survey, for sections that the train has run over.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sections: Vec<MotionSectionForm>,
-    /// Stop offsets by direction, for hops on which the train has stopped.
+    /// Stop offsets by direction, for edges that stops of the train ran over.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stop_offsets: Vec<StopOffsetForm>,
     /// How exactly each sensor trips that the train has passed often.
@@ -123,14 +123,14 @@ pub struct MotionSectionForm {
     pub add: Quantity,
 }
 
-/// The stop offset of a hop, in one direction.
+/// The stop offset of an edge, in one direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StopOffsetForm {
-    /// The sensor before it, by name.
+    /// The node at which it begins, by name.
     pub from: String,
-    /// The sensor after it.
+    /// The node at which it ends.
     pub to: String,
-    /// The offset of a stop from 300 mm/s (mm).
+    /// The offset of a stop from 300 mm/s that runs over it alone (mm).
     pub add: Quantity,
 }
 

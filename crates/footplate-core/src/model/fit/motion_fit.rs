@@ -131,7 +131,7 @@ impl MotionFit {
         match event.kind {
             EventKind::Sensor(report) => {
                 let sections = self.sections.get_or_insert_with(|| SectionIndex::of(layout));
-                if self.chain.pass(layout, sections, turnouts, event) {
+                if self.chain.pass(layout, sections, turnouts, event, &self.model.answers()) {
                     self.note_steady_pass(report.sensor);
                 }
             }
@@ -235,9 +235,9 @@ impl MotionFit {
                 *slot = by;
             }
         }
-        for (hop, column) in &columns.stop_offsets {
+        for (edge, column) in &columns.stop_offsets {
             if let Some(slot) = lasting.get_mut(*column) {
-                *slot = self.model.stop_offsets.of(Some(*hop)).mean;
+                *slot = self.model.stop_offsets.of(*edge).mean;
             }
         }
         let point = self.point(columns, &lasting);

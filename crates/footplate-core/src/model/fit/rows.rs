@@ -16,7 +16,7 @@ use crate::model::priors::{FELT, TRIP_DEVIATION, WANDER, change_error};
 use crate::model::scatter::Scatter;
 use crate::model::segment::Segment;
 use crate::model::sensor_scatter::SensorVariances;
-use crate::model::stop_offset::stop_offset_share;
+use crate::model::stop_offset::{StopEffect, stop_offset_share};
 
 /// A tape read to the centimetre beside a train: one standard deviation (m).
 const TAPE: f64 = 0.005;
@@ -174,6 +174,7 @@ impl Point<'_> {
         let here = outcome(trip, &Answers::new(self.lasting, self.highest), own, &mut segments);
         let errors = errors(trip, own, &segments, self.stop_shape_error);
         let stop_speed = segments.last().map_or(0.0, |segment| segment.from.speed);
+        let stop_distance = segments.last().map_or(0.0, Segment::way_to_rest);
         let stop_step = trip.step_of(segments.len().saturating_sub(1));
         let slopes = if with_slopes { self.slopes(trip, own, &segments) } else { Vec::new() };
         let terms_of = |of: &dyn Fn(&Outcome) -> f64| {
@@ -214,9 +215,10 @@ impl Point<'_> {
             let mut terms = terms_of(&|outcome| outcome.rest);
             subtract(&mut terms, &sections);
             terms.push((columns.next_place(), -1.0));
-            let (offset, free) = self.stop_offset(trip, stop_speed);
-            terms.extend(offset);
-            let longer: f64 = offset.map_or(0.0, |(column, share)| share * self.lasting[column]);
+            let effect = StopEffect { speed: stop_speed, distance: stop_distance };
+            let (offsets, free) = self.stop_offsets(trip, effect, next_place);
+            let longer: f64 = offsets.iter().map(|(column, share)| share * self.lasting[*column]).sum();
+            terms.extend(offsets);
             let residual = beyond_last + longer - next_place;
             if with_slopes {
                 self.scaled(&mut terms, residual, stop_step);
@@ -245,14 +247,20 @@ impl Point<'_> {
         rows
     }
 
-    /// The column of the stop offset of a trip, with its slope, or the prior variance (m²) where the hop is unknown.
-    fn stop_offset(&self, trip: &Trip, speed: f64) -> (Option<(usize, f64)>, f64) {
-        let share = stop_offset_share(speed);
-        let column = trip.rest_hop.and_then(|hop| self.columns.stop_offsets.get(&hop));
-        match column {
-            Some(column) => (Some((*column, share)), 0.0),
-            None => (None, share * share * self.stop_offset_variance),
+    /// The columns of the stop offsets of a trip that came to rest at a place, with their slopes, and the variance (m²) of what
+    /// comes from unknown track.
+    fn stop_offsets(&self, trip: &Trip, effect: StopEffect, rest: f64) -> (Vec<(usize, f64)>, f64) {
+        let share = stop_offset_share(effect.speed);
+        let (mut offsets, mut left): (Vec<(usize, f64)>, f64) = (Vec::new(), 1.0);
+        for stop in &trip.stop_edges {
+            let part = stop.part_of(effect, rest);
+            if let Some(column) = self.columns.stop_offsets.get(&stop.edge).filter(|_| part > 0.0) {
+                add_term(&mut offsets, *column, share * part);
+                left -= part;
+            }
         }
+        let left = share * left.max(0.0);
+        (offsets, left * left * self.stop_offset_variance)
     }
 
     /// Timing noise makes residuals in metres that grow with the speed; their slope in ln speed is no error of speed. Without this

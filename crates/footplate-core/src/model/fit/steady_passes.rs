@@ -102,3 +102,62 @@ impl SteadyPasses {
         self.scatter.variances()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::NodeId;
+
+    const STEP: u8 = 8;
+    const SPEED: f64 = 0.25;
+    const HOP: f64 = 0.4;
+    /// Poll intervals of 65 ms.
+    const WINDOW: f64 = 0.065;
+
+    /// Numbers in -1..1 that repeat late.
+    fn noise(nth: usize) -> f64 {
+        2.0 * libm::fmod(0.5 + 0.618_033_988_749_895 * nth as f64, 1.0) - 1.0
+    }
+
+    /// Laps over four sensors that scatter by so much (m); `wild` is added to the time (s) of one passage.
+    fn found(laps: usize, scatter: [f64; 4], wild: f64) -> [f64; 4] {
+        let mut passes = SteadyPasses::default();
+        let step = SpeedStep::new(STEP).expect("a step");
+        for nth in 0..4 * laps {
+            let (place, lap) = (nth % 4, nth / 4);
+            // Even noise of this width has the standard deviation asked for.
+            let off = scatter[place] * libm::sqrt(3.0) * noise(7 * lap + place);
+            let late = 0.5 * WINDOW * noise(nth) + if nth == 2 * laps { wild } else { 0.0 };
+            // No length is as surveyed.
+            let true_place = HOP * nth as f64 + [0.0, 0.02, -0.03, 0.01][place];
+            let contact = TripContact {
+                node: NodeId(place as u16),
+                sensor: Some(SensorId(place as u16)),
+                time: (true_place + off) / SPEED + late,
+                variance: WINDOW * WINDOW / 12.0,
+                way: HOP,
+                sections: Vec::new(),
+            };
+            passes.pass(SensorId(place as u16), step, &contact);
+        }
+        let variances = passes.variances();
+        [0, 1, 2, 3].map(|place| libm::sqrt(variances.of(Some(SensorId(place)))))
+    }
+
+    #[test]
+    fn sensors_that_scatter_are_told_apart_whatever_the_lengths_are() {
+        let [exact, loose, other, middle] = found(60, [0.001, 0.012, 0.001, 0.006], 0.0);
+        assert!((loose - 0.012).abs() < 0.003, "{loose}");
+        assert!((middle - 0.006).abs() < 0.003, "{middle}");
+        assert!(exact.max(other) < 0.004, "{exact} {other}");
+    }
+
+    #[test]
+    fn one_report_a_second_late_is_no_scatter() {
+        let without = found(30, [0.002; 4], 0.0);
+        let with = found(30, [0.002; 4], 1.0);
+        for (one, other) in without.into_iter().zip(with) {
+            assert!((one - other).abs() < 0.002, "{one} {other}");
+        }
+    }
+}

@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use crate::ids::{NodeId, SensorId};
 use crate::model::parameters::Answers;
 use crate::model::segment::{Segment, SpeedCommand};
+use crate::model::stop_offset::StopEffect;
 
 /// A sensor passed, and the path to it from the sensor before, or from the origin of the trip's distances.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +22,22 @@ pub(super) struct TripContact {
     /// Surveyed length of the path (m) and its sections.
     pub(super) way: f64,
     pub(super) sections: Vec<usize>,
+}
+
+/// An edge on the path of a train: where it begins and ends, counted from the sensor passed last before the place of rest (m).
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct PassedEdge {
+    pub(super) edge: usize,
+    pub(super) begins: f64,
+    pub(super) ends: f64,
+}
+
+impl PassedEdge {
+    /// The part of a stop's effect that comes from it, with the place of rest counted from the same sensor.
+    pub(super) fn part_of(&self, effect: StopEffect, rest: f64) -> f64 {
+        effect.between(rest - self.begins, rest - self.ends)
+    }
 }
 
 /// A tape measurement of where the train came to rest: a distance beyond one of the trip's sensors.
@@ -53,9 +70,9 @@ pub(super) struct Trip {
     pub(super) pieces: Vec<f64>,
     /// Whether the train braked to rest undisturbed.
     pub(super) came_to_rest: bool,
-    /// The hop on which it came to rest, known from the next trip.
-    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
-    pub(super) rest_hop: Option<usize>,
+    /// The edges that its stop ran over, known from the next trip.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub(super) stop_edges: Vec<PassedEdge>,
     /// Where it came to rest, if that was measured with a tape.
     pub(super) measured: Option<MeasuredRest>,
     /// Its own numbers by the last fit.
@@ -114,7 +131,7 @@ impl Trip {
             contacts: Vec::new(),
             pieces: alloc::vec![f64::NEG_INFINITY],
             came_to_rest: false,
-            rest_hop: None,
+            stop_edges: Vec::new(),
             measured: None,
             own: None,
         }
@@ -172,6 +189,17 @@ impl Trip {
             return self.begins;
         }
         self.last_segment(answers).map_or(f64::INFINITY, |last| last.settled())
+    }
+
+    /// Where the train comes to rest by its stop, counted from the sensor passed last (m), and how it stops.
+    pub(super) fn stop(&self, answers: &Answers<'_>) -> Option<(f64, StopEffect)> {
+        let (own, mut segments) = (self.start(), Vec::new());
+        self.segments(answers, &own, &mut segments);
+        let last = segments.last().filter(|last| last.is_stop())?;
+        let effect = StopEffect { speed: last.from.speed, distance: last.way_to_rest() };
+        let mut walk = Walk::new(self, &own, &segments);
+        let passed = self.contacts.last().map_or(-own.place, |contact| walk.way(contact.time));
+        Some((walk.way_to_rest() - passed, effect))
     }
 
     fn last_segment(&self, answers: &Answers<'_>) -> Option<Segment> {

@@ -33,7 +33,8 @@ impl MotionFit {
         let mut fit = self.clone();
         let passed = fit.chain.trips.iter().flat_map(|trip| &trip.contacts);
         fit.prior.meet(passed.flat_map(|contact| &contact.sections));
-        fit.prior.meet_stops(fit.chain.trips.iter().filter_map(|trip| trip.rest_hop));
+        let stops = fit.chain.trips.iter().flat_map(|trip| &trip.stop_edges);
+        fit.prior.meet_stops(stops.map(|stop| stop.edge));
         let columns = fit.prior.columns();
         let values = fit.start(&columns);
         fit.compare_promises(&columns, &values);
