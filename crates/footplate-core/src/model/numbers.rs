@@ -176,8 +176,10 @@ impl MotionModel {
         model.values.clone_from(&numbers.values);
         model.spread = Spread::of_lower_triangle(side, &numbers.covariance);
         model.sections = by_place(&numbers.sections);
-        model.stop_offsets =
-            StopOffsets { of_edge: by_place(&numbers.stop_offsets), deviation: numbers.stop_offset_deviation };
+        model.stop_offsets = StopOffsets {
+            of_edge: by_place(&numbers.stop_offsets),
+            deviation: numbers.stop_offset_deviation,
+        };
         model.residual_scales = numbers.residual_scales;
         for (step, found) in (0..=numbers.highest.get()).filter_map(SpeedStep::new).zip(&numbers.uses) {
             model.note_use(step, *found);

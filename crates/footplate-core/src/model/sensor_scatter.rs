@@ -107,7 +107,8 @@ impl SensorScatter {
     /// The variances of all sensors, over all steps.
     pub(super) fn variances(&self) -> SensorVariances {
         let usual = self.all.variance(EXPECTED_M * EXPECTED_M, EXPECTED_WEIGHT);
-        let of_sensor = self.sensors.iter().map(|(sensor, own)| (*sensor, own.all.variance(usual, LEVEL_WEIGHT)));
+        let of_sensor =
+            self.sensors.iter().map(|(sensor, own)| (*sensor, own.all.variance(usual, LEVEL_WEIGHT)));
         SensorVariances { usual, of_sensor: of_sensor.collect() }
     }
 }

@@ -147,8 +147,9 @@ mod tests {
     #[test]
     fn the_deviation_becomes_that_of_the_offsets() {
         let mut offsets = StopOffsets::default();
-        let found =
-            |size: f64| (0..40).map(|edge| (edge, (if edge % 2 == 0 { size } else { -size }, 1e-6))).collect();
+        let found = |size: f64| {
+            (0..40).map(|edge| (edge, (if edge % 2 == 0 { size } else { -size }, 1e-6))).collect()
+        };
         offsets.learn(found(0.03));
         assert!((0.027..0.031).contains(&offsets.deviation), "{}", offsets.deviation);
         offsets.learn(found(0.0));

@@ -61,7 +61,13 @@ impl<const L: usize> MotionFilter<L> {
     pub(crate) fn at_rest(time: f64, place: Gaussian) -> Self {
         let mut p = [[0.0; L]; L];
         p[B][B] = place.variance;
-        Self { course: FilterState::at_rest(time, place.mean), p, wandered: time, local: 0.0, stop_offset: None }
+        Self {
+            course: FilterState::at_rest(time, place.mean),
+            p,
+            wandered: time,
+            local: 0.0,
+            stop_offset: None,
+        }
     }
 
     /// Running steadily at a step for long.
@@ -298,7 +304,8 @@ impl<const L: usize> MotionFilter<L> {
     pub(super) fn stop(&self, model: &MotionModel) -> Option<(f64, StopEffect)> {
         let later = self.after_all(model);
         let (segment, grown) = (later.course.segment, later.course.grown());
-        let effect = StopEffect { speed: grown * segment.from.speed, distance: grown * segment.way_to_rest() };
+        let effect =
+            StopEffect { speed: grown * segment.from.speed, distance: grown * segment.way_to_rest() };
         (later.course.step == 0).then(|| (later.way_and_slopes(f64::INFINITY).0, effect))
     }
 

@@ -31,7 +31,11 @@ impl MotionFile {
                 .filter(|(_, section)| numbers.sections.iter().any(|(known, ..)| known == section))
                 .map(|(hop, _)| section_form(layout, &sections, model, &hop, measured_at_s))
                 .collect(),
-            stop_offsets: numbers.stop_offsets.iter().filter_map(|offset| stop_offset_form(layout, offset)).collect(),
+            stop_offsets: numbers
+                .stop_offsets
+                .iter()
+                .filter_map(|offset| stop_offset_form(layout, offset))
+                .collect(),
             sensors: sensor_forms(layout, &numbers),
             exact: exact(&numbers, measured_at_s),
         }

@@ -80,10 +80,8 @@ pub(super) enum Phase {
     LearningStop { until: Timestamp },
     /// ... and creeps to a sensor that measures where that was.
     LearningRest,
-    /// The recovery is complete, and it comes to rest, ...
+    /// The recovery is complete, and it comes to rest.
     Ending { outcome: Outcome },
-    /// ... and faces again where it faced before.
-    TurningBack { outcome: Outcome, is_sent: bool },
     /// An operator is needed.
     GivenUp,
 }
@@ -167,9 +165,8 @@ impl Watchdog {
                 Phase::Ending { outcome }
                     if self.stops.at_rest(train).is_some_and(|at_rest| at_rest <= now) =>
                 {
-                    self.turn_back(now, train, outcome);
+                    self.recovered(now, train, outcome);
                 }
-                Phase::TurningBack { outcome, is_sent: true } => self.recovered(now, train, outcome),
                 Phase::Measuring { trial, .. } if recovery.by <= now => self.skip(now, train, trial.step),
                 Phase::GivenUp => {}
                 _ if recovery.by <= now => self.need_operator(now, train),
@@ -258,10 +255,6 @@ impl Watchdog {
             recovery.phase = Phase::Locating { step, pushed: now, seen };
             recovery.by = now + LOCATED_WITHIN;
             self.keep_clear(now, train);
-        } else if let (EventKind::Reverse { .. }, Phase::TurningBack { is_sent, .. }) =
-            (event.kind, &mut recovery.phase)
-        {
-            *is_sent = true;
         } else if let EventKind::Speed { step, .. } = event.kind
             && let Phase::Measuring { trial, from } | Phase::LearningSpeed { trial, from } =
                 &mut recovery.phase
@@ -421,19 +414,7 @@ impl Watchdog {
         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 
-    /// The train is at rest and its recovery complete. A train that was reversed an odd number of times is reversed once more: its
-    /// orders lead where it faced before.
-    fn turn_back(&mut self, now: Timestamp, train: TrainId, outcome: Outcome) {
-        let Some(recovery) = self.dangers.get_mut(&train) else { return };
-        if recovery.reversals.is_multiple_of(2) {
-            return self.recovered(now, train, outcome);
-        }
-        recovery.phase = Phase::TurningBack { outcome, is_sent: false };
-        recovery.by = now + STOPPED_WITHIN;
-        self.issue(now, Order::Reverse { train, then: SpeedStep::STAND });
-    }
-
-    /// The train is at rest, faces where it did, and its recovery is complete.
+    /// The train is at rest and its recovery complete.
     fn recovered(&mut self, now: Timestamp, train: TrainId, outcome: Outcome) {
         let Some(recovery) = self.dangers.remove(&train) else { return };
         self.driver.set_end_of_authority(now, train, None);
@@ -468,9 +449,7 @@ impl Watchdog {
     pub(super) fn need_operator(&mut self, now: Timestamp, train: TrainId) {
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let while_it = match recovery.phase {
-            Phase::Stopping | Phase::Waiting { .. } | Phase::Ending { .. } | Phase::TurningBack { .. } => {
-                "while it was being stopped"
-            }
+            Phase::Stopping | Phase::Waiting { .. } | Phase::Ending { .. } => "while it was being stopped",
             Phase::Locating { .. } | Phase::Reversing { .. } => "while it crept to a sensor",
             Phase::GivenUp => return,
             _ => "while it was measured again",

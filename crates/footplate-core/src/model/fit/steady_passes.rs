@@ -78,7 +78,8 @@ impl SteadyPasses {
         let part = (last.time - middle.time) / lasts;
         let ahead = speed * (middle.time - first.time) - middle.length;
         let poll = |pass: &Pass| speed * speed * pass.variance;
-        let end = |pass: &Pass, part: f64| part * part * (poll(pass) + self.scatter.variance(pass.sensor, step));
+        let end =
+            |pass: &Pass, part: f64| part * part * (poll(pass) + self.scatter.variance(pass.sensor, step));
         let wander = WANDER_PART * WANDER * length;
         let motion = end(&first, part) + end(&last, 1.0 - part) + wander * wander;
         let expected = motion + poll(&middle) + self.scatter.variance(middle.sensor, step);

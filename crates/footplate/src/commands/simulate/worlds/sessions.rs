@@ -263,9 +263,6 @@ impl Driven<'_, '_> {
                     machine.handle_word(now, &Input::Link(news));
                 }
             })?;
-            if std::env::var_os("TRACE").is_some() {
-                eprintln!("TRACE {:.3} {message:?} true {:?}", self.line.now().as_s(), self.truth().map(|t| (t.position, t.speed)));
-            }
             if matches!(&message, SessionMessage::Alarm(alarm) if alarm.is_of_promises()) {
                 self.scored.sessions_warned += 1;
             }
