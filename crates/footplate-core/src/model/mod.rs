@@ -16,8 +16,8 @@
 //! survey/                              lengths of the layout, and whether it is the right one
 //! ```
 
+mod change_deviations;
 mod decoder_kind;
-mod doubts;
 mod expected_information;
 mod fit;
 mod motion_model;
@@ -38,7 +38,7 @@ mod stop_offset;
 pub mod survey;
 mod variation;
 
-pub(crate) use doubts::OTHER_SHAPES;
+pub(crate) use change_deviations::OTHER_SHAPES;
 pub use expected_information::ExpectedInformation;
 pub use fit::{MotionFit, Refit, StatedFit, StatedMotion, StatedSpeed};
 pub use motion_model::{MotionModel, StepUse, StopForecast};

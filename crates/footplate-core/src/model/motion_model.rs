@@ -299,7 +299,7 @@ impl MotionModel {
         let stop = |answers: &Answers<'_>| {
             let speed = answers.speed(usize::from(step.get()), above);
             let segment = Segment::of(&commanded, answers, Pace::steady(speed));
-            (speed * segment.begins + segment.way_to_rest(), segment.settled())
+            (speed * segment.begins + segment.distance_to_rest(), segment.settled())
         };
         let (distance, time) = stop(&self.answers());
         let speed = self.answers().speed(usize::from(step.get()), above);

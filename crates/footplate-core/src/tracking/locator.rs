@@ -5,7 +5,7 @@
 //! differ a little from path lengths.
 
 use super::motion_filter::MotionFilter;
-use super::path_length::{PathReach, hop_length, path_reaches, taping_doubt};
+use super::path_length::{PathReach, hop_length, path_reaches, taping_deviation};
 use super::reachable_set::ReachableSet;
 use super::rollout::Rollout;
 use super::track_context::TrackContext;
@@ -163,7 +163,7 @@ impl Locator {
     /// The position of the train is lost: it was lifted, or reports contradict it. It keeps running at the commanded step.
     pub const fn lose(&mut self) {
         self.node = None;
-        self.filter.doubt_place(ANYWHERE_M * ANYWHERE_M);
+        self.filter.widen_place(ANYWHERE_M * ANYWHERE_M);
     }
 
     /// Whether the same commands repeat from now on, so that the filter should learn what its changes have in common.
@@ -245,7 +245,7 @@ impl Locator {
         let scatter = model.sensor_variance(Some(sensor));
         let Some((reach, short, _)) = self.best_reach(context, model, sensor, window) else {
             // Lost until now, or no path leads here: the train is here all the same, at the speed it had.
-            self.filter.doubt_place(ANYWHERE_M * ANYWHERE_M);
+            self.filter.widen_place(ANYWHERE_M * ANYWHERE_M);
             self.filter.shift(-self.filter.place(model, time).mean, 0.0);
             let here = Gaussian { mean: 0.0, variance: scatter };
             self.filter.pass(model, time, window.variance_s2(), here);
@@ -258,7 +258,7 @@ impl Locator {
         let mut at = window.middle();
         if !contradicts {
             at = self.fuse(model, [reach.length, here], window, time + short.mean / speed);
-        } else if self.filter.doubt_change(model, time, short.mean) {
+        } else if self.filter.widen_change(model, time, short.mean) {
             // The innovation exceeds its predicted variance, and a change of speed under way will continue to deviate. The
             // sensor gives the position, however uncertain the path to it is.
             self.filter.shift(-reach.length.mean, reach.length.variance);
@@ -270,7 +270,7 @@ impl Locator {
             self.filter.pass(model, time, window.variance_s2(), place);
             self.filter.shift(-reach.length.mean, 0.0);
             // The sensor gives the position all the same: the innovation exceeds its predicted variance.
-            self.filter.doubt_place(short.mean * short.mean);
+            self.filter.widen_place(short.mean * short.mean);
             self.filter.pass(model, time, window.variance_s2(), here);
         }
         self.node = Some(node);
@@ -318,7 +318,7 @@ impl Locator {
         let time = self.seconds(at);
         let place = self.filter.place(model, time);
         let here = PathPoint { node, distance: Length::from_m(place.mean) };
-        let taping = taping_doubt(context, model, here);
+        let taping = taping_deviation(context, model, here);
         let speed = self.filter.speed(model, time);
         let at_rest = self.filter.at(model, time).rests_at(time);
         Some(Located {
@@ -438,7 +438,7 @@ impl Locator {
         filter.offset_stop(self.stop_offset(context, model, &filter));
         let (place, scatter, time) = filter.rest(model)?;
         let at = PathPoint { node, distance: Length::from_m(place.mean) };
-        let taping = taping_doubt(context, model, at);
+        let taping = taping_deviation(context, model, at);
         Some(Rest {
             at,
             doubt: Length::from_m(libm::sqrt(place.variance + taping * taping)),

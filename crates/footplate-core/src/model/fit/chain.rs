@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use super::trip::{MeasuredRest, PassedEdge, Trip, TripContact};
+use super::trip::{MeasuredRest, PassedEdge, Trip, TripDetection};
 use crate::event::{Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep};
 use crate::link::TimeModel;
@@ -146,7 +146,7 @@ impl Chain {
         let ahead: Vec<(usize, f64)> = way.as_ref().map_or_else(Vec::new, |way| edges(layout, way));
         if let [.., stopped, trip] = self.trips.as_mut_slice()
             && trip.continues
-            && trip.contacts.is_empty()
+            && trip.detections.is_empty()
         {
             stopped.stop_edges = stop_edges(stopped, answers, &self.behind, &ahead);
         }
@@ -166,17 +166,17 @@ impl Chain {
             (way.length.as_m(), way.hops().iter().filter_map(|hop| sections.section(*hop)).collect())
         });
         let (sensor, variance) = (Some(report.sensor), interval * interval / 12.0);
-        trip.pass(TripContact { node, sensor, time, variance, way: length, sections });
+        trip.pass(TripDetection { node, sensor, time, variance, length, sections });
         (self.at, self.last_sensor) = (Some(node), Some(report.sensor));
         true
     }
 
     /// The last passage, with the step, if the train was running steadily then.
-    pub(super) fn steady_pass(&self, answers: &Answers<'_>) -> Option<(&TripContact, SpeedStep)> {
+    pub(super) fn steady_pass(&self, answers: &Answers<'_>) -> Option<(&TripDetection, SpeedStep)> {
         let trip = self.trips.last()?;
-        let contact = trip.contacts.last()?;
+        let detection = trip.detections.last()?;
         let step = SpeedStep::new(self.step).filter(|step| *step != SpeedStep::STAND)?;
-        (trip.settles_at(answers) <= contact.time).then_some((contact, step))
+        (trip.settles_at(answers) <= detection.time).then_some((detection, step))
     }
 
     /// Takes a tape measurement: the train came to rest this far past a sensor.
@@ -193,20 +193,20 @@ impl Chain {
         };
         let at = self.at;
         let Some(trip) = self.trips.last_mut() else { return };
-        let passed = trip.contacts.iter().rposition(|contact| contact.node == node);
+        let passed = trip.detections.iter().rposition(|detection| detection.node == node);
         let beyond = (offset.as_m(), Vec::new());
-        let (contacts, (beyond, sections)) = match passed {
+        let (detections, (beyond, sections)) = match passed {
             Some(place) => (place + 1, beyond),
             None => {
                 let Some(reach) = at.and_then(|from| reach_of(layout, turnouts, from, landmark)) else {
                     return;
                 };
                 let sections = reach.hops().iter().filter_map(|hop| index.section(*hop)).collect();
-                (trip.contacts.len(), (reach.length.as_m() + offset.as_m(), sections))
+                (trip.detections.len(), (reach.length.as_m() + offset.as_m(), sections))
             }
         };
         trip.came_to_rest = true;
-        trip.measured = Some(MeasuredRest { contacts, beyond, sections });
+        trip.measured = Some(MeasuredRest { detections, beyond, sections });
     }
 }
 

@@ -111,8 +111,8 @@ pub(super) fn count(counts: &mut [[Counts; 2]], trip: &Trip) {
     };
     let mut commanded = trip.commanded.iter().peekable();
     let mut now = trip.running.unwrap_or((0, false));
-    for contact in &trip.contacts {
-        while let Some(next) = commanded.next_if(|next| next.sent <= contact.time) {
+    for detection in &trip.detections {
+        while let Some(next) = commanded.next_if(|next| next.sent <= detection.time) {
             now = (next.to, next.above());
         }
         at(now, &|counts| counts.contacts += 1);

@@ -151,10 +151,10 @@ impl MotionFit {
 
     /// The scatter of sensors shows where the train runs steadily.
     fn note_steady_pass(&mut self, sensor: SensorId) {
-        let Some((contact, step)) = self.chain.steady_pass(&self.model.answers()) else {
+        let Some((detection, step)) = self.chain.steady_pass(&self.model.answers()) else {
             return self.steady.interrupt();
         };
-        self.steady.pass(sensor, step, contact);
+        self.steady.pass(sensor, step, detection);
     }
 
     /// Begins a run: the train has been running steadily at `step`, or is at rest at step 0. The run has its own clock.
@@ -247,10 +247,11 @@ impl MotionFit {
             let mut own = trip.start();
             let (rest, first) = point.reach(trip, &own);
             if trip.own.is_none() {
-                let surveyed = trip.contacts.first().map_or(0.0, |contact| contact.way);
+                let surveyed = trip.detections.first().map_or(0.0, |detection| detection.length);
                 own.place = if trip.continues { next_place } else { surveyed - first.unwrap_or(surveyed) };
             }
-            next_place = own.place + rest - trip.contacts.iter().map(|contact| contact.way).sum::<f64>();
+            next_place =
+                own.place + rest - trip.detections.iter().map(|detection| detection.length).sum::<f64>();
             trips.push(own);
         }
         Values { lasting, trips }

@@ -8,7 +8,7 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use super::trip::TripContact;
+use super::trip::TripDetection;
 use crate::ids::{SensorId, SpeedStep};
 use crate::model::priors::WANDER;
 use crate::model::sensor_scatter::{SensorScatter, SensorVariances};
@@ -59,8 +59,8 @@ impl SteadyPasses {
     }
 
     /// The train has passed a sensor, running steadily at a step since the pass before if there is one.
-    pub(super) fn pass(&mut self, sensor: SensorId, step: SpeedStep, contact: &TripContact) {
-        let &TripContact { time, variance, way: length, .. } = contact;
+    pub(super) fn pass(&mut self, sensor: SensorId, step: SpeedStep, detection: &TripDetection) {
+        let &TripDetection { time, variance, length, .. } = detection;
         let last = Pass { sensor, time, variance, length };
         if let [first, middle] = *self.recent.as_slice() {
             self.compare(step, [first, middle, last]);
@@ -131,15 +131,15 @@ mod tests {
             let late = 0.5 * WINDOW * noise(nth) + if nth == 2 * laps { wild } else { 0.0 };
             // No length is as surveyed.
             let true_place = HOP * nth as f64 + [0.0, 0.02, -0.03, 0.01][place];
-            let contact = TripContact {
+            let detection = TripDetection {
                 node: NodeId(place as u16),
                 sensor: Some(SensorId(place as u16)),
                 time: (true_place + off) / SPEED + late,
                 variance: WINDOW * WINDOW / 12.0,
-                way: HOP,
+                length: HOP,
                 sections: Vec::new(),
             };
-            passes.pass(SensorId(place as u16), step, &contact);
+            passes.pass(SensorId(place as u16), step, &detection);
         }
         let variances = passes.variances();
         [0, 1, 2, 3].map(|place| libm::sqrt(variances.of(Some(SensorId(place)))))

@@ -10,7 +10,7 @@ use crate::model::stop_offset::StopEffect;
 /// A sensor passed, and the path to it from the sensor before, or from the origin of the trip's distances.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct TripContact {
+pub(super) struct TripDetection {
     /// Its node.
     pub(super) node: NodeId,
     /// The sensor; `None` in what version 6 of the model wrote.
@@ -20,7 +20,8 @@ pub(super) struct TripContact {
     pub(super) time: f64,
     pub(super) variance: f64,
     /// Surveyed length of the path (m) and its sections.
-    pub(super) way: f64,
+    #[cfg_attr(feature = "serde", serde(rename = "way"))]
+    pub(super) length: f64,
     pub(super) sections: Vec<usize>,
 }
 
@@ -45,7 +46,8 @@ impl PassedEdge {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct MeasuredRest {
     /// How many of the trip's sensors lie up to the one from which it counts.
-    pub(super) contacts: usize,
+    #[cfg_attr(feature = "serde", serde(rename = "contacts"))]
+    pub(super) detections: usize,
     /// Distance beyond that sensor (m), by tape and survey.
     pub(super) beyond: f64,
     /// Sections between that sensor and the one from which the tape was laid.
@@ -64,7 +66,8 @@ pub(super) struct Trip {
     pub(super) begins: f64,
     #[cfg_attr(feature = "serde", serde(rename = "told"))]
     pub(super) commanded: Vec<SpeedCommand>,
-    pub(super) contacts: Vec<TripContact>,
+    #[cfg_attr(feature = "serde", serde(rename = "contacts"))]
+    pub(super) detections: Vec<TripDetection>,
     /// When pieces of a constant deviation of speed begin (s).
     #[cfg_attr(feature = "serde", serde(with = "super::bits"))]
     pub(super) pieces: Vec<f64>,
@@ -128,7 +131,7 @@ impl Trip {
             continues,
             begins,
             commanded: Vec::new(),
-            contacts: Vec::new(),
+            detections: Vec::new(),
             pieces: alloc::vec![f64::NEG_INFINITY],
             came_to_rest: false,
             stop_edges: Vec::new(),
@@ -153,12 +156,12 @@ impl Trip {
         }
     }
 
-    pub(super) fn pass(&mut self, contact: TripContact) {
+    pub(super) fn pass(&mut self, detection: TripDetection) {
         let since = self.pieces.last().copied().unwrap_or(f64::NEG_INFINITY).max(self.begins);
-        if contact.time > since + LONGEST_PIECE {
-            self.pieces.push(contact.time);
+        if detection.time > since + LONGEST_PIECE {
+            self.pieces.push(detection.time);
         }
-        self.contacts.push(contact);
+        self.detections.push(detection);
     }
 
     /// The step from which the speed of a segment comes: of a stop, the one before.
@@ -196,10 +199,10 @@ impl Trip {
         let (own, mut segments) = (self.start(), Vec::new());
         self.segments(answers, &own, &mut segments);
         let last = segments.last().filter(|last| last.is_stop())?;
-        let effect = StopEffect { speed: last.from.speed, distance: last.way_to_rest() };
+        let effect = StopEffect { speed: last.from.speed, distance: last.distance_to_rest() };
         let mut walk = Walk::new(self, &own, &segments);
-        let passed = self.contacts.last().map_or(-own.place, |contact| walk.way(contact.time));
-        Some((walk.way_to_rest() - passed, effect))
+        let passed = self.detections.last().map_or(-own.place, |detection| walk.distance(detection.time));
+        Some((walk.distance_to_rest() - passed, effect))
     }
 
     fn last_segment(&self, answers: &Answers<'_>) -> Option<Segment> {
@@ -258,14 +261,14 @@ impl<'t> Walk<'t> {
             (self.segments.get(self.segment), self.segments.get(self.segment + 1))
             && next.begins <= time
         {
-            self.base += now.way(next.begins);
+            self.base += now.distance(next.begins);
             self.segment += 1;
         }
-        self.base + self.segments.get(self.segment).map_or(0.0, |segment| segment.way(time))
+        self.base + self.segments.get(self.segment).map_or(0.0, |segment| segment.distance(time))
     }
 
     /// Distance (m) from the beginning of the trip, at a time (s) not before the last one asked for.
-    pub(super) fn way(&mut self, time: f64) -> f64 {
+    pub(super) fn distance(&mut self, time: f64) -> f64 {
         while let Some(next) = self.trip.pieces.get(self.piece + 1).copied()
             && next <= time
         {
@@ -285,15 +288,15 @@ impl<'t> Walk<'t> {
     }
 
     /// Distance to standstill, when the last segment is a stop.
-    pub(super) fn way_to_rest(mut self) -> f64 {
+    pub(super) fn distance_to_rest(mut self) -> f64 {
         let Some(last) = self.segments.last() else { return 0.0 };
         let begins = last.begins;
-        let start = self.way(begins);
+        let start = self.distance(begins);
         while self.piece + 1 < self.trip.pieces.len() {
             self.piece += 1;
         }
         let added: f64 = self.own.changes.iter().sum::<f64>() - self.added(begins);
-        start + self.deviation() * last.way_to_rest() + added
+        start + self.deviation() * last.distance_to_rest() + added
     }
 
     /// Speed (m/s) at the time last asked for, or later.

@@ -31,8 +31,8 @@ impl MotionFit {
     #[must_use]
     pub fn begin_refit(&self, sections: &SectionIndex) -> Refit {
         let mut fit = self.clone();
-        let passed = fit.chain.trips.iter().flat_map(|trip| &trip.contacts);
-        fit.prior.meet(passed.flat_map(|contact| &contact.sections));
+        let passed = fit.chain.trips.iter().flat_map(|trip| &trip.detections);
+        fit.prior.meet(passed.flat_map(|detection| &detection.sections));
         let stops = fit.chain.trips.iter().flat_map(|trip| &trip.stop_edges);
         fit.prior.meet_stops(stops.map(|stop| stop.edge));
         let columns = fit.prior.columns();
