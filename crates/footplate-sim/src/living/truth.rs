@@ -12,10 +12,10 @@ use crate::train::Train;
 
 /// Further away than anybody asks (chosen: twice round a large layout).
 const FAR_MM: f64 = 20_000.0;
-/// A contact that scatters closes no further than this beyond its usual place: 2.5 standard deviations of 15 mm and of 3 mm of the
+/// A sensor that scatters closes no further than this beyond its usual place: 2.5 standard deviations of 15 mm and of 3 mm of the
 /// shoe.
 const CLOSES_WITHIN_MM: f64 = 40.0;
-/// Positions are told by a contact no further away (chosen: longer than any hop of the course layouts).
+/// Positions are stated past a sensor no further away (chosen: longer than any hop of the course layouts).
 const NEAR_MM: f64 = 5000.0;
 
 /// The truth about a living layout.
@@ -138,7 +138,7 @@ impl<'w, 'l> Truth<'w, 'l> {
         let passed = passed.filter(|pass| pass.odometer_mm >= found.put_down_at);
         let since = passed.map(|pass| found.odometer - pass.odometer_mm).filter(|mm| *mm < FAR_MM);
         // Past its usual place, and it has not closed yet this time.
-        let just_past = self.contact(sensor).and_then(|contact| self.path_length(0.0, contact, place));
+        let just_past = self.contact(sensor).and_then(|usual| self.path_length(0.0, usual, place));
         let is_due = |mm: &f64| *mm < CLOSES_WITHIN_MM && since.is_none_or(|since| since > CLOSES_WITHIN_MM);
         let since = just_past.filter(is_due).or(since);
         let before = self.way_to(place, sensor);
