@@ -6,7 +6,6 @@
 #![expect(clippy::indexing_slicing, reason = "arrays of letters, indexed by letters")]
 
 use super::apart::STEP_AGAIN;
-use super::arrival::{BISECTIONS, LONGEST_WAIT, SLOWEST};
 use super::filter_state::{B, E, FilterState, H, LATER, N, Z};
 use crate::linalg::Gaussian;
 use crate::model::MotionModel;
@@ -442,30 +441,6 @@ impl<const L: usize> MotionFilter<L> {
     pub(crate) fn shift(&mut self, by: f64, variance: f64) {
         self.course.x[B] += by;
         self.p[B][B] += variance;
-    }
-
-    /// When it reaches a place (s), with the standard deviation of that; `None` if it comes to rest before.
-    pub(crate) fn reaches(&self, model: &MotionModel, place: Gaussian, now: f64) -> Option<(f64, f64)> {
-        if let Some((rest, _, _)) = self.rest(model)
-            && rest.mean <= place.mean
-        {
-            return None;
-        }
-        let place_at = |time: f64| self.place(model, time).mean;
-        let (mut low, mut high) = (now, now + 0.5);
-        while place_at(high) < place.mean {
-            (low, high) = (high, now + 2.0 * (high - now));
-            if high - now > LONGEST_WAIT {
-                return None;
-            }
-        }
-        for _ in 0..BISECTIONS {
-            let middle = 0.5 * (low + high);
-            if place_at(middle) < place.mean { low = middle } else { high = middle }
-        }
-        let speed = self.speed(model, high).mean.max(SLOWEST);
-        let deviation = libm::sqrt(self.place(model, high).variance + place.variance) / speed;
-        Some((high, deviation))
     }
 }
 
