@@ -4,7 +4,7 @@ use footplate_core::control::learn::Fault;
 use footplate_core::control::{Alarm as Noticed, Notice};
 use footplate_core::track::Layout;
 use footplate_core::tracking::Drift;
-use footplate_core::{HALF_95, Length, TrainId};
+use footplate_core::{HALF_95, Length, TrainId, TurnoutId};
 use footplate_wire::LinkNotice;
 use serde::Serialize;
 
@@ -19,15 +19,43 @@ pub(crate) enum Grade {
     Danger,
     /// Something deviates from the plan.
     Warning,
-    /// The alarms of this train are over; without a train, those of the link.
+    /// The alarm, or what the message is about, is over.
     Over,
 }
 
-/// A message that every page shows.
+/// What an alarm is about: alarms of one cause are one entry of the list.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Cause {
+    family: &'static str,
+    train: Option<TrainId>,
+    /// The sensor, turnout or command, where a family has one entry for each.
+    subject: String,
+}
+
+/// What resolves an alarm, beside news of it and the operator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Resolution {
+    /// Its train is located, and the watchdog does not hold it.
+    Located,
+    /// Its train is commanded to run again.
+    Runs,
+    /// A sensor detects its train.
+    Detected,
+    /// Its train is at rest.
+    AtRest,
+    /// The turnout is in the other position.
+    Thrown { turnout: TurnoutId, curved: bool },
+    /// It has not recurred for a while.
+    Quiet,
+    /// News of the link, the sensor or the power, or the operator.
+    News,
+}
+
+/// A message that every page shows. Sessions record its form for debugging: its fields keep their names.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Alarm {
     /// The key of the sentence in the pages.
-    what: &'static str,
+    pub(super) what: &'static str,
     pub(super) grade: Grade,
     pub(super) train: Option<TrainId>,
     /// The values that the sentence is filled with.
@@ -41,6 +69,91 @@ pub(crate) struct Alarm {
 impl Alarm {
     fn new(grade: Grade, what: &'static str, train: impl Into<Option<TrainId>>, blanks: Vec<String>) -> Self {
         Self { what, grade, train: train.into(), blanks, text: String::new(), is_said: false }
+    }
+
+    pub(super) fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// A greater number is more severe. Within a cause, what needs the operator ranks above the danger that led to it.
+    pub(super) fn severity(&self) -> u8 {
+        match (self.what, self.grade) {
+            ("needs-person" | "line-silent" | "line-not-ready", _) => 3,
+            (_, Grade::Danger) => 2,
+            (_, Grade::Warning) => 1,
+            (_, Grade::Over) => 0,
+        }
+    }
+
+    /// The cause of the alarm.
+    pub(super) fn cause(&self) -> Cause {
+        let of_train = |family| Cause { family, train: self.train, subject: String::new() };
+        let of_link = |family| Cause { family, train: None, subject: String::new() };
+        let about = |family| Cause {
+            family,
+            train: None,
+            subject: self.blanks.first().cloned().unwrap_or_default(),
+        };
+        match self.what {
+            "lost" | "needs-person" | "held-as-unknown" | "overdue" | "stands-lost" | "stands-elsewhere"
+            | "stands-untimely" | "stands-misses" | "mishap-lost" | "mishap-moved" => of_train("position"),
+            "drifts-slower" | "drifts-faster" | "stands-slower" | "stands-faster" | "stands-distrusted" => {
+                of_train("model")
+            }
+            "diverged" | "diverged-and-others" | "track-ends" | "held-back" | "deadlock" | "dropped"
+            | "track-reserved" | "overshoots" => of_train("route"),
+            "stands-unconfirmed" | "does-not-stop" => of_train("stopping"),
+            "line-silent" | "line-not-ready" | "stands-silent" => of_link("link"),
+            "line-reply-lost" | "line-unexpected" | "line-repeated" => of_link("line noise"),
+            "power-off" => of_link("power"),
+            "lies-curved" | "lies-straight" => about("turnout"),
+            "contact-stuck" | "unexplained" | "line-held-closed" => about("sensor"),
+            "not-sent" | "unconfirmed" | "line-solenoid-late" => about(self.what),
+            "line-says" => Cause { train: self.train, ..about(self.what) },
+            other => of_train(other),
+        }
+    }
+
+    /// What resolves the alarm.
+    pub(super) fn resolution(&self) -> Resolution {
+        let turnout = self.blanks.first().and_then(|turnout| turnout.parse().ok()).map(TurnoutId);
+        match self.what {
+            "overdue" => Resolution::Detected,
+            "overshoots" => Resolution::AtRest,
+            "lies-curved" | "lies-straight" => turnout.map_or(Resolution::News, |turnout| {
+                Resolution::Thrown { turnout, curved: self.what == "lies-curved" }
+            }),
+            "lost" | "needs-person" | "held-as-unknown" | "stands-lost" | "stands-elsewhere" | "stands-untimely"
+            | "stands-misses" | "stands-slower" | "stands-faster" | "stands-distrusted" | "stands-silent"
+            | "stands-unconfirmed" | "does-not-stop" | "mishap-lost" | "mishap-moved"
+            | "line-reverse-in-doubt" => Resolution::Located,
+            "diverged" | "diverged-and-others" | "track-ends" | "track-reserved" | "held-back" | "deadlock"
+            | "dropped" => {
+                Resolution::Runs
+            }
+            "unexplained" | "line-reply-lost" | "line-unexpected" | "line-repeated" | "drifts-slower"
+            | "drifts-faster" | "mishap-stalled" | "mishap-missed" | "mishap-wrong-leg" => Resolution::Quiet,
+            _ => Resolution::News,
+        }
+    }
+
+    /// Whether this message, of the kind `over`, resolves an alarm.
+    pub(super) fn resolves(&self, alarm: &Self) -> bool {
+        let cause = alarm.cause();
+        match self.what {
+            "recovered" => {
+                alarm.train == self.train && matches!(cause.family, "position" | "model" | "stopping" | "route")
+            }
+            "line-answers" => matches!(cause.family, "link" | "line noise"),
+            "contact-restored" => cause.family == "sensor" && alarm.blanks == self.blanks,
+            "power-on" => cause.family == "power",
+            _ => false,
+        }
+    }
+
+    /// The same alarm as a message that it is over.
+    pub(super) fn over(self) -> Self {
+        Self { grade: Grade::Over, ..self }
     }
 
     /// Adds the English text that was also printed as a line.
@@ -69,6 +182,11 @@ impl Alarm {
     pub(crate) fn promises_broken(train: TrainId, by: Length) -> Self {
         let by = format!("{:.0}", HALF_95 * by.as_mm());
         Self::new(Grade::Warning, MISSED_INTERVALS, train, vec![by])
+    }
+
+    /// A train was stopped before track that is reserved for others.
+    pub(crate) fn track_reserved(train: TrainId, holders: &[TrainId]) -> Self {
+        Self::new(Grade::Warning, "track-reserved", train, vec![listed(holders)])
     }
 
     /// Whether this alarm is about missed stop intervals.
@@ -154,6 +272,8 @@ impl Alarm {
             Notice::NeedsOperator { train, .. } => (Grade::Danger, "needs-person", Some(*train), none),
             Notice::Cancelled { train, .. } => (Grade::Warning, "dropped", Some(*train), none),
             Notice::Recovered { train, .. } => (Grade::Over, "recovered", Some(*train), none),
+            Notice::SensorRestored { sensor } => (Grade::Over, "contact-restored", None, vec![name(sensor)]),
+            Notice::PowerOn => (Grade::Over, "power-on", None, none),
             Notice::Deadlock { train, moves } => {
                 (Grade::Warning, "deadlock", Some(*train), vec![listed(moves)])
             }

@@ -7,6 +7,7 @@ use anyhow::{Context, bail};
 use super::instruction::Instruction;
 use super::parse::parse;
 use super::reader::Known;
+use super::script_runner::QueueId;
 
 /// The largest script, in bytes: about a day of driving.
 const LONGEST: u64 = 1 << 20;
@@ -21,6 +22,10 @@ pub(super) struct Step {
     pub(super) is_part: bool,
     /// Whether this is the second attempt, after its train was lost and located.
     pub(super) is_retry: bool,
+    /// The queue that it belongs to.
+    pub(super) queue: QueueId,
+    /// The number of its line in a schedule, from 0.
+    pub(super) line: usize,
 }
 
 /// Reads a script.
@@ -56,5 +61,7 @@ pub(super) fn step(line: &str, known: Known<'_>) -> Result<Option<Step>, super::
         instruction,
         is_part: false,
         is_retry: false,
+        queue: QueueId::SESSION,
+        line: 0,
     }))
 }
