@@ -55,9 +55,7 @@ impl Store {
         // Text and whole numbers always have a form in JSON.
         let body = schedule.and_then(|schedule| serde_json::to_string(schedule).ok());
         let sql = "INSERT INTO schedules (layout, name, stored_at_ns, body) VALUES (?1, ?2, ?3, ?4)";
-        self.connection
-            .execute(sql, (layout, name, now.as_ns(), body))
-            .map_err(|error| self.error(error))?;
+        self.connection.execute(sql, (layout, name, now.as_ns(), body)).map_err(|error| self.error(error))?;
         Ok(())
     }
 

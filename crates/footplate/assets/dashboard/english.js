@@ -10,7 +10,7 @@ export const ENGLISH = {
   "halt-heard": "power-off sent, and the station has answered since; a 6051 does not report track power: NOT CONFIRMED, check that all trains have stopped",
   "written-until": "recorded on disk until {0} s ago; a power cut would lose the rest",
   "halt-failed": "emergency stop NOT accepted: {0}",
-  "chart-csv": "Save the data of this chart as CSV: {0}", "chart-keys": "Use the arrow keys to step through the values.", "skip": "To the page",
+  "chart-png": "Save as a picture: {0}", "chart-csv": "Save the data of this chart as CSV: {0}", "chart-keys": "Use the arrow keys to step through the values.", "skip": "To the page",
   "connected-alarmed": "live, alarms: {0}", "act-place": "Say where train {0} is", "act-way": "Find a way for train {0}", "act-power": "Switch the power on",
   "act-straight": "Set turnout {0} straight", "act-curved": "Set turnout {0} curved", "act-model": "Show its calibration", "act-train": "Show train {0}", "act-line": "Check the link",
   "act-health": "Show the alarms", "end-alarm": "Done", "end-alarm-of": "Done: {0}", "more-alarms": "{0} more alarms",
@@ -169,7 +169,7 @@ export const ENGLISH = {
   "recordings": "Recordings", "session": "session", "events": "events", "excluded-count": "excluded", "decided-by": "type",
   "machine-drive": "driving", "machine-calibrate": "calibration", "machine-tour": "demo", "choose-two": "Select a session to replay it, or two to compare them.",
   "no-recordings": "The store contains no recordings yet.", "walking": "replaying …", "walked-track": "The track of {0}", "play": "Play", "pause": "Pause",
-  "moment": "Time", "compared": "Compared", "note-recorded": "Position error at each sensor report. Vertical line: the time shown.",
+  "moment": "Time", "compared": "Compared", "played": "Speed", "note-recorded-speed": "Estimated speed of each train. Click a chart to go to that time; drag to zoom, Escape shows all.", "chart-recorded-speed": "Speed in the recorded sessions", "note-recorded": "Position error at each sensor report. Vertical line: the time shown.",
   "chart-recorded": "Prediction errors of the sessions", "axis-session": "time since the first frame (s)",
 
   // odometry
@@ -221,6 +221,17 @@ export const ENGLISH = {
   "score-speed": "Speed error: {0} m/s rms, {1} m/s at most.",
   "score-distance": "Distance error at the end: {0} m, with a 99.99 % interval {1} m wide.",
   "score-noticed": "The slip or slide was detected after {0} s.",
+
+  // schedules
+  "schedules": "Schedules", "no-schedule": "No schedule yet: write one beside this text, stop by stop, and save it.", "schedule-new": "Write a schedule",
+  "schedule-run": "Run", "schedule-end": "End", "schedule-edit": "Edit", "schedule-delete": "Delete", "schedule-deleted": "{0} deleted",
+  "schedule-once": "once", "schedule-rounds": "{0} rounds", "schedule-endless": "until it is ended", "schedule-is-button": "button on the layout page",
+  "schedule-round": "Round {0} of {1}", "schedule-runs": "Runs", "schedule-over": "Ended", "schedule-over-short": "Ended; not every line was carried out",
+  "line-done": "(done)", "line-active": "(now)", "line-next": "(next)", "schedule-begins": "{0}: begins", "schedule-ends": "{0}: ends",
+  "stop-place": "Stop at sensor", "stop-beyond": "Beyond it (mm)", "stop-wait": "Wait there (s)", "add-stop": "Add this stop", "turnout-choice": "A route: turnouts as they are now", "add-turnouts": "Add the selected turnouts", "schedule-commands": "{0} commands",
+  "schedule-lines": "Commands, one a line", "schedule-name": "Name", "schedule-how-often": "Rounds", "schedule-as-button": "Button on the layout page",
+  "schedule-save": "Save", "schedule-saved": "{0} saved", "schedule-no-turnout": "Choose turnouts whose position is known.", "routes": "Saved routes and schedules",
+  "note-schedule": "A train finishes one command before it begins the next; every command of the prompt is possible. A command by hand ends the schedule of that train.",
 
   // the editor
   "editor": "Draw a layout", "draft": "The layout that is being drawn; click a joint to select it", "draft-undo": "Undo", "draft-redo": "Redo", "draft-clear": "Clear",

@@ -10,7 +10,7 @@ export const GERMAN = {
   "halt-heard": "Abschaltbefehl gesendet, die Zentrale hat seither geantwortet; eine 6051 meldet den Fahrstrom nicht: NICHT BESTÄTIGT, prüfen, ob alle Züge stehen",
   "written-until": "bis vor {0} s auf der Platte aufgezeichnet; ein Stromausfall verlöre den Rest",
   "halt-failed": "Nothalt NICHT angenommen: {0}",
-  "chart-csv": "Daten dieses Diagramms als CSV speichern: {0}", "chart-keys": "Mit den Pfeiltasten von Wert zu Wert gehen.", "skip": "Zur Seite",
+  "chart-png": "Als Bild sichern: {0}", "chart-csv": "Daten dieses Diagramms als CSV speichern: {0}", "chart-keys": "Mit den Pfeiltasten von Wert zu Wert gehen.", "skip": "Zur Seite",
   "connected-alarmed": "live, Alarme: {0}", "act-place": "Sagen, wo Zug {0} ist", "act-way": "Weg für Zug {0} suchen", "act-power": "Fahrstrom einschalten",
   "act-straight": "Weiche {0} gerade stellen", "act-curved": "Weiche {0} auf Abzweig stellen", "act-model": "Kalibrierung zeigen", "act-train": "Zug {0} zeigen", "act-line": "Verbindung prüfen",
   "act-health": "Alarme zeigen", "end-alarm": "Erledigt", "end-alarm-of": "Erledigt: {0}", "more-alarms": "{0} weitere Alarme",
@@ -169,7 +169,7 @@ export const GERMAN = {
   "recordings": "Aufzeichnungen", "session": "Sitzung", "events": "Ereignisse", "excluded-count": "ausgeschlossen", "decided-by": "Art",
   "machine-drive": "Fahren", "machine-calibrate": "Kalibrierung", "machine-tour": "Vorführung", "choose-two": "Eine Sitzung wählen, um sie erneut abzuspielen, oder zwei zum Vergleichen.",
   "no-recordings": "Der Speicher enthält noch keine Aufzeichnung.", "walking": "wird abgespielt …", "walked-track": "Die Anlage von {0}", "play": "Abspielen", "pause": "Anhalten",
-  "moment": "Zeitpunkt", "compared": "Verglichen", "note-recorded": "Positionsfehler bei jeder Meldung. Senkrechte Linie: der gezeigte Zeitpunkt.",
+  "moment": "Zeitpunkt", "compared": "Verglichen", "played": "Tempo", "note-recorded-speed": "Geschätztes Tempo jedes Zuges. Ein Klick in ein Diagramm geht zu dieser Zeit; Ziehen vergrößert, Escape zeigt alles.", "chart-recorded-speed": "Tempo in den aufgezeichneten Sitzungen", "note-recorded": "Positionsfehler bei jeder Meldung. Senkrechte Linie: der gezeigte Zeitpunkt.",
   "chart-recorded": "Vorhersagefehler der Sitzungen", "axis-session": "Zeit seit dem ersten Bild (s)",
 
   // odometry
@@ -221,6 +221,17 @@ export const GERMAN = {
   "score-speed": "Fehler des Tempos: {0} m/s rms, höchstens {1} m/s.",
   "score-distance": "Fehler der Strecke am Ende: {0} m, bei einem 99,99-%-Intervall von {1} m Breite.",
   "score-noticed": "Gleiten oder Schleudern wurde nach {0} s erkannt.",
+
+  // schedules
+  "schedules": "Fahrpläne", "no-schedule": "Noch kein Fahrplan: daneben Halt für Halt einen schreiben und sichern.", "schedule-new": "Einen Fahrplan schreiben",
+  "schedule-run": "Fahren", "schedule-end": "Beenden", "schedule-edit": "Ändern", "schedule-delete": "Löschen", "schedule-deleted": "{0} gelöscht",
+  "schedule-once": "einmal", "schedule-rounds": "{0} Durchgänge", "schedule-endless": "bis er beendet wird", "schedule-is-button": "Knopf auf der Anlagenseite",
+  "schedule-round": "Durchgang {0} von {1}", "schedule-runs": "Läuft", "schedule-over": "Beendet", "schedule-over-short": "Beendet; nicht jede Zeile wurde ausgeführt",
+  "line-done": "(erledigt)", "line-active": "(jetzt)", "line-next": "(als Nächstes)", "schedule-begins": "{0}: beginnt", "schedule-ends": "{0}: endet",
+  "stop-place": "Halt an Rückmelder", "stop-beyond": "Dahinter (mm)", "stop-wait": "Dort warten (s)", "add-stop": "Diesen Halt anfügen", "turnout-choice": "Eine Fahrstraße: Weichen, wie sie jetzt liegen", "add-turnouts": "Die gewählten Weichen anfügen", "schedule-commands": "{0} Befehle",
+  "schedule-lines": "Befehle, einer je Zeile", "schedule-name": "Name", "schedule-how-often": "Durchgänge", "schedule-as-button": "Knopf auf der Anlagenseite",
+  "schedule-save": "Sichern", "schedule-saved": "{0} gesichert", "schedule-no-turnout": "Weichen wählen, deren Lage bekannt ist.", "routes": "Gespeicherte Fahrstraßen und Fahrpläne",
+  "note-schedule": "Ein Zug beendet einen Befehl, bevor er den nächsten beginnt; jeder Befehl der Eingabezeile ist möglich. Ein Befehl von Hand beendet den Fahrplan dieses Zuges.",
 
   // the editor
   "editor": "Anlage zeichnen", "draft": "Die Anlage, die gezeichnet wird; auf einen Stoß klicken, um ihn zu wählen", "draft-undo": "Rückgängig", "draft-redo": "Wiederholen", "draft-clear": "Leeren",

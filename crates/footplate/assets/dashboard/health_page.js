@@ -62,9 +62,9 @@ export function healthPage(root, live) {
     } } });
     const inDoubts = ({ late_ms: late, late_half_ms: half }) => (late == null ? null : late / half);
     const beside = ({ short_mm: short }) => (short == null ? null : -short);
-    add("errors", () => ({ name: say("chart-errors"), x, y: say("axis-sure"), zero: true, range: about(10, beside), series: series("mm", 1) }), joined(beside));
+    add("errors", () => ({ name: say("chart-errors"), x, sync: "health", y: say("axis-sure"), zero: true, range: about(10, beside), series: series("mm", 1) }), joined(beside));
     add("doubts", () => ({
-      name: say("chart-doubts"), x, y: say("axis-doubts"), height: 200, zero: true, range: about(1.5, inDoubts), series: series("", 2),
+      name: say("chart-doubts"), x, sync: "health", y: say("axis-doubts"), height: 200, zero: true, range: about(1.5, inDoubts), series: series("", 2),
       below: [(u) => {
         const [top, foot] = [u.valToPos(1, "y", true), u.valToPos(-1, "y", true)];
         u.ctx.save();

@@ -2,6 +2,7 @@
 
 import { make, put, signed } from "./dom.js";
 import { Guide } from "./guide.js";
+import { RouteButtons } from "./route_buttons.js";
 import { order } from "./server.js";
 import { PickTrack } from "./pick_track.js";
 import { SCALES, chooseScale, kmPerHour, scale } from "./scale.js";
@@ -63,6 +64,8 @@ export function layoutPage(root, live, about) {
   }
 
   const guide = sought === undefined ? undefined : new Guide($("#guide"), live, sought, track, give);
+
+  const routes = new RouteButtons($("#routes"), $("#routes-answer"));
 
   const leg = (lies) => say(lies ? `leg-${lies}` : "leg-unknown");
   const stands = (turnout, lies) => (lies ? say("turnout-is", turnout, leg(lies)) : say("turnout-unknown", turnout));
@@ -158,6 +161,7 @@ export function layoutPage(root, live, about) {
   function show(picture) {
     track.show(picture);
     guide?.show(picture);
+    routes.show(picture);
     listTurnouts(picture);
     picture.trains.forEach((train, nth) => {
       const parts = cards.get(train.train) ?? card(train, nth);

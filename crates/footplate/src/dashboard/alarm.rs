@@ -89,19 +89,22 @@ impl Alarm {
     pub(super) fn cause(&self) -> Cause {
         let of_train = |family| Cause { family, train: self.train, subject: String::new() };
         let of_link = |family| Cause { family, train: None, subject: String::new() };
-        let about = |family| Cause {
-            family,
-            train: None,
-            subject: self.blanks.first().cloned().unwrap_or_default(),
-        };
+        let about =
+            |family| Cause { family, train: None, subject: self.blanks.first().cloned().unwrap_or_default() };
         match self.what {
             "lost" | "needs-person" | "held-as-unknown" | "overdue" | "stands-lost" | "stands-elsewhere"
             | "stands-untimely" | "stands-misses" | "mishap-lost" | "mishap-moved" => of_train("position"),
             "drifts-slower" | "drifts-faster" | "stands-slower" | "stands-faster" | "stands-distrusted" => {
                 of_train("model")
             }
-            "diverged" | "diverged-and-others" | "track-ends" | "held-back" | "deadlock" | "dropped"
-            | "track-reserved" | "overshoots" => of_train("route"),
+            "diverged"
+            | "diverged-and-others"
+            | "track-ends"
+            | "held-back"
+            | "deadlock"
+            | "dropped"
+            | "track-reserved"
+            | "overshoots" => of_train("route"),
             "stands-unconfirmed" | "does-not-stop" => of_train("stopping"),
             "line-silent" | "line-not-ready" | "stands-silent" => of_link("link"),
             "line-reply-lost" | "line-unexpected" | "line-repeated" => of_link("line noise"),
@@ -123,14 +126,29 @@ impl Alarm {
             "lies-curved" | "lies-straight" => turnout.map_or(Resolution::News, |turnout| {
                 Resolution::Thrown { turnout, curved: self.what == "lies-curved" }
             }),
-            "lost" | "needs-person" | "held-as-unknown" | "stands-lost" | "stands-elsewhere" | "stands-untimely"
-            | "stands-misses" | "stands-slower" | "stands-faster" | "stands-distrusted" | "stands-silent"
-            | "stands-unconfirmed" | "does-not-stop" | "mishap-lost" | "mishap-moved"
+            "lost"
+            | "needs-person"
+            | "held-as-unknown"
+            | "stands-lost"
+            | "stands-elsewhere"
+            | "stands-untimely"
+            | "stands-misses"
+            | "stands-slower"
+            | "stands-faster"
+            | "stands-distrusted"
+            | "stands-silent"
+            | "stands-unconfirmed"
+            | "does-not-stop"
+            | "mishap-lost"
+            | "mishap-moved"
             | "line-reverse-in-doubt" => Resolution::Located,
-            "diverged" | "diverged-and-others" | "track-ends" | "track-reserved" | "held-back" | "deadlock"
-            | "dropped" => {
-                Resolution::Runs
-            }
+            "diverged"
+            | "diverged-and-others"
+            | "track-ends"
+            | "track-reserved"
+            | "held-back"
+            | "deadlock"
+            | "dropped" => Resolution::Runs,
             "unexplained" | "line-reply-lost" | "line-unexpected" | "line-repeated" | "drifts-slower"
             | "drifts-faster" | "mishap-stalled" | "mishap-missed" | "mishap-wrong-leg" => Resolution::Quiet,
             _ => Resolution::News,
@@ -142,7 +160,8 @@ impl Alarm {
         let cause = alarm.cause();
         match self.what {
             "recovered" => {
-                alarm.train == self.train && matches!(cause.family, "position" | "model" | "stopping" | "route")
+                alarm.train == self.train
+                    && matches!(cause.family, "position" | "model" | "stopping" | "route")
             }
             "line-answers" => matches!(cause.family, "link" | "line noise"),
             "contact-restored" => cause.family == "sensor" && alarm.blanks == self.blanks,

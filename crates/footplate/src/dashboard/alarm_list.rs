@@ -60,7 +60,14 @@ impl AlarmList {
         }
         let id = self.next;
         self.next += 1;
-        self.active.push(ActiveAlarm { id, since_s: t_s, count: 1, alarm: alarm.clone(), cause, raised: now });
+        self.active.push(ActiveAlarm {
+            id,
+            since_s: t_s,
+            count: 1,
+            alarm: alarm.clone(),
+            cause,
+            raised: now,
+        });
         if self.active.len() > MAX_ALARMS
             && let Some(least) = self.active.iter().map(|active| active.alarm.severity()).min()
             && let Some(place) = self.active.iter().position(|active| active.alarm.severity() == least)
@@ -173,7 +180,11 @@ mod tests {
         list.raise(at(4.0), 4.0, &alarm(&Notice::Unexplained { sensor: SensorId(3), time: at(4.0) }));
         list.raise(at(5.0), 5.0, &alarm(&Notice::Lost { train: TrainId(58) }));
         assert_eq!(whats(&list), ["needs-person", "lost", "unexplained"]);
-        assert!(list.summary().is_some_and(|line| line == "ALARM: said (and 2 more)"), "{:?}", list.summary());
+        assert!(
+            list.summary().is_some_and(|line| line == "ALARM: said (and 2 more)"),
+            "{:?}",
+            list.summary()
+        );
     }
 
     #[test]

@@ -12,7 +12,7 @@ import { findings } from "./axe.mjs";
 import { AT, colours, launch, openQuietly, width } from "./browser.mjs";
 import { PATIENCE, calibratedStore, end, say, serve } from "./railway.mjs";
 
-const PAGES = ["layout", "train/24", "calibration", "health", "recordings", "odometry", "editor"];
+const PAGES = ["layout", "train/24", "calibration", "health", "recordings", "odometry", "editor", "schedules"];
 
 let browser;
 let running;
@@ -103,6 +103,23 @@ test("sessions are walked again with a slider, and two are compared", async () =
   assert.match(await text(page, ".where"), /Train 24: \S+ ± \d+ mm, \d+ mm\/s/);
   await boxes.first().check();
   await until(page, () => document.querySelectorAll(".session").length === 2 && document.querySelectorAll("#figures tr").length === 2);
+  // Both charts share their time axis with the slider: a click goes to that time, and playing goes on at the chosen speed.
+  const charts = page.locator("#walked .uplot");
+  assert.equal(await charts.count(), 2);
+  for (const [place, count] of (await colours(page)).entries()) assert.ok(count > 4, `chart ${place}: ${count} colours`);
+  const over = page.locator("#walked .u-over").first();
+  const { width: wide } = await over.boundingBox();
+  await over.click({ position: { x: wide / 2, y: 20 } });
+  const most = Number(await page.getAttribute("#time", "max"));
+  const time = () => page.locator("#time").inputValue().then(Number);
+  assert.ok(Math.abs(await time() - most / 2) < 0.05 * most, `${await time()} of ${most}`);
+  await page.selectOption("#played", "30");
+  await page.click("#play");
+  await until(page, () => document.querySelector("#time").value === document.querySelector("#time").max);
+  assert.equal(await text(page, "#play"), "Play");
+  assert.doesNotMatch(await page.locator("#walked .u-legend").first().textContent(), /–/);
+  const [picture] = await Promise.all([page.waitForEvent("download"), page.locator("#walked .csv", { hasText: "PNG" }).first().click()]);
+  assert.match(picture.suggestedFilename(), /\.png$/);
   await page.screenshot({ path: join(AT, "recordings.png"), fullPage: true });
   assert.deepEqual(complaints, []);
   await page.close();

@@ -8,8 +8,8 @@ use super::reader::{Known, Words};
 use super::words::{Mistake, meant, words};
 
 const VERBS: [&str; 19] = [
-    "speed", "reverse", "turnout", "stop", "go", "move", "hold", "follow", "arrive", "find", "place", "length",
-    "light", "function", "halt", "power", "where", "wait", "help",
+    "speed", "reverse", "turnout", "stop", "go", "move", "hold", "follow", "arrive", "find", "place",
+    "length", "light", "function", "halt", "power", "where", "wait", "help",
 ];
 
 /// Parses one line; `None` for an empty line or a comment.

@@ -90,7 +90,9 @@ impl ViewThread {
         let with_control = key.modifiers.contains(KeyModifiers::CONTROL);
         match key.code {
             KeyCode::Char('c' | 'd') if with_control => self.ask("quit", Request::Line("quit".to_owned())),
-            KeyCode::Char(' ') if self.prompt.text().is_empty() => self.ask("emergency stop", Request::EmergencyStop),
+            KeyCode::Char(' ') if self.prompt.text().is_empty() => {
+                self.ask("emergency stop", Request::EmergencyStop)
+            }
             KeyCode::Char(letter) if !with_control => self.prompt.insert(letter),
             KeyCode::Enter => {
                 if let Some(line) = self.prompt.take() {

@@ -27,7 +27,6 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::answer_queue::{AnswerForm, AnswerQueue, Rejection};
-use super::schedules::listed as listed_schedules;
 use crate::clock::{now, rfc3339};
 use crate::commands::calibrate;
 use crate::commands::clerk::Question;
@@ -86,17 +85,14 @@ impl Archive {
         }
     }
 
-    /// The saved schedules.
-    pub(super) async fn schedules(&self) -> Result<Vec<Schedule>, Rejection> {
-        #[derive(Deserialize)]
-        struct Saved {
-            schedules: Vec<Schedule>,
-        }
-        let question = self.question(StoreQuery::Schedules)?;
-        let text = self.answer_queue.ask(question, Body::empty(), 0).await?;
-        let saved: Result<Saved, _> = serde_json::from_str(&text);
-        saved
-            .map(|saved| saved.schedules)
+    pub(super) const fn has_store(&self) -> bool {
+        self.store.is_some()
+    }
+
+    /// The saved schedules after a request for them, or one that changes them.
+    pub(super) async fn schedules(&self, query: StoreQuery) -> Result<Vec<Schedule>, Rejection> {
+        let text = self.answer_queue.ask(self.question(query)?, Body::empty(), 0).await?;
+        serde_json::from_str(&text)
             .map_err(|error| Rejection(StatusCode::INTERNAL_SERVER_ERROR, error.to_string()))
     }
 }
@@ -139,17 +135,21 @@ impl StoreQuery {
             }
             Self::Marks => marked(layout, &store),
             Self::Mark(new) => new.make(&mut store),
-            Self::Schedules => Ok(listed_schedules(&store.schedules(layout.name())?)),
+            Self::Schedules => schedules(layout, &store),
             Self::KeepSchedule(schedule) => {
                 store.keep_schedule(layout.name(), &schedule, now())?;
-                Ok(listed_schedules(&store.schedules(layout.name())?))
+                schedules(layout, &store)
             }
             Self::WithdrawSchedule { name } => {
                 store.withdraw_schedule(layout.name(), &name, now())?;
-                Ok(listed_schedules(&store.schedules(layout.name())?))
+                schedules(layout, &store)
             }
         }
     }
+}
+
+fn schedules(layout: &Layout, store: &Store) -> anyhow::Result<String> {
+    Ok(serde_json::to_string(&store.schedules(layout.name())?)?)
 }
 
 fn train_of(text: &str) -> anyhow::Result<TrainId> {

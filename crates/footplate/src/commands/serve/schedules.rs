@@ -8,7 +8,7 @@
 //! POST /api/schedules/end       {"name": "evening"}: its trains finish the commands that they have
 //! ```
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use axum::Json;
 use axum::extract::State;
@@ -31,6 +31,8 @@ const LONGEST_NAME: usize = 40;
 struct Schedules {
     archive: Archive,
     board: Arc<Board>,
+    /// The saved schedules, once they were read: only these routes change them.
+    known: Arc<Mutex<Option<Vec<Schedule>>>>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -52,7 +54,7 @@ type Body<T> = Result<Json<T>, JsonRejection>;
 /// The routes; `archive` has the store, `board` leads to the control loop.
 pub(super) fn schedule_routes(archive: Archive, board: Arc<Board>) -> Routes {
     Routes::new(
-        Schedules { archive, board },
+        Schedules { archive, board, known: Arc::default() },
         [
             ("/api/schedules", get(saved).post(save)),
             ("/api/schedules/delete", post(delete)),
@@ -70,8 +72,40 @@ fn refused(why: String) -> Response {
     Rejection(StatusCode::UNPROCESSABLE_ENTITY, why).into_response()
 }
 
+impl Schedules {
+    /// The saved schedules; none without a store.
+    async fn saved(&self) -> Result<Vec<Schedule>, Rejection> {
+        if !self.archive.has_store() {
+            return Ok(Vec::new());
+        }
+        let known = self.known().clone();
+        match known {
+            Some(known) => Ok(known),
+            None => self.changed(StoreQuery::Schedules).await,
+        }
+    }
+
+    /// The saved schedules after a request to the store.
+    async fn changed(&self, query: StoreQuery) -> Result<Vec<Schedule>, Rejection> {
+        let saved = self.archive.schedules(query).await?;
+        *self.known() = Some(saved.clone());
+        Ok(saved)
+    }
+
+    fn known(&self) -> MutexGuard<'_, Option<Vec<Schedule>>> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn listed(saved: Result<Vec<Schedule>, Rejection>) -> Response {
+    match saved {
+        Ok(schedules) => Json(json!({ "schedules": schedules })).into_response(),
+        Err(rejection) => rejection.into_response(),
+    }
+}
+
 async fn saved(State(schedules): State<Schedules>) -> Response {
-    schedules.archive.answer(StoreQuery::Schedules).await
+    listed(schedules.saved().await)
 }
 
 async fn save(State(schedules): State<Schedules>, body: Body<Schedule>) -> Response {
@@ -87,14 +121,14 @@ async fn save(State(schedules): State<Schedules>, body: Body<Schedule>) -> Respo
     // The control loop knows the trains and the places that the lines name.
     let checked = schedules.board.ask_and_wait(Request::CheckSchedule(schedule.clone())).await;
     match checked {
-        Ok(_) => schedules.archive.answer(StoreQuery::KeepSchedule(schedule)).await,
+        Ok(_) => listed(schedules.changed(StoreQuery::KeepSchedule(schedule)).await),
         Err(not_done) => answered(Err(not_done)),
     }
 }
 
 async fn delete(State(schedules): State<Schedules>, body: Body<Named>) -> Response {
     match body {
-        Ok(Json(Named { name })) => schedules.archive.answer(StoreQuery::WithdrawSchedule { name }).await,
+        Ok(Json(Named { name })) => listed(schedules.changed(StoreQuery::WithdrawSchedule { name }).await),
         Err(error) => wrong(&error),
     }
 }
@@ -102,7 +136,7 @@ async fn delete(State(schedules): State<Schedules>, body: Body<Named>) -> Respon
 async fn run(State(schedules): State<Schedules>, body: Body<ToRun>) -> Response {
     let schedule = match body {
         Ok(Json(ToRun::Written(schedule))) => schedule,
-        Ok(Json(ToRun::Saved(Named { name }))) => match schedules.archive.schedules().await {
+        Ok(Json(ToRun::Saved(Named { name }))) => match schedules.saved().await {
             Ok(saved) => match saved.into_iter().find(|schedule| schedule.name == name) {
                 Some(schedule) => schedule,
                 None => return refused(format!("there is no schedule `{name}`; /api/schedules lists them")),
@@ -116,14 +150,7 @@ async fn run(State(schedules): State<Schedules>, body: Body<ToRun>) -> Response 
 
 async fn end(State(schedules): State<Schedules>, body: Body<Named>) -> Response {
     match body {
-        Ok(Json(Named { name })) => {
-            answered(schedules.board.ask_and_wait(Request::EndSchedule(name)).await)
-        }
+        Ok(Json(Named { name })) => answered(schedules.board.ask_and_wait(Request::EndSchedule(name)).await),
         Err(error) => wrong(&error),
     }
-}
-
-/// The schedules as the answer to a page.
-pub(super) fn listed(saved: &[Schedule]) -> String {
-    json!({ "schedules": saved }).to_string()
 }

@@ -123,7 +123,12 @@ impl ScriptRunner {
         let Some(picture) = self.schedule_picture(id) else { return };
         self.queues.end(id);
         self.say(format!("schedule `{}` {how}", picture.name));
-        self.ended_schedules.push(SchedulePicture { active: Vec::new(), next: None, is_over: true, ..picture });
+        self.ended_schedules.push(SchedulePicture {
+            active: Vec::new(),
+            next: None,
+            is_over: true,
+            ..picture
+        });
         if self.ended_schedules.len() > MAX_SCHEDULES {
             self.ended_schedules.remove(0);
         }

@@ -3,8 +3,8 @@
 use footplate_core::control::{Order, OrderId, Refusal};
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use super::queue::{QueueId, Queues};
 use super::ScriptRunner;
+use super::queue::{QueueId, Queues};
 use crate::commands::drive::instruction::{Instruction, Until};
 use crate::commands::drive::script::Step;
 

@@ -233,7 +233,8 @@ impl Pages {
                 "calibration": set_up.calibrations.get(address),
             })
         });
-        let addresses = set_up.station().map(|station| [*station.addresses().start(), *station.addresses().end()]);
+        let addresses =
+            set_up.station().map(|station| [*station.addresses().start(), *station.addresses().end()]);
         json!({
             "mode": SetUpMode::SettingUp, "instance": self.shared.instance, "store": self.shared.store, "layouts": BUILT_IN,
             "problem": self.shared.problem.as_ref().or(problem.as_ref()), "link": set_up.link, "speed": set_up.speed,
