@@ -10,7 +10,7 @@ export const ENGLISH = {
   "halt-heard": "power-off sent, and the station has answered since; a 6051 does not report track power: NOT CONFIRMED, check that all trains have stopped",
   "written-until": "recorded on disk until {0} s ago; a power cut would lose the rest",
   "halt-failed": "emergency stop NOT accepted: {0}",
-  "chart-png": "Save as a picture: {0}", "chart-csv": "Save the data of this chart as CSV: {0}", "chart-keys": "Use the arrow keys to step through the values.", "skip": "To the page",
+  "chart-png": "Save the picture of this chart as PNG: {0}", "chart-csv": "Save the data of this chart as CSV: {0}", "chart-keys": "Use the arrow keys to step through the values.", "skip": "To the page",
   "connected-alarmed": "live, alarms: {0}", "act-place": "Say where train {0} is", "act-way": "Find a way for train {0}", "act-power": "Switch the power on",
   "act-straight": "Set turnout {0} straight", "act-curved": "Set turnout {0} curved", "act-model": "Show its calibration", "act-train": "Show train {0}", "act-line": "Check the link",
   "act-health": "Show the alarms", "end-alarm": "Done", "end-alarm-of": "Done: {0}", "more-alarms": "{0} more alarms",

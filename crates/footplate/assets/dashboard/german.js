@@ -10,7 +10,7 @@ export const GERMAN = {
   "halt-heard": "Abschaltbefehl gesendet, die Zentrale hat seither geantwortet; eine 6051 meldet den Fahrstrom nicht: NICHT BESTÄTIGT, prüfen, ob alle Züge stehen",
   "written-until": "bis vor {0} s auf der Platte aufgezeichnet; ein Stromausfall verlöre den Rest",
   "halt-failed": "Nothalt NICHT angenommen: {0}",
-  "chart-png": "Als Bild sichern: {0}", "chart-csv": "Daten dieses Diagramms als CSV speichern: {0}", "chart-keys": "Mit den Pfeiltasten von Wert zu Wert gehen.", "skip": "Zur Seite",
+  "chart-png": "Bild dieses Diagramms als PNG speichern: {0}", "chart-csv": "Daten dieses Diagramms als CSV speichern: {0}", "chart-keys": "Mit den Pfeiltasten von Wert zu Wert gehen.", "skip": "Zur Seite",
   "connected-alarmed": "live, Alarme: {0}", "act-place": "Sagen, wo Zug {0} ist", "act-way": "Weg für Zug {0} suchen", "act-power": "Fahrstrom einschalten",
   "act-straight": "Weiche {0} gerade stellen", "act-curved": "Weiche {0} auf Abzweig stellen", "act-model": "Kalibrierung zeigen", "act-train": "Zug {0} zeigen", "act-line": "Verbindung prüfen",
   "act-health": "Alarme zeigen", "end-alarm": "Erledigt", "end-alarm-of": "Erledigt: {0}", "more-alarms": "{0} weitere Alarme",

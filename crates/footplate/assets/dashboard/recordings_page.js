@@ -5,7 +5,7 @@ import { colour, dots, line } from "./chart.js";
 import { LiveChart } from "./charts.js";
 import { make, put, shown, signed } from "./dom.js";
 import { get } from "./server.js";
-import { Track } from "./track.js";
+import { COLOURS, Track } from "./track.js";
 import { View } from "./view.js";
 import { say } from "./words.js";
 
@@ -16,7 +16,6 @@ const SPEEDS = [0.5, 1, 2, 4, 10, 30];
 const USUAL_SPEED = 4;
 /** The charts share their time axis, cursor and zoom. */
 const SYNC = "recordings";
-const COLOURS = ["first", "second", "third"];
 
 /** One session on the page: its track, and its state at a time. */
 class Walked {
@@ -117,7 +116,8 @@ export function recordingsPage(root, live, number) {
   function draw() {
     charts.splice(0).forEach((chart) => chart.close());
     const x = { label: say("axis-session"), unit: "s", digits: 1 };
-    const range = { x: { range: (_, low, high) => [low ?? 0, high ?? (Number(slider.max) || 1)] } };
+    // Both charts begin and end with the slider.
+    const spread = (series) => uPlot.join([...series, [[0, Number(slider.max)], [null, null]]]).slice(0, series.length + 1);
     const all = [...shownSessions.entries()].map(([name, walked]) => [name, walked.errors()]);
     $("#walked").hidden = all.length === 0;
     // A calibration predicts no detections.
@@ -126,15 +126,15 @@ export function recordingsPage(root, live, number) {
     const speeds = [...shownSessions.entries()].flatMap(([name, walked]) => walked.speeds().map(([train, times, values]) => [`${say("train", train)}, ${name}`, times, values]));
     if (speeds.length > 0) {
       charts.push(new LiveChart($('[data-chart="recorded-speed"]'), () => ({
-        name: say("chart-recorded-speed"), x, y: say("axis-speed"), sync: SYNC, range, below: [mark],
-        series: speeds.map(([name], place) => line(name, COLOURS[place % COLOURS.length], "mm/s", 0)),
-      }), uPlot.join(speeds.map(([, times, values]) => [times, values])), pick));
+        name: say("chart-recorded-speed"), x, y: say("axis-speed"), sync: SYNC, below: [mark],
+        series: speeds.map(([name], place) => line(name, `t${place % COLOURS}`, "mm/s", 0)),
+      }), spread(speeds.map(([, times, values]) => [times, values])), pick));
     }
     if (!predicts) return;
     charts.push(new LiveChart($('[data-chart="recorded"]'), () => ({
-      name: say("chart-recorded"), x, y: say("axis-sure"), zero: true, sync: SYNC, range, below: [mark],
-      series: all.map(([name], place) => dots(name, COLOURS[place], "mm", 1)),
-    }), uPlot.join(all.map(([, own]) => [own.map(({ at }) => at), own.map(({ mm }) => mm)])), pick));
+      name: say("chart-recorded"), x, y: say("axis-sure"), zero: true, sync: SYNC, below: [mark],
+      series: all.map(([name], place) => dots(name, `t${place}`, "mm", 1)),
+    }), spread(all.map(([, own]) => [own.map(({ at }) => at), own.map(({ mm }) => mm)])), pick));
     $("#figures").replaceChildren(...all.map(([name, own]) => {
       const rms = Math.sqrt(own.reduce((sum, { mm }) => sum + mm * mm, 0) / Math.max(own.length, 1));
       const mean = own.reduce((sum, { mm }) => sum + mm, 0) / Math.max(own.length, 1);

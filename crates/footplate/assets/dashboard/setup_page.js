@@ -236,7 +236,7 @@ export function setupPage(root, live, wanted) {
     const shown = trains.length > 1 && $("#first-turnouts").hidden ? unknown : [];
     if (place.dataset.trains === shown.join()) return;
     place.dataset.trains = shown.join();
-    place.replaceChildren(...shown.map((train) => make("div", { class: "does" }, make("span", {}, say("setup-lost", live.called(train))),
+    place.replaceChildren(...(shown.length ? [make("p", {}, say("setup-lost", shown.map((train) => live.called(train)).join(", ")))] : []), ...shown.map((train) => make("div", { class: "does" },
       button(say("find-train", train), () => busy(say("setup-sending"), () => order(`find ${train}`))),
       make("a", { href: `#/layout/${train}` }, say("act-place", train)))));
   }
@@ -265,7 +265,7 @@ export function setupPage(root, live, wanted) {
     },
     line: lines,
     ended({ train, achieved, error_mm: error, promised_low_mm: low, promised_high_mm: high, refused, true_error_mm: truth }) {
-      if (!$("#first-result")) return;
+      if (!$("#first-result") || (achieved == null && !refused)) return;
       const parts = refused ? [say("refused", refused)] : [say("setup-stopped", train, achieved ?? "", error == null ? "" : signed(error, 1)),
         low == null ? "" : say("setup-promised", signed(low), signed(high)), truth == null ? "" : say("setup-truth", signed(truth, 1))];
       put($("#first-result"), parts.filter(Boolean).join(" "));

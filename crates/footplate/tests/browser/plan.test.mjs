@@ -119,7 +119,7 @@ test("a turnout is asked about, thrown by a press, and refused under a train", a
   await page.locator("#here-does button", { hasText: "Other direction" }).click();
   assert.notEqual(await text(page, "#picked"), first);
   const place = (await text(page, "#picked")).replace("Selected: ", "");
-  await page.locator("#here-does button", { hasText: "Train 24 stands here" }).click();
+  await page.locator("#here-does button", { hasText: "Train 24 is here" }).click();
   const name = /^[A-E]\d+/.exec(place)[0];
   await until(page, (name) => document.querySelector(".train dd").textContent.startsWith(name), name);
   assert.deepEqual(await findings(page), []);

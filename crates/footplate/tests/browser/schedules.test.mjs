@@ -1,6 +1,7 @@
 // Schedules in a real browser: written stop by stop, saved in the store, run with their progress line by line, and as route buttons.
 
 import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 
@@ -88,6 +89,9 @@ test("a command by hand ends the schedule of its train, and a refused line is ma
 
 test("saved turnouts are a button beside the track, on a phone, in the dark and in German, and survive the program", async () => {
   await end(program);
+  // Schedules are among the recorded inputs: a replay decides the same.
+  const replayed = execFileSync(process.env.FOOTPLATE, ["replay", store], { encoding: "utf8" });
+  assert.match(replayed, /decisions, all the same/);
   program = await serve(store, 0, { speed: 20 });
   const options = { viewport: { width: 390, height: 800 }, locale: "de-DE", colorScheme: "dark", hasTouch: true };
   const { page, complaints } = await openQuietly(browser, `${program.url}#/schedules`, options);
