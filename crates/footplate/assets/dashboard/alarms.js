@@ -43,7 +43,7 @@ function remedy(alarm, fails) {
   };
   const guide = guides(alarm);
   if (guide) return link(`#/layout/${train}`, say(`act-${guide}`, train));
-  if (what === "power-off") return orders(say("act-power"), "power on");
+  if (what === "power-off" || what === "line-power-lost" || what === "line-restarted") return orders(say("act-power"), "power on");
   if (what === "lies-curved") return orders(say("act-straight", blanks[0]), `turnout ${blanks[0]} straight`);
   if (what === "lies-straight") return orders(say("act-curved", blanks[0]), `turnout ${blanks[0]} curved`);
   if (OF_MODEL.has(what)) return link("#/calibration", say("act-model"));

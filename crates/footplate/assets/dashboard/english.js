@@ -126,6 +126,8 @@ export const ENGLISH = {
   "alarm-line-held-closed": "sensor {0} has been occupied since the start: a train is on it, or it is stuck",
   "alarm-line-reads-all-only": "the interface can only read all sensor modules at once: polling is slower, and short detections may be missed",
   "alarm-line-solenoid-late": "turnout {0} was powered for {1} ms: check whether its coil is hot",
+  "alarm-line-power-lost": "track power went off without a command: look for a short circuit, then switch it on",
+  "alarm-line-restarted": "the station restarted and lost all commands: trains stopped where they were when the power went off",
   "alarm-line-says": "{0}",
   "alarm-deadlock": "deadlock; these trains move out of the way: {0}",
   "alarm-diverged": "stopped: it left its movement authority",

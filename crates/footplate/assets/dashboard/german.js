@@ -126,6 +126,8 @@ export const GERMAN = {
   "alarm-line-held-closed": "Rückmelder {0} ist seit dem Start belegt: ein Zug steht darauf, oder er klemmt",
   "alarm-line-reads-all-only": "das Interface liest nur alle Rückmeldemodule auf einmal: die Abfrage ist langsamer, kurze Meldungen können fehlen",
   "alarm-line-solenoid-late": "Weiche {0} hatte {1} ms lang Strom: prüfen, ob ihre Spule heiß ist",
+  "alarm-line-power-lost": "Fahrstrom ohne Befehl ausgefallen: nach einem Kurzschluss suchen, dann einschalten",
+  "alarm-line-restarted": "die Zentrale ist neu gestartet und hat alle Befehle verloren: Züge halten, wo sie beim Stromausfall waren",
   "alarm-line-says": "{0}",
   "alarm-deadlock": "Verklemmung; diese Züge weichen aus: {0}",
   "alarm-diverged": "angehalten: er hat seine Fahrstraße verlassen",

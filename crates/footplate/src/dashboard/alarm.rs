@@ -4,7 +4,7 @@ use footplate_core::control::learn::Fault;
 use footplate_core::control::{Alarm as Noticed, Notice};
 use footplate_core::track::Layout;
 use footplate_core::tracking::Drift;
-use footplate_core::{HALF_95, Length, TrainId, TurnoutId};
+use footplate_core::{HALF_95, Length, SensorId, TrainId, TurnoutId};
 use footplate_wire::LinkNotice;
 use serde::Serialize;
 
@@ -41,6 +41,8 @@ pub(super) enum Resolution {
     Runs,
     /// A sensor detects its train.
     Detected,
+    /// This sensor detects a train.
+    Reported(SensorId),
     /// Its train is at rest.
     AtRest,
     /// The turnout is in the other position.
@@ -108,7 +110,7 @@ impl Alarm {
             "stands-unconfirmed" | "does-not-stop" => of_train("stopping"),
             "line-silent" | "line-not-ready" | "stands-silent" => of_link("link"),
             "line-reply-lost" | "line-unexpected" | "line-repeated" => of_link("line noise"),
-            "power-off" => of_link("power"),
+            "power-off" | "line-power-lost" | "line-restarted" => of_link("power"),
             "lies-curved" | "lies-straight" => about("turnout"),
             "contact-stuck" | "unexplained" | "line-held-closed" => about("sensor"),
             "not-sent" | "unconfirmed" | "line-solenoid-late" => about(self.what),
@@ -119,12 +121,15 @@ impl Alarm {
 
     /// What resolves the alarm.
     pub(super) fn resolution(&self) -> Resolution {
-        let turnout = self.blanks.first().and_then(|turnout| turnout.parse().ok()).map(TurnoutId);
+        let number = || self.blanks.first().and_then(|number| number.parse().ok());
         match self.what {
+            "line-held-closed" => {
+                number().map_or(Resolution::News, |sensor| Resolution::Reported(SensorId(sensor)))
+            }
             "overdue" => Resolution::Detected,
             "overshoots" => Resolution::AtRest,
-            "lies-curved" | "lies-straight" => turnout.map_or(Resolution::News, |turnout| {
-                Resolution::Thrown { turnout, curved: self.what == "lies-curved" }
+            "lies-curved" | "lies-straight" => number().map_or(Resolution::News, |turnout| {
+                Resolution::Thrown { turnout: TurnoutId(turnout), curved: self.what == "lies-curved" }
             }),
             "lost"
             | "needs-person"
@@ -149,7 +154,8 @@ impl Alarm {
             | "held-back"
             | "deadlock"
             | "dropped" => Resolution::Runs,
-            "unexplained" | "line-reply-lost" | "line-unexpected" | "line-repeated" | "drifts-slower"
+            "unexplained" | "line-reply-lost" | "line-unexpected" | "line-repeated" | "line-reads-all-only"
+            | "drifts-slower"
             | "drifts-faster" | "mishap-stalled" | "mishap-missed" | "mishap-wrong-leg" => Resolution::Quiet,
             _ => Resolution::News,
         }
@@ -163,7 +169,7 @@ impl Alarm {
                 alarm.train == self.train
                     && matches!(cause.family, "position" | "model" | "stopping" | "route")
             }
-            "line-answers" => matches!(cause.family, "link" | "line noise"),
+            "line-answers" => matches!(cause.family, "link" | "line noise" | "not-sent" | "unconfirmed"),
             "contact-restored" => cause.family == "sensor" && alarm.blanks == self.blanks,
             "power-on" => cause.family == "power",
             _ => false,
@@ -250,10 +256,9 @@ impl Alarm {
             LinkNotice::OtherThrottle { train, .. } => {
                 (Grade::Danger, "line-says", Some(*train), vec![notice.to_string()])
             }
-            LinkNotice::Restarted
-            | LinkNotice::PowerLost
-            | LinkNotice::Unconfirmed { .. }
-            | LinkNotice::Locked => (Grade::Danger, "line-says", None, vec![notice.to_string()]),
+            LinkNotice::PowerLost => (Grade::Danger, "line-power-lost", None, Vec::new()),
+            LinkNotice::Restarted => (Grade::Danger, "line-restarted", None, Vec::new()),
+            LinkNotice::Unconfirmed { .. } | LinkNotice::Locked => (Grade::Danger, "line-says", None, vec![notice.to_string()]),
             other => (Grade::Warning, "line-says", None, vec![other.to_string()]),
         };
         Some(Self { text: notice.to_string(), ..Self::new(grade, what, train, blanks) })

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use footplate_core::control::Driver;
-use footplate_core::{TimeSpan, Timestamp, TrainId};
+use footplate_core::{SensorId, TimeSpan, Timestamp, TrainId};
 use serde::Serialize;
 
 use super::alarm::{Alarm, Cause, Grade, Resolution};
@@ -41,8 +41,9 @@ pub(super) struct ActiveAlarm {
 pub(super) struct AlarmList {
     active: Vec<ActiveAlarm>,
     next: u64,
-    /// The last detection of each train.
+    /// The last detection of each train, and by each sensor.
     detected: BTreeMap<TrainId, Timestamp>,
+    reported: BTreeMap<SensorId, Timestamp>,
 }
 
 impl AlarmList {
@@ -91,8 +92,9 @@ impl AlarmList {
     }
 
     /// Notes a detection of a train.
-    pub(super) fn detect(&mut self, train: TrainId, at: Timestamp) {
+    pub(super) fn detect(&mut self, train: TrainId, sensor: SensorId, at: Timestamp) {
         self.detected.insert(train, at);
+        self.reported.insert(sensor, at);
     }
 
     /// Removes the alarms whose cause is resolved, and returns them. `is_recovering` tells whether the watchdog holds a train.
@@ -102,7 +104,7 @@ impl AlarmList {
         driver: &Driver,
         is_recovering: impl Fn(TrainId) -> bool,
     ) -> Vec<ActiveAlarm> {
-        let detected = &self.detected;
+        let (detected, reported) = (&self.detected, &self.reported);
         let is_resolved = |active: &mut ActiveAlarm| {
             let ActiveAlarm { alarm, raised, .. } = active;
             let is_located = |train| driver.locate(train, now).is_some();
@@ -112,6 +114,7 @@ impl AlarmList {
                     (Resolution::Located, Some(train)) => is_located(train) && !is_recovering(train),
                     (Resolution::Runs, Some(train)) => is_located(train) && driver.commanded(train).get() > 0,
                     (Resolution::Detected, Some(train)) => detected.get(&train).is_some_and(|at| at > raised),
+                    (Resolution::Reported(sensor), _) => reported.get(&sensor).is_some_and(|at| at > raised),
                     (Resolution::AtRest, Some(train)) => driver.is_at_rest(train, now),
                     (Resolution::Thrown { turnout, curved }, _) => {
                         driver.turnouts().get(turnout).is_some_and(|leg| leg.is_curved() != curved)
@@ -145,7 +148,7 @@ mod tests {
     use footplate_core::control::{Notice, Outcome};
     use footplate_core::model::MotionModel;
     use footplate_core::track::{Layout, TurnoutStates};
-    use footplate_core::{Length, SensorId};
+    use footplate_core::Length;
     use footplate_store::layout_named;
 
     use super::*;

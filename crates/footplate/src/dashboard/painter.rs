@@ -154,7 +154,7 @@ impl Painter {
     /// Takes in a detection.
     pub(crate) fn passed(&mut self, passed: TrainPassed) {
         self.flashes.insert(passed.passed.sensor, passed.passed.window.middle());
-        self.alarms.detect(passed.train, passed.passed.window.middle());
+        self.alarms.detect(passed.train, passed.passed.sensor, passed.passed.window.middle());
         self.unpublished.push(passed);
     }
 

@@ -1,4 +1,4 @@
-// Alarms in a real browser: each stays on every page until it is over or the operator ends it, and leads to its remedy.
+// Alarms in a real browser: each one stays on every page until its cause is resolved or the operator ends it, and links to its remedy.
 
 import assert from "node:assert/strict";
 import { join } from "node:path";
@@ -8,7 +8,7 @@ import { findings } from "./axe.mjs";
 import { AT, launch, openQuietly, width } from "./browser.mjs";
 import { PATIENCE, calibratedStore, end, say, serve } from "./railway.mjs";
 
-/** The train really is at most this far from where it was said to be: two trains' lengths of rounding and survey. */
+/** The largest difference (mm) between the true place and the one that was entered: rounding, and errors of the survey. */
 const SAME_PLACE_MM = 30;
 
 let browser, store;
@@ -36,7 +36,7 @@ after(async () => {
   await Promise.all([...running].map(end));
 });
 
-test("a train of unknown position is found by the truth of the simulation, or finds itself at the next sensor", async () => {
+test("a train of unknown position is placed where the simulation shows it, or creeps to the next sensor", async () => {
   const program = await started();
   const { page, complaints } = await openQuietly(browser, `${program.url}#/layout/24`);
   await until(page, () => document.querySelector("#guide")?.hidden === false);
@@ -49,7 +49,7 @@ test("a train of unknown position is found by the truth of the simulation, or fi
   assert.equal(await page.locator("#use-truth").textContent(), `Train 24 is at ${truth.at}`);
   await page.screenshot({ path: join(AT, "guide.png"), fullPage: true });
   await page.click("#use-truth");
-  // The way out is over, and with it the outline of the truth.
+  // The guide and the outline of the true position disappear.
   await until(page, () => document.querySelector("#guide").hidden && !document.querySelector(".truth"));
   const mm = (place) => [place.split("+")[0], Number(/\+(\d+)mm/.exec(place)?.[1] ?? 0)];
   const [said, is] = [(await picture(program)).trains[0].at, truth.at].map(mm);
@@ -60,7 +60,7 @@ test("a train of unknown position is found by the truth of the simulation, or fi
   running.delete(program);
   await end(program);
 
-  // Another session knows nothing of it again: the train creeps to a sensor, stops there, and is known.
+  // The next session does not know the position again: the train creeps to a sensor and stops there.
   const again = await started();
   await say(again, "turnout all straight");
   const { page: other } = await openQuietly(browser, `${again.url}#/layout/24`);
@@ -76,7 +76,7 @@ test("a train of unknown position is found by the truth of the simulation, or fi
   await end(again);
 });
 
-test("an alarm stays for everybody until it is over or ended, and is one for each cause", async () => {
+test("each cause has one alarm, which stays on all pages until it is resolved or ended", async () => {
   const program = await started();
   const first = await openQuietly(browser, program.url);
   const second = await openQuietly(browser, `${program.url}#/health`, { viewport: { width: 390, height: 800 }, locale: "de-DE", colorScheme: "dark" });
@@ -90,13 +90,13 @@ test("an alarm stays for everybody until it is over or ended, and is one for eac
   await say(program, `place 24 at ${elsewhere}`);
   await say(program, "speed 24 8");
   for (const { page } of [first, second]) await page.waitForSelector("#alarmed .danger", { timeout: PATIENCE });
-  // The danger leads to where the train is, on the page that shows it.
+  // The alarm links to the page on which the operator enters the position.
   const link = first.page.locator("#alarmed .danger a.button");
   assert.equal(await link.textContent(), "Say where train 24 is");
   await link.click();
   await until(first.page, () => document.querySelector("#guide")?.hidden === false || document.querySelector("#alarmed").hidden);
   await first.page.screenshot({ path: join(AT, "alarm-way-out.png"), fullPage: true });
-  // No two alarms are of one cause, and what is graver comes first.
+  // Each cause has one alarm; dangers come first.
   for (let look = 0; look < 20; look++) {
     const { alarms } = await picture(program);
     const grades = alarms.map(({ grade }) => grade);
@@ -108,7 +108,7 @@ test("an alarm stays for everybody until it is over or ended, and is one for eac
   assert.deepEqual(await findings(second.page), []);
   assert.equal(await width(second.page), 390);
   await second.page.screenshot({ path: join(AT, "alarms-phone.png"), fullPage: true });
-  // The watchdog brings the train back, or somebody ends the alarm: for all who watch.
+  // The watchdog recovers the train, or an operator ends the alarm on all pages.
   const { alarms } = await picture(program);
   if (alarms.length > 0) {
     assert.ok([202, 422].includes(await ends(program, alarms[0].id)));
@@ -119,6 +119,37 @@ test("an alarm stays for everybody until it is over or ended, and is one for eac
   assert.deepEqual(first.complaints, []);
   await first.page.close();
   await second.page.close();
+  running.delete(program);
+  await end(program);
+});
+
+test("a train that is blocked by another one is led to a way out", async () => {
+  const program = await started({ speed: 20 });
+  const { page, complaints } = await openQuietly(browser, program.url);
+  await say(program, "turnout all straight");
+  for (const { train, at } of await get(program, "api/truth")) await say(program, `place ${train} at ${at}`);
+  for (let trains; !trains?.every(({ at }) => at);) ({ trains } = await picture(program));
+  // Turnout 8 leads to the siding of train 58.
+  await say(program, "turnout 8 curved");
+  for (let lies; lies !== "curved";) lies = (await picture(program)).turnouts[8];
+  await say(program, "speed 24 8");
+  const link = page.locator("#alarmed .warning a.button");
+  await link.waitFor({ timeout: PATIENCE });
+  assert.match(await page.locator("#alarmed .warning span").textContent(), /Train 24: stopped: the track ahead is reserved for train 58/);
+  await link.click();
+  await until(page, () => document.querySelector("#guide")?.hidden === false);
+  const buttons = await page.locator("#guide button").allTextContents();
+  assert.deepEqual(buttons, ["Reverse train 24", "Reverse train 58"]);
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "guide-blocked.png"), fullPage: true });
+  await page.locator("#guide button", { hasText: "Reverse train 24" }).click();
+  for (let own; !own?.reversed;) [own] = (await picture(program)).trains;
+  // The alarm stays while the train is at rest, and is over when it runs away.
+  assert.equal((await picture(program)).alarms.length, 1);
+  await say(program, "speed 24 5");
+  await until(page, () => document.querySelector("#guide").hidden && document.querySelector("#alarmed").hidden);
+  assert.deepEqual(complaints, []);
+  await page.close();
   running.delete(program);
   await end(program);
 });

@@ -34,7 +34,7 @@ test("a schedule is written stop by stop, checked, saved and run line by line", 
   await page.fill("#stop-wait", "2");
   await page.click("#add-stop button[type=submit]");
   assert.equal(await page.inputValue("#schedule-lines"), "go 24 to C13\nwait 24 at rest\nwait 2s");
-  // A line that nobody can carry out is named with its place.
+  // Each line that cannot be read is named with its column.
   await page.fill("#schedule-lines", "go 24 to C13\nwait 24 at rest\nwait 2s\nlight 24 onn\nquit");
   await page.fill("#schedule-name", "Evening");
   await page.click("#schedule-save");
@@ -78,7 +78,7 @@ test("a command by hand ends the schedule of its train, and a refused line is ma
   assert.deepEqual(events.active, []);
 
   for (let own; !own?.at_rest;) [own] = (await picture()).trains;
-  // A train that moves cannot be put anywhere: the line is refused, and those behind it are carried out.
+  // A moving train cannot be placed: the line is refused, and the lines after it are carried out.
   await post("api/schedules/run", { name: "half", lines: ["speed 24 8", "wait 1s", "place 24 at C13", "speed 24 0", "light 24 off"] });
   for (let state; !state?.is_over;) state = (await picture()).schedules.find(({ name }) => name === "half");
   const { refused } = (await picture()).schedules.find(({ name }) => name === "half");

@@ -1,4 +1,4 @@
-// A new owner starts the program without arguments, and is led in a real browser from nothing to a calibrated train and its first stop.
+// The set-up in a real browser: from starting the program without arguments to a calibrated train and its first stop.
 
 import assert from "node:assert/strict";
 import { existsSync, mkdtempSync, readFileSync, writeFileSync } from "node:fs";
@@ -10,9 +10,9 @@ import { findings } from "./axe.mjs";
 import { AT, launch, openQuietly, width } from "./browser.mjs";
 import { PATIENCE, begin, end } from "./railway.mjs";
 
-/** The longest that a calibration takes: five minutes at twenty times real time, on a busy machine. */
+/** The time limit of a calibration: five minutes at twenty times real time, on a busy machine. */
 const CALIBRATED_MS = 120_000;
-/** While another program takes over the address, a browser reports that nobody answers. */
+/** While another program takes over the address, a browser reports that the server does not answer. */
 const GOES_OVER = /ERR_CONNECTION_REFUSED|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET|ERR_INCOMPLETE_CHUNKED_ENCODING|ERR_SOCKET_NOT_CONNECTED/;
 
 let browser;
@@ -48,7 +48,7 @@ test("from nothing to a calibrated train and its first stop", async () => {
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "setup-station.png"), fullPage: true });
 
-  // What cannot be is refused, and says what would be right.
+  // An impossible entry is refused with an example of a right one.
   await page.click("#use-typed");
   assert.match(await page.locator("#setup-answer").textContent(), /such as 192\.168/);
   await page.selectOption("#sim-speed", "4");
@@ -62,7 +62,7 @@ test("from nothing to a calibrated train and its first stop", async () => {
   await page.locator(".address").nth(1).fill("24");
   await page.click("#save-trains");
   await page.waitForFunction(() => /used twice/.test(document.querySelector("#setup-answer").textContent));
-  // With two trains the first one could not be sent anywhere before the position of the other is known.
+  // Only one train: with two, the position of the other must be known first (see below).
   await page.locator("#train-rows button").nth(1).click();
   assert.deepEqual(await findings(page), []);
   await page.click("#save-trains");
@@ -73,7 +73,7 @@ test("from nothing to a calibrated train and its first stop", async () => {
   assert.match(await page.locator("#setup-step pre").textContent(), /sensor modules/);
   await page.screenshot({ path: join(AT, "setup-link.png"), fullPage: true });
 
-  // Each step is kept: the program is started again, and goes on where it was.
+  // Each step is kept: the restarted program continues at the same step.
   assert.equal(await ended(program), 0);
   const again = await started("railway.db", program.port);
   await page.goto(`${again.url}#/setup/station`);
@@ -82,7 +82,7 @@ test("from nothing to a calibrated train and its first stop", async () => {
   await page.goto(`${again.url}#/setup`);
   await isShown(page, "[data-calibrate='24']");
 
-  // No train moves before its owner has looked at the turnouts.
+  // No train moves before the owner has confirmed that the turnouts are clear.
   await page.click("[data-calibrate='24']");
   await page.waitForFunction(() => /check first that no train is standing on one/.test(document.querySelector("#setup-answer").textContent));
   await page.check("#turnouts-clear");
@@ -112,7 +112,7 @@ test("from nothing to a calibrated train and its first stop", async () => {
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "setup-stopped.png"), fullPage: true });
 
-  // The way back, and forth again: the second time the program drives at once.
+  // Back to the set-up and forward again; the next start drives at once.
   await page.click("#setup-again");
   await isShown(page, "#setup-steps a");
   assert.match(await heading(page), /first stop/i);
@@ -157,7 +157,7 @@ test("a station that is gone leads back to the set-up, with the reason", async (
   const file = join(folder, "gone.setup.json");
   writeFileSync(file, JSON.stringify({ link: "dcc-ex:tcp://127.0.0.1:1", layout: "track-a", trains: [{ address: 24, name: "" }], is_complete: true }));
   const program = await started("gone.db");
-  // The session serves its page before it finds that it cannot begin: a page that came in half opens again by itself.
+  // The session serves its page before it finds that it cannot begin: a page that loaded only in part reloads itself.
   const page = await browser.newPage();
   while (!await page.goto(program.url).catch(() => undefined)) await new Promise((again) => { setTimeout(again, 20); });
   await page.waitForSelector("#setup-problem:visible", { timeout: PATIENCE });
@@ -166,7 +166,7 @@ test("a station that is gone leads back to the set-up, with the reason", async (
   await ended(program);
 });
 
-test("a page that came in half opens again by itself", async () => {
+test("a page that loaded only in part reloads itself", async () => {
   const program = await started("half.db");
   const page = await browser.newPage();
   // The first request for one of its modules fails, as it does while another program takes over the address.

@@ -190,9 +190,11 @@ impl ScriptRunner {
         self.last_event = now;
         self.forward_outputs(now);
         self.continue_refit(now);
-        for queue in self.queues.ids() {
-            self.advance_queue(now, queue);
-            self.continue_schedule(now, queue);
+        let mut queue = Some(QueueId::SESSION);
+        while let Some(id) = queue {
+            self.advance_queue(now, id);
+            self.continue_schedule(now, id);
+            queue = self.queues.after(id);
         }
         self.cancel_late_journeys(now);
         let is_idle = |(_, queue): (_, &StepQueue)| {

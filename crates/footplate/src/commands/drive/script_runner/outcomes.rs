@@ -65,7 +65,10 @@ impl ScriptRunner {
             if let Notice::AuthorityEnds { train } = notice {
                 let holders = self.dispatcher.holders_beyond(*train, now);
                 if !holders.is_empty() {
-                    line += &format!("; it is reserved for {}", trains(&holders));
+                    line = format!(
+                        "train {train} stopped: the track ahead is reserved for {}",
+                        trains(&holders)
+                    );
                     let alarm = Alarm::track_reserved(*train, &holders).said(&line);
                     self.outputs.push_back(Output::Notice(SessionMessage::Alarm(alarm)));
                 }

@@ -1,6 +1,7 @@
 //! Queues of instructions: the script or the operator of the session, and the schedules that run beside it.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::ops::Bound;
 
 use footplate_core::{Timestamp, TrainId};
 use footplate_store::Schedule;
@@ -112,8 +113,9 @@ impl Queues {
         Some(())
     }
 
-    pub(super) fn ids(&self) -> Vec<QueueId> {
-        self.queues.keys().copied().collect()
+    /// The queue behind another one.
+    pub(super) fn after(&self, id: QueueId) -> Option<QueueId> {
+        self.queues.range((Bound::Excluded(id), Bound::Unbounded)).next().map(|(id, _)| *id)
     }
 
     pub(super) fn get(&self, id: QueueId) -> Option<&StepQueue> {
