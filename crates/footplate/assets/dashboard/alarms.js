@@ -10,8 +10,8 @@ const phone = matchMedia("(max-width: 40rem)");
 
 /** Alarms whose train is lost, or may be elsewhere than estimated: the layout page leads to its position. */
 const OF_PLACE = new Set(["lost", "needs-person", "held-as-unknown", "stands-lost", "stands-elsewhere", "stands-untimely", "stands-misses", "mishap-lost", "mishap-moved"]);
-/** Alarms of a train that has no way on: the layout page leads to another one. */
-const OF_WAY = new Set(["deadlock", "track-reserved", "diverged", "diverged-and-others", "track-ends"]);
+/** Alarms of a blocked train: the layout page offers other routes. */
+const OF_ROUTE = new Set(["deadlock", "track-reserved", "diverged", "diverged-and-others", "track-ends"]);
 /** Alarms of a train whose model is wrong. */
 const OF_MODEL = new Set(["promises-broken", "drifts-slower", "drifts-faster", "stands-slower", "stands-faster", "stands-distrusted"]);
 
@@ -28,8 +28,8 @@ export const described = (alarm) => (alarm.train == null ? sentence(alarm) : `${
 /** News of alarms as a sentence: an alarm that ends keeps its own. */
 export const news = (alarm) => (alarm.grade === "over" && alarm.id != null ? say("alarm-over", described(alarm)) : described(alarm));
 
-/** What the layout page offers for an alarm: to say where its train is, or to find it another way. */
-export const guides = ({ what, train }) => (train == null ? undefined : OF_PLACE.has(what) ? "place" : OF_WAY.has(what) ? "way" : undefined);
+/** What the layout page offers for an alarm: to say where its train is, or to find another route for it. */
+export const guides = ({ what, train }) => (train == null ? undefined : OF_PLACE.has(what) ? "place" : OF_ROUTE.has(what) ? "route" : undefined);
 
 const link = (href, text) => make("a", { class: "button", href }, text);
 

@@ -1,4 +1,4 @@
-// The way out of an alarm, on the layout page: where a lost train is, or where a blocked one goes.
+// The remedy of an alarm, on the layout page: the position of a lost train, or another route for a blocked one.
 
 import { described, guides } from "./alarms.js";
 import { make, put } from "./dom.js";
@@ -27,7 +27,7 @@ export class Guide {
     const answer = make("output", { class: "answer", role: "status" });
     this.#place.replaceChildren(
       make("h3", {}, alarm ? described(alarm) : say("guide-unknown", this.#train)),
-      kind === "place" ? this.#toPlace(answer) : this.#onWay(alarm, answer), answer);
+      kind === "place" ? this.#toPlace(answer) : this.#toRoute(alarm, answer), answer);
   }
 
   #button(text, line, answer) {
@@ -44,7 +44,7 @@ export class Guide {
     return steps;
   }
 
-  /** In a simulation nobody can look at the track: the program shows where the train really is. */
+  /** In a simulation there is no track to look at: the program shows where the train really is. */
   #truth(answer) {
     const shows = make("button", { type: "button", id: "show-truth" }, say("show-truth"));
     shows.addEventListener("click", async () => {
@@ -65,8 +65,8 @@ export class Guide {
     return shows;
   }
 
-  /** Turns the blocked train or one that is in its way, or sends it elsewhere. */
-  #onWay({ what, blanks }, answer) {
+  /** Reverses the blocked train or one that blocks it, or sends it elsewhere. */
+  #toRoute({ what, blanks }, answer) {
     const trains = this.#live.picture.trains.map(({ train }) => train);
     const named = (blanks[0] ?? "").split(", ").map(Number).filter((train) => trains.includes(train) && train !== this.#train);
     const others = what === "diverged" || what === "track-ends" ? [] : named;

@@ -10,6 +10,10 @@ use serde::Serialize;
 
 /// The key of the alarm about missed stop intervals.
 const MISSED_INTERVALS: &str = "promises-broken";
+/// The key of the alarm about a sensor that reports where no train can be.
+const STUCK_SENSOR: &str = "contact-stuck";
+/// The prefix of the keys of faults during a calibration.
+const FAULT_PREFIX: &str = "mishap-";
 
 /// The severity of an alarm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -87,15 +91,20 @@ impl Alarm {
         }
     }
 
+    /// The key without the prefix of calibrations: the same fault has the same cause there.
+    fn key(&self) -> &'static str {
+        self.what.strip_prefix(FAULT_PREFIX).unwrap_or(self.what)
+    }
+
     /// The cause of the alarm.
     pub(super) fn cause(&self) -> Cause {
         let of_train = |family| Cause { family, train: self.train, subject: String::new() };
         let of_link = |family| Cause { family, train: None, subject: String::new() };
         let about =
             |family| Cause { family, train: None, subject: self.blanks.first().cloned().unwrap_or_default() };
-        match self.what {
+        match self.key() {
             "lost" | "needs-person" | "held-as-unknown" | "overdue" | "stands-lost" | "stands-elsewhere"
-            | "stands-untimely" | "stands-misses" | "mishap-lost" | "mishap-moved" => of_train("position"),
+            | "stands-untimely" | "stands-misses" | "moved" => of_train("position"),
             "drifts-slower" | "drifts-faster" | "stands-slower" | "stands-faster" | "stands-distrusted" => {
                 of_train("model")
             }
@@ -112,7 +121,7 @@ impl Alarm {
             "line-reply-lost" | "line-unexpected" | "line-repeated" => of_link("line noise"),
             "power-off" | "line-power-lost" | "line-restarted" => of_link("power"),
             "lies-curved" | "lies-straight" => about("turnout"),
-            "contact-stuck" | "unexplained" | "line-held-closed" => about("sensor"),
+            STUCK_SENSOR | "unexplained" | "line-held-closed" => about("sensor"),
             "not-sent" | "unconfirmed" | "line-solenoid-late" => about(self.what),
             "line-says" => Cause { train: self.train, ..about(self.what) },
             other => of_train(other),
@@ -122,7 +131,7 @@ impl Alarm {
     /// What resolves the alarm.
     pub(super) fn resolution(&self) -> Resolution {
         let number = || self.blanks.first().and_then(|number| number.parse().ok());
-        match self.what {
+        match self.key() {
             "line-held-closed" => {
                 number().map_or(Resolution::News, |sensor| Resolution::Reported(SensorId(sensor)))
             }
@@ -144,8 +153,7 @@ impl Alarm {
             | "stands-silent"
             | "stands-unconfirmed"
             | "does-not-stop"
-            | "mishap-lost"
-            | "mishap-moved"
+            | "moved"
             | "line-reverse-in-doubt" => Resolution::Located,
             "diverged"
             | "diverged-and-others"
@@ -154,9 +162,16 @@ impl Alarm {
             | "held-back"
             | "deadlock"
             | "dropped" => Resolution::Runs,
-            "unexplained" | "line-reply-lost" | "line-unexpected" | "line-repeated" | "line-reads-all-only"
+            "unexplained"
+            | "line-reply-lost"
+            | "line-unexpected"
+            | "line-repeated"
+            | "line-reads-all-only"
             | "drifts-slower"
-            | "drifts-faster" | "mishap-stalled" | "mishap-missed" | "mishap-wrong-leg" => Resolution::Quiet,
+            | "drifts-faster"
+            | "stalled"
+            | "missed"
+            | "wrong-leg" => Resolution::Quiet,
             _ => Resolution::News,
         }
     }
@@ -170,7 +185,7 @@ impl Alarm {
                     && matches!(cause.family, "position" | "model" | "stopping" | "route")
             }
             "line-answers" => matches!(cause.family, "link" | "line noise" | "not-sent" | "unconfirmed"),
-            "contact-restored" => cause.family == "sensor" && alarm.blanks == self.blanks,
+            "sensor-restored" => cause.family == "sensor" && alarm.blanks == self.blanks,
             "power-on" => cause.family == "power",
             _ => false,
         }
@@ -258,7 +273,9 @@ impl Alarm {
             }
             LinkNotice::PowerLost => (Grade::Danger, "line-power-lost", None, Vec::new()),
             LinkNotice::Restarted => (Grade::Danger, "line-restarted", None, Vec::new()),
-            LinkNotice::Unconfirmed { .. } | LinkNotice::Locked => (Grade::Danger, "line-says", None, vec![notice.to_string()]),
+            LinkNotice::Unconfirmed { .. } | LinkNotice::Locked => {
+                (Grade::Danger, "line-says", None, vec![notice.to_string()])
+            }
             other => (Grade::Warning, "line-says", None, vec![other.to_string()]),
         };
         Some(Self { text: notice.to_string(), ..Self::new(grade, what, train, blanks) })
@@ -286,7 +303,7 @@ impl Alarm {
             Notice::TrackEnds { train, end } => {
                 (Grade::Warning, "track-ends", Some(*train), vec![layout.node_name(*end).to_owned()])
             }
-            Notice::SensorStuck { sensor } => (Grade::Warning, "contact-stuck", None, vec![name(sensor)]),
+            Notice::SensorStuck { sensor } => (Grade::Warning, STUCK_SENSOR, None, vec![name(sensor)]),
             Notice::Unexplained { sensor, .. } => (Grade::Warning, "unexplained", None, vec![name(sensor)]),
             Notice::Unconfirmed { command } => {
                 (Grade::Danger, "unconfirmed", None, vec![command.to_string()])
@@ -296,7 +313,7 @@ impl Alarm {
             Notice::NeedsOperator { train, .. } => (Grade::Danger, "needs-person", Some(*train), none),
             Notice::Cancelled { train, .. } => (Grade::Warning, "dropped", Some(*train), none),
             Notice::Recovered { train, .. } => (Grade::Over, "recovered", Some(*train), none),
-            Notice::SensorRestored { sensor } => (Grade::Over, "contact-restored", None, vec![name(sensor)]),
+            Notice::SensorRestored { sensor } => (Grade::Over, "sensor-restored", None, vec![name(sensor)]),
             Notice::PowerOn => (Grade::Over, "power-on", None, none),
             Notice::Deadlock { train, moves } => {
                 (Grade::Warning, "deadlock", Some(*train), vec![listed(moves)])

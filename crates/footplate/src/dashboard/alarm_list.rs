@@ -145,10 +145,10 @@ impl AlarmList {
 
 #[cfg(test)]
 mod tests {
+    use footplate_core::Length;
     use footplate_core::control::{Notice, Outcome};
     use footplate_core::model::MotionModel;
     use footplate_core::track::{Layout, TurnoutStates};
-    use footplate_core::Length;
     use footplate_store::layout_named;
 
     use super::*;

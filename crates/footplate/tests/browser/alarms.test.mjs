@@ -95,7 +95,7 @@ test("each cause has one alarm, which stays on all pages until it is resolved or
   assert.equal(await link.textContent(), "Say where train 24 is");
   await link.click();
   await until(first.page, () => document.querySelector("#guide")?.hidden === false || document.querySelector("#alarmed").hidden);
-  await first.page.screenshot({ path: join(AT, "alarm-way-out.png"), fullPage: true });
+  await first.page.screenshot({ path: join(AT, "alarm-remedy.png"), fullPage: true });
   // Each cause has one alarm; dangers come first.
   for (let look = 0; look < 20; look++) {
     const { alarms } = await picture(program);
@@ -123,7 +123,7 @@ test("each cause has one alarm, which stays on all pages until it is resolved or
   await end(program);
 });
 
-test("a train that is blocked by another one is led to a way out", async () => {
+test("the alarm of a blocked train links to ways of moving it on", async () => {
   const program = await started({ speed: 20 });
   const { page, complaints } = await openQuietly(browser, program.url);
   await say(program, "turnout all straight");

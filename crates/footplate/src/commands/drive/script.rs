@@ -7,10 +7,18 @@ use anyhow::{Context, bail};
 use super::instruction::Instruction;
 use super::parse::parse;
 use super::reader::Known;
-use super::script_runner::QueueId;
 
 /// The largest script, in bytes: about a day of driving.
 const LONGEST: u64 = 1 << 20;
+
+/// The number of a queue of steps in a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct QueueId(pub(super) u32);
+
+impl QueueId {
+    /// The queue of the session: its script or its operator. Schedules have queues of their own.
+    pub(super) const SESSION: Self = Self(0);
+}
 
 /// One instruction and the text that it was parsed from.
 #[derive(Debug, Clone, PartialEq)]

@@ -18,14 +18,13 @@ use footplate_core::tracking::PathPoint;
 use footplate_core::{Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 use serde::{Deserialize, Serialize};
 
-pub(super) use self::queue::QueueId;
 use self::queue::{Queues, StepQueue};
 use self::waiting::{CHECK_INTERVAL, Wait, is_open_ended};
 use super::formatter::NoticeFormatter;
 use super::instruction::{HELP, Instruction, Until};
 use super::learning::Learning;
 use super::reader::Known;
-use super::script::{Step, step};
+use super::script::{QueueId, Step, step};
 use super::session_message::SessionMessage;
 use crate::dashboard::{Painter, SchedulePicture, SessionState, TrainTask};
 use crate::recorded::{Input, Listener};

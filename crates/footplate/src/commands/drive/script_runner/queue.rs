@@ -8,16 +8,7 @@ use footplate_store::Schedule;
 
 use super::CommandSource;
 use super::waiting::Wait;
-use crate::commands::drive::script::Step;
-
-/// The number of a queue in a session; its steps carry it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(in crate::commands::drive) struct QueueId(u32);
-
-impl QueueId {
-    /// The queue of the session: its script or its operator.
-    pub(in crate::commands::drive) const SESSION: Self = Self(0);
-}
+use crate::commands::drive::script::{QueueId, Step};
 
 /// Steps that are carried out one after the other.
 #[derive(Debug)]

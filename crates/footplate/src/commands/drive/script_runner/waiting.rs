@@ -4,9 +4,9 @@ use footplate_core::control::{Order, OrderId, Refusal};
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::ScriptRunner;
-use super::queue::{QueueId, Queues};
+use super::queue::Queues;
 use crate::commands::drive::instruction::{Instruction, Until};
-use crate::commands::drive::script::Step;
+use crate::commands::drive::script::{QueueId, Step};
 
 /// How often to check whether a train is at rest.
 pub(super) const CHECK_INTERVAL: TimeSpan = TimeSpan::from_ms(100);
