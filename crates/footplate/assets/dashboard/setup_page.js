@@ -3,7 +3,7 @@
 import { aboutCalibration } from "./calibration_page.js";
 import { make, put, shown, signed } from "./dom.js";
 import { ask, get, order } from "./server.js";
-import { say } from "./words.js";
+import { inOwnLanguage, say } from "./words.js";
 
 const STEPS = ["station", "layout", "trains", "link", "calibrate", "stop"];
 /** The stations that a serial port may lead to. */
@@ -84,7 +84,7 @@ export function setupPage(root, live, wanted) {
     if (!result) return "";
     const word = result.status === 0 ? "setup-done" : result.status === 1 ? "setup-short" : "setup-failed";
     return make("details", { open: isOpen || result.status !== 0 }, make("summary", { class: result.status === 0 ? "" : "answer bad" }, say(word)),
-      make("pre", { tabIndex: 0, role: "region", "aria-label": say(word) }, result.report));
+      make("pre", { tabIndex: 0, role: "region", "aria-label": say(word) }, inOwnLanguage(result.report)));
   }
 
   const build = {

@@ -187,6 +187,7 @@ impl Alarm {
             "line-answers" => matches!(cause.family, "link" | "line noise" | "not-sent" | "unconfirmed"),
             "sensor-restored" => cause.family == "sensor" && alarm.blanks == self.blanks,
             "power-on" => cause.family == "power",
+            "track-clear" => cause.family == "unauthorised",
             _ => false,
         }
     }

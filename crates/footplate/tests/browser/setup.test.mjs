@@ -1,6 +1,7 @@
 // The set-up in a real browser: from starting the program without arguments to a calibrated train and its first stop.
 
 import assert from "node:assert/strict";
+import { execFileSync, spawnSync } from "node:child_process";
 import { existsSync, mkdtempSync, readFileSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -216,7 +217,31 @@ test("the set-up fits a phone, in the dark and in German", async () => {
   const icon = await fetch(new URL(await page.getAttribute("link[rel=apple-touch-icon]", "href"), program.url));
   assert.equal(icon.headers.get("content-type"), "image/png");
   assert.deepEqual([...new Uint8Array(await icon.arrayBuffer()).slice(1, 4)], [...Buffer.from("PNG")]);
+  // The report of the link is in the reader's language, too.
+  await page.fill(".address", "24");
+  await page.click("#save-trains");
+  await isShown(page, "#check-link");
+  await page.click("#check-link");
+  await isShown(page, "#link-next");
+  const report = await page.locator("#setup-step pre").textContent();
+  assert.match(report, /Rückmeldemodule, Handshake CTS/);
+  assert.doesNotMatch(report, /\b(line|polls|without|reply|median|longest|costs|later|answers)\b/);
+  assert.equal(await width(page), 390);
+  await page.screenshot({ path: join(AT, "setup-phone-link.png"), fullPage: true });
   assert.deepEqual(complaints, []);
   await page.close();
   await ended(program);
+});
+
+test("the reports of a link and of a calibration have no English line for German readers", async () => {
+  const { inGerman } = await import("../../assets/dashboard/german_report.js");
+  const table = execFileSync(process.env.FOOTPLATE, ["calibrate", "--link", "sim:track-a?seed=7", "--layout", "track-a", "--train", "24", "--budget", "1m"], { encoding: "utf8", stdio: ["ignore", "pipe", "ignore"] });
+  const german = inGerman(table.trim());
+  assert.match(german, /^Zug 24 auf track-a: \S+ Fahrzeit, die vorgesehene Zeit ist um/);
+  assert.doesNotMatch(german, /\b(step|below|above|stops|track time|value|repeatability)\b/);
+  for (const station of ["marklin", "dcc-ex", "z21", "marklin-can", "loconet"]) {
+    // On a busy machine a station twenty times as fast as real loses replies, which is a status of 1.
+    const { stdout } = spawnSync(process.env.FOOTPLATE, ["doctor", "--link", `sim:track-a?seed=7&station=${station}&speed=20`, "--layout", "track-a"], { encoding: "utf8" });
+    assert.doesNotMatch(inGerman(stdout), /\b(line|polls|without|reply|median|longest|costs|later|answers|occupied|reports|taken|serial|number|unknown|refused|station at)\b/, station);
+  }
 });

@@ -197,3 +197,91 @@ impl ScriptRunner {
         self.queues.get(QueueId::SESSION).is_some_and(|queue| queue.source == CommandSource::Person)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use footplate_core::SpeedStep;
+    use footplate_core::control::{Driver, Machine as _};
+    use footplate_core::model::MotionModel;
+    use footplate_core::track::TurnoutStates;
+    use footplate_store::layout_named;
+
+    use super::*;
+    use crate::commands::drive::learning::Learning;
+    use crate::recorded::{Input, Listener as _};
+
+    fn schedule(name: &str, lines: &[&str], rounds: Option<u32>) -> Schedule {
+        let lines = lines.iter().map(|line| (*line).to_owned()).collect();
+        Schedule { name: name.to_owned(), lines, rounds, is_button: false }
+    }
+
+    fn runner() -> ScriptRunner {
+        let layout = layout_named("track-a").expect("built in").layout;
+        let mut driver = Driver::new(layout.clone(), TurnoutStates::default());
+        driver.add_train(MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step")));
+        let mut runner =
+            ScriptRunner::new(driver, Learning::new(&layout, Vec::new()), CommandSource::Person, Vec::new());
+        runner.handle_timeout(Timestamp::ZERO);
+        runner
+    }
+
+    /// Runs for a time, as the loop does: whenever the machine asks for it.
+    fn run_until(runner: &mut ScriptRunner, end: Timestamp) {
+        while let Some(due) = runner.next_timeout().filter(|due| *due <= end) {
+            runner.handle_timeout(due.max(runner.last_event + TimeSpan::from_ms(1)));
+            while runner.poll_output().is_some() {}
+        }
+    }
+
+    #[test]
+    fn rounds_follow_each_other_a_second_apart_at_least_and_end() {
+        let mut runner = runner();
+        let at = Timestamp::from_s;
+        runner.handle_word(
+            at(1.0),
+            &Input::Schedule(schedule("lights", &["light 24 on", "light 24 off"], Some(3))),
+        );
+        let state = |runner: &ScriptRunner| {
+            let [picture] = runner.schedule_pictures().try_into().expect("one schedule");
+            (picture.round, picture.is_over)
+        };
+        assert_eq!(state(&runner), (1, false));
+        run_until(&mut runner, at(2.9));
+        assert_eq!(state(&runner), (2, false));
+        run_until(&mut runner, at(10.0));
+        assert_eq!(state(&runner), (3, true));
+        assert!(!runner.runs("lights"));
+    }
+
+    #[test]
+    fn a_command_by_hand_ends_the_schedule_of_its_train_and_a_wait_does_not() {
+        let mut runner = runner();
+        let at = Timestamp::from_s;
+        let lines = ["wait 100s", "", "speed 24 3 # the third line"];
+        runner.handle_word(at(1.0), &Input::Schedule(schedule("evening", &lines, None)));
+        let [before] = runner.schedule_pictures().try_into().expect("one schedule");
+        assert_eq!((before.active, before.next), (vec![0], Some(2)), "empty lines count as lines");
+        runner.handle_word(at(2.0), &Input::Line("wait 1s".to_owned()));
+        runner.handle_word(at(2.0), &Input::Line("light 24 on".to_owned()));
+        assert!(runner.runs("evening"));
+        let why = runner.check_run(&schedule("night", &["speed 24 2"], Some(1))).unwrap_err();
+        assert_eq!(why, "schedule `evening` drives train 24 already: end it first");
+        runner.handle_word(at(3.0), &Input::Line("speed 24 0".to_owned()));
+        let [after] = runner.schedule_pictures().try_into().expect("one schedule");
+        assert!(after.is_over && after.active.is_empty());
+        assert_eq!(runner.check_run(&schedule("night", &["speed 24 2"], Some(1))), Ok(()));
+    }
+
+    #[test]
+    fn a_schedule_that_cannot_be_read_names_every_mistake() {
+        let runner = runner();
+        let read = |lines: &[&str], rounds| {
+            runner.read_schedule(&schedule("x", lines, rounds)).expect_err("mistakes")
+        };
+        let mistakes = read(&["sped 24 8", "# nothing", "quit"], None);
+        assert!(mistakes.contains("line 1, column 1: `sped`"), "{mistakes}");
+        assert!(mistakes.contains("line 3: `quit` is not for schedules"), "{mistakes}");
+        assert!(read(&["# nothing"], None).contains("no line that does anything"));
+        assert!(read(&["light 24 on"], Some(0)).contains("0 rounds"));
+    }
+}
