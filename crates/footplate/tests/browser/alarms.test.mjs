@@ -6,7 +6,7 @@ import { after, before, test } from "node:test";
 
 import { findings } from "./axe.mjs";
 import { AT, launch, openQuietly, width } from "./browser.mjs";
-import { PATIENCE, calibratedStore, end, say, serve } from "./railway.mjs";
+import { PATIENCE, calibratedStore, end, picture, say, serve } from "./railway.mjs";
 
 /** The largest difference (mm) between the true place and the one that was entered: rounding, and errors of the survey. */
 const SAME_PLACE_MM = 30;
@@ -16,7 +16,6 @@ const running = new Set();
 
 const until = (page, what, arg) => page.waitForFunction(what, arg, { timeout: PATIENCE });
 const get = async ({ url }, path) => (await fetch(url + path)).json();
-const picture = (program) => get(program, "api/picture");
 
 /** Ends an alarm for the operator. */
 const ends = async ({ url }, id) => (await fetch(`${url}api/alarms/${id}/end`, { method: "POST", headers: { "Content-Type": "application/json" }, body: "{}" })).status;
@@ -67,7 +66,7 @@ test("a train of unknown position is placed where the simulation shows it, or cr
   await until(other, () => document.querySelector("#guide")?.hidden === false);
   await other.locator("#guide button", { hasText: "Find train 24" }).click();
   await until(other, () => document.querySelector("#guide").hidden);
-  for (let own; !own?.at_rest;) [own] = (await picture(again)).trains;
+  await picture(again, ({ trains: [own] }) => own.at_rest);
   const [found] = (await picture(again)).trains;
   assert.equal(found.step, 0);
   assert.ok(found.half_mm < 200, `± ${found.half_mm} mm`);
@@ -82,9 +81,9 @@ test("each cause has one alarm, which stays on all pages until it is resolved or
   const second = await openQuietly(browser, `${program.url}#/health`, { viewport: { width: 390, height: 800 }, locale: "de-DE", colorScheme: "dark" });
   await say(program, "turnout all straight");
   await say(program, "speed 24 8");
-  for (let own; !own?.at;) [own] = (await picture(program)).trains;
+  await picture(program, ({ trains: [own] }) => own.at);
   await say(program, "stop 24");
-  for (let own; !own?.at_rest;) [own] = (await picture(program)).trains;
+  await picture(program, ({ trains: [own] }) => own.at_rest);
   assert.deepEqual((await picture(program)).alarms, []);
   const elsewhere = (await picture(program)).trains[0].at.startsWith("E") ? "A13" : "E14";
   await say(program, `place 24 at ${elsewhere}`);
@@ -124,14 +123,14 @@ test("each cause has one alarm, which stays on all pages until it is resolved or
 });
 
 test("the alarm of a blocked train links to ways of moving it on", async () => {
-  const program = await started({ speed: 20 });
+  const program = await started();
   const { page, complaints } = await openQuietly(browser, program.url);
   await say(program, "turnout all straight");
   for (const { train, at } of await get(program, "api/truth")) await say(program, `place ${train} at ${at}`);
-  for (let trains; !trains?.every(({ at }) => at);) ({ trains } = await picture(program));
+  await picture(program, ({ trains }) => trains.every(({ at }) => at));
   // Turnout 8 leads to the siding of train 58.
   await say(program, "turnout 8 curved");
-  for (let lies; lies !== "curved";) lies = (await picture(program)).turnouts[8];
+  await picture(program, ({ turnouts }) => turnouts[8] === "curved");
   await say(program, "speed 24 8");
   const link = page.locator("#alarmed .warning a.button");
   await link.waitFor({ timeout: PATIENCE });
@@ -143,7 +142,7 @@ test("the alarm of a blocked train links to ways of moving it on", async () => {
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "guide-blocked.png"), fullPage: true });
   await page.locator("#guide button", { hasText: "Reverse train 24" }).click();
-  for (let own; !own?.reversed;) [own] = (await picture(program)).trains;
+  await picture(program, ({ trains: [own] }) => own.reversed);
   // The alarm stays while the train is at rest, and is over when it runs away.
   assert.equal((await picture(program)).alarms.length, 1);
   await say(program, "speed 24 5");

@@ -52,3 +52,13 @@ export async function say({ url }, line) {
   const answer = await fetch(`${url}api/orders`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ line }) });
   if (!answer.ok) throw new Error(await answer.text());
 }
+
+/** The picture of a session once `is` holds for it; without `is`, the present one. */
+export async function picture({ url }, is = () => true) {
+  for (const began = Date.now(); ;) {
+    const seen = await (await fetch(`${url}api/picture`)).json();
+    if (seen && is(seen)) return seen;
+    if (Date.now() - began > 2 * PATIENCE) throw new Error(`the state never came: ${is}`);
+    await new Promise((again) => { setTimeout(again, 50); });
+  }
+}

@@ -241,7 +241,7 @@ impl ScriptRunner {
                     }
                     self.pending.insert(id, step);
                 }
-                Err(Refusal::Lost { train }) if !step.is_retry => self.locate_first(train, step),
+                Err(Refusal::Lost { train }) if !step.is_retry => self.locate_first(train, &step),
                 Err(why) => self.refuse(now, &step, &why),
             },
             Instruction::Go(train, journey) => self.send(now, step, train, journey),
@@ -322,7 +322,7 @@ impl ScriptRunner {
                 self.pending.insert(id, step);
             }
             Err(Refusal::Lost { train } | Refusal::OtherNowhere { other: train, .. }) if !step.is_retry => {
-                self.locate_first(train, step);
+                self.locate_first(train, &step);
             }
             Err(why) => self.refuse(now, &step, &why),
         }

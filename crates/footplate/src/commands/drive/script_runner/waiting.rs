@@ -107,10 +107,10 @@ impl ScriptRunner {
     }
 
     /// Has a lost train run to a sensor and stop before its order is carried out.
-    pub(super) fn locate_first(&mut self, train: TrainId, step: Step) {
+    pub(super) fn locate_first(&mut self, train: TrainId, step: &Step) {
         self.say(format!("train {train} is located first"));
         self.queues.push_front(Step { is_retry: true, ..step.clone() });
-        self.find(train, &step);
+        self.find(train, step);
     }
 
     /// Has a train run to a sensor and stop there, before all other steps.
