@@ -91,7 +91,7 @@ impl ViewThread {
         match key.code {
             KeyCode::Char('c' | 'd') if with_control => self.ask("quit", Request::Line("quit".to_owned())),
             KeyCode::Char(' ') if self.prompt.text().is_empty() => {
-                self.ask("emergency stop", Request::EmergencyStop)
+                self.ask("emergency stop", Request::EmergencyStop);
             }
             KeyCode::Char(letter) if !with_control => self.prompt.insert(letter),
             KeyCode::Enter => {
