@@ -191,7 +191,7 @@ test("with two trains the page leads to the one whose position is unknown", asyn
   await page.click("#all-straight");
   await page.waitForSelector("#go:visible", { timeout: PATIENCE });
   await page.waitForFunction(() => document.querySelectorAll("#first-lost .does").length === 2, null, { timeout: PATIENCE });
-  assert.match(await page.locator("#first-lost").textContent(), /Big Boy: position unknown.*knows where all of them are/);
+  assert.match(await page.locator("#first-lost").textContent(), /Big Boy, Train 58: position unknown\. .*knows where all of them are/);
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "setup-two-trains.png"), fullPage: true });
   await page.locator("#first-lost button", { hasText: "Find train 58" }).click();
