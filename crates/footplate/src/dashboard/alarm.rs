@@ -39,7 +39,7 @@ pub(super) struct Cause {
 /// What resolves an alarm, beside news of it and the operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Resolution {
-    /// Its train is located, and the watchdog does not hold it.
+    /// Its train is located, and the watchdog does not distrust it.
     Located,
     /// Its train is commanded to run again.
     Runs,

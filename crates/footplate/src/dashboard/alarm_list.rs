@@ -97,12 +97,13 @@ impl AlarmList {
         self.reported.insert(sensor, at);
     }
 
-    /// Removes the alarms whose cause is resolved, and returns them. `is_recovering` tells whether the watchdog holds a train.
+    /// Removes the alarms whose cause is resolved, and returns them. `is_in_danger` tells whether the watchdog distrusts a train: it
+    /// is being recovered, or needs the operator.
     pub(super) fn settle(
         &mut self,
         now: Timestamp,
         driver: &Driver,
-        is_recovering: impl Fn(TrainId) -> bool,
+        is_in_danger: impl Fn(TrainId) -> bool,
     ) -> Vec<ActiveAlarm> {
         let (detected, reported) = (&self.detected, &self.reported);
         let is_resolved = |active: &mut ActiveAlarm| {
@@ -111,7 +112,7 @@ impl AlarmList {
             let has_settled = now >= *raised + SETTLING_TIME;
             has_settled
                 && match (alarm.resolution(), alarm.train) {
-                    (Resolution::Located, Some(train)) => is_located(train) && !is_recovering(train),
+                    (Resolution::Located, Some(train)) => is_located(train) && !is_in_danger(train),
                     (Resolution::Runs, Some(train)) => is_located(train) && driver.commanded(train).get() > 0,
                     (Resolution::Detected, Some(train)) => detected.get(&train).is_some_and(|at| at > raised),
                     (Resolution::Reported(sensor), _) => reported.get(&sensor).is_some_and(|at| at > raised),
@@ -201,7 +202,7 @@ mod tests {
         let node = driver.layout().node_named("C13").expect("a sensor");
         let place = footplate_core::tracking::PathPoint { node, distance: Length::ZERO };
         driver.place(at(4_000.0), TRAIN, place, Length::from_mm(10.0));
-        assert!(list.settle(at(4_001.0), &driver, |_| true).is_empty(), "the watchdog still holds it");
+        assert!(list.settle(at(4_001.0), &driver, |_| true).is_empty(), "the watchdog still distrusts it");
         assert_eq!(list.settle(at(4_001.0), &driver, |_| false).len(), 1);
         assert!(list.ranked().is_empty());
     }

@@ -231,9 +231,8 @@ impl Painter {
         for passed in std::mem::take(&mut self.unpublished) {
             self.publish_detection(driver, &passed, began);
         }
-        let is_recovering =
-            |train| dispatcher.is_some_and(|dispatcher| dispatcher.is_interrupted(now, train));
-        let resolved = self.alarms.settle(now, driver, is_recovering);
+        let is_in_danger = |train| dispatcher.is_some_and(|dispatcher| dispatcher.is_in_danger(train));
+        let resolved = self.alarms.settle(now, driver, is_in_danger);
         self.publish_over(now, resolved);
         let reserved = |train| {
             dispatcher
