@@ -12,6 +12,8 @@ use serde::Serialize;
 const MISSED_INTERVALS: &str = "promises-broken";
 /// The key of the alarm about a sensor that reports where no train can be.
 const STUCK_SENSOR: &str = "contact-stuck";
+/// The key of the alarm about a train whose direction is unknown.
+const DIRECTION_UNKNOWN: &str = "line-reverse-in-doubt";
 /// The prefix of the keys of faults during a calibration.
 const FAULT_PREFIX: &str = "mishap-";
 
@@ -140,21 +142,10 @@ impl Alarm {
             "lies-curved" | "lies-straight" => number().map_or(Resolution::News, |turnout| {
                 Resolution::Thrown { turnout: TurnoutId(turnout), curved: self.what == "lies-curved" }
             }),
-            "lost"
-            | "needs-person"
-            | "held-as-unknown"
-            | "stands-lost"
-            | "stands-elsewhere"
-            | "stands-untimely"
-            | "stands-misses"
-            | "stands-slower"
-            | "stands-faster"
-            | "stands-distrusted"
-            | "stands-silent"
-            | "stands-unconfirmed"
-            | "does-not-stop"
-            | "moved"
-            | "line-reverse-in-doubt" => Resolution::Located,
+            "lost" | "needs-person" | "held-as-unknown" | "stands-lost" | "stands-elsewhere"
+            | "stands-untimely" | "stands-misses" | "stands-slower" | "stands-faster"
+            | "stands-distrusted" | "stands-silent" | "stands-unconfirmed" | "does-not-stop" | "moved"
+            | DIRECTION_UNKNOWN => Resolution::Located,
             "diverged"
             | "diverged-and-others"
             | "track-ends"
@@ -259,7 +250,7 @@ impl Alarm {
             }
             LinkNotice::Repeated { .. } => (Grade::Warning, "line-repeated", None, Vec::new()),
             LinkNotice::ReverseInDoubt { train } => {
-                (Grade::Danger, "line-reverse-in-doubt", Some(*train), Vec::new())
+                (Grade::Danger, DIRECTION_UNKNOWN, Some(*train), Vec::new())
             }
             LinkNotice::HeldClosed { sensor } => {
                 (Grade::Warning, "line-held-closed", None, vec![sensor.to_string()])

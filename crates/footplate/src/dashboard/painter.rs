@@ -86,7 +86,8 @@ struct PassedPicture<'l> {
     short_mm: Option<f64>,
     missed: usize,
     /// Distance travelled so far.
-    way_mm: f64,
+    #[serde(rename = "way_mm")]
+    distance_mm: f64,
     /// The drift statistic relative to its alarm threshold, 0 to 1.
     drift: f64,
     /// The mean speed since the sensor before, from the surveyed length alone: (time, mm/s).
@@ -319,7 +320,7 @@ impl Painter {
                 short_mm: passed.short.map(|short| tenths(short.as_mm())),
                 missed: passed.missed,
                 drift: millis(level),
-                way_mm: tenths(at_sensor.as_mm()),
+                distance_mm: tenths(at_sensor.as_mm()),
                 mean: mean.map(|(at, speed)| [since(at), tenths(speed.as_mm_per_s())]),
                 next: next.map(|next| DuePicture {
                     contact: layout.sensor_name(next.sensor),
