@@ -86,7 +86,11 @@ export class Alarmed extends EventTarget {
     const text = make("span");
     const fails = (why) => put(text, `${described(alarm)} (${say("refused", why)})`);
     const end = make("button", { type: "button", class: "small", "aria-label": say("end-alarm-of", described(alarm)) }, say("end-alarm"));
-    end.addEventListener("click", () => ask(`/api/alarms/${alarm.id}/end`, {}).catch(({ message }) => fails(message)));
+    end.addEventListener("click", () => {
+      // The next picture removes the row.
+      end.disabled = true;
+      ask(`/api/alarms/${alarm.id}/end`, {}).catch(({ message }) => fails(message));
+    });
     const acts = remedy(alarm, fails);
     put(text, described(alarm));
     return make("p", { class: `alarm ${alarm.grade}` }, text, ...(acts.hash === location.hash ? [] : [acts]), end);
