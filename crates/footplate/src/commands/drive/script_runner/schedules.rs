@@ -143,7 +143,10 @@ impl ScriptRunner {
             return;
         }
         let refused = run.refused.len();
-        if self.queues.begin_round(id, now).is_none() {
+        if self.queues.begin_round(id, now).is_some() {
+            // Nothing else may wake the machine for the first line of the round.
+            self.advance_queue(now, id);
+        } else {
             let how = match refused {
                 0 => "has ended".to_owned(),
                 1 => "has ended; one line of its last round was refused".to_owned(),
