@@ -74,8 +74,8 @@ pub use speed_profile::{
 };
 pub use store::{
     Calibration, Change, EventKey, Import, Journal, JournalEntry, MachineKey, Mark, MarkKind, NewCalibration,
-    NewMachine, RecordingKey, RunKey, Salvaged, SalvagedTable, Side, Store, StoreError, StoredEvent,
-    StoredMachine, StoredRecording, StoredRun, Traced, UnfinishedSession, salvage,
+    NewMachine, RecordingKey, RunKey, Salvaged, SalvagedTable, Schedule, Side, Store, StoreError,
+    StoredEvent, StoredMachine, StoredRecording, StoredRun, Traced, UnfinishedSession, salvage,
 };
 pub use table::{LONGEST_LINE, TableError};
 pub use tachometer::{
