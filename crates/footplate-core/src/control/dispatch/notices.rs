@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use crate::control::Notice;
 use crate::control::drive::Refusal;
-use crate::control::supervise::Alarm;
+use crate::control::supervise::{Alarm, Clearance};
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
@@ -204,9 +204,9 @@ impl Dispatcher {
         self.has_changed = true;
     }
 
-    /// After a wrong position: several turnouts may not be in their commanded positions. Each is commanded again
-    /// before it is used.
-    fn distrust_turnouts(&mut self) {
+    /// After a wrong position, or while the station was silent: several turnouts may not be in their commanded
+    /// positions. Each is commanded again before it is used.
+    pub(super) fn distrust_turnouts(&mut self) {
         self.commanded.values_mut().for_each(|commanded| commanded.times = 0);
     }
 
@@ -223,10 +223,21 @@ impl Dispatcher {
             if !others.copied().any(|other| moves(&other)) {
                 self.awaiting_creep.remove(&id);
                 let free = self.free_track(id);
-                if let Some(train) = self.trains.get_mut(&id) {
-                    train.reservation = free;
+                let Some(train) = self.trains.get_mut(&id) else { continue };
+                let own = core::mem::replace(&mut train.reservation, free);
+                let layout = self.watchdog.driver().layout();
+                let mut others = Reservation::empty();
+                let trains = self.trains.values().filter(|other| other.id != id);
+                for other in trains {
+                    others.add(layout, &other.reservation);
+                    if other.reservation.is_empty() {
+                        // It may be anywhere.
+                        layout
+                            .edges()
+                            .for_each(|(edge, known)| others.take(layout, edge, Length::ZERO, known.length));
+                    }
                 }
-                self.watchdog.permit(now, id);
+                self.watchdog.permit(now, id, Clearance { own, others });
                 has_permitted = true;
             }
         }

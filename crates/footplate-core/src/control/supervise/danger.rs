@@ -26,16 +26,13 @@ const STOP_WITHOUT_POWER_DEVIATION: Length = Length::from_mm(40.0);
 /// direction: one hop.
 const DANGER_REACH: Length = Length::from_mm(700.0);
 /// A lost train may be this far from its last detection: two sensors stayed silent.
-const LOST_REACH: Length = Length::from_mm(4_000.0);
-/// A lost train needs this many sensors ahead of its last detection: two may have stayed silent, and the third
-/// reports it.
-const SENSORS_AHEAD: usize = 3;
+pub(super) const LOST_REACH: Length = Length::from_mm(4_000.0);
 /// A train extends this far to either side of its pickup: a long locomotive of the gauge.
-const BODY: Length = Length::from_mm(250.0);
+pub(super) const BODY: Length = Length::from_mm(250.0);
 /// The gap between trains.
-const CLEAR: Length = Length::from_mm(150.0);
+pub(super) const CLEAR: Length = Length::from_mm(150.0);
 /// Bound on the error of a position, in standard deviations.
-const CERTAIN: f64 = 3.0;
+pub(super) const CERTAIN: f64 = 3.0;
 /// The longest stop of a train in danger, as a multiple of its model.
 const LONGER_STOP: f64 = 1.5;
 
@@ -114,57 +111,6 @@ impl Watchdog {
         Some(rails_within(layout, place, stop.distance * LONGER_STOP + margin, margin))
     }
 
-    /// Sets the end of authority of a train in recovery before the next train at rest. No other train runs meanwhile.
-    pub(super) fn keep_clear(&mut self, now: Timestamp, train: TrainId) {
-        let layout = self.driver.layout();
-        let others = self.driver.trains().filter(|other| *other != train);
-        let taken: BTreeSet<EdgeId> = others
-            .filter_map(|other| {
-                let located = self.driver.locate(other, now)?;
-                let reach = BODY + located.uncertainty * CERTAIN;
-                Some(rails_within(layout, self.driver.position(other, now)?, reach, reach))
-            })
-            .flatten()
-            .collect();
-        let limit = self.driver.locate(train, now).and_then(|located| {
-            let context = self.driver.context();
-            let hops = context.hops_ahead(located.at.node).take(layout.nodes().len());
-            let edges = hops.flat_map(|hop| hop.edges.iter().copied());
-            let blocked = edges.into_iter().find(|edge| taken.contains(&rails(*edge)))?;
-            let begin = Position { edge: blocked, offset: Length::ZERO };
-            let mut at = self.driver.path_point(train, located.at.node, begin)?;
-            at.distance += -(BODY + CLEAR);
-            Some(at)
-        });
-        self.driver.set_end_of_authority(now, train, limit);
-    }
-
-    /// Whether a lost train may creep ahead: from its last detection, over the turnouts as set, [`SENSORS_AHEAD`]
-    /// sensors come before the end of the track and before any other train.
-    pub(super) fn is_clear_ahead(&self, now: Timestamp, train: TrainId) -> bool {
-        let layout = self.driver.layout();
-        let mut taken = BTreeSet::new();
-        for other in self.driver.trains().filter(|other| *other != train) {
-            let Some(place) = self.driver.position(other, now) else { return false };
-            taken.extend(rails_within(layout, place, BODY, BODY));
-        }
-        let Some(seen) = self.seen.get(&train) else { return false };
-        let Some(edge) = layout.edge(seen.edge).filter(|_| !taken.contains(&rails(seen.edge))) else {
-            return false;
-        };
-        let mut sensors = usize::from(layout.sensor_at(edge.to).is_some());
-        for hop in self.driver.context().hops_ahead(edge.to).take(layout.nodes().len()) {
-            if hop.sensor.is_none() || hop.edges.iter().any(|edge| taken.contains(&rails(*edge))) {
-                return false;
-            }
-            sensors += 1;
-            if sensors >= SENSORS_AHEAD {
-                return true;
-            }
-        }
-        false
-    }
-
     /// Switches the track power off, as the last resort to stop a train.
     pub(super) fn power_off(&mut self, now: Timestamp, for_train: TrainId) {
         if self.power == Power::On {
@@ -228,7 +174,12 @@ impl Watchdog {
 
 /// The rails within distances ahead of and behind a position, over both legs of every turnout: each as the edge with
 /// the lower number.
-fn rails_within(layout: &Layout, place: Position, ahead: Length, behind: Length) -> BTreeSet<EdgeId> {
+pub(super) fn rails_within(
+    layout: &Layout,
+    place: Position,
+    ahead: Length,
+    behind: Length,
+) -> BTreeSet<EdgeId> {
     let mut rails = walk(layout, place, ahead);
     if let Some(back) = layout.reversed(place) {
         rails.extend(walk(layout, back, behind));

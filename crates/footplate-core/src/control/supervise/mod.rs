@@ -12,12 +12,14 @@
 //! watchdog             the machine
 //! alarm                alarms, and the tests at every sensor that raise them
 //! danger  stops        trains that are stopped and held; stops that have to be confirmed
+//! creeping             where a train in recovery may go
 //! line                 the link and the track power
 //! recovery             the recovery of one train
 //! remeasuring  trials  its measurements, and the conclusions from them
 //! ```
 
 mod alarm;
+mod creeping;
 mod danger;
 mod line;
 mod recovery;
@@ -27,5 +29,6 @@ mod trials;
 mod watchdog;
 
 pub use alarm::Alarm;
+pub use creeping::Clearance;
 pub use line::LinkNews;
 pub use watchdog::Watchdog;

@@ -1,6 +1,6 @@
 //! The watchdog: monitors the trains of a driver, and recovers those that do not run as modelled.
 
-use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
+use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec::Vec;
 
 use crate::control::drive::{Driver, Order, OrderId, Refusal};
@@ -14,6 +14,7 @@ use crate::tracking::{Locator, PathPoint};
 use crate::units::Length;
 
 use super::alarm::{Alarm, ConsistencyMonitor};
+use super::creeping::Clearance;
 use super::recovery::{Phase, Recovery};
 use super::stops::Stops;
 use crate::control::Notice;
@@ -60,7 +61,8 @@ pub struct Watchdog {
     is_watching: bool,
     /// Whether an operator has switched the power off.
     pub(super) is_switched_off: bool,
-    pub(super) permitted: BTreeSet<TrainId>,
+    /// Trains that may creep, with the track for it.
+    pub(super) permitted: BTreeMap<TrainId, Clearance>,
     /// The last time that it acted: timeouts up to then are handled.
     acted: Timestamp,
 }
@@ -85,7 +87,7 @@ impl Watchdog {
             permits_all: true,
             is_watching: true,
             is_switched_off: false,
-            permitted: BTreeSet::new(),
+            permitted: BTreeMap::new(),
             acted: now,
         };
         let trains: Vec<TrainId> = watchdog.driver.trains().collect();
@@ -221,9 +223,9 @@ impl Watchdog {
         self.permits_all = false;
     }
 
-    /// Permits a train that asked to creep and to be measured.
-    pub fn permit(&mut self, now: Timestamp, train: TrainId) {
-        self.permitted.insert(train);
+    /// Permits a train that asked to creep and to be measured, outside the track of others.
+    pub fn permit(&mut self, now: Timestamp, train: TrainId, clearance: Clearance) {
+        self.permitted.insert(train, clearance);
         self.act(now);
     }
 
