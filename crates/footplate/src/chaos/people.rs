@@ -181,7 +181,7 @@ impl Attendant<Dispatcher> for People<'_, '_> {
             | Notice::NeedsOperator { train, .. }
             | Notice::AsksToCreep { train }
             | Notice::Lost { train } => self.alarm(now, train),
-            Notice::PowerOff { .. } => {
+            Notice::PowerOff { .. } | Notice::UnauthorisedMovement { .. } => {
                 self.seen.alarms += 1;
                 self.without_power.get_or_insert(now);
             }

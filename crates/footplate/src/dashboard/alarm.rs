@@ -146,6 +146,10 @@ impl Alarm {
             }
             Notice::SensorStuck { sensor } => (Grade::Warning, "contact-stuck", None, vec![name(sensor)]),
             Notice::Unexplained { sensor, .. } => (Grade::Warning, "unexplained", None, vec![name(sensor)]),
+            Notice::UnauthorisedMovement { from, to, .. } => {
+                (Grade::Danger, "unauthorised", None, vec![name(from), name(to)])
+            }
+            Notice::TrackClear => (Grade::Over, "track-clear", None, none),
             Notice::Unconfirmed { command } => {
                 (Grade::Danger, "unconfirmed", None, vec![command.to_string()])
             }

@@ -174,6 +174,9 @@ impl Dispatcher {
                 self.set_halting(*train);
                 self.set_state(*train, State::InDanger);
             }
+            Notice::UnauthorisedMovement { stopped, .. } => {
+                stopped.iter().for_each(|train| self.set_halting(*train));
+            }
             Notice::AsksToCreep { train } => {
                 self.awaiting_creep.insert(*train);
             }
@@ -198,7 +201,8 @@ impl Dispatcher {
             | Notice::SpeedMeasured { .. }
             | Notice::StopChecked { .. }
             | Notice::Resumed { .. }
-            | Notice::Cancelled { .. } => {}
+            | Notice::Cancelled { .. }
+            | Notice::TrackClear => {}
             _ => return,
         }
         self.has_changed = true;

@@ -78,7 +78,10 @@ impl Watchdog {
 
     /// Whether a train could meet one in danger, whose position may be uncertain.
     pub(super) fn could_meet(&self, now: Timestamp, train: TrainId) -> bool {
-        let Some(own) = self.own_reach(now, train) else { return !self.dangers.is_empty() };
+        let Some(own) = self.own_reach(now, train) else { return self.has_danger() };
+        if self.intruder_reach().is_some_and(|rails| !rails.is_disjoint(&own)) {
+            return true;
+        }
         let mut dangers = self.dangers.keys().filter(|danger| **danger != train);
         dangers.any(|danger| match self.danger_reach(now, *danger) {
             Some(rails) => !rails.is_disjoint(&own),

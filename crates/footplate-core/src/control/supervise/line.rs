@@ -54,10 +54,15 @@ impl Watchdog {
         self.act(now);
     }
 
-    /// Switches the track power off or on for an operator. It then stays off until an operator switches it on.
+    /// Switches the track power off or on for an operator. It then stays off until an operator switches it on. An
+    /// operator who switches it on has seen that nothing else moves on the track.
     pub fn switch_power(&mut self, now: Timestamp, on: bool) {
         if on {
             self.is_switched_off = false;
+            self.clear_intruder();
+            if self.is_powered() {
+                self.release_held();
+            }
             if self.is_powered() {
                 self.command(Command::PowerOn);
             }

@@ -13,6 +13,7 @@
 //! alarm                alarms, and the tests at every sensor that raise them
 //! danger  stops        trains that are stopped and held; stops that have to be confirmed
 //! creeping             where a train in recovery may go
+//! intruder             movements that no session drives
 //! line                 the link and the track power
 //! recovery             the recovery of one train
 //! remeasuring  trials  its measurements, and the conclusions from them
@@ -21,6 +22,7 @@
 mod alarm;
 mod creeping;
 mod danger;
+mod intruder;
 mod line;
 mod recovery;
 mod remeasuring;

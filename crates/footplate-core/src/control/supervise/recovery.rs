@@ -432,6 +432,7 @@ impl Watchdog {
             monitor.place();
         }
         self.notify(Notice::Recovered { train, outcome, took: now - recovery.began });
+        self.clear_intruder();
         if self.dangers.is_empty() {
             let held = core::mem::take(&mut self.held);
             let interrupted = held.into_iter().filter_map(|(train, order)| Some((train, order?)));

@@ -15,6 +15,7 @@ use crate::units::Length;
 
 use super::alarm::{Alarm, ConsistencyMonitor};
 use super::creeping::Clearance;
+use super::intruder::Intruder;
 use super::recovery::{Phase, Recovery};
 use super::stops::Stops;
 use crate::control::Notice;
@@ -61,6 +62,7 @@ pub struct Watchdog {
     is_watching: bool,
     /// Whether an operator has switched the power off.
     pub(super) is_switched_off: bool,
+    pub(super) intruder: Intruder,
     /// Trains that may creep, with the track for it.
     pub(super) permitted: BTreeMap<TrainId, Clearance>,
     /// The last time that it acted: timeouts up to then are handled.
@@ -87,6 +89,7 @@ impl Watchdog {
             permits_all: true,
             is_watching: true,
             is_switched_off: false,
+            intruder: Intruder::default(),
             permitted: BTreeMap::new(),
             acted: now,
         };
@@ -153,6 +156,7 @@ impl Watchdog {
         self.monitors.entry(train).or_default().place();
         self.note_place(now, train);
         self.behind.remove(&train);
+        self.clear_intruder();
         self.release_held();
         self.drain(now);
     }
@@ -160,7 +164,7 @@ impl Watchdog {
     /// Releases held trains once no train is in danger. Their orders are cancelled, so that no train starts by itself
     /// while an operator is at the track.
     pub(super) fn release_held(&mut self) {
-        if !self.dangers.is_empty() {
+        if self.has_danger() {
             return;
         }
         for (train, order) in core::mem::take(&mut self.held) {
@@ -198,10 +202,10 @@ impl Watchdog {
         self.dangers.contains_key(&train) || self.held.contains_key(&train)
     }
 
-    /// Whether any train is in danger.
+    /// Whether any train is in danger, or something moves that no session drives.
     #[must_use]
     pub fn has_danger(&self) -> bool {
-        !self.dangers.is_empty()
+        !self.dangers.is_empty() || self.has_intruder()
     }
 
     /// Whether a train is in danger.
@@ -352,7 +356,7 @@ impl Watchdog {
                 self.notify(notice);
                 return self.lost(now, train);
             }
-            Notice::Unexplained { sensor, .. } if self.is_watching => {
+            Notice::Unexplained { sensor, time } if self.is_watching => {
                 let stray = |train: &TrainId| {
                     self.stops.should_be_at_rest(*train, now)
                         && self.driver.sensor_ahead(*train, now) == Some(*sensor)
@@ -361,6 +365,10 @@ impl Watchdog {
                 if let Some(train) = stray {
                     self.raise(now, train, Alarm::DoesNotStop(*sensor));
                     self.power_off(now, train);
+                } else {
+                    let (sensor, time) = (*sensor, *time);
+                    self.notify(notice);
+                    return self.note_unexplained(now, sensor, time);
                 }
             }
             Notice::Done(finished) => {
@@ -418,7 +426,7 @@ impl Watchdog {
         } else if let Some(why) = alarm {
             self.raise(now, train, why);
         }
-        if !self.dangers.is_empty() {
+        if self.has_danger() {
             let stopped = self.hold_endangered(now);
             debug_assert!(stopped.iter().all(|train| self.is_held(*train)));
         }

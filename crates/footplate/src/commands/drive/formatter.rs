@@ -159,6 +159,13 @@ impl NoticeFormatter<'_> {
                 self.at(*time),
                 self.sensor(*sensor)
             ),
+            Notice::UnauthorisedMovement { from, to, stopped } => format!(
+                "something moves from {} to {} that Footplate does not drive; stopped: {}; check the track, then \
+                 enter `power on`, or `place` the train that it is",
+                self.sensor(*from),
+                self.sensor(*to),
+                trains(stopped)
+            ),
             Notice::Unconfirmed { command } => format!("not confirmed as sent: {command}"),
             // The result of the order says both.
             Notice::Replaced { .. } | Notice::GivenUp { .. } => return None,
@@ -290,6 +297,7 @@ fn supervised(notice: &Notice) -> Option<String> {
             trains(stopped)
         ),
         Notice::PowerOff { train } => format!("track power off: train {train} may not have stopped"),
+        Notice::TrackClear => "the track is clear; trains may run again".to_owned(),
         Notice::PowerOn => "track power on; all trains are commanded to stop".to_owned(),
         Notice::AsksToCreep { train } => format!("train {train} is waiting for clearance to creep"),
         Notice::Creeps { train, step } => {
