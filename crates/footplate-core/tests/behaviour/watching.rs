@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use footplate_core::control::{
-    Alarm, Clearance, LinkNews, Machine, Notice, Order, Outcome, Output, Refusal, StopOrder, Watchdog,
+    Alarm, LinkNews, Machine, Notice, Order, Outcome, Output, Refusal, Reservation, StopOrder, Watchdog,
 };
 use footplate_core::track::Landmark;
 use footplate_core::{
@@ -354,7 +354,7 @@ fn the_first_train_asked_waits_for_the_answer() {
     let asked = |notice: &Notice| matches!(notice, Notice::AsksToCreep { train: FIRST });
     assert_eq!(watched.notices.iter().filter(|notice| asked(notice)).count(), 1);
     assert!(watched.world.trains[0].speed_mm_per_s < 1.0);
-    watched.dog.permit(watched.world.now, FIRST, Clearance::default());
+    watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
     assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
 }
 
@@ -362,7 +362,7 @@ fn the_first_train_asked_waits_for_the_answer() {
 fn a_train_lost_again_on_reserved_track_does_not_creep_on() {
     // Given a train under a dispatcher that is located and measured again,
     let mut watched = Watched::asking();
-    watched.dog.permit(watched.world.now, FIRST, Clearance::default());
+    watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
     let is_located =
         |watched: &Watched| watched.notices.iter().any(|notice| matches!(notice, Notice::Located { .. }));
     assert!(watched.run_until(60.0, is_located), "{:#?}", watched.notices);

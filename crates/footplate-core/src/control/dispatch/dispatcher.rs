@@ -177,6 +177,7 @@ impl Dispatcher {
             known.detected_since_start = true;
             known.authorities.clear();
             known.unobstructed_s = None;
+            known.waiting_reported = false;
             known.reservation = Reservation::empty();
         }
         self.reserve_standstill(now, train);

@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use crate::control::Notice;
 use crate::control::drive::Refusal;
-use crate::control::supervise::{Alarm, Clearance};
+use crate::control::supervise::Alarm;
 use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
@@ -227,8 +227,9 @@ impl Dispatcher {
             if !others.copied().any(|other| moves(&other)) {
                 self.awaiting_creep.remove(&id);
                 let free = self.free_track(id);
-                let Some(train) = self.trains.get_mut(&id) else { continue };
-                let own = core::mem::replace(&mut train.reservation, free);
+                if let Some(train) = self.trains.get_mut(&id) {
+                    train.reservation = free;
+                }
                 let layout = self.watchdog.driver().layout();
                 let mut others = Reservation::empty();
                 let trains = self.trains.values().filter(|other| other.id != id);
@@ -241,7 +242,7 @@ impl Dispatcher {
                             .for_each(|(edge, known)| others.take(layout, edge, Length::ZERO, known.length));
                     }
                 }
-                self.watchdog.permit(now, id, Clearance { own, others });
+                self.watchdog.permit(now, id, others);
                 has_permitted = true;
             }
         }

@@ -31,6 +31,5 @@ mod trials;
 mod watchdog;
 
 pub use alarm::Alarm;
-pub use creeping::Clearance;
 pub use line::LinkNews;
 pub use watchdog::Watchdog;

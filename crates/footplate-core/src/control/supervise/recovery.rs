@@ -13,7 +13,6 @@ use crate::tracking::PassedContact;
 use crate::units::Length;
 
 use super::alarm::Alarm;
-use super::creeping::Clearance;
 use super::trials::{SpeedTrial, Steps};
 use super::watchdog::Watchdog;
 use crate::control::{Notice, Outcome};
@@ -57,8 +56,8 @@ pub(super) struct Recovery {
     /// How often the train has reversed.
     reversals: u8,
     lost: u8,
-    /// The track that a dispatcher allotted to it.
-    pub(super) clearance: Option<Clearance>,
+    /// The track that a dispatcher has reserved for others.
+    pub(super) closed: Option<Reservation>,
 }
 
 /// The phase of a recovery.
@@ -111,7 +110,7 @@ impl Recovery {
             lessons_taken: 0,
             reversals: 0,
             lost: 0,
-            clearance: None,
+            closed: None,
         }
     }
 
@@ -194,8 +193,8 @@ impl Watchdog {
         if !is_free || !is_first {
             return;
         }
-        let clearance = self.permitted.remove(&train);
-        if !self.permits_all && clearance.is_none() {
+        let closed = self.permitted.remove(&train);
+        if !self.permits_all && closed.is_none() {
             if !has_asked {
                 self.set_phase(train, Phase::Waiting { has_asked: true }, now);
                 self.notify(Notice::AsksToCreep { train });
@@ -203,7 +202,7 @@ impl Watchdog {
             return;
         }
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
-        recovery.clearance = clearance;
+        recovery.closed = closed;
         let is_roughly_located = matches!(recovery.why, Alarm::Drift(_) | Alarm::Misses | Alarm::Distrusted);
         match self.driver.locate(train, now).filter(|_| is_roughly_located) {
             Some(located) => self.driver.place(now, train, located.at, ABOUT.max(located.uncertainty)),
@@ -211,7 +210,7 @@ impl Watchdog {
                 self.driver.lose(now, train);
                 // Other trains are near, and the track may end ahead. Behind the train is track that it ran over.
                 if !self.permits_all {
-                    return match self.sensor_behind(train) {
+                    return match self.sensor_behind(now, train) {
                         seen @ Some(_) => self.creep_back(now, train, seen),
                         None if self.is_clear_ahead(now, train) => self.creep_ahead(now, train),
                         None => self.need_operator(now, train),
@@ -371,15 +370,11 @@ impl Watchdog {
         let (creep, reversals) = (recovery.steps.creep, recovery.reversals);
         recovery.ratios.clear();
         recovery.by = now + LOCATED_WITHIN;
-        if let Some(clearance) = &mut recovery.clearance {
-            // It has left the place where it was lost first.
-            clearance.own = Reservation::empty();
-        }
         if self.permits_all {
             return self.creep(now, train, creep, None);
         }
         // Track ahead may end or be reserved for others; the train ran over the track behind it.
-        match self.sensor_behind(train) {
+        match self.sensor_behind(now, train) {
             seen @ Some(_) if reversals < MAX_REVERSALS => self.creep_back(now, train, seen),
             _ => self.need_operator(now, train),
         }

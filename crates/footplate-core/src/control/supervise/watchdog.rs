@@ -3,6 +3,7 @@
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec::Vec;
 
+use crate::control::dispatch::Reservation;
 use crate::control::drive::{Driver, Order, OrderId, Refusal};
 use crate::control::{Machine, Output};
 use crate::event::{Command, Event, EventKind};
@@ -14,7 +15,7 @@ use crate::tracking::{Locator, PathPoint};
 use crate::units::Length;
 
 use super::alarm::{Alarm, ConsistencyMonitor};
-use super::creeping::Clearance;
+use super::creeping::Unheard;
 use super::intruder::Intruder;
 use super::recovery::{Phase, Recovery};
 use super::stops::Stops;
@@ -54,6 +55,8 @@ pub struct Watchdog {
     pub(super) seen: BTreeMap<TrainId, Position>,
     /// The sensor that reported each train last since it reversed or was placed: it is behind the train.
     pub(super) behind: BTreeMap<TrainId, NodeId>,
+    /// How far each train may have run since its last detection.
+    pub(super) unheard: BTreeMap<TrainId, Unheard>,
     /// The orders of recoveries.
     own: BTreeMap<OrderId, TrainId>,
     /// Whether no dispatcher keeps trains apart and repeats orders.
@@ -63,8 +66,8 @@ pub struct Watchdog {
     /// Whether an operator has switched the power off.
     pub(super) is_switched_off: bool,
     pub(super) intruder: Intruder,
-    /// Trains that may creep, with the track for it.
-    pub(super) permitted: BTreeMap<TrainId, Clearance>,
+    /// Trains that may creep, with the track that is reserved for others.
+    pub(super) permitted: BTreeMap<TrainId, Reservation>,
     /// The last time that it acted: timeouts up to then are handled.
     acted: Timestamp,
 }
@@ -85,6 +88,7 @@ impl Watchdog {
             unfinished: BTreeMap::new(),
             seen: BTreeMap::new(),
             behind: BTreeMap::new(),
+            unheard: BTreeMap::new(),
             own: BTreeMap::new(),
             permits_all: true,
             is_watching: true,
@@ -155,6 +159,7 @@ impl Watchdog {
         self.driver.place(now, train, at, uncertainty);
         self.monitors.entry(train).or_default().place();
         self.note_place(now, train);
+        self.note_detection(train, now);
         self.behind.remove(&train);
         self.clear_intruder();
         self.release_held();
@@ -227,9 +232,10 @@ impl Watchdog {
         self.permits_all = false;
     }
 
-    /// Permits a train that asked to creep and to be measured, outside the track of others.
-    pub fn permit(&mut self, now: Timestamp, train: TrainId, clearance: Clearance) {
-        self.permitted.insert(train, clearance);
+    /// Permits a train that asked to creep and to be measured, outside the track that is
+    /// reserved for others.
+    pub fn permit(&mut self, now: Timestamp, train: TrainId, closed: Reservation) {
+        self.permitted.insert(train, closed);
         self.act(now);
     }
 
@@ -415,6 +421,7 @@ impl Watchdog {
     fn passed(&mut self, now: Timestamp, train: TrainId, passed: &crate::tracking::PassedContact) {
         let alarm = self.monitors.entry(train).or_default().pass(passed);
         self.note_place(now, train);
+        self.note_detection(train, passed.window.until);
         if let Some(node) = self.driver.node_passed(passed) {
             self.behind.insert(train, node);
         }
@@ -459,6 +466,7 @@ impl Machine for Watchdog {
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         if let EventKind::Speed { train, step } = event.kind {
+            self.note_command(train, event.time, step);
             if step == SpeedStep::STAND {
                 let at_rest = self.at_rest_by(train, event.time);
                 self.stops.sent(train, at_rest);
@@ -468,6 +476,7 @@ impl Machine for Watchdog {
             }
         }
         if let EventKind::Reverse { train } = event.kind {
+            self.note_command(train, event.time, SpeedStep::STAND);
             self.behind.remove(&train);
             if let Some(place) = self.seen.get_mut(&train) {
                 *place = self.driver.layout().reversed(*place).unwrap_or(*place);
