@@ -272,6 +272,12 @@ pub enum Notice {
         /// The trains that have reserved it.
         on: Vec<TrainId>,
     },
+    /// Trains at rest block each other, and none of them can move: an operator has to move one and place it. Repeated
+    /// until one can.
+    Deadlocked {
+        /// The train whose path was searched last.
+        train: TrainId,
+    },
     /// Trains at rest block each other: some of them make room.
     Deadlock {
         /// The train that is blocked.

@@ -129,6 +129,7 @@ export const ENGLISH = {
   "alarm-overdue": "overdue at {0} by {1} s: missed detection, or the train has stalled",
   "alarm-track-ends": "stopped: the track ends at {0}",
   "alarm-contact-stuck": "{0} reports again and again where no train can be: it is ignored until it works again",
+  "alarm-deadlocked": "deadlock: no train can make room for another. Move one by hand, then place it",
   "alarm-unauthorised": "something moves from {0} to {1} that Footplate does not drive: check the track, then switch the power on, or place the train that it is",
   "alarm-track-clear": "the track is clear",
   "alarm-unexplained": "{0} reported, but no train can be there",

@@ -129,6 +129,7 @@ export const GERMAN = {
   "alarm-overdue": "an {0} seit {1} s überfällig: Meldung fehlt, oder der Zug ist stehen geblieben",
   "alarm-track-ends": "angehalten: das Gleis endet bei {0}",
   "alarm-contact-stuck": "{0} meldet immer wieder, wo kein Zug sein kann: wird ignoriert, bis er wieder arbeitet",
+  "alarm-deadlocked": "Züge blockieren sich: keiner kann ausweichen. Einen von Hand versetzen, dann mit `place` eingeben",
   "alarm-unauthorised": "von {0} nach {1} bewegt sich etwas, das Footplate nicht fährt: Gleis prüfen, dann Fahrstrom einschalten oder den Zug mit `place` eingeben",
   "alarm-track-clear": "das Gleis ist frei",
   "alarm-unexplained": "{0} hat gemeldet, aber dort kann kein Zug sein",

@@ -158,6 +158,7 @@ impl Alarm {
             Notice::NeedsOperator { train, .. } => (Grade::Danger, "needs-person", Some(*train), none),
             Notice::Cancelled { train, .. } => (Grade::Warning, "dropped", Some(*train), none),
             Notice::Recovered { train, .. } => (Grade::Over, "recovered", Some(*train), none),
+            Notice::Deadlocked { train } => (Grade::Danger, "deadlocked", Some(*train), none),
             Notice::Deadlock { train, moves } => {
                 (Grade::Warning, "deadlock", Some(*train), vec![listed(moves)])
             }

@@ -180,6 +180,10 @@ impl NoticeFormatter<'_> {
             Notice::Waits { train, on } => {
                 format!("train {train} waits for track that is reserved for {}", trains(on))
             }
+            Notice::Deadlocked { train } => format!(
+                "train {train} is in a deadlock: no train can make room for another; move one by hand, then \
+                 enter `place` with its new position"
+            ),
             Notice::Deadlock { train, moves } if moves.is_empty() => {
                 format!(
                     "train {train} is in a deadlock that no train can resolve from its place: one \
