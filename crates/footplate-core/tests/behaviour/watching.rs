@@ -18,14 +18,14 @@ use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_assert, prop_o
 
 use crate::toy_railway::{ToyRailway, add_train, driver_of, step};
 
-const FIRST: TrainId = TrainId(24);
+pub(crate) const FIRST: TrainId = TrainId(24);
 const SECOND: TrainId = TrainId(58);
 
 /// A world with a watchdog, and all its notices and commands.
-struct Watched {
-    world: ToyRailway,
-    dog: Watchdog,
-    notices: Vec<Notice>,
+pub(crate) struct Watched {
+    pub(crate) world: ToyRailway,
+    pub(crate) dog: Watchdog,
+    pub(crate) notices: Vec<Notice>,
     commanded: Vec<(Timestamp, Command)>,
 }
 
@@ -48,7 +48,7 @@ impl Watched {
     }
 
     /// The same, with train 58 half a lap ahead.
-    fn two() -> Self {
+    pub(crate) fn two() -> Self {
         let mut world = ToyRailway::new(24, "D1", 300.0);
         world.put(58, "B1", 100.0);
         let mut driver = driver_of(&world, "D1", 300.0);
@@ -73,7 +73,7 @@ impl Watched {
         }
     }
 
-    fn run_until(&mut self, seconds: f64, is_so: impl Fn(&Self) -> bool) -> bool {
+    pub(crate) fn run_until(&mut self, seconds: f64, is_so: impl Fn(&Self) -> bool) -> bool {
         let end = self.world.now + TimeSpan::from_s(seconds);
         self.listen();
         while self.world.now < end && !is_so(self) {
@@ -89,11 +89,11 @@ impl Watched {
         is_so(self)
     }
 
-    fn run(&mut self, seconds: f64) {
+    pub(crate) fn run(&mut self, seconds: f64) {
         self.run_until(seconds, |_| false);
     }
 
-    fn go(&mut self, train: TrainId, number: u8) {
+    pub(crate) fn go(&mut self, train: TrainId, number: u8) {
         self.dog.order(self.world.now, Order::Speed { train, step: step(number) }).expect("free to go");
     }
 
@@ -232,33 +232,6 @@ fn power_is_switched_off_when_a_train_does_not_stop() {
     watched.run(0.2);
     assert_eq!(watched.alarm(), Some(Alarm::DoesNotStop(ahead)));
     assert!(watched.power_off().is_some());
-}
-
-#[test]
-fn what_no_session_drives_stops_trains_until_an_operator_says_that_the_track_is_clear() {
-    let mut watched = Watched::two();
-    watched.go(FIRST, 8);
-    watched.run(6.0);
-    let is_raised = |watched: &Watched| {
-        watched.notices.iter().any(|notice| matches!(notice, Notice::UnauthorisedMovement { .. }))
-    };
-    let [one, other] = ["B2", "A2"].map(|name| watched.world.layout.sensor_named(name).expect("a sensor"));
-    // A detection by itself may be spurious,
-    watched.world.close(one);
-    watched.run(6.0);
-    assert!(!is_raised(&watched), "{:#?}", watched.notices);
-    // one at the next sensor is a movement: a train that could meet it stops and stays.
-    watched.world.close(other);
-    assert!(watched.run_until(10.0, is_raised), "{:#?}", watched.notices);
-    watched.run(5.0);
-    assert!(watched.world.trains.iter().all(|train| train.speed_mm_per_s < 1.0));
-    let order = Order::Speed { train: FIRST, step: step(5) };
-    let refused = watched.dog.order(watched.world.now, order);
-    assert_eq!(refused, Err(Refusal::InDanger { train: FIRST }));
-    watched.run(60.0);
-    assert!(watched.dog.has_danger());
-    watched.dog.switch_power(watched.world.now, true);
-    watched.go(FIRST, 5);
 }
 
 #[test]

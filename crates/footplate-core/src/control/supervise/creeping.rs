@@ -13,6 +13,7 @@ use crate::units::Length;
 
 use super::danger::{BODY, CERTAIN, CLEAR, LOST_REACH, rails_within};
 use super::recovery::Recovery;
+use super::unheard::Unheard;
 use super::watchdog::Watchdog;
 
 /// A lost train needs this many sensors ahead, one of them beyond all places where it may be: one may stay silent.
@@ -124,28 +125,6 @@ impl Watchdog {
     pub(super) fn note_detection(&mut self, train: TrainId, now: Timestamp) {
         let step = self.unheard.get(&train).map_or(SpeedStep::STAND, |known| known.step);
         self.unheard.insert(train, Unheard { step, since: now, before: step, ..Unheard::default() });
-    }
-}
-
-/// The distance that a train has run since its last detection, by its commands, whatever was heard of it.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Unheard {
-    run: Length,
-    /// The step of its last command, and when that was sent.
-    step: SpeedStep,
-    since: Timestamp,
-    /// The step before that.
-    before: SpeedStep,
-}
-
-impl Unheard {
-    fn after(self, now: Timestamp, model: &MotionModel) -> Self {
-        if self.step == SpeedStep::STAND {
-            return self;
-        }
-        let speed = model.speed(self.step, Approach::Below).value;
-        let span = (now - self.since).max(TimeSpan::ZERO);
-        Self { run: self.run + speed * span, since: now.max(self.since), ..self }
     }
 }
 

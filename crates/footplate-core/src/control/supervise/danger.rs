@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use crate::control::drive::Order;
 use crate::event::{Approach, Command};
-use crate::ids::{EdgeId, SpeedStep, TrainId};
+use crate::ids::{EdgeId, SensorId, SpeedStep, TrainId};
 use crate::model::Rescaling;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Layout, Position};
@@ -171,6 +171,66 @@ impl Watchdog {
     pub(super) fn note_place(&mut self, now: Timestamp, train: TrainId) {
         if let Some(place) = self.driver.position(train, now) {
             self.seen.insert(train, place);
+        }
+    }
+}
+
+impl Watchdog {
+    /// A detection that no train explains: the second one at adjacent sensors raises the alarm.
+    pub(super) fn note_unexplained(&mut self, now: Timestamp, sensor: SensorId, time: Timestamp) {
+        let before = self.intruder.take(self.driver.layout(), sensor, time);
+        if self.intruder.near.is_some() {
+            self.intruder.near = Some(sensor);
+            self.hold_endangered(now);
+            return;
+        }
+        let Some(from) = before.filter(|_| self.dangers.is_empty()) else { return };
+        self.intruder.near = Some(sensor);
+        let stopped = self.hold_endangered(now);
+        self.notify(Notice::UnauthorisedMovement { from, to: sensor, stopped });
+        // A decoder may have missed its stop: all trains that should be at rest are commanded to stop again.
+        let rests = |train: &TrainId| self.driver.commanded(*train) == SpeedStep::STAND;
+        let resting: Vec<TrainId> = self.driver.trains().filter(rests).collect();
+        for train in resting {
+            self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
+        }
+    }
+
+    /// The rails that whatever moves may be on; `None` if nothing does.
+    pub(super) fn intruder_reach(&self) -> Option<BTreeSet<EdgeId>> {
+        let layout = self.driver.layout();
+        let node = layout.sensor_node(self.intruder.near?)?;
+        let begins = layout.outgoing(node).edges().chain(layout.outgoing(node.reverse()).edges());
+        let reach = |edge| {
+            let place = Position { edge, offset: Length::ZERO };
+            rails_within(layout, place, LOST_REACH, Length::ZERO)
+        };
+        Some(begins.flat_map(reach).collect())
+    }
+
+    /// The track is clear again: an operator said so, or a train was located that was lost.
+    pub(super) fn clear_intruder(&mut self) {
+        self.intruder.last = None;
+        if self.intruder.near.take().is_some() {
+            self.notify(Notice::TrackClear);
+        }
+    }
+
+    /// Whether something moves that no session drives.
+    pub(super) const fn has_intruder(&self) -> bool {
+        self.intruder.near.is_some()
+    }
+
+    /// Releases held trains once no train is in danger. Their orders are cancelled, so that no train starts by itself
+    /// while an operator is at the track.
+    pub(super) fn release_held(&mut self) {
+        if self.has_danger() {
+            return;
+        }
+        for (train, order) in core::mem::take(&mut self.held) {
+            if let Some((_, order)) = order {
+                self.notify(Notice::Cancelled { train, order });
+            }
         }
     }
 }

@@ -5,18 +5,9 @@
 //! thousand spurious ones: a layout has four neighbours to a sensor, each with one in 10⁵ s. While a train is in
 //! danger they may be its own. What moved may stay where it is: only an operator can say that the track is clear.
 
-use alloc::collections::BTreeSet;
-use alloc::vec::Vec;
-
-use crate::control::Notice;
-use crate::control::drive::Order;
-use crate::ids::{EdgeId, SensorId, SpeedStep, TrainId};
+use crate::ids::SensorId;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Layout, Position};
-use crate::units::Length;
-
-use super::danger::{LOST_REACH, rails_within};
-use super::watchdog::Watchdog;
+use crate::track::Layout;
 
 /// Two adjacent sensors that report within this time: the longest hop (1.5 m) at the speed of a slow hand, 50 mm/s.
 const NEXT_WITHIN: TimeSpan = TimeSpan::from_ms(30_000);
@@ -24,58 +15,16 @@ const NEXT_WITHIN: TimeSpan = TimeSpan::from_ms(30_000);
 /// What is known of a movement that no session drives.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Intruder {
-    last: Option<(SensorId, Timestamp)>,
+    pub(super) last: Option<(SensorId, Timestamp)>,
     /// The sensor that reported it last, until an operator says that the track is clear.
-    near: Option<SensorId>,
+    pub(super) near: Option<SensorId>,
 }
 
-impl Watchdog {
-    /// A detection that no train explains: the second one at adjacent sensors raises the alarm.
-    pub(super) fn note_unexplained(&mut self, now: Timestamp, sensor: SensorId, time: Timestamp) {
-        let before = self.intruder.last.replace((sensor, time));
-        if self.intruder.near.is_some() {
-            self.intruder.near = Some(sensor);
-            self.hold_endangered(now);
-            return;
-        }
-        let Some((from, at)) = before.filter(|_| self.dangers.is_empty()) else { return };
-        if (time - at).abs() > NEXT_WITHIN || !are_adjacent(self.driver.layout(), from, sensor) {
-            return;
-        }
-        self.intruder.near = Some(sensor);
-        let stopped = self.hold_endangered(now);
-        self.notify(Notice::UnauthorisedMovement { from, to: sensor, stopped });
-        // A decoder may have missed its stop: all trains that should be at rest are commanded to stop again.
-        let rests = |train: &TrainId| self.driver.commanded(*train) == SpeedStep::STAND;
-        let resting: Vec<TrainId> = self.driver.trains().filter(rests).collect();
-        for train in resting {
-            self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
-        }
-    }
-
-    /// The rails that whatever moves may be on; `None` if nothing does.
-    pub(super) fn intruder_reach(&self) -> Option<BTreeSet<EdgeId>> {
-        let layout = self.driver.layout();
-        let node = layout.sensor_node(self.intruder.near?)?;
-        let begins = layout.outgoing(node).edges().chain(layout.outgoing(node.reverse()).edges());
-        let reach = |edge| {
-            let place = Position { edge, offset: Length::ZERO };
-            rails_within(layout, place, LOST_REACH, Length::ZERO)
-        };
-        Some(begins.flat_map(reach).collect())
-    }
-
-    /// The track is clear again: an operator said so, or a train was located that was lost.
-    pub(super) fn clear_intruder(&mut self) {
-        self.intruder.last = None;
-        if self.intruder.near.take().is_some() {
-            self.notify(Notice::TrackClear);
-        }
-    }
-
-    /// Whether something moves that no session drives.
-    pub(super) const fn has_intruder(&self) -> bool {
-        self.intruder.near.is_some()
+impl Intruder {
+    /// Takes a detection that no train explains. Returns the adjacent sensor that reported just before, if any did.
+    pub(super) fn take(&mut self, layout: &Layout, sensor: SensorId, time: Timestamp) -> Option<SensorId> {
+        let (from, at) = self.last.replace((sensor, time))?;
+        ((time - at).abs() <= NEXT_WITHIN && are_adjacent(layout, from, sensor)).then_some(from)
     }
 }
 
@@ -84,4 +33,25 @@ fn are_adjacent(layout: &Layout, one: SensorId, other: SensorId) -> bool {
     let Some(node) = layout.sensor_node(one) else { return false };
     let hops = [node, node.reverse()].into_iter().flat_map(|node| layout.hops_from(node));
     one != other && hops.into_iter().any(|hop| hop.sensor == Some(other))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::example::oval;
+
+    #[test]
+    fn a_movement_is_two_adjacent_sensors_in_time() {
+        let layout = oval();
+        let [a, c, d, e] = ["A1", "C1", "D1", "E1"].map(|name| layout.sensor_named(name).unwrap());
+        let mut intruder = Intruder::default();
+        let mut take = |seconds, sensor| intruder.take(&layout, sensor, Timestamp::from_s(seconds));
+        assert_eq!(take(1.0, a), None);
+        assert_eq!(take(3.0, a), None, "the same sensor again");
+        assert_eq!(take(5.0, e), None, "another track");
+        assert_eq!(take(7.0, a), None);
+        assert_eq!(take(9.0, c), Some(a));
+        assert_eq!(take(38.0, d), Some(c));
+        assert_eq!(take(69.0, a), None, "too late");
+    }
 }

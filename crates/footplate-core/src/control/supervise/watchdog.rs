@@ -15,10 +15,10 @@ use crate::tracking::{Locator, PathPoint};
 use crate::units::Length;
 
 use super::alarm::{Alarm, ConsistencyMonitor};
-use super::creeping::Unheard;
 use super::intruder::Intruder;
 use super::recovery::{Phase, Recovery};
 use super::stops::Stops;
+use super::unheard::Unheard;
 use crate::control::Notice;
 
 /// A train should be at rest after its predicted time multiplied by this, ...
@@ -164,19 +164,6 @@ impl Watchdog {
         self.clear_intruder();
         self.release_held();
         self.drain(now);
-    }
-
-    /// Releases held trains once no train is in danger. Their orders are cancelled, so that no train starts by itself
-    /// while an operator is at the track.
-    pub(super) fn release_held(&mut self) {
-        if self.has_danger() {
-            return;
-        }
-        for (train, order) in core::mem::take(&mut self.held) {
-            if let Some((_, order)) = order {
-                self.notify(Notice::Cancelled { train, order });
-            }
-        }
     }
 
     /// Gives up the position of a train that was found to be wrong. A monitored train is stopped and located again.
