@@ -78,7 +78,7 @@ impl Watchdog {
 
     /// The sensor to which a lost train may creep back, in its new direction: the one that reported it last. `None` if
     /// it could reach the end of the track, or track that is closed to it, before a sensor reports it, wherever it
-    /// may be and whichever way turnouts are set.
+    /// may be and however turnouts are set.
     pub(super) fn sensor_behind(&self, now: Timestamp, train: TrainId) -> Option<NodeId> {
         let layout = self.driver.layout();
         let behind = *self.behind.get(&train)?;
@@ -115,7 +115,7 @@ impl Watchdog {
     }
 
     /// The station has been silent for a while: it may not have received the last command of any train.
-    pub(super) fn doubt_last_commands(&mut self, now: Timestamp) {
+    pub(super) fn distrust_last_commands(&mut self, now: Timestamp) {
         for known in self.unheard.values_mut().filter(|known| now - known.since <= SILENT_FOR) {
             known.step = known.step.max(known.before);
         }

@@ -32,7 +32,7 @@ impl Watchdog {
             _ if !self.is_watching() => {}
             LinkNews::Silent if self.silent.is_none() => {
                 self.silent = Some(now);
-                self.doubt_last_commands(now);
+                self.distrust_last_commands(now);
                 let trains: Vec<TrainId> = self.driver.trains().collect();
                 for train in trains {
                     if self.driver.commanded(train) > SpeedStep::STAND || !self.driver.is_at_rest(train, now)
