@@ -152,6 +152,18 @@ pub enum Notice {
         /// When it was detected.
         time: Timestamp,
     },
+    /// Something moves that no session drives: two adjacent sensors reported what no train explains. Trains that could
+    /// meet it were commanded to stop, until an operator places a train or switches the power on.
+    UnauthorisedMovement {
+        /// The sensor that reported it first.
+        from: SensorId,
+        /// The next one.
+        to: SensorId,
+        /// Trains that it could meet.
+        stopped: Vec<TrainId>,
+    },
+    /// The track is clear of what no session drove.
+    TrackClear,
     /// A command was not sent for a long time. A stop is commanded again.
     Unconfirmed {
         /// The command.
@@ -259,6 +271,12 @@ pub enum Notice {
         train: TrainId,
         /// The trains that have reserved it.
         on: Vec<TrainId>,
+    },
+    /// Trains at rest block each other, and none of them can move: an operator has to move one and place it. Repeated
+    /// until one can.
+    Deadlocked {
+        /// The train whose path was searched last.
+        train: TrainId,
     },
     /// Trains at rest block each other: some of them make room.
     Deadlock {

@@ -27,5 +27,6 @@ mod toy_body;
 mod toy_railway;
 mod trains_fitted;
 mod two_sensors;
+mod unauthorised_movements;
 mod watching;
 mod wheel_diameters;

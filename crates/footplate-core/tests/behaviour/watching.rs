@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use footplate_core::control::{
-    Alarm, LinkNews, Machine, Notice, Order, Outcome, Output, Refusal, StopOrder, Watchdog,
+    Alarm, LinkNews, Machine, Notice, Order, Outcome, Output, Refusal, Reservation, StopOrder, Watchdog,
 };
 use footplate_core::track::Landmark;
 use footplate_core::{
@@ -18,14 +18,14 @@ use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_assert, prop_o
 
 use crate::toy_railway::{ToyRailway, add_train, driver_of, step};
 
-const FIRST: TrainId = TrainId(24);
+pub(crate) const FIRST: TrainId = TrainId(24);
 const SECOND: TrainId = TrainId(58);
 
 /// A world with a watchdog, and all its notices and commands.
-struct Watched {
-    world: ToyRailway,
-    dog: Watchdog,
-    notices: Vec<Notice>,
+pub(crate) struct Watched {
+    pub(crate) world: ToyRailway,
+    pub(crate) dog: Watchdog,
+    pub(crate) notices: Vec<Notice>,
     commanded: Vec<(Timestamp, Command)>,
 }
 
@@ -48,7 +48,7 @@ impl Watched {
     }
 
     /// The same, with train 58 half a lap ahead.
-    fn two() -> Self {
+    pub(crate) fn two() -> Self {
         let mut world = ToyRailway::new(24, "D1", 300.0);
         world.put(58, "B1", 100.0);
         let mut driver = driver_of(&world, "D1", 300.0);
@@ -73,7 +73,7 @@ impl Watched {
         }
     }
 
-    fn run_until(&mut self, seconds: f64, is_so: impl Fn(&Self) -> bool) -> bool {
+    pub(crate) fn run_until(&mut self, seconds: f64, is_so: impl Fn(&Self) -> bool) -> bool {
         let end = self.world.now + TimeSpan::from_s(seconds);
         self.listen();
         while self.world.now < end && !is_so(self) {
@@ -89,11 +89,11 @@ impl Watched {
         is_so(self)
     }
 
-    fn run(&mut self, seconds: f64) {
+    pub(crate) fn run(&mut self, seconds: f64) {
         self.run_until(seconds, |_| false);
     }
 
-    fn go(&mut self, train: TrainId, number: u8) {
+    pub(crate) fn go(&mut self, train: TrainId, number: u8) {
         self.dog.order(self.world.now, Order::Speed { train, step: step(number) }).expect("free to go");
     }
 
@@ -327,7 +327,7 @@ fn the_first_train_asked_waits_for_the_answer() {
     let asked = |notice: &Notice| matches!(notice, Notice::AsksToCreep { train: FIRST });
     assert_eq!(watched.notices.iter().filter(|notice| asked(notice)).count(), 1);
     assert!(watched.world.trains[0].speed_mm_per_s < 1.0);
-    watched.dog.permit(watched.world.now, FIRST);
+    watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
     assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
 }
 
@@ -335,7 +335,7 @@ fn the_first_train_asked_waits_for_the_answer() {
 fn a_train_lost_again_on_reserved_track_does_not_creep_on() {
     // Given a train under a dispatcher that is located and measured again,
     let mut watched = Watched::asking();
-    watched.dog.permit(watched.world.now, FIRST);
+    watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
     let is_located =
         |watched: &Watched| watched.notices.iter().any(|notice| matches!(notice, Notice::Located { .. }));
     assert!(watched.run_until(60.0, is_located), "{:#?}", watched.notices);

@@ -109,6 +109,8 @@ pub struct Session<'l> {
     waits: BTreeMap<TrainId, Timestamp>,
     /// Since when each train has needed a person.
     needs_person: BTreeMap<TrainId, Timestamp>,
+    /// Since when something seems to move that no session drives.
+    warned: Option<Timestamp>,
     talk: bool,
 }
 
@@ -163,6 +165,7 @@ impl<'l> Session<'l> {
             trains,
             waits: BTreeMap::new(),
             needs_person: BTreeMap::new(),
+            warned: None,
             talk,
         })
     }
@@ -237,6 +240,11 @@ impl<'l> Session<'l> {
             Notice::Diverged { .. } => self.tally.diverged += 1,
             Notice::ReservedAsUnknown { .. } => self.tally.lost += 1,
             Notice::Danger { .. } => self.tally.dangers += 1,
+            Notice::UnauthorisedMovement { .. } => {
+                self.tally.dangers += 1;
+                self.warned.get_or_insert(now);
+            }
+            Notice::TrackClear => self.warned = None,
             Notice::NeedsOperator { train, .. } => {
                 self.needs_person.insert(*train, now);
             }
@@ -270,6 +278,9 @@ impl<'l> Session<'l> {
     /// Compares what trains are on with what they hold, and helps those that are lost.
     fn look(&mut self) {
         let now = self.rehearsal.line.now();
+        if self.warned.is_some_and(|since| now - since >= HELP_AFTER) {
+            self.dispatcher.switch_power(now, true);
+        }
         for train in self.trains.clone() {
             let is_inside =
                 is_on_reserved_track(self.layout, self.rehearsal.world(), &self.dispatcher, train);

@@ -1,4 +1,4 @@
-//! What models made of the events: kept beside them, with the date of the events they saw.
+//! Calibrations: models of trains, with the date of the events that they follow from.
 
 use footplate_core::{Timestamp, TrainId};
 use rusqlite::{ErrorCode, Row};
@@ -6,47 +6,47 @@ use rusqlite::{ErrorCode, Row};
 use super::error::StoreError;
 use super::file::Store;
 
-/// A calibration to be kept.
+/// A calibration to store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NewCalibration<'a> {
-    /// Of which train.
+    /// The train.
     pub train: TrainId,
-    /// It saw the events that were there, and not excluded, at this date: so it can be made again.
+    /// The date of the events, without excluded ones, that it follows from: it can be made again.
     pub as_of: Timestamp,
     /// The version of the model that made it.
     pub model_version: &'a str,
-    /// What it says, as JSON.
+    /// The model, as JSON.
     pub body: &'a str,
 }
 
-/// A calibration that was kept.
+/// A stored calibration.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Calibration {
-    /// Of which train.
+    /// The train.
     pub train: TrainId,
     /// When it was made.
     pub made_at: Timestamp,
-    /// It saw the events that were there, and not excluded, at this date.
+    /// The date of the events, without excluded ones, that it follows from.
     pub as_of: Timestamp,
     /// The version of the model that made it.
     pub model_version: String,
-    /// What it says, as JSON.
+    /// The model, as JSON.
     pub body: String,
 }
 
 const COLUMNS: &str = "train, made_at_ns, as_of_ns, model_version, body";
-/// What kept models are called in the column `kind`. Older programs kept fits of another form there, too, as `recordings`:
-/// they stay in the table and are never read as models.
+/// The value of the column `kind` for models. Older programs stored fits of another form as `recordings`: they stay in the
+/// table and are not read as models.
 const KIND: &str = "motion";
 
 impl Store {
-    /// Keeps a calibration; those before it stay.
+    /// Stores a calibration; earlier ones stay.
     pub fn keep_calibration(&mut self, new: NewCalibration<'_>, now: Timestamp) -> Result<(), StoreError> {
         let sql = format!("INSERT INTO calibrations (kind, {COLUMNS}) VALUES (?1, ?2, ?3, ?4, ?5, ?6)");
         let row = (KIND, new.train.0, now.as_ns(), new.as_of.as_ns(), new.model_version, new.body);
         match self.connection.execute(&sql, row) {
             Ok(_) => Ok(()),
-            // The only constraint that a value of these types can break.
+            // The only constraint that these types can violate.
             Err(error) if error.sqlite_error_code() == Some(ErrorCode::ConstraintViolation) => {
                 Err(StoreError::NotJson { train: new.train })
             }
@@ -54,7 +54,7 @@ impl Store {
         }
     }
 
-    /// The calibration that was in force for a train at a date: the last one made until then.
+    /// The calibration in force for a train at a date: the last one made until then.
     pub fn calibration(&self, train: TrainId, at: Timestamp) -> Result<Option<Calibration>, StoreError> {
         let sql = format!(
             "SELECT {COLUMNS} FROM calibrations WHERE kind = ?1 AND train = ?2 AND made_at_ns <= ?3 \
@@ -63,13 +63,13 @@ impl Store {
         Ok(self.rows(&sql, (KIND, train.0, at.as_ns()), read)?.pop())
     }
 
-    /// All calibrations of a train in the order in which they were made, those of older forms as well.
+    /// All calibrations of a train in the order of their making, including older forms.
     pub fn calibrations(&self, train: TrainId) -> Result<Vec<Calibration>, StoreError> {
         let sql = format!("SELECT {COLUMNS} FROM calibrations WHERE train = ?1 ORDER BY id");
         self.rows(&sql, [train.0], read)
     }
 
-    /// The trains that were ever calibrated.
+    /// The trains with a calibration.
     pub fn calibrated_trains(&self) -> Result<Vec<TrainId>, StoreError> {
         self.rows("SELECT DISTINCT train FROM calibrations ORDER BY train", [], |row| {
             Ok(TrainId(row.get(0)?))

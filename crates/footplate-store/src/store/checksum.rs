@@ -1,4 +1,4 @@
-//! The checksum of a row: damage that turns a value into another possible one is noticed.
+//! The checksum of a row, which detects damage that turns a value into another possible one.
 
 use crc32fast::Hasher;
 use rusqlite::types::{ToSqlOutput, Value, ValueRef};
@@ -55,8 +55,7 @@ pub(super) fn insert(
     Ok(())
 }
 
-/// Whether a row of a table is as it was written, as far as its checksum shows; `values` begin with its number. Only a whole row of one
-/// of [`TABLES`] has a checksum.
+/// Whether a row of a table matches its checksum; `values` begin with its number. Only whole rows of [`TABLES`] have one.
 pub(super) fn holds(table: &str, columns: &[String], values: &[Value]) -> bool {
     match values {
         [_, values @ .., Value::Integer(written)]

@@ -1,7 +1,7 @@
-//! What a machine decided in a live session, and all that it followed from.
+//! The decisions of a machine in a live session, and their inputs.
 //!
-//! A machine is kept as it began, and behind that, numbered together, what it was told and what it decided. Every row is
-//! one [`Traced`]; what its text means is known to whoever wrote it.
+//! The store keeps the initial state of a machine, and after it, numbered together, its inputs and decisions. Every row
+//! is one [`Traced`]; the program that wrote the text defines its meaning.
 
 use std::borrow::Cow;
 
@@ -25,11 +25,11 @@ pub struct NewMachine<'a> {
     pub kind: &'a str,
     /// The version of the program.
     pub program: &'a str,
-    /// All that it is made of, as JSON.
+    /// Its initial state, as JSON.
     pub body: &'a str,
 }
 
-/// A machine as it began in a session that is kept.
+/// The initial state of a machine in a recorded session.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredMachine {
     /// Its number in the store.
@@ -42,42 +42,42 @@ pub struct StoredMachine {
     pub kind: String,
     /// The version of the program that ran it.
     pub program: String,
-    /// All that it was made of, as JSON.
+    /// Its initial state, as JSON.
     pub body: String,
-    /// Whether the body is what was written, byte for byte.
+    /// Whether the body has the bytes that were written.
     pub is_whole: bool,
-    /// How many inputs of it are kept.
+    /// The number of its inputs.
     pub inputs: u64,
-    /// How many of its decisions are kept.
+    /// The number of its decisions.
     pub decisions: u64,
 }
 
-/// Which way something went.
+/// The direction of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
-    /// The machine was told.
+    /// An input of the machine.
     Input,
-    /// The machine decided.
+    /// A decision of the machine.
     Decision,
 }
 
-/// One thing that a machine was told or decided.
+/// An input or a decision of a machine.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Traced {
-    /// Counts inputs and decisions of a machine together, from 0 on without a gap.
+    /// Counts inputs and decisions of a machine together, from 0 without gaps.
     pub number: u64,
-    /// When the machine was told, on the clock of the run; of a decision, when it was told what came before.
+    /// The time of the input on the clock of the run; of a decision, the time of the input before it.
     pub time: Timestamp,
-    /// Told or decided.
+    /// Input or decision.
     pub side: Side,
-    /// What kind of input or decision.
+    /// The kind of input or decision.
     pub kind: Cow<'static, str>,
-    /// What exactly.
+    /// Its content.
     pub text: String,
 }
 
 impl Store {
-    /// Keeps how a machine begins in a live session.
+    /// Stores the initial state of a machine in a live session.
     ///
     /// # Errors
     /// The store cannot be written, or the body is no JSON.
@@ -95,7 +95,7 @@ impl Store {
         Ok(MachineKey(self.connection.last_insert_rowid()))
     }
 
-    /// The machines of all sessions, in the order in which they began.
+    /// The machines of all sessions, in the order of their beginnings.
     ///
     /// # Errors
     /// The store cannot be read.
@@ -110,7 +110,7 @@ impl Store {
         read().map_err(|error| self.error(error))
     }
 
-    /// All that a machine was told and decided, in its order.
+    /// All inputs and decisions of a machine, in order.
     ///
     /// # Errors
     /// The store cannot be read.
@@ -151,7 +151,7 @@ fn traced(row: &Row<'_>) -> rusqlite::Result<Traced> {
     })
 }
 
-/// Appends one thing that a machine was told or decided.
+/// Appends an input or a decision.
 pub(super) fn insert(
     transaction: &Transaction<'_>,
     machine: MachineKey,

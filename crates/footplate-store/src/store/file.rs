@@ -1,4 +1,4 @@
-//! The file of a store: opening and creating it, bringing it up to date, and who may write.
+//! The file of a store: opens, creates and migrates it, and grants write access.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -8,11 +8,11 @@ use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior};
 use super::checksum;
 use super::error::StoreError;
 
-/// Marks the file as ours for tools that look: `Foot` in ASCII (`PRAGMA application_id`).
+/// Marks the file as a store for other tools: `Foot` in ASCII (`PRAGMA application_id`).
 const APPLICATION_ID: i64 = 0x466F_6F74;
 
-/// What turns an empty file into version 1, version 1 into version 2 and so on. Entries are appended and never
-/// changed: files out there were made by them. `testdata/compat` keeps a file of every version.
+/// Migrations: an empty file to version 1, version 1 to version 2 and so on. Entries are appended and never changed,
+/// because published programs made files with them. `testdata/compat` keeps a file of every version.
 const MIGRATIONS: &[&str] = &[
     include_str!("migrations/1_begin.sql"),
     include_str!("migrations/2_motion.sql"),
@@ -23,13 +23,13 @@ const MIGRATIONS: &[&str] = &[
     include_str!("migrations/7_schedules.sql"),
 ];
 
-/// How long we wait for another process to finish writing, chosen: an import of a million events takes less.
+/// The longest wait for another process to finish writing (chosen: an import of a million events takes less).
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// A store that is open.
+/// An open store.
 ///
-/// Several processes may have it open. Readers see what was there when they began; one writes at a time, the
-/// others wait for a while and then say who is in the way.
+/// Several processes may have it open. Readers see the state at their beginning. One process writes at a time; the
+/// others wait, and then fail with an error that names the cause.
 #[derive(Debug)]
 pub struct Store {
     path: PathBuf,
@@ -37,7 +37,7 @@ pub struct Store {
 }
 
 impl Store {
-    /// Opens the store at `path`, and brings it up to date if an older Footplate made it.
+    /// Opens the store at `path`, and migrates it if an older Footplate made it.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
         if !path.try_exists().unwrap_or(true) {
             return Err(StoreError::Missing { file: path.to_owned() });
@@ -45,7 +45,7 @@ impl Store {
         Self::open_with(path, OpenFlags::SQLITE_OPEN_READ_WRITE, MIGRATIONS)
     }
 
-    /// Opens the store at `path` to read it, and changes nothing in it. One that an older Footplate made is brought up to date first.
+    /// Opens the store at `path` read-only. If an older Footplate made it, it is migrated first.
     pub fn open_to_read(path: &Path) -> Result<Self, StoreError> {
         if !path.try_exists().unwrap_or(true) {
             return Err(StoreError::Missing { file: path.to_owned() });
@@ -59,25 +59,25 @@ impl Store {
         if store.version(known)? == known { Ok(store) } else { Self::open(path) }
     }
 
-    /// Opens the store at `path`, or makes an empty one there.
+    /// Opens the store at `path`, or creates an empty one.
     pub fn open_or_create(path: &Path) -> Result<Self, StoreError> {
         let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE;
         Self::open_with(path, flags, MIGRATIONS)
     }
 
-    /// The same store, waiting this long for others to finish writing.
+    /// Sets how long the store waits for other processes to finish writing.
     pub fn with_patience(self, patience: Duration) -> Result<Self, StoreError> {
         self.connection.busy_timeout(patience).map_err(|error| self.error(error))?;
         Ok(self)
     }
 
-    /// Where it is.
+    /// Its path.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What makes the tables of a store, step by step.
+    /// The migrations that make the tables of a store.
     pub(super) const fn migrations() -> &'static [&'static str] {
         MIGRATIONS
     }
@@ -128,25 +128,25 @@ impl Store {
         let mut store = Self { path: path.to_owned(), connection };
         store.set_up().map_err(|error| store.error(error))?;
         store.migrate(migrations)?;
-        // Only a store of ours is switched to a journal that stays in the file.
+        // Only a file of ours is switched to a write-ahead log, a setting that stays in the file.
         let journal: Result<String, _> =
             store.connection.query_row("PRAGMA journal_mode = WAL", [], |row| row.get(0));
         journal.map_err(|error| store.error(error))?;
         Ok(store)
     }
 
-    /// What holds for a connection and not for the file.
+    /// Sets what belongs to a connection and not to the file.
     fn set_up(&self) -> rusqlite::Result<()> {
         self.connection.busy_timeout(PATIENCE)?;
-        // A commit has reached the disk before it is acknowledged.
+        // A commit is on disk before it is acknowledged.
         self.connection.pragma_update(None, "synchronous", "FULL")?;
         self.connection.pragma_update(None, "foreign_keys", true)?;
-        // Nothing in a file that came from elsewhere runs with our rights, and bent pages are noticed early.
+        // No code in a foreign file runs with our rights, and damaged pages are detected early.
         self.connection.pragma_update(None, "trusted_schema", false)?;
         self.connection.pragma_update(None, "cell_size_check", true)
     }
 
-    /// Brings the file up to date in one step: it has the old version or the newest, nothing between.
+    /// Migrates the file in one transaction: it has the old version or the newest.
     fn migrate(&mut self, migrations: &[&str]) -> Result<(), StoreError> {
         let known = migrations.len() as i64;
         if self.version(known)? == known {
@@ -154,7 +154,7 @@ impl Store {
         }
         let path = self.path.clone();
         let transaction = self.write()?;
-        // Another process may have been quicker.
+        // Another process may have migrated it meanwhile.
         let from = version_of(&transaction).map_err(|error| StoreError::of(&path, error))?;
         let pending = migrations.iter().skip(usize::try_from(from).unwrap_or(usize::MAX));
         let migrated = pending
@@ -166,7 +166,7 @@ impl Store {
         migrated.map_err(|error| self.error(error))
     }
 
-    /// The version of the file, if it is ours and not newer than we are; 0 for one that is still empty.
+    /// The version of the file, if it is a store and not newer than this program; 0 if it is empty.
     fn version(&self, known: i64) -> Result<i64, StoreError> {
         let read = || {
             let application: i64 =
@@ -186,13 +186,13 @@ impl Store {
         }
     }
 
-    /// A transaction that may write: nobody else writes until it ends, and it is undone unless committed.
+    /// A transaction that may write: no other process writes until it ends. It is undone unless committed.
     pub(super) fn write(&mut self) -> Result<Transaction<'_>, StoreError> {
         let begun = self.connection.transaction_with_behavior(TransactionBehavior::Immediate);
         begun.map_err(|error| StoreError::of(&self.path, error))
     }
 
-    /// What SQLite said, in our words.
+    /// An error of SQLite as an error of the store.
     pub(super) fn error(&self, source: rusqlite::Error) -> StoreError {
         StoreError::of(&self.path, source)
     }
@@ -284,7 +284,7 @@ mod tests {
         assert!(store.write().is_err() || store.connection.execute("DELETE FROM replays", []).is_err());
         drop(store);
         assert_eq!(std::fs::read(&path).unwrap(), before);
-        // One of an older version cannot be read as it is.
+        // An older version has to be migrated before it can be read.
         let old = folder.path().join("old.db");
         drop(Store::open_with(&old, FLAGS, &MIGRATIONS[..2]).unwrap());
         assert!(Store::open_to_read(&old).unwrap().check().is_ok());

@@ -1,4 +1,4 @@
-//! What comes out of a store: what was there at a date, and what changed between two.
+//! Reads a store: its state at a date, and the changes between two dates.
 
 use footplate_core::{RunId, Timestamp, TrainId};
 use rusqlite::{Connection, Row};
@@ -10,29 +10,29 @@ use super::recordings::{EventKey, LIVE, RecordingKey, RunKey};
 use super::row;
 use crate::recording::{GatePass, RawEvent, Run, TrainAtStart};
 
-/// A recording as a list shows it.
+/// A summary of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredRecording {
     /// Its number in the store.
     pub key: RecordingKey,
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// The name of its form, or `live`.
     pub form: String,
     /// The layout whose sensors it reports.
     pub layout: String,
-    /// When it was imported or began.
+    /// When it was imported, or its session began.
     pub stored_at: Timestamp,
-    /// How many runs it has.
+    /// The number of its runs.
     pub runs: u64,
-    /// How many events it had at the date.
+    /// The number of its events at the date.
     pub events: u64,
-    /// How many of them were excluded at the date.
+    /// The number of events that were excluded at the date.
     pub excluded: u64,
 }
 
 impl StoredRecording {
-    /// Whether it is of a live session, not of a file.
+    /// Whether it is a live session and not an imported file.
     #[must_use]
     pub fn is_live(&self) -> bool {
         self.form == LIVE
@@ -46,18 +46,18 @@ pub struct StoredRun {
     pub key: RunKey,
     /// Its number in the recording.
     pub id: RunId,
-    /// When its clock stood at zero, since the Unix epoch, where that is known.
+    /// When its clock was zero, since the Unix epoch, if known.
     pub began_at: Option<Timestamp>,
-    /// What its trains did when it began.
+    /// The state of its trains at the beginning.
     pub trains: Vec<TrainAtStart>,
-    /// All events, the excluded ones too.
+    /// All events, including excluded ones.
     pub events: Vec<StoredEvent>,
     /// Passes of light gates.
     pub gates: Vec<GatePass>,
 }
 
 impl StoredRun {
-    /// The run without what was excluded: what an estimator is given.
+    /// The run without excluded events, for estimators.
     #[must_use]
     pub fn accepted(&self) -> Run {
         let events = self.events.iter().filter(|stored| !stored.is_excluded());
@@ -76,49 +76,49 @@ impl StoredRun {
 pub struct StoredEvent {
     /// Its number in the store.
     pub key: EventKey,
-    /// What happened; line 0 if it came from no file.
+    /// The event; line 0 if no file was read.
     pub raw: RawEvent,
-    /// The newest mark on it, if it ever had one.
+    /// The newest mark on it.
     pub mark: Option<Mark>,
 }
 
 impl StoredEvent {
-    /// Whether a person has excluded it, and not restored it since.
+    /// Whether it is excluded.
     #[must_use]
     pub fn is_excluded(&self) -> bool {
         self.mark.as_ref().is_some_and(|mark| mark.kind == MarkKind::Excluded)
     }
 }
 
-/// Something that may have changed the numbers.
+/// A change that may have changed estimates.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
-    /// Events came in.
+    /// Events were added.
     Measured {
-        /// When the last of them did.
+        /// When the last of them was added.
         at: Timestamp,
-        /// Into which recording.
+        /// The recording.
         recording: RecordingKey,
-        /// What it is called.
+        /// Its name.
         name: String,
-        /// How many.
+        /// The number of events.
         events: u64,
     },
-    /// A person excluded an event or restored it.
+    /// An event was excluded or restored.
     Marked(Mark),
     /// A calibration was made.
     Calibrated {
         /// When.
         at: Timestamp,
-        /// Of which train.
+        /// The train.
         train: TrainId,
-        /// By which version of the model.
+        /// The version of the model.
         model_version: String,
     },
 }
 
 impl Change {
-    /// When it was.
+    /// The time of the change.
     #[must_use]
     pub const fn at(&self) -> Timestamp {
         match self {
@@ -128,12 +128,12 @@ impl Change {
     }
 }
 
-/// The newest mark on each event at the date `?1`. Of two marks the one that was written later counts, even if a
-/// clock was set back between them.
+/// The newest mark on each event at the date `?1`. Of two marks the later row counts, even if the clock was set back
+/// between them.
 const NEWEST_MARKS: &str = "SELECT event, mark, max(id) FROM marks WHERE made_at_ns <= ?1 GROUP BY event";
 
 impl Store {
-    /// The recordings that were there at a date.
+    /// The recordings at a date.
     pub fn recordings(&self, as_of: Timestamp) -> Result<Vec<StoredRecording>, StoreError> {
         let sql = format!(
             "SELECT recordings.id, name, form, layout, recordings.stored_at_ns, count(DISTINCT runs.id), \
@@ -157,7 +157,7 @@ impl Store {
         })
     }
 
-    /// The runs of a recording as they were at a date, in the order in which they came.
+    /// The runs of a recording at a date, in the order of their beginnings.
     pub fn runs(&self, recording: RecordingKey, as_of: Timestamp) -> Result<Vec<StoredRun>, StoreError> {
         let sql = "SELECT runs.id, number, began_at_ns FROM runs JOIN recordings ON recordings.id = recording \
                    WHERE recording = ?1 AND recordings.stored_at_ns <= ?2 ORDER BY runs.id";
@@ -208,7 +208,7 @@ impl Store {
         Ok(StoredRun { key: RunKey(key), id, began_at, trains, events, gates })
     }
 
-    /// What changed after one date and until another, in order: why numbers of the two differ.
+    /// The changes after one date and until another, in order: why estimates of the two differ.
     pub fn changes(&self, after: Timestamp, until: Timestamp) -> Result<Vec<Change>, StoreError> {
         let between = [after.as_ns(), until.as_ns()];
         let measured = "SELECT max(events.stored_at_ns), recordings.id, name, count(*) FROM events \
@@ -251,7 +251,7 @@ impl Store {
     }
 }
 
-/// A mark whose reason and date stand in the columns from `first`.
+/// A mark whose reason and date are in the columns from `first`.
 fn mark_of(row: &Row<'_>, event: EventKey, kind: MarkKind, first: usize) -> rusqlite::Result<Mark> {
     let made_at = Timestamp::from_ns(row.get(first + 1)?);
     Ok(Mark { event, kind, reason: row.get(first)?, made_at })

@@ -1,9 +1,9 @@
-//! The journal of a live session: what a railway reports and is told, on the disk as it happens.
+//! The journal of a live session: reports and commands, on disk as they happen.
 //!
-//! A session is a recording, and a stretch of it in which the clock is continuous and no train is lifted is a run. An
-//! event is acknowledged once it is on the disk (write-ahead journal, `synchronous = FULL`: one wait for the disk a call),
-//! and what was acknowledged outlives whatever happens to the process or the power. What came together is handed over
-//! together; nobody waits here for more to come.
+//! A session is a recording; a part of it with a continuous clock, in which no train is lifted, is a run. An event is
+//! acknowledged once it is on disk (write-ahead log, `synchronous = FULL`: one wait for the disk a call). Acknowledged
+//! events survive the death of the process and a power cut. The caller passes events together that arrived together; the
+//! journal does not wait for more.
 
 use footplate_core::{Event, RunId, Timestamp};
 
@@ -14,12 +14,12 @@ use super::recordings::{RecordingKey, RunKey};
 use super::row;
 use crate::recording::TrainAtStart;
 
-/// What a session brings, as it comes.
+/// An entry of a session.
 #[derive(Debug, Clone, PartialEq)]
 pub enum JournalEntry {
-    /// The railway reported something, or was told.
+    /// A report of the railway, or a command to it.
     Event(Event),
-    /// The machine that was begun last was told something, or decided.
+    /// An input or a decision of the machine that began last.
     Traced(Traced),
 }
 
@@ -34,10 +34,10 @@ impl JournalEntry {
     }
 }
 
-/// No row has this number, so that the store refuses what is of no machine.
+/// No row has this number: the store refuses entries without a machine.
 const NO_MACHINE: MachineKey = MachineKey(0);
 
-/// A live session that is being written down.
+/// The recorder of a live session.
 #[derive(Debug)]
 pub struct Journal {
     store: Store,
@@ -49,11 +49,11 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Begins a session on `layout` with its first run, whose clock stood at zero at `began_at`. `now` since the Unix
+    /// Begins a session on `layout` with its first run, whose clock was zero at `began_at`. `now` is the time since the Unix
     /// epoch, as everywhere in a store.
     ///
     /// # Errors
-    /// The store cannot be written: better known before the first train moves.
+    /// The store cannot be written, which shows before the first train moves.
     pub fn begin(
         mut store: Store,
         name: &str,
@@ -67,11 +67,11 @@ impl Journal {
         Ok(Self { store, recording, run, number: 1, machine: None, acknowledged: 0 })
     }
 
-    /// Begins the next run: the clock has jumped, a train was lifted, or other trains take part. `began_at` as above, and
-    /// what the trains do now.
+    /// Begins the next run: the clock has jumped, a train was lifted, or other trains take part. `began_at` as above;
+    /// `trains` are their present states.
     ///
     /// # Errors
-    /// The store cannot be written; the run before goes on.
+    /// The store cannot be written; the present run continues.
     pub fn begin_run(
         &mut self,
         began_at: Option<Timestamp>,
@@ -83,29 +83,29 @@ impl Journal {
         Ok(())
     }
 
-    /// A machine begins to decide; what is traced from here on is of it.
+    /// Begins a machine, to which the following traced entries belong.
     ///
     /// # Errors
-    /// The store cannot be written: better known before the first train moves.
+    /// The store cannot be written, which shows before the first train moves.
     pub fn begin_machine(&mut self, new: NewMachine<'_>, now: Timestamp) -> Result<(), StoreError> {
         self.machine = Some(self.store.begin_machine(self.recording, new, now)?);
         Ok(())
     }
 
-    /// Writes events down, in their order. When this returns they are on the disk, all of them; it says how many of the
-    /// session are by now.
+    /// Appends events in order. All of them are on disk when this returns. Returns the number of events of the session on
+    /// disk.
     ///
     /// # Errors
-    /// None of these events was acknowledged. They can be handed over again: nothing is written down twice.
+    /// None of these events was acknowledged. They can be passed again: no event is stored twice.
     pub fn append(&mut self, events: &[Event], now: Timestamp) -> Result<u64, StoreError> {
         let entries: Vec<JournalEntry> = events.iter().copied().map(JournalEntry::Event).collect();
         self.append_all(&entries, now)
     }
 
-    /// The same for all that a session brings: in their order, and all of it or nothing.
+    /// The same for all kinds of entries: in order, and all of them or none.
     ///
     /// # Errors
-    /// As [`append`](Self::append); and if something is traced before a machine was begun.
+    /// As [`append`](Self::append); and for a traced entry before the first machine.
     pub fn append_all(&mut self, entries: &[JournalEntry], now: Timestamp) -> Result<u64, StoreError> {
         if entries.is_empty() {
             return Ok(self.acknowledged);
@@ -126,7 +126,7 @@ impl Journal {
         Ok(self.acknowledged)
     }
 
-    /// How many events of the session are on the disk.
+    /// The number of events of the session on disk.
     #[must_use]
     pub const fn acknowledged(&self) -> u64 {
         self.acknowledged
@@ -138,13 +138,13 @@ impl Journal {
         self.recording
     }
 
-    /// The store in which it is.
+    /// Its store.
     #[must_use]
     pub const fn store(&self) -> &Store {
         &self.store
     }
 
-    /// Ends the session, which changes nothing: all that was acknowledged is there already.
+    /// Ends the session and returns the store. Nothing is written: all acknowledged entries are on disk.
     #[must_use]
     pub fn end(self) -> Store {
         self.store

@@ -1,4 +1,4 @@
-//! What a person thinks of an event: excluding it and restoring it, each with a reason and a date.
+//! Marks on events: a person excludes or restores an event, with a reason and a date.
 
 use footplate_core::Timestamp;
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ToSql, ToSqlOutput, ValueRef};
@@ -21,12 +21,12 @@ pub struct Mark {
     pub made_at: Timestamp,
 }
 
-/// What a mark does.
+/// The effect of a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MarkKind {
-    /// No calibration uses the event from here on.
+    /// Later calibrations do not use the event.
     Excluded,
-    /// Calibrations use it again.
+    /// Later calibrations use it again.
     Restored,
 }
 
@@ -56,12 +56,12 @@ impl ToSql for MarkKind {
 }
 
 impl Store {
-    /// Excludes events from every calibration from now on. All of them, or none if one cannot be.
+    /// Excludes events from later calibrations: all of them, or none if one cannot be excluded.
     pub fn exclude(&mut self, events: &[EventKey], reason: &str, now: Timestamp) -> Result<(), StoreError> {
         self.mark(events, MarkKind::Excluded, reason, now)
     }
 
-    /// Takes events in again that were excluded. All of them, or none if one cannot be.
+    /// Restores excluded events: all of them, or none if one cannot be restored.
     pub fn restore(&mut self, events: &[EventKey], reason: &str, now: Timestamp) -> Result<(), StoreError> {
         self.mark(events, MarkKind::Restored, reason, now)
     }
@@ -94,7 +94,7 @@ impl Store {
     }
 }
 
-/// Why an event cannot be marked so, if there is a reason.
+/// The reason why an event cannot have a mark; `None` if it can.
 fn objection(
     transaction: &Transaction<'_>,
     event: EventKey,

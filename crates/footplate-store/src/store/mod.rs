@@ -1,23 +1,23 @@
-//! One SQLite file that keeps every measurement for ever, and what people and models made of them.
+//! A store: one SQLite file that keeps every measurement for ever, with marks of people and models of trains.
 //!
-//! Raw events are appended and never changed: triggers in the file refuse it, whoever asks. What a person thinks of
-//! an event is a mark beside it, a calibration is a row beside them, both with their date; so the state of any
-//! date can be had again, and every change since be listed. Time is an argument: the program knows what time it is.
+//! Raw events are appended and never changed; triggers in the file enforce this. A mark of a person and a calibration are
+//! rows of their own, with dates. So the state at any date can be read again, and every change since can be listed. Time
+//! is an argument.
 //!
 //! ```text
-//! file          opening, creating, migrating; who may write
-//! recordings    importing a recording, appending the events of a live session
+//! file          opens, creates and migrates the file; write access
+//! recordings    imports recordings, appends the events of a live session
 //! journal       a live session from its beginning to its end
-//! decisions     what a machine was told and decided, so that it can be made to decide again
-//! history       reading back what was there at a date, and what changed between two
-//! marks         excluding events and restoring them
-//! calibrations  keeping them and finding the one in force
-//! profiles      speeds of other programs, with which a train begins
+//! decisions     inputs and decisions of a machine, for a replay
+//! history       the state at a date, and the changes between two dates
+//! marks         excludes and restores events
+//! calibrations  models of trains by date
+//! profiles      speeds from other programs, the prior of a train
 //! schedules     scripts that owners saved
-//! replays       how far a replay of all sessions came, so that the next one goes on from there
-//! checksum      of each row, so that a changed value is noticed
+//! replays       the state of a replay of all sessions, from which the next one continues
+//! checksum      checksums of rows, which detect changed values
 //! unfinished    the session that was running when the program died
-//! salvage       what can still be read of a damaged file, into a new one
+//! salvage       copies the readable rows of a damaged file into a new one
 //! ```
 
 mod calibrations;

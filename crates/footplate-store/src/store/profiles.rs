@@ -1,4 +1,4 @@
-//! Speed profiles that were imported for trains: the newest of each counts, and all of them stay.
+//! Imported speed profiles of trains: the newest one of a train is in force, and all of them stay.
 
 use footplate_core::{Timestamp, TrainId};
 use rusqlite::Row;
@@ -9,8 +9,8 @@ use super::file::Store;
 use crate::speed_profile::SpeedProfile;
 
 impl Store {
-    /// Keeps a profile as the one that counts for a train from now on. `None` withdraws those before it: the train begins
-    /// again with the prior of any train.
+    /// Stores a profile, which is in force for a train from now on. `None` withdraws earlier ones: the train begins with
+    /// the prior of an unknown train.
     pub fn keep_profile(
         &mut self,
         train: TrainId,
@@ -27,7 +27,7 @@ impl Store {
         Ok(())
     }
 
-    /// The profile that counted for a train at a date.
+    /// The profile in force for a train at a date.
     pub fn profile(&self, train: TrainId, at: Timestamp) -> Result<Option<SpeedProfile>, StoreError> {
         let sql =
             "SELECT body FROM profiles WHERE train = ?1 AND stored_at_ns <= ?2 ORDER BY id DESC LIMIT 1";

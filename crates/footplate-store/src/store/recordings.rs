@@ -1,4 +1,4 @@
-//! What comes into a store: recordings from files, once each, and the events of a live session as they happen.
+//! Writes a store: recordings from files, once each, and the events of a live session as they happen.
 
 use std::fmt;
 
@@ -11,7 +11,7 @@ use super::row;
 use crate::content_hash::ContentHash;
 use crate::recording::{Recording, Run, TrainAtStart};
 
-/// One newtype over the number that SQLite gives a row.
+/// A newtype over the number of a row.
 macro_rules! key {
     ($(#[$doc:meta])* $name:ident) => {
         $(#[$doc])*
@@ -31,38 +31,38 @@ key!(
     RecordingKey
 );
 key!(
-    /// A run by its number in the store, which no other recording shares.
+    /// A run by its number in the store, unique over all recordings.
     RunKey
 );
 key!(
-    /// An event by its number in the store. People use it to exclude the event.
+    /// An event by its number in the store, by which a person excludes it.
     EventKey
 );
 
-/// The form of a recording that no file was read for.
+/// The form of the recording of a live session.
 pub(super) const LIVE: &str = "live";
 
-/// What an import did.
+/// The result of an import.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Import {
-    /// The recording is in the store now.
+    /// The recording was added.
     New {
         /// Its number.
         recording: RecordingKey,
     },
-    /// A file with the same bytes is in the store already; nothing was added.
+    /// The store has a recording of the same bytes; nothing was added.
     AlreadyThere {
-        /// The number of the recording that was made of it then.
+        /// Its number.
         recording: RecordingKey,
-        /// When.
+        /// When it was imported.
         stored_at: Timestamp,
     },
 }
 
 impl Store {
-    /// Adds a recording that was read from a file with this content, whose sensors are those of `layout`.
+    /// Adds a recording from a file with this content, with the sensors of `layout`.
     ///
-    /// All of it or nothing; a content that is in the store already adds nothing.
+    /// Adds all of it or nothing. A content that the store has already adds nothing.
     pub fn import(
         &mut self,
         recording: &Recording,
@@ -91,7 +91,7 @@ impl Store {
         Ok(RecordingKey(self.connection.last_insert_rowid()))
     }
 
-    /// Begins a run of a live session: its clock, and what its trains are doing.
+    /// Begins a run of a live session, with its clock and the state of its trains.
     pub fn begin_run(
         &mut self,
         recording: RecordingKey,
@@ -111,9 +111,9 @@ impl Store {
         })
     }
 
-    /// Appends events to a run of a live session. When this returns, they are on the disk.
+    /// Appends events to a run of a live session. They are on disk when this returns.
     ///
-    /// Every call waits for the disk once: hand over together what came together.
+    /// Every call waits for the disk once: pass events together that arrived together.
     pub fn append(&mut self, run: RunKey, events: &[Event], now: Timestamp) -> Result<(), StoreError> {
         let path = self.path().to_owned();
         let transaction = self.write()?;
@@ -231,7 +231,7 @@ mod tests {
         let recording = store.begin_recording("live", "track-a", Timestamp::ZERO).unwrap();
         let run = store.begin_run(recording, RunId(1), None, &[]).unwrap();
         store.append(run, &[reverse(1)], Timestamp::ZERO).unwrap();
-        // SQLite answers as it does when the disk is full once the file may not grow.
+        // A file that may not grow gives the same error of SQLite as a full disk.
         let pages: i64 = store.connection.pragma_query_value(None, "page_count", |row| row.get(0)).unwrap();
         let limit: i64 = store
             .connection
@@ -247,7 +247,7 @@ mod tests {
         assert!(error.to_string().starts_with("no space is left for the store "), "{error}");
         assert_eq!((count(&store, "recordings"), count(&store, "runs"), count(&store, "events")), (1, 1, 1));
         store.check().unwrap();
-        // What fits is taken as before.
+        // Events that fit are still taken.
         store.append(run, &[reverse(2)], Timestamp::ZERO).unwrap();
         assert_eq!(count(&store, "events"), 2);
     }
@@ -306,7 +306,7 @@ mod tests {
         ];
         for table in tables {
             assert!(count(&store, table) > 0, "{table}");
-            // Each table has a column of its own that would be changed.
+            // Each table has another column to change.
             for sql in [
                 format!("UPDATE {table} SET id = id + 1"),
                 format!("DELETE FROM {table}"),
@@ -318,7 +318,7 @@ mod tests {
                 assert!(error.to_string().starts_with(&format!("{table} are kept ")), "{sql}: {error}");
             }
         }
-        // Nor by way of another column that may stand only once.
+        // Nor by replacing a row through another unique column.
         let same_content = "INSERT OR REPLACE INTO recordings (name, form, layout, content_sha256, stored_at_ns) \
                             SELECT 'forged', form, layout, content_sha256, 0 FROM recordings";
         let error = store.connection.execute(same_content, []).unwrap_err();

@@ -1,4 +1,4 @@
-//! How far replays of all sessions of a train came: kept beside the events that they follow from, and replaced by the next.
+//! States of replays of all sessions of a train, which follow from the events; the next replay replaces them.
 
 use footplate_core::TrainId;
 use rusqlite::Row;
@@ -7,17 +7,17 @@ use super::error::StoreError;
 use super::file::Store;
 use crate::content_hash::ContentHash;
 
-/// How far a replay came.
+/// The state of a replay.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct KeptReplay {
-    /// The fingerprint of all that it follows from, as text.
+    /// The fingerprint of its inputs, as text.
     pub(crate) of: String,
     /// Its state, as JSON.
     pub(crate) body: String,
 }
 
 impl Store {
-    /// How far the last replay of a train came; `None` where there is none, or its bytes are not those that were written.
+    /// The state of the last replay of a train; `None` without one, or if its bytes have changed.
     pub(crate) fn kept_replay(&self, train: TrainId, layout: &str) -> Result<Option<KeptReplay>, StoreError> {
         let sql = "SELECT of_sha256, body, body_sha256 FROM replays WHERE train = ?1 AND layout = ?2";
         let read = |row: &Row<'_>| {
@@ -28,7 +28,7 @@ impl Store {
         Ok(self.rows(sql, (train.0, layout), read)?.pop().flatten())
     }
 
-    /// Keeps how far a replay came, in the place of the one before it.
+    /// Stores the state of a replay, in place of the one before it.
     pub(crate) fn keep_replay(
         &mut self,
         train: TrainId,

@@ -1,4 +1,4 @@
-//! One event as the columns of its row, both ways.
+//! Events as rows: writes and reads the columns of an event.
 
 use footplate_core::{
     Event, EventKind, Length, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
@@ -10,16 +10,16 @@ use super::checksum;
 use super::recordings::RunKey;
 use crate::recording::RawEvent;
 
-/// The columns that [`read`] wants, in its order.
+/// The columns that [`read`] expects, in its order.
 pub(super) const COLUMNS: &str =
     "line, time_ns, kind, sensor, poll_interval_ns, train, step, turnout, curved, offset_m";
 
-/// Appends an event. The columns are in the order of the table, as its checksum needs them.
+/// Appends an event. The columns are in the order of the table, which the checksum needs.
 pub(super) const INSERT: &str = "INSERT INTO events (run, line, stored_at_ns, time_ns, kind, sensor, \
      poll_interval_ns, train, step, turnout, curved, offset_m, crc32) \
      VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13)";
 
-/// Executes [`INSERT`] for one event. `line` is that of its file, if it came from one.
+/// Executes [`INSERT`] for an event. `line` is its line in the imported file.
 pub(super) fn insert(
     statement: &mut Statement<'_>,
     run: RunKey,
@@ -72,7 +72,7 @@ pub(super) fn insert(
     checksum::insert(statement, "events", &values)
 }
 
-/// What only some kinds of event have.
+/// Columns that only some kinds of event have.
 #[derive(Default)]
 struct Columns {
     sensor: Option<u16>,
@@ -115,7 +115,7 @@ pub(super) fn read(row: &Row<'_>, first: usize) -> rusqlite::Result<RawEvent> {
     })
 }
 
-/// Reads a line, 0 where there was no file.
+/// Reads a line number; 0 without a file.
 pub(super) fn line(row: &Row<'_>, column: usize) -> rusqlite::Result<u64> {
     let line: Option<i64> = row.get(column)?;
     Ok(line.and_then(|line| u64::try_from(line).ok()).unwrap_or(0))

@@ -1,8 +1,8 @@
-//! What can still be read of a damaged store, copied into a new one.
+//! Copies the readable rows of a damaged store into a new one.
 //!
-//! The damaged file is not touched: a copy of it is read, row after row by number, passing over rows whose page does not
-//! make sense any more. Then every page is looked at by itself for rows that the trees do not lead to any more. Events whose run
-//! or recording is lost get a stand-in, so that nothing readable is dropped.
+//! The damaged file is not changed: a copy of it is read row by row, by number, without the rows of damaged pages. Then
+//! every page is searched by itself for rows that no tree reaches any more. Events whose run or recording is lost get a
+//! placeholder, so that no readable row is dropped.
 
 mod leaf_pages;
 mod strays;
@@ -19,21 +19,21 @@ use super::checksum;
 use super::error::StoreError;
 use super::file::Store;
 
-/// What came over into the new store.
+/// The rows that were copied and lost.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Salvaged {
-    /// Table by table, in the order in which they depend on each other.
+    /// The tables in the order of their dependences.
     pub tables: Vec<SalvagedTable>,
-    /// What is wrong with the damaged file; `None` if nothing is. Then more may be lost than the tables count: rows at the end
-    /// of a table leave no gap.
+    /// The damage of the file; `None` if it has none. With damage more rows may be lost than the tables count: rows at the
+    /// end of a table leave no gap.
     pub damage: Option<String>,
-    /// Rows that were found in pages by themselves and could belong to more than one table; they did not come over.
+    /// Rows found in pages by themselves that could belong to more than one table; they were not copied.
     pub ambiguous: u64,
 }
 
 impl Salvaged {
-    /// Whether all that the damaged store held came over. As far as pages and numbers tell: a value that was bent into another one
-    /// that is possible cannot be told from it.
+    /// Whether all rows were copied, as far as pages and numbers show: damage that turns a value into another possible one is
+    /// not visible there.
     #[must_use]
     pub fn is_all(&self) -> bool {
         let is_lost = |table: &SalvagedTable| table.lost + table.stand_ins > 0;
@@ -41,63 +41,62 @@ impl Salvaged {
     }
 }
 
-/// What came over of one table.
+/// The rows of one table.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SalvagedTable {
     /// The table.
     pub name: &'static str,
-    /// Rows that were read and make sense.
+    /// Rows that were read and are valid.
     pub rows: u64,
-    /// Rows that were there, by the gaps in their numbers, and cannot be read. Rows lost at the end leave no gap
-    /// and are not counted.
+    /// Unreadable rows, by the gaps in the numbers. Rows lost at the end leave no gap and are not counted.
     pub lost: u64,
-    /// Lost rows of other tables that got a stand-in, because rows of this one belong to them.
+    /// Lost rows of other tables that got a placeholder, because rows of this one refer to them.
     pub stand_ins: u64,
 }
 
-/// Tables with what they belong to, parents first. How far replays came is not among them: it follows from the rest.
+/// The tables with their parents, parents first. States of replays are not copied: they follow from the rest.
 const TABLES: [(&str, Option<Parent>); 12] = [
     ("recordings", None),
     ("runs", Some(Parent { column: "recording", table: "recordings", stand_in: STAND_IN_RECORDING })),
     ("starts", Some(Parent { column: "run", table: "runs", stand_in: STAND_IN_RUN })),
     ("events", Some(Parent { column: "run", table: "runs", stand_in: STAND_IN_RUN })),
     ("gate_passes", Some(Parent { column: "run", table: "runs", stand_in: STAND_IN_RUN })),
-    // A mark says nothing without its event.
+    // A mark is useless without its event.
     ("marks", None),
     ("calibrations", None),
     ("profiles", None),
     ("schedules", None),
     ("machines", Some(Parent { column: "recording", table: "recordings", stand_in: STAND_IN_RECORDING })),
-    // Without how it began nothing can be decided again.
+    // Without the initial state no decision can be replayed.
     ("inputs", None),
     ("decisions", None),
 ];
 
-/// Where a row belongs.
+/// The parent of a row.
 #[derive(Clone, Copy)]
 struct Parent {
     column: &'static str,
     table: &'static str,
-    /// Makes the row `?1` of the parent table.
+    /// Inserts the row `?1` of the parent table.
     stand_in: &'static str,
 }
 
 const STAND_IN_RECORDING: &str = "INSERT INTO recordings (id, name, form, layout, stored_at_ns) \
      VALUES (?1, 'lost recording', 'salvaged', 'unknown', 0)";
-/// Every lost run goes to one recording, under its number in the store.
+/// All lost runs get one recording, under their numbers in the store.
 const STAND_IN_RUN: &str = "INSERT INTO runs (id, recording, number) \
      SELECT ?1, id, ?1 FROM recordings WHERE form = 'salvaged runs'";
-/// The recording for them, behind all numbers that were read.
+/// The number of that recording, above all numbers that were read.
 const RECORDING_OF_LOST_RUNS: &str = "INSERT INTO recordings (name, form, layout, stored_at_ns) \
      SELECT 'lost runs', 'salvaged runs', 'unknown', 0 \
      WHERE NOT EXISTS (SELECT 1 FROM recordings WHERE form = 'salvaged runs')";
 
-/// No row takes less than this in the file: header and key of a cell (SQLite file format, section 1.6).
+/// The smallest size of a row in the file: header and key of a cell (SQLite file format, section 1.6).
 const LEAST_ROW_BYTES: u64 = 4;
-/// Where the header keeps the size of the file in pages; zero has it counted anew (SQLite file format, 1.3).
+/// The offset of the size of the file in pages in its header; with zero SQLite counts them (SQLite file format, 1.3).
 const SIZE_IN_HEADER: std::ops::Range<usize> = 28..32;
 
-/// Copies what can be read of the store at `damaged` into a new store at `into`, where no file may be.
+/// Copies the readable rows of the store at `damaged` into a new store at `into`, where no file may exist.
 pub fn salvage(damaged: &Path, into: &Path) -> Result<Salvaged, StoreError> {
     let exists = |path: &Path| path.try_exists().unwrap_or(true);
     if !exists(damaged) {
@@ -115,7 +114,7 @@ pub fn salvage(damaged: &Path, into: &Path) -> Result<Salvaged, StoreError> {
     let copy = copy_of(damaged, folder.path())?;
     let mut salvaged = match copy_rows(&copy, &fresh) {
         Ok(salvaged) if !salvaged.is_empty() => salvaged,
-        // Without its first pages a file has lost the list of its tables; a new one has the same list.
+        // A file without its first pages has lost the list of its tables; a new store has the same list.
         _ => {
             let copy = copy_of(damaged, folder.path())?;
             replace_list_of_tables(&copy, &fresh)?;
@@ -131,7 +130,7 @@ pub fn salvage(damaged: &Path, into: &Path) -> Result<Salvaged, StoreError> {
     Ok(salvaged)
 }
 
-/// What is wrong with a store, if anything is.
+/// The damage of a store; `None` if it is whole.
 fn damage_of(copy: &Path) -> Option<String> {
     let checked = Store::open(copy).and_then(|store| store.check());
     checked.err().map(|error| match error {
@@ -151,7 +150,7 @@ fn system(file: &Path, doing: &'static str) -> impl FnOnce(std::io::Error) -> St
     move |source| StoreError::System { file, doing, source }
 }
 
-/// A copy of a store with what its journal still holds.
+/// A copy of a store, with the readable part of its write-ahead log.
 fn copy_of(damaged: &Path, folder: &Path) -> Result<PathBuf, StoreError> {
     let with = |path: &Path, suffix: &str| {
         let mut name = path.as_os_str().to_owned();
@@ -168,7 +167,7 @@ fn copy_of(damaged: &Path, folder: &Path) -> Result<PathBuf, StoreError> {
     Ok(copy)
 }
 
-/// Replaces the pages that list the tables by those of a new store, which lists the same tables in the same places.
+/// Replaces the pages that list the tables with those of a new store, which has the same tables in the same places.
 fn replace_list_of_tables(copy: &Path, fresh: &Path) -> Result<(), StoreError> {
     let pages = || {
         let fresh = Connection::open(fresh)?;
@@ -182,7 +181,7 @@ fn replace_list_of_tables(copy: &Path, fresh: &Path) -> Result<(), StoreError> {
     let mut bytes = fs::read(copy).map_err(system(copy, "read"))?;
     for page in pages {
         let range = page * size..(page + 1) * size;
-        // The file may have been cut off before the end of the list.
+        // The file may end before the end of the list.
         bytes.resize(bytes.len().max(range.end), 0);
         if let (Some(bytes), Some(good)) = (bytes.get_mut(range.clone()), good.get(range)) {
             bytes.copy_from_slice(good);
@@ -195,12 +194,12 @@ fn replace_list_of_tables(copy: &Path, fresh: &Path) -> Result<(), StoreError> {
 }
 
 fn copy_rows(copy: &Path, fresh: &Path) -> Result<Salvaged, StoreError> {
-    // What the journal holds belongs into the file, as far as that still works.
+    // Moves the write-ahead log into the file, if that still works.
     drop(Connection::open(copy).and_then(|copy| copy.execute_batch("PRAGMA wal_checkpoint(TRUNCATE)")));
     let bytes = fs::read(copy).map_err(system(copy, "read"))?;
     let strays = Strays::new(Pages::of(&bytes)).map_err(|error| StoreError::of(fresh, error))?;
     let from = Connection::open(copy).map_err(|error| StoreError::of(copy, error))?;
-    // Lets SQLite read a file that is shorter than its header says.
+    // Lets SQLite read a file that is shorter than its header states.
     from.pragma_update(None, "writable_schema", true).map_err(|error| StoreError::of(copy, error))?;
     let mut store = Store::open(fresh)?;
     let path = store.path().to_owned();
@@ -221,8 +220,8 @@ fn copy_rows(copy: &Path, fresh: &Path) -> Result<Salvaged, StoreError> {
     copied.map_err(|error| StoreError::of(&path, error))
 }
 
-/// Copies the rows of a table by number, from the first to the last that can be found, or to number `most`.
-/// Fails only if the new store does.
+/// Copies the rows of a table by number, from the first to the last that is found, or to number `most`. Fails only if the
+/// new store does.
 fn copy_table(
     from: &Connection,
     into: &Transaction<'_>,
@@ -231,7 +230,7 @@ fn copy_table(
     most: u64,
 ) -> rusqlite::Result<SalvagedTable> {
     let empty = SalvagedTable { name, rows: 0, lost: 0, stand_ins: 0 };
-    // An older store has fewer columns, and the names in a damaged one may be anything.
+    // An older store has fewer columns, and names in a damaged one may be wrong.
     let known = columns_of(into, name);
     let columns: Vec<String> =
         columns_of(from, name).into_iter().filter(|column| known.contains(column)).collect();
@@ -263,14 +262,14 @@ fn copy_table(
         if stretch.ended {
             break;
         }
-        // The row behind cannot be read: go on with the next.
+        // The next row cannot be read: continue behind it.
         next = stretch.last_read.unwrap_or(next).saturating_add(1);
     }
     copy.table.lost = u64::try_from(last_known).unwrap_or(0).saturating_sub(copy.table.rows);
     Ok(copy.table)
 }
 
-/// The columns of a table as far as their names can be read.
+/// The columns of a table whose names can be read.
 fn columns_of(connection: &Connection, table: &str) -> Vec<String> {
     let names = |connection: &Connection| {
         connection
@@ -281,19 +280,19 @@ fn columns_of(connection: &Connection, table: &str) -> Vec<String> {
     names(connection).unwrap_or_default()
 }
 
-/// A table on its way into the new store.
+/// A table that is copied.
 struct TableCopy<'a> {
     /// Reads the rows from a number on, in order.
     select: Statement<'a>,
     columns: Vec<String>,
     insert: Statement<'a>,
     into: &'a Transaction<'a>,
-    /// Where the rows belong, and in which column they say so.
+    /// The parent of its rows, and the column that refers to it.
     parent: Option<(Parent, usize)>,
     table: SalvagedTable,
 }
 
-/// How far rows could be read.
+/// How far rows were read.
 struct Stretch {
     last_read: Option<i64>,
     /// Whether that was the last row of the table.
@@ -301,7 +300,7 @@ struct Stretch {
 }
 
 impl TableCopy<'_> {
-    /// Copies the rows from number `first` on as far as they can be read.
+    /// Copies rows from number `first` on, until one cannot be read.
     fn copy_from(&mut self, first: i64) -> rusqlite::Result<Stretch> {
         let mut stretch = Stretch { last_read: None, ended: false };
         let Ok(mut rows) = self.select.query([first]) else { return Ok(stretch) };
@@ -318,7 +317,7 @@ impl TableCopy<'_> {
                 (0..self.columns.len()).map(|column| row.get(column)).collect();
             let Ok(values) = values else { return Ok(stretch) };
             let Some(Value::Integer(id)) = values.first() else { return Ok(stretch) };
-            // Rows come in the order of their ids; in damaged pages they may come round again, for ever.
+            // Rows are in the order of their ids; damaged pages may lead round in a circle for ever.
             if stretch.last_read.is_some_and(|last| *id <= last) {
                 return Ok(stretch);
             }
@@ -334,7 +333,7 @@ impl TableCopy<'_> {
     }
 }
 
-/// Inserts a row if it makes sense.
+/// Inserts a row if it is valid.
 fn accepted(insert: &mut Statement<'_>, values: &[Value]) -> rusqlite::Result<bool> {
     match insert.execute(params_from_iter(values)) {
         Ok(_) => Ok(true),
@@ -345,7 +344,7 @@ fn accepted(insert: &mut Statement<'_>, values: &[Value]) -> rusqlite::Result<bo
     }
 }
 
-/// Makes the row `key` of the parent table if it is lost, and says whether it did.
+/// Inserts the row `key` of the parent table if it is lost. Returns whether it did.
 fn stand_in(into: &Transaction<'_>, parent: Parent, key: i64) -> rusqlite::Result<bool> {
     let there = format!("SELECT 1 FROM {} WHERE id = ?1", parent.table);
     if into.prepare_cached(&there)?.exists([key])? {
@@ -354,6 +353,6 @@ fn stand_in(into: &Transaction<'_>, parent: Parent, key: i64) -> rusqlite::Resul
     if parent.table == "runs" {
         into.execute(RECORDING_OF_LOST_RUNS, [])?;
     }
-    // A number that cannot be is a bent row, which its own insertion refuses.
+    // An impossible number is a damaged row, which its own insertion refuses.
     Ok(into.execute(parent.stand_in, [key]).is_ok())
 }

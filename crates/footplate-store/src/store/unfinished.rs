@@ -6,18 +6,18 @@ use rusqlite::OptionalExtension;
 use super::error::StoreError;
 use super::file::Store;
 
-/// A session whose last machine was never told the end: its trains may still be running.
+/// A session whose last machine has no end: its trains may still be running.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnfinishedSession {
-    /// What the session is called.
+    /// The name of the session.
     pub name: String,
-    /// Every train that may be running, by number: those that its machine began with, and all that this store has ever known. A
-    /// command may have left before it was written down, so that what the session commanded is not enough.
+    /// Every train that may be running, by number: those of its machine's initial state, and all others in this store. A
+    /// command may have been sent before it was recorded, so recorded commands are not enough.
     pub trains: Vec<TrainId>,
 }
 
 impl Store {
-    /// The newest session with a machine, if that has no end.
+    /// The newest session with a machine, if it has no end.
     ///
     /// # Errors
     /// The store cannot be read.

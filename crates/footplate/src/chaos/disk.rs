@@ -1,8 +1,8 @@
-//! A journal on a disk that is slow, full or fails, and what a power cut leaves of it.
+//! The journal on a slow, full or failing disk, and what a power cut leaves of it.
 //!
-//! The store is a real one. The disk is simulated between commits: when a commit ends, whether it can be made, and which of
-//! the sectors that the last commit wrote are there after a power cut. SQLite waits for the disk once in a commit
-//! (`synchronous = FULL`), and what it wrote before that wait may arrive in any order, or not at all.
+//! The store is real. The disk is simulated between commits: when a commit ends, whether it fails, and which sectors of the
+//! last commit survive a power cut. SQLite waits for the disk once in a commit (`synchronous = FULL`); sectors written
+//! before that wait may reach the disk in any order, or not at all.
 
 use std::collections::VecDeque;
 use std::fs;
@@ -19,14 +19,14 @@ use super::plan::{Planned, Trouble};
 use crate::runtime::Recorder;
 use crate::session_journal::IfUnkept;
 
-/// What a commit takes on a disk that is in order (measured: 2 to 8 ms).
+/// The duration of a commit on a sound disk (measured: 2 to 8 ms).
 const COMMIT: TimeSpan = TimeSpan::from_ms(5);
-/// How long after a failure the disk is tried again, as the writing thread of a session does.
+/// The pause after a failure, as in the writing thread of a session.
 const RETRY: TimeSpan = TimeSpan::from_ms(500);
-/// The least that a disk writes as a whole.
+/// The unit that a disk writes as a whole.
 const SECTOR: usize = 512;
 
-/// Entries that are on their way to the disk.
+/// Entries of a commit that has not ended.
 #[derive(Debug)]
 struct Commit {
     entries: usize,
@@ -34,7 +34,7 @@ struct Commit {
     fails: bool,
 }
 
-/// What writes one life of the program down.
+/// The recorder of one life of the program.
 pub(super) struct FaultyDisk {
     journal: Journal,
     path: PathBuf,
@@ -48,7 +48,7 @@ pub(super) struct FaultyDisk {
     retry_at: Timestamp,
     is_in_trouble: bool,
     if_unkept: IfUnkept,
-    /// All that was handed over, in order.
+    /// All entries passed on, in order.
     recorded: Vec<Event>,
     acknowledged: usize,
     now: Timestamp,
@@ -100,7 +100,7 @@ impl FaultyDisk {
             .find_map(|planned| pick(planned.trouble))
     }
 
-    /// What the computer's calendar shows.
+    /// The time of the computer's calendar.
     fn calendar(&self, now: Timestamp) -> Timestamp {
         let jump = self.trouble(now, |trouble| match trouble {
             Trouble::Calendar(jump) => Some(jump),
@@ -109,7 +109,7 @@ impl FaultyDisk {
         self.calendar + (now - self.began) + jump.unwrap_or(TimeSpan::ZERO)
     }
 
-    /// The disk goes on until a time.
+    /// Advances the disk to a time.
     pub(super) fn advance(&mut self, now: Timestamp) -> anyhow::Result<()> {
         self.now = now;
         if let Some(commit) = self.commit.take_if(|commit| commit.ends <= now) {
@@ -139,7 +139,7 @@ impl FaultyDisk {
         Ok(())
     }
 
-    /// The session ends in order: all that waits is written down, and that it has ended.
+    /// Ends the session in order: writes all waiting entries, and its end.
     pub(super) fn finish(mut self) -> anyhow::Result<()> {
         self.append(self.pending.len())?;
         let end =
@@ -150,7 +150,7 @@ impl FaultyDisk {
         kept(&path, &recorded, acknowledged, acknowledged)
     }
 
-    /// The program dies. What was acknowledged has to be in the store, and nothing that was never recorded.
+    /// The program dies. The store must hold all acknowledged entries, and no others than recorded ones.
     pub(super) fn die(self) -> anyhow::Result<()> {
         let (path, recorded, acknowledged) = (self.path.clone(), self.recorded.clone(), self.acknowledged);
         drop(self);
@@ -217,7 +217,7 @@ impl Image {
     fn write(&self, path: &Path) -> anyhow::Result<()> {
         fs::write(path, &self.file)?;
         fs::write(beside(path, "-wal"), &self.log)?;
-        // It is made anew from the log.
+        // SQLite makes it again from the log.
         let _ = fs::remove_file(beside(path, "-shm"));
         Ok(())
     }
@@ -229,12 +229,12 @@ fn beside(path: &Path, ending: &str) -> PathBuf {
     name.into()
 }
 
-/// Checks that the last session of a store holds what was recorded, in order: at least what was acknowledged, and nothing
-/// beyond what was under way.
+/// Checks that the last session of a store holds the recorded entries in order: at least the acknowledged ones, and none
+/// beyond those of the commit under way.
 fn kept(path: &Path, recorded: &[Event], least: usize, most: usize) -> anyhow::Result<()> {
     let store = Store::open(path).context("the store cannot be opened after its program died")?;
     store.check()?;
-    // Whatever the calendar showed when they were stored.
+    // Whatever the calendar showed at that time.
     let ever = Timestamp::from_ns(i64::MAX);
     let recordings = store.recordings(ever)?;
     let session = recordings.last().context("the session is not in the store")?;

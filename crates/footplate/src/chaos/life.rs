@@ -17,23 +17,23 @@ pub(super) enum Death {
     PowerCut(TimeSpan),
 }
 
-/// What the parts of a life share. A step is whatever the world outside can see: bytes written, a wait, an entry recorded.
+/// State that the parts of a life share. A step is an action that is visible outside: a write, a wait, a recorded entry.
 #[derive(Debug)]
 pub(super) struct Life {
     steps: Cell<u64>,
     ends: Option<(u64, Death)>,
     died: Cell<Option<Death>>,
-    /// Whether the program has found that its guardian is dead, and wants to end.
+    /// Whether the program has noticed the death of its guardian, and ends.
     is_orphan: Cell<bool>,
 }
 
 impl Life {
-    /// A life that ends at a step, if it comes so far.
+    /// A life that ends at a step, if it reaches it.
     pub(super) const fn new(ends: Option<(u64, Death)>) -> Self {
         Self { steps: Cell::new(0), ends, died: Cell::new(None), is_orphan: Cell::new(false) }
     }
 
-    /// The program is about to do something that can be seen outside. Returns whether it still does.
+    /// Counts a step before it is taken. Returns whether the program is still alive to take it.
     pub(super) fn step(&self) -> bool {
         let step = self.steps.get() + 1;
         self.steps.set(step);
@@ -43,12 +43,12 @@ impl Life {
         !self.is_over()
     }
 
-    /// Whether the program does nothing any more. One whose guardian was killed still stops its trains.
+    /// Whether the program is dead. One whose guardian was killed still stops its trains.
     pub(super) fn is_over(&self) -> bool {
         !matches!(self.died.get(), None | Some(Death::GuardianKilled))
     }
 
-    /// Ends it from outside: its guardian found that it hangs.
+    /// Ends it from outside: the guardian kills a program that hangs.
     pub(super) fn end(&self, death: Death) {
         self.died.set(Some(death));
     }

@@ -1,4 +1,4 @@
-//! The line to the station, which loses, delays, garbles and breaks; and what a guardian sees of the program behind it.
+//! The line to the station, which loses, delays and garbles bytes and breaks; and the guardian's view of the program.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -13,14 +13,14 @@ use super::plan::{Planned, Trouble};
 use crate::link::{Bequest, FromSimulated, Guardian, Heard, Link, Lost, SimulatedStation};
 use crate::runtime::{WillLine, written};
 
-/// A guardian takes a program for dead that drives trains and says nothing for so long.
+/// The guardian takes a program that drives trains for dead after this silence.
 pub(super) const LATE: TimeSpan = TimeSpan::from_ms(500);
-/// How often people are asked: seldom enough that a story of minutes takes a second.
+/// How often the operator acts: seldom enough that a story of minutes takes a second.
 const PATIENCE: TimeSpan = TimeSpan::from_ms(25);
-/// How often the truth is looked at while trains are being stopped.
+/// How often the true motion is checked while trains are stopped.
 const LOOK: TimeSpan = TimeSpan::from_ms(5);
 
-/// The station of a story, which all its lives speak to.
+/// The station of a story, shared by all its lives.
 pub(super) type SharedStation<'l> = Rc<RefCell<SimulatedStation<'l>>>;
 
 /// Who of those that look at the line is still there.
@@ -41,7 +41,7 @@ pub(super) struct FaultyLine<'l> {
     choice: Choice,
     began: Timestamp,
     troubles: Vec<Planned>,
-    /// Troubles that begin at one moment, and have.
+    /// Failures of one moment that have happened.
     begun: Vec<bool>,
     arrivals: VecDeque<(Timestamp, Heard)>,
     holder: Holder,
@@ -52,7 +52,7 @@ pub(super) struct FaultyLine<'l> {
     /// What the guardian knows.
     pub(super) will: Option<Vec<u8>>,
     runs: bool,
-    /// When all trains had been commanded to stop, or had no power, while somebody was stopping them.
+    /// When all trains had received their stop, or had no power.
     pub(super) stopped_at: Option<Timestamp>,
     /// What happened, for people.
     pub(super) told: Vec<(Timestamp, String)>,
@@ -98,7 +98,7 @@ impl<'l> FaultyLine<'l> {
         self.station.borrow().now()
     }
 
-    /// The time since this life began, as troubles count it.
+    /// The time since the beginning of this life.
     pub(super) fn age(&self) -> Timestamp {
         Timestamp::ZERO + (self.time() - self.began)
     }
@@ -115,14 +115,14 @@ impl<'l> FaultyLine<'l> {
         self.now_in(|trouble| (trouble == Trouble::Cut).then_some(())).is_some()
     }
 
-    /// The spells, in the world's time, in which no command reaches the station.
+    /// The spans of world time in which no command reaches the station.
     pub(super) fn unreachable(&self) -> Vec<Spell> {
         let cuts = self.troubles.iter().filter(|planned| planned.trouble == Trouble::Cut);
         let at = |time: Timestamp| self.began + (time - Timestamp::ZERO);
         cuts.map(|cut| Spell { from: at(cut.spell.from), until: at(cut.spell.until) }).collect()
     }
 
-    /// Lets things begin that happen at one moment.
+    /// Begins failures of one moment that are due.
     fn happen(&mut self) {
         for at in 0..self.troubles.len() {
             let Planned { trouble, spell } = self.troubles[at];
@@ -161,7 +161,7 @@ impl<'l> FaultyLine<'l> {
         }
     }
 
-    /// The program stands still. Its guardian ends it if that is too long while trains run.
+    /// The program hangs. Its guardian ends it if that lasts too long while trains run.
     fn hang(&mut self, span: TimeSpan) {
         let until = self.time() + span;
         let is_watched = self.holder == Holder::Guardian && self.runs;
@@ -173,7 +173,7 @@ impl<'l> FaultyLine<'l> {
         }
     }
 
-    /// Lets the world go on; what the station says waits for the program.
+    /// Advances the world; bytes of the station wait for the program.
     fn advance(&mut self, until: Timestamp) {
         while self.time() < until {
             let heard = self.station.borrow_mut().advance(until);
@@ -183,7 +183,7 @@ impl<'l> FaultyLine<'l> {
         }
     }
 
-    /// What the station says arrives, sooner or later, if it does.
+    /// Schedules the arrival of bytes from the station, unless they are lost.
     fn hear(&mut self, heard: FromSimulated) {
         if self.is_cut() || !self.is_open {
             return;
@@ -193,7 +193,7 @@ impl<'l> FaultyLine<'l> {
             _ => None,
         });
         let at = self.time() + delay.unwrap_or(TimeSpan::ZERO);
-        // Nothing overtakes.
+        // Bytes keep their order.
         let at = self.arrivals.back().map_or(at, |(last, _)| at.max(*last));
         match heard {
             FromSimulated::Cts(up) => self.arrivals.push_back((at, Heard::Cts(up))),
@@ -229,7 +229,7 @@ impl<'l> FaultyLine<'l> {
         (noise, loss)
     }
 
-    /// A byte after its way over the line.
+    /// A byte as it arrives; `None` if it is lost.
     fn passed(&mut self, byte: u8) -> Option<u8> {
         let (noise, loss) = self.rates();
         if self.happens(loss) {
@@ -242,7 +242,7 @@ impl<'l> FaultyLine<'l> {
         })
     }
 
-    /// A datagram comes whole or not at all: the network checks it.
+    /// A datagram arrives whole or not at all: the network has checksums.
     fn passed_datagram(&mut self, datagram: Vec<u8>) -> Option<Vec<u8>> {
         let (noise, loss) = self.rates();
         (!self.happens(loss) && !self.happens(noise)).then_some(datagram)

@@ -1,4 +1,4 @@
-//! Who sends trains to places, helps them, and sees whether anything is as it must not be.
+//! The operator, who sends trains to places and helps them, and the checks of every step.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -16,29 +16,29 @@ use super::life::Life;
 use super::line::SharedStation;
 use crate::runtime::{Attendant, Recorder, Wish};
 
-/// How often the truth is compared with what trains hold.
+/// How often true positions are compared with reservations.
 const LOOK: TimeSpan = TimeSpan::from_ms(50);
-/// A person comes to the help of a train after this long, and switches the power on again.
+/// The operator helps a train, or switches the power on, this long after the alarm.
 const HELP_AFTER: TimeSpan = TimeSpan::from_ms(15_000);
-/// All trains at rest for so long although one wants to be somewhere, and nothing that a person was told: stuck. Twice the
-/// time that the dispatcher takes to resolve a deadlock.
+/// The program is stuck if all trains are at rest for this long, one has a journey, and no alarm is active. Twice the time
+/// that the dispatcher takes to resolve a deadlock.
 const STUCK_AFTER: TimeSpan = TimeSpan::from_ms(120_000);
 const TRIES: usize = 100;
 
-/// What must not be, and what is counted.
+/// Violations and counts.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Seen {
     pub(super) arrivals: u32,
     pub(super) alarms: u32,
-    /// Track that trains entered without a reservation, of so many grants.
+    /// Entries of trains into track that was not reserved for them.
     pub(super) intrusions: Vec<(Timestamp, TrainId)>,
     pub(super) grants: u32,
-    /// Nothing moved although it should have, and nobody was told.
+    /// When the program was stuck without an alarm.
     pub(super) stuck: Option<Timestamp>,
     pub(super) told: Vec<(Timestamp, String)>,
 }
 
-/// People at the railway, in one life of the program.
+/// The operator of the railway in one life of the program.
 pub(super) struct People<'p, 'l> {
     pub(super) layout: &'l Layout,
     pub(super) station: SharedStation<'l>,
@@ -50,7 +50,7 @@ pub(super) struct People<'p, 'l> {
     pub(super) seen: Seen,
     is_inside: BTreeMap<TrainId, bool>,
     moves: BTreeMap<TrainId, bool>,
-    /// Trains that a person was told to look after, and since when.
+    /// Trains with an active alarm, and since when.
     troubled: BTreeMap<TrainId, Timestamp>,
     without_power: Option<Timestamp>,
     is_silent: bool,
@@ -140,7 +140,7 @@ impl<'p, 'l> People<'p, 'l> {
                     format!("really: train {train} {}", if moves { "moves" } else { "is at rest" }),
                 );
             }
-            // A person looks where it stands, and says so.
+            // The operator enters the true position.
             if self.troubled.get(train).is_some_and(|since| now - *since >= HELP_AFTER) {
                 let stands = world.truth().train(*train).is_some_and(|truth| truth.at_rest_since.is_some());
                 if stands && let Some(at) = place_by_hand(self.layout, world, *train) {
@@ -180,8 +180,9 @@ impl Attendant<Dispatcher> for People<'_, '_> {
             Notice::ReservedAsUnknown { train }
             | Notice::NeedsOperator { train, .. }
             | Notice::AsksToCreep { train }
+            | Notice::Deadlocked { train }
             | Notice::Lost { train } => self.alarm(now, train),
-            Notice::PowerOff { .. } => {
+            Notice::PowerOff { .. } | Notice::UnauthorisedMovement { .. } => {
                 self.seen.alarms += 1;
                 self.without_power.get_or_insert(now);
             }
@@ -242,7 +243,7 @@ impl Attendant<Dispatcher> for People<'_, '_> {
     }
 }
 
-/// The same disk for the loop that records and the people who look at it.
+/// The disk, shared by the recording loop and the operator.
 pub(super) struct SharedDisk(pub(super) Rc<RefCell<FaultyDisk>>);
 
 impl Recorder for SharedDisk {

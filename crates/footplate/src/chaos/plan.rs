@@ -1,4 +1,4 @@
-//! What a seed draws: a station, trains, what fails when, and how each life of the program ends.
+//! What a seed draws: a station, failures with their times, and how each life of the program ends.
 
 use footplate_core::{TimeSpan, Timestamp};
 use footplate_eval::seeds::Choice;
@@ -9,8 +9,8 @@ use crate::session_journal::IfUnkept;
 
 /// Lives of the program in one story, at most.
 const MOST_LIVES: usize = 3;
-/// A life that is not cut short lasts so long (s of track time). The last one begins when all that fails has failed, and shows
-/// whether trains get going again.
+/// The length of a life that nothing ends (s of track time). The last one continues after all failures, and shows whether
+/// trains run again.
 const LASTS_S: [f64; 2] = [15.0, 60.0];
 const LAST_LIFE_S: f64 = 240.0;
 /// Failures begin within this part of a life.
@@ -19,34 +19,34 @@ const TROUBLES_WITHIN: f64 = 0.8;
 const STEPS_PER_S: f64 = 100.0;
 const MOST_TROUBLES: usize = 5;
 
-/// What goes wrong on the line, the disk or a clock.
+/// A failure of the line, the disk or a clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Trouble {
-    /// Nothing passes; a line of bytes notices.
+    /// No byte passes. A serial line notices.
     Cut,
-    /// Of 100 bytes or datagrams so many are garbled.
+    /// The percentage of bytes or datagrams that are garbled.
     Noise(f64),
-    /// Of 100 bytes or datagrams so many vanish.
+    /// The percentage of bytes or datagrams that are lost.
     Loss(f64),
-    /// What the station says arrives this much later.
+    /// The delay of everything that the station sends.
     Delay(TimeSpan),
-    /// The station is off, forgets everything, and starts again.
+    /// The station is off, loses its state, and restarts.
     StationOff,
-    /// The program stands still, as a computer does that is asleep or swaps.
+    /// The program hangs, as on a computer that sleeps or swaps.
     Hang,
     /// No byte can be written.
     DiskFull,
-    /// Each commit takes so long.
+    /// The time that each commit takes.
     DiskSlow(TimeSpan),
     /// The computer's calendar jumps.
     Calendar(TimeSpan),
 }
 
-/// One trouble, and when.
+/// A failure and its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Planned {
     pub(super) trouble: Trouble,
-    /// From the beginning of the life, as times of a clock that stands at zero there.
+    /// Counted from the beginning of the life.
     pub(super) spell: Spell,
 }
 
@@ -59,7 +59,7 @@ pub(super) struct PlannedLife {
     pub(super) if_unkept: IfUnkept,
 }
 
-/// All that a seed draws before the world begins.
+/// Everything that a seed draws before the world begins.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Plan {
     pub(super) station: StationKind,

@@ -1,4 +1,4 @@
-//! All lives of one seed, and what came of them.
+//! All lives of one seed, and their result.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -32,21 +32,21 @@ use crate::runtime::{Ended, Runtime, carry_out};
 const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(1)];
 /// Track time in which each was calibrated.
 const BUDGET: TimeSpan = TimeSpan::from_ms(120_000);
-/// So many stories are told of the same trains and rails.
+/// The number of stories with the same trains and rails.
 const STORIES_A_STAGE: u64 = 32;
-/// Where trains stand past a contact in the beginning.
+/// The distance of a train beyond a sensor at the beginning.
 const PAST: Length = Length::from_mm(150.0);
 const TRIES: usize = 1_000;
-/// Stops are on the line and heard within this after a death, as long as the line is there (issue of trust).
+/// Stops are on the line within this time after a death, unless the line is cut (a requirement).
 const STOPPED_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
-/// From a byte on the line until a decoder has heard it: the refresh of the slowest station, with a margin.
+/// From a byte on the line to its effect on a decoder: the refresh of the slowest station, with a margin.
 const HEARD_WITHIN: TimeSpan = TimeSpan::from_ms(500);
-/// Until trains that are commanded to stop have stopped.
+/// The longest time from a stop command to standstill.
 const BRAKES_WITHIN: TimeSpan = TimeSpan::from_ms(4_000);
 /// The calendar of the computer when a story begins; any other would do.
 const CALENDAR: Timestamp = Timestamp::from_s(1.7e9);
 
-/// Trains and rails that were drawn and calibrated once, for stories to begin with.
+/// Trains and rails, drawn and calibrated once for several stories.
 pub(crate) struct Stage<'l> {
     number: u64,
     layout: &'l Layout,
@@ -72,7 +72,7 @@ impl<'l> Stage<'l> {
     }
 }
 
-/// What came of a seed.
+/// The result of a seed.
 #[derive(Debug, Default)]
 pub(crate) struct Fate {
     pub(crate) seed: u64,
@@ -88,13 +88,13 @@ pub(crate) struct Fate {
     pub(crate) out_of_reach: u32,
     /// From each death until all trains were stopped, in ms.
     pub(crate) stopped_ms: Vec<f64>,
-    /// What must not be.
+    /// Violated invariants.
     pub(crate) failures: Vec<String>,
-    /// What happened, when.
+    /// The events of the story.
     pub(crate) told: Vec<(Timestamp, String)>,
 }
 
-/// Tells the story of a seed. `store` is where its store will be; nothing is there.
+/// Runs the story of a seed. `store` is the path of its store, which does not exist yet.
 ///
 /// # Errors
 /// When the store of a new session cannot be made, or there is no room for the trains.
@@ -146,7 +146,7 @@ fn station_of(kind: StationKind, world: LivingLayout<'_>, seed: u64) -> Simulate
     }
 }
 
-/// Puts trains where none is in another's way, off the turnouts.
+/// Places trains on reservations that do not overlap, clear of turnouts.
 fn put_trains(stage: &Stage<'_>, world: &mut LivingLayout<'_>, choice: &mut Choice) -> anyhow::Result<()> {
     let layout = stage.layout;
     let sensors: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
@@ -176,7 +176,7 @@ fn put_trains(stage: &Stage<'_>, world: &mut LivingLayout<'_>, choice: &mut Choi
     Ok(())
 }
 
-/// What a program is told by people when it begins: where trains are, and how turnouts lie.
+/// The dispatcher at the start of a life: an operator enters the positions of trains and turnouts.
 fn dispatcher_of(stage: &Stage<'_>, world: &LivingLayout<'_>, trains: &[TrainId]) -> Dispatcher {
     let layout = stage.layout;
     let turnouts: TurnoutStates =
@@ -197,7 +197,7 @@ fn dispatcher_of(stage: &Stage<'_>, world: &LivingLayout<'_>, trains: &[TrainId]
     dispatcher
 }
 
-/// What is the same in all lives of a story.
+/// State that all lives of a story share.
 struct Teller<'s, 'l> {
     stage: &'s Stage<'l>,
     address: Address,
@@ -217,7 +217,7 @@ impl<'l> Teller<'_, 'l> {
         self.fate.told.push((now, words));
     }
 
-    /// What the decoders heard last, and which ends lead.
+    /// Notes the steps that decoders received last, and the leading ends of trains.
     fn tell_truth(&mut self) {
         let truth = |train: &TrainId| {
             let station = self.station.borrow();
@@ -247,7 +247,7 @@ impl<'l> Teller<'_, 'l> {
         open_session(&self.address, line, self.stage.layout)
     }
 
-    /// Commands all trains to stop that the last life left running, as the program does before anything else.
+    /// Stops all trains that the previous life may have left running, as the program does first.
     fn stop_left_running(&mut self) -> anyhow::Result<()> {
         if !self.store.exists() {
             return Ok(());
@@ -267,7 +267,7 @@ impl<'l> Teller<'_, 'l> {
         Ok(())
     }
 
-    /// One life, and what its guardian does after it.
+    /// Runs one life, and its guardian's actions afterwards.
     fn live(&mut self, planned: &PlannedLife) -> anyhow::Result<()> {
         self.stop_left_running()?;
         self.await_rest();
@@ -308,7 +308,7 @@ impl<'l> Teller<'_, 'l> {
         let mut runtime = Runtime::new(&mut line, session, Some(&mut recorder), None);
         let ended = runtime.run(&mut dispatcher, &mut people);
         let began = self.station.borrow().now();
-        // A program that is alive stops its trains, whatever ended its loop.
+        // A living program stops its trains, whatever ended its loop.
         let closing = runtime.close();
         drop(runtime);
         let (seen, trouble) = (std::mem::take(&mut people.seen), people.trouble.take());
@@ -343,8 +343,8 @@ impl<'l> Teller<'_, 'l> {
         }
     }
 
-    /// What trains have come to. While no command reaches the station, and until trains have stopped after that, nobody could
-    /// have done anything about it.
+    /// Checks the mishaps of a life. Those while no command reaches the station, and until trains have stopped after that, are
+    /// counted apart: no program could have prevented them.
     fn check_mishaps(&mut self, before: usize, unreachable: &[Spell]) {
         let mishaps: Vec<_> = self.station.borrow().world().mishaps().iter().skip(before).copied().collect();
         for mishap in mishaps {
@@ -359,7 +359,7 @@ impl<'l> Teller<'_, 'l> {
         }
     }
 
-    /// What happens after a program has ended, in order or not.
+    /// The end of a life, in order or not.
     fn bury(
         &mut self,
         death: Option<Death>,
@@ -381,7 +381,7 @@ impl<'l> Teller<'_, 'l> {
         let allowed = STOPPED_WITHIN + HEARD_WITHIN;
         match death {
             Some(Death::PowerCut(dark)) => {
-                // The line is without anybody; trains run on.
+                // No process is left; trains run on.
                 let until = self.now() + dark;
                 while self.now() < until {
                     let _ = self.station.borrow_mut().advance(until);
@@ -401,7 +401,7 @@ impl<'l> Teller<'_, 'l> {
         let Some(will) = line.will.take() else { return Ok(()) };
         self.note(format!("the guardian begins with a last will of {} bytes", will.len()));
         self.tell_truth();
-        // While the line is cut nobody can be stopped.
+        // While the line is cut no train can be stopped.
         let mut since = began;
         if line.all_stopped() {
             line.stopped_at = Some(since);
@@ -426,7 +426,7 @@ impl<'l> Teller<'_, 'l> {
         Ok(())
     }
 
-    /// A person waits until nothing moves before the next life begins.
+    /// The operator waits for standstill before the next life begins.
     fn await_rest(&mut self) {
         let mut station = self.station.borrow_mut();
         let until = station.now() + TimeSpan::from_s(20.0);

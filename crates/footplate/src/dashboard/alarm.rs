@@ -115,6 +115,7 @@ impl Alarm {
             | "track-ends"
             | "held-back"
             | "deadlock"
+            | "deadlocked"
             | "dropped"
             | "track-reserved"
             | "overshoots" => of_train("route"),
@@ -152,6 +153,7 @@ impl Alarm {
             | "track-reserved"
             | "held-back"
             | "deadlock"
+            | "deadlocked"
             | "dropped" => Resolution::Runs,
             "unexplained"
             | "line-reply-lost"
@@ -297,6 +299,10 @@ impl Alarm {
             }
             Notice::SensorStuck { sensor } => (Grade::Warning, STUCK_SENSOR, None, vec![name(sensor)]),
             Notice::Unexplained { sensor, .. } => (Grade::Warning, "unexplained", None, vec![name(sensor)]),
+            Notice::UnauthorisedMovement { from, to, .. } => {
+                (Grade::Danger, "unauthorised", None, vec![name(from), name(to)])
+            }
+            Notice::TrackClear => (Grade::Over, "track-clear", None, none),
             Notice::Unconfirmed { command } => {
                 (Grade::Danger, "unconfirmed", None, vec![command.to_string()])
             }
@@ -307,6 +313,7 @@ impl Alarm {
             Notice::Recovered { train, .. } => (Grade::Over, "recovered", Some(*train), none),
             Notice::SensorRestored { sensor } => (Grade::Over, "sensor-restored", None, vec![name(sensor)]),
             Notice::PowerOn => (Grade::Over, "power-on", None, none),
+            Notice::Deadlocked { train } => (Grade::Danger, "deadlocked", Some(*train), none),
             Notice::Deadlock { train, moves } => {
                 (Grade::Warning, "deadlock", Some(*train), vec![listed(moves)])
             }

@@ -161,6 +161,9 @@ impl Dispatcher {
                 return;
             }
         }
+        if is_due {
+            self.notify(Notice::Deadlocked { train: id });
+        }
     }
 
     /// After a failed search the estimated position of a train may be wrong. A train that a sensor did not report, or

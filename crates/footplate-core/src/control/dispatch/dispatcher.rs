@@ -183,6 +183,7 @@ impl Dispatcher {
             known.detected_since_start = true;
             known.authorities.clear();
             known.unobstructed_s = None;
+            known.waiting_reported = false;
             known.reservation = Reservation::empty();
         }
         self.reserve_standstill(now, train);
@@ -231,8 +232,11 @@ impl Dispatcher {
         self.act(now);
     }
 
-    /// Takes news of the link; see [`Watchdog::handle_link`].
+    /// Takes news of the link; see [`Watchdog::handle_link`]. A silent station may not have set a turnout.
     pub fn handle_link(&mut self, now: Timestamp, news: LinkNews) {
+        if matches!(news, LinkNews::Silent | LinkNews::Answers) {
+            self.distrust_turnouts();
+        }
         self.watchdog.handle_link(now, news);
         self.act(now);
     }

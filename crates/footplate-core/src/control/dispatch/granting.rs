@@ -142,8 +142,13 @@ impl Dispatcher {
         let unplaced: Vec<TrainId> =
             self.trains.values().filter(has_no_reservation).map(|train| train.id).collect();
         unplaced.iter().for_each(|id| self.reserve_standstill(now, *id));
-        // Commands lost on the line are repeated; a train that may be on such a turnout was rejected before.
-        let _ = self.set_unknown_turnouts(now);
+        // Commands lost on the line are repeated. A train that may be on such a turnout needs an operator.
+        if let Err(Refusal::TurnoutUnknown { train, .. }) = self.set_unknown_turnouts(now)
+            && let Some(known) = self.trains.get_mut(&train)
+            && !core::mem::replace(&mut known.waiting_reported, true)
+        {
+            self.notify(Notice::ReservedAsUnknown { train });
+        }
         self.trains.values().any(|train| train.rests() && self.unknown_turnout_ahead(now, train.id).is_some())
     }
 

@@ -174,6 +174,9 @@ impl Dispatcher {
                 self.set_halting(*train);
                 self.set_state(*train, State::InDanger);
             }
+            Notice::UnauthorisedMovement { stopped, .. } => {
+                stopped.iter().for_each(|train| self.set_halting(*train));
+            }
             Notice::AsksToCreep { train } => {
                 self.awaiting_creep.insert(*train);
             }
@@ -198,15 +201,16 @@ impl Dispatcher {
             | Notice::SpeedMeasured { .. }
             | Notice::StopChecked { .. }
             | Notice::Resumed { .. }
-            | Notice::Cancelled { .. } => {}
+            | Notice::Cancelled { .. }
+            | Notice::TrackClear => {}
             _ => return,
         }
         self.has_changed = true;
     }
 
-    /// After a wrong position: several turnouts may not be in their commanded positions. Each is commanded again
-    /// before it is used.
-    fn distrust_turnouts(&mut self) {
+    /// After a wrong position, or while the station was silent: several turnouts may not be in their commanded
+    /// positions. Each is commanded again before it is used.
+    pub(super) fn distrust_turnouts(&mut self) {
         self.commanded.values_mut().for_each(|commanded| commanded.times = 0);
     }
 
@@ -226,7 +230,19 @@ impl Dispatcher {
                 if let Some(train) = self.trains.get_mut(&id) {
                     train.reservation = free;
                 }
-                self.watchdog.permit(now, id);
+                let layout = self.watchdog.driver().layout();
+                let mut others = Reservation::empty();
+                let trains = self.trains.values().filter(|other| other.id != id);
+                for other in trains {
+                    others.add(layout, &other.reservation);
+                    if other.reservation.is_empty() {
+                        // It may be anywhere.
+                        layout
+                            .edges()
+                            .for_each(|(edge, known)| others.take(layout, edge, Length::ZERO, known.length));
+                    }
+                }
+                self.watchdog.permit(now, id, others);
                 has_permitted = true;
             }
         }

@@ -82,7 +82,7 @@ impl Reservation {
     }
 
     /// Adds part of an edge, counted from its start, without turnouts.
-    pub(super) fn take_rails(&mut self, layout: &Layout, id: EdgeId, from: Length, to: Length) {
+    pub(in crate::control) fn take_rails(&mut self, layout: &Layout, id: EdgeId, from: Length, to: Length) {
         if let Some(span) = Span::on(layout, id, from, to) {
             self.spans.entry(id.stretch()).or_default().push(span);
         }
@@ -125,6 +125,25 @@ impl Reservation {
     pub fn overlaps(&self, stretch: StretchId, span: Span) -> bool {
         let spans = self.spans.get(&stretch);
         spans.is_some_and(|spans| spans.iter().any(|own| own.from <= span.to && span.from <= own.to))
+    }
+
+    /// Where reserved track begins on an edge, from an offset on in its direction: reserved rails, or the fouling point
+    /// of a reserved turnout. `None` if the rest of the edge is not reserved.
+    #[must_use]
+    pub fn begins_on(&self, layout: &Layout, id: EdgeId, from: Length) -> Option<Length> {
+        let rest = Span::on(layout, id, from, layout.edge(id)?.length)?;
+        let length = layout.edge(id)?.length;
+        let met = self.spans.get(&id.stretch()).into_iter().flatten();
+        let met = met.filter(|span| span.from <= rest.to && rest.from <= span.to);
+        let rails = met.map(|span| if id < id.twin() { span.from } else { length - span.to });
+        let is_taken = |turnout: &TurnoutId| self.turnouts.contains(turnout);
+        let entered = leg_of(layout, id).filter(is_taken).filter(|_| from < CLEARANCE).map(|_| from);
+        let left = leg_of(layout, id.twin()).filter(is_taken).map(|_| length - CLEARANCE);
+        rails
+            .chain(entered)
+            .chain(left)
+            .min_by(|one, other| one.as_m().total_cmp(&other.as_m()))
+            .map(|at| at.max(from))
     }
 
     /// Whether all of an interval is reserved, except less than `tolerance` at its ends.

@@ -253,12 +253,13 @@ impl Dispatcher {
             self.reserve_standstill(now, id);
         }
         let leg = Leg::from_curved(curved);
-        let times = self
-            .commanded
-            .get(&turnout)
-            .filter(|commanded| commanded.leg == leg)
-            .map_or(0, |commanded| commanded.times);
-        self.commanded.insert(turnout, TurnoutCommand { leg, times: times.saturating_add(1), last: now });
+        let known = self.commanded.get(&turnout).filter(|commanded| commanded.leg == leg);
+        let times = known.map_or(1, |known| {
+            // The session repeats a command that was lost: these are one command.
+            let is_repeated = known.times > 0 && now - known.last < POINTS_MOVE;
+            known.times.saturating_add(u8::from(!is_repeated))
+        });
+        self.commanded.insert(turnout, TurnoutCommand { leg, times, last: now });
     }
 
     /// A train has shown the position of a turnout.

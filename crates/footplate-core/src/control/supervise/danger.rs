@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use crate::control::drive::Order;
 use crate::event::{Approach, Command};
-use crate::ids::{EdgeId, SpeedStep, TrainId};
+use crate::ids::{EdgeId, SensorId, SpeedStep, TrainId};
 use crate::model::Rescaling;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Layout, Position};
@@ -26,16 +26,13 @@ const STOP_WITHOUT_POWER_DEVIATION: Length = Length::from_mm(40.0);
 /// direction: one hop.
 const DANGER_REACH: Length = Length::from_mm(700.0);
 /// A lost train may be this far from its last detection: two sensors stayed silent.
-const LOST_REACH: Length = Length::from_mm(4_000.0);
-/// A lost train needs this many sensors ahead of its last detection: two may have stayed silent, and the third
-/// reports it.
-const SENSORS_AHEAD: usize = 3;
+pub(super) const LOST_REACH: Length = Length::from_mm(4_000.0);
 /// A train extends this far to either side of its pickup: a long locomotive of the gauge.
-const BODY: Length = Length::from_mm(250.0);
+pub(super) const BODY: Length = Length::from_mm(250.0);
 /// The gap between trains.
-const CLEAR: Length = Length::from_mm(150.0);
+pub(super) const CLEAR: Length = Length::from_mm(150.0);
 /// Bound on the error of a position, in standard deviations.
-const CERTAIN: f64 = 3.0;
+pub(super) const CERTAIN: f64 = 3.0;
 /// The longest stop of a train in danger, as a multiple of its model.
 const LONGER_STOP: f64 = 1.5;
 
@@ -81,7 +78,10 @@ impl Watchdog {
 
     /// Whether a train could meet one in danger, whose position may be uncertain.
     pub(super) fn could_meet(&self, now: Timestamp, train: TrainId) -> bool {
-        let Some(own) = self.own_reach(now, train) else { return !self.dangers.is_empty() };
+        let Some(own) = self.own_reach(now, train) else { return self.has_danger() };
+        if self.intruder_reach().is_some_and(|rails| !rails.is_disjoint(&own)) {
+            return true;
+        }
         let mut dangers = self.dangers.keys().filter(|danger| **danger != train);
         dangers.any(|danger| match self.danger_reach(now, *danger) {
             Some(rails) => !rails.is_disjoint(&own),
@@ -112,57 +112,6 @@ impl Watchdog {
         let stop = self.driver.model(train)?.stop(step, Approach::Below);
         let margin = located.uncertainty * CERTAIN + BODY + CLEAR + DANGER_REACH;
         Some(rails_within(layout, place, stop.distance * LONGER_STOP + margin, margin))
-    }
-
-    /// Sets the end of authority of a train in recovery before the next train at rest. No other train runs meanwhile.
-    pub(super) fn keep_clear(&mut self, now: Timestamp, train: TrainId) {
-        let layout = self.driver.layout();
-        let others = self.driver.trains().filter(|other| *other != train);
-        let taken: BTreeSet<EdgeId> = others
-            .filter_map(|other| {
-                let located = self.driver.locate(other, now)?;
-                let reach = BODY + located.uncertainty * CERTAIN;
-                Some(rails_within(layout, self.driver.position(other, now)?, reach, reach))
-            })
-            .flatten()
-            .collect();
-        let limit = self.driver.locate(train, now).and_then(|located| {
-            let context = self.driver.context();
-            let hops = context.hops_ahead(located.at.node).take(layout.nodes().len());
-            let edges = hops.flat_map(|hop| hop.edges.iter().copied());
-            let blocked = edges.into_iter().find(|edge| taken.contains(&rails(*edge)))?;
-            let begin = Position { edge: blocked, offset: Length::ZERO };
-            let mut at = self.driver.path_point(train, located.at.node, begin)?;
-            at.distance += -(BODY + CLEAR);
-            Some(at)
-        });
-        self.driver.set_end_of_authority(now, train, limit);
-    }
-
-    /// Whether a lost train may creep ahead: from its last detection, over the turnouts as set, [`SENSORS_AHEAD`]
-    /// sensors come before the end of the track and before any other train.
-    pub(super) fn is_clear_ahead(&self, now: Timestamp, train: TrainId) -> bool {
-        let layout = self.driver.layout();
-        let mut taken = BTreeSet::new();
-        for other in self.driver.trains().filter(|other| *other != train) {
-            let Some(place) = self.driver.position(other, now) else { return false };
-            taken.extend(rails_within(layout, place, BODY, BODY));
-        }
-        let Some(seen) = self.seen.get(&train) else { return false };
-        let Some(edge) = layout.edge(seen.edge).filter(|_| !taken.contains(&rails(seen.edge))) else {
-            return false;
-        };
-        let mut sensors = usize::from(layout.sensor_at(edge.to).is_some());
-        for hop in self.driver.context().hops_ahead(edge.to).take(layout.nodes().len()) {
-            if hop.sensor.is_none() || hop.edges.iter().any(|edge| taken.contains(&rails(*edge))) {
-                return false;
-            }
-            sensors += 1;
-            if sensors >= SENSORS_AHEAD {
-                return true;
-            }
-        }
-        false
     }
 
     /// Switches the track power off, as the last resort to stop a train.
@@ -226,9 +175,74 @@ impl Watchdog {
     }
 }
 
+impl Watchdog {
+    /// A detection that no train explains: the second one at adjacent sensors raises the alarm.
+    pub(super) fn note_unexplained(&mut self, now: Timestamp, sensor: SensorId, time: Timestamp) {
+        let before = self.intruder.take(self.driver.layout(), sensor, time);
+        if self.intruder.near.is_some() {
+            self.intruder.near = Some(sensor);
+            self.hold_endangered(now);
+            return;
+        }
+        let Some(from) = before.filter(|_| self.dangers.is_empty()) else { return };
+        self.intruder.near = Some(sensor);
+        let stopped = self.hold_endangered(now);
+        self.notify(Notice::UnauthorisedMovement { from, to: sensor, stopped });
+        // A decoder may have missed its stop: all trains that should be at rest are commanded to stop again.
+        let rests = |train: &TrainId| self.driver.commanded(*train) == SpeedStep::STAND;
+        let resting: Vec<TrainId> = self.driver.trains().filter(rests).collect();
+        for train in resting {
+            self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
+        }
+    }
+
+    /// The rails that whatever moves may be on; `None` if nothing does.
+    pub(super) fn intruder_reach(&self) -> Option<BTreeSet<EdgeId>> {
+        let layout = self.driver.layout();
+        let node = layout.sensor_node(self.intruder.near?)?;
+        let begins = layout.outgoing(node).edges().chain(layout.outgoing(node.reverse()).edges());
+        let reach = |edge| {
+            let place = Position { edge, offset: Length::ZERO };
+            rails_within(layout, place, LOST_REACH, Length::ZERO)
+        };
+        Some(begins.flat_map(reach).collect())
+    }
+
+    /// The track is clear again: an operator said so, or a train was located that was lost.
+    pub(super) fn clear_intruder(&mut self) {
+        self.intruder.last = None;
+        if self.intruder.near.take().is_some() {
+            self.notify(Notice::TrackClear);
+        }
+    }
+
+    /// Whether something moves that no session drives.
+    pub(super) const fn has_intruder(&self) -> bool {
+        self.intruder.near.is_some()
+    }
+
+    /// Releases held trains once no train is in danger. Their orders are cancelled, so that no train starts by itself
+    /// while an operator is at the track.
+    pub(super) fn release_held(&mut self) {
+        if self.has_danger() {
+            return;
+        }
+        for (train, order) in core::mem::take(&mut self.held) {
+            if let Some((_, order)) = order {
+                self.notify(Notice::Cancelled { train, order });
+            }
+        }
+    }
+}
+
 /// The rails within distances ahead of and behind a position, over both legs of every turnout: each as the edge with
 /// the lower number.
-fn rails_within(layout: &Layout, place: Position, ahead: Length, behind: Length) -> BTreeSet<EdgeId> {
+pub(super) fn rails_within(
+    layout: &Layout,
+    place: Position,
+    ahead: Length,
+    behind: Length,
+) -> BTreeSet<EdgeId> {
     let mut rails = walk(layout, place, ahead);
     if let Some(back) = layout.reversed(place) {
         rails.extend(walk(layout, back, behind));

@@ -32,6 +32,7 @@ impl Watchdog {
             _ if !self.is_watching() => {}
             LinkNews::Silent if self.silent.is_none() => {
                 self.silent = Some(now);
+                self.distrust_last_commands(now);
                 let trains: Vec<TrainId> = self.driver.trains().collect();
                 for train in trains {
                     if self.driver.commanded(train) > SpeedStep::STAND || !self.driver.is_at_rest(train, now)
@@ -54,10 +55,15 @@ impl Watchdog {
         self.act(now);
     }
 
-    /// Switches the track power off or on for an operator. It then stays off until an operator switches it on.
+    /// Switches the track power off or on for an operator. It then stays off until an operator switches it on. An
+    /// operator who switches it on has seen that nothing else moves on the track.
     pub fn switch_power(&mut self, now: Timestamp, on: bool) {
         if on {
             self.is_switched_off = false;
+            self.clear_intruder();
+            if self.is_powered() {
+                self.release_held();
+            }
             if self.is_powered() {
                 self.command(Command::PowerOn);
             }

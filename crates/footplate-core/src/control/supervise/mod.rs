@@ -12,18 +12,23 @@
 //! watchdog             the machine
 //! alarm                alarms, and the tests at every sensor that raise them
 //! danger  stops        trains that are stopped and held; stops that have to be confirmed
+//! creeping  unheard    where a train in recovery may go; how far it can have run
+//! intruder             movements that no session drives
 //! line                 the link and the track power
 //! recovery             the recovery of one train
 //! remeasuring  trials  its measurements, and the conclusions from them
 //! ```
 
 mod alarm;
+mod creeping;
 mod danger;
+mod intruder;
 mod line;
 mod recovery;
 mod remeasuring;
 mod stops;
 mod trials;
+mod unheard;
 mod watchdog;
 
 pub use alarm::Alarm;

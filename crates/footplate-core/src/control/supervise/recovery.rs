@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 
+use crate::control::dispatch::Reservation;
 use crate::control::drive::{Order, OrderId, Refusal};
 use crate::event::{Event, EventKind, Report};
 use crate::ids::{NodeId, SpeedStep, TrainId};
@@ -55,6 +56,8 @@ pub(super) struct Recovery {
     /// How often the train has reversed.
     reversals: u8,
     lost: u8,
+    /// The track that a dispatcher has reserved for others.
+    pub(super) closed: Option<Reservation>,
 }
 
 /// The phase of a recovery.
@@ -107,6 +110,7 @@ impl Recovery {
             lessons_taken: 0,
             reversals: 0,
             lost: 0,
+            closed: None,
         }
     }
 
@@ -189,14 +193,16 @@ impl Watchdog {
         if !is_free || !is_first {
             return;
         }
-        if !self.permits_all && !self.permitted.remove(&train) {
+        let closed = self.permitted.remove(&train);
+        if !self.permits_all && closed.is_none() {
             if !has_asked {
                 self.set_phase(train, Phase::Waiting { has_asked: true }, now);
                 self.notify(Notice::AsksToCreep { train });
             }
             return;
         }
-        let Some(recovery) = self.dangers.get(&train) else { return };
+        let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        recovery.closed = closed;
         let is_roughly_located = matches!(recovery.why, Alarm::Drift(_) | Alarm::Misses | Alarm::Distrusted);
         match self.driver.locate(train, now).filter(|_| is_roughly_located) {
             Some(located) => self.driver.place(now, train, located.at, ABOUT.max(located.uncertainty)),
@@ -204,9 +210,8 @@ impl Watchdog {
                 self.driver.lose(now, train);
                 // Other trains are near, and the track may end ahead. Behind the train is track that it ran over.
                 if !self.permits_all {
-                    let seen = self.behind.get(&train).map(|node| node.reverse());
-                    return match seen {
-                        Some(_) => self.creep_back(now, train, seen),
+                    return match self.sensor_behind(now, train) {
+                        seen @ Some(_) => self.creep_back(now, train, seen),
                         None if self.is_clear_ahead(now, train) => self.creep_ahead(now, train),
                         None => self.need_operator(now, train),
                     };
@@ -369,7 +374,7 @@ impl Watchdog {
             return self.creep(now, train, creep, None);
         }
         // Track ahead may end or be reserved for others; the train ran over the track behind it.
-        match self.behind.get(&train).map(|node| node.reverse()) {
+        match self.sensor_behind(now, train) {
             seen @ Some(_) if reversals < MAX_REVERSALS => self.creep_back(now, train, seen),
             _ => self.need_operator(now, train),
         }
@@ -422,6 +427,7 @@ impl Watchdog {
             monitor.place();
         }
         self.notify(Notice::Recovered { train, outcome, took: now - recovery.began });
+        self.clear_intruder();
         if self.dangers.is_empty() {
             let held = core::mem::take(&mut self.held);
             let interrupted = held.into_iter().filter_map(|(train, order)| Some((train, order?)));

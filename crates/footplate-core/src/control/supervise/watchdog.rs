@@ -1,8 +1,9 @@
 //! The watchdog: monitors the trains of a driver, and recovers those that do not run as modelled.
 
-use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
+use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec::Vec;
 
+use crate::control::dispatch::Reservation;
 use crate::control::drive::{Driver, Order, OrderId, Refusal};
 use crate::control::{Machine, Output};
 use crate::event::{Command, Event, EventKind};
@@ -14,8 +15,10 @@ use crate::tracking::{Locator, PathPoint};
 use crate::units::Length;
 
 use super::alarm::{Alarm, ConsistencyMonitor};
+use super::intruder::Intruder;
 use super::recovery::{Phase, Recovery};
 use super::stops::Stops;
+use super::unheard::Unheard;
 use crate::control::Notice;
 
 /// A train should be at rest after its predicted time multiplied by this, ...
@@ -52,6 +55,8 @@ pub struct Watchdog {
     pub(super) seen: BTreeMap<TrainId, Position>,
     /// The sensor that reported each train last since it reversed or was placed: it is behind the train.
     pub(super) behind: BTreeMap<TrainId, NodeId>,
+    /// How far each train may have run since its last detection.
+    pub(super) unheard: BTreeMap<TrainId, Unheard>,
     /// The orders of recoveries.
     own: BTreeMap<OrderId, TrainId>,
     /// Whether no dispatcher keeps trains apart and repeats orders.
@@ -60,7 +65,9 @@ pub struct Watchdog {
     is_watching: bool,
     /// Whether an operator has switched the power off.
     pub(super) is_switched_off: bool,
-    pub(super) permitted: BTreeSet<TrainId>,
+    pub(super) intruder: Intruder,
+    /// Trains that may creep, with the track that is reserved for others.
+    pub(super) permitted: BTreeMap<TrainId, Reservation>,
     /// The last time that it acted: timeouts up to then are handled.
     acted: Timestamp,
 }
@@ -81,11 +88,13 @@ impl Watchdog {
             unfinished: BTreeMap::new(),
             seen: BTreeMap::new(),
             behind: BTreeMap::new(),
+            unheard: BTreeMap::new(),
             own: BTreeMap::new(),
             permits_all: true,
             is_watching: true,
             is_switched_off: false,
-            permitted: BTreeSet::new(),
+            intruder: Intruder::default(),
+            permitted: BTreeMap::new(),
             acted: now,
         };
         let trains: Vec<TrainId> = watchdog.driver.trains().collect();
@@ -150,22 +159,11 @@ impl Watchdog {
         self.driver.place(now, train, at, uncertainty);
         self.monitors.entry(train).or_default().place();
         self.note_place(now, train);
+        self.note_detection(train, now);
         self.behind.remove(&train);
+        self.clear_intruder();
         self.release_held();
         self.drain(now);
-    }
-
-    /// Releases held trains once no train is in danger. Their orders are cancelled, so that no train starts by itself
-    /// while an operator is at the track.
-    pub(super) fn release_held(&mut self) {
-        if !self.dangers.is_empty() {
-            return;
-        }
-        for (train, order) in core::mem::take(&mut self.held) {
-            if let Some((_, order)) = order {
-                self.notify(Notice::Cancelled { train, order });
-            }
-        }
     }
 
     /// Gives up the position of a train that was found to be wrong. A monitored train is stopped and located again.
@@ -196,10 +194,10 @@ impl Watchdog {
         self.dangers.contains_key(&train) || self.held.contains_key(&train)
     }
 
-    /// Whether any train is in danger.
+    /// Whether any train is in danger, or something moves that no session drives.
     #[must_use]
     pub fn has_danger(&self) -> bool {
-        !self.dangers.is_empty()
+        !self.dangers.is_empty() || self.has_intruder()
     }
 
     /// Whether a train is in danger.
@@ -221,9 +219,10 @@ impl Watchdog {
         self.permits_all = false;
     }
 
-    /// Permits a train that asked to creep and to be measured.
-    pub fn permit(&mut self, now: Timestamp, train: TrainId) {
-        self.permitted.insert(train);
+    /// Permits a train that asked to creep and to be measured, outside the track that is
+    /// reserved for others.
+    pub fn permit(&mut self, now: Timestamp, train: TrainId, closed: Reservation) {
+        self.permitted.insert(train, closed);
         self.act(now);
     }
 
@@ -350,7 +349,7 @@ impl Watchdog {
                 self.notify(notice);
                 return self.lost(now, train);
             }
-            Notice::Unexplained { sensor, .. } if self.is_watching => {
+            Notice::Unexplained { sensor, time } if self.is_watching => {
                 let stray = |train: &TrainId| {
                     self.stops.should_be_at_rest(*train, now)
                         && self.driver.sensor_ahead(*train, now) == Some(*sensor)
@@ -359,6 +358,10 @@ impl Watchdog {
                 if let Some(train) = stray {
                     self.raise(now, train, Alarm::DoesNotStop(*sensor));
                     self.power_off(now, train);
+                } else {
+                    let (sensor, time) = (*sensor, *time);
+                    self.notify(notice);
+                    return self.note_unexplained(now, sensor, time);
                 }
             }
             Notice::Done(finished) => {
@@ -405,6 +408,7 @@ impl Watchdog {
     fn passed(&mut self, now: Timestamp, train: TrainId, passed: &crate::tracking::PassedContact) {
         let alarm = self.monitors.entry(train).or_default().pass(passed);
         self.note_place(now, train);
+        self.note_detection(train, passed.window.until);
         if let Some(node) = self.driver.node_passed(passed) {
             self.behind.insert(train, node);
         }
@@ -416,7 +420,7 @@ impl Watchdog {
         } else if let Some(why) = alarm {
             self.raise(now, train, why);
         }
-        if !self.dangers.is_empty() {
+        if self.has_danger() {
             let stopped = self.hold_endangered(now);
             debug_assert!(stopped.iter().all(|train| self.is_held(*train)));
         }
@@ -449,6 +453,7 @@ impl Machine for Watchdog {
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         if let EventKind::Speed { train, step } = event.kind {
+            self.note_command(train, event.time, step);
             if step == SpeedStep::STAND {
                 let at_rest = self.at_rest_by(train, event.time);
                 self.stops.sent(train, at_rest);
@@ -458,6 +463,7 @@ impl Machine for Watchdog {
             }
         }
         if let EventKind::Reverse { train } = event.kind {
+            self.note_command(train, event.time, SpeedStep::STAND);
             self.behind.remove(&train);
             if let Some(place) = self.seen.get_mut(&train) {
                 *place = self.driver.layout().reversed(*place).unwrap_or(*place);

@@ -160,6 +160,13 @@ impl NoticeFormatter<'_> {
                 self.at(*time),
                 self.sensor(*sensor)
             ),
+            Notice::UnauthorisedMovement { from, to, stopped } => format!(
+                "something moves from {} to {} that Footplate does not drive; stopped: {}; check the track, then \
+                 enter `power on`, or `place` the train that it is",
+                self.sensor(*from),
+                self.sensor(*to),
+                trains(stopped)
+            ),
             Notice::Unconfirmed { command } => format!("not confirmed as sent: {command}"),
             // The result of the order says both.
             Notice::Replaced { .. } | Notice::GivenUp { .. } => return None,
@@ -174,6 +181,10 @@ impl NoticeFormatter<'_> {
             Notice::Waits { train, on } => {
                 format!("train {train} waits for track that is reserved for {}", trains(on))
             }
+            Notice::Deadlocked { train } => format!(
+                "train {train} is in a deadlock: no train can make room for another; move one by hand, then \
+                 enter `place` with its new position"
+            ),
             Notice::Deadlock { train, moves } if moves.is_empty() => {
                 format!(
                     "train {train} is in a deadlock that no train can resolve from its place: one \
@@ -291,6 +302,7 @@ fn supervised(notice: &Notice) -> Option<String> {
             trains(stopped)
         ),
         Notice::PowerOff { train } => format!("track power off: train {train} may not have stopped"),
+        Notice::TrackClear => "the track is clear; trains may run again".to_owned(),
         Notice::PowerOn => "track power on; all trains are commanded to stop".to_owned(),
         Notice::AsksToCreep { train } => format!("train {train} is waiting for clearance to creep"),
         Notice::Creeps { train, step } => {

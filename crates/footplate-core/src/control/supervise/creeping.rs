@@ -1,0 +1,236 @@
+//! Where a train in recovery may creep: not into track that may be occupied, from wherever the train may be.
+
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
+
+use crate::control::dispatch::Reservation;
+use crate::event::Approach;
+use crate::ids::{EdgeId, NodeId, SpeedStep, TrainId};
+use crate::model::MotionModel;
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::{Layout, Position};
+use crate::units::Length;
+
+use super::danger::{BODY, CERTAIN, CLEAR, LOST_REACH, rails_within};
+use super::recovery::Recovery;
+use super::unheard::Unheard;
+use super::watchdog::Watchdog;
+
+/// A lost train needs this many sensors ahead, one of them beyond all places where it may be: one may stay silent.
+const SENSORS_AHEAD: usize = 2;
+/// A train runs no faster than its model, times this.
+const FASTER: f64 = 1.2;
+/// Commands that were sent this long before the station was found silent may be lost: it is silent for 1.5 s by then.
+const SILENT_FOR: TimeSpan = TimeSpan::from_ms(2_000);
+
+impl Watchdog {
+    /// The track that a train in recovery must not enter. Without a dispatcher, the track under the other trains.
+    fn closed_to(&self, now: Timestamp, train: TrainId) -> Reservation {
+        if let Some(closed) = self.dangers.get(&train).and_then(|recovery| recovery.closed.as_ref()) {
+            return closed.clone();
+        }
+        let layout = self.driver.layout();
+        let mut closed = Reservation::empty();
+        for other in self.driver.trains().filter(|other| *other != train) {
+            let place = self.driver.position(other, now);
+            let Some((located, place)) = self.driver.locate(other, now).zip(place) else { continue };
+            let reach = BODY + located.uncertainty * CERTAIN;
+            for edge in rails_within(layout, place, reach, reach) {
+                let length = layout.edge(edge).map_or(Length::ZERO, |edge| edge.length);
+                closed.take_rails(layout, edge, Length::ZERO, length);
+            }
+        }
+        closed
+    }
+
+    /// Sets the end of authority of a train in recovery before the next track that is closed to it. No other train
+    /// runs meanwhile.
+    pub(super) fn keep_clear(&mut self, now: Timestamp, train: TrainId) {
+        let layout = self.driver.layout();
+        let closed = self.closed_to(now, train);
+        let limit = self.driver.locate(train, now).and_then(|located| {
+            let place = self.driver.position(train, now);
+            let hops = self.driver.context().hops_ahead(located.at.node).take(layout.nodes().len());
+            let mut edges: Vec<EdgeId> = hops.flat_map(|hop| hop.edges.iter().copied()).collect();
+            let here = place.and_then(|place| edges.iter().position(|edge| *edge == place.edge));
+            edges.drain(..here.unwrap_or(0));
+            let start = place.filter(|_| here.is_some()).map_or(Length::ZERO, |place| place.offset);
+            let begin = edges.iter().enumerate().find_map(|(nth, edge)| {
+                let from = if nth == 0 { start } else { Length::ZERO };
+                Some(Position { edge: *edge, offset: closed.begins_on(layout, *edge, from)? })
+            })?;
+            let mut at = self.driver.path_point(train, located.at.node, begin)?;
+            at.distance += -(BODY + CLEAR);
+            Some(at)
+        });
+        self.driver.set_end_of_authority(now, train, limit);
+    }
+
+    /// Whether a lost train may creep ahead. From its last detection, over both legs of every turnout, and from
+    /// wherever it may be, [`SENSORS_AHEAD`] sensors come before the end of the track and before any track that is
+    /// closed to it.
+    pub(super) fn is_clear_ahead(&self, now: Timestamp, train: TrainId) -> bool {
+        let Some(seen) = self.seen.get(&train) else { return false };
+        let closed = self.closed_to(now, train);
+        let ahead = Ahead { run: self.unheard_run(now, train), sensors: SENSORS_AHEAD };
+        reports_before(self.driver.layout(), alloc::vec![(seen.edge, seen.offset)], ahead, &closed)
+    }
+
+    /// The sensor to which a lost train may creep back, in its new direction: the one that reported it last. `None` if
+    /// it could reach the end of the track, or track that is closed to it, before a sensor reports it, wherever it
+    /// may be and however turnouts are set.
+    pub(super) fn sensor_behind(&self, now: Timestamp, train: TrainId) -> Option<NodeId> {
+        let layout = self.driver.layout();
+        let behind = *self.behind.get(&train)?;
+        let reach = edges_within(layout, behind, self.unheard_run(now, train) + BODY);
+        let length = |edge| layout.edge(edge).map_or(Length::ZERO, |edge| edge.length);
+        let from = |(edge, left): (EdgeId, Length)| (edge.twin(), (length(edge) - left).max(Length::ZERO));
+        let begins = reach.into_iter().map(from).collect();
+        let back = Ahead { run: Length::ZERO, sensors: 1 };
+        reports_before(layout, begins, back, &self.closed_to(now, train)).then(|| behind.reverse())
+    }
+
+    /// The longest distance that a train can have run since its last detection.
+    fn unheard_run(&self, now: Timestamp, train: TrainId) -> Length {
+        let known = self.unheard.get(&train).copied().unwrap_or_default();
+        let Some(model) = self.base_model(train) else { return LOST_REACH };
+        known.after(now, model).run * FASTER
+    }
+
+    /// The model of a train, from before an alarm.
+    fn base_model(&self, train: TrainId) -> Option<&MotionModel> {
+        self.dangers.get(&train).map(Recovery::base).or_else(|| self.driver.model(train))
+    }
+
+    /// A command to a train was sent: until then it ran at the step before.
+    pub(super) fn note_command(&mut self, train: TrainId, sent: Timestamp, step: SpeedStep) {
+        let Some(model) = self.base_model(train) else { return };
+        let known = self.unheard.get(&train).copied().unwrap_or_default().after(sent, model);
+        // A station that is silent may not have received it.
+        let step = if self.is_silent() { step.max(known.step) } else { step };
+        let stops = step == SpeedStep::STAND && known.step > SpeedStep::STAND;
+        let stop = if stops { model.stop(known.step, Approach::Above).distance } else { Length::ZERO };
+        let run = known.run + stop;
+        self.unheard.insert(train, Unheard { run, step, since: sent, before: known.step });
+    }
+
+    /// The station has been silent for a while: it may not have received the last command of any train.
+    pub(super) fn distrust_last_commands(&mut self, now: Timestamp) {
+        for known in self.unheard.values_mut().filter(|known| now - known.since <= SILENT_FOR) {
+            known.step = known.step.max(known.before);
+        }
+    }
+
+    /// A train was detected or placed.
+    pub(super) fn note_detection(&mut self, train: TrainId, now: Timestamp) {
+        let step = self.unheard.get(&train).map_or(SpeedStep::STAND, |known| known.step);
+        self.unheard.insert(train, Unheard { step, since: now, before: step, ..Unheard::default() });
+    }
+}
+
+/// The edges that begin within a distance of a node, over both legs of every turnout, with the distance that is left
+/// at their beginning.
+fn edges_within(layout: &Layout, from: NodeId, reach: Length) -> BTreeMap<EdgeId, Length> {
+    let mut best: BTreeMap<EdgeId, Length> = BTreeMap::new();
+    let mut open: Vec<(EdgeId, Length)> = layout.outgoing(from).edges().map(|edge| (edge, reach)).collect();
+    while let Some((edge, left)) = open.pop() {
+        if left <= Length::ZERO || best.get(&edge).is_some_and(|known| *known >= left) {
+            continue;
+        }
+        best.insert(edge, left);
+        let Some(known) = layout.edge(edge) else { continue };
+        open.extend(layout.outgoing(known.to).edges().map(|next| (next, left - known.length)));
+    }
+    best
+}
+
+/// What has to be free ahead of a place: the sensors of the distance that a train may have run from there already do
+/// not report it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Ahead {
+    run: Length,
+    /// The number of sensors on the path, one of them beyond the run.
+    sensors: usize,
+}
+
+/// Whether on every path, over both legs of every turnout, a sensor comes before closed track and before the end of
+/// the track, with the length that a train needs to stop behind it.
+fn reports_before(
+    layout: &Layout,
+    begins: Vec<(EdgeId, Length)>,
+    ahead: Ahead,
+    closed: &Reservation,
+) -> bool {
+    let mut open: Vec<(EdgeId, Length, Ahead, Option<Length>)> =
+        begins.into_iter().map(|(edge, from)| (edge, from, ahead, None)).collect();
+    // The most that was still wanted on each edge.
+    let mut known: BTreeMap<EdgeId, Ahead> = BTreeMap::new();
+    while let Some((id, from, mut ahead, left)) = open.pop() {
+        let Some(edge) = layout.edge(id) else { return false };
+        let closed_at = closed.begins_on(layout, id, from);
+        if closed_at.is_some_and(|at| left.is_none_or(|left| at - from < left)) {
+            return false;
+        }
+        let left = left.map(|left| left - (edge.length - from));
+        if left.is_some_and(|left| left <= Length::ZERO) {
+            continue;
+        }
+        ahead.run -= edge.length - from;
+        if [edge.to, edge.to.reverse()].into_iter().any(|node| layout.sensor_at(node).is_some()) {
+            ahead.sensors = ahead.sensors.saturating_sub(1).max(usize::from(ahead.run > Length::ZERO));
+        }
+        let left = left.or_else(|| (ahead.sensors == 0).then_some(BODY + CLEAR));
+        let mut next = layout.outgoing(edge.to).edges().peekable();
+        if next.peek().is_none() {
+            return false;
+        }
+        let is_new = |next: &EdgeId| {
+            let is_covered = |other: &Ahead| other.run >= ahead.run && other.sensors >= ahead.sensors;
+            left.is_some() || !known.get(next).is_some_and(is_covered)
+        };
+        let next: Vec<EdgeId> = next.filter(is_new).collect();
+        for next in next {
+            if left.is_none() {
+                known.insert(next, ahead);
+            }
+            open.push((next, Length::ZERO, ahead, left));
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::example::oval;
+
+    const BACK: Ahead = Ahead { run: Length::ZERO, sensors: 1 };
+
+    #[test]
+    fn a_train_creeps_back_only_if_a_sensor_comes_before_track_of_others_over_either_leg() {
+        let layout = oval();
+        let node = |name| layout.node_named(name).unwrap();
+        let edge = |from, to| layout.edge_between(node(from), node(to)).unwrap();
+        let closed = |from, to, until| {
+            let mut closed = Reservation::empty();
+            closed.take_rails(&layout, edge(from, to), Length::ZERO, Length::from_mm(until));
+            closed
+        };
+        // It is somewhere between turnout 2 and D1, and creeps back over either leg: to B1 or C1.
+        let begins = || alloc::vec![(edge("MR2", "D1").twin(), Length::ZERO)];
+        assert!(reports_before(&layout, begins(), BACK, &Reservation::empty()));
+        assert!(!reports_before(&layout, begins(), BACK, &closed("C1", "MR2", 100.0)));
+        assert!(!reports_before(&layout, begins(), BACK, &closed("B1", "MR2", 100.0)));
+        // Beyond those sensors it needs 400 mm to stop, as far as 100 mm before D1.
+        assert!(!reports_before(&layout, begins(), BACK, &closed("A1", "BR1", 10.0)));
+        assert!(!reports_before(&layout, begins(), BACK, &closed("D1", "A1", 500.0)));
+        assert!(reports_before(&layout, begins(), BACK, &closed("D1", "A1", 390.0)));
+        // Track that ends is no better.
+        assert!(!reports_before(
+            &layout,
+            alloc::vec![(edge("EN1", "E1").twin(), Length::ZERO)],
+            BACK,
+            &Reservation::empty()
+        ));
+    }
+}

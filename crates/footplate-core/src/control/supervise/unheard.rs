@@ -1,0 +1,30 @@
+//! How far a train can have run since its last detection, by its commands.
+
+use crate::event::Approach;
+use crate::ids::SpeedStep;
+use crate::model::MotionModel;
+use crate::time::{TimeSpan, Timestamp};
+use crate::units::Length;
+
+/// The distance that a train has run since its last detection, by its commands, whatever was heard of it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Unheard {
+    pub(super) run: Length,
+    /// The step of its last command, and when that was sent.
+    pub(super) step: SpeedStep,
+    pub(super) since: Timestamp,
+    /// The step before that.
+    pub(super) before: SpeedStep,
+}
+
+impl Unheard {
+    /// The same at a later time.
+    pub(super) fn after(self, now: Timestamp, model: &MotionModel) -> Self {
+        if self.step == SpeedStep::STAND {
+            return self;
+        }
+        let speed = model.speed(self.step, Approach::Below).value;
+        let span = (now - self.since).max(TimeSpan::ZERO);
+        Self { run: self.run + speed * span, since: now.max(self.since), ..self }
+    }
+}

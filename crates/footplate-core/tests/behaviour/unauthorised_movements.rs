@@ -1,0 +1,33 @@
+//! What no session drives is noticed, and stops the trains that could meet it.
+
+use footplate_core::control::{Notice, Order, Refusal};
+
+use crate::toy_railway::step;
+use crate::watching::{FIRST, Watched};
+
+#[test]
+fn what_no_session_drives_stops_trains_until_an_operator_says_that_the_track_is_clear() {
+    let mut watched = Watched::two();
+    watched.go(FIRST, 8);
+    watched.run(6.0);
+    let is_raised = |watched: &Watched| {
+        watched.notices.iter().any(|notice| matches!(notice, Notice::UnauthorisedMovement { .. }))
+    };
+    let [one, other] = ["B2", "A2"].map(|name| watched.world.layout.sensor_named(name).expect("a sensor"));
+    // A detection by itself may be spurious,
+    watched.world.close(one);
+    watched.run(6.0);
+    assert!(!is_raised(&watched), "{:#?}", watched.notices);
+    // one at the next sensor is a movement: a train that could meet it stops and stays.
+    watched.world.close(other);
+    assert!(watched.run_until(10.0, is_raised), "{:#?}", watched.notices);
+    watched.run(5.0);
+    assert!(watched.world.trains.iter().all(|train| train.speed_mm_per_s < 1.0));
+    let order = Order::Speed { train: FIRST, step: step(5) };
+    let refused = watched.dog.order(watched.world.now, order);
+    assert_eq!(refused, Err(Refusal::InDanger { train: FIRST }));
+    watched.run(60.0);
+    assert!(watched.dog.has_danger());
+    watched.dog.switch_power(watched.world.now, true);
+    watched.go(FIRST, 5);
+}
