@@ -53,6 +53,8 @@ pub(crate) enum Met {
     Touches(Coming),
     /// The shoe leaves a contact that it holds.
     Leaves(Point<SensorId>),
+    /// The last axle that a detector senses leaves its block.
+    Vacates(Point<SensorId>),
     /// The shoe is on dirt.
     Dirt,
     /// The front end comes onto another edge, or the rear end leaves one.
@@ -73,6 +75,10 @@ pub(crate) struct Body {
     ahead: f64,
     shoe: f64,
     behind: f64,
+    /// From the leading end of the shoe to the first and back to the last part of the train that detectors sense.
+    sensed: [f64; 2],
+    /// Where blocks end that the train is in or comes to, in order.
+    block_ends: VecDeque<Point<SensorId>>,
     /// Contacts and dirty spots that the shoe has not come to, in order.
     contacts: VecDeque<Coming>,
     dirt: VecDeque<f64>,
@@ -98,6 +104,7 @@ impl Body {
         edge: EdgeId,
         offset: f64,
         [ahead, shoe, behind]: [f64; 3],
+        sensed: [f64; 2],
     ) -> Option<Self> {
         let length = rails.rail(edge)?.length_mm;
         let lead = offset.clamp(0.0, length);
@@ -107,6 +114,8 @@ impl Body {
             ahead,
             shoe,
             behind,
+            sensed,
+            block_ends: VecDeque::new(),
             contacts: VecDeque::new(),
             dirt: VecDeque::new(),
             held: VecDeque::new(),
@@ -180,6 +189,10 @@ impl Body {
         if let Some(held) = self.held.pop_front_if(|held| held.at_mm + self.shoe <= lead) {
             return Some(Met::Leaves(held));
         }
+        let last = lead - self.sensed[1];
+        if let Some(end) = self.block_ends.pop_front_if(|end| end.at_mm <= last) {
+            return Some(Met::Vacates(Point { at_mm: end.at_mm + self.sensed[1], ..end }));
+        }
         if let Some(contact) = self.contacts.pop_front_if(|coming| coming.contact.at_mm <= lead) {
             return Some(Met::Touches(contact));
         }
@@ -220,6 +233,19 @@ impl Body {
         self.held.drain(..).map(|held| held.what)
     }
 
+    /// The detectors of the blocks under the train, once for each time that it is in one.
+    pub(crate) fn blocks(&self, rails: &Rails<'_>) -> Vec<SensorId> {
+        let (first, last) = (self.lead + self.sensed[0], self.lead - self.sensed[1]);
+        let mut blocks = Vec::new();
+        for under in self.way.iter().filter(|under| under.ends > last && under.begins < first) {
+            let Some(rail) = rails.rail(under.edge) else { continue };
+            // Several edges of one block count once.
+            let is_new = under.begins <= last || rails.is_boundary(under.edge);
+            blocks.extend(rail.block.filter(|_| is_new));
+        }
+        blocks
+    }
+
     /// The other way round, where it stands.
     pub(crate) fn turn(&mut self, rails: &Rails<'_>) {
         let turned = self.way.iter().rev().filter_map(|under| {
@@ -230,6 +256,7 @@ impl Body {
         self.way = turned.collect();
         self.lead = self.shoe - self.lead;
         std::mem::swap(&mut self.ahead, &mut self.behind);
+        self.sensed = [self.sensed[1] - self.shoe, self.sensed[0] + self.shoe];
         self.held = self.held.iter().rev().map(|held| Point { at_mm: -held.at_mm, ..*held }).collect();
         self.dirty_until = f64::NEG_INFINITY;
         self.look_ahead(rails);
@@ -311,21 +338,38 @@ impl Body {
         };
         let Rail { length_mm, factor, grade, .. } = *rail;
         self.way.push_back(Under { edge, begins, ends: begins + length_mm, factor, grade });
-        let coming = coming(&mut self.scatter, rails, rail, begins);
+        let coming = coming(&mut self.scatter, rails, rail, [begins, self.sensed[0]]);
         self.contacts.extend(coming);
+        self.sort_contacts();
+        self.block_ends.extend(rail.ends_block.map(|what| Point { at_mm: begins, what }));
         self.dirt.extend(rail.dirty.iter().map(|at| begins + at));
+    }
+
+    /// Blocks are sensed further ahead than contacts where carriages lead.
+    fn sort_contacts(&mut self) {
+        if self.sensed[0] > 0.0 {
+            let by_place = |one: &Coming, other: &Coming| one.contact.at_mm.total_cmp(&other.contact.at_mm);
+            self.contacts.make_contiguous().sort_by(by_place);
+        }
     }
 
     /// Finds everything ahead of the shoe anew.
     fn look_ahead(&mut self, rails: &Rails<'_>) {
+        self.block_ends.clear();
+        let last = self.lead - self.sensed[1];
+        for under in self.way.iter().filter(|under| under.begins > last) {
+            let ended = rails.rail(under.edge).and_then(|rail| rail.ends_block);
+            self.block_ends.extend(ended.map(|what| Point { at_mm: under.begins, what }));
+        }
         self.contacts.clear();
         self.dirt.clear();
         for under in &self.way {
             let Some(rail) = rails.rail(under.edge) else { continue };
-            let coming = coming(&mut self.scatter, rails, rail, under.begins);
+            let coming = coming(&mut self.scatter, rails, rail, [under.begins, self.sensed[0]]);
             self.contacts.extend(coming.into_iter().filter(|coming| coming.contact.at_mm > self.lead));
             self.dirt.extend(rail.dirty.iter().map(|at| under.begins + at).filter(|at| *at > self.lead));
         }
+        self.sort_contacts();
         self.under = self.way.iter().position(|under| self.lead < under.ends).unwrap_or(0);
         self.feel_rail();
         self.find_next();
@@ -349,14 +393,22 @@ impl Body {
         let edge = self.way.get(self.under).map_or(f64::INFINITY, |under| under.ends);
         let front = self.way.back().map_or(f64::INFINITY, |last| last.ends - self.ahead);
         let rear = self.way.front().map_or(f64::INFINITY, |first| first.ends + self.shoe + self.behind);
-        self.next = contact.min(left).min(dirt).min(edge).min(front).min(rear);
+        let block = self.block_ends.front().map_or(f64::INFINITY, |end| end.at_mm + self.sensed[1]);
+        self.next = contact.min(left).min(dirt).min(edge).min(front).min(rear).min(block);
     }
 }
 
-/// The contacts of an edge that begins at a place, where they close this time.
-fn coming(scatter: &mut Option<Scatter>, rails: &Rails<'_>, rail: &Rail, begins: f64) -> Vec<Coming> {
+/// The contacts and entries of blocks of an edge that begins at a place, where the shoe is when they close this time.
+/// Detectors sense a train so far ahead of its shoe.
+fn coming(
+    scatter: &mut Option<Scatter>,
+    rails: &Rails<'_>,
+    rail: &Rail,
+    [begins, sensed_ahead]: [f64; 2],
+) -> Vec<Coming> {
     let contacts = rail.contacts.iter().map(|(at, what)| {
-        let usual_mm = begins + at;
+        let is_entry = rails.layout.block_of_entry(*what).is_some();
+        let usual_mm = begins + at - if is_entry { sensed_ahead } else { 0.0 };
         let by = scatter.as_mut().map_or(0.0, |scatter| {
             let sd = libm::hypot(rails.scatter_mm(*what), scatter.shoe_mm);
             scatter.draws.normal_within(0.0, sd, 2.5)

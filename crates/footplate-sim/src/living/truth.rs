@@ -1,7 +1,7 @@
 //! What really happens on a living layout: for scorers, and for nobody else.
 
 use footplate_core::track::Position;
-use footplate_core::{EdgeId, Length, SensorId, Speed, SpeedStep, Timestamp, TrainId};
+use footplate_core::{EdgeId, Length, SensorId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use crate::living::body::{Body, after};
 use crate::living::live_train::{End, LiveTrain};
@@ -114,6 +114,18 @@ impl<'w, 'l> Truth<'w, 'l> {
     #[must_use]
     pub fn engine(&self, train: TrainId) -> Option<&'w Train> {
         Some(&*self.found(train)?.train)
+    }
+
+    /// From the first to the last part of a train that detectors of blocks sense.
+    #[must_use]
+    pub fn sensed_length(&self, train: TrainId) -> Option<Length> {
+        Some(Length::from_mm(self.found(train)?.sensed().iter().sum()))
+    }
+
+    /// The usual release delay of a detector.
+    #[must_use]
+    pub fn release_delay(&self, detector: SensorId) -> Option<TimeSpan> {
+        self.world.s88.release_delay(detector)
     }
 
     /// The rails as they are.

@@ -103,6 +103,7 @@ fn tables(layout: &Layout) -> (String, String) {
             NodeKind::Sensor(sensor) => ("sensor", sensor.0),
             NodeKind::Branch(turnout) => ("branch", turnout.0),
             NodeKind::Merge(turnout) => ("merge", turnout.0),
+            NodeKind::Boundary => unreachable!("these layouts have no blocks"),
             NodeKind::Enter => ("enter", 1),
             NodeKind::Exit => ("exit", 1),
         };
@@ -198,7 +199,15 @@ fn any_layout() -> impl Strategy<Value = LayoutFile> {
             });
             let zones = zones.collect();
             let survey = Survey::taped(Length::from_mm(2.5), "made up".to_owned());
-            let plan = LayoutPlan { name, survey, places, stretches, never_both_curved: vec![], zones };
+            let plan = LayoutPlan {
+                name,
+                survey,
+                places,
+                stretches,
+                never_both_curved: vec![],
+                zones,
+                blocks: vec![],
+            };
             let layout = Layout::build(&plan).unwrap();
             let mut drawing = Drawing::default();
             for (node, x, y) in points {

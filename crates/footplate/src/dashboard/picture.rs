@@ -200,6 +200,7 @@ impl LayoutPicture {
                 NodeKind::Branch(turnout) => ("branch", Some(turnout.0)),
                 NodeKind::Merge(turnout) => ("merge", Some(turnout.0)),
                 NodeKind::Enter | NodeKind::Exit => ("end", None),
+                NodeKind::Boundary => ("contact", None),
             };
             NodePicture { id: id.0, name: node.name.clone(), kind, number, point: file.drawing.point(id) }
         };

@@ -419,7 +419,7 @@ impl Machine for Driver {
                 }
             }
             EventKind::Turnout { turnout, curved } => self.turnout_sent(now, turnout, curved),
-            EventKind::Stopped { .. } => {}
+            EventKind::Freed(_) | EventKind::Stopped { .. } => {}
         }
         self.supervise_speed(now);
         self.pace(now);
