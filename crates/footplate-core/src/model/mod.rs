@@ -9,6 +9,7 @@
 //! segment  decoder_kind                how it moves after one command
 //! scatter  spread  variation           how single stops, runs and sessions differ
 //! expected_information  objective      what an experiment would teach
+//! train_length                         how long it is, where blocks report that it has left
 //! passage                              reports of a run, judged one by one
 //! fit/                                 from trips to a model
 //! report/                              runs beside the model, laws compared: for people
@@ -34,6 +35,7 @@ mod spread;
 mod standing_times;
 mod stop_offset;
 pub mod survey;
+mod train_length;
 mod variation;
 
 pub(crate) use doubts::OTHER_SHAPES;
@@ -47,4 +49,5 @@ pub(crate) use priors::{FELT, TRIP_DEVIATION, WANDER, change_error, run_variance
 pub use rescaled::{MeasuredRatio, Rescaling};
 pub(crate) use segment::{Pace, Segment, SpeedCommand};
 pub use short_moves::ShortMoveForecast;
+pub use train_length::{BlockRelease, TrainLength};
 pub(crate) use standing_times::StandingTimes;

@@ -2,8 +2,8 @@
 
 use crate::event::{Approach, Command, Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
-use crate::link::TimeModel;
-use crate::model::{MotionModel, StepUse};
+use crate::link::{ContactWindow, TimeModel};
+use crate::model::{BlockRelease, MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{Located, Locator, PassedContact, PathPoint, TrackContext, landmark_of};
 use crate::units::Length;
@@ -49,6 +49,8 @@ pub(super) struct DrivenTrain {
     pub(super) is_reversed: bool,
     /// The command that has not been sent yet, and since when it waits.
     unsent: Option<(Command, Timestamp)>,
+    /// When its speed is steady at the step sent last.
+    steady_at: Timestamp,
     /// What should be reported next.
     pub(super) expected: Expectation,
     /// Where its movement authority ends; `None` without a limit.
@@ -75,6 +77,7 @@ impl DrivenTrain {
             commanded: SpeedStep::STAND,
             is_reversed: false,
             unsent: None,
+            steady_at: Timestamp::ZERO,
             expected: Expectation::default(),
             end_of_authority: None,
             reach: [TRAIN_REACH; 2],
@@ -86,8 +89,9 @@ impl DrivenTrain {
     }
 
     /// Replaces the motion model.
-    pub(super) fn set_model(&mut self, model: MotionModel) {
+    pub(super) fn set_model(&mut self, mut model: MotionModel) {
         self.widest_stop = widest_stop(&model);
+        model.keep_length(&self.model);
         self.model = model;
     }
 
@@ -136,6 +140,24 @@ impl DrivenTrain {
 
     pub(super) fn goal(&self) -> Option<Goal> {
         self.task.map(|task| task.goal)
+    }
+
+    /// What the release of a block behind it says of its length; `None` if it did not leave this block.
+    pub(super) fn release_of(
+        &self,
+        context: TrackContext<'_>,
+        detector: SensorId,
+        window: ContactWindow,
+    ) -> Option<BlockRelease> {
+        self.locator.release_of(context, &self.model, detector, window)
+    }
+
+    /// Learns its length from a release, if its speed was steady since it left the block.
+    pub(super) fn take_release(&mut self, release: &BlockRelease) {
+        let left = release.window.after - self.model.train_length().longest_delay();
+        if left >= self.steady_at {
+            self.model.take_release(release);
+        }
     }
 
     /// Replaces its task by another.
@@ -218,6 +240,10 @@ impl DrivenTrain {
     ) {
         match event.kind {
             EventKind::Speed { step, .. } => {
+                let before = self.located(context, event.time).map_or(SpeedStep::STAND, |located| located.step);
+                if before != step {
+                    self.steady_at = event.time + self.model.settles_within(before, step);
+                }
                 self.locator.handle_command(context, &self.model, event);
                 let train = self.id();
                 let waits_for = self.unsent.map(|(command, _)| command);

@@ -16,7 +16,7 @@ use crate::units::Length;
 use super::ambiguity::Branch;
 use super::data_association::{Association, DataAssociation, Resolution};
 use super::driven_train::DrivenTrain;
-use super::hypotheses::{Detection, Explanation};
+use super::hypotheses::{Detection, Explanation, hypotheses};
 use super::order::{Aim, Order, OrderId, StopOrder};
 use super::outputs::Outputs;
 use super::path::KnownTrack;
@@ -32,6 +32,8 @@ const WATCH_AHEAD: TimeSpan = TimeSpan::from_s(6.0);
 /// The range of probabilities of stopping beyond the target that an order may ask for: above it is no limit, below it
 /// no stop can comply.
 const AIM_PROBABILITIES: [f64; 2] = [1e-6, 0.5];
+/// By how much likelier another entry of a block must be than the one that the session found by the occupied blocks.
+const SESSION_IS_RIGHT: f64 = 10.0;
 /// The longest move accepted: 100 m, longer than any layout.
 const LONGEST_MOVE: Length = Length::from_m(100.0);
 
@@ -305,7 +307,8 @@ impl Driver {
         while let Some(sensor) = self.association.next_restored(now) {
             self.outputs.notify(Notice::SensorRestored { sensor });
         }
-        let detection = Detection { sensor, window };
+        let detection = self.likeliest_entry(now, Detection { sensor, window });
+        let sensor = detection.sensor;
         match self.association.resolve(&self.trains, self.track.context(), now, detection) {
             Some(Resolution::Revised(branch)) => self.revise(now, *branch),
             Some(Resolution::Spurious(detection)) => {
@@ -322,6 +325,43 @@ impl Driver {
             Association::Unexplained => self.outputs.notify(Notice::Unexplained { sensor, time }),
             Association::Stuck => self.outputs.notify(Notice::SensorStuck { sensor }),
             Association::Ignored => {}
+        }
+    }
+
+    /// The sensor of a report. A detector does not say at which end of its block a train came in, and the session only knows
+    /// which blocks were occupied; where trains are decides.
+    fn likeliest_entry(&self, now: Timestamp, detection: Detection) -> Detection {
+        let context = self.track.context();
+        let Some(block) = context.layout.block_of_entry(detection.sensor) else { return detection };
+        let likelihood = |sensor: SensorId| -> f64 {
+            let found = hypotheses(&self.trains, context, now, Detection { sensor, ..detection });
+            let explained = found.iter().filter(|one| matches!(one.explanation, Explanation::Train(_)));
+            explained.map(|one| libm::exp(one.log_density)).sum()
+        };
+        let reported = likelihood(detection.sensor) * SESSION_IS_RIGHT;
+        let others = block.entries.iter().copied().filter(|entry| *entry != detection.sensor);
+        let best = others.map(|entry| (entry, likelihood(entry))).max_by(|(_, a), (_, b)| a.total_cmp(b));
+        match best {
+            Some((sensor, likelihood)) if likelihood > reported => Detection { sensor, ..detection },
+            _ => detection,
+        }
+    }
+
+    /// A block is free: the train that left it last is as long as it is ahead of the block.
+    fn freed(&mut self, time: Timestamp, report: Report) {
+        let interval = report.poll_interval.unwrap_or(self.link.report_window).abs();
+        let window = ContactWindow { after: time - interval, until: time };
+        let context = self.track.context();
+        let releases = self.trains.iter().filter_map(|(id, train)| {
+            Some((*id, train.release_of(context, report.sensor, window)?))
+        });
+        let nearest = releases.min_by(|(_, one), (_, other)| {
+            one.beyond[0].as_m().total_cmp(&other.beyond[0].as_m())
+        });
+        if let Some((id, release)) = nearest
+            && let Some(train) = self.trains.get_mut(&id)
+        {
+            train.take_release(&release);
         }
     }
 
@@ -419,7 +459,8 @@ impl Machine for Driver {
                 }
             }
             EventKind::Turnout { turnout, curved } => self.turnout_sent(now, turnout, curved),
-            EventKind::Freed(_) | EventKind::Stopped { .. } => {}
+            EventKind::Freed(report) => self.freed(event.time, report),
+            EventKind::Stopped { .. } => {}
         }
         self.supervise_speed(now);
         self.pace(now);
