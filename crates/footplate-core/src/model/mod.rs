@@ -49,5 +49,5 @@ pub(crate) use priors::{FELT, TRIP_DEVIATION, WANDER, change_error, run_variance
 pub use rescaled::{MeasuredRatio, Rescaling};
 pub(crate) use segment::{Pace, Segment, SpeedCommand};
 pub use short_moves::ShortMoveForecast;
-pub use train_length::{BlockRelease, TrainLength};
 pub(crate) use standing_times::StandingTimes;
+pub use train_length::{BlockRelease, TrainLength};

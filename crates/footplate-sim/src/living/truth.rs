@@ -134,8 +134,8 @@ impl<'w, 'l> Truth<'w, 'l> {
         &self.world.rails.track
     }
 
-    /// How far the leading end of a train's shoe is past where it closes a contact, in true lengths, short of it if
-    /// negative: the way since it came by or, if that is nearer, the way to it as the turnouts lie. Nothing if neither
+    /// How far the leading end of a train's shoe is past where it closes a contact, or the first part that detectors sense past
+    /// where it enters a block, in true lengths, short of it if negative: the way since it came by or, if that is nearer, the way to it as the turnouts lie. Nothing if neither
     /// is less than 20 m.
     #[must_use]
     pub fn past(&self, train: TrainId, sensor: SensorId) -> Option<Length> {
@@ -145,7 +145,10 @@ impl<'w, 'l> Truth<'w, 'l> {
         // What it passed before a hand took it elsewhere is no way from here.
         let passed = passed.filter(|pass| pass.odometer_mm >= found.put_down_at);
         let since = passed.map(|pass| found.odometer - pass.odometer_mm).filter(|mm| *mm < FAR_MM);
-        let before = self.way_to(found.body.as_ref()?.place()?, sensor);
+        let is_entry = self.world.layout().block_of_entry(sensor).is_some();
+        let ahead = if is_entry { found.sensed()[0] } else { 0.0 };
+        let (edge, offset) = found.body.as_ref()?.place()?;
+        let before = self.way_to((edge, offset + ahead), sensor);
         let nearer = |since: f64, before: f64| if since <= before { since } else { -before };
         let mm = match (since, before) {
             (Some(since), Some(before)) => nearer(since, before),

@@ -240,7 +240,8 @@ impl DrivenTrain {
     ) {
         match event.kind {
             EventKind::Speed { step, .. } => {
-                let before = self.located(context, event.time).map_or(SpeedStep::STAND, |located| located.step);
+                let before =
+                    self.located(context, event.time).map_or(SpeedStep::STAND, |located| located.step);
                 if before != step {
                     self.steady_at = event.time + self.model.settles_within(before, step);
                 }

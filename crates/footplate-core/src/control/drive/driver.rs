@@ -1,6 +1,6 @@
 //! The driver: carries out orders, one report at a time.
 
-use alloc::collections::BTreeMap;
+use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 
 use crate::control::{Machine, Notice, Output};
@@ -45,6 +45,8 @@ pub struct Driver {
     pub(super) outputs: Outputs,
     /// The last detection of each sensor.
     last_detections: BTreeMap<SensorId, Timestamp>,
+    /// The detectors of blocks that are occupied. They do not report a second train.
+    occupied: BTreeSet<SensorId>,
     /// Turnout commands that have not been sent yet, with their orders.
     pending_turnouts: Vec<(TurnoutId, OrderId)>,
     pub(super) association: DataAssociation,
@@ -63,6 +65,7 @@ impl Driver {
             trains: BTreeMap::new(),
             outputs: Outputs::default(),
             last_detections: BTreeMap::new(),
+            occupied: BTreeSet::new(),
             pending_turnouts: Vec::new(),
             association: DataAssociation::default(),
             orders: 0,
@@ -307,6 +310,9 @@ impl Driver {
         while let Some(sensor) = self.association.next_restored(now) {
             self.outputs.notify(Notice::SensorRestored { sensor });
         }
+        if let Some(block) = self.track.layout.block_of_entry(sensor) {
+            self.occupied.insert(block.detector);
+        }
         let detection = self.likeliest_entry(now, Detection { sensor, window });
         let sensor = detection.sensor;
         match self.association.resolve(&self.trains, self.track.context(), now, detection) {
@@ -349,15 +355,16 @@ impl Driver {
 
     /// A block is free: the train that left it last is as long as it is ahead of the block.
     fn freed(&mut self, time: Timestamp, report: Report) {
+        self.occupied.remove(&report.sensor);
         let interval = report.poll_interval.unwrap_or(self.link.report_window).abs();
         let window = ContactWindow { after: time - interval, until: time };
         let context = self.track.context();
-        let releases = self.trains.iter().filter_map(|(id, train)| {
-            Some((*id, train.release_of(context, report.sensor, window)?))
-        });
-        let nearest = releases.min_by(|(_, one), (_, other)| {
-            one.beyond[0].as_m().total_cmp(&other.beyond[0].as_m())
-        });
+        let releases = self
+            .trains
+            .iter()
+            .filter_map(|(id, train)| Some((*id, train.release_of(context, report.sensor, window)?)));
+        let nearest =
+            releases.min_by(|(_, one), (_, other)| one.beyond[0].as_m().total_cmp(&other.beyond[0].as_m()));
         if let Some((id, release)) = nearest
             && let Some(train) = self.trains.get_mut(&id)
         {
@@ -470,6 +477,13 @@ impl Machine for Driver {
     fn handle_timeout(&mut self, now: Timestamp) {
         let context = self.track.context();
         for train in self.trains.values_mut() {
+            let silent = train.due().map(|(sensor, _)| sensor).filter(|sensor| {
+                let block = context.layout.block_of_entry(*sensor);
+                block.is_some_and(|block| self.occupied.contains(&block.detector))
+            });
+            if silent.is_some_and(|sensor| train.is_overdue_at(sensor, now)) {
+                train.expect_beyond(context, now);
+            }
             train.handle_timeout(context, now, &mut self.outputs);
         }
         self.supervise_speed(now);
