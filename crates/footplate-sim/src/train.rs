@@ -158,8 +158,8 @@ impl Train {
 
     /// Couples carriages to its rear.
     pub(crate) fn couple(&mut self, carriages: Length) {
-        self.carriages = self.carriages + carriages;
-        self.tail = self.tail + carriages;
+        self.carriages += carriages;
+        self.tail += carriages;
     }
 
     /// From the shoe's end at the tail to the last axle that a detector senses.

@@ -69,7 +69,7 @@ fn a_block_is_occupied_from_the_front_of_a_train_until_its_rear_has_left() {
             EventKind::Freed(report) => {
                 // The boundary by which the train left, and when its rear was there.
                 let passes = truth.passes().iter().filter(|pass| pass.train == Some(ONE));
-                let left = passes.filter(|pass| {
+                let mut left = passes.filter(|pass| {
                     let node = layout.sensor_node(pass.sensor).unwrap();
                     layout.block_left_at(node).is_some_and(|block| block.detector == report.sensor)
                 });
@@ -101,8 +101,7 @@ fn a_train_is_calibrated_stopped_and_measured_by_blocks_alone() {
     driver.add_located(model, locator);
     for (name, offset) in [("B5", 0.0), ("B9", 300.0), ("B3", -150.0), ("B7", 10.0)] {
         let target = Landmark { node: layout.node_named(name).unwrap(), offset: Length::from_mm(offset) };
-        let order =
-            StopOrder { train: ONE, target, aim: Aim::Median, step: Some(step(9)), next_round: true };
+        let order = StopOrder { train: ONE, target, aim: Aim::Median, step: Some(step(9)), next_round: true };
         driver.order(line.now(), Order::Stop(order)).unwrap();
         let until = line.now() + TimeSpan::from_s(60.0);
         while !matches!(line.drive(&mut driver, until).expect("it stops"), Notice::Done(_)) {}

@@ -2,8 +2,8 @@
 
 use crate::event::{Approach, Command, Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
-use crate::link::{ContactWindow, TimeModel};
-use crate::model::{BlockRelease, MotionModel, StepUse};
+use crate::link::TimeModel;
+use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{Located, Locator, PassedContact, PathPoint, TrackContext, landmark_of};
 use crate::units::Length;
@@ -50,7 +50,7 @@ pub(super) struct DrivenTrain {
     /// The command that has not been sent yet, and since when it waits.
     unsent: Option<(Command, Timestamp)>,
     /// When its speed is steady at the step sent last.
-    steady_at: Timestamp,
+    pub(super) steady_at: Timestamp,
     /// What should be reported next.
     pub(super) expected: Expectation,
     /// Where its movement authority ends; `None` without a limit.
@@ -140,24 +140,6 @@ impl DrivenTrain {
 
     pub(super) fn goal(&self) -> Option<Goal> {
         self.task.map(|task| task.goal)
-    }
-
-    /// What the release of a block behind it says of its length; `None` if it did not leave this block.
-    pub(super) fn release_of(
-        &self,
-        context: TrackContext<'_>,
-        detector: SensorId,
-        window: ContactWindow,
-    ) -> Option<BlockRelease> {
-        self.locator.release_of(context, &self.model, detector, window)
-    }
-
-    /// Learns its length from a release, if its speed was steady since it left the block.
-    pub(super) fn take_release(&mut self, release: &BlockRelease) {
-        let left = release.window.after - self.model.train_length().longest_delay();
-        if left >= self.steady_at {
-            self.model.take_release(release);
-        }
     }
 
     /// Replaces its task by another.

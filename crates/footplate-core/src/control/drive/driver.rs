@@ -16,7 +16,7 @@ use crate::units::Length;
 use super::ambiguity::Branch;
 use super::data_association::{Association, DataAssociation, Resolution};
 use super::driven_train::DrivenTrain;
-use super::hypotheses::{Detection, Explanation, hypotheses};
+use super::hypotheses::{Detection, Explanation};
 use super::order::{Aim, Order, OrderId, StopOrder};
 use super::outputs::Outputs;
 use super::path::KnownTrack;
@@ -32,8 +32,6 @@ const WATCH_AHEAD: TimeSpan = TimeSpan::from_s(6.0);
 /// The range of probabilities of stopping beyond the target that an order may ask for: above it is no limit, below it
 /// no stop can comply.
 const AIM_PROBABILITIES: [f64; 2] = [1e-6, 0.5];
-/// By how much likelier another entry of a block must be than the one that the session found by the occupied blocks.
-const SESSION_IS_RIGHT: f64 = 10.0;
 /// The longest move accepted: 100 m, longer than any layout.
 const LONGEST_MOVE: Length = Length::from_m(100.0);
 
@@ -46,14 +44,14 @@ pub struct Driver {
     /// The last detection of each sensor.
     last_detections: BTreeMap<SensorId, Timestamp>,
     /// The detectors of blocks that are occupied. They do not report a second train.
-    occupied: BTreeSet<SensorId>,
+    pub(super) occupied: BTreeSet<SensorId>,
     /// Turnout commands that have not been sent yet, with their orders.
     pending_turnouts: Vec<(TurnoutId, OrderId)>,
     pub(super) association: DataAssociation,
     pub(super) orders: u32,
     /// When the sensor to be polled more often changes.
     pub(super) watch_changes: Option<Timestamp>,
-    link: TimeModel,
+    pub(super) link: TimeModel,
 }
 
 impl Driver {
@@ -310,9 +308,6 @@ impl Driver {
         while let Some(sensor) = self.association.next_restored(now) {
             self.outputs.notify(Notice::SensorRestored { sensor });
         }
-        if let Some(block) = self.track.layout.block_of_entry(sensor) {
-            self.occupied.insert(block.detector);
-        }
         let detection = self.likeliest_entry(now, Detection { sensor, window });
         let sensor = detection.sensor;
         match self.association.resolve(&self.trains, self.track.context(), now, detection) {
@@ -331,44 +326,6 @@ impl Driver {
             Association::Unexplained => self.outputs.notify(Notice::Unexplained { sensor, time }),
             Association::Stuck => self.outputs.notify(Notice::SensorStuck { sensor }),
             Association::Ignored => {}
-        }
-    }
-
-    /// The sensor of a report. A detector does not say at which end of its block a train came in, and the session only knows
-    /// which blocks were occupied; where trains are decides.
-    fn likeliest_entry(&self, now: Timestamp, detection: Detection) -> Detection {
-        let context = self.track.context();
-        let Some(block) = context.layout.block_of_entry(detection.sensor) else { return detection };
-        let likelihood = |sensor: SensorId| -> f64 {
-            let found = hypotheses(&self.trains, context, now, Detection { sensor, ..detection });
-            let explained = found.iter().filter(|one| matches!(one.explanation, Explanation::Train(_)));
-            explained.map(|one| libm::exp(one.log_density)).sum()
-        };
-        let reported = likelihood(detection.sensor) * SESSION_IS_RIGHT;
-        let others = block.entries.iter().copied().filter(|entry| *entry != detection.sensor);
-        let best = others.map(|entry| (entry, likelihood(entry))).max_by(|(_, a), (_, b)| a.total_cmp(b));
-        match best {
-            Some((sensor, likelihood)) if likelihood > reported => Detection { sensor, ..detection },
-            _ => detection,
-        }
-    }
-
-    /// A block is free: the train that left it last is as long as it is ahead of the block.
-    fn freed(&mut self, time: Timestamp, report: Report) {
-        self.occupied.remove(&report.sensor);
-        let interval = report.poll_interval.unwrap_or(self.link.report_window).abs();
-        let window = ContactWindow { after: time - interval, until: time };
-        let context = self.track.context();
-        let releases = self
-            .trains
-            .iter()
-            .filter_map(|(id, train)| Some((*id, train.release_of(context, report.sensor, window)?)));
-        let nearest =
-            releases.min_by(|(_, one), (_, other)| one.beyond[0].as_m().total_cmp(&other.beyond[0].as_m()));
-        if let Some((id, release)) = nearest
-            && let Some(train) = self.trains.get_mut(&id)
-        {
-            train.take_release(&release);
         }
     }
 
@@ -475,15 +432,9 @@ impl Machine for Driver {
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
+        self.expect_beyond_occupied_blocks(now);
         let context = self.track.context();
         for train in self.trains.values_mut() {
-            let silent = train.due().map(|(sensor, _)| sensor).filter(|sensor| {
-                let block = context.layout.block_of_entry(*sensor);
-                block.is_some_and(|block| self.occupied.contains(&block.detector))
-            });
-            if silent.is_some_and(|sensor| train.is_overdue_at(sensor, now)) {
-                train.expect_beyond(context, now);
-            }
             train.handle_timeout(context, now, &mut self.outputs);
         }
         self.supervise_speed(now);
