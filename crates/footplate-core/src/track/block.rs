@@ -38,7 +38,7 @@ impl Layout {
         self.blocks.iter().find(|block| block.detector == detector)
     }
 
-    /// The block that a train enters at a sensor; `None` for a point contact.
+    /// The block that a train enters at a sensor; `None` for any other sensor.
     #[must_use]
     pub fn block_of_entry(&self, entry: SensorId) -> Option<&Block> {
         self.blocks.get(*self.entered.get(&entry)?)

@@ -1,7 +1,7 @@
 //! From reports of block detectors to the entries at which trains came in.
 //!
 //! A detector says that a train is in its block, and neither which nor from where. The train came from a block that was
-//! occupied before, or over track without a detector. If several boundaries qualify, a train that was under way to this one
+//! occupied before, or over track without a detector. If several boundaries qualify, a train that was heading for this one
 //! is likelier than a train that ran away from it and has reversed; the driver, which knows its trains, may decide otherwise.
 //!
 //! Dirty wheels make a detector flicker: it reports free, and occupied again a moment later. No train comes back that fast.
@@ -107,7 +107,7 @@ impl Occupancy {
     }
 
     /// How likely a train comes in at an entry: 0 from a free block, 1 over track without a detector, 2 from an occupied block,
-    /// 3 from a block whose train is under way to this entry.
+    /// 3 from a block whose train heads for this entry.
     fn rank(&self, layout: &Layout, entry: SensorId) -> u8 {
         let Some(node) = layout.sensor_node(entry) else { return 0 };
         let Some(before) = layout.block_left_at(node) else { return 1 };
@@ -189,14 +189,14 @@ mod tests {
     }
 
     #[test]
-    fn of_two_neighbours_the_one_under_way_to_the_block_comes_in() {
+    fn of_two_neighbours_the_one_heading_for_the_block_comes_in() {
         let mut scene = Scene::new(false);
         scene.occupied(1.0, "station");
         scene.occupied(4.0, "main");
         scene.freed(6.0, "station");
         // One train is ahead, in `main`; another comes over the track without a detector.
         assert_eq!(scene.occupied(9.0, "station"), Some("S4"), "the detectors alone cannot know");
-        // A train under way to the block is likelier than one that ran away from it: `main` was entered from there.
+        // A train that heads for the block is likelier than one that ran away from it: `main` was entered from there.
         let mut scene = Scene::new(false);
         scene.occupied(1.0, "station");
         scene.occupied(4.0, "main");
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn contacts_and_commands_pass_unchanged() {
+    fn sensors_and_commands_pass_unchanged() {
         let layout = crate::track::example::oval();
         let mut occupancy = Occupancy::new(&layout);
         let time = Timestamp::from_s(1.0);

@@ -48,8 +48,8 @@ fn beyond_block(
         let hop = context.hop_from(at.node)?;
         let inside = hop.edges.iter().take_while(|edge| block.stretches.contains(&edge.stretch()));
         let inside: Length = inside.filter_map(|edge| layout.edge(*edge)).map(|edge| edge.length).sum();
-        let [felt, _] = model.length(context.sections, &hop);
-        return Some(at.distance - felt * (inside / hop.length));
+        let [length, _] = model.length(context.sections, &hop);
+        return Some(at.distance - length * (inside / hop.length));
     }
     let (mut node, mut beyond) = (at.node, at.distance);
     for _ in 0..MOST_BOUNDARIES {

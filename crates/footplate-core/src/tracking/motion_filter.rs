@@ -35,7 +35,7 @@ const LATER_CHANGE: f64 = 0.03;
 /// the state in which a train was told something fades over some dozens of changes (chosen by how well speeds are held).
 const LATER_WALK: f64 = 0.004;
 const STEP_WALK: f64 = 0.0005;
-/// A train under way. Ways in m from an origin that the caller keeps, times in s on a clock of the caller's.
+/// A train in motion. Distances in m from an origin that the caller keeps, times in s on a clock of the caller's.
 ///
 /// `L` letters: those of its [`FilterState`], and behind them any number of companions, which are not its own but are known
 /// together with it ([`pass_beside`](Self::pass_beside)). The companions' means are kept by the caller.

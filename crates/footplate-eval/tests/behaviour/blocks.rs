@@ -178,7 +178,7 @@ fn two_trains_on_six_blocks_are_kept_apart_and_found_again_after_reversing() {
 }
 
 #[test]
-fn contacts_and_blocks_locate_a_train_together() {
+fn sensors_and_blocks_locate_a_train_together() {
     let text = r#"
         format = 1
         name = "mixed"

@@ -32,9 +32,9 @@ pub(super) struct Contacts(Vec<Contact>);
 /// What a report means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum News {
-    /// The contact has become occupied, and when the station saw it.
+    /// It has become occupied, and when the station saw it.
     Occupied(Span),
-    /// The contact has become free, and when the station saw it.
+    /// It has become free, and when the station saw it.
     Freed(Span),
     /// It was occupied before it was first read.
     HeldFromStart,
