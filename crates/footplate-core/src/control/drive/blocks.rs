@@ -2,7 +2,6 @@
 
 use crate::event::Report;
 use crate::ids::SensorId;
-use crate::link::ContactWindow;
 use crate::model::BlockRelease;
 use crate::time::Timestamp;
 
@@ -37,8 +36,7 @@ impl Driver {
     /// A block is free: the train that left it last is as long as it is ahead of the block.
     pub(super) fn freed(&mut self, time: Timestamp, report: Report) {
         self.occupied.remove(&report.sensor);
-        let interval = report.poll_interval.unwrap_or(self.link.report_window).abs();
-        let window = ContactWindow { after: time - interval, until: time };
+        let Detection { window, .. } = self.detection(time, report);
         let context = self.track.context();
         let releases = self.trains.iter().filter_map(|(id, train)| {
             Some((*id, train.locator.release_of(context, &train.model, report.sensor, window)?))

@@ -51,7 +51,7 @@ pub struct Driver {
     pub(super) orders: u32,
     /// When the sensor to be polled more often changes.
     pub(super) watch_changes: Option<Timestamp>,
-    pub(super) link: TimeModel,
+    link: TimeModel,
 }
 
 impl Driver {
@@ -297,10 +297,16 @@ impl Driver {
         }
     }
 
+    /// A report, and the window of its time.
+    pub(super) fn detection(&self, time: Timestamp, report: Report) -> Detection {
+        let interval = report.poll_interval.unwrap_or(self.link.report_window).abs();
+        Detection { sensor: report.sensor, window: ContactWindow { after: time - interval, until: time } }
+    }
+
     fn report(&mut self, now: Timestamp, time: Timestamp, report: Report) {
         let sensor = report.sensor;
-        let interval = report.poll_interval.unwrap_or(self.link.report_window).abs();
-        let window = ContactWindow { after: time - interval, until: time };
+        let detection = self.detection(time, report);
+        let interval = detection.window.width();
         let before = self.last_detections.insert(sensor, time);
         if before.is_some_and(|before| time - before <= BOUNCE_TIME.max(interval)) {
             return;
@@ -308,7 +314,7 @@ impl Driver {
         while let Some(sensor) = self.association.next_restored(now) {
             self.outputs.notify(Notice::SensorRestored { sensor });
         }
-        let detection = self.likeliest_entry(now, Detection { sensor, window });
+        let detection = self.likeliest_entry(now, detection);
         let sensor = detection.sensor;
         match self.association.resolve(&self.trains, self.track.context(), now, detection) {
             Some(Resolution::Revised(branch)) => self.revise(now, *branch),

@@ -205,7 +205,7 @@ const SHOE_LENGTH: Length = Length::from_mm(35.0);
 /// One standard deviation of that.
 const SHOE_DEVIATION: Length = Length::from_mm(12.0);
 
-/// From the first to the last part of a train that sensors detect, and one standard deviation: its pickup where a contact gave
+/// From the first to the last part of a train that sensors detect, and one standard deviation: its pickup where a point sensor gave
 /// its position, all of it where a block did.
 fn sensed_length(context: TrackContext<'_>, model: &MotionModel, at: PathPoint) -> [Length; 2] {
     let sensor = context.layout.sensor_at(at.node);
