@@ -100,9 +100,16 @@ fn a_train_is_calibrated_stopped_and_measured_by_blocks_alone() {
     let mut driver = Driver::new(layout.clone(), turnouts);
     driver.add_located(model, locator);
     for (name, offset) in [("B5", 0.0), ("B9", 300.0), ("B3", -150.0), ("B7", 10.0)] {
-        let target = Landmark { node: layout.node_named(name).unwrap(), offset: Length::from_mm(offset) };
-        let order = StopOrder { train: ONE, target, aim: Aim::Median, step: Some(step(9)), next_round: true };
-        driver.order(line.now(), Order::Stop(order)).unwrap();
+        // In the direction in which it was put down.
+        let node = layout.node_named(name).unwrap();
+        let now = line.now();
+        let mut stop = |node| {
+            let target = Landmark { node, offset: Length::from_mm(offset) };
+            let order =
+                StopOrder { train: ONE, target, aim: Aim::Median, step: Some(step(9)), next_round: true };
+            driver.order(now, Order::Stop(order)).map(|_| target)
+        };
+        let target = stop(node).or_else(|_| stop(node.reverse())).unwrap();
         let until = line.now() + TimeSpan::from_s(60.0);
         while !matches!(line.drive(&mut driver, until).expect("it stops"), Notice::Done(_)) {}
         line.drive(&mut driver, line.now() + TimeSpan::from_s(2.0));
@@ -136,12 +143,12 @@ fn two_trains_on_six_blocks_are_kept_apart_and_found_again_after_reversing() {
     };
     let mut driver = Driver::new(layout.clone(), TurnoutStates::unknown());
     for train in [ONE, OTHER] {
-        [ONE, OTHER].map(|all| line.station.world_mut().lift(all));
+        [ONE, OTHER].into_iter().for_each(|all| line.station.world_mut().lift(all));
         line.station.world_mut().place(train, place(0), End::Nose).unwrap();
         let found = calibrate(&layout, &mut line, train, TimeSpan::from_s(240.0));
         driver.add_located(found.model, Locator::new(train));
     }
-    [ONE, OTHER].map(|all| line.station.world_mut().lift(all));
+    [ONE, OTHER].into_iter().for_each(|all| line.station.world_mut().lift(all));
     line.station.world_mut().place(ONE, place(4), End::Nose).unwrap();
     line.station.world_mut().place(OTHER, place(0), End::Nose).unwrap();
     let wait = |line: &mut VirtualLine<'_>, driver: &mut Driver, seconds: f64| {
@@ -206,7 +213,7 @@ fn sensors_and_blocks_locate_a_train_together() {
     "#;
     let layout = parse_layout("mixed.toml", text.as_bytes()).unwrap().layout;
     let mut line = world(&layout, 2, &[ONE]);
-    let found = calibrate(&layout, &mut line, ONE, TimeSpan::from_s(300.0));
+    let found = calibrate(&layout, &mut line, ONE, TimeSpan::from_s(480.0));
     assert!(found.ending.contains("Budget"), "{}", found.ending);
     let truth = line.station.world().truth();
     let length = found.model.train_length().length();
