@@ -146,7 +146,7 @@ each_table() {
   "$1" cross-check compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv --markdown
   "$1" running-times example running_times
   "$1" driving simulate driving --seeds 1..5 --markdown
-  "$1" worlds simulate worlds --seeds fresh:5@a4ee42fcd085f15a6b7e9ab59360494689ae33db --markdown
+  "$1" worlds simulate worlds --seeds fresh:5@fa2ca933d86df1e8306612a4804d20d6a9d337c7 --markdown
   "$1" disasters simulate disasters --seeds 1..8 --markdown
   "$1" pacing simulate pacing --seeds 1..3 --markdown
   "$1" zones simulate zones --seeds 21..26 --markdown

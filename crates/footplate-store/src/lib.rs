@@ -52,7 +52,7 @@ pub use layout_file::{
 pub use line_file::{LineFile, LineFileForm, parse_line, read_line, write_line};
 pub use motion_file::{
     ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionFileError, MotionSectionForm, MotionStepForm,
-    StopOffsetForm, StoredModel, UseForm,
+    SensorScatterForm, StopOffsetForm, StoredModel, UseForm,
 };
 pub use motion_replay::MotionReplay;
 pub use position_series::{PositionSeries, PositionSeriesError};
@@ -74,8 +74,8 @@ pub use speed_profile::{
 };
 pub use store::{
     Calibration, Change, EventKey, Import, Journal, JournalEntry, MachineKey, Mark, MarkKind, NewCalibration,
-    NewMachine, RecordingKey, RunKey, Salvaged, SalvagedTable, Side, Store, StoreError, StoredEvent,
-    StoredMachine, StoredRecording, StoredRun, Traced, UnfinishedSession, salvage,
+    NewMachine, RecordingKey, RunKey, Salvaged, SalvagedTable, Schedule, Side, Store, StoreError,
+    StoredEvent, StoredMachine, StoredRecording, StoredRun, Traced, UnfinishedSession, salvage,
 };
 pub use table::{LONGEST_LINE, TableError};
 pub use tachometer::{

@@ -5,7 +5,8 @@
 //! picture  spans   the current state; the parts of edges that a length of track covers
 //! history          the last minutes of a train; `travelled_distance` makes one growing number of its positions
 //! model_picture    the motion model of a train, step by step
-//! alarm            alarms, as sentences that the pages have in both languages
+//! alarm            alarms, as sentences that the pages have in both languages; their causes, and what resolves them
+//! alarm_list       the active alarms, one for each cause
 //! board            the exchange between control loop and watchers; the loop never waits for them
 //! guard  token     access control: hosts, origins, and a token for other machines
 //! connections      the limit on connections, such that an emergency stop always gets through
@@ -16,6 +17,7 @@
 //! ```
 
 mod alarm;
+mod alarm_list;
 mod assets;
 mod board;
 mod calibration_picture;
@@ -34,11 +36,10 @@ mod token;
 mod travelled_distance;
 
 pub(crate) use alarm::Alarm;
-pub(crate) use board::{Answer, Board, Request};
+pub(crate) use board::{Answer, Board, PendingRequest, Request};
 pub(crate) use painter::{Painter, TrainPassed};
-pub(crate) use picture::LayoutPicture;
-pub(crate) use picture::TrainTask;
+pub(crate) use picture::{LayoutPicture, SchedulePicture, SessionState, TrainTask};
 pub(crate) use read_only::{CalibrationFollower, ReadOnlyDashboard};
 pub(crate) use routes::Routes;
-pub(crate) use server::{Dashboard, ServedAt, ServedPages};
+pub(crate) use server::{Dashboard, ServedAt, ServedPages, answered};
 pub(crate) use token::Token;

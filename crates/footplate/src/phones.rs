@@ -283,7 +283,7 @@ impl Station {
             PhoneOrder::EmergencyStop => Request::EmergencyStop,
             PhoneOrder::PowerOn => Request::Line("power on".to_owned()),
         };
-        self.board.ask_and_wait(request).await.map_err(|not_done| not_done.says().to_owned())
+        self.board.ask_and_wait(request).await.map(drop).map_err(|not_done| not_done.says().to_owned())
     }
 }
 

@@ -18,7 +18,7 @@ const TIMING: f64 = 0.012;
 /// Standard deviation of a sensor's place on the path after some laps (m).
 const PLACE: f64 = 0.003;
 /// The planned place of rest is about this far short of its sensor (m).
-const CRAWL: f64 = 0.06;
+const CREEP: f64 = 0.06;
 /// Distance to the next sensor after one passed while braking (m).
 const TO_NEXT: f64 = 0.3;
 /// A typical hop between two sensors (m).
@@ -41,10 +41,10 @@ pub(super) struct Seen {
 }
 
 /// The stopping distance (m), from the command on.
-pub(super) fn stop_way(answers: &Answers<'_>, step: u8, above: bool) -> f64 {
+pub(super) fn stop_distance(answers: &Answers<'_>, step: u8, above: bool) -> f64 {
     let speed = answers.speed(usize::from(step), above);
     let segment = stop_from(answers, step, speed);
-    speed * segment.begins + segment.way_to_rest()
+    speed * segment.begins + segment.distance_to_rest()
 }
 
 fn stop_from(answers: &Answers<'_>, step: u8, speed: f64) -> Segment {
@@ -94,14 +94,14 @@ impl MotionModel {
         &self,
         step: SpeedStep,
         approach: Approach,
-        crawl: SpeedStep,
+        creep: SpeedStep,
         past: Option<Length>,
     ) -> ExpectedInformation {
         let (step, above) = (step.get(), approach == Approach::Above);
         let answers = self.answers();
         let speed = answers.speed(usize::from(step), above);
         let scatter = self.scatter(speed);
-        let whole = stop_way(&answers, step, above);
+        let whole = stop_distance(&answers, step, above);
         // The place of the train at the command.
         let begin = sum_of_squares(&[speed * TIMING, PLACE]);
         let mut seen = Vec::new();
@@ -110,46 +110,47 @@ impl MotionModel {
             let way = |answers: &Answers<'_>, time: f64| {
                 let speed = answers.speed(usize::from(step), above);
                 let segment = stop_from(answers, step, speed);
-                speed * segment.begins + segment.way(time)
+                speed * segment.begins + segment.distance(time)
             };
             let time = time_of(until, |time| way(&answers, time));
             let slow = stop_from(&answers, step, speed).speed(time);
             let variance = begin + sum_of_squares(&[slow * TIMING, SHAPE * whole, scatter]);
             seen.push(Seen { slopes: self.slopes(|answers| way(answers, time)), variance });
         }
-        let rest = if past.is_some() { TO_NEXT } else { CRAWL };
-        let (time, crawl_speed) = self.crawl(crawl, rest);
-        let slopes =
-            self.slopes(|answers| stop_way(answers, step, above) + start_to(answers, crawl.get()).way(time));
-        let late = crawl_speed * LATE_START;
+        let rest = if past.is_some() { TO_NEXT } else { CREEP };
+        let (time, creep_speed) = self.creep(creep, rest);
+        let slopes = self.slopes(|answers| {
+            stop_distance(answers, step, above) + start_to(answers, creep.get()).distance(time)
+        });
+        let late = creep_speed * LATE_START;
         let variance =
-            begin + sum_of_squares(&[scatter, late, crawl_speed * TIMING, TRIP_DEVIATION * rest, PLACE]);
+            begin + sum_of_squares(&[scatter, late, creep_speed * TIMING, TRIP_DEVIATION * rest, PLACE]);
         seen.push(Seen { slopes, variance });
         ExpectedInformation { seen }
     }
 
     /// A short move from a place of rest that was reached at creep speed, then creep to the next sensor.
     #[must_use]
-    pub fn prospect_of_move(&self, step: SpeedStep, run: TimeSpan, crawl: SpeedStep) -> ExpectedInformation {
-        let (time, crawl_speed) = self.crawl(crawl, CRAWL);
+    pub fn prospect_of_move(&self, step: SpeedStep, run: TimeSpan, creep: SpeedStep) -> ExpectedInformation {
+        let (time, creep_speed) = self.creep(creep, CREEP);
         let slopes = self.slopes(|answers| {
-            stop_way(answers, crawl.get(), false)
+            stop_distance(answers, creep.get(), false)
                 + move_way(answers, step.get(), run.as_s())
-                + start_to(answers, crawl.get()).way(time)
+                + start_to(answers, creep.get()).distance(time)
         });
         let answers = self.answers();
         let reached = start_to(&answers, step.get()).speed(run.as_s());
         let late =
-            sum_of_squares(&[crawl_speed * LATE_START, reached * LATE_START, crawl_speed * TIMING, PLACE]);
+            sum_of_squares(&[creep_speed * LATE_START, reached * LATE_START, creep_speed * TIMING, PLACE]);
         let scatter = self.scatter(reached);
         ExpectedInformation { seen: vec![Seen { slopes, variance: late + scatter * scatter }] }
     }
 
     /// The time (s) of creeping over a distance (m) from rest, and the speed (m/s) then.
-    fn crawl(&self, step: SpeedStep, way: f64) -> (f64, f64) {
+    fn creep(&self, step: SpeedStep, way: f64) -> (f64, f64) {
         let answers = self.answers();
         let start = start_to(&answers, step.get());
-        let time = time_of(way, |time| if time <= start.begins { 0.0 } else { start.way(time) });
+        let time = time_of(way, |time| if time <= start.begins { 0.0 } else { start.distance(time) });
         (time, start.speed(time))
     }
 }

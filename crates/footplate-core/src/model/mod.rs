@@ -8,6 +8,7 @@
 //! motion_model  parameters  priors     what is known of a train, and before it ran
 //! segment  decoder_kind                how it moves after one command
 //! scatter  spread  variation           how single stops, runs and sessions differ
+//! sensor_scatter                       how exactly sensors trip
 //! expected_information  objective      what an experiment would teach
 //! train_length                         how long it is, where blocks report that it has left
 //! passage                              reports of a run, judged one by one
@@ -16,8 +17,8 @@
 //! survey/                              lengths of the layout, and whether it is the right one
 //! ```
 
+mod change_deviations;
 mod decoder_kind;
-mod doubts;
 mod expected_information;
 mod fit;
 mod motion_model;
@@ -30,6 +31,7 @@ pub mod report;
 mod rescaled;
 mod scatter;
 mod segment;
+mod sensor_scatter;
 mod short_moves;
 mod spread;
 mod standing_times;
@@ -38,7 +40,7 @@ pub mod survey;
 mod train_length;
 mod variation;
 
-pub(crate) use doubts::OTHER_SHAPES;
+pub(crate) use change_deviations::OTHER_SHAPES;
 pub use expected_information::ExpectedInformation;
 pub use fit::{MotionFit, Refit, StatedFit, StatedMotion, StatedSpeed};
 pub use motion_model::{MotionModel, StepUse, StopForecast};
@@ -48,6 +50,8 @@ pub use passage::{Drive, Passage, PassageTracker, STALE_WITHIN, Sighting};
 pub(crate) use priors::{FELT, TRIP_DEVIATION, WANDER, change_error, run_variance, section_variance};
 pub use rescaled::{MeasuredRatio, Rescaling};
 pub(crate) use segment::{Pace, Segment, SpeedCommand};
+pub(crate) use sensor_scatter::SensorScatter;
 pub use short_moves::ShortMoveForecast;
 pub(crate) use standing_times::StandingTimes;
+pub(crate) use stop_offset::StopEffect;
 pub use train_length::{BlockRelease, TrainLength};

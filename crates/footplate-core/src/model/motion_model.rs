@@ -9,6 +9,7 @@ use super::priors::end_of_stop;
 use super::priors::section_variance;
 use super::scatter::Scatter;
 use super::segment::{Pace, Segment, SpeedCommand};
+use super::sensor_scatter::SensorVariances;
 use super::spread::Spread;
 use super::stop_offset::{StopOffsets, stop_offset_share};
 use super::survey::SectionIndex;
@@ -16,10 +17,10 @@ use super::train_length::{BlockRelease, TrainLength};
 use super::variation::Variation;
 use crate::estimate::Estimate;
 use crate::event::Approach;
-use crate::ids::{SpeedStep, TrainId};
+use crate::ids::{EdgeId, SensorId, SpeedStep, TrainId};
 use crate::linalg::Gaussian;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Hop, HopId};
+use crate::track::Hop;
 use crate::units::{Acceleration, Length, Speed};
 
 /// Whether a step moves the train.
@@ -70,7 +71,7 @@ pub struct MotionModel {
     pub(crate) spread: Spread,
     /// By how much sections are longer than surveyed (m), with the variance.
     pub(crate) sections: BTreeMap<usize, (f64, f64)>,
-    /// By how much stops are longer because of where they end.
+    /// By how much stops are longer because of the track that they run over.
     #[cfg_attr(feature = "serde", serde(default))]
     pub(crate) stop_offsets: StopOffsets,
     /// How long the train is, from releases of blocks.
@@ -83,6 +84,9 @@ pub struct MotionModel {
     pub(crate) counts: Vec<[Counts; 2]>,
     /// The scatter of stops and starts.
     pub(crate) scatter: Scatter,
+    /// The scatter of sensors.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(crate) sensor_variances: SensorVariances,
     /// The change of each number for one standard deviation of the survey's scale.
     pub(crate) scale: Vec<f64>,
     pub(crate) date: Timestamp,
@@ -119,6 +123,7 @@ impl MotionModel {
             uses: vec![StepUse::Untried; steps + 1],
             counts: vec![[Counts::default(); 2]; steps + 1],
             scatter: Scatter::USUAL,
+            sensor_variances: SensorVariances::default(),
             scale: vec![0.0; super::parameters::count(steps)],
             date: Timestamp::ZERO,
         }
@@ -315,7 +320,7 @@ impl MotionModel {
         let stop = |answers: &Answers<'_>| {
             let speed = answers.speed(usize::from(step.get()), above);
             let segment = Segment::of(&commanded, answers, Pace::steady(speed));
-            (speed * segment.begins + segment.way_to_rest(), segment.settled())
+            (speed * segment.begins + segment.distance_to_rest(), segment.settled())
         };
         let (distance, time) = stop(&self.answers());
         let speed = self.answers().speed(usize::from(step.get()), above);
@@ -327,7 +332,7 @@ impl MotionModel {
             )),
             scatter: Length::from_m(libm::hypot(
                 self.scatter(speed),
-                libm::sqrt(self.stop_offset(None, speed).variance),
+                libm::sqrt(self.stop_offset(core::iter::empty(), speed).variance),
             )),
             time: TimeSpan::from_s(time.max(LEAST_STOP_S)),
             count: self.counts_at(step, approach).stops,
@@ -339,10 +344,26 @@ impl MotionModel {
         self.scatter.of_stop(speed)
     }
 
-    /// By how much (m) a stop from a speed (m/s) is longer that ends on a hop, or at an unknown place.
-    pub(crate) fn stop_offset(&self, hop: Option<HopId>, speed: f64) -> Gaussian {
-        let (share, offset) = (stop_offset_share(speed), self.stop_offsets.of(hop.map(HopId::index)));
-        Gaussian { mean: share * offset.mean, variance: share * share * offset.variance }
+    /// Variance (m²) of where a sensor trips about its usual place.
+    pub(crate) fn sensor_variance(&self, sensor: Option<SensorId>) -> f64 {
+        self.sensor_variances.of(sensor)
+    }
+
+    /// By how much (m) a stop from a speed (m/s) is longer that runs over some edges: each with the part of the effect that comes
+    /// from it. What is left of the effect comes from unknown track.
+    pub(crate) fn stop_offset(&self, edges: impl Iterator<Item = (EdgeId, f64)>, speed: f64) -> Gaussian {
+        let mut sum = Gaussian { mean: 0.0, variance: 0.0 };
+        let mut left: f64 = 1.0;
+        for (edge, part) in edges {
+            let offset = self.stop_offsets.of(usize::from(edge.0));
+            sum.mean += part * offset.mean;
+            sum.variance += part * part * offset.variance;
+            left -= part;
+        }
+        let left = left.max(0.0);
+        let share = stop_offset_share(speed);
+        let variance = sum.variance + left * left * self.stop_offsets.variance();
+        Gaussian { mean: share * sum.mean, variance: share * share * variance }
     }
 
     /// One standard deviation of the scatter of stops that the model does not explain, as broken promises show it: loads, wear,

@@ -6,9 +6,10 @@ use core::fmt;
 
 use super::motion_model::{Counts, MotionModel, StepUse};
 use super::scatter::Scatter;
+use super::sensor_scatter::SensorVariances;
 use super::spread::Spread;
 use super::stop_offset::StopOffsets;
-use crate::ids::{SpeedStep, TrainId};
+use crate::ids::{SensorId, SpeedStep, TrainId};
 use crate::time::Timestamp;
 
 /// All that a [`MotionModel`] is made of, to the last bit. What it means for a step or a section the model says.
@@ -24,9 +25,9 @@ pub struct MotionNumbers {
     pub covariance: Vec<f64>,
     /// By [section](crate::model::survey::SectionIndex), by how much it is longer than surveyed (m), with the variance.
     pub sections: Vec<(usize, f64, f64)>,
-    /// By [hop](crate::track::HopId) on which stops ended, by how much they are longer there (m), with the variance.
+    /// By [edge](crate::EdgeId) that stops ran over, by how much they are longer there (m), with the variance.
     pub stop_offsets: Vec<(usize, f64, f64)>,
-    /// One standard deviation of that from hop to hop (m).
+    /// One standard deviation of that from edge to edge (m).
     pub stop_offset_deviation: f64,
     /// By how much more than usual the laws of stops and of starts leave over: factors on a standard deviation.
     pub residual_scales: [f64; 2],
@@ -38,6 +39,10 @@ pub struct MotionNumbers {
     pub scatter_scale: f64,
     /// What stops scatter by besides, whatever their speed (m): slopes, loads, shapes of laws that are none of ours.
     pub scatter_floor: f64,
+    /// Standard deviation (m) of where a sensor trips that the train has not passed often, and of each that it has.
+    pub usual_sensor_scatter: f64,
+    /// See [`usual_sensor_scatter`](Self::usual_sensor_scatter).
+    pub sensor_scatter: Vec<(SensorId, f64)>,
     /// How late or early starts are against what trains usually do.
     pub start_scale: f64,
     /// What each number is off by for one standard deviation of the survey's scale.
@@ -93,13 +98,14 @@ impl MotionModel {
     pub fn numbers(&self) -> MotionNumbers {
         let side = self.values.len();
         let counts = |one: &Counts| (one.contacts, one.stops);
+        let deviation = |(sensor, variance): (&SensorId, &f64)| (*sensor, libm::sqrt(*variance));
         MotionNumbers {
             train: self.train(),
             highest: self.highest(),
             values: self.values.clone(),
             covariance: (0..side).flat_map(|i| (0..=i).map(move |j| self.spread.between(i, j))).collect(),
             sections: of_places(&self.sections),
-            stop_offsets: of_places(&self.stop_offsets.of_hop),
+            stop_offsets: of_places(&self.stop_offsets.of_edge),
             stop_offset_deviation: self.stop_offsets.deviation,
             residual_scales: self.residual_scales,
             uses: self.uses.clone(),
@@ -107,6 +113,8 @@ impl MotionModel {
             scatter_scale: self.scatter.stops,
             scatter_floor: self.scatter.floor,
             start_scale: self.scatter.starts,
+            usual_sensor_scatter: libm::sqrt(self.sensor_variances.usual),
+            sensor_scatter: self.sensor_variances.of_sensor.iter().map(deviation).collect(),
             scale: self.scale.clone(),
             date: self.date,
         }
@@ -159,15 +167,19 @@ impl MotionModel {
             numbers.stop_offset_deviation,
             numbers.residual_scales[0],
             numbers.residual_scales[1],
+            numbers.usual_sensor_scatter,
         ];
-        if scatters.iter().any(|scatter| !scatter.is_finite() || *scatter < 0.0) {
+        let sensors = numbers.sensor_scatter.iter().map(|(_, scatter)| scatter);
+        if scatters.iter().chain(sensors).any(|scatter| !scatter.is_finite() || *scatter < 0.0) {
             return wrong("scatters");
         }
         model.values.clone_from(&numbers.values);
         model.spread = Spread::of_lower_triangle(side, &numbers.covariance);
         model.sections = by_place(&numbers.sections);
-        model.stop_offsets =
-            StopOffsets { of_hop: by_place(&numbers.stop_offsets), deviation: numbers.stop_offset_deviation };
+        model.stop_offsets = StopOffsets {
+            of_edge: by_place(&numbers.stop_offsets),
+            deviation: numbers.stop_offset_deviation,
+        };
         model.residual_scales = numbers.residual_scales;
         for (step, found) in (0..=numbers.highest.get()).filter_map(SpeedStep::new).zip(&numbers.uses) {
             model.note_use(step, *found);
@@ -181,6 +193,11 @@ impl MotionModel {
             stops: numbers.scatter_scale,
             floor: numbers.scatter_floor,
             starts: numbers.start_scale,
+        };
+        let variance = |(sensor, scatter): &(SensorId, f64)| (*sensor, scatter * scatter);
+        model.sensor_variances = SensorVariances {
+            usual: numbers.usual_sensor_scatter * numbers.usual_sensor_scatter,
+            of_sensor: numbers.sensor_scatter.iter().map(variance).collect(),
         };
         model.scale.clone_from(&numbers.scale);
         model.date = numbers.date;
@@ -198,7 +215,7 @@ mod tests {
         model.note_use(SpeedStep::new(1).unwrap(), StepUse::Unreliable);
         model.note_use(SpeedStep::new(9).unwrap(), StepUse::Moves);
         model.sections.insert(3, (0.012, 1e-6));
-        model.stop_offsets.of_hop.insert(5, (-0.02, 1e-5));
+        model.stop_offsets.of_edge.insert(5, (-0.02, 1e-5));
         model.stop_offsets.deviation = 0.015;
         model.counts[9][1] = Counts { contacts: 41, stops: 7 };
         model.scatter = Scatter { stops: 1.25, floor: 0.002, ..Scatter::USUAL };

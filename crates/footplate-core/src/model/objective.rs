@@ -10,7 +10,7 @@
 
 use alloc::vec::Vec;
 
-use super::expected_information::{ExpectedInformation, Seen, stop_way};
+use super::expected_information::{ExpectedInformation, Seen, stop_distance};
 use super::motion_model::MotionModel;
 use super::short_moves::move_way;
 use crate::event::Approach;
@@ -46,7 +46,7 @@ impl Objective {
                 let speed = model.answers().speed(usize::from(step), above);
                 let scatter = model.scatter(speed).max(LEAST_SCATTER);
                 let weight = 1.0 / (scatter * scatter);
-                targets.push((model.slopes(|answers| stop_way(answers, step, above)), weight));
+                targets.push((model.slopes(|answers| stop_distance(answers, step, above)), weight));
                 let run = |answers: &super::parameters::Answers<'_>| {
                     RUN_BEFORE_STOP * answers.speed(usize::from(step), above)
                 };
@@ -64,7 +64,7 @@ impl Objective {
         Self { targets }
     }
 
-    /// Its value: how large the doubts are against the scatters, squared and summed.
+    /// Its value: the squared uncertainties relative to the scatter, summed.
     #[must_use]
     pub fn value(&self, model: &MotionModel) -> f64 {
         self.targets.iter().map(|(slopes, weight)| weight * model.spread.variance_along(slopes)).sum()
@@ -107,7 +107,7 @@ impl MotionModel {
         approach: Approach,
         prospect: &ExpectedInformation,
     ) -> f64 {
-        let slopes = self.slopes(|answers| stop_way(answers, step.get(), approach == Approach::Above));
+        let slopes = self.slopes(|answers| stop_distance(answers, step.get(), approach == Approach::Above));
         let one = Objective { targets: alloc::vec![(slopes, 1.0)] };
         libm::sqrt((one.value(self) - one.gain(self, prospect)).max(0.0))
     }

@@ -190,14 +190,14 @@ impl Segment {
     }
 
     /// Distance (m) run since it took effect; before that, at the speed before.
-    pub(crate) fn way(&self, time: f64) -> f64 {
+    pub(crate) fn distance(&self, time: f64) -> f64 {
         let since = time - self.begins;
         let Pace { speed, set } = self.from;
         if since <= 0.0 {
             return speed * since;
         }
         if let Some(rolling) = self.braking.filter(|rolling| since >= rolling.ends()) {
-            return self.way_of_stop(rolling);
+            return self.distance_of_stop(rolling);
         }
         let caught_up = (speed - set) * self.shape.lag() * (1.0 - self.behind(since));
         let taken = self.braking.map_or(0.0, |rolling| rolling.taken(since, self.shape.lag()).1);
@@ -263,11 +263,11 @@ impl Segment {
     }
 
     /// The whole distance of a stop (m).
-    pub(crate) fn way_to_rest(&self) -> f64 {
-        self.braking.map_or_else(|| self.displacement(), |rolling| self.way_of_stop(rolling))
+    pub(crate) fn distance_to_rest(&self) -> f64 {
+        self.braking.map_or_else(|| self.displacement(), |rolling| self.distance_of_stop(rolling))
     }
 
-    fn way_of_stop(&self, rolling: Rolling) -> f64 {
+    fn distance_of_stop(&self, rolling: Rolling) -> f64 {
         self.displacement() - rolling.loss(self.shape.lag())
     }
 

@@ -1,6 +1,6 @@
 //! Short moves by the motion model: "go, wait, stop", with the stop commanded before the speed is reached.
 
-use super::doubts::OTHER_SHAPES;
+use super::change_deviations::OTHER_SHAPES;
 use super::expected_information::{start_to, time_of};
 use super::motion_model::MotionModel;
 use super::parameters::Answers;
@@ -43,7 +43,7 @@ pub(super) fn move_way(answers: &Answers<'_>, step: u8, run: f64) -> f64 {
         return 0.0;
     }
     commanded.sent = 0.0;
-    start.way(effect) + Segment::of(&commanded, answers, start.pace(effect)).way_to_rest()
+    start.distance(effect) + Segment::of(&commanded, answers, start.pace(effect)).distance_to_rest()
 }
 
 /// Standard deviation (m) of where a short move ends, by dry friction and gears. The error that stops and starts share with
@@ -65,7 +65,7 @@ impl MotionModel {
         // The stop begins in the middle of the start, where its law is least known; it goes on for as long as the speed there
         // says, so that both errors go the same way.
         let stop = Segment::of(&commanded, &answers, start.pace(effect));
-        let stop_lasts = stop.way_to_rest() / start.speed(effect).max(LEAST_SPEED);
+        let stop_lasts = stop.distance_to_rest() / start.speed(effect).max(LEAST_SPEED);
         let shape = OTHER_SHAPES * (start.shape_error(effect) + stop_lasts * start.shape_speed_error(effect));
         ShortMoveForecast {
             distance: Length::from_m(distance),

@@ -42,7 +42,7 @@ impl StandingTimes<'_> {
     pub(crate) fn after(&self, speed: f64) -> f64 {
         let answers = Answers::new(&self.values, self.model.steps());
         let stop = self.stop(&answers, speed);
-        let late = stop.way_to_rest() / speed.max(f64::MIN_POSITIVE);
+        let late = stop.distance_to_rest() / speed.max(f64::MIN_POSITIVE);
         match self.kind {
             DecoderKind::Lagging => stop.settled(),
             DecoderKind::Even => stop.begins + 2.0 * late,
@@ -103,7 +103,7 @@ mod tests {
                 let commanded = SpeedCommand { sent: 0.0, from: step, to: 0, at_rest: false };
                 let of = |values: &[f64]| {
                     let stop = Segment::of(&commanded, &Answers::new(values, 14), Pace::steady(speed));
-                    speed * stop.begins + stop.way_to_rest()
+                    speed * stop.begins + stop.distance_to_rest()
                 };
                 let here = of(&model.values);
                 let slopes: Vec<f64> = (0..SPEEDS)

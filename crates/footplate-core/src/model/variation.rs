@@ -28,9 +28,12 @@ pub(super) struct Variation {
     /// Of what the law of stops and starts leaves over, as part of the speed (m per m/s).
     residual: f64,
     /// Of the time that starts and other accelerations take, and of the time that stops and other decelerations take, each
-    /// as a part of it: a heavier load makes all of them slower by the same factor.
+    /// as a part of it.
     acceleration_time: f64,
     deceleration_time: f64,
+    /// Of the time that all changes of speed take, as a part of it: a heavier load makes starts and stops slower by the same factor.
+    /// No sum of a stop and the next start shows that where both take as long; sensors passed while braking do.
+    load: f64,
 }
 
 impl Variation {
@@ -45,8 +48,9 @@ impl Variation {
             kappa: 0.05,
             friction: 0.001,
             residual: 0.010,
-            acceleration_time: 0.08,
-            deceleration_time: 0.08,
+            acceleration_time: 0.05,
+            deceleration_time: 0.05,
+            load: 0.12,
         }
     }
 
@@ -63,6 +67,7 @@ impl Variation {
             residual: 0.008,
             acceleration_time: 0.0,
             deceleration_time: 0.0,
+            load: 0.0,
         }
     }
 
@@ -80,6 +85,7 @@ impl Variation {
             residual: by * self.residual,
             acceleration_time: by * self.acceleration_time,
             deceleration_time: by * self.deceleration_time,
+            load: by * self.load,
         }
     }
 
@@ -87,10 +93,11 @@ impl Variation {
     /// covariances of a pair add up. `values` are the numbers before the change.
     pub(super) fn each(&self, values: &[f64], highest: usize, mut add: impl FnMut(usize, usize, f64)) {
         let squared = |deviation: f64| deviation * deviation;
-        for (slopes, deviation) in [
-            (time_slopes(values, UP, START_NODES), self.acceleration_time),
-            (time_slopes(values, DOWN, STOP_NODES), self.deceleration_time),
-        ] {
+        let (up, down) = (time_slopes(values, UP, START_NODES), time_slopes(values, DOWN, STOP_NODES));
+        let both = up.iter().chain(&down).copied().collect();
+        for (slopes, deviation) in
+            [(up, self.acceleration_time), (down, self.deceleration_time), (both, self.load)]
+        {
             for (nth, (one, slope)) in slopes.iter().enumerate() {
                 for (other, by) in slopes.iter().take(nth + 1) {
                     add(*one, *other, squared(deviation) * slope * by);

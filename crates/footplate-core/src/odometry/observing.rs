@@ -9,7 +9,7 @@ use super::odometer::Odometer;
 use super::wheel_channel::WheelChannel;
 use super::wheels::{Count, Direction, Heading, Period, Range, WheelReading};
 
-/// A faster train cannot reverse between two periods (m/s).
+/// A train that runs faster in its direction of travel cannot reverse between two periods (m/s).
 const CERTAIN_HEADING: f64 = 1.5;
 /// A larger reading of an accelerometer is a fault (m/s²).
 const LARGEST_READING: f64 = 50.0;
@@ -20,17 +20,19 @@ impl Odometer {
         for (wheel, reading) in self.wheels.iter_mut().zip(&period.wheels) {
             wheel.read_direction(reading, self.direction, t);
         }
-        // One forward and the other backward: neither proves that the train has reversed.
+        // One forward and the other backward: one of them may have swapped wires. Sensors that once reported the same direction
+        // together do not: a wheel spins on a train that rolls back.
         let disputed = {
             let [first, second] = &self.wheels;
-            first.reported.direction() * second.reported.direction() < 0.0
+            let product = first.reported.direction() * second.reported.direction();
+            self.agreed |= product > 0.0 && first.reported.convincing() && second.reported.convincing();
+            product < 0.0 && !self.agreed
         };
         if disputed && self.direction < 0.0 {
-            // One of the two has swapped wires; trains that run backward are rarer.
+            // Trains that run backward are rarer than swapped wires.
             self.turn();
         }
-        let heading =
-            Heading { direction: self.direction, certain: self.speed.abs() > CERTAIN_HEADING, disputed };
+        let heading = Heading { direction: self.direction, certain: self.speed > CERTAIN_HEADING, disputed };
         let at = (t, self.vehicle.period.as_s());
         let [first, second] = &mut self.wheels;
         let counted =

@@ -70,6 +70,8 @@ pub struct Odometer {
     pub(super) above_top: u64,
     /// A sensor has reported a direction; a wheel has turned.
     pub(super) signed: bool,
+    /// Both sensors have reported the same direction at once.
+    pub(super) agreed: bool,
     pub(super) turned: bool,
 }
 
@@ -197,6 +199,7 @@ impl Odometer {
             amounts: self.amounts,
             above_top: self.above_top,
             signed: self.signed,
+            agreed: self.agreed,
             turned: self.turned,
             ..fresh
         };
@@ -243,6 +246,7 @@ impl Odometer {
             amounts: [0.0; 2],
             above_top: 0,
             signed: false,
+            agreed: false,
             turned: false,
         }
     }

@@ -19,6 +19,10 @@ const STUCK_AFTER_S: f64 = 0.7;
 /// Counts of rolling wheels differ by no more than these pulses, and this part of them (diameters, creepage in curves).
 const APART_PULSES: f64 = 2.0;
 const APART_PART: f64 = 0.03;
+/// Over a constant count that lasts this long (s), rolling wheels run equally far, to these pulses and this part of the distance
+/// (creepage in curves and under effort) beyond the tolerances of the diameters.
+const APART_AFTER_S: f64 = 1.5;
+const RAN_APART_PART: f64 = 0.005;
 /// Readings after which the tracker's expectation is good enough to reject a count.
 const WARM: u32 = 8;
 /// How many times faster than the fastest train a wheel may turn: one that rolls or is braked, and one that a motor can
@@ -46,6 +50,9 @@ pub(super) struct WheelChannel {
     pub(super) missing_for: f64,
     /// How long its count has been the same and not zero (s).
     same_for: f64,
+    /// How far it turned in that time, and the other wheel less that (m).
+    turned_same: f64,
+    other_further: f64,
     /// That count is no wheel's.
     pub(super) stuck: bool,
     /// How many pulses its last count may be wrong by.
@@ -76,6 +83,8 @@ impl WheelChannel {
             late: 0.0,
             missing_for: 0.0,
             same_for: 0.0,
+            turned_same: 0.0,
+            other_further: 0.0,
             stuck: false,
             doubt: 0.0,
             doubt_before: 0.0,
@@ -200,7 +209,11 @@ impl WheelChannel {
         let least = APART_PULSES * larger(self.pitch, other.pitch);
         let apart =
             (turned - other_turned).abs() > least + APART_PART * larger(turned.abs(), other_turned.abs());
-        let (moves, other_moves) = (apart && self.moves(), apart && other.moves());
+        let tolerance = self.tolerance() + other.tolerance() + RAN_APART_PART;
+        self.compare_way(turned, other_turned);
+        other.compare_way(other_turned, turned);
+        let moves = self.moves() && (apart || other.ran_apart(least, tolerance));
+        let other_moves = other.moves() && (apart || self.ran_apart(least, tolerance));
         for (wheel, beside) in [(self, other_moves), (other, moves)] {
             let was = wheel.stuck;
             wheel.stuck = wheel.stands_still() && (was || beside);
@@ -209,6 +222,21 @@ impl WheelChannel {
                 wheel.tracker.restart(wheel.pulses * wheel.pitch / t);
             }
         }
+    }
+
+    /// Adds up how far the other wheel turned beyond it (m) since its count has been constant.
+    fn compare_way(&mut self, turned: f64, other_turned: f64) {
+        if self.same_for > 0.0 {
+            self.turned_same += turned.abs();
+            self.other_further += other_turned - turned;
+        } else {
+            (self.turned_same, self.other_further) = (0.0, 0.0);
+        }
+    }
+
+    /// Whether the other wheel turned farther or less far, while its count was constant, than rolling wheels do.
+    fn ran_apart(&self, least: f64, part: f64) -> bool {
+        self.same_for > APART_AFTER_S && self.other_further.abs() > least + part * self.turned_same
     }
 
     /// The true pitch lies within this part of the assumed one.

@@ -101,7 +101,7 @@ impl Apart {
     /// Adds how the place of a train changes with the letters of its steps.
     pub(super) fn add_slopes(&self, course: &FilterState, time: f64, slope: &mut [f64; N]) {
         let way = |segment: &Segment| {
-            if time.is_infinite() { segment.way_to_rest() } else { segment.way(time - course.x[H]) }
+            if time.is_infinite() { segment.distance_to_rest() } else { segment.distance(time - course.x[H]) }
         };
         let grown = libm::exp(course.x[E]) / STEP;
         let here = way(&course.segment);
@@ -198,7 +198,7 @@ impl FilterState {
         if learnt == [0.0; 3] {
             return 0.0;
         }
-        let way = |segment: &Segment| segment.way(time - self.x[H]);
+        let way = |segment: &Segment| segment.distance(time - self.x[H]);
         let here = way(&self.segment);
         let before = apart.before[0].1 * learnt[1] + apart.before[1].1 * learnt[2];
         ((way(&apart.toward) - here) * learnt[0] + (way(&apart.away) - here) * before) / STEP

@@ -13,11 +13,11 @@ use crate::linalg::Gaussian;
 use crate::model::MotionModel;
 
 /// A train that has not arrived after this long (s) does not arrive: the longest hop at the lowest step takes a minute.
-pub(super) const LONGEST_WAIT: f64 = 200.0;
+const LONGEST_WAIT: f64 = 200.0;
 /// Halvings of half a second that leave less than a microsecond.
-pub(super) const BISECTIONS: usize = 30;
+const BISECTIONS: usize = 30;
 /// Below this (m/s) a place says nothing of a time.
-pub(super) const SLOWEST: f64 = 0.002;
+const SLOWEST: f64 = 0.002;
 
 /// When a train reaches a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,6 +56,30 @@ impl<const L: usize> MotionFilter<L> {
         self.p[N + companion][N + companion] = variance;
     }
 
+    /// When it reaches a place (s), with the standard deviation of that; `None` if it comes to rest before.
+    pub(crate) fn reaches(&self, model: &MotionModel, place: Gaussian, now: f64) -> Option<(f64, f64)> {
+        if let Some((rest, _, _)) = self.rest(model)
+            && rest.mean <= place.mean
+        {
+            return None;
+        }
+        let place_at = |time: f64| self.place(model, time).mean;
+        let (mut low, mut high) = (now, now + 0.5);
+        while place_at(high) < place.mean {
+            (low, high) = (high, now + 2.0 * (high - now));
+            if high - now > LONGEST_WAIT {
+                return None;
+            }
+        }
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if place_at(middle) < place.mean { low = middle } else { high = middle }
+        }
+        let speed = self.speed(model, high).mean.max(SLOWEST);
+        let deviation = libm::sqrt(self.place(model, high).variance + place.variance) / speed;
+        Some((high, deviation))
+    }
+
     /// When it reaches a place that companions move (see [`pass_beside`](Self::pass_beside)), looked for from a time on;
     /// `None` if it comes to rest before.
     pub(crate) fn arrives(
@@ -85,7 +109,7 @@ impl<const L: usize> MotionFilter<L> {
         course.settle(model, high);
         let speed = course.speed(high).max(SLOWEST);
         let there = self.at(model, high);
-        let (_, slope) = there.way_and_slopes(high);
+        let (_, slope) = there.place_and_slopes(high);
         let shape = there.shape_error(high);
         let variance = there.variance_along(Self::past(slope, slopes)) + shape * shape + place.variance;
         Some(Arrival { time: high, variance: variance / (speed * speed), speed })

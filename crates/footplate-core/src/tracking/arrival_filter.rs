@@ -172,7 +172,7 @@ impl ArrivalFilter {
     pub(super) fn appear(&mut self, time: f64, variance: f64, scatter: f64) {
         self.following = self.following.at(&self.model, time);
         if self.is_placed {
-            self.following.doubt_place(ANYWHERE_M * ANYWHERE_M);
+            self.following.widen_place(ANYWHERE_M * ANYWHERE_M);
         }
         let place = Gaussian { mean: 0.0, variance: scatter };
         self.following.pass_beside(&self.model, time, variance, place, &[], &mut self.longer);
@@ -189,6 +189,6 @@ impl ArrivalFilter {
     /// It is off by more (m) than any interval allows. Whether a change of speed is under way that may be why: its uncertainty
     /// is widened then.
     pub(super) fn widen_change(&mut self, time: f64, off: f64) -> bool {
-        self.following.doubt_change(&self.model, time, off)
+        self.following.widen_change(&self.model, time, off)
     }
 }

@@ -5,7 +5,7 @@
 //! the last sensor. Without the second, a train with dirty wheels would not be tracked for long enough to notice the
 //! change.
 
-use super::locator::{CONTACT_SCATTER_M, LEAST_SPEED_M_PER_S, Locator, log_density};
+use super::locator::{LEAST_SPEED_M_PER_S, Locator, log_density};
 use super::path_length::{LOG_CHANCE_OF_SILENCE, path_reaches};
 use super::track_context::TrackContext;
 use crate::ids::SensorId;
@@ -33,7 +33,7 @@ impl Locator {
     ) -> Option<f64> {
         let (node, place, speed) = self.motion_at(model, window.middle())?;
         let speed = speed.max(LEAST_SPEED_M_PER_S);
-        let noise = CONTACT_SCATTER_M * CONTACT_SCATTER_M + speed * speed * window.variance_s2();
+        let noise = model.sensor_variance(Some(sensor)) + speed * speed * window.variance_s2();
         let off = CHANGED_PART * place.mean;
         let density = path_reaches(context, model, node, sensor).map(|reach| {
             let variance = place.variance + reach.length.variance + noise;

@@ -1,7 +1,7 @@
 //! The most likely course of a train: where its laws take it from one command to the next.
 //!
 //! Letters: `b` place at which the segment under way began (m), `ε` deviation of ln speed of this run, `η` by how much
-//! (s) the start was late, `ζ` way (m) by which the change under way differs from its law, `S(t)` way of the segment by
+//! (s) the start was late, `ζ` distance (m) by which the change under way differs from its law, `S(t)` distance of the segment by
 //! the laws, `r(t)` share of its change that is done. What is the same whenever the train does it again has letters
 //! that last, for a train that does the same again and again: by how much (s) changes of speed are later than their law,
 //! `τ` upwards and downwards, and what ln speed is off by at each of the steps met of late, `s`. With `Δ` the speed before
@@ -11,8 +11,8 @@
 //! x(t) = b + e^(ε + s) S(t − η) + (ζ + τ Δ) r(t)
 //! ```
 //!
-//! [`MotionFilter`](super::MotionFilter) knows beside it how sure each letter is. What commands not given yet would come to is
-//! asked of a copy: cheap enough to look at thousands of ways to go on within a millisecond.
+//! [`MotionFilter`](super::MotionFilter) has the covariance of the letters. A copy answers what further commands would lead to: cheap
+//! enough for thousands of alternatives within a millisecond.
 #![expect(clippy::indexing_slicing, reason = "arrays of letters, indexed by letters")]
 
 use super::apart::Apart;
@@ -36,7 +36,7 @@ pub(crate) const N: usize = STEPS + STEPS_KEPT;
 /// line carries more: see [`FilterState::tell`].
 const MOST_PENDING: usize = 6;
 
-/// A train under way. Ways in m from an origin that the caller keeps, times in s on a clock of the caller's.
+/// A train in motion. Distances in m from an origin that the caller keeps, times in s on the caller's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct FilterState {
@@ -126,23 +126,23 @@ impl FilterState {
     pub(crate) fn settle(&mut self, model: &MotionModel, time: f64) {
         while let Some((commanded, begins)) = self.next_effect(model).filter(|(_, begins)| *begins <= time) {
             let until = if commanded.at_rest { f64::INFINITY } else { begins };
-            let (way, _) = self.way_and_slope(until);
-            self.begin(model, commanded, begins, way);
+            let (distance, _) = self.place_and_slope(until);
+            self.begin(model, commanded, begins, distance);
         }
     }
 
-    /// The next segment begins, from a place: the way so far becomes its origin. Returns how fast it was there.
+    /// The next segment begins at a place (m), which becomes its origin. Returns the speed there.
     pub(super) fn begin(
         &mut self,
         model: &MotionModel,
         commanded: SpeedCommand,
         begins: f64,
-        way: f64,
+        distance: f64,
     ) -> f64 {
         self.pending.rotate_left(1);
         self.pending[MOST_PENDING - 1] = None;
         let pace = if commanded.at_rest { Pace::steady(0.0) } else { self.segment.pace(begins - self.x[H]) };
-        self.x[B] = way;
+        self.x[B] = distance;
         let apart = self.apart.map(|apart| apart.next(self, &commanded, begins));
         self.segment = Segment::of(&commanded, &model.answers(), pace);
         self.segment.begins = begins;
@@ -170,7 +170,7 @@ impl FilterState {
         self.is_repeating && commanded.to != 0 && !commanded.at_rest
     }
 
-    /// Whether it will do the same again and again from now on; what it learnt of that before is forgotten.
+    /// Whether the same commands repeat from now on; what was learnt before is forgotten.
     pub(super) fn repeat(&mut self, is_repeating: bool) {
         self.is_repeating = is_repeating;
         if is_repeating {
@@ -188,8 +188,7 @@ impl FilterState {
         Some(STEPS + at)
     }
 
-    /// Runs at a step, of which nothing is known but what the model says unless it is kept. Letters that are busy are not
-    /// given away.
+    /// Runs at a step, of which only the model is known unless its letter is kept. Letters in use are not replaced.
     pub(super) fn meet(&mut self, step: u8, above: bool, busy: [usize; 2]) -> usize {
         self.kept(step, above).unwrap_or_else(|| {
             while busy.contains(&(STEPS + self.oldest)) {
@@ -209,16 +208,16 @@ impl FilterState {
         met.map(|(at, (step, above))| (STEPS + at, step, above))
     }
 
-    /// Its speed over what the segment under way says of it.
+    /// Its speed relative to that of the segment under way.
     pub(super) fn grown(&self) -> f64 {
         // Where steps are apart the segment has the speed of its step already.
         let by_step = self.speed.filter(|_| self.apart.is_none()).map_or(0.0, |letter| self.x[letter]);
         libm::exp(self.x[E] + by_step)
     }
 
-    /// It has been running steadily for long: ways are counted from here on.
-    pub(super) fn run_on(&mut self, time: f64, way: f64) {
-        self.x[B] = way;
+    /// It has been running steadily for long: distances count from here.
+    pub(super) fn run_on(&mut self, time: f64, distance: f64) {
+        self.x[B] = distance;
         self.segment = Segment::steady(time, self.segment.to);
         self.slower = 0.0;
         if let Some(apart) = &mut self.apart {
@@ -226,7 +225,7 @@ impl FilterState {
         }
     }
 
-    /// By how much way the change under way differs from its law once it is done.
+    /// By how much (m) the change under way differs from its law once it is done.
     fn displaced(&self) -> f64 {
         self.x[Z] + self.slower * self.x[self.later]
     }
@@ -244,36 +243,40 @@ impl FilterState {
         slope
     }
 
-    /// `x(t)` and its slopes; at an infinite time the whole way of a stop.
-    pub(super) fn way_and_slope(&self, time: f64) -> (f64, [f64; N]) {
+    /// `x(t)` and its slopes; at an infinite time the place of rest.
+    pub(super) fn place_and_slope(&self, time: f64) -> (f64, [f64; N]) {
         let grown = self.grown();
         if time.is_infinite() {
-            let way = self.segment.way_to_rest();
-            let place = self.x[B] + grown * way + self.displaced();
-            return (place, self.slope([1.0, grown * way, 0.0, 1.0], time));
+            let distance = self.segment.distance_to_rest();
+            let place = self.x[B] + grown * distance + self.displaced();
+            return (place, self.slope([1.0, grown * distance, 0.0, 1.0], time));
         }
         let late = time - self.x[H];
-        let way = if self.is_still() { 0.0 } else { self.segment.way(late) + self.learnt_since(time) };
+        let distance =
+            if self.is_still() { 0.0 } else { self.segment.distance(late) + self.learnt_since(time) };
         let (speed, share) = (self.segment.speed(late), self.segment.share(time));
-        let place = self.x[B] + grown * way + self.displaced() * share;
-        (place, self.slope([1.0, grown * way, -grown * speed, share], time))
+        let place = self.x[B] + grown * distance + self.displaced() * share;
+        (place, self.slope([1.0, grown * distance, -grown * speed, share], time))
     }
 
     pub(super) const fn is_still(&self) -> bool {
         self.segment.from.speed == 0.0 && self.segment.to == 0.0
     }
 
-    /// Where it is (m), once all that has taken effect by then has been taken in.
+    /// Where it is (m), after all commands that have taken effect by then.
     pub(crate) fn place(&self, time: f64) -> f64 {
         let is_done = self.rests_at(time) && !self.is_still();
         let (grown, displaced) = (self.grown(), self.displaced());
         if is_done {
-            return self.x[B] + grown * self.segment.way_to_rest() + displaced;
+            return self.x[B] + grown * self.segment.distance_to_rest() + displaced;
         }
-        let way =
-            if self.is_still() { 0.0 } else { self.segment.way(time - self.x[H]) + self.learnt_since(time) };
+        let distance = if self.is_still() {
+            0.0
+        } else {
+            self.segment.distance(time - self.x[H]) + self.learnt_since(time)
+        };
         let change = if displaced == 0.0 { 0.0 } else { displaced * self.segment.share(time) };
-        self.x[B] + grown * way + change
+        self.x[B] + grown * distance + change
     }
 
     /// The speed (m/s) that the change under way has still to make at a time.
@@ -281,7 +284,7 @@ impl FilterState {
         (self.segment.to - self.segment.speed(time - self.x[H])).abs()
     }
 
-    /// How fast it is (m/s) then.
+    /// Its speed (m/s) then.
     pub(crate) fn speed(&self, time: f64) -> f64 {
         self.grown() * self.segment.speed(time - self.x[H])
     }

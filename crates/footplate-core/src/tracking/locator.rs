@@ -5,7 +5,7 @@
 //! differ a little from path lengths.
 
 use super::motion_filter::MotionFilter;
-use super::path_length::{PathReach, hop_length, path_reaches, taping_doubt};
+use super::path_length::{PathReach, hop_length, path_reaches, taping_deviation};
 use super::reachable_set::ReachableSet;
 use super::rollout::Rollout;
 use super::track_context::TrackContext;
@@ -15,11 +15,8 @@ use crate::linalg::Gaussian;
 use crate::link::{ContactWindow, TruncatedNormal};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::HopId;
 use crate::units::{Length, Speed};
 
-/// Standard deviation of where a sensor closes, from one passage to the next (m).
-pub(super) const CONTACT_SCATTER_M: f64 = 0.0015;
 /// Standard deviation of the position of a lost train (m).
 const ANYWHERE_M: f64 = 30.0;
 /// A sensor that is this many standard deviations behind the train was missed.
@@ -166,7 +163,7 @@ impl Locator {
     /// The position of the train is lost: it was lifted, or reports contradict it. It keeps running at the commanded step.
     pub const fn lose(&mut self) {
         self.node = None;
-        self.filter.doubt_place(ANYWHERE_M * ANYWHERE_M);
+        self.filter.widen_place(ANYWHERE_M * ANYWHERE_M);
     }
 
     /// Whether the same commands repeat from now on, so that the filter should learn what its changes have in common.
@@ -179,7 +176,7 @@ impl Locator {
         match event.kind {
             EventKind::Speed { train, step } if train == self.train => {
                 self.filter.command(model, self.seconds(event.time), step.get());
-                self.filter.stop_on(self.stops_on(context, model, &self.filter));
+                self.filter.offset_stop(self.stop_offset(context, model, &self.filter));
             }
             // It faces the other direction now; how far its pickup reaches on that side is unknown here.
             EventKind::Reverse { train } if train == self.train => self.lose(),
@@ -204,7 +201,7 @@ impl Locator {
         let time = self.seconds(window.middle());
         let place = self.filter.place(model, time);
         let speed = self.filter.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
-        let noise = CONTACT_SCATTER_M * CONTACT_SCATTER_M + speed * speed * window.variance_s2();
+        let noise = model.sensor_variance(Some(sensor)) + speed * speed * window.variance_s2();
         let short = |reach: &PathReach| Gaussian {
             mean: reach.length.mean - place.mean,
             variance: place.variance + reach.length.variance + noise,
@@ -245,26 +242,26 @@ impl Locator {
         let time = self.seconds(window.middle());
         let known = PassedContact { sensor, window, at: window.middle(), late: None, short: None, missed: 0 };
         let Some(node) = context.node_of(sensor) else { return known };
+        let scatter = model.sensor_variance(Some(sensor));
         let Some((reach, short, _)) = self.best_reach(context, model, sensor, window) else {
             // Lost until now, or no path leads here: the train is here all the same, at the speed it had.
-            self.filter.doubt_place(ANYWHERE_M * ANYWHERE_M);
+            self.filter.widen_place(ANYWHERE_M * ANYWHERE_M);
             self.filter.shift(-self.filter.place(model, time).mean, 0.0);
-            let here = Gaussian { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
+            let here = Gaussian { mean: 0.0, variance: scatter };
             self.filter.pass(model, time, window.variance_s2(), here);
             self.node = Some(node);
             return known;
         };
         let speed = self.filter.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
-        let scatter = CONTACT_SCATTER_M * CONTACT_SCATTER_M;
+        let here = Gaussian { mean: 0.0, variance: scatter };
         let contradicts = short.mean * short.mean > GATE * GATE * short.variance;
         let mut at = window.middle();
         if !contradicts {
-            at = self.fuse(model, &reach, window, time + short.mean / speed);
-        } else if self.filter.doubt_change(model, time, short.mean) {
+            at = self.fuse(model, [reach.length, here], window, time + short.mean / speed);
+        } else if self.filter.widen_change(model, time, short.mean) {
             // The innovation exceeds its predicted variance, and a change of speed under way will continue to deviate. The
             // sensor gives the position, however uncertain the path to it is.
             self.filter.shift(-reach.length.mean, reach.length.variance);
-            let here = Gaussian { mean: 0.0, variance: scatter };
             self.filter.pass(model, time, window.variance_s2(), here);
         } else {
             // Model and report contradict each other. An error of the path is not attributed to the train's speed, so that
@@ -273,8 +270,7 @@ impl Locator {
             self.filter.pass(model, time, window.variance_s2(), place);
             self.filter.shift(-reach.length.mean, 0.0);
             // The sensor gives the position all the same: the innovation exceeds its predicted variance.
-            self.filter.doubt_place(short.mean * short.mean);
-            let here = Gaussian { mean: 0.0, variance: scatter };
+            self.filter.widen_place(short.mean * short.mean);
             self.filter.pass(model, time, window.variance_s2(), here);
         }
         self.node = Some(node);
@@ -291,21 +287,26 @@ impl Locator {
     /// Updates with a report that agrees with the prediction, by which the train was due at a time (s). The train reached the
     /// sensor within the window; within it, the prediction alone says which times are likely. Distances count from this
     /// sensor from now on. Returns the most likely time of the passage.
-    fn fuse(&mut self, model: &MotionModel, reach: &PathReach, window: ContactWindow, due: f64) -> Timestamp {
+    fn fuse(
+        &mut self,
+        model: &MotionModel,
+        [length, sensor]: [Gaussian; 2],
+        window: ContactWindow,
+        due: f64,
+    ) -> Timestamp {
         let [after, until] = [window.after, window.until].map(|end| self.seconds(end));
         let time = due.clamp(after, until.max(after));
         let place = self.filter.place(model, time);
         let speed = self.filter.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
-        let scatter = CONTACT_SCATTER_M * CONTACT_SCATTER_M;
         let short = TruncatedNormal {
-            mean: reach.length.mean - place.mean,
-            variance: place.variance + reach.length.variance + scatter,
+            mean: length.mean - place.mean,
+            variance: place.variance + length.variance + sensor.variance,
             low: speed * (after - time),
             high: speed * (until - time),
         };
         let (measured, variance) = short.as_measurement();
-        self.filter.shift(-reach.length.mean, reach.length.variance);
-        let here = Gaussian { mean: -measured, variance: scatter + variance };
+        self.filter.shift(-length.mean, length.variance);
+        let here = Gaussian { mean: -measured, variance: sensor.variance + variance };
         self.filter.pass(model, time, 0.0, here);
         self.timestamp(time + short.moments().0 / speed)
     }
@@ -317,7 +318,7 @@ impl Locator {
         let time = self.seconds(at);
         let place = self.filter.place(model, time);
         let here = PathPoint { node, distance: Length::from_m(place.mean) };
-        let taping = taping_doubt(context, model, here);
+        let taping = taping_deviation(context, model, here);
         let speed = self.filter.speed(model, time);
         let at_rest = self.filter.at(model, time).rests_at(time);
         Some(Located {
@@ -341,16 +342,17 @@ impl Locator {
         let node = self.node?;
         let time = self.seconds(now);
         let here = self.filter.place(model, time);
-        let mut way = Gaussian { mean: 0.0, variance: CONTACT_SCATTER_M * CONTACT_SCATTER_M };
+        let mut way = Gaussian { mean: 0.0, variance: 0.0 };
         for hop in context.hops_ahead(node).take(MOST_HOPS) {
             let reach = hop_length(context, model, &hop);
             way = Gaussian { mean: way.mean + reach.mean, variance: way.variance + reach.variance };
             let beyond = here.mean - way.mean;
-            if beyond > MISSED_BEYOND * libm::sqrt(here.variance + way.variance) {
+            let at = Gaussian { variance: way.variance + model.sensor_variance(hop.sensor), ..way };
+            if beyond > MISSED_BEYOND * libm::sqrt(here.variance + at.variance) {
                 continue;
             }
             let sensor = hop.sensor?;
-            let (due, doubt) = self.filter.reaches(model, way, time)?;
+            let (due, doubt) = self.filter.reaches(model, at, time)?;
             let speed = self.filter.speed(model, due).mean;
             return Some(DueContact {
                 sensor,
@@ -402,24 +404,28 @@ impl Locator {
         self.rest_of(context, moved, model)
     }
 
-    /// The hop on which a train that was commanded to stop comes to rest, before stop offsets are applied.
-    fn stops_on(
+    /// By how much (m) the stop of a train that was commanded to stop is longer because of the track that it runs over.
+    fn stop_offset(
         &self,
         context: TrackContext<'_>,
         model: &MotionModel,
         filter: &MotionFilter,
-    ) -> Option<HopId> {
+    ) -> Option<Gaussian> {
         let mut anywhere = *filter;
-        anywhere.stop_on(None);
-        let (rest, ..) = anywhere.rest(model)?;
-        let mut way = 0.0;
-        for hop in context.hops_ahead(self.node?).take(MOST_HOPS) {
-            way += hop_length(context, model, &hop).mean;
-            if rest.mean < way {
-                return Some(hop.id);
-            }
-        }
-        None
+        anywhere.offset_stop(None);
+        let (rest, effect) = anywhere.stop(model)?;
+        let mut begins = 0.0;
+        let edges = context.hops_ahead(self.node?).take(MOST_HOPS).flat_map(|hop| {
+            let length = hop_length(context, model, &hop).mean;
+            let scale = if hop.length > Length::ZERO { length / hop.length.as_m() } else { 0.0 };
+            hop.edges.iter().map(move |edge| (*edge, scale))
+        });
+        let parts = edges.map_while(|(edge, scale)| {
+            let from = begins;
+            begins += scale * context.layout.edge(edge)?.length.as_m();
+            (from < rest).then(|| (edge, effect.between(rest - from, rest - begins)))
+        });
+        Some(model.stop_offset(parts, effect.speed))
     }
 
     fn rest_of(
@@ -429,10 +435,10 @@ impl Locator {
         model: &MotionModel,
     ) -> Option<Rest> {
         let node = self.node?;
-        filter.stop_on(self.stops_on(context, model, &filter));
+        filter.offset_stop(self.stop_offset(context, model, &filter));
         let (place, scatter, time) = filter.rest(model)?;
         let at = PathPoint { node, distance: Length::from_m(place.mean) };
-        let taping = taping_doubt(context, model, at);
+        let taping = taping_deviation(context, model, at);
         Some(Rest {
             at,
             doubt: Length::from_m(libm::sqrt(place.variance + taping * taping)),

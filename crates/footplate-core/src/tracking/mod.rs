@@ -2,7 +2,7 @@
 //!
 //! [`Predictor`] walks a recording entry by entry and never looks ahead. At every passage of a sensor it
 //! compares what it had forecast with what happened ([`Hit`]), and learns: where the train is, how fast it runs and how
-//! long the hops are (`arrival_filter`), how exactly each sensor trips (`sensor_scatter`), and, at the end of every run, how
+//! long the hops are (`arrival_filter`), how exactly each sensor trips, and, at the end of every run, how
 //! the train answers its commands ([`MotionFit`](crate::model::MotionFit)). Each forecast is a distribution
 //! ([`Forecast`]) whose intervals hold as often as they say.
 //!
@@ -25,7 +25,6 @@ mod predictor;
 mod reachable_set;
 mod rollout;
 mod route_memory;
-mod sensor_scatter;
 mod shown_length;
 #[cfg(feature = "serde")]
 mod square;

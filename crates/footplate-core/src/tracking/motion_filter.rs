@@ -1,44 +1,45 @@
-//! A train under way: where its laws take it from one command to the next, with the doubts that come with each.
+//! Kalman filter of a train in motion: its position by the laws of each command, with the uncertainty that each command adds.
 //!
-//! The letters of its [`FilterState`] are a Kalman filter's state. A new command begins a new segment: its `b` is the `x` at which it
-//! takes effect, and the doubt of what is its own alone comes to `ε` and `ζ`. What it has in common with those before, how
-//! late changes are and how fast its step is, `τ` and `s` go on knowing.
+//! The letters of its [`FilterState`] are the state. A new command begins a new segment: its `b` is the `x` at which the command
+//! takes effect, and the uncertainty of this change alone goes into `ε` and `ζ`. What changes have in common, how late they are
+//! and how fast each step is, stays in `τ` and `s`.
 #![expect(clippy::indexing_slicing, reason = "arrays of letters, indexed by letters")]
 
 use super::apart::STEP_AGAIN;
-use super::arrival::{BISECTIONS, LONGEST_WAIT, SLOWEST};
 use super::filter_state::{B, E, FilterState, H, LATER, N, Z};
 use crate::linalg::Gaussian;
 use crate::model::MotionModel;
-use crate::model::{OTHER_SHAPES, SpeedCommand};
+use crate::model::{OTHER_SHAPES, SpeedCommand, StopEffect};
 use crate::model::{WANDER, change_error, run_variance};
-use crate::track::HopId;
 
 /// Over this time (s) a run's speed wanders by [`WANDER`].
 const WANDERS_IN: f64 = 4.0;
-/// Looks at one contact from ever better points: speed and place bend the way while little is known.
+/// Iterations of an update: while little is known, the distance is not linear in the speed.
 const LOOKS: usize = 3;
-/// Share of a change from which on it is to blame for what is off: earlier, what is off by little would be off by many times
-/// that in the end.
+/// Share of a change from which on it explains a large innovation: earlier, a small innovation would mean many times that at the
+/// end of the change.
 const BEGUN: f64 = 0.3;
 /// A steady run is counted anew after this long (s): before, the law of its start and its speed are still distinguished.
 const LONG_RUN: f64 = 20.0;
+/// With a larger standard deviation of ln speed a steady run is counted anew at every sensor: the distance so far bends with the
+/// speed, and a line through it would be off by half the square, 2 %.
+const UNSURE_SPEED: f64 = 0.2;
 /// Share of a change from which on the run is steady: what is left is less than a millimetre.
 const STEADY: f64 = 0.995;
-/// A change that begins while another is under way goes another way than the sum of both, by the speed that was still
-/// missing over this time (s): an eased decoder begins again at no rate at all, a counter goes on at its own.
+/// A change that begins during another differs from the sum of both by the speed that was still missing times this time (s): an eased
+/// decoder begins again at rate zero, a counter continues at its own rate.
 pub(crate) const INTERRUPTED: f64 = 0.2;
 /// By how much (s) all changes of a train in one direction are later or earlier than its law has them: of what single ones
 /// differ from it, 5 % of 0.8 s, about as much as is left once this is taken away.
 const LATER_CHANGE: f64 = 0.03;
-/// From one change to the next that, and ln of the speed of a step, walk by so much: no law is quite true, and what was learnt in
-/// the state in which a train was told something fades over some dozens of changes (chosen by how well speeds are held).
+/// Process noise of that, and of ln of the speed of a step, from one change to the next: no law is exact, and what was learnt
+/// in one state of a train fades over some dozens of changes (chosen by how well speeds are held).
 const LATER_WALK: f64 = 0.004;
 const STEP_WALK: f64 = 0.0005;
-/// A train in motion. Distances in m from an origin that the caller keeps, times in s on a clock of the caller's.
+/// A train in motion. Distances in m from an origin that the caller keeps, times in s on the caller's clock.
 ///
-/// `L` letters: those of its [`FilterState`], and behind them any number of companions, which are not its own but are known
-/// together with it ([`pass_beside`](Self::pass_beside)). The companions' means are kept by the caller.
+/// `L` letters: those of its [`FilterState`], and behind them any number of companions, which are other numbers correlated with them
+/// ([`pass_beside`](Self::pass_beside)). The caller keeps the companions' means.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct MotionFilter<const L: usize = N> {
@@ -47,11 +48,11 @@ pub(crate) struct MotionFilter<const L: usize = N> {
     pub(super) p: [[f64; L]; L],
     /// Until when wander is in the variance of `ε`.
     wandered: f64,
-    /// What of the variance of ln of a speed is not believed to be learnt for every single moment.
+    /// The part of the variance of ln of a speed that is not learnt for each moment.
     local: f64,
-    /// Where a stop would end, as far as its owner knows.
+    /// By how much (m) a stop that has not begun is longer because of the track ahead, as far as its owner knows.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
-    stops_on: Option<HopId>,
+    stop_offset: Option<Gaussian>,
 }
 
 impl<const L: usize> MotionFilter<L> {
@@ -59,7 +60,13 @@ impl<const L: usize> MotionFilter<L> {
     pub(crate) fn at_rest(time: f64, place: Gaussian) -> Self {
         let mut p = [[0.0; L]; L];
         p[B][B] = place.variance;
-        Self { course: FilterState::at_rest(time, place.mean), p, wandered: time, local: 0.0, stops_on: None }
+        Self {
+            course: FilterState::at_rest(time, place.mean),
+            p,
+            wandered: time,
+            local: 0.0,
+            stop_offset: None,
+        }
     }
 
     /// Running steadily at a step for long.
@@ -71,7 +78,7 @@ impl<const L: usize> MotionFilter<L> {
         following
     }
 
-    /// Where it most likely goes from here, doubts apart.
+    /// The most likely motion from here, without uncertainty.
     pub(crate) const fn course(&self) -> FilterState {
         self.course
     }
@@ -90,9 +97,9 @@ impl<const L: usize> MotionFilter<L> {
         self.course.command(sent, step);
     }
 
-    /// A stop that has not begun yet would end on a hop.
-    pub(crate) const fn stop_on(&mut self, hop: Option<HopId>) {
-        self.stops_on = hop;
+    /// A stop that has not begun yet is longer by so much (m).
+    pub(crate) const fn offset_stop(&mut self, by: Option<Gaussian>) {
+        self.stop_offset = by;
     }
 
     /// Whether a train that was commanded to stop stands by a time.
@@ -114,17 +121,17 @@ impl<const L: usize> MotionFilter<L> {
         self.wandered = self.wandered.max(time);
     }
 
-    /// The next segment begins: the way so far becomes its origin.
+    /// The next segment begins: the distance so far becomes its origin.
     fn begin(&mut self, model: &MotionModel, commanded: SpeedCommand, begins: f64) {
         let from_rest = commanded.at_rest;
-        // A train at rest has run its whole way to rest, whenever it is told the next step.
+        // A train at rest has run its whole stopping distance, whenever the next step is commanded.
         let time = if from_rest { f64::INFINITY } else { begins };
-        let (way, slope) = self.way_and_slopes(time);
+        let (place, slope) = self.place_and_slopes(time);
         let unshaped = if from_rest { 0.0 } else { self.shape_speed_error(begins) };
         let unsettled = self.course.unsettled(begins);
         self.transform(slope);
         let kept = self.course.kept(commanded.to, commanded.above());
-        let speed = self.course.begin(model, commanded, begins, way);
+        let speed = self.course.begin(model, commanded, begins, place);
         for letter in [H, Z] {
             self.forget(letter);
         }
@@ -135,15 +142,15 @@ impl<const L: usize> MotionFilter<L> {
             self.p[H][H] = late * late + model.start_delay_variance();
         }
         if commanded.to != 0 {
-            self.doubt_step(model.ln_speed_variance(commanded.to, commanded.above()), kept.is_some());
+            self.widen_step(model.ln_speed_variance(commanded.to, commanded.above()), kept.is_some());
         }
         let to = self.course.segment.to;
-        let doubt = if commanded.to == 0 {
-            model.stop_doubt(speed)
+        let deviation = if commanded.to == 0 {
+            model.stop_deviation(speed)
         } else if from_rest {
-            model.start_doubt(to)
+            model.start_deviation(to)
         } else {
-            model.change_doubt(speed, to)
+            model.change_deviation(speed, to)
         };
         let error = if commanded.to == 0 || from_rest {
             0.0
@@ -151,19 +158,20 @@ impl<const L: usize> MotionFilter<L> {
             let part = if self.course.apart.is_some() { OTHER_SHAPES } else { 1.0 };
             part * libm::hypot(change_error(to - speed), INTERRUPTED * unsettled)
         };
-        // Who begins faster than was thought is farther by so much once the change is done.
+        // A train that begins faster than estimated is farther by so much once the change is done.
         let carried = unshaped * self.course.segment.delay();
-        self.p[Z][Z] = doubt * doubt + error * error + carried * carried;
+        self.p[Z][Z] = deviation * deviation + error * error + carried * carried;
         if commanded.to == 0 {
             let speed = speed * self.course.grown();
-            let (scatter, offset) = (model.scatter(speed), model.stop_offset(self.stops_on, speed));
+            let scatter = model.scatter(speed);
+            let offset = self.stop_offset.unwrap_or_else(|| model.stop_offset(core::iter::empty(), speed));
             self.p[Z][Z] += scatter * scatter + offset.variance;
             self.course.x[Z] = offset.mean;
         }
     }
 
-    /// A step was told whose ln speed the model knows to a variance, and which may have been met before.
-    fn doubt_step(&mut self, variance: f64, is_kept: bool) {
+    /// A step was commanded whose ln speed the model knows to a variance, and which the train may have run at before.
+    fn widen_step(&mut self, variance: f64, is_kept: bool) {
         let Some(letter) = self.course.speed else {
             self.p[E][E] += variance;
             self.local = 0.0;
@@ -184,7 +192,7 @@ impl<const L: usize> MotionFilter<L> {
         }
     }
 
-    /// Whether from now on it is told the same again and again, so that what its changes have in common is worth learning.
+    /// Whether the same commands repeat from now on, so that what its changes have in common is learnt.
     pub(crate) fn repeat(&mut self, is_repeating: bool) {
         if is_repeating {
             self.p[E][E] = self.ln_speed_variance();
@@ -200,7 +208,7 @@ impl<const L: usize> MotionFilter<L> {
         }
     }
 
-    /// Moves the origin along a slope: `b` takes in all of it.
+    /// Moves the origin along a slope: `b` takes all of its variance.
     pub(super) fn transform(&mut self, slope: [f64; L]) {
         let with = self.covariance_along(&slope);
         let own: f64 = (0..L).map(|j| slope[j] * with[j]).sum();
@@ -220,7 +228,7 @@ impl<const L: usize> MotionFilter<L> {
         }
     }
 
-    /// The state at a time that is not before the last contact.
+    /// The state at a time that is not before the last detection.
     pub(crate) fn at(&self, model: &MotionModel, time: f64) -> Self {
         let mut later = *self;
         later.settle(model, time);
@@ -231,7 +239,7 @@ impl<const L: usize> MotionFilter<L> {
     pub(crate) fn place(&self, model: &MotionModel, time: f64) -> Gaussian {
         let later = self.at(model, time);
         let is_done = later.rests_at(time) && !later.course.is_still();
-        let (mean, slope) = later.way_and_slopes(if is_done { f64::INFINITY } else { time });
+        let (mean, slope) = later.place_and_slopes(if is_done { f64::INFINITY } else { time });
         let shape = later.shape_error(time);
         Gaussian { mean, variance: later.variance_along(slope) + shape * shape }
     }
@@ -243,7 +251,7 @@ impl<const L: usize> MotionFilter<L> {
         Gaussian { mean: speed, variance: speed * speed * later.ln_speed_variance() }
     }
 
-    /// Once all that was told has taken effect.
+    /// Once all commands have taken effect.
     pub(crate) fn after_all(&self, model: &MotionModel) -> Self {
         let mut later = *self;
         while let Some((_, begins)) = later.course.next_effect(model) {
@@ -252,7 +260,7 @@ impl<const L: usize> MotionFilter<L> {
         later
     }
 
-    /// Its speed (m/s) at a time, with what no shape of a change is true to and what a start that is late or early makes of it.
+    /// Its speed (m/s) at a time, with the uncertainty of the shape of a change and of the time of a start.
     pub(crate) fn changing_speed(&self, model: &MotionModel, time: f64) -> Gaussian {
         let speed = self.speed(model, time);
         let later = self.at(model, time);
@@ -276,19 +284,28 @@ impl<const L: usize> MotionFilter<L> {
         self.p[E][E] + self.p[step][step] + 2.0 * self.p[E][step] + self.local
     }
 
-    /// Where it comes to rest (m), the scatter of stops left out: (place, doubt², scatter²), and when (s). `None` for a
+    /// Where it comes to rest (m) without the scatter of stops, the variance of that scatter, and when (s). `None` for a
     /// train that was commanded to run.
     pub(crate) fn rest(&self, model: &MotionModel) -> Option<(Gaussian, f64, f64)> {
         let later = self.after_all(model);
         if later.course.step != 0 {
             return None;
         }
-        let (mean, slope) = later.way_and_slopes(f64::INFINITY);
+        let (mean, slope) = later.place_and_slopes(f64::INFINITY);
         let speed = later.course.segment.from.speed * later.course.grown();
         let scatter = if speed > 0.0 { model.scatter(speed) } else { 0.0 };
         let scatter = scatter * scatter;
         let variance = (later.variance_along(slope) - scatter).max(0.0);
         Some((Gaussian { mean, variance }, scatter, later.course.rest_time()))
+    }
+
+    /// Where a train that was commanded to stop comes to rest (m) without what the track adds, and how it stops.
+    pub(super) fn stop(&self, model: &MotionModel) -> Option<(f64, StopEffect)> {
+        let later = self.after_all(model);
+        let (segment, grown) = (later.course.segment, later.course.grown());
+        let effect =
+            StopEffect { speed: grown * segment.from.speed, distance: grown * segment.distance_to_rest() };
+        (later.course.step == 0).then(|| (later.place_and_slopes(f64::INFINITY).0, effect))
     }
 
     /// One standard deviation (m/s) of the speed in the middle of a change.
@@ -301,11 +318,11 @@ impl<const L: usize> MotionFilter<L> {
     }
 
     /// Where it is at a time, with the slopes of that.
-    pub(super) fn way_and_slopes(&self, time: f64) -> (f64, [f64; L]) {
-        let (way, own) = self.course.way_and_slope(time);
+    pub(super) fn place_and_slopes(&self, time: f64) -> (f64, [f64; L]) {
+        let (place, own) = self.course.place_and_slope(time);
         let mut slope = [0.0; L];
         slope[..N].copy_from_slice(&own);
-        (way, slope)
+        (place, slope)
     }
 
     /// Covariance with each letter of the sum of letters times slopes.
@@ -346,7 +363,7 @@ impl<const L: usize> MotionFilter<L> {
         let shape = self.shape_error(time);
         let noise = place.variance + speed * speed * time_variance + shape * shape;
         let (mean, before) = (self.course.x, *self);
-        let (first, slope) = self.way_and_slopes(time);
+        let (first, slope) = self.place_and_slopes(time);
         let (mut seen, mut slope) = (first, Self::past(slope, slopes));
         let short = Gaussian { mean: place.mean - first, variance: self.variance_along(slope) + noise };
         for look in 1..=LOOKS {
@@ -369,7 +386,7 @@ impl<const L: usize> MotionFilter<L> {
                     *mean += with / s * off;
                 }
             } else {
-                let (place, motion) = self.course.way_and_slope(time);
+                let (place, motion) = self.course.place_and_slope(time);
                 seen = place;
                 slope[..N].copy_from_slice(&motion);
             }
@@ -378,40 +395,41 @@ impl<const L: usize> MotionFilter<L> {
         short
     }
 
-    /// Begins the way of a steady run anew: what its speed does from here on says nothing of the way so far. Counted from
-    /// where the run began, wander of some tenths of a per cent would put a train in doubt by that part of all its way.
+    /// Counts the distance of a steady run anew: its speed from here on says nothing of the distance so far. Counted from
+    /// where the run began, wander of some tenths of a per cent would widen the place by that part of the whole distance.
     fn count_from(&mut self, time: f64) {
         let segment = self.course.segment;
-        // What companions share with the way so far, their covariance tells apart.
-        let long = if self.course.apart.is_some() { 0.0 } else { LONG_RUN };
+        // The covariance with companions separates what they share with the distance so far.
+        let is_unsure = self.p[E][E] > UNSURE_SPEED * UNSURE_SPEED;
+        let long = if self.course.apart.is_some() || is_unsure { 0.0 } else { LONG_RUN };
         let is_steady = segment.share(time) >= STEADY && time - segment.begins > long;
         if self.course.step == 0 || !is_steady {
             return;
         }
-        let (way, slope) = self.way_and_slopes(time);
+        let (place, slope) = self.place_and_slopes(time);
         self.transform(slope);
-        self.course.run_on(time, way);
+        self.course.run_on(time, place);
         for letter in [H, Z] {
             self.forget(letter);
             self.course.x[letter] = 0.0;
         }
     }
 
-    /// Where it is nobody knows any more.
-    pub(crate) const fn doubt_place(&mut self, variance: f64) {
+    /// Its place is unknown from now on, to a variance (m²).
+    pub(crate) const fn widen_place(&mut self, variance: f64) {
         self.forget(B);
         self.p[B][B] = variance;
     }
 
-    /// It is so far (m) from where it is believed to be as no doubt allows. While a change of speed is under way that is off,
-    /// and so is the rest of it: a start that is late, or one that goes another way. Whether there is one.
-    pub(crate) fn doubt_change(&mut self, model: &MotionModel, time: f64, off: f64) -> bool {
+    /// Its innovation (m) is larger than its uncertainty allows. During a change of speed the rest of the change is uncertain, too: a
+    /// start that is late, or a change of another shape. Whether a change is under way.
+    pub(crate) fn widen_change(&mut self, model: &MotionModel, time: f64, off: f64) -> bool {
         self.settle(model, time);
         let share = self.course.segment.share(time);
         if !(BEGUN..STEADY).contains(&share) {
             return false;
         }
-        let (_, slope) = self.course.way_and_slope(time);
+        let (_, slope) = self.course.place_and_slope(time);
         let letter = if self.course.segment.from.speed == 0.0 { H } else { Z };
         let wide = off / slope[letter];
         self.forget(letter);
@@ -419,40 +437,16 @@ impl<const L: usize> MotionFilter<L> {
         wide.is_finite()
     }
 
-    /// All ways are counted from elsewhere from now on, which is so far (m), with its variance.
+    /// Moves the origin of all distances by so much (m), with its variance.
     pub(crate) fn shift(&mut self, by: f64, variance: f64) {
         self.course.x[B] += by;
         self.p[B][B] += variance;
     }
-
-    /// When it reaches a place (s), with the standard deviation of that; `None` if it comes to rest before.
-    pub(crate) fn reaches(&self, model: &MotionModel, place: Gaussian, now: f64) -> Option<(f64, f64)> {
-        if let Some((rest, _, _)) = self.rest(model)
-            && rest.mean <= place.mean
-        {
-            return None;
-        }
-        let place_at = |time: f64| self.place(model, time).mean;
-        let (mut low, mut high) = (now, now + 0.5);
-        while place_at(high) < place.mean {
-            (low, high) = (high, now + 2.0 * (high - now));
-            if high - now > LONGEST_WAIT {
-                return None;
-            }
-        }
-        for _ in 0..BISECTIONS {
-            let middle = 0.5 * (low + high);
-            if place_at(middle) < place.mean { low = middle } else { high = middle }
-        }
-        let speed = self.speed(model, high).mean.max(SLOWEST);
-        let doubt = libm::sqrt(self.place(model, high).variance + place.variance) / speed;
-        Some((high, doubt))
-    }
 }
 
 impl<const L: usize> MotionFilter<L> {
-    /// From now on what is learnt of its run and of each step's speed is kept apart: for forecasts of a train that may be
-    /// hardly known.
+    /// From now on the deviation of its run and those of each step's speed are separate: for forecasts of a train that is hardly
+    /// known.
     pub(crate) fn keep_apart(mut self, model: &MotionModel) -> Self {
         if let Some(letter) = self.course.keep_apart() {
             let variance = model.ln_speed_variance(self.course.step, false);
@@ -469,25 +463,25 @@ mod tests {
     use crate::ids::{SpeedStep, TrainId};
 
     #[test]
-    fn what_all_changes_on_a_trip_have_in_common_is_learnt_and_foreseen() {
+    fn what_all_changes_of_a_trip_have_in_common_is_learnt_and_predicted() {
         // Given a train that answers every command but its start 60 ms later than its model says,
         let model = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));
         let mut begins: MotionFilter = MotionFilter::at_rest(0.0, Gaussian { mean: 0.0, variance: 1e-6 });
         begins.repeat(true);
-        let (mut train, mut believed) = (begins, begins);
+        let (mut train, mut estimated) = (begins, begins);
         let mut missed = [0.0; 2];
         for nth in 0..80_u8 {
-            // when it is told one step up and one down again, and again, and seen every two seconds,
+            // when one step up and one down are commanded again and again, and it is detected every two seconds,
             let (sent, step) = (2.0 * f64::from(nth), 8 + nth % 2);
             train.command(&model, sent + if nth == 0 { 0.0 } else { 0.06 }, step);
-            believed.command(&model, sent, step);
+            estimated.command(&model, sent, step);
             let seen = sent + 1.9;
             train = train.at(&model, seen);
             let place = Gaussian { mean: train.place(&model, seen).mean, variance: 1e-6 };
-            let short = believed.pass(&model, seen, 0.0, place).mean;
+            let short = estimated.pass(&model, seen, 0.0, place).mean;
             missed[usize::from(nth >= 40)] += short * short;
         }
-        // then it is foreseen better and better: half of what was missed would be a quarter of the squares.
+        // then its predictions improve: half of the error is a quarter of the squares.
         let [before, after] = missed;
         assert!(after < 0.25 * before, "{after} after {before} m²");
     }

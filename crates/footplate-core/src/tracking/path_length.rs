@@ -43,7 +43,7 @@ pub(super) fn hop_length(context: TrackContext<'_>, model: &MotionModel, hop: &H
     Gaussian { mean: length, variance: uncertainty * uncertainty }
 }
 
-fn felt(context: TrackContext<'_>, model: &MotionModel, layout: &Layout, reach: &Reach) -> PathReach {
+fn reach_length(context: TrackContext<'_>, model: &MotionModel, layout: &Layout, reach: &Reach) -> PathReach {
     let hops = reach.hops().iter().filter_map(|hop| layout.hop(*hop));
     let length = hops.map(|hop| hop_length(context, model, &hop)).fold(
         Gaussian { mean: 0.0, variance: 0.0 },
@@ -63,7 +63,7 @@ pub(super) fn path_reaches<'g>(
         .layout
         .reaches(from, context.turnouts, MOST_MISSED)
         .filter(move |reach| reach.sensor == Some(sensor))
-        .map(move |reach| felt(context, model, context.layout, &reach))
+        .map(move |reach| reach_length(context, model, context.layout, &reach))
 }
 
 /// The path length from a waypoint's node to a place on the layout, as the turnouts lie; `None` if no path leads there within
@@ -80,15 +80,15 @@ pub fn distance_to(
         if count > 0 && hop.from == from {
             return None;
         }
-        let [felt, _] = model.length(context.sections, &hop);
+        let [path_length, _] = model.length(context.sections, &hop);
         let mut along = Length::ZERO;
         for id in hop.edges {
             if *id == to.edge {
-                return Some(way + felt * part(along + to.offset, hop.length));
+                return Some(way + path_length * part(along + to.offset, hop.length));
             }
             along += context.layout.edge(*id)?.length;
         }
-        way += felt;
+        way += path_length;
     }
     None
 }
@@ -97,18 +97,21 @@ pub fn distance_to(
 /// close, the train to the difference between path length and surveyed length. Both are weighted by their variance; the train
 /// mostly knows it better.
 pub(super) fn taped_length(context: TrackContext<'_>, model: &MotionModel, hop: &Hop<'_>) -> Gaussian {
-    let felt = hop_length(context, model, hop);
+    let path_length = hop_length(context, model, hop);
     let surveyed = hop.length.as_m();
     let survey =
         context.sections.section(hop.id).map_or(0.0, |section| context.sections.survey_variance(section))
             + 2.0 * CONTACT_PLACE_M * CONTACT_PLACE_M;
     let feels = FELT * surveyed;
-    let train = felt.variance + feels * feels;
+    let train = path_length.variance + feels * feels;
     if train <= 0.0 {
         return Gaussian { mean: surveyed, variance: survey };
     }
     let (one, other) = (1.0 / survey, 1.0 / train);
-    Gaussian { mean: (surveyed * one + felt.mean * other) / (one + other), variance: 1.0 / (one + other) }
+    Gaussian {
+        mean: (surveyed * one + path_length.mean * other) / (one + other),
+        variance: 1.0 / (one + other),
+    }
 }
 
 /// The path length from a waypoint's node to a landmark ahead: so many millimetres past the sensor of its name, whatever the
@@ -129,12 +132,12 @@ pub fn distance_to_landmark(
     }
     let (mut way, mut left) = (base, to.offset);
     for hop in context.hops_ahead(to.node).take(MOST_HOPS) {
-        let felt = hop_length(context, model, &hop).mean;
+        let path_length = hop_length(context, model, &hop).mean;
         let taped = taped_length(context, model, &hop).mean;
         if left.as_m() <= taped {
-            return Some(way + left * if taped > 0.0 { felt / taped } else { 1.0 });
+            return Some(way + left * if taped > 0.0 { path_length / taped } else { 1.0 });
         }
-        (way, left) = (way + Length::from_m(felt), left - Length::from_m(taped));
+        (way, left) = (way + Length::from_m(path_length), left - Length::from_m(taped));
     }
     (left == Length::ZERO).then_some(way)
 }
@@ -154,11 +157,11 @@ fn way_to_node(
         if count > 0 && hop.from == from {
             return None;
         }
-        let felt = hop_length(context, model, &hop).mean;
-        way += felt;
+        let path_length = hop_length(context, model, &hop).mean;
+        way += path_length;
         if hop.to == to {
             let taped = taped_length(context, model, &hop).mean;
-            return Some((Length::from_m(way), if taped > 0.0 { felt / taped } else { 1.0 }));
+            return Some((Length::from_m(way), if taped > 0.0 { path_length / taped } else { 1.0 }));
         }
     }
     None
@@ -174,9 +177,9 @@ pub fn landmark_of(context: TrackContext<'_>, model: &MotionModel, at: PathPoint
 
 /// Standard deviation of a point of the path as people name it (m), for a train that knows its position exactly: past a sensor
 /// the ratio of path length to taped length is uncertain.
-pub(super) fn taping_doubt(context: TrackContext<'_>, model: &MotionModel, at: PathPoint) -> f64 {
-    let [_, doubt] = taped(context, model, at);
-    doubt.offset.as_m()
+pub(super) fn taping_deviation(context: TrackContext<'_>, model: &MotionModel, at: PathPoint) -> f64 {
+    let [_, deviation] = taped(context, model, at);
+    deviation.offset.as_m()
 }
 
 /// The landmark of a point on the path, and one standard deviation of its offset in the same form.
@@ -184,14 +187,14 @@ fn taped(context: TrackContext<'_>, model: &MotionModel, at: PathPoint) -> [Land
     let mut from = at.node;
     let mut left = at.distance.as_m();
     for hop in context.hops_ahead(at.node).take(MOST_HOPS) {
-        let felt = hop_length(context, model, &hop).mean;
-        if left > felt && hop.sensor.is_some() {
-            left -= felt;
+        let path_length = hop_length(context, model, &hop).mean;
+        if left > path_length && hop.sensor.is_some() {
+            left -= path_length;
             from = hop.to;
             continue;
         }
         let length = taped_length(context, model, &hop);
-        let scale = if felt > 0.0 && left > 0.0 { length.mean / felt } else { 1.0 };
+        let scale = if path_length > 0.0 && left > 0.0 { length.mean / path_length } else { 1.0 };
         let relative = if length.mean > 0.0 { libm::sqrt(length.variance) / length.mean } else { 0.0 };
         let offset = Length::from_m(left * scale);
         return [Landmark { node: from, offset }, Landmark { node: from, offset: offset.abs() * relative }];
@@ -208,12 +211,12 @@ fn part(of: Length, whole: Length) -> f64 {
 pub fn place_of(context: TrackContext<'_>, model: &MotionModel, at: PathPoint) -> Option<Position> {
     let mut left = at.distance.max(Length::ZERO);
     for hop in context.hops_ahead(at.node).take(MOST_HOPS) {
-        let [felt, _] = model.length(context.sections, &hop);
-        if left > felt && hop.sensor.is_some() {
-            left -= felt;
+        let [path_length, _] = model.length(context.sections, &hop);
+        if left > path_length && hop.sensor.is_some() {
+            left -= path_length;
             continue;
         }
-        let mut along = (hop.length * part(left, felt)).min(hop.length);
+        let mut along = (hop.length * part(left, path_length)).min(hop.length);
         let mut last = None;
         for id in hop.edges {
             let length = context.layout.edge(*id)?.length;

@@ -47,7 +47,7 @@ impl Rollout {
     }
 
     /// One standard deviation (m) of the distance that a further command adds, given at a time not before the last query.
-    pub(crate) fn doubt_of_interruption(&mut self, model: &MotionModel, time: f64) -> f64 {
+    pub(crate) fn interruption_deviation(&mut self, model: &MotionModel, time: f64) -> f64 {
         self.course.settle(model, time);
         INTERRUPTED * self.course.unsettled(time)
     }

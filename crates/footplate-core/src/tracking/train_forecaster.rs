@@ -7,16 +7,15 @@ use super::forecast::{Forecast, Phase};
 use super::polls::Polls;
 use super::predictor::{Hit, Verdict};
 use super::route_memory::RouteMemory;
-use super::sensor_scatter::SensorScatter;
 use crate::estimate::Estimate;
 use crate::event::{Event, EventKind, Report};
 use crate::ids::{DecoderSteps, SensorId, SpeedStep, TrainId};
 use crate::linalg::Gaussian;
 use crate::link::UniformNormal;
-use crate::model::MotionFit;
 use crate::model::survey::SectionIndex;
 use crate::model::{Drive, Passage, PassageTracker};
 use crate::model::{FELT, MotionModel};
+use crate::model::{MotionFit, SensorScatter};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Layout, Reach, TurnoutStates};
 use crate::units::Speed;
@@ -247,7 +246,8 @@ impl TrainForecaster {
             let squared = due.speed * due.speed;
             let motion = (due.variance * squared - scatter).max(0.0);
             let miss = late * due.speed;
-            self.scatter.take(passage.sensor, self.drive.step, miss, motion, variance * squared);
+            let explained = [motion, variance * squared];
+            self.scatter.take(passage.sensor, self.drive.step, miss * miss, explained);
         }
         if drift.is_some() {
             self.filter.widen_speed(REOPENED * REOPENED);

@@ -285,3 +285,55 @@ fn a_gap_of_an_hour_is_degraded_and_the_bounds_span_it() {
     assert_eq!(last.mode, Mode::Normal);
     assert!((last.speed.as_m_per_s() - 20.0).abs() < 0.1, "{last:?}");
 }
+
+/// The worst error of the speed (m/s), and how often it was outside the 99.99 % interval, of a train that accelerates by 0.4 m/s² from
+/// 20 s to 80 s and then runs on; `counts` changes what the sensors of a time and a speed (s, m/s) count.
+fn driven(counts: impl Fn(f64, f64, &mut Rolling, &mut Period)) -> (f64, usize) {
+    let mut odometer = Odometer::new(vehicle(), OdometrySettings::recommended()).expect("a vehicle");
+    let mut train = Rolling { time: 0.0, place: 0.0, counted: [0; 2] };
+    let (mut worst, mut outside) = (0.0_f64, 0);
+    for row in 0..2400 {
+        let time = f64::from(row) * PERIOD_S;
+        let speed = 0.4 * (time - 20.0).clamp(0.0, 60.0);
+        let effort = if time < 20.0 { -0.6 } else { 0.5 };
+        let mut period = train.next(speed, effort);
+        counts(time, speed, &mut train, &mut period);
+        let estimate = odometer.step(&period);
+        assert_sound(&estimate);
+        worst = worst.max((estimate.speed.as_m_per_s() - speed).abs());
+        let within = estimate.confidence;
+        let outside_now =
+            speed < within.speed_low.as_m_per_s() - 0.01 || within.speed_high.as_m_per_s() + 0.01 < speed;
+        outside += usize::from(outside_now);
+    }
+    (worst, outside)
+}
+
+#[test]
+fn a_train_does_not_stand_because_a_wheel_spins_beside_a_dead_sensor() {
+    // The second sensor dies at 30 s. At 60 s the driven wheel runs away by 2 m/s within a second and comes back.
+    let (worst, outside) = driven(|time, _, _, period| {
+        if time > 30.0 {
+            period.wheels[1] = WheelReading::pulses(0);
+        }
+        let spins = (1.0 - (time - 61.0).abs()).max(0.0) * 2.0;
+        if let Count::Pulses(pulses) = period.wheels[0].count {
+            let more = (spins * PERIOD_S / (core::f64::consts::PI * 0.86 / 100.0)).round() as i64;
+            period.wheels[0] = WheelReading::pulses(pulses + more);
+        }
+    });
+    // No wheel shows how much of 2 m/s is spin.
+    assert!(worst < 2.5 && outside < 40, "{worst} {outside}");
+}
+
+#[test]
+fn a_sensor_that_repeats_its_count_is_found_though_the_wheels_differ_little() {
+    // From 40 s on the second sensor repeats what it counted then, for 4 s, in which the train gains 1.6 m/s.
+    let (worst, outside) = driven(|time, _, _, period| {
+        if (40.0..44.0).contains(&time) {
+            let pulses = (8.0 * PERIOD_S / (core::f64::consts::PI * 0.86 / 100.0)).round() as i64;
+            period.wheels[1] = WheelReading::pulses(pulses);
+        }
+    });
+    assert!(worst < 1.0 && outside < 30, "{worst} {outside}");
+}

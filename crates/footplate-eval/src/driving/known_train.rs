@@ -24,6 +24,8 @@ const NODES: usize = 8;
 const SPEEDS: usize = STOP_NODES + 2 * NODES;
 /// Numbers of the shapes of starts and stops, behind the hysteresis by step. They stay zero: the residuals at rest are known.
 const SHAPES: usize = 4;
+/// Sensors of the usual worlds trip where they are (m): the finest scatter that a model knows.
+const SENSOR_SCATTER_M: f64 = 0.001;
 /// The spacing of the nodes over speed, in m/s.
 const NODE_SPACING: f64 = 0.1;
 /// The speed below which hysteresis shrinks in proportion, as in the model, in m/s.
@@ -105,6 +107,7 @@ pub(crate) fn known(
     let starts = starts.collect::<Vec<_>>();
     fill_nodes(&mut numbers.values[STOP_NODES + NODES..SPEEDS], &starts);
     numbers.scatter_scale = scatter_scale(engine, &plain);
+    numbers.usual_sensor_scatter = SENSOR_SCATTER_M;
     MotionModel::from_numbers(&numbers).map_err(|error| anyhow!("{error}"))
 }
 

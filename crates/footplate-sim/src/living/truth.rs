@@ -12,7 +12,10 @@ use crate::train::Train;
 
 /// Further away than anybody asks (chosen: twice round a large layout).
 const FAR_MM: f64 = 20_000.0;
-/// Positions are told by a contact no further away (chosen: longer than any hop of the course layouts).
+/// A sensor that scatters closes no further than this beyond its usual place: 2.5 standard deviations of 15 mm and of 3 mm of the
+/// shoe.
+const CLOSES_WITHIN_MM: f64 = 40.0;
+/// Positions are stated past a sensor no further away (chosen: longer than any hop of the course layouts).
 const NEAR_MM: f64 = 5000.0;
 
 /// The truth about a living layout.
@@ -142,13 +145,17 @@ impl<'w, 'l> Truth<'w, 'l> {
         let found = self.found(train)?;
         let by = |pass: &&PassTruth| pass.train == Some(train) && pass.sensor == sensor;
         let passed = self.world.s88.passes.iter().rev().find(by);
+        let place = found.body.as_ref()?.place()?;
         // What it passed before a hand took it elsewhere is no way from here.
         let passed = passed.filter(|pass| pass.odometer_mm >= found.put_down_at);
         let since = passed.map(|pass| found.odometer - pass.odometer_mm).filter(|mm| *mm < FAR_MM);
+        // Past its usual place, and it has not closed yet this time.
+        let just_past = self.contact(sensor).and_then(|usual| self.path_length(0.0, usual, place));
+        let is_due = |mm: &f64| *mm < CLOSES_WITHIN_MM && since.is_none_or(|since| since > CLOSES_WITHIN_MM);
+        let since = just_past.filter(is_due).or(since);
         let is_entry = self.world.layout().block_of_entry(sensor).is_some();
         let ahead = if is_entry { found.sensed()[0] } else { 0.0 };
-        let (edge, offset) = found.body.as_ref()?.place()?;
-        let before = self.way_to((edge, offset + ahead), sensor);
+        let before = self.way_to((place.0, place.1 + ahead), sensor);
         let nearer = |since: f64, before: f64| if since <= before { since } else { -before };
         let mm = match (since, before) {
             (Some(since), Some(before)) => nearer(since, before),

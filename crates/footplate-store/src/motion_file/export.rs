@@ -3,10 +3,11 @@
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::model::{MotionModel, MotionNumbers, NumbersError, StepUse};
 use footplate_core::track::{Hop, Layout};
-use footplate_core::{Approach, Length, SpeedStep, Timestamp};
+use footplate_core::{Approach, EdgeId, Length, SensorId, SpeedStep, Timestamp};
 
 use super::form::{
-    ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, StopOffsetForm, UseForm,
+    ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, SensorScatterForm,
+    StopOffsetForm, UseForm,
 };
 use crate::quantity::Quantity;
 
@@ -30,7 +31,12 @@ impl MotionFile {
                 .filter(|(_, section)| numbers.sections.iter().any(|(known, ..)| known == section))
                 .map(|(hop, _)| section_form(layout, &sections, model, &hop, measured_at_s))
                 .collect(),
-            stop_offsets: layout.hops().filter_map(|hop| stop_offset_form(layout, &numbers, &hop)).collect(),
+            stop_offsets: numbers
+                .stop_offsets
+                .iter()
+                .filter_map(|offset| stop_offset_form(layout, offset))
+                .collect(),
+            sensors: sensor_forms(layout, &numbers),
             exact: exact(&numbers, measured_at_s),
         }
     }
@@ -52,8 +58,13 @@ impl MotionFile {
             Some((index.section(hop.id)?, 1e-3 * longer_mm, 1e-6 * form.add.uncertainty.powi(2)))
         });
         let offsets = self.stop_offsets.iter().filter_map(|form| {
-            let hop = hop_between(&form.from, &form.to)?;
-            Some((hop.id.index(), 1e-3 * form.add.value, 1e-6 * form.add.uncertainty.powi(2)))
+            let (from, to) = (layout.node_named(&form.from)?, layout.node_named(&form.to)?);
+            let (edge, _) = layout.edges().find(|(_, edge)| (edge.from, edge.to) == (from, to))?;
+            Some((usize::from(edge.0), 1e-3 * form.add.value, 1e-6 * form.add.uncertainty.powi(2)))
+        });
+        let sensors = self.sensors.iter().filter_map(|form| {
+            let sensor = layout.sensor_at(layout.node_named(&form.sensor)?)?;
+            Some((sensor, 1e-3 * form.scatter_mm))
         });
         let exact = &self.exact;
         MotionModel::from_numbers(&MotionNumbers {
@@ -74,6 +85,8 @@ impl MotionFile {
             scatter_scale: exact.scatter_scale,
             scatter_floor: exact.scatter_floor,
             start_scale: exact.start_scale,
+            usual_sensor_scatter: exact.usual_sensor_scatter,
+            sensor_scatter: sensors.collect(),
             scale: exact.scale.clone(),
             date: exact.measured_at_s.map_or(Timestamp::ZERO, Timestamp::from_s),
         })
@@ -132,11 +145,12 @@ fn section_form(
     }
 }
 
-fn stop_offset_form(layout: &Layout, numbers: &MotionNumbers, hop: &Hop<'_>) -> Option<StopOffsetForm> {
-    let (_, offset, variance) = numbers.stop_offsets.iter().find(|(known, ..)| *known == hop.id.index())?;
+fn stop_offset_form(layout: &Layout, offset: &(usize, f64, f64)) -> Option<StopOffsetForm> {
+    let (edge, offset, variance) = offset;
+    let edge = layout.edge(EdgeId(u16::try_from(*edge).ok()?))?;
     Some(StopOffsetForm {
-        from: layout.node_name(hop.from).to_owned(),
-        to: layout.node_name(hop.to).to_owned(),
+        from: layout.node_name(edge.from).to_owned(),
+        to: layout.node_name(edge.to).to_owned(),
         add: Quantity {
             value: 1e3 * offset,
             uncertainty: 1e3 * variance.sqrt(),
@@ -148,6 +162,14 @@ fn stop_offset_form(layout: &Layout, numbers: &MotionNumbers, hop: &Hop<'_>) -> 
     })
 }
 
+fn sensor_forms(layout: &Layout, numbers: &MotionNumbers) -> Vec<SensorScatterForm> {
+    let form = |(sensor, scatter): &(SensorId, f64)| {
+        let sensor = layout.node_name(layout.sensor_node(*sensor)?).to_owned();
+        Some(SensorScatterForm { sensor, scatter_mm: 1e3 * scatter })
+    };
+    numbers.sensor_scatter.iter().filter_map(form).collect()
+}
+
 fn exact(numbers: &MotionNumbers, measured_at_s: Option<f64>) -> ExactForm {
     let counts = numbers.counts.iter().map(|[below, above]| [below.0, below.1, above.0, above.1]);
     ExactForm {
@@ -157,6 +179,7 @@ fn exact(numbers: &MotionNumbers, measured_at_s: Option<f64>) -> ExactForm {
         stop_offset_deviation: numbers.stop_offset_deviation,
         residual_scales: numbers.residual_scales,
         start_scale: numbers.start_scale,
+        usual_sensor_scatter: numbers.usual_sensor_scatter,
         scale: numbers.scale.clone(),
         counts: counts.collect(),
         uses: numbers.uses.iter().map(|found| UseForm::of(*found)).collect(),

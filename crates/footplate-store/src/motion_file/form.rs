@@ -9,7 +9,7 @@ use crate::quantity::Quantity;
 /// change of the fit in `calibration::motion` of core, or of the events that [`MotionReplay`](crate::MotionReplay)
 /// feeds it. Stored models and replays are then computed again from the events. A test pins the numbers of every
 /// version.
-pub const MOTION_MODEL_VERSION: &str = "6";
+pub const MOTION_MODEL_VERSION: &str = "7";
 
 /// The motion model of one train on one layout.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -30,9 +30,12 @@ pub struct MotionFile {
     /// Path lengths between sensors, relative to the survey, for sections that the train has run over.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sections: Vec<MotionSectionForm>,
-    /// Stop offsets by direction, for hops on which the train has stopped.
+    /// Stop offsets by direction, for edges that stops of the train ran over.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub stop_offsets: Vec<StopOffsetForm>,
+    /// How exactly each sensor trips that the train has passed often.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sensors: Vec<SensorScatterForm>,
     /// The numbers of the model, for programs.
     pub exact: ExactForm,
 }
@@ -56,6 +59,8 @@ pub struct ExactForm {
     pub residual_scales: [f64; 2],
     /// The scatter of start delays relative to the prior.
     pub start_scale: f64,
+    /// The scatter of a sensor that the train has not passed often, one standard deviation (m).
+    pub usual_sensor_scatter: f64,
     /// The change of each of `values` for one standard deviation of the survey's scale.
     pub scale: Vec<f64>,
     /// By step from 0: detections and stops for steps reached from below, and the same from above.
@@ -118,13 +123,22 @@ pub struct MotionSectionForm {
     pub add: Quantity,
 }
 
-/// The stop offset of a hop, in one direction.
+/// The stop offset of an edge, in one direction.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StopOffsetForm {
-    /// The sensor before it, by name.
+    /// The node at which it begins, by name.
     pub from: String,
-    /// The sensor after it.
+    /// The node at which it ends.
     pub to: String,
-    /// The offset of a stop from 300 mm/s (mm).
+    /// The offset of a stop from 300 mm/s that runs over it alone (mm).
     pub add: Quantity,
+}
+
+/// The scatter of a sensor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SensorScatterForm {
+    /// The sensor, by name.
+    pub sensor: String,
+    /// One standard deviation of where it trips about its usual place (mm).
+    pub scatter_mm: f64,
 }

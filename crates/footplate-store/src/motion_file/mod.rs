@@ -8,6 +8,7 @@ mod form;
 mod read;
 
 pub use form::{
-    ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, StopOffsetForm, UseForm,
+    ExactForm, MOTION_MODEL_VERSION, MotionFile, MotionSectionForm, MotionStepForm, SensorScatterForm,
+    StopOffsetForm, UseForm,
 };
 pub use read::{MotionFileError, StoredModel};

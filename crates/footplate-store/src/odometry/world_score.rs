@@ -17,6 +17,8 @@ use crate::tachometer::Truth;
 const AGAIN_S: f64 = 20.0;
 /// The width of an interval is normal up to this times the median of normal running.
 const NORMAL_WIDTH: f64 = 1.5;
+/// Both roll again when they have for so long (s).
+const COHERENT_S: f64 = 3.0;
 /// Shorter slips of both do not count for the time until the width is normal again (s).
 const BOTH_FOR_S: f64 = 1.0;
 
@@ -285,35 +287,48 @@ struct Moment {
     width: f32,
 }
 
-/// Time from each slip of both until the width is normal; infinite if the next slip or the end of the run comes first.
+/// Time from each slip of both until the width is normal; infinite if the next slip or the end of the run comes first. Only where both
+/// rolled for [`COHERENT_S`] then: a wheel that touches the train's speed between two slides does not roll again, nor does one that
+/// was locked until the train stood.
 fn back_to_normal(seen: &[Moment], normal: Option<f64>) -> Vec<f32> {
     let Some(normal) = normal else { return Vec::new() };
-    let (mut both_since, mut waits_since) = (None, None);
+    let (mut both_since, mut rolls_since) = (None, None::<Timestamp>);
+    let mut normal_after = f32::INFINITY;
     let mut found = Vec::new();
     for moment in seen {
+        let rolls = matches!(moment.phase, Phase::Rolling | Phase::RollingAgain);
+        if !rolls && let Some(since) = rolls_since.take() {
+            if (moment.time - since).as_s() >= COHERENT_S {
+                found.push(normal_after);
+            }
+            normal_after = f32::INFINITY;
+        }
         match moment.phase {
             Phase::BothSlip => {
                 both_since.get_or_insert(moment.time);
-                waits_since = None;
             }
-            Phase::OneSlips => {
-                // Time counts from when both roll.
-            }
-            _ => {
+            // Time counts from when both roll.
+            Phase::OneSlips => {}
+            Phase::Standing => both_since = None,
+            Phase::Rolling | Phase::RollingAgain => {
                 if let Some(since) = both_since.take()
                     && (moment.time - since).as_s() >= BOTH_FOR_S
                 {
-                    waits_since = Some(moment.time);
-                    found.push(f32::INFINITY);
+                    rolls_since = Some(moment.time);
                 }
-                if let (Some(since), Some(last)) = (waits_since, found.last_mut())
+                if let Some(since) = rolls_since
+                    && normal_after.is_infinite()
                     && f64::from(moment.width) <= NORMAL_WIDTH * normal
                 {
-                    *last = (moment.time - since).as_s() as f32;
-                    waits_since = None;
+                    normal_after = (moment.time - since).as_s() as f32;
                 }
             }
         }
+    }
+    if let (Some(since), Some(last)) = (rolls_since, seen.last())
+        && (last.time - since).as_s() >= COHERENT_S
+    {
+        found.push(normal_after);
     }
     found
 }
@@ -341,18 +356,25 @@ mod tests {
 
     #[test]
     fn the_time_until_the_interval_is_normal_begins_when_both_roll() {
-        use Phase::{BothSlip, OneSlips, Rolling, RollingAgain};
+        use Phase::{BothSlip, OneSlips, Rolling, RollingAgain, Standing};
         let seen = moments(&[
             (Rolling, 0.5, 10),
             (BothSlip, 3.0, 20),
             (OneSlips, 3.0, 10),
             (RollingAgain, 2.0, 15),
             (RollingAgain, 0.7, 50),
-            // Too short to count, and one after which it stays wide.
+            // Too short to count.
             (BothSlip, 3.0, 5),
-            (RollingAgain, 2.0, 10),
+            (RollingAgain, 2.0, 40),
+            // They do not roll again but touch the train's speed, and then they stand.
             (BothSlip, 3.0, 15),
-            (RollingAgain, 2.0, 10),
+            (RollingAgain, 0.5, 20),
+            (BothSlip, 3.0, 15),
+            (Standing, 0.5, 50),
+            (Rolling, 0.5, 50),
+            // It stays wide.
+            (BothSlip, 3.0, 15),
+            (RollingAgain, 2.0, 40),
         ]);
         assert_eq!(back_to_normal(&seen, Some(0.5)), [1.5, f32::INFINITY]);
     }

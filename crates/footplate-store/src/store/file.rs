@@ -20,6 +20,7 @@ const MIGRATIONS: &[&str] = &[
     include_str!("migrations/4_replays.sql"),
     include_str!("migrations/5_checksums.sql"),
     include_str!("migrations/6_profiles.sql"),
+    include_str!("migrations/7_schedules.sql"),
 ];
 
 /// How long we wait for another process to finish writing, chosen: an import of a million events takes less.

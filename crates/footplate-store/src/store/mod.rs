@@ -13,6 +13,7 @@
 //! marks         excluding events and restoring them
 //! calibrations  keeping them and finding the one in force
 //! profiles      speeds of other programs, with which a train begins
+//! schedules     scripts that owners saved
 //! replays       how far a replay of all sessions came, so that the next one goes on from there
 //! checksum      of each row, so that a changed value is noticed
 //! unfinished    the session that was running when the program died
@@ -32,6 +33,7 @@ mod recordings;
 mod replays;
 mod row;
 mod salvage;
+mod schedules;
 mod unfinished;
 
 pub use calibrations::{Calibration, NewCalibration};
@@ -44,4 +46,5 @@ pub use marks::{Mark, MarkKind};
 pub use recordings::{EventKey, Import, RecordingKey, RunKey};
 pub(crate) use replays::KeptReplay;
 pub use salvage::{Salvaged, SalvagedTable, salvage};
+pub use schedules::Schedule;
 pub use unfinished::UnfinishedSession;

@@ -56,7 +56,7 @@ pub struct SalvagedTable {
 }
 
 /// Tables with what they belong to, parents first. How far replays came is not among them: it follows from the rest.
-const TABLES: [(&str, Option<Parent>); 11] = [
+const TABLES: [(&str, Option<Parent>); 12] = [
     ("recordings", None),
     ("runs", Some(Parent { column: "recording", table: "recordings", stand_in: STAND_IN_RECORDING })),
     ("starts", Some(Parent { column: "run", table: "runs", stand_in: STAND_IN_RUN })),
@@ -66,6 +66,7 @@ const TABLES: [(&str, Option<Parent>); 11] = [
     ("marks", None),
     ("calibrations", None),
     ("profiles", None),
+    ("schedules", None),
     ("machines", Some(Parent { column: "recording", table: "recordings", stand_in: STAND_IN_RECORDING })),
     // Without how it began nothing can be decided again.
     ("inputs", None),

@@ -13,24 +13,34 @@ export const upright = (label, name) => ({
   value: (_, value) => (value == null ? "–" : rounded(value, 0)),
 });
 
+/** The height of a line of text in a saved picture, in pixels of the page. */
+const TEXT_LINE = 20;
+
 /** A field of a table. */
 const field = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 
 export class LiveChart {
-  #figure; #options; #u; #data; #watch; #again;
+  #figure; #options; #u; #data; #watch; #again; #onPick;
 
-  /** `options` makes the options of a chart in the current colours; `data` is the initial data. */
-  constructor(figure, options, data) {
+  /**
+   * `options` makes the options of a chart in the current colours; `data` is the initial data; `onPick` receives the value of the x
+   * axis that is clicked.
+   */
+  constructor(figure, options, data, onPick) {
     this.#figure = figure;
     this.#options = options;
     this.#data = data;
+    this.#onPick = onPick;
     this.#draw();
     const { name } = options();
-    const saves = make("button", { type: "button", class: "csv", "aria-label": say("chart-csv", name), title: say("chart-csv", name) }, "CSV");
-    saves.addEventListener("click", () => this.#save());
-    (figure.querySelector("figcaption") ?? figure).append(saves);
+    const saves = (word, text, does) => {
+      const made = make("button", { type: "button", class: "csv", "aria-label": say(word, name), title: say(word, name) }, text);
+      made.addEventListener("click", does);
+      return made;
+    };
+    (figure.querySelector("figcaption") ?? figure).append(saves("chart-csv", "CSV", () => this.#save()), saves("chart-png", "PNG", () => this.#draws()));
     let width = figure.clientWidth;
     this.#watch = new ResizeObserver(() => {
       if (figure.clientWidth === width) return;
@@ -45,7 +55,20 @@ export class LiveChart {
 
   #draw() {
     this.#u?.destroy();
-    this.#u = chart(this.#figure, { keys: say("chart-keys"), ...this.#options(), data: this.#data });
+    const u = chart(this.#figure, { keys: say("chart-keys"), ...this.#options(), data: this.#data });
+    // Without a cursor the legend has no values.
+    for (const series of u.series) {
+      const { value } = series;
+      series.value = (of, at, ...more) => (at == null ? "" : value(of, at, ...more));
+    }
+    u.setLegend({ idx: null });
+    if (this.#onPick) u.over.addEventListener("click", ({ offsetX }) => this.#onPick(u.posToVal(offsetX, "x")));
+    this.#u = u;
+  }
+
+  /** Draws the same data again, for marks that have moved. */
+  redraw() {
+    this.#u.redraw(false);
   }
 
   set(data) {
@@ -58,15 +81,44 @@ export class LiveChart {
     const { name, x, y } = this.#options();
     const columns = this.#u.series.map(({ label }, nth) => field(nth === 0 ? x.label : [label, y].filter(Boolean).join("; ")));
     const rows = Array.from(this.#u.data[0], (_, nth) => this.#u.data.map((column) => column[nth] ?? "").join(","));
-    const address = URL.createObjectURL(new Blob([[columns.join(","), ...rows, ""].join("\n")], { type: "text/csv" }));
-    make("a", { href: address, download: `${name.toLowerCase().replace(/[^a-z0-9äöüß]+/g, "-")}.csv` }).click();
+    this.#hand(new Blob([[columns.join(","), ...rows, ""].join("\n")], { type: "text/csv" }), name, "csv");
+  }
+
+  /** Saves the chart as a picture, with its name and what its colours mean. */
+  #draws() {
+    const { name } = this.#options();
+    const { ctx: { canvas: drawn } } = this.#u;
+    const line = TEXT_LINE * devicePixelRatio;
+    const canvas = make("canvas", { width: drawn.width, height: drawn.height + 2 * line });
+    const ctx = canvas.getContext("2d");
+    ctx.fillStyle = colour("card");
+    ctx.fillRect(0, 0, canvas.width, canvas.height);
+    ctx.drawImage(drawn, 0, line);
+    ctx.fillStyle = colour("text");
+    ctx.font = `${0.7 * line}px system-ui, sans-serif`;
+    ctx.fillText(name, line / 2, 0.75 * line);
+    let x = line / 2;
+    for (const { label, stroke, class: own } of this.#u.series.slice(1)) {
+      if (own === "unlisted") continue;
+      ctx.fillStyle = typeof stroke === "function" ? stroke(this.#u) : stroke;
+      ctx.fillRect(x, drawn.height + 1.3 * line, line / 2, line / 2);
+      ctx.fillStyle = colour("text");
+      ctx.fillText(label, x + 0.7 * line, drawn.height + 1.75 * line);
+      x += ctx.measureText(label).width + 1.6 * line;
+    }
+    canvas.toBlob((picture) => this.#hand(picture, name, "png"));
+  }
+
+  #hand(blob, name, kind) {
+    const address = URL.createObjectURL(blob);
+    make("a", { href: address, download: `${name.toLowerCase().replace(/[^a-z0-9äöüß]+/g, "-")}.${kind}` }).click();
     setTimeout(() => URL.revokeObjectURL(address), 1000);
   }
 
   close() {
     this.#watch.disconnect();
     dark.removeEventListener("change", this.#again);
-    this.#figure.querySelector(".csv")?.remove();
+    this.#figure.querySelectorAll(".csv").forEach((button) => button.remove());
     this.#u.destroy();
   }
 }

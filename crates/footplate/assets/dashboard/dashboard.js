@@ -11,6 +11,7 @@ import { Live } from "./live.js";
 import { odometryPage } from "./odometry_page.js";
 import { get } from "./server.js";
 import { recordingsPage } from "./recordings_page.js";
+import { schedulesPage } from "./schedules_page.js";
 import { setupPage } from "./setup_page.js";
 import { trainPage } from "./train_page.js";
 import { say, translate } from "./words.js";
@@ -23,7 +24,7 @@ const MODE_MS = [3000, 300];
 const WITHOUT_SESSION = ["setup", "editor"];
 const PAGES = {
   layout: layoutPage, train: trainPage, calibration: calibrationPage, health: healthPage, recordings: recordingsPage, odometry: odometryPage,
-  editor: editorPage, setup: setupPage,
+  editor: editorPage, schedules: schedulesPage, setup: setupPage,
 };
 /** The header says how far the session is on disk when that is further back than this (s): a usual commit takes 0.02 s. */
 const LATE_ON_DISK_S = 1;
@@ -111,7 +112,8 @@ async function begin() {
   turn();
   addEventListener("hashchange", () => {
     turn();
-    $("page").focus();
+    $("page").focus({ preventScroll: true });
+    scrollTo(0, 0);
   });
   live.addEventListener("picture", ({ detail }) => links(detail));
   live.addEventListener("picture", ({ detail }) => written(detail));

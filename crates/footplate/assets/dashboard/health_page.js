@@ -1,6 +1,6 @@
 // The health page: prediction errors, drift, alarms, and the timing of link and control loop.
 
-import { described } from "./alarms.js";
+import { described, news } from "./alarms.js";
 import { colour, dots } from "./chart.js";
 import { LiveChart, upright } from "./charts.js";
 import { make, put, shown, signed } from "./dom.js";
@@ -62,9 +62,9 @@ export function healthPage(root, live) {
     } } });
     const inDoubts = ({ late_ms: late, late_half_ms: half }) => (late == null ? null : late / half);
     const beside = ({ short_mm: short }) => (short == null ? null : -short);
-    add("errors", () => ({ name: say("chart-errors"), x, y: say("axis-sure"), zero: true, range: about(10, beside), series: series("mm", 1) }), joined(beside));
+    add("errors", () => ({ name: say("chart-errors"), x, sync: "health", y: say("axis-sure"), zero: true, range: about(10, beside), series: series("mm", 1) }), joined(beside));
     add("doubts", () => ({
-      name: say("chart-doubts"), x, y: say("axis-doubts"), height: 200, zero: true, range: about(1.5, inDoubts), series: series("", 2),
+      name: say("chart-doubts"), x, sync: "health", y: say("axis-doubts"), height: 200, zero: true, range: about(1.5, inDoubts), series: series("", 2),
       below: [(u) => {
         const [top, foot] = [u.valToPos(1, "y", true), u.valToPos(-1, "y", true)];
         u.ctx.save();
@@ -103,9 +103,19 @@ export function healthPage(root, live) {
 
   function alarms() {
     const rows = live.alarms.slice(-LISTED).reverse().map((alarm) => make("li", { class: alarm.grade },
-      make("span", { class: "quiet" }, `${shown(alarm.t_s, 1)} s `), described(alarm)));
+      make("span", { class: "quiet" }, `${shown(alarm.t_s, 1)} s `), news(alarm)));
     $("#alarms").replaceChildren(...rows);
-    $("#no-alarm").hidden = rows.length > 0;
+  }
+
+  let listed;
+  /** The alarms that are active now, with how long and how often. */
+  function active({ alarms: open }) {
+    const key = JSON.stringify(open.map(({ id, count, what }) => [id, count, what]));
+    if (key === listed) return;
+    listed = key;
+    $("#no-alarm").hidden = open.length > 0;
+    $("#active-alarms").replaceChildren(...open.map((alarm) => make("li", { class: alarm.grade }, described(alarm),
+      make("span", { class: "quiet" }, ` ${say(alarm.count > 1 ? "alarm-since-often" : "alarm-since", shown(alarm.since_s, 1), alarm.count)}`))));
   }
 
   const quantiles = ({ count, median_ms: median, p95_ms: p95, p99_ms: p99, longest_ms: longest }) =>
@@ -128,6 +138,7 @@ export function healthPage(root, live) {
   look();
   const timer = setInterval(look, LOOKED_EVERY_MS);
   return {
+    picture: active,
     passed() {
       if (trains().join() !== order.join()) build();
       table();

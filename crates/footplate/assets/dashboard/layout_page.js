@@ -1,6 +1,8 @@
 // The layout page: track and trains, messages, and a command line.
 
 import { make, put, signed } from "./dom.js";
+import { Guide } from "./guide.js";
+import { RouteButtons } from "./route_buttons.js";
 import { order } from "./server.js";
 import { PickTrack } from "./pick_track.js";
 import { SCALES, chooseScale, kmPerHour, scale } from "./scale.js";
@@ -60,6 +62,10 @@ export function layoutPage(root, live, about) {
     if (!track.other) return;
     $("#here-does").append(button("other-direction", () => { track.turn(); showPlace(track.place); }, { title: track.other }));
   }
+
+  const guide = sought === undefined ? undefined : new Guide($("#guide"), live, sought, track, give);
+
+  const routes = new RouteButtons($("#routes"), $("#routes-answer"));
 
   const leg = (lies) => say(lies ? `leg-${lies}` : "leg-unknown");
   const stands = (turnout, lies) => (lies ? say("turnout-is", turnout, leg(lies)) : say("turnout-unknown", turnout));
@@ -154,6 +160,8 @@ export function layoutPage(root, live, about) {
 
   function show(picture) {
     track.show(picture);
+    guide?.show(picture);
+    routes.show(picture);
     listTurnouts(picture);
     picture.trains.forEach((train, nth) => {
       const parts = cards.get(train.train) ?? card(train, nth);

@@ -28,6 +28,11 @@ export class PickTrack {
     this.#track.show(picture);
   }
 
+  /** Outlines where trains really are. */
+  truth(trains) {
+    this.#track.truth(trains);
+  }
+
   fails(name) {
     this.#track.fails(name);
   }

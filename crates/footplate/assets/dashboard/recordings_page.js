@@ -1,18 +1,21 @@
 // The recordings page: lists sessions, replays one with a slider, and compares two.
 
 import { aboutCalibration } from "./calibration_page.js";
-import { colour, dots } from "./chart.js";
+import { colour, dots, line } from "./chart.js";
 import { LiveChart } from "./charts.js";
 import { make, put, shown, signed } from "./dom.js";
 import { get } from "./server.js";
-import { Track } from "./track.js";
+import { COLOURS, Track } from "./track.js";
 import { View } from "./view.js";
 import { say } from "./words.js";
 
 /** Lines shown around the selected time. */
 const LINES = 8;
-/** Replay speed over real time. */
-const PLAYED = 4;
+/** Replay speeds over real time. */
+const SPEEDS = [0.5, 1, 2, 4, 10, 30];
+const USUAL_SPEED = 4;
+/** The charts share their time axis, cursor and zoom. */
+const SYNC = "recordings";
 
 /** One session on the page: its track, and its state at a time. */
 class Walked {
@@ -57,6 +60,17 @@ class Walked {
     this.#root.querySelector(".said").replaceChildren(...said);
   }
 
+  /** The speed of each train by time since the first picture. */
+  speeds() {
+    const begins = this.#pictures[0].t_s;
+    const trains = [...new Set(this.#pictures.flatMap((picture) => picture.trains.map(({ train }) => train)))];
+    const times = this.#pictures.map(({ t_s }) => t_s - begins);
+    return trains.map((train) => [train, times, this.#pictures.map((picture) => {
+      const own = picture.trains.find((one) => one.train === train);
+      return own?.at ? own.speed_mm_per_s : null;
+    })]);
+  }
+
   /** Detections by time since the first picture, with their prediction errors. */
   errors() {
     const begins = this.#pictures[0].t_s;
@@ -67,38 +81,60 @@ class Walked {
 export function recordingsPage(root, live, number) {
   const $ = (selector) => root.querySelector(selector);
   const shownSessions = new Map();
-  let chart, playing, list = [];
+  let charts = [], playing, list = [];
   const slider = $("#time");
+  const speed = $("#played");
+  speed.append(...SPEEDS.map((times) => new Option(`${times} ×`, String(times))));
+  speed.value = String(USUAL_SPEED);
 
   function show() {
     const time = Number(slider.value);
     put($("#time-told"), `${shown(time, 1)} s`);
     for (const walked of shownSessions.values()) walked.show(time);
+    for (const chart of charts) chart.redraw();
   }
 
-  function errors() {
-    chart?.close();
-    chart = undefined;
+  /** The time shown, in all charts. */
+  function mark(u) {
+    const at = u.valToPos(Number(slider.value), "x", true);
+    u.ctx.save();
+    u.ctx.strokeStyle = colour("text");
+    u.ctx.lineWidth = 1.5 * devicePixelRatio;
+    u.ctx.beginPath();
+    u.ctx.moveTo(at, u.bbox.top);
+    u.ctx.lineTo(at, u.bbox.top + u.bbox.height);
+    u.ctx.stroke();
+    u.ctx.restore();
+  }
+
+  /** Goes to a time that was clicked in a chart. */
+  function pick(time) {
+    slider.value = String(time);
+    show();
+  }
+
+  function draw() {
+    charts.splice(0).forEach((chart) => chart.close());
+    const x = { label: say("axis-session"), unit: "s", digits: 1 };
+    // Both charts begin and end with the slider.
+    const spread = (series) => uPlot.join([...series, [[0, Number(slider.max)], [null, null]]]).slice(0, series.length + 1);
     const all = [...shownSessions.entries()].map(([name, walked]) => [name, walked.errors()]);
     $("#walked").hidden = all.length === 0;
     // A calibration predicts no detections.
     const predicts = all.some(([, own]) => own.length > 0);
-    $("figure").hidden = $("#compared").hidden = !predicts;
+    $('[data-chart="recorded"]').hidden = $("#compared").hidden = !predicts;
+    const speeds = [...shownSessions.entries()].flatMap(([name, walked]) => walked.speeds().map(([train, times, values]) => [`${say("train", train)}, ${name}`, times, values]));
+    if (speeds.length > 0) {
+      charts.push(new LiveChart($('[data-chart="recorded-speed"]'), () => ({
+        name: say("chart-recorded-speed"), x, y: say("axis-speed"), sync: SYNC, below: [mark],
+        series: speeds.map(([name], place) => line(name, `t${place % COLOURS}`, "mm/s", 0)),
+      }), spread(speeds.map(([, times, values]) => [times, values])), pick));
+    }
     if (!predicts) return;
-    chart = new LiveChart($("figure"), () => ({
-      name: say("chart-recorded"), x: { label: say("axis-session"), unit: "s", digits: 1 }, y: say("axis-sure"), zero: true, zooms: true,
-      series: all.map(([name], place) => dots(name, ["first", "second"][place], "mm", 1)),
-      below: [(u) => {
-        const at = u.valToPos(Number(slider.value), "x", true);
-        u.ctx.save();
-        u.ctx.strokeStyle = colour("quiet");
-        u.ctx.beginPath();
-        u.ctx.moveTo(at, u.bbox.top);
-        u.ctx.lineTo(at, u.bbox.top + u.bbox.height);
-        u.ctx.stroke();
-        u.ctx.restore();
-      }],
-    }), uPlot.join(all.map(([, own]) => [own.map(({ at }) => at), own.map(({ mm }) => mm)])));
+    charts.push(new LiveChart($('[data-chart="recorded"]'), () => ({
+      name: say("chart-recorded"), x, y: say("axis-sure"), zero: true, sync: SYNC, below: [mark],
+      series: all.map(([name], place) => dots(name, `t${place}`, "mm", 1)),
+    }), spread(all.map(([, own]) => [own.map(({ at }) => at), own.map(({ mm }) => mm)])), pick));
     $("#figures").replaceChildren(...all.map(([name, own]) => {
       const rms = Math.sqrt(own.reduce((sum, { mm }) => sum + mm * mm, 0) / Math.max(own.length, 1));
       const mean = own.reduce((sum, { mm }) => sum + mm, 0) / Math.max(own.length, 1);
@@ -129,7 +165,7 @@ export function recordingsPage(root, live, number) {
     }
     slider.max = String(Math.max(0, ...[...shownSessions.values()].map((walked) => walked.lasts)).toFixed(1));
     slider.value = "0";
-    errors();
+    draw();
     show();
   }
 
@@ -145,14 +181,13 @@ export function recordingsPage(root, live, number) {
     let last = performance.now();
     playing = setInterval(() => {
       const now = performance.now();
-      slider.value = String(Number(slider.value) + PLAYED * (now - last) / 1000);
+      slider.value = String(Number(slider.value) + Number(speed.value) * (now - last) / 1000);
       last = now;
       show();
       if (Number(slider.value) >= Number(slider.max)) stop();
     }, 50);
   });
   slider.addEventListener("input", show);
-  slider.addEventListener("change", errors);
 
   async function begin() {
     try {
@@ -180,7 +215,7 @@ export function recordingsPage(root, live, number) {
   return {
     close() {
       stop();
-      chart?.close();
+      charts.forEach((chart) => chart.close());
     },
   };
 }

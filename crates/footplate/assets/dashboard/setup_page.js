@@ -3,7 +3,7 @@
 import { aboutCalibration } from "./calibration_page.js";
 import { make, put, shown, signed } from "./dom.js";
 import { ask, get, order } from "./server.js";
-import { say } from "./words.js";
+import { inOwnLanguage, say } from "./words.js";
 
 const STEPS = ["station", "layout", "trains", "link", "calibrate", "stop"];
 /** The stations that a serial port may lead to. */
@@ -16,6 +16,9 @@ const LINKS = {
   "loconet": (host) => `loconet:${host}`,
   "marklin-serial": (host) => `marklin-serial:tcp://${host}`,
 };
+
+/** The last address of DCC decoders (NMRA S-9.2.1), before a station is chosen. */
+const LAST_ADDRESS = 10_239;
 
 /** The steps that are done. */
 function done({ mode, link, layout, trains = [], line }) {
@@ -81,7 +84,7 @@ export function setupPage(root, live, wanted) {
     if (!result) return "";
     const word = result.status === 0 ? "setup-done" : result.status === 1 ? "setup-short" : "setup-failed";
     return make("details", { open: isOpen || result.status !== 0 }, make("summary", { class: result.status === 0 ? "" : "answer bad" }, say(word)),
-      make("pre", { tabIndex: 0, role: "region", "aria-label": say(word) }, result.report));
+      make("pre", { tabIndex: 0, role: "region", "aria-label": say(word) }, inOwnLanguage(result.report)));
   }
 
   const build = {
@@ -132,10 +135,11 @@ export function setupPage(root, live, wanted) {
 
     trains() {
       const rows = make("div", { id: "train-rows" });
+      const [first, last] = setUp().addresses ?? [1, LAST_ADDRESS];
       const add = ({ address = "", name = "" } = {}) => {
         const nth = rows.children.length + 1;
         const row = make("div", { class: "does fields", role: "group", "aria-label": say("setup-train-row", nth) },
-          make("label", {}, make("span", {}, say("setup-address")), make("input", { type: "number", min: 1, max: 80, required: true, value: address, class: "address" })),
+          make("label", {}, make("span", {}, say("setup-address")), make("input", { type: "number", min: first, max: last, required: true, value: address, class: "address" })),
           make("label", {}, make("span", {}, say("setup-name")), make("input", { maxLength: 40, value: name, autocomplete: "off", class: "called" })));
         row.append(button(say("setup-remove"), () => row.remove()));
         rows.append(row);
@@ -149,7 +153,7 @@ export function setupPage(root, live, wanted) {
         const trains = [...rows.children].map((row) => ({ address: Number(row.querySelector(".address").value), name: row.querySelector(".called").value.trim() }));
         send({ trains }, "link");
       });
-      return [make("p", { class: "quiet" }, say("setup-address-about")), form];
+      return [make("p", { class: "quiet" }, say("setup-address-about", first, last)), form];
     },
 
     link() {
@@ -187,6 +191,7 @@ export function setupPage(root, live, wanted) {
       const straight = () => busy(say("setup-setting"), () => order("turnout all straight"));
       const go = () => busy(say("setup-sending"), () => order(`go ${train.value} to ${place.value}`));
       return [make("div", { id: "first-turnouts" }, make("p", {}, say("setup-turnouts-unknown")), button(say("setup-straight"), straight, { id: "all-straight" })),
+        make("div", { id: "first-lost" }),
         make("div", { id: "first-go", class: "does fields", hidden: true }, make("label", {}, make("span", {}, say("setup-train")), train),
           make("label", {}, make("span", {}, say("setup-place")), place), button(say("setup-go"), go, { id: "go" })),
         make("p", { id: "first-does", class: "now", role: "status" }), make("p", { id: "first-result", role: "status" }),
@@ -224,6 +229,18 @@ export function setupPage(root, live, wanted) {
   $("#setup-again").addEventListener("click", () => busy(say("setup-goes-over"), again));
   show();
 
+  /** A train goes nowhere while the position of another one is unknown: the page offers to find that one. */
+  function lost({ trains }) {
+    const place = $("#first-lost");
+    const unknown = trains.filter(({ at }) => !at).map(({ train }) => train);
+    const shown = trains.length > 1 && $("#first-turnouts").hidden ? unknown : [];
+    if (place.dataset.trains === shown.join()) return;
+    place.dataset.trains = shown.join();
+    place.replaceChildren(...(shown.length ? [make("p", {}, say("setup-lost", shown.map((train) => live.called(train)).join(", ")))] : []), ...shown.map((train) => make("div", { class: "does" },
+      button(say("find-train", train), () => busy(say("setup-sending"), () => order(`find ${train}`))),
+      make("a", { href: `#/layout/${train}` }, say("act-place", train)))));
+  }
+
   const lines = () => {
     if (!$("#told")) return;
     $("#told").replaceChildren(...live.lines.slice(-12).map(({ text }) => make("li", {}, text)));
@@ -241,13 +258,14 @@ export function setupPage(root, live, wanted) {
         const isKnown = Object.values(picture.turnouts).every(Boolean);
         $("#first-turnouts").hidden = isKnown;
         $("#first-go").hidden = !isKnown;
+        lost(picture);
         const own = picture.trains.find(({ train }) => String(train) === $("#first-train").value);
         put($("#first-does"), own?.doing ? say("setup-does", own.train, own.doing, shown(own.speed_mm_per_s)) : "");
       }
     },
     line: lines,
     ended({ train, achieved, error_mm: error, promised_low_mm: low, promised_high_mm: high, refused, true_error_mm: truth }) {
-      if (!$("#first-result")) return;
+      if (!$("#first-result") || (achieved == null && !refused)) return;
       const parts = refused ? [say("refused", refused)] : [say("setup-stopped", train, achieved ?? "", error == null ? "" : signed(error, 1)),
         low == null ? "" : say("setup-promised", signed(low), signed(high)), truth == null ? "" : say("setup-truth", signed(truth, 1))];
       put($("#first-result"), parts.filter(Boolean).join(" "));

@@ -29,7 +29,7 @@ function element(name, attributes, parent) {
 export const colourOf = (place) => `var(--t${place % COLOURS})`;
 
 export class Track {
-  #nodes; #edges; #plan; #blades = []; #contacts = new Map(); #layer; #numbers; #trains = new Map(); #unit; #picked; #turnouts = new Map();
+  #nodes; #edges; #plan; #blades = []; #contacts = new Map(); #layer; #truth; #numbers; #trains = new Map(); #unit; #picked; #turnouts = new Map();
 
   constructor(svg, layout) {
     this.#nodes = new Map(layout.nodes.map((node) => [node.id, node]));
@@ -52,6 +52,7 @@ export class Track {
       element("title", {}, rail).textContent = say("zone", edge.zone.name, edge.zone.max_mm_s);
     }
     this.#bladesOf(layout, element("g", {}, svg));
+    this.#truth = element("g", {}, svg);
     this.#layer = element("g", {}, svg);
     this.#mark(layout.nodes, element("g", {}, svg));
     // The train number must be readable over anything.
@@ -169,6 +170,11 @@ export class Track {
   /** Marks a sensor that missed a detection, until its next one. */
   fails(name) {
     this.#contacts.get(`named ${name}`)?.classList.add("failed");
+  }
+
+  /** Outlines where the simulated trains really are; without trains, removes the outlines. */
+  truth(trains) {
+    this.#truth.replaceChildren(...trains.map(({ body }) => element("path", { class: "truth", d: this.#path(body), "stroke-width": this.#unit * 3.4 })));
   }
 
   #partsOf(train, place) {

@@ -2,6 +2,7 @@
 
 import { ENGLISH } from "./english.js";
 import { GERMAN } from "./german.js";
+import { inGerman } from "./german_report.js";
 
 const isGerman = navigator.language.toLowerCase().startsWith("de");
 const WORDS = isGerman ? GERMAN : ENGLISH;
@@ -12,6 +13,9 @@ export const LANGUAGE = isGerman ? "de" : "en";
 export function say(word, ...blanks) {
   return (WORDS[word] ?? word).replace(/\{(\d)\}/g, (_, place) => String(blanks[Number(place)] ?? ""));
 }
+
+/** A report of another verb in the reader's language. */
+export const inOwnLanguage = (report) => (isGerman ? inGerman(report) : report);
 
 /** Fills in all texts of a part of the page. */
 export function translate(root) {

@@ -46,7 +46,7 @@ use super::predict::turnout_state;
 use super::serve::{SetUpMode, SetUpRoute, open_dashboard};
 use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
-use crate::dashboard::{Board, Dashboard, LayoutPicture, ServedAt};
+use crate::dashboard::{Answer, Board, Dashboard, LayoutPicture, ServedAt};
 use crate::layout_check::LayoutWatch;
 use crate::link::{
     Address, Link, MeasuredLine, NamedTrain, ObservedLink, SharedTallies, Speed, open, open_session,
@@ -277,7 +277,8 @@ impl Arguments {
 
     fn dashboard(&self, written: &WrittenLayout) -> anyhow::Result<Option<Dashboard>> {
         let store = || self.railway.store.clone();
-        let set_up = || SetUpRoute::of_session(self.set_up.clone(), SetUpMode::Driving);
+        let offers_truth = self.railway.station()?.simulated().is_some();
+        let set_up = || SetUpRoute::of_session(self.set_up.clone(), SetUpMode::Driving, offers_truth);
         self.serve.as_ref().map(|at| open_dashboard(at, written, store(), set_up())).transpose()
     }
 
@@ -321,12 +322,13 @@ impl Arguments {
             session.set_decoder(model.train(), DecoderSteps::with(model.highest()))?;
         }
         let sits_at_terminal = self.is_drawn();
-        let is_shown = sits_at_terminal || self.railway.phones.is_some();
+        let asks = self.script.is_none() && !self.is_headless() && !sits_at_terminal;
+        // The board keeps the alarms: every operator has one.
+        let is_shown = sits_at_terminal || asks || self.railway.phones.is_some();
         let board = dashboard.map(|dashboard| Arc::clone(&dashboard.board));
         let board = board.or_else(|| is_shown.then(|| Board::new(now().as_ns())));
         let phones = self.railway.phones.zip(board.as_ref()).zip(line.as_ref());
         let _phones = phones.map(|((at, board), line)| Phones::serve(at, board, line)).transpose()?;
-        let asks = self.script.is_none() && !self.is_headless() && !sits_at_terminal;
         let mut console = Console::new(asks.then(lines_of_stdin), self.json, board.as_ref());
         let mut terminal = None;
         if let Some(board) = board.filter(|_| sits_at_terminal) {
@@ -369,6 +371,17 @@ impl Arguments {
                         output.flush()?;
                     }
                 }
+            }
+            for asked in std::mem::take(&mut console.for_truth) {
+                let trains = script_runner.machine().trains();
+                let found: Option<Vec<_>> =
+                    trains.map(|train| runtime.link().whereabouts(layout, train)).collect();
+                asked.answer(match found {
+                    Some(trains) => Answer::Found(serde_json::to_string(&trains)?),
+                    None => Answer::Refused(
+                        "only a simulated railway knows where its trains really are".to_owned(),
+                    ),
+                });
             }
             if console.is_over || !matches!(ending, Ended::Finished) {
                 break ending;

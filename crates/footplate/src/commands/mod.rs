@@ -32,6 +32,4 @@ mod written_layout;
 pub(crate) use command::{Command, Outcome};
 pub(crate) use left_running::stop_all;
 #[cfg(test)]
-pub(crate) use serve::{AnswerQueue, archive_routes, odometry_routes, set_up_paths, slide_routes};
-#[cfg(test)]
-pub(crate) use written_layout::WrittenLayout;
+pub(crate) use serve::{session_paths, set_up_paths};

@@ -3,11 +3,13 @@
 mod answer_queue;
 mod archive;
 mod odometry_pages;
+mod schedules;
 mod set_up;
 mod slides;
 
 use std::io::Write;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use anyhow::bail;
 use clap::Args;
@@ -16,16 +18,18 @@ use footplate_store::parse_layout;
 use super::Outcome;
 use super::drive;
 use super::written_layout::WrittenLayout;
-use crate::dashboard::{Dashboard, ServedAt, Token};
+use crate::dashboard::{Board, Dashboard, Routes, ServedAt, Token};
 use crate::link::Address;
 
 pub(crate) use answer_queue::{AnswerForm, AnswerQueue};
-pub(crate) use archive::{StoreQuery, archive_routes};
-pub(crate) use odometry_pages::odometry_routes;
+pub(crate) use archive::StoreQuery;
+use archive::{Archive, archive_routes};
+use odometry_pages::odometry_routes;
+use schedules::schedule_routes;
 #[cfg(test)]
 pub(crate) use set_up::set_up_paths;
 pub(crate) use set_up::{SetUpMode, SetUpRoute};
-pub(crate) use slides::slide_routes;
+use slides::slide_routes;
 
 /// Drive trains from browsers and API clients, without a prompt.
 ///
@@ -69,13 +73,28 @@ pub(super) fn open_dashboard(
     let token = chosen.as_deref().map(Token::chosen).transpose()?;
     let layout = parse_layout(written.layout.name(), written.text.as_bytes())?;
     let answer_queue = AnswerQueue::new();
-    let more = archive_routes(store, written, &answer_queue)
-        .and(odometry_routes(&answer_queue))
-        .and(slide_routes())
-        .and(set_up.routes());
+    let archive = Archive::new(store, written, &answer_queue);
+    let more = |board: &Arc<Board>| session_routes(archive, &answer_queue, board).and(set_up.routes());
     let dashboard = Dashboard::open(at, token, &layout, more)?;
     eprintln!("the dashboard is at {}", dashboard.url);
     Ok(dashboard)
+}
+
+/// The routes of a session beside those of driving and of the set-up.
+fn session_routes(archive: Archive, answer_queue: &AnswerQueue, board: &Arc<Board>) -> Routes {
+    archive_routes(archive.clone())
+        .and(schedule_routes(archive, Arc::clone(board)))
+        .and(odometry_routes(answer_queue))
+        .and(slide_routes())
+}
+
+/// The same for the test of the description.
+#[cfg(test)]
+pub(crate) fn session_paths(board: &Arc<Board>) -> Vec<&'static str> {
+    let layout = WrittenLayout::named("track-a").expect("built in");
+    let answer_queue = AnswerQueue::new();
+    let routes = session_routes(Archive::new(None, &layout, &answer_queue), &answer_queue, board);
+    routes.paths().to_vec()
 }
 
 impl Arguments {

@@ -4,12 +4,18 @@ use footplate_core::control::learn::Fault;
 use footplate_core::control::{Alarm as Noticed, Notice};
 use footplate_core::track::Layout;
 use footplate_core::tracking::Drift;
-use footplate_core::{HALF_95, Length, TrainId};
+use footplate_core::{HALF_95, Length, SensorId, TrainId, TurnoutId};
 use footplate_wire::LinkNotice;
 use serde::Serialize;
 
 /// The key of the alarm about missed stop intervals.
 const MISSED_INTERVALS: &str = "promises-broken";
+/// The key of the alarm about a sensor that reports where no train can be.
+const STUCK_SENSOR: &str = "contact-stuck";
+/// The key of the alarm about a train whose direction is unknown.
+const DIRECTION_UNKNOWN: &str = "line-reverse-in-doubt";
+/// The prefix of the keys of faults during a calibration.
+const FAULT_PREFIX: &str = "mishap-";
 
 /// The severity of an alarm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -19,15 +25,45 @@ pub(crate) enum Grade {
     Danger,
     /// Something deviates from the plan.
     Warning,
-    /// The alarms of this train are over; without a train, those of the link.
+    /// The alarm, or what the message is about, is over.
     Over,
 }
 
-/// A message that every page shows.
+/// What an alarm is about: alarms of one cause are one entry of the list.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Cause {
+    family: &'static str,
+    train: Option<TrainId>,
+    /// The sensor, turnout or command, where a family has one entry for each.
+    subject: String,
+}
+
+/// What resolves an alarm, beside news of it and the operator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Resolution {
+    /// Its train is located, and the watchdog does not distrust it.
+    Located,
+    /// Its train is commanded to run again.
+    Runs,
+    /// A sensor detects its train.
+    Detected,
+    /// This sensor detects a train.
+    Reported(SensorId),
+    /// Its train is at rest.
+    AtRest,
+    /// The turnout is in the other position.
+    Thrown { turnout: TurnoutId, curved: bool },
+    /// It has not recurred for a while.
+    Quiet,
+    /// News of the link, the sensor or the power, or the operator.
+    News,
+}
+
+/// A message that every page shows. Sessions record its form for debugging: its fields keep their names.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Alarm {
     /// The key of the sentence in the pages.
-    what: &'static str,
+    pub(super) what: &'static str,
     pub(super) grade: Grade,
     pub(super) train: Option<TrainId>,
     /// The values that the sentence is filled with.
@@ -41,6 +77,115 @@ pub(crate) struct Alarm {
 impl Alarm {
     fn new(grade: Grade, what: &'static str, train: impl Into<Option<TrainId>>, blanks: Vec<String>) -> Self {
         Self { what, grade, train: train.into(), blanks, text: String::new(), is_said: false }
+    }
+
+    pub(super) fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// A greater number is more severe. Within a cause, what needs the operator ranks above the danger that led to it.
+    pub(super) fn severity(&self) -> u8 {
+        match (self.what, self.grade) {
+            ("needs-person" | "line-silent" | "line-not-ready", _) => 3,
+            (_, Grade::Danger) => 2,
+            (_, Grade::Warning) => 1,
+            (_, Grade::Over) => 0,
+        }
+    }
+
+    /// The key without the prefix of calibrations: the same fault has the same cause there.
+    fn key(&self) -> &'static str {
+        self.what.strip_prefix(FAULT_PREFIX).unwrap_or(self.what)
+    }
+
+    /// The cause of the alarm.
+    pub(super) fn cause(&self) -> Cause {
+        let of_train = |family| Cause { family, train: self.train, subject: String::new() };
+        let of_link = |family| Cause { family, train: None, subject: String::new() };
+        let about =
+            |family| Cause { family, train: None, subject: self.blanks.first().cloned().unwrap_or_default() };
+        match self.key() {
+            "lost" | "needs-person" | "held-as-unknown" | "overdue" | "stands-lost" | "stands-elsewhere"
+            | "stands-untimely" | "stands-misses" | "moved" => of_train("position"),
+            "drifts-slower" | "drifts-faster" | "stands-slower" | "stands-faster" | "stands-distrusted" => {
+                of_train("model")
+            }
+            "diverged"
+            | "diverged-and-others"
+            | "track-ends"
+            | "held-back"
+            | "deadlock"
+            | "dropped"
+            | "track-reserved"
+            | "overshoots" => of_train("route"),
+            "stands-unconfirmed" | "does-not-stop" => of_train("stopping"),
+            "line-silent" | "line-not-ready" | "stands-silent" => of_link("link"),
+            "line-reply-lost" | "line-unexpected" | "line-repeated" => of_link("line noise"),
+            "power-off" | "line-power-lost" | "line-restarted" => of_link("power"),
+            "lies-curved" | "lies-straight" => about("turnout"),
+            STUCK_SENSOR | "unexplained" | "line-held-closed" => about("sensor"),
+            "not-sent" | "unconfirmed" | "line-solenoid-late" => about(self.what),
+            "line-says" => Cause { train: self.train, ..about(self.what) },
+            other => of_train(other),
+        }
+    }
+
+    /// What resolves the alarm.
+    pub(super) fn resolution(&self) -> Resolution {
+        let number = || self.blanks.first().and_then(|number| number.parse().ok());
+        match self.key() {
+            "line-held-closed" => {
+                number().map_or(Resolution::News, |sensor| Resolution::Reported(SensorId(sensor)))
+            }
+            "overdue" => Resolution::Detected,
+            "overshoots" => Resolution::AtRest,
+            "lies-curved" | "lies-straight" => number().map_or(Resolution::News, |turnout| {
+                Resolution::Thrown { turnout: TurnoutId(turnout), curved: self.what == "lies-curved" }
+            }),
+            "lost" | "needs-person" | "held-as-unknown" | "stands-lost" | "stands-elsewhere"
+            | "stands-untimely" | "stands-misses" | "stands-slower" | "stands-faster"
+            | "stands-distrusted" | "stands-silent" | "stands-unconfirmed" | "does-not-stop" | "moved"
+            | DIRECTION_UNKNOWN => Resolution::Located,
+            "diverged"
+            | "diverged-and-others"
+            | "track-ends"
+            | "track-reserved"
+            | "held-back"
+            | "deadlock"
+            | "dropped" => Resolution::Runs,
+            "unexplained"
+            | "line-reply-lost"
+            | "line-unexpected"
+            | "line-repeated"
+            | "line-reads-all-only"
+            | "drifts-slower"
+            | "drifts-faster"
+            | "stalled"
+            | "missed"
+            | "wrong-leg" => Resolution::Quiet,
+            _ => Resolution::News,
+        }
+    }
+
+    /// Whether this message, of the kind `over`, resolves an alarm.
+    pub(super) fn resolves(&self, alarm: &Self) -> bool {
+        let cause = alarm.cause();
+        match self.what {
+            "recovered" => {
+                alarm.train == self.train
+                    && matches!(cause.family, "position" | "model" | "stopping" | "route")
+            }
+            "line-answers" => matches!(cause.family, "link" | "line noise" | "not-sent" | "unconfirmed"),
+            "sensor-restored" => cause.family == "sensor" && alarm.blanks == self.blanks,
+            "power-on" => cause.family == "power",
+            "track-clear" => cause.family == "unauthorised",
+            _ => false,
+        }
+    }
+
+    /// The same alarm as a message that it is over.
+    pub(super) fn over(self) -> Self {
+        Self { grade: Grade::Over, ..self }
     }
 
     /// Adds the English text that was also printed as a line.
@@ -69,6 +214,11 @@ impl Alarm {
     pub(crate) fn promises_broken(train: TrainId, by: Length) -> Self {
         let by = format!("{:.0}", HALF_95 * by.as_mm());
         Self::new(Grade::Warning, MISSED_INTERVALS, train, vec![by])
+    }
+
+    /// A train was stopped before track that is reserved for others.
+    pub(crate) fn track_reserved(train: TrainId, holders: &[TrainId]) -> Self {
+        Self::new(Grade::Warning, "track-reserved", train, vec![listed(holders)])
     }
 
     /// Whether this alarm is about missed stop intervals.
@@ -100,7 +250,7 @@ impl Alarm {
             }
             LinkNotice::Repeated { .. } => (Grade::Warning, "line-repeated", None, Vec::new()),
             LinkNotice::ReverseInDoubt { train } => {
-                (Grade::Danger, "line-reverse-in-doubt", Some(*train), Vec::new())
+                (Grade::Danger, DIRECTION_UNKNOWN, Some(*train), Vec::new())
             }
             LinkNotice::HeldClosed { sensor } => {
                 (Grade::Warning, "line-held-closed", None, vec![sensor.to_string()])
@@ -113,10 +263,11 @@ impl Alarm {
             LinkNotice::OtherThrottle { train, .. } => {
                 (Grade::Danger, "line-says", Some(*train), vec![notice.to_string()])
             }
-            LinkNotice::Restarted
-            | LinkNotice::PowerLost
-            | LinkNotice::Unconfirmed { .. }
-            | LinkNotice::Locked => (Grade::Danger, "line-says", None, vec![notice.to_string()]),
+            LinkNotice::PowerLost => (Grade::Danger, "line-power-lost", None, Vec::new()),
+            LinkNotice::Restarted => (Grade::Danger, "line-restarted", None, Vec::new()),
+            LinkNotice::Unconfirmed { .. } | LinkNotice::Locked => {
+                (Grade::Danger, "line-says", None, vec![notice.to_string()])
+            }
             other => (Grade::Warning, "line-says", None, vec![other.to_string()]),
         };
         Some(Self { text: notice.to_string(), ..Self::new(grade, what, train, blanks) })
@@ -144,7 +295,7 @@ impl Alarm {
             Notice::TrackEnds { train, end } => {
                 (Grade::Warning, "track-ends", Some(*train), vec![layout.node_name(*end).to_owned()])
             }
-            Notice::SensorStuck { sensor } => (Grade::Warning, "contact-stuck", None, vec![name(sensor)]),
+            Notice::SensorStuck { sensor } => (Grade::Warning, STUCK_SENSOR, None, vec![name(sensor)]),
             Notice::Unexplained { sensor, .. } => (Grade::Warning, "unexplained", None, vec![name(sensor)]),
             Notice::Unconfirmed { command } => {
                 (Grade::Danger, "unconfirmed", None, vec![command.to_string()])
@@ -154,6 +305,8 @@ impl Alarm {
             Notice::NeedsOperator { train, .. } => (Grade::Danger, "needs-person", Some(*train), none),
             Notice::Cancelled { train, .. } => (Grade::Warning, "dropped", Some(*train), none),
             Notice::Recovered { train, .. } => (Grade::Over, "recovered", Some(*train), none),
+            Notice::SensorRestored { sensor } => (Grade::Over, "sensor-restored", None, vec![name(sensor)]),
+            Notice::PowerOn => (Grade::Over, "power-on", None, none),
             Notice::Deadlock { train, moves } => {
                 (Grade::Warning, "deadlock", Some(*train), vec![listed(moves)])
             }

@@ -11,7 +11,7 @@ const POLICY: &str = "default-src 'none'; connect-src 'self'; manifest-src 'self
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Asset {
     kind: &'static str,
-    text: &'static str,
+    bytes: &'static [u8],
 }
 
 macro_rules! files {
@@ -26,6 +26,9 @@ macro_rules! files {
 /// The file of a path.
 pub(super) fn asset(path: &str) -> Option<Asset> {
     let path = if path.is_empty() { "index.html" } else { path };
+    if path == "icon.png" {
+        return Some(Asset { kind: "image/png", bytes: include_bytes!("../../assets/dashboard/icon.png") });
+    }
     let text = match path {
         "uplot.js" => include_str!("../../assets/vendor/uplot/uPlot.iife.min.js"),
         "uplot.css" => include_str!("../../assets/vendor/uplot/uPlot.min.css"),
@@ -35,8 +38,8 @@ pub(super) fn asset(path: &str) -> Option<Asset> {
             "\nexport { chart, colour, dots, line, rounded };\n"
         ),
         _ => files! { path:
-            "index.html" "dashboard.css" "dashboard.js" "alarms.js" "server.js" "live.js" "halt.js" "dom.js" "words.js" "english.js"
-            "german.js" "charts.js" "layout_page.js" "pick_track.js" "track.js" "view.js" "train_page.js"
+            "index.html" "boot.js" "dashboard.css" "dashboard.js" "alarms.js" "guide.js" "schedules_page.js" "route_buttons.js" "server.js" "live.js" "halt.js" "dom.js" "words.js" "english.js"
+            "german.js" "german_report.js" "charts.js" "layout_page.js" "pick_track.js" "track.js" "view.js" "train_page.js"
             "train_charts.js" "places.js" "plan.js" "plan_curve.js" "plan_without_points.js" "scale.js" "throttle.js" "doing_now.js" "pieces.js" "draft.js" "editor_page.js" "setup_page.js" "worker.js" "icon.svg" "manifest.webmanifest" "calibration_page.js" "health_page.js" "recordings_page.js" "odometry_page.js" "slide_view.js"
         },
     };
@@ -47,7 +50,7 @@ pub(super) fn asset(path: &str) -> Option<Asset> {
         Some((_, "webmanifest")) => "application/manifest+json",
         _ => "text/html; charset=utf-8",
     };
-    Some(Asset { kind, text })
+    Some(Asset { kind, bytes: text.as_bytes() })
 }
 
 impl IntoResponse for Asset {
@@ -57,7 +60,7 @@ impl IntoResponse for Asset {
             (header::CONTENT_SECURITY_POLICY, POLICY),
             (header::CACHE_CONTROL, "no-cache"),
         ];
-        (headers, self.text).into_response()
+        (headers, self.bytes).into_response()
     }
 }
 
@@ -78,7 +81,7 @@ mod tests {
         let weight: usize = names
             .iter()
             .chain(&shared)
-            .map(|name| asset(name).unwrap_or_else(|| panic!("{name} is not served")).text.len())
+            .map(|name| asset(name).unwrap_or_else(|| panic!("{name} is not served")).bytes.len())
             .sum();
         assert!(weight <= HEAVIEST, "the pages weigh {weight} bytes");
     }

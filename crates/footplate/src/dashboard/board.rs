@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use footplate_core::model::MotionModel;
 use footplate_core::{Timestamp, TrainId};
+use footplate_store::Schedule;
 use serde::Serialize;
 use serde_json::json;
 use tokio::sync::{oneshot, watch};
@@ -43,6 +44,8 @@ pub(crate) enum Answer {
     Taken,
     /// Rejected, with the reason.
     Refused(String),
+    /// What was asked for, as JSON.
+    Found(String),
 }
 
 /// A request to the control loop.
@@ -52,6 +55,16 @@ pub(crate) enum Request {
     EmergencyStop,
     /// A line in the syntax of the prompt.
     Line(String),
+    /// End an alarm: the operator has seen to it.
+    EndAlarm(u64),
+    /// Where simulated trains really are; a real railway does not know.
+    Truth,
+    /// Whether the lines of a schedule can be read.
+    CheckSchedule(Schedule),
+    /// Begin a schedule.
+    RunSchedule(Schedule),
+    /// End the schedule of this name.
+    EndSchedule(String),
 }
 
 /// A request that waits for the loop.
@@ -212,19 +225,18 @@ impl Board {
         let mut waiting = lock(&self.waiting);
         match request {
             Request::EmergencyStop => waiting.push_front(PendingRequest { request, answer }),
-            Request::Line(_) if waiting.len() < MAX_WAITING => {
-                waiting.push_back(PendingRequest { request, answer });
-            }
-            Request::Line(_) => return Err(TooMany),
+            _ if waiting.len() < MAX_WAITING => waiting.push_back(PendingRequest { request, answer }),
+            _ => return Err(TooMany),
         }
         Ok(answered)
     }
 
-    /// Adds a request and waits for the control loop's answer.
-    pub(crate) async fn ask_and_wait(&self, request: Request) -> Result<(), NotDone> {
+    /// Adds a request and waits for the control loop's answer, which is JSON if something was asked for.
+    pub(crate) async fn ask_and_wait(&self, request: Request) -> Result<Option<String>, NotDone> {
         let answered = self.ask(request).map_err(|TooMany| NotDone::TooMany)?;
         match tokio::time::timeout(LOOP_TIMEOUT, answered).await {
-            Ok(Ok(Answer::Taken)) => Ok(()),
+            Ok(Ok(Answer::Taken)) => Ok(None),
+            Ok(Ok(Answer::Found(json))) => Ok(Some(json)),
             Ok(Ok(Answer::Refused(why))) => Err(NotDone::Refused(why)),
             _ => Err(NotDone::NoAnswer),
         }

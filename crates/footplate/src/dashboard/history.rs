@@ -57,7 +57,8 @@ pub(super) struct Columns {
     step: Vec<u8>,
     speed_mm_per_s: Vec<Option<f64>>,
     speed_half_mm_per_s: Vec<Option<f64>>,
-    way_mm: Vec<Option<f64>>,
+    #[serde(rename = "way_mm")]
+    distance_mm: Vec<Option<f64>>,
     half_mm: Vec<Option<f64>>,
 }
 
@@ -76,7 +77,7 @@ impl History {
             columns.step.push(*step);
             columns.speed_mm_per_s.push(at.map(|at| at.speed));
             columns.speed_half_mm_per_s.push(at.map(|at| at.speed_half));
-            columns.way_mm.push(at.map(|at| at.distance));
+            columns.distance_mm.push(at.map(|at| at.distance));
             columns.half_mm.push(at.map(|at| at.half));
         }
         columns

@@ -1,6 +1,6 @@
 //! Composes the picture of the current state, the histories and the detections from the state of a driver.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use footplate_core::control::learn::CalibrationNotice;
@@ -13,11 +13,12 @@ use footplate_core::{FunctionNumber, HALF_95, Length, SensorId, TimeSpan, Timest
 use serde::Serialize;
 
 use super::alarm::{Alarm, Grade};
+use super::alarm_list::{ActiveAlarm, AlarmList};
 use super::board::Board;
 use super::calibration_picture::CalibrationPicture;
 use super::history::Sample;
-use super::picture::{Picture, TrainTask, millis, paint_train, tenths};
-use super::spans::{Span, reserved_spans};
+use super::picture::{Picture, SessionState, TrainTask, millis, paint_train, tenths};
+use super::spans::reserved_spans;
 use super::travelled_distance::TravelledDistance;
 
 /// How long a detection is highlighted (s).
@@ -49,8 +50,7 @@ pub(crate) struct Painter {
     samples: Vec<(TrainId, Sample)>,
     sampled: Option<Timestamp>,
     drifts: BTreeMap<TrainId, DriftTest>,
-    /// Trains with active alarms; `None` for the link.
-    alarmed: BTreeSet<Option<TrainId>>,
+    alarms: AlarmList,
     /// When the session began, by the clock of the link.
     began: Option<Timestamp>,
     models: BTreeMap<TrainId, MotionModel>,
@@ -60,10 +60,13 @@ pub(crate) struct Painter {
     calibration: Option<CalibrationPicture>,
 }
 
-/// An alarm, as sent to browsers.
+/// The begin or the end of an alarm, as sent to browsers.
 #[derive(Debug, Serialize)]
 struct TimedAlarm<'a> {
     t_s: f64,
+    /// The number of the alarm in the list.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    id: Option<u64>,
     #[serde(flatten)]
     alarm: &'a Alarm,
 }
@@ -83,7 +86,8 @@ struct PassedPicture<'l> {
     short_mm: Option<f64>,
     missed: usize,
     /// Distance travelled so far.
-    way_mm: f64,
+    #[serde(rename = "way_mm")]
+    distance_mm: f64,
     /// The drift statistic relative to its alarm threshold, 0 to 1.
     drift: f64,
     /// The mean speed since the sensor before, from the surveyed length alone: (time, mm/s).
@@ -114,7 +118,7 @@ impl Painter {
             samples: Vec::new(),
             sampled: None,
             drifts: BTreeMap::new(),
-            alarmed: BTreeSet::new(),
+            alarms: AlarmList::default(),
             began: None,
             models: BTreeMap::new(),
             models_published: None,
@@ -151,55 +155,76 @@ impl Painter {
     /// Takes in a detection.
     pub(crate) fn passed(&mut self, passed: TrainPassed) {
         self.flashes.insert(passed.passed.sensor, passed.passed.window.middle());
+        self.alarms.detect(passed.train, passed.passed.sensor, passed.passed.window.middle());
         self.unpublished.push(passed);
     }
 
-    /// Publishes an alarm, or the end of one.
+    /// Raises an alarm, or resolves those that a message of the kind `over` is about.
     pub(crate) fn alarm(&mut self, now: Timestamp, alarm: &Alarm) {
-        let is_news = match alarm.grade {
-            Grade::Over => self.alarmed.remove(&alarm.train),
-            Grade::Danger | Grade::Warning => {
-                self.alarmed.insert(alarm.train);
-                true
+        let t_s = self.seconds(now);
+        if alarm.grade == Grade::Over {
+            // The end of an alarm is published only if the alarm was.
+            if self.alarms.resolve(alarm) > 0 {
+                self.board.publish("alarm", &TimedAlarm { t_s, id: None, alarm });
             }
-        };
-        // The end of an alarm is published only if the alarm was.
-        if is_news {
-            let t_s = millis((now - self.began.unwrap_or(now)).as_s());
-            self.board.publish("alarm", &TimedAlarm { t_s, alarm });
+            return;
         }
+        let id = Some(self.alarms.raise(now, t_s, alarm));
+        self.board.publish("alarm", &TimedAlarm { t_s, id, alarm });
+    }
+
+    /// Ends an alarm for the operator; returns whether it was active.
+    pub(crate) fn end_alarm(&mut self, now: Timestamp, id: u64) -> bool {
+        let ended = self.alarms.end(id);
+        self.publish_over(now, ended.iter().cloned());
+        ended.is_some()
+    }
+
+    /// The active alarms in one line for the prompt; `None` without alarms.
+    pub(crate) fn alarm_summary(&self) -> Option<String> {
+        self.alarms.summary()
+    }
+
+    fn publish_over(&self, now: Timestamp, ended: impl IntoIterator<Item = ActiveAlarm>) {
+        let t_s = self.seconds(now);
+        for ActiveAlarm { id, alarm, .. } in ended {
+            self.board.publish("alarm", &TimedAlarm { t_s, id: Some(id), alarm: &alarm.over() });
+        }
+    }
+
+    /// Seconds since the session began.
+    fn seconds(&self, at: Timestamp) -> f64 {
+        millis((at - self.began.unwrap_or(at)).as_s())
     }
 
     /// Publishes the state at `now`, which must not precede the last detection.
     pub(crate) fn paint(
         &mut self,
         dispatcher: &Dispatcher,
-        tasks: &BTreeMap<TrainId, TrainTask>,
-        functions: &BTreeMap<TrainId, u32>,
+        session: SessionState,
         now: Timestamp,
         began: Timestamp,
     ) {
-        let reserved = |train| dispatcher.reservation(train).map_or_else(Vec::new, reserved_spans);
-        self.paint_driven(dispatcher.driver(), reserved, tasks, functions, now, began);
+        self.paint_driven(dispatcher.driver(), Some(dispatcher), session, now, began);
     }
 
     /// Publishes trains without a dispatcher, which have no reservations.
     pub(crate) fn paint_undispatched(
         &mut self,
         driver: &Driver,
-        tasks: &BTreeMap<TrainId, TrainTask>,
+        tasks: BTreeMap<TrainId, TrainTask>,
         now: Timestamp,
         began: Timestamp,
     ) {
-        self.paint_driven(driver, |_| Vec::new(), tasks, &BTreeMap::new(), now, began);
+        let session = SessionState { tasks, ..SessionState::default() };
+        self.paint_driven(driver, None, session, now, began);
     }
 
     fn paint_driven(
         &mut self,
         driver: &Driver,
-        reserved: impl Fn(TrainId) -> Vec<Span>,
-        tasks: &BTreeMap<TrainId, TrainTask>,
-        functions: &BTreeMap<TrainId, u32>,
+        dispatcher: Option<&Dispatcher>,
+        session: SessionState,
         now: Timestamp,
         began: Timestamp,
     ) {
@@ -207,6 +232,14 @@ impl Painter {
         for passed in std::mem::take(&mut self.unpublished) {
             self.publish_detection(driver, &passed, began);
         }
+        let is_in_danger = |train| dispatcher.is_some_and(|dispatcher| dispatcher.is_in_danger(train));
+        let resolved = self.alarms.settle(now, driver, is_in_danger);
+        self.publish_over(now, resolved);
+        let reserved = |train| {
+            dispatcher
+                .and_then(|dispatcher| dispatcher.reservation(train))
+                .map_or_else(Vec::new, reserved_spans)
+        };
         let is_due = |last: Option<Timestamp>, between| last.is_none_or(|last| now - last >= between);
         let is_sampled = is_due(self.sampled, SAMPLE_INTERVAL);
         let mut trains = Vec::new();
@@ -215,9 +248,9 @@ impl Painter {
             let travelled = located.map(|located| self.travelled(driver, train, located.at));
             let commanded =
                 located.filter(|_| self.display_only).map_or_else(|| driver.commanded(train), |at| at.step);
-            let task = tasks.get(&train);
+            let task = session.tasks.get(&train);
             let mut picture = paint_train(driver, train, task, now, commanded, travelled, reserved(train));
-            picture.functions = functions.get(&train).copied().map_or_else(Vec::new, numbers);
+            picture.functions = session.functions.get(&train).copied().map_or_else(Vec::new, numbers);
             trains.push(picture);
             if is_sampled {
                 let sample = Sample::of((now - began).as_s(), commanded, located.as_ref(), travelled);
@@ -247,6 +280,8 @@ impl Painter {
                 })
                 .collect(),
             calibration: self.calibration.clone(),
+            alarms: self.alarms.ranked(),
+            schedules: session.schedules,
             passed: self.flashes.iter().map(|(sensor, at)| (sensor.0, millis(seconds_since(*at)))).collect(),
         });
     }
@@ -285,7 +320,7 @@ impl Painter {
                 short_mm: passed.short.map(|short| tenths(short.as_mm())),
                 missed: passed.missed,
                 drift: millis(level),
-                way_mm: tenths(at_sensor.as_mm()),
+                distance_mm: tenths(at_sensor.as_mm()),
                 mean: mean.map(|(at, speed)| [since(at), tenths(speed.as_mm_per_s())]),
                 next: next.map(|next| DuePicture {
                     contact: layout.sensor_name(next.sensor),

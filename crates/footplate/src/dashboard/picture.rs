@@ -9,6 +9,7 @@ use footplate_core::{HALF_95, Length, SpeedStep, Timestamp, TrainId};
 use footplate_store::LayoutFile;
 use serde::Serialize;
 
+use super::alarm_list::ActiveAlarm;
 use super::calibration_picture::CalibrationPicture;
 use super::spans::{Span, spans};
 
@@ -28,6 +29,32 @@ pub(crate) struct TrainTask {
     pub(crate) promise: Option<[Length; 3]>,
 }
 
+/// What a session knows beside its driver.
+#[derive(Debug, Default)]
+pub(crate) struct SessionState {
+    pub(crate) tasks: BTreeMap<TrainId, TrainTask>,
+    /// The functions of each train that were switched on, one bit each.
+    pub(crate) functions: BTreeMap<TrainId, u32>,
+    pub(crate) schedules: Vec<SchedulePicture>,
+}
+
+/// How far a schedule has come. Lines are counted from 0.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct SchedulePicture {
+    pub(crate) name: String,
+    /// The present round, from 1.
+    pub(crate) round: u32,
+    /// How many there are; `None` until it is ended.
+    pub(crate) rounds: Option<u32>,
+    /// The lines that are being carried out.
+    pub(crate) active: Vec<usize>,
+    /// The line that follows.
+    pub(crate) next: Option<usize>,
+    /// The lines of this round that were refused, with the reasons.
+    pub(crate) refused: BTreeMap<usize, String>,
+    pub(crate) is_over: bool,
+}
+
 /// The state of the railway at one time.
 #[derive(Debug, Serialize)]
 pub(super) struct Picture {
@@ -39,6 +66,10 @@ pub(super) struct Picture {
     pub(super) turnouts: BTreeMap<u16, Option<&'static str>>,
     /// Recent detections: sensor, and seconds since.
     pub(super) passed: BTreeMap<u16, f64>,
+    /// The active alarms, the most severe first.
+    pub(super) alarms: Vec<ActiveAlarm>,
+    /// The schedules that run, and those that have ended.
+    pub(super) schedules: Vec<SchedulePicture>,
     /// A calibration in progress.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) calibration: Option<CalibrationPicture>,

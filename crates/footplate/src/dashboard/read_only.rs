@@ -43,15 +43,22 @@ impl ReadOnlyDashboard {
     }
 
     /// Whether an emergency stop was requested. All other requests are rejected with `why`.
-    pub(crate) fn is_halted(&self, why: &str) -> bool {
+    pub(crate) fn is_halted(&mut self, now: Timestamp, why: &str) -> bool {
         let mut is_halted = false;
         while let Some(asked) = self.board.next_request() {
-            let halts = match &asked.request {
-                Request::EmergencyStop => true,
-                Request::Line(line) => line.trim() == "halt",
+            let is_taken = match &asked.request {
+                Request::EmergencyStop => {
+                    is_halted = true;
+                    true
+                }
+                Request::Line(line) if line.trim() == "halt" => {
+                    is_halted = true;
+                    true
+                }
+                Request::EndAlarm(id) => self.painter.end_alarm(now, *id),
+                _ => false,
             };
-            is_halted |= halts;
-            asked.answer(if halts { Answer::Taken } else { Answer::Refused(why.to_owned()) });
+            asked.answer(if is_taken { Answer::Taken } else { Answer::Refused(why.to_owned()) });
         }
         is_halted
     }
@@ -80,7 +87,7 @@ impl ReadOnlyDashboard {
     pub(crate) fn driver(&mut self, driver: &Driver, tasks: &BTreeMap<TrainId, TrainTask>, now: Timestamp) {
         if self.is_due() {
             self.painter.end_calibration();
-            self.painter.paint_undispatched(driver, tasks, now, self.began);
+            self.painter.paint_undispatched(driver, tasks.clone(), now, self.began);
         }
     }
 
@@ -89,7 +96,7 @@ impl ReadOnlyDashboard {
         if !self.is_due() {
             return;
         }
-        self.painter.paint_undispatched(self.follower.of(calibrator), &BTreeMap::new(), now, self.began);
+        self.painter.paint_undispatched(self.follower.of(calibrator), BTreeMap::new(), now, self.began);
     }
 
     fn is_due(&mut self) -> bool {

@@ -10,6 +10,8 @@
 //! GET  /api/trains/24/history   the last five minutes of a train
 //! GET  /api/trains/24/model     its motion model
 //! GET  /api/line             timing of the link and of the control loop
+//! GET  /api/truth            where simulated trains really are
+//! POST /api/alarms/3/end     {}: the operator has seen to this alarm
 //! POST /api/orders           {"line": "stop 24 at C13+120mm"}: a line in the syntax of the prompt
 //! POST /api/emergency-stop   {}: stop all trains, switch the track power off
 //! ```
@@ -137,7 +139,7 @@ struct Shared {
 }
 
 impl Dashboard {
-    /// Starts the server; `more` are routes beside those of driving.
+    /// Starts the server; `more` are routes beside those of driving, over the same board.
     ///
     /// # Errors
     /// The address is in use, or the token is too short.
@@ -145,14 +147,14 @@ impl Dashboard {
         at: &ServedAt,
         token: Option<Token>,
         layout: &LayoutFile,
-        more: Routes,
+        more: impl FnOnce(&Arc<Board>) -> Routes,
     ) -> anyhow::Result<Self> {
         let layout = serde_json::to_string(&LayoutPicture::of(layout))?.into();
         // The start time in nanoseconds identifies the session.
         let board = Board::new(now().as_ns());
         let line = SharedTallies::default();
         let shared = Shared { board: Arc::clone(&board), layout, line: Arc::clone(&line) };
-        let pages = ServedPages::open(at, token, own_routes(shared).and(more))?;
+        let pages = ServedPages::open(at, token, own_routes(shared).and(more(&board)))?;
         Ok(Self { board, line, url: pages.url.clone(), _pages: pages })
     }
 }
@@ -232,6 +234,8 @@ fn own_routes(shared: Shared) -> Routes {
             ("/api/trains/{train}/history", get(history)),
             ("/api/trains/{train}/model", get(model)),
             ("/api/line", get(line)),
+            ("/api/truth", get(truth)),
+            ("/api/alarms/{alarm}/end", post(end_alarm)),
             ("/api/orders", post(order)),
             ("/api/emergency-stop", post(emergency_stop)),
         ],
@@ -350,9 +354,30 @@ async fn emergency_stop(State(shared): State<Shared>) -> Response {
     ask(&shared.board, board::Request::EmergencyStop).await
 }
 
+async fn truth(State(shared): State<Shared>) -> Response {
+    ask(&shared.board, board::Request::Truth).await
+}
+
+async fn end_alarm(State(shared): State<Shared>, Path(alarm): Path<String>) -> Response {
+    match alarm.parse() {
+        Ok(id) => ask(&shared.board, board::Request::EndAlarm(id)).await,
+        Err(_) => {
+            let says = format!("`{alarm}` is not the number of an alarm; /api/picture lists them");
+            (StatusCode::NOT_FOUND, Json(json!({ "error": says }))).into_response()
+        }
+    }
+}
+
 async fn ask(board: &Board, request: board::Request) -> Response {
-    let Err(not_done) = board.ask_and_wait(request).await else {
-        return (StatusCode::ACCEPTED, Json(json!({ "taken": true }))).into_response();
+    answered(board.ask_and_wait(request).await)
+}
+
+/// The answer of the control loop as a response.
+pub(crate) fn answered(answer: Result<Option<String>, NotDone>) -> Response {
+    let not_done = match answer {
+        Ok(None) => return (StatusCode::ACCEPTED, Json(json!({ "taken": true }))).into_response(),
+        Ok(Some(json)) => return ready_json(&json),
+        Err(not_done) => not_done,
     };
     let status = match not_done {
         NotDone::TooMany => StatusCode::TOO_MANY_REQUESTS,
@@ -367,18 +392,15 @@ mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::commands::{
-        AnswerQueue, WrittenLayout, archive_routes, odometry_routes, set_up_paths, slide_routes,
-    };
+    use crate::commands::{session_paths, set_up_paths};
 
     #[test]
     fn the_description_of_the_interface_has_every_route_and_no_other() {
         let shared = Shared { board: Board::new(0), layout: "".into(), line: SharedTallies::default() };
-        let layout = WrittenLayout::named("track-a").expect("built in");
-        let answer_queue = AnswerQueue::new();
-        let of_files = archive_routes(None, &layout, &answer_queue).and(odometry_routes(&answer_queue));
-        let routes = own_routes(shared).and(of_files).and(slide_routes());
-        let there: BTreeSet<&str> = routes.paths().iter().copied().chain(set_up_paths()).collect();
+        let of_session = session_paths(&shared.board);
+        let own = own_routes(shared);
+        let there: BTreeSet<&str> =
+            own.paths().iter().copied().chain(of_session).chain(set_up_paths()).collect();
         let described: serde_json::Value = serde_json::from_str(OPENAPI).expect("JSON");
         let described: BTreeSet<&str> =
             described["paths"].as_object().expect("paths").keys().map(String::as_str).collect();

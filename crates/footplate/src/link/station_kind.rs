@@ -1,5 +1,7 @@
 //! The kinds of command stations: which addresses and decoders each commands.
 
+use std::ops::RangeInclusive;
+
 use footplate_core::{DecoderSteps, TrainId};
 use footplate_wire::marklin_can::LocomotiveProtocol;
 use footplate_wire::{dcc_ex, loconet, marklin_serial, z21};
@@ -26,13 +28,14 @@ impl StationKind {
     /// # Errors
     /// What it does not have, for people.
     pub(crate) fn check(self, train: TrainId, decoder: DecoderSteps) -> Result<(), String> {
-        let (name, addresses) = match self {
-            Self::Marklin => ("a 6051", marklin_serial::TRAINS),
-            Self::DccEx => ("a DCC-EX board", dcc_ex::CABS),
-            Self::Z21 => ("a Z21", z21::LOCOMOTIVES),
-            Self::MarklinCan => ("a Central Station", LocomotiveProtocol::Mfx.addresses()),
-            Self::LocoNet => ("LocoNet", loconet::LOCOMOTIVES),
+        let name = match self {
+            Self::Marklin => "a 6051",
+            Self::DccEx => "a DCC-EX board",
+            Self::Z21 => "a Z21",
+            Self::MarklinCan => "a Central Station",
+            Self::LocoNet => "LocoNet",
         };
+        let addresses = self.addresses();
         if !addresses.contains(&train.0) {
             let (first, last) = (addresses.start(), addresses.end());
             return Err(format!("train {train} has no address on {name}; addresses are {first} to {last}"));
@@ -44,6 +47,17 @@ impl StationKind {
             ));
         }
         Ok(())
+    }
+
+    /// The addresses of trains that the station has.
+    pub(crate) const fn addresses(self) -> RangeInclusive<u16> {
+        match self {
+            Self::Marklin => marklin_serial::TRAINS,
+            Self::DccEx => dcc_ex::CABS,
+            Self::Z21 => z21::LOCOMOTIVES,
+            Self::MarklinCan => LocomotiveProtocol::Mfx.addresses(),
+            Self::LocoNet => loconet::LOCOMOTIVES,
+        }
     }
 
     /// Returns the station with this name.

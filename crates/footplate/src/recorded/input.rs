@@ -2,6 +2,7 @@
 
 use footplate_core::control::{LinkNews, Order};
 use footplate_core::{Event, TrainId};
+use footplate_store::Schedule;
 use serde::de::DeserializeOwned;
 
 /// Prefix of the train number.
@@ -17,6 +18,10 @@ pub(crate) enum Input {
     Timeout,
     /// A line that a person wrote.
     Line(String),
+    /// A schedule begins.
+    Schedule(Schedule),
+    /// The schedule of this name ends.
+    EndSchedule(String),
     /// An emergency stop: all trains stop, and the track power goes off.
     EmergencyStop,
     /// No more lines follow.
@@ -65,6 +70,8 @@ impl Input {
             Self::Link(LinkNews::ReverseInDoubt { train }) => ("link", format!("{REVERSE_IN_DOUBT}{train}")),
             Self::Timeout => ("timeout", String::new()),
             Self::Line(line) => ("line", line.clone()),
+            Self::Schedule(schedule) => ("schedule", serde_json::to_string(schedule).unwrap_or_default()),
+            Self::EndSchedule(name) => ("end-schedule", name.clone()),
             Self::EmergencyStop => ("emergency-stop", String::new()),
             Self::NoMoreLines => ("no-more-lines", String::new()),
             Self::End => ("end", String::new()),
@@ -93,6 +100,8 @@ impl Input {
             },
             "timeout" => Self::Timeout,
             "line" => Self::Line(text.to_owned()),
+            "schedule" => Self::Schedule(of_json(kind, text)?),
+            "end-schedule" => Self::EndSchedule(text.to_owned()),
             "emergency-stop" => Self::EmergencyStop,
             "no-more-lines" => Self::NoMoreLines,
             "end" => Self::End,
@@ -138,6 +147,13 @@ mod tests {
         inputs.extend([
             Input::Timeout,
             Input::Line("stop 24 at C13+120mm  # näher".to_owned()),
+            Input::Schedule(Schedule {
+                name: "Abend".to_owned(),
+                lines: vec!["go 24 to C13".to_owned(), "wait 24 at rest".to_owned()],
+                rounds: None,
+                is_button: true,
+            }),
+            Input::EndSchedule("Abend".to_owned()),
             Input::EmergencyStop,
             Input::NoMoreLines,
             Input::Link(LinkNews::Silent),

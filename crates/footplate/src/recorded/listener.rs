@@ -17,7 +17,13 @@ pub(crate) trait Listener: Machine<Notice: Debug> {
         match input {
             Input::Event(event) => self.handle_event(now, event),
             Input::Timeout => self.handle_timeout(now),
-            Input::Line(_) | Input::EmergencyStop | Input::NoMoreLines | Input::Order(_) | Input::Link(_) => {
+            Input::Line(_)
+            | Input::Schedule(_)
+            | Input::EndSchedule(_)
+            | Input::EmergencyStop
+            | Input::NoMoreLines
+            | Input::Order(_)
+            | Input::Link(_) => {
                 self.handle_word(now, input);
             }
             Input::End => {}

@@ -235,15 +235,15 @@ fn two_trains_whose_ways_cross_are_sent_at_once_and_both_arrive() {
 }
 
 #[test]
-fn whoever_is_stopped_before_track_of_another_is_told_whose_it_is() {
+fn a_train_stopped_at_the_reservation_of_another_names_that_train() {
     let link = "sim:track-a?seed=7&faults=none&trains=24,58";
     let store = store_that_knows("holder-store", link, &["24", "58"]);
     let script = "turnout all straight\nspeed 24 8\nwait 24 located\nwait 5s\nstop 24\nwait 24 at rest\n\
                   speed 58 8\nwait 58 located\nwait 20s\nstop 58\n";
     let run = drive("holder", link, script, &["--store", &store]);
-    let told = run.output.lines().find(|line| line.contains("the track ahead is not reserved for it"));
+    let told = run.output.lines().find(|line| line.contains("the track ahead is reserved for"));
     let told = told.unwrap_or_else(|| panic!("{}{}", run.output, run.errors));
-    assert!(told.ends_with("; it is reserved for train 24"), "{told}");
+    assert!(told.ends_with("train 58 stopped: the track ahead is reserved for train 24"), "{told}");
 }
 
 /// The stops of a script, each of which says how far off it truly was and what had been promised.
@@ -266,11 +266,11 @@ fn a_script_waits_for_a_train_that_is_lost_and_found_again() {
         orders.map(|(place, step)| format!("stop 24 at {place}mm at step {step} next round\n")).collect();
     let script =
         format!("turnout all straight\nspeed 24 8\nwait 24 located\nspeed 24 0\nwait 24 at rest\n{orders}");
-    let run = drive("lost", "sim:track-a?seed=88&trains=24", &script, &["--json"]);
+    let run = drive("lost", "sim:track-a?seed=300&trains=24", &script, &["--json"]);
     // then that stop and those after it are made once it has been found, where they were promised.
     assert_eq!(run.status, 0, "{}{}", run.output, run.errors);
     assert!(run.errors.contains("position of train 24 lost"), "{}", run.errors);
-    assert!(run.errors.contains("`stop 24 at B15+38mm at step 4 next round` waits"), "{}", run.errors);
+    assert!(run.errors.contains("`stop 24 at A3+86mm at step 4 next round` waits"), "{}", run.errors);
     let stops = stops(&run, "stop");
     assert_eq!(stops.len(), places.len(), "{}", run.output);
     assert!(stops.iter().all(|[error, low, high]| (low..=high).contains(&error)), "{stops:?}");

@@ -1,4 +1,4 @@
-// What axe-core finds wrong with a page for people who cannot see it well, or use no mouse.
+// Checks pages with axe-core for readers with low vision and for use without a mouse.
 
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -9,7 +9,7 @@ const AXE = readFileSync(join(AT, "node_modules", "axe-core", "axe.min.js"), "ut
 
 /** The serious and critical findings of a page, a line each. */
 export async function findings(page) {
-  // The pages allow no script but their own: axe is put in from outside, as the browser's own tools are.
+  // The content security policy allows only scripts of the server: axe is injected as the browser's own tools are.
   await page.evaluate(AXE);
   const { violations } = await page.evaluate(() => globalThis.axe.run(document, { resultTypes: ["violations"] }));
   return violations

@@ -1,4 +1,4 @@
-// What the tests of all pages have in common: a browser, a page that collects complaints, and a look at its charts.
+// Common code of the browser tests: starting the browser, collecting console errors, and looking at charts.
 
 import { createRequire } from "node:module";
 import { join, resolve } from "node:path";
@@ -11,7 +11,7 @@ export function launch() {
   return chromium.launch({ executablePath: "/usr/bin/chromium", args: ["--no-sandbox", "--disable-gpu"] });
 }
 
-/** Opens a page; what it complains of, or asks the network for, is collected. */
+/** Opens a file as a page; collects console errors and network requests. */
 export async function openPage(browser, address, options = {}) {
   const page = await browser.newPage({ viewport: { width: 1300, height: 900 }, ...options });
   const complaints = [];
@@ -23,7 +23,7 @@ export async function openPage(browser, address, options = {}) {
   return { page, complaints };
 }
 
-/** Opens a live page; what it complains of is collected. */
+/** Opens a live page; collects console errors. */
 export async function openQuietly(browser, address, options = {}) {
   const page = await browser.newPage({ viewport: { width: 1300, height: 900 }, ...options });
   const complaints = [];
@@ -33,11 +33,11 @@ export async function openQuietly(browser, address, options = {}) {
   return { page, complaints };
 }
 
-/** How many different colours each chart's canvas shows: a blank one has a single one. */
+/** The number of different colours on each chart's canvas: a blank canvas has one. */
 export const colours = (page) => page.$$eval(".uplot canvas", (all) => all.map((canvas) => {
   const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
   return new Set(new Uint32Array(data.buffer)).size;
 }));
 
-/** How wide a page is: a phone zooms out until everything fits, and what it then shows is wider than it is. */
+/** The width of a page: a phone zooms out until everything fits, which makes the page wider than the screen. */
 export const width = (page) => page.evaluate(() => Math.max(document.documentElement.scrollWidth, innerWidth));

@@ -1,5 +1,5 @@
-// The dashboard in a real browser: a simulated train is found, driven by clicking and stopped where it should, an
-// emergency stop is one key, pages from elsewhere are turned away, and a server that comes back is found again.
+// The dashboard in a real browser: a simulated train is located, driven by clicking and stopped at its target; the space bar is an
+// emergency stop; requests of other sites are refused; a page finds a server that comes back.
 
 import assert from "node:assert/strict";
 import { request } from "node:http";
@@ -9,14 +9,14 @@ import { after, before, test } from "node:test";
 import { AT, launch, openQuietly } from "./browser.mjs";
 import { PATIENCE, calibratedStore, end, serve } from "./railway.mjs";
 
-/** A stop that ends further off than this has missed its place: more than a train's length of doubt. */
+/** A stop further from its target than this (mm) has failed: no interval of this train is as wide. */
 const MISSED_MM = 60;
 
 let browser;
 let running;
 let store;
 
-/** A request as no browser would send it; its status. */
+/** The status of a request with headers that no browser would send. */
 function ask(path, headers, body) {
   return new Promise((resolve, reject) => {
     const sent = request({ host: "127.0.0.1", port: running.port, path, method: body ? "POST" : "GET", headers }, (answer) => {
@@ -41,7 +41,7 @@ after(async () => {
   if (running) await end(running);
 });
 
-test("a train is found, driven by clicking and stopped where it should, and stands at the space bar", async () => {
+test("a train is located, driven by clicking, stopped at its target, and stopped by the space bar", async () => {
   const { page, complaints } = await openQuietly(browser, running.url);
   await page.waitForSelector(".train");
   await page.fill("#line", "turnout all straight");
@@ -53,7 +53,7 @@ test("a train is found, driven by clicking and stopped where it should, and stan
   await page.waitForFunction(() => /±/.test(document.querySelector(".train dd").textContent), null, { timeout: PATIENCE });
   await page.screenshot({ path: join(AT, "dashboard.png") });
 
-  // Once E7 is passed, C13 is a lap away. A press on it names it, and the card's button stops the train there.
+  // After E7, C13 is a lap away. A click selects it, and the button on the card stops the train there.
   await page.waitForFunction(() => /at E7,[^]*$/.test(document.querySelector("#said").lastElementChild.textContent), null, { timeout: PATIENCE });
   const spot = await page.locator("#track text", { hasText: "C13 C14" }).boundingBox();
   await page.mouse.click(spot.x + spot.width / 2, spot.y + spot.height + 6);
@@ -74,7 +74,7 @@ test("a train is found, driven by clicking and stopped where it should, and stan
   await page.waitForFunction(() => /commanded to stop/.test(document.querySelector("#halted").textContent), null, { timeout: PATIENCE });
   const { trains } = await picture();
   assert.equal(trains[0].step, 0);
-  // The station was told, and is heard; that it did what it was told is never claimed.
+  // The command was sent and the station has answered since; the page never claims that the power is off.
   await page.waitForFunction(() => /NOT CONFIRMED, check that all trains have stopped/.test(document.querySelector("#halted").textContent), null, { timeout: PATIENCE });
   await page.fill("#line", "power on");
   await page.click("#order button");
@@ -83,7 +83,7 @@ test("a train is found, driven by clicking and stopped where it should, and stan
   await page.close();
 });
 
-test("pages from elsewhere, other names and forms are turned away, and mistakes are named", async () => {
+test("requests of other origins, hosts and content types are refused, and errors name the mistake", async () => {
   const own = { Host: `127.0.0.1:${running.port}`, "Content-Type": "application/json" };
   const order = JSON.stringify({ line: "where" });
   assert.equal(await ask("/api/orders", own, order), 202);
@@ -97,13 +97,13 @@ test("pages from elsewhere, other names and forms are turned away, and mistakes 
   assert.equal(await ask("/nothing", own), 404);
 });
 
-test("beyond this machine the token is asked for, and the page works with it", async () => {
+test("other machines need the token, and the page works with it", async () => {
   const refused = await serve(store, "0.0.0.0:0", { token: "s3cret" }).catch((error) => error);
   assert.match(String(refused), /FOOTPLATE_TOKEN has 6 characters/);
   const generated = await serve(store, "0.0.0.0:0");
   assert.match(generated.url, /\?token=[0-9a-f]{32}$/);
   await end(generated);
-  // As Base64 writes it, with all of its signs.
+  // A token with all characters that Base64 uses.
   const token = "c2VjcmV0IHRva2Vu+/8=";
   const open = await serve(store, "0.0.0.0:0", { token });
   const url = `http://127.0.0.1:${open.port}/`;
@@ -120,7 +120,7 @@ test("beyond this machine the token is asked for, and the page works with it", a
   await end(open);
 });
 
-test("it fits a phone, in the dark and in German, and finds a server that comes back", async () => {
+test("the dashboard fits a phone, in the dark and in German, and reconnects to a restarted server", async () => {
   const page = await browser.newPage({ viewport: { width: 390, height: 800 }, colorScheme: "dark", locale: "de-DE", hasTouch: true });
   await page.goto(running.url);
   await page.waitForSelector(".train");

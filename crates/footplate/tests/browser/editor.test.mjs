@@ -29,7 +29,7 @@ after(async () => {
   await Promise.all([...running].map(end));
 });
 
-test("an oval with a siding is drawn from nothing, its file is sound, and a train is calibrated on it", async () => {
+test("an oval with a siding is drawn from nothing, its file is valid, and a train is calibrated on it", async () => {
   const program = await started("sim:track-a?seed=7", "any.db");
   const { page, complaints } = await openQuietly(browser, `${program.url}#/editor`);
   await page.waitForSelector("#pieces button");
@@ -38,7 +38,7 @@ test("an oval with a siding is drawn from nothing, its file is sound, and a trai
   };
   const joints = (kind) => page.locator(`#draft .joint.${kind}`);
   const says = () => page.locator("#draft-says").textContent();
-  /** Presses the joint of a kind that is nearest to a point of the drawing (mm). */
+  /** Clicks the joint of a kind that is nearest to a point of the drawing (mm). */
   const press = async (kind, x, y) => {
     const nth = await page.$$eval(`#draft .joint.${kind}`, (all, [x, y]) => {
       const away = (joint) => Math.hypot(joint.cx.baseVal.value - x, joint.cy.baseVal.value - y);
@@ -49,12 +49,12 @@ test("an oval with a siding is drawn from nothing, its file is sound, and a trai
     await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
   };
 
-  // Nothing is no layout, and says what to do.
+  // An empty drawing is refused with what to do.
   assert.ok(await page.locator("#draft-save").isDisabled());
   assert.match(await says(), /Choose a piece to begin/);
   await page.click("#hand-right");
   await lay("24611/24612", "24172", "24188", "24188", "24172");
-  // The other turnout is met from its straight leg, and its curved leg is on the same side of the track.
+  // The track joins the other turnout at its straight leg; both curved legs are on the same side.
   await page.click("#hand-left");
   await page.selectOption("#joined-at", { label: "the straight leg" });
   await lay("24611/24612");
@@ -62,7 +62,7 @@ test("an oval with a siding is drawn from nothing, its file is sound, and a trai
   const half = ["24130", "24130", "24130", "24130", "24130", "24130"];
   await lay(...half, "24188", "24172", "24188", "24188", "24172", "24188");
   assert.equal(await joints("open").count(), 4);
-  // A piece too many is taken back, and laid again.
+  // Undo removes a piece, redo restores it.
   await lay("24094");
   await page.click("#draft-undo");
   await lay(...half);
@@ -83,7 +83,7 @@ test("an oval with a siding is drawn from nothing, its file is sound, and a trai
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "editor.png") });
 
-  // What was drawn is there when the page comes back.
+  // The drawing survives a reload.
   await page.reload();
   await page.waitForSelector("#draft .joint.sensor");
   assert.equal(await joints("sensor").count(), 4);
@@ -94,7 +94,7 @@ test("an oval with a siding is drawn from nothing, its file is sound, and a trai
   await download.saveAs(file);
   assert.match(footplate("layout", "check", file), /a sound layout of 12 nodes and 14 edges/);
   assert.match(readFileSync(file, "utf8"), /^name = "My \\"first\\" oval"$/m);
-  // The way round is what the catalogue says: six straights on either side, and twelve curves of 30° and 360 mm.
+  // The circumference follows from the catalogue: six straights on either side, and twelve curves of 30° and 360 mm.
   const { hops } = JSON.parse(footplate("layout", "show", file, "--json"));
   const round = 2 * (4 * 188.3 + 2 * 171.7) + 2 * Math.PI * 360;
   const main = hops.filter(({ from, to }) => !/^A[78]$/.test(from) && !/^A[78]$/.test(to));

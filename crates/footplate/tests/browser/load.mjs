@@ -1,10 +1,10 @@
-// What the dashboard costs: first paint, state updates, frames, and what a thousand clients do to the control loop.
+// Measures the cost of the dashboard: first paint, state updates, frames, and the effect of a thousand clients on the control loop.
 //
 //   FOOTPLATE=target/debug/footplate BROWSER_AT=target/browser node crates/footplate/tests/browser/load.mjs
 //
 // A simulated 6051 with four trains, one of them running, in real time. Shares of a core are read from the kernel's clock of each
-// thread; the loop's times are counted by the program itself (GET /api/line). Everything is measured in turns, so that what
-// else the machine does falls on all of them.
+// thread; the loop's times are counted by the program itself (GET /api/line). All cases are measured in turns, so that
+// other load on the machine affects them equally.
 
 import { readFileSync, readdirSync } from "node:fs";
 import { connect } from "node:net";
@@ -23,7 +23,7 @@ const TICKS = 100;
 const sleep = (ms) => new Promise((resolve) => setTimeout(resolve, ms));
 const median = (values) => [...values].sort((one, other) => one - other)[Math.floor(values.length / 2)];
 
-/** Seconds that each thread has computed, by its name. */
+/** The processor time of each thread (s), by its name. */
 function threads(pid) {
   const used = {};
   for (const thread of readdirSync(`/proc/${pid}/task`)) {
@@ -35,7 +35,7 @@ function threads(pid) {
   return used;
 }
 
-/** What threads use while something goes on, as shares of a core. */
+/** The load of each thread during an activity, in shares of a core. */
 async function shares(pid, ms) {
   const before = threads(pid);
   const began = performance.now();
@@ -47,7 +47,7 @@ async function shares(pid, ms) {
 
 const line = async ({ url }) => (await fetch(`${url}api/line`)).json();
 
-/** The quantile of what was counted between two looks. */
+/** A quantile of the counts between two readings. */
 function between(before, after, share) {
   const counts = new Map(after.bins.map(([, to, count]) => [to, count]));
   for (const [, to, count] of before.bins) counts.set(to, counts.get(to) - count);
@@ -64,7 +64,7 @@ async function turnsFor(running, ms) {
   return [between(before, after, 0.5), between(before, after, 0.99)];
 }
 
-/** Clients that ask for the events and then do nothing: half of them read what comes, half never do. */
+/** Clients that request the events: half of them read the answer, half never do. */
 async function crowd({ port }) {
   const sockets = [];
   for (let nth = 0; nth < CLIENTS; nth++) {
@@ -88,7 +88,7 @@ const browser = await launch();
 try {
   await say(running, "turnout all straight");
   await sleep(6000);
-  // Trains that stand where a person says that they were put.
+  // Trains at rest where the operator placed them.
   for (const [train, place] of [[43, "A13"], [47, "B11"], [58, "A15"]]) await say(running, `place ${train} at ${place}`);
   await say(running, "speed 24 8");
   await sleep(8000);

@@ -1,5 +1,4 @@
-// A page of odometry opens in a real browser: every chart is drawn, all zoom together, in dark and light, on a phone,
-// by keyboard.
+// An odometry report in a real browser: every chart is drawn and all zoom together, in dark and light, on a phone, by keyboard.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -12,11 +11,11 @@ import { pathToFileURL } from "node:url";
 import { AT, colours, launch, openPage, width } from "./browser.mjs";
 
 const PERIOD_S = 0.05;
-/** Way of a pulse of the vehicle below. */
+/** The distance of one pulse of the vehicle below (m). */
 const PITCH_M = (Math.PI * 0.86) / 80;
 const KINDS = ["speed", "wheels", "shares", "distance", "acceleration"];
 
-/** Two minutes of a train that starts, coasts and stops; if it is wet, one wheelset slips, and later both slide. */
+/** Two minutes of a train that starts, coasts and stops; on wet rail one wheelset slips, and later both slide. */
 function rows(name, wet) {
   let [speed, distance] = [0, 0];
   const [rolled, counted] = [[0, 0], [0, 0]];
@@ -42,7 +41,7 @@ function rows(name, wet) {
 }
 
 const HEADER = "run_id,t_s,pulses_1,pulses_2,effort,accel_m_s2,true_speed_m_s,true_distance_m";
-/** What is known of the vehicle: without it, every page warns. */
+/** The vehicle file: without it, every page warns. */
 const VEHICLE = `name = "wet train"
 period_s = ${PERIOD_S}
 max_speed_m_s = 50.0
@@ -67,9 +66,9 @@ before(async () => {
     execFileSync(process.env.FOOTPLATE, ["odometry", ...files], { stdio: "pipe" });
   };
   writeFileSync(join(folder, "vehicle.toml"), VEHICLE);
-  // This name would run if it were taken for markup.
+  // A name that would run as a script if it were not escaped.
   write("runs", [HEADER, ...rows("<img src=x onerror=document.title='taken-over'>", true), ...rows("dry", false)]);
-  // Nothing but counts is known, and time is that of a clock.
+  // Only counts, with times of a clock.
   const counts = rows("", true).map((row) => row.split(","));
   write("counts", ["t_s,pulses_1,pulses_2", ...counts.map(([, time, ...rest]) => [1.7e9 + Number(time), rest[0], rest[1]].join(","))]);
   address = (name) => pathToFileURL(join(folder, `${name}.html`)).href;
@@ -86,7 +85,7 @@ for (const colorScheme of ["light", "dark"]) {
   test(`every chart is drawn in ${colorScheme}`, async () => {
     const { page, complaints } = await open("runs", { colorScheme });
     const found = await colours(page);
-    // One for each kind, and one more for the effort.
+    // One chart of each kind, and one of the effort.
     assert.equal(found.length, KINDS.length + 1);
     assert.ok(found.every((count) => count > 8), String(found));
     await page.screenshot({ path: join(AT, `odometry-${colorScheme}.png`), fullPage: true });
@@ -95,7 +94,7 @@ for (const colorScheme of ["light", "dark"]) {
   });
 }
 
-test("what is only counted is drawn without truth, effort and accelerometer", async () => {
+test("a recording of counts alone is drawn without truth, effort and accelerometer", async () => {
   const { page, complaints } = await open("counts");
   assert.equal((await colours(page)).length, KINDS.length);
   assert.match(await chart(page, "distance").innerText(), /width of the interval/);
@@ -137,7 +136,7 @@ test("keys read values, zoom all charts and show all again", async () => {
   const whole = await pictures(page);
   await chart(page, "speed").locator(".u-over").focus();
   for (let times = 0; times < 3; times++) await page.keyboard.press("ArrowRight");
-  // The cursors of all charts stand at the third row.
+  // The cursors of all charts are at the third row.
   for (const kind of KINDS) assert.match(await chart(page, kind).locator(".u-legend").first().innerText(), /0\.10 s/, kind);
   await page.keyboard.press("+");
   const zoomed = await pictures(page);
@@ -148,7 +147,7 @@ test("keys read values, zoom all charts and show all again", async () => {
   await page.close();
 });
 
-test("another run can be picked, and a name that would run stays a name", async () => {
+test("another run can be selected, and a name with markup is shown as text", async () => {
   const { page, complaints } = await open();
   const wet = await pictures(page);
   assert.match(await chart(page, "wheels").innerText(), /wheelset 1 slips/);
@@ -163,7 +162,7 @@ test("another run can be picked, and a name that would run stays a name", async 
   await page.close();
 });
 
-test("without scripts the numbers are there", async () => {
+test("without scripts the page still shows its numbers", async () => {
   const page = await browser.newPage({ javaScriptEnabled: false });
   await page.goto(address("runs"));
   const text = await page.locator("body").innerText();

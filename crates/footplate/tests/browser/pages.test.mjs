@@ -1,5 +1,5 @@
-// The other pages in a real browser: calibration and why a number is so, health, recordings walked again and compared, and
-// odometry of a file. All pages pass axe in both colours, and fit a phone.
+// The other pages in a real browser: calibration with the measurements behind a number, health, recordings replayed and compared,
+// and odometry of a file. All pages pass axe in light and dark, and fit a phone.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -12,7 +12,7 @@ import { findings } from "./axe.mjs";
 import { AT, colours, launch, openQuietly, width } from "./browser.mjs";
 import { PATIENCE, calibratedStore, end, say, serve } from "./railway.mjs";
 
-const PAGES = ["layout", "train/24", "calibration", "health", "recordings", "odometry", "editor"];
+const PAGES = ["layout", "train/24", "calibration", "health", "recordings", "odometry", "editor", "schedules"];
 
 let browser;
 let running;
@@ -20,7 +20,7 @@ let running;
 const until = (page, what, arg) => page.waitForFunction(what, arg, { timeout: PATIENCE });
 const text = (page, selector) => page.locator(selector).textContent();
 
-/** Enough contacts that there is something to see of all kinds. */
+/** Waits for this many samples: then every chart has data. */
 async function runsAround(contacts) {
   for (;;) {
     const { t_s: times } = await (await fetch(`${running.url}api/trains/24/history`)).json();
@@ -31,7 +31,7 @@ async function runsAround(contacts) {
 
 before(async () => {
   const store = calibratedStore("pages");
-  // A session of before, so that there is something to look at again.
+  // An earlier session, to be replayed.
   running = await serve(store, 0);
   await say(running, "turnout all straight");
   await say(running, "speed 24 8");
@@ -49,7 +49,7 @@ after(async () => {
   if (running) await end(running);
 });
 
-test("a calibration shows both sides of each step, and why a number is so; what is excluded can be restored", async () => {
+test("a calibration shows both sides of each step and the measurements behind a number; exclusions can be undone", async () => {
   const { page, complaints } = await openQuietly(browser, `${running.url}#/calibration`);
   await until(page, () => document.querySelectorAll("#steps tr").length > 10);
   await until(page, () => !document.querySelector("#of-store").hidden);
@@ -57,10 +57,10 @@ test("a calibration shows both sides of each step, and why a number is so; what 
   await page.screenshot({ path: join(AT, "calibration.png"), fullPage: true });
   await page.fill("#why-of", "SPEED:8");
   await page.click("#ask button");
-  // How often the train passed in the first session depends on how soon it was commanded: five to seven times.
+  // The number of passes in the first session depends on when the command arrived: five to seven.
   await until(page, () => document.querySelectorAll("#listings tbody tr").length > 2);
   const first = page.locator("#listings tbody tr button").first();
-  // Nothing is excluded without a reason.
+  // An exclusion needs a reason.
   await first.click();
   assert.match(await text(page, "#why-answer"), /reason/);
   await page.fill("#reason", "a hand on the track");
@@ -76,12 +76,12 @@ test("a calibration shows both sides of each step, and why a number is so; what 
   await page.close();
 });
 
-test("health shows errors by their intervals and how the line keeps time", async () => {
+test("health shows prediction errors with their intervals, and the timing of the line", async () => {
   const { page, complaints } = await openQuietly(browser, `${running.url}#/health`);
   await until(page, () => document.querySelectorAll("#fares tr").length === 1);
   await until(page, () => /times: median/.test(document.querySelector("#poll").textContent));
   const period = Number(/median ([\d.]+) ms/.exec(await text(page, "#poll"))[1]);
-  // Five modules of two bytes and a request at 2400 baud with eleven bits a byte: 50 ms, and what the station needs.
+  // Five modules of two bytes and a request at 2400 baud with eleven bits a byte: 50 ms, and the response time of the station.
   assert.ok(period > 50 && period < 75, `${period} ms`);
   await until(page, () => document.querySelectorAll(".uplot canvas").length === 5);
   for (const [place, count] of (await colours(page)).entries()) assert.ok(count > 4, `chart ${place}: ${count} colours`);
@@ -90,7 +90,7 @@ test("health shows errors by their intervals and how the line keeps time", async
   await page.close();
 });
 
-test("sessions are walked again with a slider, and two are compared", async () => {
+test("sessions are replayed with a slider and at a speed, and two are compared", async () => {
   const { page, complaints } = await openQuietly(browser, `${running.url}#/recordings`);
   await until(page, () => document.querySelectorAll("#recordings input:not([disabled])").length === 3);
   const boxes = page.locator("#recordings tr", { hasText: "driving" }).locator("input");
@@ -103,12 +103,29 @@ test("sessions are walked again with a slider, and two are compared", async () =
   assert.match(await text(page, ".where"), /Train 24: \S+ ± \d+ mm, \d+ mm\/s/);
   await boxes.first().check();
   await until(page, () => document.querySelectorAll(".session").length === 2 && document.querySelectorAll("#figures tr").length === 2);
+  // Both charts share their time axis with the slider: a click goes to that time, and playing goes on at the chosen speed.
+  const charts = page.locator("#walked .uplot");
+  assert.equal(await charts.count(), 2);
+  for (const [place, count] of (await colours(page)).entries()) assert.ok(count > 4, `chart ${place}: ${count} colours`);
+  const over = page.locator("#walked .u-over").first();
+  const { width: wide } = await over.boundingBox();
+  await over.click({ position: { x: wide / 2, y: 20 } });
+  const most = Number(await page.getAttribute("#time", "max"));
+  const time = () => page.locator("#time").inputValue().then(Number);
+  assert.ok(Math.abs(await time() - most / 2) < 0.05 * most, `${await time()} of ${most}`);
+  await page.selectOption("#played", "30");
+  await page.click("#play");
+  await until(page, () => document.querySelector("#time").value === document.querySelector("#time").max);
+  assert.equal(await text(page, "#play"), "Play");
+  assert.doesNotMatch(await page.locator("#walked .u-legend").first().textContent(), /–/);
+  const [picture] = await Promise.all([page.waitForEvent("download"), page.locator("#walked .csv", { hasText: "PNG" }).first().click()]);
+  assert.match(picture.suggestedFilename(), /\.png$/);
   await page.screenshot({ path: join(AT, "recordings.png"), fullPage: true });
   assert.deepEqual(complaints, []);
   await page.close();
 });
 
-test("a recording of a tachometer is walked, and one that is none says what is wrong", async () => {
+test("a tachometer recording is analysed, and a wrong file is refused with the reason", async () => {
   const { page, complaints } = await openQuietly(browser, `${running.url}#/odometry`);
   const folder = mkdtempSync(join(tmpdir(), "footplate-slide-"));
   execFileSync(process.env.FOOTPLATE, ["simulate", "line", "--scenario", "S5", "--seed", "1", "--teeth", "80", "--out", folder], { stdio: "pipe" });
@@ -151,7 +168,7 @@ test("every page fits a phone, in German", async () => {
     await page.waitForTimeout(600);
     assert.equal(await width(page), 390, name);
     assert.deepEqual(await findings(page), [], name);
-    // A word that is missing shows as its own name.
+    // A missing text is shown as its key.
     const untranslated = await page.evaluate(() => [...document.querySelectorAll("[data-word]")].filter((one) => one.textContent === one.dataset.word && /-/.test(one.dataset.word)).map((one) => one.dataset.word));
     assert.deepEqual(untranslated, [], name);
     await page.screenshot({ path: join(AT, `phone-${name.replace("/", "-")}.png`), fullPage: true });
@@ -174,7 +191,7 @@ test("every path of the description answers as it says", async () => {
     for (const [method, { parameters = [], responses, requestBody }] of Object.entries(methods)) {
       // An emergency stop would end the other tests, and a stream never ends.
       if (["/api/emergency-stop", "/api/events", "/api/slides/{scenario}"].includes(path)) continue;
-      // A session answers only what tells its mode; the set-up answers the rest (setup.test.mjs).
+      // A session answers only the request for its mode; the set-up answers the others (setup.test.mjs).
       if (path.startsWith("/api/setup") && method !== "get" || path === "/api/setup/stations") continue;
       const filled = path.replace(/\{(\w+)\}/g, (_, name) => encodeURIComponent(parameters.find((one) => one.name === name).example));
       const kind = requestBody && Object.keys(requestBody.content)[0];

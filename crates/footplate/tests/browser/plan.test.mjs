@@ -1,5 +1,4 @@
-// The layout as it is drawn, in a real browser: tracks beside each other also without coordinates, and turnouts, trains and places
-// that a person presses.
+// The drawn layout in a real browser: parallel tracks are drawn even without coordinates; turnouts, trains and places can be clicked.
 
 import assert from "node:assert/strict";
 import { mkdtempSync, readFileSync, writeFileSync } from "node:fs";
@@ -18,7 +17,7 @@ const folder = mkdtempSync(join(tmpdir(), "footplate-plan-"));
 const until = (page, what, arg) => page.waitForFunction(what, arg, { timeout: PATIENCE });
 const text = (page, selector) => page.locator(selector).textContent();
 
-/** The oval of the guide, with its points or without them. */
+/** The oval of the guide, with or without drawing coordinates. */
 function oval(name, change = (toml) => toml) {
   const guide = readFileSync(new URL("../../../../docs/formats/layout.md", import.meta.url), "utf8");
   const path = join(folder, `${name}.toml`);
@@ -37,7 +36,7 @@ async function ended(program) {
   running.delete(program);
 }
 
-/** Presses the drawing beside a name that stands there. */
+/** Clicks the drawing beside a name. */
 async function press(page, name, below) {
   const place = page.locator("#track text", { hasText: name }).first();
   await place.scrollIntoViewIfNeeded();
@@ -75,7 +74,7 @@ test("the guide's oval is drawn as an oval with its siding beside it, also if it
         assert.ok(one.some((point) => other.every((beside) => apart(point, beside) > wide / 100)), "two rails are one line");
       }
     }
-    // Each turnout shows both of its legs, and that nobody knows which is set.
+    // Each turnout shows both of its legs, and that its position is unknown.
     assert.equal(await page.locator("#track .blade.unknown").count(), 4);
     assert.equal(await page.locator("#track .rail.restricted").count(), 1);
     assert.deepEqual(await findings(page), []);
@@ -86,7 +85,7 @@ test("the guide's oval is drawn as an oval with its siding beside it, also if it
   }
 });
 
-test("a turnout is asked about, thrown by a press, and refused under a train", async () => {
+test("a click asks for the position of a turnout, then throws it, and is refused under a train", async () => {
   const store = calibratedStore("plan");
   const program = await serve(store, 0);
   running.add(program);
@@ -102,7 +101,7 @@ test("a turnout is asked about, thrown by a press, and refused under a train", a
   await press(page, "⟨12⟩", 4);
   await until(page, () => document.querySelector("#picked").textContent === "Turnout 12 is set to curved.");
   await until(page, () => document.querySelector("#here-answer").textContent === "Done.");
-  // A train stands on turnout 11: where a person clicked.
+  // The operator places a train on turnout 11 by a click.
   await say(program, "turnout all straight");
   await until(page, () => document.querySelectorAll("#track .blade.unknown").length === 0);
   await say(program, "place 24 at C14+160mm");
@@ -112,14 +111,14 @@ test("a turnout is asked about, thrown by a press, and refused under a train", a
   await until(page, () => /refused: train 24 is on turnout 11/.test(document.querySelector("#here-answer").textContent));
   assert.equal((await lies())[11], "straight");
 
-  // A place is pressed, and the train is said to stand there, in the direction that is asked for.
+  // A click on a place puts the train there, in the chosen direction.
   await press(page, "E7 E8", 6);
   await until(page, () => /^Selected: E[78]/.test(document.querySelector("#picked").textContent));
   const first = await text(page, "#picked");
   await page.locator("#here-does button", { hasText: "Other direction" }).click();
   assert.notEqual(await text(page, "#picked"), first);
   const place = (await text(page, "#picked")).replace("Selected: ", "");
-  await page.locator("#here-does button", { hasText: "Train 24 stands here" }).click();
+  await page.locator("#here-does button", { hasText: "Train 24 is here" }).click();
   const name = /^[A-E]\d+/.exec(place)[0];
   await until(page, (name) => document.querySelector(".train dd").textContent.startsWith(name), name);
   assert.deepEqual(await findings(page), []);

@@ -5,12 +5,12 @@ import { mkdtempSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 
-/** A railway that is the same every time. */
+/** The simulated railway of all tests. */
 export const LINK = "sim:track-a?seed=7";
-/** The longest that anything takes in a test: a lap of the track, at four times real time. */
+/** The time limit of a step (ms): a lap of the track at four times real time takes less. */
 export const PATIENCE = 60_000;
 
-/** A new store that knows train 24. */
+/** A new store with a calibration of train 24. */
 export function calibratedStore(name) {
   const store = join(mkdtempSync(join(tmpdir(), `footplate-${name}-`)), "railway.db");
   execFileSync(process.env.FOOTPLATE, ["calibrate", "--link", LINK, "--layout", "track-a", "--train", "24", "--store", store], { stdio: "pipe" });
@@ -36,7 +36,7 @@ export function begin(commands, env = process.env) {
   });
 }
 
-/** Starts the program at a port, 0 for any, so many times as fast as real. */
+/** Starts the program at a port, 0 for any, at a multiple of real time. */
 export function serve(store, port, { speed = 4, more = [], token } = {}) {
   const env = { ...process.env, ...(token && { FOOTPLATE_TOKEN: token }) };
   return begin(["serve", String(port), "--link", `${LINK}&speed=${speed}`, "--train", "24", "--store", store, ...more], env);
@@ -51,4 +51,14 @@ export function end({ child, over }) {
 export async function say({ url }, line) {
   const answer = await fetch(`${url}api/orders`, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ line }) });
   if (!answer.ok) throw new Error(await answer.text());
+}
+
+/** The picture of a session once `is` holds for it; without `is`, the present one. */
+export async function picture({ url }, is = () => true) {
+  for (const began = Date.now(); ;) {
+    const seen = await (await fetch(`${url}api/picture`)).json();
+    if (seen && is(seen)) return seen;
+    if (Date.now() - began > 2 * PATIENCE) throw new Error(`the state never came: ${is}`);
+    await new Promise((again) => { setTimeout(again, 50); });
+  }
 }

@@ -1,4 +1,4 @@
-// A report opens in a real browser: every chart is drawn, in dark and light, on a phone, and by keyboard.
+// A report in a real browser: every chart is drawn, in dark and light, on a phone, and by keyboard.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -19,7 +19,7 @@ let address;
 before(async () => {
   const folder = mkdtempSync(join(tmpdir(), "footplate-report-"));
   mkdirSync(AT, { recursive: true });
-  // A recording is called by its file; this name would run if it were taken for markup.
+  // A recording has the name of its file; this one would run as a script if it were not escaped.
   const hostile = join(folder, "<img src=x onerror=document.title='taken-over'>.csv");
   copyFileSync(log(74, "run"), hostile);
   const out = join(folder, "report.html");
@@ -87,7 +87,7 @@ test("dragging zooms, Escape shows all again", async () => {
   await page.close();
 });
 
-test("another change can be picked", async () => {
+test("another change can be selected", async () => {
   const { page, complaints } = await open();
   const pick = page.locator("figure[data-chart=change] select").first();
   const before = await page.locator("figure[data-chart=change] canvas").first().evaluate((canvas) => canvas.toDataURL());
@@ -98,7 +98,7 @@ test("another change can be picked", async () => {
   await page.close();
 });
 
-test("a name that would run stays a name", async () => {
+test("a name with markup is shown as text", async () => {
   const { page, complaints } = await open({}, "hostile.html");
   assert.equal(await page.title(), "Trains 74 on track-a");
   assert.equal(await page.locator("img").count(), 0);
@@ -106,7 +106,7 @@ test("a name that would run stays a name", async () => {
   await page.close();
 });
 
-test("without scripts the numbers are there", async () => {
+test("without scripts the page still shows its numbers", async () => {
   const page = await browser.newPage({ javaScriptEnabled: false });
   await page.goto(address("report.html"));
   const text = await page.locator("#train-24").innerText();

@@ -1,6 +1,7 @@
-// A new owner starts the program without arguments, and is led in a real browser from nothing to a calibrated train and its first stop.
+// The set-up in a real browser: from starting the program without arguments to a calibrated train and its first stop.
 
 import assert from "node:assert/strict";
+import { execFileSync, spawnSync } from "node:child_process";
 import { existsSync, mkdtempSync, readFileSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -10,9 +11,9 @@ import { findings } from "./axe.mjs";
 import { AT, launch, openQuietly, width } from "./browser.mjs";
 import { PATIENCE, begin, end } from "./railway.mjs";
 
-/** The longest that a calibration takes: five minutes at twenty times real time, on a busy machine. */
+/** The time limit of a calibration: five minutes at twenty times real time, on a busy machine. */
 const CALIBRATED_MS = 120_000;
-/** While another program takes over the address, a browser reports that nobody answers. */
+/** While another program takes over the address, a browser reports that the server does not answer. */
 const GOES_OVER = /ERR_CONNECTION_REFUSED|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET|ERR_INCOMPLETE_CHUNKED_ENCODING|ERR_SOCKET_NOT_CONNECTED/;
 
 let browser;
@@ -48,7 +49,7 @@ test("from nothing to a calibrated train and its first stop", async () => {
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "setup-station.png"), fullPage: true });
 
-  // What cannot be is refused, and says what would be right.
+  // An impossible entry is refused with an example of a right one.
   await page.click("#use-typed");
   assert.match(await page.locator("#setup-answer").textContent(), /such as 192\.168/);
   await page.selectOption("#sim-speed", "4");
@@ -62,7 +63,7 @@ test("from nothing to a calibrated train and its first stop", async () => {
   await page.locator(".address").nth(1).fill("24");
   await page.click("#save-trains");
   await page.waitForFunction(() => /used twice/.test(document.querySelector("#setup-answer").textContent));
-  // With two trains the first one could not be sent anywhere before the position of the other is known.
+  // Only one train: with two, the position of the other must be known first (see below).
   await page.locator("#train-rows button").nth(1).click();
   assert.deepEqual(await findings(page), []);
   await page.click("#save-trains");
@@ -73,7 +74,7 @@ test("from nothing to a calibrated train and its first stop", async () => {
   assert.match(await page.locator("#setup-step pre").textContent(), /sensor modules/);
   await page.screenshot({ path: join(AT, "setup-link.png"), fullPage: true });
 
-  // Each step is kept: the program is started again, and goes on where it was.
+  // Each step is kept: the restarted program continues at the same step.
   assert.equal(await ended(program), 0);
   const again = await started("railway.db", program.port);
   await page.goto(`${again.url}#/setup/station`);
@@ -82,7 +83,7 @@ test("from nothing to a calibrated train and its first stop", async () => {
   await page.goto(`${again.url}#/setup`);
   await isShown(page, "[data-calibrate='24']");
 
-  // No train moves before its owner has looked at the turnouts.
+  // No train moves before the owner has confirmed that the turnouts are clear.
   await page.click("[data-calibrate='24']");
   await page.waitForFunction(() => /check first that no train is standing on one/.test(document.querySelector("#setup-answer").textContent));
   await page.check("#turnouts-clear");
@@ -112,7 +113,7 @@ test("from nothing to a calibrated train and its first stop", async () => {
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "setup-stopped.png"), fullPage: true });
 
-  // The way back, and forth again: the second time the program drives at once.
+  // Back to the set-up and forward again; the next start drives at once.
   await page.click("#setup-again");
   await isShown(page, "#setup-steps a");
   assert.match(await heading(page), /first stop/i);
@@ -120,8 +121,8 @@ test("from nothing to a calibrated train and its first stop", async () => {
   await isShown(page, "#to-layout");
   await page.click("#to-layout");
   await isShown(page, "#track .rail");
-  // The two refusals above are answers with status 422; a session's page asks the set-up once for what only a session has (404).
-  assert.deepEqual(complaints.filter((text) => !GOES_OVER.test(text) && !/status of (422|404)/.test(text)), []);
+  // The two refusals above are answers with status 422.
+  assert.deepEqual(complaints.filter((text) => !GOES_OVER.test(text) && !/status of 422/.test(text)), []);
   await page.close();
   await ended(again);
   const third = await started("railway.db");
@@ -157,12 +158,44 @@ test("a station that is gone leads back to the set-up, with the reason", async (
   const file = join(folder, "gone.setup.json");
   writeFileSync(file, JSON.stringify({ link: "dcc-ex:tcp://127.0.0.1:1", layout: "track-a", trains: [{ address: 24, name: "" }], is_complete: true }));
   const program = await started("gone.db");
-  // The session serves its page before it finds that it cannot begin; what is loaded then may come in half.
-  const mode = () => fetch(`${program.url}api/setup`).then((answer) => answer.json()).then((state) => state.mode, () => "");
-  while (await mode() !== "setting-up") await new Promise((again) => { setTimeout(again, 100); });
-  const { page } = await openQuietly(browser, program.url);
+  // The session serves its page before it finds that it cannot begin: a page that loaded only in part reloads itself.
+  const page = await browser.newPage();
+  while (!await page.goto(program.url).catch(() => undefined)) await new Promise((again) => { setTimeout(again, 20); });
   await page.waitForSelector("#setup-problem:visible", { timeout: PATIENCE });
   assert.match(await page.locator("#setup-problem").textContent(), /127\.0\.0\.1:1/);
+  await page.close();
+  await ended(program);
+});
+
+test("a page that loaded only in part reloads itself", async () => {
+  const program = await started("half.db");
+  const page = await browser.newPage();
+  // The first request for one of its modules fails, as it does while another program takes over the address.
+  let failed = 0;
+  await page.route("**/setup_page.js", (route) => (failed++ === 0 ? route.abort() : route.continue()));
+  await page.goto(program.url);
+  await isShown(page, "#use-simulated");
+  assert.ok(failed > 1, String(failed));
+  await page.close();
+  await ended(program);
+});
+
+test("with two trains the page leads to the one whose position is unknown", async () => {
+  const file = join(folder, "two.setup.json");
+  const trains = [{ address: 24, name: "Big Boy" }, { address: 58, name: "" }];
+  writeFileSync(file, JSON.stringify({ link: "sim", speed: 4, layout: "track-a", trains, is_complete: true }));
+  const program = await started("two.db");
+  const page = await browser.newPage({ viewport: { width: 1300, height: 900 } });
+  while (!await page.goto(`${program.url}#/setup`).catch(() => undefined)) await new Promise((again) => { setTimeout(again, 20); });
+  await page.waitForSelector("#all-straight:visible", { timeout: PATIENCE });
+  await page.click("#all-straight");
+  await page.waitForSelector("#go:visible", { timeout: PATIENCE });
+  await page.waitForFunction(() => document.querySelectorAll("#first-lost .does").length === 2, null, { timeout: PATIENCE });
+  assert.match(await page.locator("#first-lost").textContent(), /Big Boy, Train 58: position unknown\. .*knows where all of them are/);
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "setup-two-trains.png"), fullPage: true });
+  await page.locator("#first-lost button", { hasText: "Find train 58" }).click();
+  await page.waitForFunction(() => document.querySelectorAll("#first-lost .does").length === 1, null, { timeout: PATIENCE });
   await page.close();
   await ended(program);
 });
@@ -180,7 +213,35 @@ test("the set-up fits a phone, in the dark and in German", async () => {
   await isShown(page, "#save-trains");
   assert.equal(await width(page), 390);
   await page.screenshot({ path: join(AT, "setup-phone-trains.png"), fullPage: true });
+  // A phone's home screen shows the icon as a picture.
+  const icon = await fetch(new URL(await page.getAttribute("link[rel=apple-touch-icon]", "href"), program.url));
+  assert.equal(icon.headers.get("content-type"), "image/png");
+  assert.deepEqual([...new Uint8Array(await icon.arrayBuffer()).slice(1, 4)], [...Buffer.from("PNG")]);
+  // The report of the link is in the reader's language, too.
+  await page.fill(".address", "24");
+  await page.click("#save-trains");
+  await isShown(page, "#check-link");
+  await page.click("#check-link");
+  await isShown(page, "#link-next");
+  const report = await page.locator("#setup-step pre").textContent();
+  assert.match(report, /Rückmeldemodule, Handshake CTS/);
+  assert.doesNotMatch(report, /\b(line|polls|without|reply|median|longest|costs|later|answers)\b/);
+  assert.equal(await width(page), 390);
+  await page.screenshot({ path: join(AT, "setup-phone-link.png"), fullPage: true });
   assert.deepEqual(complaints, []);
   await page.close();
   await ended(program);
+});
+
+test("the reports of a link and of a calibration have no English line for German readers", async () => {
+  const { inGerman } = await import("../../assets/dashboard/german_report.js");
+  const table = execFileSync(process.env.FOOTPLATE, ["calibrate", "--link", "sim:track-a?seed=7", "--layout", "track-a", "--train", "24", "--budget", "1m"], { encoding: "utf8", stdio: ["ignore", "pipe", "ignore"] });
+  const german = inGerman(table.trim());
+  assert.match(german, /^Zug 24 auf track-a: \S+ Fahrzeit, die vorgesehene Zeit ist um/);
+  assert.doesNotMatch(german, /\b(step|below|above|stops|track time|value|repeatability)\b/);
+  for (const station of ["marklin", "dcc-ex", "z21", "marklin-can", "loconet"]) {
+    // On a busy machine a station twenty times as fast as real loses replies, which is a status of 1.
+    const { stdout } = spawnSync(process.env.FOOTPLATE, ["doctor", "--link", `sim:track-a?seed=7&station=${station}&speed=20`, "--layout", "track-a"], { encoding: "utf8" });
+    assert.doesNotMatch(inGerman(stdout), /\b(line|polls|without|reply|median|longest|costs|later|answers|occupied|reports|taken|serial|number|unknown|refused|station at)\b/, station);
+  }
 });

@@ -1,5 +1,5 @@
-// The page of odometry in a real browser: a simulated slide is watched live and is the same for the same seed, and the page of a
-// recording is written in the reader's language.
+// The odometry page in a real browser: a simulated slide is shown live and repeats for the same seed; the report of a recording is in
+// the reader's language.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -19,7 +19,7 @@ const until = (page, what, arg) => page.waitForFunction(what, arg, { timeout: PA
 const text = (page, selector) => page.locator(selector).textContent();
 const folder = () => mkdtempSync(join(tmpdir(), "footplate-slide-"));
 
-/** What the command line makes of the same run. */
+/** The result of the command line for the same run. */
 function scored(scenario, seed) {
   const out = folder();
   const footplate = (...words) => execFileSync(process.env.FOOTPLATE, words, { stdio: "pipe" }).toString();
@@ -28,7 +28,7 @@ function scored(scenario, seed) {
   return { recording: file(".csv"), score: JSON.parse(footplate("odometry", file(".csv"), "--vehicle", file(".toml"), "--score", "--json")) };
 }
 
-/** All events of a slide, read as fast as they come. */
+/** All events of a slide. */
 async function events(address) {
   const answer = await fetch(running.url + address);
   assert.equal(answer.status, 200);
@@ -49,13 +49,13 @@ after(async () => {
   if (running) await end(running);
 });
 
-test("a slide is watched live: both wheels leave the train, the bounds hold, and the score is that of the command line", async () => {
+test("a slide is shown live: both wheels lag behind the train, the bounds hold, and the score equals that of the command line", async () => {
   const { page, complaints } = await openQuietly(browser, `${running.url}#/odometry`);
   await page.selectOption("#slide", "S2");
   await page.fill("#slide-seed", "7");
   await page.selectOption("#slide-speed", "5");
   await page.click("#watch-slide button[type=submit]");
-  // Both wheelsets slide, and are said to; the train is faster than either of them.
+  // Both wheelsets slide and are classified as sliding; the train is faster than both.
   await until(page, () => /slides/.test(document.querySelector("#slide-wheel-1").textContent) && /slides/.test(document.querySelector("#slide-wheel-2").textContent));
   await until(page, () => {
     const of = (id) => parseFloat(document.querySelector(id).textContent);
@@ -86,7 +86,7 @@ test("a slide fits a phone in the dark and in German, and ends when its page is 
   assert.equal(await width(page), 390);
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "slide-phone.png"), fullPage: true });
-  // Four can be watched at once; whoever has left makes room.
+  // Four can run at once; a client that leaves makes room.
   await page.goto(`${running.url}#/layout`);
   for (let again = 0; again < 6; again++) {
     await page.goto(`${running.url}#/odometry`);
@@ -99,7 +99,7 @@ test("a slide fits a phone in the dark and in German, and ends when its page is 
   await page.close();
 });
 
-test("the same seed is the same run, and what cannot be watched says why", async () => {
+test("the same seed repeats the same run, and an impossible request is refused with the reason", async () => {
   const rows = async (address) => (await events(address)).filter(({ kind }) => kind === "rows").flatMap(({ data }) => data.rows);
   const [one, other, another] = await Promise.all([rows("api/slides/s2?seed=7&speed=20"), rows("api/slides/S2?seed=7&speed=10"), rows("api/slides/S2?seed=8&speed=20")]);
   assert.ok(one.length > 400, `${one.length} periods`);

@@ -1,5 +1,4 @@
-// The page of a train in a real browser: its curves are drawn and go on, it is told what to do from there, and what is
-// refused says why.
+// The page of a train in a real browser: its charts are drawn and continue, commands are sent, and a refused command shows the reason.
 
 import assert from "node:assert/strict";
 import { join } from "node:path";
@@ -9,7 +8,7 @@ import { findings } from "./axe.mjs";
 import { AT, colours, launch, openQuietly, width } from "./browser.mjs";
 import { PATIENCE, calibratedStore, end, say, serve } from "./railway.mjs";
 
-/** A stop that ends further off than this has missed its place: more than a train's length of doubt. */
+/** A stop further from its target than this (mm) has failed: no interval of this train is as wide. */
 const MISSED_MM = 60;
 
 let browser;
@@ -28,7 +27,7 @@ after(async () => {
 const text = (page, selector) => page.locator(selector).textContent();
 const until = (page, what, arg) => page.waitForFunction(what, arg, { timeout: PATIENCE });
 
-test("a train runs at the step of its slider, and its curves show what contacts said", async () => {
+test("a train runs at the step of its slider, and its charts show the detections", async () => {
   const { page, complaints } = await openQuietly(browser, `${running.url}#/train/24`);
   await say(running, "turnout all straight");
   await page.waitForSelector("#pages a[aria-current][data-train='24']");
@@ -45,7 +44,7 @@ test("a train runs at the step of its slider, and its curves show what contacts 
   for (const [place, count] of drawn.entries()) assert.ok(count > 5, `chart ${place}: ${count} colours`);
   await page.screenshot({ path: join(AT, "train.png"), fullPage: true });
 
-  // The page is opened anew and still knows what was: it asks the server for the last minutes.
+  // A reloaded page requests the last minutes from the server.
   await page.reload();
   await until(page, () => document.querySelectorAll("#passed tr").length > 6);
   const { t_s: times, way_mm: way } = await (await fetch(`${running.url}api/trains/24/history`)).json();
@@ -56,7 +55,7 @@ test("a train runs at the step of its slider, and its curves show what contacts 
   await page.close();
 });
 
-test("it is stopped at a place on the track, and what cannot be done says why", async () => {
+test("a train is stopped at a clicked place, and an impossible command is refused with the reason", async () => {
   const { page, complaints } = await openQuietly(browser, `${running.url}#/train/24`);
   await until(page, () => document.querySelectorAll("#passed tr").length > 0);
   // A lap ahead, so that there is room to stop.
@@ -64,7 +63,7 @@ test("it is stopped at a place on the track, and what cannot be done says why", 
   const spot = await page.locator("#track text", { hasText: "C13 C14" }).boundingBox();
   await page.mouse.click(spot.x + spot.width / 2, spot.y + spot.height + 3);
   await until(page, () => !document.querySelector("#stop-at").disabled);
-  // At four times real time a lap takes five seconds: on a busy machine the train may be too near by now, and is asked again.
+  // At four times real time a lap takes five seconds: on a busy machine the train may be too near by now, and the command is repeated.
   let said = "";
   for (let times = 0; times < 5 && !(await page.locator("#ends tr").count()); times++) {
     await page.click("#stop-at");
@@ -85,7 +84,7 @@ test("it is stopped at a place on the track, and what cannot be done says why", 
   assert.equal(await text(page, "#hold .answer"), "", "what comes of an order is said beside it, and nowhere else");
   assert.deepEqual(await page.$$eval(".orders label span", (all) => all.map((one) => one.textContent)),
     ["Place of arrival", "Arrive in (s)", "Speed to hold (mm/s)", "Distance to move (mm)", "Train to follow", "Time gap (s)"]);
-  // The server said no to the last one, which a browser writes down as an error of the page.
+  // The browser logs the refusal of the last command as an error of the page.
   assert.deepEqual(complaints.filter((complaint) => !/422/.test(complaint)), []);
   await page.close();
 });
@@ -108,7 +107,7 @@ test("a throttle is locked to its train on a phone, and the train stops when the
   await until(page, () => /^Runs at \d+ mm\/s \(\d+ km\/h\), step 6\.$/.test(document.querySelector("#now").textContent));
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "throttle-locked.png") });
-  // A phone that is put away says that the page is hidden.
+  // A phone that is put away reports the page as hidden.
   await page.evaluate(() => {
     Object.defineProperty(document, "hidden", { value: true, configurable: true });
     document.dispatchEvent(new Event("visibilitychange"));

@@ -1,5 +1,5 @@
-// What drives by itself, watched in a real browser: a calibration and a demonstration. The numbers on the page are those that the
-// program answers, prints and keeps, and the emergency stop ends either.
+// A calibration and a demonstration in a real browser. The numbers on the page equal those of the interface, of the printed result
+// and of the store; the emergency stop ends both.
 
 import assert from "node:assert/strict";
 import { mkdtempSync } from "node:fs";
@@ -12,11 +12,11 @@ import { AT, colours, launch, openQuietly, width } from "./browser.mjs";
 import { LINK, PATIENCE, begin, calibratedStore, end, say, serve } from "./railway.mjs";
 
 const PHONE = { viewport: { width: 390, height: 800 }, locale: "de-DE", hasTouch: true };
-/** What a browser itself writes down when the server has gone, which it has to when the calibration is over. */
+/** What the browser logs when the server ends with the calibration. */
 const GONE = /ERR_CONNECTION_REFUSED|ERR_INCOMPLETE_CHUNKED_ENCODING|ERR_CONNECTION_RESET|ERR_EMPTY_RESPONSE/;
-/** One standard deviation of what differs between sessions, as part of a speed: 2 % in common and 1.2 % by step. */
+/** The standard deviation between sessions relative to the speed: 2 % of all steps together, 1.2 % of each step. */
 const BETWEEN_SESSIONS = Math.hypot(0.02, 0.012);
-/** And of how much faster a step is that is reached from above, at most: at all steps and at one. */
+/** The largest standard deviation of the speed difference of a step reached from above: of all steps, and of one. */
 const HYSTERESIS_MM_PER_S = Math.hypot(2, 1);
 
 let browser;
@@ -41,7 +41,7 @@ const get = async ({ url }, path) => (await fetch(url + path)).json();
 /** The rows of the table of steps, by step and side. */
 const rows = (page) => page.$$eval("#steps tr", (all) => all.map((row) => [...row.children].map((cell) => cell.textContent)));
 
-/** Looks again until what the page says is what somebody else says of the same moment. */
+/** Repeats until the page shows the value that another source gives for the same moment. */
 async function agree(page, said, expected) {
   let last;
   for (const began = Date.now(); Date.now() - began < PATIENCE;) {
@@ -58,7 +58,7 @@ after(async () => {
   await Promise.all([...running].map(end));
 });
 
-test("a calibration says what it tries and why, and its table is what the program answers, prints and keeps", async () => {
+test("a calibration shows its experiment and the reason; its table equals the interface, the printed result and the store", async () => {
   const store = join(folder(), "railway.db");
   const program = await calibrating(store);
   const { page, complaints } = await openQuietly(browser, `${program.url}#/calibration`);
@@ -66,11 +66,11 @@ test("a calibration says what it tries and why, and its table is what the progra
   await until(page, () => /within|: |step/.test(document.querySelector("#about").textContent) && /^\d+ s of 120 s/.test(document.querySelector("#left").textContent));
   await agree(page, () => text(page, "#about"), async () => (await get(program, "api/picture")).calibration.experiment);
   await agree(page, async () => Number((await text(page, "#left")).split(" ")[0]), async () => Math.round((await get(program, "api/picture")).calibration.left_s));
-  // The next experiment is one of those that take most doubt away, and that reason is shown with what it takes.
+  // The page shows why the next experiment was selected: its expected information and its duration.
   await until(page, () => /most informative experiment per second \(expected information [\d.]+ in \d+ s\)/.test(document.querySelector("#because").textContent));
   await until(page, () => /at step \d+: stops within \d+ mm, speed within [\d.]+ %/.test(document.querySelector("#expected").textContent));
   await until(page, () => document.querySelectorAll("#steps tr").length > 8);
-  // While it runs: what the page says of each step is the model that the program answers.
+  // While it runs, the table of steps equals the model of the interface.
   const of = (steps) => steps.filter(({ uses, contacts }) => uses === "moves" || contacts > 0).map((one) => [String(one.step), one.approach,
     `${one.speed_mm_per_s.toFixed(1)} ± ${one.speed_half_mm_per_s.toFixed(1)}`, String(one.contacts), `${one.stop_mm.toFixed(0)} ± ${one.stop_half_mm.toFixed(0)}`]);
   await agree(page, async () => (await rows(page)).map((cells) => cells.slice(0, 5)), async () => of((await get(program, "api/trains/24/model")).steps));
@@ -79,8 +79,8 @@ test("a calibration says what it tries and why, and its table is what the progra
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "calibrating.png"), fullPage: true });
 
-  // When it is over, what it printed is what a session that begins with its store shows: an interval is 1.96 standard
-  // deviations, to which a later session adds what differs between sessions.
+  // Afterwards a session with the same store shows the printed result: intervals are 1.96 standard deviations, to which a later
+  // session adds the difference between sessions.
   assert.equal(await program.over, 0);
   await page.waitForSelector("#connection.red", { timeout: PATIENCE });
   assert.deepEqual(complaints.filter((complaint) => !GONE.test(complaint) && !/422/.test(complaint)), []);
@@ -101,9 +101,9 @@ test("a calibration says what it tries and why, and its table is what the progra
     assert.equal(Number(from), contacts, `step ${step} ${approach}`);
     assert.ok(Math.abs(Number(way.split(" ± ")[0]) - stop) < 0.6, `step ${step} ${approach}: ${way} beside ${stop}`);
   }
-  // And what the store says of the train is there with the number of contacts behind it.
+  // The page also shows the calibration in the store with its number of detections.
   await until(later.page, () => document.querySelector("#of-store")?.hidden === false);
-  // The session of calibrating is walked again: its train goes round, and what is tried is said.
+  // The calibration is replayed with its train and its experiments.
   await later.page.goto(`${driving.url}#/recordings`);
   const box = later.page.locator("#recordings tr", { hasText: "calibration" }).locator("input");
   await box.check({ timeout: PATIENCE });
@@ -136,14 +136,14 @@ test("a calibration fits a phone in the dark and in German, takes no orders, and
   await page.close();
 });
 
-test("a demonstration is watched from its first contact to its last stop, and says what it prints", async () => {
+test("a demonstration is shown from its first detection to its last stop, and the page equals the printed result", async () => {
   const program = await started("demo", "--seed", "7", "--speed", "30", "--serve", "0", "--json");
   const { page, complaints } = await openQuietly(browser, program.url);
   await page.waitForSelector(".train");
   await until(page, () => /±/.test(document.querySelector(".train dd").textContent));
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "demo.png"), fullPage: true });
-  // A stop is shown while it is under way: where it leads to, and within which millimetres it will end.
+  // A stop in progress shows its target and its predicted interval.
   await until(page, () => /^stop \d+ at \S+ from step \d+ \(predicted [+−]?\d+ … [+−]?\d+ mm\)$/.test(document.querySelectorAll(".train dd")[2]?.textContent));
   await page.waitForSelector("#track .target", { state: "attached" });
   await page.screenshot({ path: join(AT, "demo-stopping.png"), fullPage: true });
@@ -154,7 +154,7 @@ test("a demonstration is watched from its first contact to its last stop, and sa
   assert.deepEqual(await findings(phone.page), []);
   await phone.page.screenshot({ path: join(AT, "demo-phone.png"), fullPage: true });
   await phone.page.close();
-  // Every stop is said on the page as the simulator's truth has it in what the program writes.
+  // The page shows every stop with the true error that the program writes.
   await until(page, () => document.querySelectorAll("#said li").length >= 11);
   const said = await page.$$eval("#said li", (all) => all.map((one) => one.textContent));
   const lines = program.wrote.output.trim().split("\n").map((line) => JSON.parse(line));
@@ -171,7 +171,7 @@ test("a demonstration is watched from its first contact to its last stop, and sa
   assert.equal(await program.over, 0);
 });
 
-test("what is not as it should be is said on every page in the reader's language until it is over or ended, and is listed", async () => {
+test("every page shows active alarms in the reader's language until they are resolved or ended, and health lists them", async () => {
   const store = calibratedStore("alarmed");
   const program = await serve(store, 0);
   running.add(program);
@@ -182,7 +182,7 @@ test("what is not as it should be is said on every page in the reader's language
   assert.ok(await page.locator("#alarmed").isHidden());
   await say(program, "stop 24");
   await until(page, () => /^0 /.test(document.querySelectorAll(".train dd")[1].textContent));
-  // A person says that it stands somewhere else. What closes then cannot have been this train.
+  // The operator enters a wrong position. The next detections cannot be of this train.
   const elsewhere = (await get(program, "api/picture")).trains[0].at.startsWith("E") ? "A13" : "E14";
   await say(program, `place 24 at ${elsewhere}`);
   await say(program, "speed 24 8");
@@ -191,16 +191,16 @@ test("what is not as it should be is said on every page in the reader's language
   assert.match(alarm, /hat gemeldet, aber dort kann kein Zug sein|wohin er nicht gefahren sein kann|überfällig|verloren/);
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "alarmed.png") });
-  // A danger stays on every page and beside the state of the connection, whoever has looked, until it is over or somebody ends it.
+  // A danger stays on every page, and in the state of the connection, until it is resolved or ended.
   await until(page, () => document.querySelector("#alarmed .danger") && document.querySelector("#connection.red")
     && /Alarme/.test(document.querySelector("#connection").textContent));
   const causes = await page.$$eval("#alarmed .alarm span", (all) => all.map((one) => one.textContent));
   assert.equal(new Set(causes).size, causes.length, `one alarm a cause: ${causes}`);
   await page.goto(`${program.url}#/health`);
   await until(page, () => document.querySelector("#page").dataset.page === "health" && document.querySelectorAll("#alarms li").length > 0);
-  // It is over only if the railway says so, not because somebody has looked.
+  // Opening the health page does not end it.
   await until(page, () => !document.querySelector("#alarmed").hidden || document.querySelector("#alarms li.over"));
-  // The line that the prompt says, word by word in English, is the same alarm for programs.
+  // The list has no other grades.
   const listed = await page.$$eval("#alarms li", (all) => all.map((one) => one.className));
   assert.ok(listed.every((grade) => ["danger", "warning", "over"].includes(grade)), String(listed));
   assert.deepEqual(await findings(page), []);
@@ -211,7 +211,8 @@ test("what is not as it should be is said on every page in the reader's language
     for (const end of document.querySelectorAll("#alarmed .danger button")) end.click();
     return document.querySelector("#connection.green");
   });
-  assert.deepEqual(complaints, []);
+  // An alarm may be resolved in the moment of the click, which the server answers with 422.
+  assert.deepEqual(complaints.filter((complaint) => !/422/.test(complaint)), []);
   await page.close();
   await end(program);
 });

@@ -151,6 +151,12 @@ impl Dispatcher {
         self.watchdog.is_interrupted(now, train)
     }
 
+    /// See [`Watchdog::is_in_danger`].
+    #[must_use]
+    pub fn is_in_danger(&self, train: TrainId) -> bool {
+        self.watchdog.is_in_danger(train)
+    }
+
     /// The reservation of a train: no other train may enter it.
     #[must_use]
     pub fn reservation(&self, train: TrainId) -> Option<&Reservation> {

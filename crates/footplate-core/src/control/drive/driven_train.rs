@@ -8,6 +8,7 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{Located, Locator, PassedContact, PathPoint, TrackContext, landmark_of};
 use crate::units::Length;
 
+use super::expectation::DetectionCount;
 use super::order::OrderId;
 use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
@@ -53,6 +54,8 @@ pub(super) struct DrivenTrain {
     pub(super) steady_at: Timestamp,
     /// What should be reported next.
     pub(super) expected: Expectation,
+    /// How often it was reported, and how often not.
+    pub(super) detections: DetectionCount,
     /// Where its movement authority ends; `None` without a limit.
     pub(super) end_of_authority: Option<PathPoint>,
     /// Its lengths ahead of and behind the leading end of the pickup.
@@ -79,6 +82,7 @@ impl DrivenTrain {
             unsent: None,
             steady_at: Timestamp::ZERO,
             expected: Expectation::default(),
+            detections: DetectionCount::default(),
             end_of_authority: None,
             reach: [TRAIN_REACH; 2],
             speed_supervision: SpeedSupervision::default(),
@@ -318,6 +322,7 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) {
         self.clear_missed();
+        self.detections.take(passed.missed);
         self.note_passage(context, node, passed.at);
         self.recount_end_of_authority(context, node);
         self.expect_next(context, now);

@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use super::trip::{MeasuredRest, Trip, TripContact};
+use super::trip::{MeasuredRest, PassedEdge, Trip, TripDetection};
 use crate::event::{Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep};
 use crate::link::TimeModel;
@@ -17,6 +17,10 @@ use crate::units::Length;
 const USUAL_INTERVAL: TimeSpan = TimeModel::POLLED_2400_BAUD.report_window;
 /// Seconds between the last entry of a run and the first of the next, whose clocks have nothing in common.
 const BETWEEN_RUNS: f64 = 60.0;
+/// No stop is longer (m): published ones take up to 1.6 m.
+const LONGEST_STOP: f64 = 3.0;
+/// An edge from which less than this part of the effect of gradients comes is left out.
+const LEAST_PART: f64 = 0.02;
 /// With more missed detections in a row than this, the path between two sensors counts as unknown.
 const MOST_MISSED: usize = 2;
 
@@ -37,6 +41,9 @@ pub(super) struct Chain {
     /// The sensor passed last.
     at: Option<NodeId>,
     last_sensor: Option<SensorId>,
+    /// The edges passed last before that sensor, with their lengths (m), as far as a stop may reach back.
+    #[cfg_attr(feature = "serde", serde(default))]
+    behind: Vec<(usize, f64)>,
     /// Whether the next trip begins where the last one ended.
     unbroken: bool,
     /// Whether the train has moved as commanded since it was last at rest.
@@ -71,6 +78,7 @@ impl Chain {
         self.unbroken = false;
         self.at = None;
         self.last_sensor = None;
+        self.behind.clear();
     }
 
     /// Takes a command to the train. The model decides whether the train was at rest by then.
@@ -101,23 +109,24 @@ impl Chain {
         (self.step, self.above) = (to, to < from);
     }
 
-    /// Takes a report that data association assigned to the train.
+    /// Takes a report that data association assigned to the train. Whether it is a passage.
     pub(super) fn pass(
         &mut self,
         layout: &Layout,
         sections: &SectionIndex,
         turnouts: &TurnoutStates,
         event: &Event,
-    ) {
-        let EventKind::Sensor(report) = event.kind else { return };
-        let Some(node) = layout.sensor_node(report.sensor) else { return };
+        answers: &Answers<'_>,
+    ) -> bool {
+        let EventKind::Sensor(report) = event.kind else { return false };
+        let Some(node) = layout.sensor_node(report.sensor) else { return false };
         if self.last_sensor == Some(report.sensor) {
-            return;
+            return false;
         }
         let interval = report.poll_interval.unwrap_or(USUAL_INTERVAL).abs().as_s();
         let time = self.seconds(event.time) - 0.5 * interval;
         if self.step == 0 && (self.at_rest || self.trips.is_empty()) {
-            return;
+            return false;
         }
         let way = self
             .at
@@ -134,18 +143,40 @@ impl Chain {
             self.trips.push(trip);
             self.unbroken = true;
         }
-        if let (Some([hop]), [.., stopped, trip]) = (way.as_ref().map(Reach::hops), self.trips.as_mut_slice())
+        let ahead: Vec<(usize, f64)> = way.as_ref().map_or_else(Vec::new, |way| edges(layout, way));
+        if let [.., stopped, trip] = self.trips.as_mut_slice()
             && trip.continues
-            && trip.contacts.is_empty()
+            && trip.detections.is_empty()
         {
-            stopped.rest_hop = Some(hop.index());
+            stopped.stop_edges = stop_edges(stopped, answers, &self.behind, &ahead);
         }
-        let Some(trip) = self.trips.last_mut() else { return };
+        if begins_anew {
+            self.behind.clear();
+        } else {
+            self.behind.extend(ahead);
+            let mut length = 0.0;
+            let far = self.behind.iter().rposition(|(_, of_edge)| {
+                length += of_edge;
+                length > LONGEST_STOP
+            });
+            self.behind.drain(..far.unwrap_or(0));
+        }
+        let Some(trip) = self.trips.last_mut() else { return false };
         let (length, sections) = way.filter(|_| !begins_anew).map_or((0.0, Vec::new()), |way| {
             (way.length.as_m(), way.hops().iter().filter_map(|hop| sections.section(*hop)).collect())
         });
-        trip.pass(TripContact { node, time, variance: interval * interval / 12.0, way: length, sections });
+        let (sensor, variance) = (Some(report.sensor), interval * interval / 12.0);
+        trip.pass(TripDetection { node, sensor, time, variance, length, sections });
         (self.at, self.last_sensor) = (Some(node), Some(report.sensor));
+        true
+    }
+
+    /// The last passage, with the step, if the train was running steadily then.
+    pub(super) fn steady_pass(&self, answers: &Answers<'_>) -> Option<(&TripDetection, SpeedStep)> {
+        let trip = self.trips.last()?;
+        let detection = trip.detections.last()?;
+        let step = SpeedStep::new(self.step).filter(|step| *step != SpeedStep::STAND)?;
+        (trip.settles_at(answers) <= detection.time).then_some((detection, step))
     }
 
     /// Takes a tape measurement: the train came to rest this far past a sensor.
@@ -162,21 +193,45 @@ impl Chain {
         };
         let at = self.at;
         let Some(trip) = self.trips.last_mut() else { return };
-        let passed = trip.contacts.iter().rposition(|contact| contact.node == node);
+        let passed = trip.detections.iter().rposition(|detection| detection.node == node);
         let beyond = (offset.as_m(), Vec::new());
-        let (contacts, (beyond, sections)) = match passed {
+        let (detections, (beyond, sections)) = match passed {
             Some(place) => (place + 1, beyond),
             None => {
                 let Some(reach) = at.and_then(|from| reach_of(layout, turnouts, from, landmark)) else {
                     return;
                 };
                 let sections = reach.hops().iter().filter_map(|hop| index.section(*hop)).collect();
-                (trip.contacts.len(), (reach.length.as_m() + offset.as_m(), sections))
+                (trip.detections.len(), (reach.length.as_m() + offset.as_m(), sections))
             }
         };
         trip.came_to_rest = true;
-        trip.measured = Some(MeasuredRest { contacts, beyond, sections });
+        trip.measured = Some(MeasuredRest { detections, beyond, sections });
     }
+}
+
+/// The edges of a path, with their lengths (m).
+fn edges(layout: &Layout, way: &Reach) -> Vec<(usize, f64)> {
+    let hops = way.hops().iter().filter_map(|hop| layout.hop(*hop));
+    let edges = hops.flat_map(|hop| hop.edges.iter().copied());
+    edges.filter_map(|edge| Some((usize::from(edge.0), layout.edge(edge)?.length.as_m()))).collect()
+}
+
+/// The edges that a stop ran over, of those behind and ahead of the sensor passed last.
+fn stop_edges(
+    stopped: &Trip,
+    answers: &Answers<'_>,
+    behind: &[(usize, f64)],
+    ahead: &[(usize, f64)],
+) -> Vec<PassedEdge> {
+    let Some((rest, effect)) = stopped.stop(answers) else { return Vec::new() };
+    let mut begins = -behind.iter().map(|(_, length)| length).sum::<f64>();
+    let all = behind.iter().chain(ahead).map(|(edge, length)| {
+        let passed = PassedEdge { edge: *edge, begins, ends: begins + length };
+        begins = passed.ends;
+        passed
+    });
+    all.filter(|passed| passed.part_of(effect, rest) >= LEAST_PART).collect()
 }
 
 /// The path with the fewest missed detections, and of these the shortest.

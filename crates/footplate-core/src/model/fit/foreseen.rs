@@ -57,9 +57,9 @@ impl Point<'_> {
             let slope = of_local.iter().find(|(of, _)| of == column).map_or(0.0, |(_, slope)| *slope);
             variance += slope * slope * model.section(*section).map_or(0.0, |(_, variance)| variance);
         }
-        for (hop, column) in &self.columns.stop_offsets {
+        for (edge, column) in &self.columns.stop_offsets {
             let slope = of_local.iter().find(|(of, _)| of == column).map_or(0.0, |(_, slope)| *slope);
-            variance += slope * slope * model.stop_offsets.of(Some(*hop)).variance;
+            variance += slope * slope * model.stop_offsets.of(*edge).variance;
         }
         let slope_at =
             |column: usize| first.terms.iter().find(|(of, _)| *of == column).map_or(0.0, |(_, slope)| *slope);

@@ -17,7 +17,7 @@ impl MotionModel {
         for (_, variance) in certain.sections.values_mut() {
             *variance = 0.0;
         }
-        for (_, variance) in certain.stop_offsets.of_hop.values_mut() {
+        for (_, variance) in certain.stop_offsets.of_edge.values_mut() {
             *variance = 0.0;
         }
         certain

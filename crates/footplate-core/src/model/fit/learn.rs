@@ -45,8 +45,8 @@ impl MotionModel {
         self.scatter = scatter.scatter();
         let offset =
             |column: usize| (lasting.get(column).copied().unwrap_or(0.0), solution.variance(column).max(0.0));
-        let offsets = columns.stop_offsets.iter().map(|(hop, column)| (*hop, offset(*column)));
-        self.stop_offsets.learn(offsets.collect(), self.scatter.floor);
+        let offsets = columns.stop_offsets.iter().map(|(edge, column)| (*edge, offset(*column)));
+        self.stop_offsets.learn(offsets.collect());
         for (scale, first) in self.residual_scales.iter_mut().zip([STOP_NODES, START_NODES]) {
             *scale = residual_scale(first, lasting, solution);
         }
@@ -111,8 +111,8 @@ pub(super) fn count(counts: &mut [[Counts; 2]], trip: &Trip) {
     };
     let mut commanded = trip.commanded.iter().peekable();
     let mut now = trip.running.unwrap_or((0, false));
-    for contact in &trip.contacts {
-        while let Some(next) = commanded.next_if(|next| next.sent <= contact.time) {
+    for detection in &trip.detections {
+        while let Some(next) = commanded.next_if(|next| next.sent <= detection.time) {
             now = (next.to, next.above());
         }
         at(now, &|counts| counts.contacts += 1);

@@ -28,10 +28,11 @@ const NODE_BOUND: f64 = 10.0;
 enum Local {
     /// By how much a section is longer than surveyed.
     Section(usize),
-    /// By how much stops that end on a hop are longer.
+    /// By how much stops that run over an edge are longer.
     StopOffset {
-        /// The hop.
-        hop: usize,
+        /// The edge.
+        #[cfg_attr(feature = "serde", serde(alias = "hop"))]
+        edge: usize,
     },
 }
 
@@ -72,10 +73,10 @@ impl MarginalPrior {
         }
     }
 
-    /// Adds columns for hops on which a stop ended for the first time.
-    pub(super) fn meet_stops(&mut self, hops: impl Iterator<Item = usize>) {
-        for hop in hops {
-            self.meet_local(Local::StopOffset { hop });
+    /// Adds columns for edges that a stop ran over for the first time.
+    pub(super) fn meet_stops(&mut self, edges: impl Iterator<Item = usize>) {
+        for edge in edges {
+            self.meet_local(Local::StopOffset { edge });
         }
     }
 
@@ -95,7 +96,7 @@ impl MarginalPrior {
         for (column, local) in (first..).zip(&self.local) {
             match *local {
                 Local::Section(section) => sections.insert(section, column),
-                Local::StopOffset { hop } => stop_offsets.insert(hop, column),
+                Local::StopOffset { edge } => stop_offsets.insert(edge, column),
             };
         }
         Columns { sections, stop_offsets, lasting: self.equations.unknowns() - 1 }

@@ -15,6 +15,7 @@ mod motion_fit;
 mod robust;
 mod rows;
 mod stated;
+mod steady_passes;
 mod trip;
 mod unknowns;
 

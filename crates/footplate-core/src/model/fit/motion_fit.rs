@@ -20,10 +20,11 @@ pub use refit::Refit;
 use super::chain::Chain;
 use super::marginal_prior::MarginalPrior;
 use super::rows::{Linear, Point, Source, TripAt};
+use super::steady_passes::SteadyPasses;
 use super::trip::{Own, Trip};
 use super::unknowns::Columns;
 use crate::event::{Event, EventKind};
-use crate::ids::{SpeedStep, TrainId};
+use crate::ids::{SensorId, SpeedStep, TrainId};
 use crate::linalg::{Eliminated, NormalEquations};
 use crate::model::BlockRelease;
 use crate::model::motion_model::{MotionModel, StepUse};
@@ -63,6 +64,8 @@ pub struct MotionFit {
     pub(super) model: MotionModel,
     pub(super) prior: MarginalPrior,
     chain: Chain,
+    #[cfg_attr(feature = "serde", serde(default))]
+    steady: SteadyPasses,
     /// Follows from the layout; made when first needed.
     #[cfg_attr(feature = "serde", serde(skip))]
     sections: Option<SectionIndex>,
@@ -117,6 +120,7 @@ impl MotionFit {
             model: MotionModel::unknown(train, highest),
             prior: MarginalPrior::new(usize::from(highest.get())),
             chain: Chain::default(),
+            steady: SteadyPasses::default(),
             sections: None,
             date: Timestamp::ZERO,
         }
@@ -126,14 +130,17 @@ impl MotionFit {
     /// The turnouts as they lay at that time.
     pub fn take(&mut self, layout: &Layout, turnouts: &TurnoutStates, event: &Event) {
         match event.kind {
-            EventKind::Sensor(_) => {
+            EventKind::Sensor(report) => {
                 let sections = self.sections.get_or_insert_with(|| SectionIndex::of(layout));
-                self.chain.pass(layout, sections, turnouts, event);
+                if self.chain.pass(layout, sections, turnouts, event, &self.model.answers()) {
+                    self.note_steady_pass(report.sensor);
+                }
             }
             EventKind::Speed { train, step } if train == self.model.train() => {
                 self.chain.command(event.time, step, &self.model.answers());
+                self.steady.interrupt();
             }
-            EventKind::Reverse { train } if train == self.model.train() => self.chain.interrupt(),
+            EventKind::Reverse { train } if train == self.model.train() => self.interrupt(),
             EventKind::Stopped { train, landmark, offset } if train == self.model.train() => {
                 let sections = self.sections.get_or_insert_with(|| SectionIndex::of(layout));
                 self.chain.measure_rest(layout, sections, turnouts, landmark, offset);
@@ -143,15 +150,24 @@ impl MotionFit {
         self.date = event.time;
     }
 
+    /// The scatter of sensors shows where the train runs steadily.
+    fn note_steady_pass(&mut self, sensor: SensorId) {
+        let Some((detection, step)) = self.chain.steady_pass(&self.model.answers()) else {
+            return self.steady.interrupt();
+        };
+        self.steady.pass(sensor, step, detection);
+    }
+
     /// Begins a run: the train has been running steadily at `step`, or is at rest at step 0. The run has its own clock.
     pub fn begin_run(&mut self, step: SpeedStep) {
+        self.steady.interrupt();
         self.chain.begin_run(step);
     }
 
     /// Begins another session with the train at rest. Train, track and voltage may have changed a little since the last one, so
     /// older measurements count for less. Takes as long as a fit.
     pub fn begin_session(&mut self, sections: &SectionIndex) {
-        self.chain.begin_run(SpeedStep::STAND);
+        self.begin_run(SpeedStep::STAND);
         if self.chain.trips.is_empty() {
             return;
         }
@@ -163,12 +179,14 @@ impl MotionFit {
 
     /// Breaks the chain: the train was lifted, pushed, stalled or lost. Earlier trips still count.
     pub fn interrupt(&mut self) {
+        self.steady.interrupt();
         self.chain.interrupt();
     }
 
     /// The position of the train no longer follows from earlier ones, but it moves as commanded: a train whose place was unknown
     /// was located.
     pub fn lose_place(&mut self) {
+        self.steady.interrupt();
         self.chain.lose_place();
     }
 
@@ -181,12 +199,13 @@ impl MotionFit {
         usize::from(self.model.highest().get())
     }
 
-    fn point<'p>(&self, columns: &'p Columns, lasting: &'p [f64]) -> Point<'p> {
+    fn point<'p>(&'p self, columns: &'p Columns, lasting: &'p [f64]) -> Point<'p> {
         Point {
             columns,
             lasting,
             highest: self.highest(),
             scatter: self.model.scatter,
+            sensors: &self.model.sensor_variances,
             stop_offset_variance: self.model.stop_offsets.variance(),
             stop_shape_error: self.model.stop_shape_error(),
         }
@@ -217,9 +236,9 @@ impl MotionFit {
                 *slot = by;
             }
         }
-        for (hop, column) in &columns.stop_offsets {
+        for (edge, column) in &columns.stop_offsets {
             if let Some(slot) = lasting.get_mut(*column) {
-                *slot = self.model.stop_offsets.of(Some(*hop)).mean;
+                *slot = self.model.stop_offsets.of(*edge).mean;
             }
         }
         let point = self.point(columns, &lasting);
@@ -229,10 +248,11 @@ impl MotionFit {
             let mut own = trip.start();
             let (rest, first) = point.reach(trip, &own);
             if trip.own.is_none() {
-                let surveyed = trip.contacts.first().map_or(0.0, |contact| contact.way);
+                let surveyed = trip.detections.first().map_or(0.0, |detection| detection.length);
                 own.place = if trip.continues { next_place } else { surveyed - first.unwrap_or(surveyed) };
             }
-            next_place = own.place + rest - trip.contacts.iter().map(|contact| contact.way).sum::<f64>();
+            next_place =
+                own.place + rest - trip.detections.iter().map(|detection| detection.length).sum::<f64>();
             trips.push(own);
         }
         Values { lasting, trips }

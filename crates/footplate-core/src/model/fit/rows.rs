@@ -15,10 +15,9 @@ use crate::model::priors::SHAPE_ERROR;
 use crate::model::priors::{FELT, TRIP_DEVIATION, WANDER, change_error};
 use crate::model::scatter::Scatter;
 use crate::model::segment::Segment;
-use crate::model::stop_offset::stop_offset_share;
+use crate::model::sensor_scatter::SensorVariances;
+use crate::model::stop_offset::{StopEffect, stop_offset_share};
 
-/// Standard deviation of where a sensor closes, from one passage to the next (m).
-const SENSOR_SCATTER: f64 = 0.0015;
 /// A tape read to the centimetre beside a train: one standard deviation (m).
 const TAPE: f64 = 0.005;
 /// Standard deviation of a place of rest after the train has settled (m).
@@ -60,7 +59,7 @@ impl Linear {
     }
 
     /// Its robust weight; priors count in full.
-    fn belief(&self, believes_all: bool) -> Option<RobustWeight> {
+    fn robust_weight(&self, believes_all: bool) -> Option<RobustWeight> {
         match self.source {
             _ if believes_all => None,
             Source::Usual => None,
@@ -71,13 +70,13 @@ impl Linear {
 
     /// Its weight.
     pub(super) fn weight(&self, believes_all: bool) -> f64 {
-        self.belief(believes_all).map_or(1.0, |belief| belief.weight(self.size()))
+        self.robust_weight(believes_all).map_or(1.0, |robust| robust.weight(self.size()))
     }
 
     /// Its cost.
     pub(super) fn cost(&self, believes_all: bool) -> f64 {
         let size = self.size();
-        self.belief(believes_all).map_or(size * size, |belief| belief.cost(size))
+        self.robust_weight(believes_all).map_or(size * size, |robust| robust.cost(size))
     }
 }
 
@@ -93,8 +92,8 @@ struct Outcome {
 fn outcome(trip: &Trip, answers: &Answers<'_>, own: &Own, segments: &mut Vec<Segment>) -> Outcome {
     trip.segments(answers, own, segments);
     let mut walk = Walk::new(trip, own, segments);
-    let at = trip.contacts.iter().map(|contact| walk.way(contact.time)).collect();
-    Outcome { at, rest: walk.way_to_rest() }
+    let at = trip.detections.iter().map(|detection| walk.distance(detection.time)).collect();
+    Outcome { at, rest: walk.distance_to_rest() }
 }
 
 /// The point of a fit about which its trips are linearised.
@@ -106,6 +105,8 @@ pub(super) struct Point<'p> {
     pub(super) highest: usize,
     /// The scatter of stops and starts.
     pub(super) scatter: Scatter,
+    /// The scatter of sensors.
+    pub(super) sensors: &'p SensorVariances,
     /// Prior variance of stop offsets (m²).
     pub(super) stop_offset_variance: f64,
     /// Standard deviation of a stop's shape in its middle, as part of its displacement.
@@ -155,12 +156,12 @@ impl Point<'_> {
     /// What the first sensor of a trip says of the sum of the stop before and its start.
     pub(super) fn first_sensor(&self, at: TripAt<'_>) -> Option<FirstSensor> {
         let TripAt { trip, own, .. } = at;
-        let contact = trip.contacts.first()?;
+        let detection = trip.detections.first()?;
         let mut segments = Vec::new();
         let outcome = outcome(trip, &Answers::new(self.lasting, self.highest), own, &mut segments);
         let Error { speed, law, .. } = *errors(trip, own, &segments, self.stop_shape_error).first()?;
         let run = outcome.at.first()? * TRIP_DEVIATION;
-        let timing = speed * speed * contact.variance + SENSOR_SCATTER * SENSOR_SCATTER;
+        let timing = speed * speed * detection.variance + self.sensors.of(detection.sensor);
         Some(FirstSensor { speed, variance: timing + law * law + run * run })
     }
 
@@ -173,6 +174,7 @@ impl Point<'_> {
         let here = outcome(trip, &Answers::new(self.lasting, self.highest), own, &mut segments);
         let errors = errors(trip, own, &segments, self.stop_shape_error);
         let stop_speed = segments.last().map_or(0.0, |segment| segment.from.speed);
+        let stop_distance = segments.last().map_or(0.0, Segment::distance_to_rest);
         let stop_step = trip.step_of(segments.len().saturating_sub(1));
         let slopes = if with_slopes { self.slopes(trip, own, &segments) } else { Vec::new() };
         let terms_of = |of: &dyn Fn(&Outcome) -> f64| {
@@ -188,14 +190,14 @@ impl Point<'_> {
         let row =
             |terms, residual, variance, source| Linear { terms, residual, variance, once: variance, source };
         let mut surveyed = 0.0;
-        for (index, contact) in trip.contacts.iter().enumerate() {
-            surveyed += contact.way;
-            let passed = trip.contacts.iter().take(index + 1).flat_map(|contact| &contact.sections);
+        for (index, detection) in trip.detections.iter().enumerate() {
+            surveyed += detection.length;
+            let passed = trip.detections.iter().take(index + 1).flat_map(|detection| &detection.sections);
             let (longer, sections) = self.longer(passed);
             let mut terms = terms_of(&|outcome| outcome.at[index]);
             subtract(&mut terms, &sections);
             let Error { speed, law, systematic, step } = errors[index];
-            let own = speed * speed * contact.variance + SENSOR_SCATTER * SENSOR_SCATTER;
+            let own = speed * speed * detection.variance + self.sensors.of(detection.sensor);
             let variance = own + systematic * systematic * law * law;
             let residual = at.own.place + here.at[index] - surveyed - longer;
             if with_slopes {
@@ -203,7 +205,8 @@ impl Point<'_> {
             }
             rows.push(Linear { once: own + law * law, ..row(terms, residual, variance, Source::Sensor) });
         }
-        let (longer, sections) = self.longer(trip.contacts.iter().flat_map(|contact| &contact.sections));
+        let (longer, sections) =
+            self.longer(trip.detections.iter().flat_map(|detection| &detection.sections));
         let beyond_last = own.place + here.rest - surveyed - longer;
         let alone = self.scatter.of_stop_alone(stop_speed);
         let scatter = self.scatter.of_stop(stop_speed);
@@ -213,9 +216,10 @@ impl Point<'_> {
             let mut terms = terms_of(&|outcome| outcome.rest);
             subtract(&mut terms, &sections);
             terms.push((columns.next_place(), -1.0));
-            let (offset, free) = self.stop_offset(trip, stop_speed);
-            terms.extend(offset);
-            let longer: f64 = offset.map_or(0.0, |(column, share)| share * self.lasting[column]);
+            let effect = StopEffect { speed: stop_speed, distance: stop_distance };
+            let (offsets, free) = self.stop_offsets(trip, effect, next_place);
+            let longer: f64 = offsets.iter().map(|(column, share)| share * self.lasting[*column]).sum();
+            terms.extend(offsets);
             let residual = beyond_last + longer - next_place;
             if with_slopes {
                 self.scaled(&mut terms, residual, stop_step);
@@ -223,9 +227,9 @@ impl Point<'_> {
             rows.push(Linear { once: alone * alone, ..row(terms, residual, scatter + free, Source::Stop) });
         }
         if let Some(rest) = &trip.measured {
-            let counted = || trip.contacts.iter().take(rest.contacts);
-            let taped = counted().map(|contact| contact.way).sum::<f64>() + rest.beyond;
-            let passed = counted().flat_map(|contact| &contact.sections).chain(&rest.sections);
+            let counted = || trip.detections.iter().take(rest.detections);
+            let taped = counted().map(|detection| detection.length).sum::<f64>() + rest.beyond;
+            let passed = counted().flat_map(|detection| &detection.sections).chain(&rest.sections);
             let (taped_longer, taped_sections) = self.longer(passed);
             let tape = TAPE * TAPE + FELT * FELT * rest.beyond * rest.beyond;
             // With a next trip the tape measures its beginning; otherwise the scatter of the stop is included.
@@ -244,14 +248,20 @@ impl Point<'_> {
         rows
     }
 
-    /// The column of the stop offset of a trip, with its slope, or the prior variance (m²) where the hop is unknown.
-    fn stop_offset(&self, trip: &Trip, speed: f64) -> (Option<(usize, f64)>, f64) {
-        let share = stop_offset_share(speed);
-        let column = trip.rest_hop.and_then(|hop| self.columns.stop_offsets.get(&hop));
-        match column {
-            Some(column) => (Some((*column, share)), 0.0),
-            None => (None, share * share * self.stop_offset_variance),
+    /// The columns of the stop offsets of a trip that came to rest at a place, with their slopes, and the variance (m²) of what
+    /// comes from unknown track.
+    fn stop_offsets(&self, trip: &Trip, effect: StopEffect, rest: f64) -> (Vec<(usize, f64)>, f64) {
+        let share = stop_offset_share(effect.speed);
+        let (mut offsets, mut left): (Vec<(usize, f64)>, f64) = (Vec::new(), 1.0);
+        for stop in &trip.stop_edges {
+            let part = stop.part_of(effect, rest);
+            if let Some(column) = self.columns.stop_offsets.get(&stop.edge).filter(|_| part > 0.0) {
+                add_term(&mut offsets, *column, share * part);
+                left -= part;
+            }
         }
+        let left = share * left.max(0.0);
+        (offsets, left * left * self.stop_offset_variance)
     }
 
     /// Timing noise makes residuals in metres that grow with the speed; their slope in ln speed is no error of speed. Without this
@@ -361,18 +371,18 @@ struct Error {
 
 fn errors(trip: &Trip, own: &Own, segments: &[Segment], stop_shape_error: f64) -> Vec<Error> {
     let mut walk = Walk::new(trip, own, segments);
-    trip.contacts
+    trip.detections
         .iter()
-        .map(|contact| {
-            walk.way(contact.time);
-            let (middle, displacement) = walk.in_change(contact.time);
+        .map(|detection| {
+            walk.distance(detection.time);
+            let (middle, displacement) = walk.in_change(detection.time);
             let shape_error = if walk.is_stopping() { stop_shape_error } else { SHAPE_ERROR };
             let law = shape_error * middle * displacement.abs();
             // The common errors of starts and of stops are learnt: see `Answers::shape`.
             let change = walk.segment().checked_sub(1).and_then(|place| trip.commanded.get(place));
             let is_end = change.is_some_and(|change| change.to == 0 || change.at_rest);
             let systematic = if is_end { 1.0 } else { SYSTEMATIC };
-            Error { speed: walk.speed(contact.time), law, systematic, step: trip.step_of(walk.segment()) }
+            Error { speed: walk.speed(detection.time), law, systematic, step: trip.step_of(walk.segment()) }
         })
         .collect()
 }

@@ -2,22 +2,43 @@
 
 use alloc::vec::Vec;
 
-use crate::ids::NodeId;
+use crate::ids::{NodeId, SensorId};
 use crate::model::parameters::Answers;
 use crate::model::segment::{Segment, SpeedCommand};
+use crate::model::stop_offset::StopEffect;
 
 /// A sensor passed, and the path to it from the sensor before, or from the origin of the trip's distances.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(super) struct TripContact {
+pub(super) struct TripDetection {
     /// Its node.
     pub(super) node: NodeId,
+    /// The sensor; `None` in what version 6 of the model wrote.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(super) sensor: Option<SensorId>,
     /// Mean time of the detection (s, on the run's clock) and its variance.
     pub(super) time: f64,
     pub(super) variance: f64,
     /// Surveyed length of the path (m) and its sections.
-    pub(super) way: f64,
+    #[cfg_attr(feature = "serde", serde(rename = "way"))]
+    pub(super) length: f64,
     pub(super) sections: Vec<usize>,
+}
+
+/// An edge on the path of a train: where it begins and ends, counted from the sensor passed last before the place of rest (m).
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct PassedEdge {
+    pub(super) edge: usize,
+    pub(super) begins: f64,
+    pub(super) ends: f64,
+}
+
+impl PassedEdge {
+    /// The part of a stop's effect that comes from it, with the place of rest counted from the same sensor.
+    pub(super) fn part_of(&self, effect: StopEffect, rest: f64) -> f64 {
+        effect.between(rest - self.begins, rest - self.ends)
+    }
 }
 
 /// A tape measurement of where the train came to rest: a distance beyond one of the trip's sensors.
@@ -25,7 +46,8 @@ pub(super) struct TripContact {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct MeasuredRest {
     /// How many of the trip's sensors lie up to the one from which it counts.
-    pub(super) contacts: usize,
+    #[cfg_attr(feature = "serde", serde(rename = "contacts"))]
+    pub(super) detections: usize,
     /// Distance beyond that sensor (m), by tape and survey.
     pub(super) beyond: f64,
     /// Sections between that sensor and the one from which the tape was laid.
@@ -44,15 +66,16 @@ pub(super) struct Trip {
     pub(super) begins: f64,
     #[cfg_attr(feature = "serde", serde(rename = "told"))]
     pub(super) commanded: Vec<SpeedCommand>,
-    pub(super) contacts: Vec<TripContact>,
+    #[cfg_attr(feature = "serde", serde(rename = "contacts"))]
+    pub(super) detections: Vec<TripDetection>,
     /// When pieces of a constant deviation of speed begin (s).
     #[cfg_attr(feature = "serde", serde(with = "super::bits"))]
     pub(super) pieces: Vec<f64>,
     /// Whether the train braked to rest undisturbed.
     pub(super) came_to_rest: bool,
-    /// The hop on which it came to rest, known from the next trip.
-    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
-    pub(super) rest_hop: Option<usize>,
+    /// The edges that its stop ran over, known from the next trip.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Vec::is_empty"))]
+    pub(super) stop_edges: Vec<PassedEdge>,
     /// Where it came to rest, if that was measured with a tape.
     pub(super) measured: Option<MeasuredRest>,
     /// Its own numbers by the last fit.
@@ -108,10 +131,10 @@ impl Trip {
             continues,
             begins,
             commanded: Vec::new(),
-            contacts: Vec::new(),
+            detections: Vec::new(),
             pieces: alloc::vec![f64::NEG_INFINITY],
             came_to_rest: false,
-            rest_hop: None,
+            stop_edges: Vec::new(),
             measured: None,
             own: None,
         }
@@ -133,12 +156,12 @@ impl Trip {
         }
     }
 
-    pub(super) fn pass(&mut self, contact: TripContact) {
+    pub(super) fn pass(&mut self, detection: TripDetection) {
         let since = self.pieces.last().copied().unwrap_or(f64::NEG_INFINITY).max(self.begins);
-        if contact.time > since + LONGEST_PIECE {
-            self.pieces.push(contact.time);
+        if detection.time > since + LONGEST_PIECE {
+            self.pieces.push(detection.time);
         }
-        self.contacts.push(contact);
+        self.detections.push(detection);
     }
 
     /// The step from which the speed of a segment comes: of a stop, the one before.
@@ -160,9 +183,32 @@ impl Trip {
 
     /// When the train rests, if it was commanded to stop last (s).
     pub(super) fn rests_at(&self, answers: &Answers<'_>) -> f64 {
+        self.last_segment(answers).filter(|last| last.to == 0.0).map_or(f64::INFINITY, |last| last.settled())
+    }
+
+    /// When the last change of speed is complete (s).
+    pub(super) fn settles_at(&self, answers: &Answers<'_>) -> f64 {
+        if self.commanded.is_empty() {
+            return self.begins;
+        }
+        self.last_segment(answers).map_or(f64::INFINITY, |last| last.settled())
+    }
+
+    /// Where the train comes to rest by its stop, counted from the sensor passed last (m), and how it stops.
+    pub(super) fn stop(&self, answers: &Answers<'_>) -> Option<(f64, StopEffect)> {
+        let (own, mut segments) = (self.start(), Vec::new());
+        self.segments(answers, &own, &mut segments);
+        let last = segments.last().filter(|last| last.is_stop())?;
+        let effect = StopEffect { speed: last.from.speed, distance: last.distance_to_rest() };
+        let mut walk = Walk::new(self, &own, &segments);
+        let passed = self.detections.last().map_or(-own.place, |detection| walk.distance(detection.time));
+        Some((walk.distance_to_rest() - passed, effect))
+    }
+
+    fn last_segment(&self, answers: &Answers<'_>) -> Option<Segment> {
         let mut segments = Vec::new();
         self.segments(answers, &self.start(), &mut segments);
-        segments.last().filter(|last| last.to == 0.0).map_or(f64::INFINITY, Segment::settled)
+        segments.pop()
     }
 
     /// The changes of speed one after the other, the state before the first command included.
@@ -215,14 +261,14 @@ impl<'t> Walk<'t> {
             (self.segments.get(self.segment), self.segments.get(self.segment + 1))
             && next.begins <= time
         {
-            self.base += now.way(next.begins);
+            self.base += now.distance(next.begins);
             self.segment += 1;
         }
-        self.base + self.segments.get(self.segment).map_or(0.0, |segment| segment.way(time))
+        self.base + self.segments.get(self.segment).map_or(0.0, |segment| segment.distance(time))
     }
 
     /// Distance (m) from the beginning of the trip, at a time (s) not before the last one asked for.
-    pub(super) fn way(&mut self, time: f64) -> f64 {
+    pub(super) fn distance(&mut self, time: f64) -> f64 {
         while let Some(next) = self.trip.pieces.get(self.piece + 1).copied()
             && next <= time
         {
@@ -242,15 +288,15 @@ impl<'t> Walk<'t> {
     }
 
     /// Distance to standstill, when the last segment is a stop.
-    pub(super) fn way_to_rest(mut self) -> f64 {
+    pub(super) fn distance_to_rest(mut self) -> f64 {
         let Some(last) = self.segments.last() else { return 0.0 };
         let begins = last.begins;
-        let start = self.way(begins);
+        let start = self.distance(begins);
         while self.piece + 1 < self.trip.pieces.len() {
             self.piece += 1;
         }
         let added: f64 = self.own.changes.iter().sum::<f64>() - self.added(begins);
-        start + self.deviation() * last.way_to_rest() + added
+        start + self.deviation() * last.distance_to_rest() + added
     }
 
     /// Speed (m/s) at the time last asked for, or later.

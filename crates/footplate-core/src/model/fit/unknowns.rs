@@ -9,7 +9,7 @@ use super::trip::{Own, Trip};
 pub(super) struct Columns {
     /// Sections that were run over, with their columns after the numbers of the train.
     pub(super) sections: BTreeMap<usize, usize>,
-    /// Hops on which a stop ended, with the columns of their stop offsets.
+    /// Edges that a stop ran over, with the columns of their stop offsets.
     pub(super) stop_offsets: BTreeMap<usize, usize>,
     /// The count of lasting numbers.
     pub(super) lasting: usize,

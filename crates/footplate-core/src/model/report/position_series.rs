@@ -264,7 +264,7 @@ impl Series {
     fn residuals(&self, x: &[f64]) -> Vec<f64> {
         let law = self.law(x);
         let pairs = self.times.iter().zip(&self.positions);
-        pairs.map(|(time, position)| position - x[POSITION] - law.way(*time)).collect()
+        pairs.map(|(time, position)| position - x[POSITION] - law.distance(*time)).collect()
     }
 
     /// Where the search begins: the delay and ramp that a stop or start of this length has at an even rate.
@@ -328,7 +328,7 @@ impl Series {
         };
         let (lag, is_stop) = (libm::exp(x[LAG]), self.change == SeriesChange::Stop);
         let (ramp, friction) = (libm::exp(x[RAMP]), libm::exp(x[FRICTION]));
-        let (way, way_deviation) = derived(Segment::way_to_rest);
+        let (way, way_deviation) = derived(Segment::distance_to_rest);
         let (time, time_deviation) = derived(|law| law.settled() - law.begins);
         let shape = SHAPE * self.law(x).delay() * x[SPEED];
         let shape_time = SHAPE * self.law(x).delay();

@@ -64,6 +64,8 @@ const RETURNS: f64 = 2.5;
 /// from it.
 const LOST: f64 = 2.5e-3;
 const FAR: f64 = 4.0;
+/// A sensor of which this is as probable is found dead.
+const FOUND_DEAD: f64 = 0.99;
 /// A train comes to rest from below this speed (m/s).
 const STOPS_BELOW: f64 = 0.15;
 
@@ -92,6 +94,8 @@ pub(in super::super) struct Bank {
     pub(super) touches: [Touch; 2],
     /// Time since one of them was (s).
     pub(super) since_touch: f64,
+    /// Which sensors were found dead and have not counted since: they are still dead after a stop.
+    found_dead: [bool; 2],
     /// How far the train may be from wheels that lost the rail together.
     reach: Reach,
     /// The estimate of the last period.
@@ -121,6 +125,7 @@ impl Bank {
             side: 1.0,
             touches: [Touch::new(); 2],
             since_touch: f64::INFINITY,
+            found_dead: [false; 2],
             reach: Reach::new(),
             speed,
             acceleration: 0.0,
@@ -169,6 +174,7 @@ impl Bank {
         let evidence = evidence(scene, &wheels, &self.filters, surprise, self.wheels_a, self.side, t);
         let weights = (self.probability * evidence.likelihoods()).at_least(LEAST);
         self.probability = weights * (1.0 / weights.sum());
+        self.find_dead(scene);
         self.learn_ratio(scene, t);
         self.summed_up(scene.top_speed)
     }
@@ -183,7 +189,7 @@ impl Bank {
             scene,
             &wheels,
             self.probability.0,
-            (self.since_touch, self.wheels_a),
+            (self.since_touch, self.wheels_a, self.side),
             t,
         );
         let distance = Range {
@@ -223,18 +229,19 @@ impl Bank {
     /// The wheels, corrected by the ratio of their diameters.
     fn compared(&self, scene: &Scene) -> [Compared; 2] {
         let [first, second] = &scene.wheels;
-        let of = |wheel: &WheelScene, scale: f64| {
+        let of = |wheel: &WheelScene, scale: f64, dead: bool| {
             let speed = wheel.speed * scale;
             let ratio = 0.25 * self.ratio_variance * speed * speed;
-            Compared { speed, variance: wheel.speed_deviation * wheel.speed_deviation + ratio }
+            Compared { speed, variance: wheel.speed_deviation * wheel.speed_deviation + ratio, dead }
         };
         let [one, other] = self.scales(scene);
-        [of(first, one), of(second, other)]
+        let [first_dead, second_dead] = self.found_dead;
+        [of(first, one, first_dead), of(second, other, second_dead)]
     }
 
     /// Applies the transitions between hypotheses.
     fn mix(&mut self, scene: &Scene, wheels: &[Compared; 2], t: f64) {
-        let Transitions { ends, after_rolling, after_others } = transitions(scene, t);
+        let Transitions { ends, after_rolling, after_others } = transitions(scene, self.found_dead, t);
         // A hypothesis that cannot begin now takes no probability.
         let may = self.may_begin();
         let (after_rolling, after_others) = (after_rolling * may, after_others * may);
@@ -271,9 +278,10 @@ impl Bank {
     /// once, not in every period.
     ///
     /// A slide has lost the train where both wheels turn alike at quite another speed: they roll. A sensor that is taken for dead
-    /// may be the good one: its wheel rolls, and the other slips or has the dead sensor.
+    /// may be the good one: its wheel rolls, and the other slips or has the dead sensor. So may a wheel that is taken to slip beside a
+    /// stuck count.
     fn lost(&self, scene: &Scene, [one, other]: &[Compared; 2], pool: &Pool) -> Lanes {
-        let [.., slip, _, _, first_dead, second_dead] = self.probability.0;
+        let [_, first_slips, second_slips, slip, _, _, first_dead, second_dead] = self.probability.0;
         let [_, (most, part)] = CREEP_BY;
         let leap = |speed: f64, variance: f64, least: f64| {
             let leap = (speed - pool.v).abs();
@@ -288,12 +296,13 @@ impl Bank {
             0.0
         };
         let of_wheel = |wheel: &WheelScene, compared: &Compared| {
-            let counts = wheel.read && !wheel.stuck && wheel.speed.abs() > SILENT;
-            if counts { leap(compared.speed, compared.variance, AWAY) } else { 0.0 }
+            if wheel.counts() { leap(compared.speed, compared.variance, AWAY) } else { 0.0 }
         };
         let [first, second] = &scene.wheels;
-        let of_first = if first_dead > 0.9 { of_wheel(first, one) } else { 0.0 };
-        let of_second = if second_dead > 0.9 { of_wheel(second, other) } else { 0.0 };
+        let lost_first = first_dead > 0.9 || second.stuck && first_slips > 0.9;
+        let lost_second = second_dead > 0.9 || first.stuck && second_slips > 0.9;
+        let of_first = if lost_first { of_wheel(first, one) } else { 0.0 };
+        let of_second = if lost_second { of_wheel(second, other) } else { 0.0 };
         Lanes([alike, of_second, of_first, 0.0, 0.0, 0.0, of_second, of_first])
     }
 
@@ -338,6 +347,14 @@ impl Bank {
     pub(super) fn scales(&self, scene: &Scene) -> [f64; 2] {
         let [one, other] = shares(scene);
         [1.0 - other * self.ratio, 1.0 + one * self.ratio]
+    }
+
+    /// Remembers which sensors are dead.
+    fn find_dead(&mut self, scene: &Scene) {
+        let [.., first, second] = self.probability.0;
+        for ((found, wheel), dead) in self.found_dead.iter_mut().zip(&scene.wheels).zip([first, second]) {
+            *found = !wheel.counts() && (*found || dead > FOUND_DEAD);
+        }
     }
 
     /// Learns the ratio of the diameters while both roll.

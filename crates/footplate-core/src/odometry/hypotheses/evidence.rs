@@ -41,6 +41,8 @@ const USUAL: f64 = 1.0;
 const RESTLESS_ACCELERATION: f64 = 0.04;
 /// Cost of a dead sensor that counts (nats per second): it explains no count, and most dead sensors are silent.
 const DEAD_COUNTS: f64 = 10.0;
+/// Cost of taking the spin of a wheel beside a dead sensor for the motion of the train (nats per second), and the slide of one.
+const BESIDE_DEAD: [f64; 2] = [1.0, 8.0];
 /// Cost of a locked wheel (nats per second): it may come free. A slower train has none (m/s).
 const LOCKED: f64 = 0.1;
 const NEARLY_STANDING: f64 = 0.15;
@@ -64,12 +66,21 @@ const MOST: f64 = 25.0;
 const GRIPS: Lanes = Lanes([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
 const ONE_SLIPS: Lanes = Lanes([0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 
+impl WheelScene {
+    /// Whether its count is that of a wheel that turns.
+    pub(super) fn counts(&self) -> bool {
+        self.read && !self.stuck && self.speed.abs() > SILENT
+    }
+}
+
 /// A wheel as hypotheses compare it with their train.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Compared {
     /// Speed (m/s), with what is known of the ratio of the diameters, and its variance.
     pub(super) speed: f64,
     pub(super) variance: f64,
+    /// Its sensor was found dead and has not counted since.
+    pub(super) dead: bool,
 }
 
 /// The logarithm of the likelihood of every hypothesis, less that of the best. `surprise` is the square of the innovation
@@ -121,6 +132,7 @@ pub(super) fn evidence(
     let surprising = (surprise - Lanes::all(SURPRISING)).at_least(0.0) * -0.5;
     let known = (filters.paa - Lanes::all(UNKNOWN)).at_least(0.0) + Lanes::all(BEYOND * BEYOND);
     let total = of_wheels + surprising - beyond * beyond * known.inverse() * (0.5 * followed);
+    let total = total.or_if_larger(beside_dead(&one, &other, [&first_dead, &second_dead]));
     let best = total.largest();
     (total - Lanes::all(best)).at_least(-MOST)
 }
@@ -148,13 +160,13 @@ impl Shown<'_> {
         let creep = (ROLLING_CREEPAGE * effort + RESTLESS) * train.v;
         let y = compared.speed - train.v;
         let speed = unusual(y * y / (train.pvv + compared.variance + creep * creep));
-        let stuck = if wheel.stuck { STUCK } else { 0.0 };
+        let stuck = if wheel.stuck || compared.dead { STUCK } else { 0.0 };
         -0.5 * self.followed * (speed + self.unsteady(train)) - stuck * self.t
     }
 
     /// It rests with the train.
     fn rests(&self, train: &State) -> f64 {
-        if self.wheel.stuck { 0.0 } else { self.rolls(train) }
+        if self.wheel.stuck || self.compared.dead { 0.0 } else { self.rolls(train) }
     }
 
     /// By how much its acceleration is unlike that of the train.
@@ -198,8 +210,7 @@ impl Shown<'_> {
 
     /// Its sensor is dead.
     fn dead(&self) -> f64 {
-        let counts = self.wheel.read && !self.wheel.stuck && self.wheel.speed.abs() > SILENT;
-        if counts { -DEAD_COUNTS * self.t } else { 0.0 }
+        if self.wheel.counts() { -DEAD_COUNTS * self.t } else { 0.0 }
     }
 
     /// Cost of a slip of this wheel (nats per second).
@@ -209,6 +220,18 @@ impl Shown<'_> {
         let stuck = if wheel.stuck { STUCK } else { 0.0 };
         if possible { stuck } else { IMPOSSIBLE + stuck }
     }
+}
+
+/// What the hypotheses of a dead sensor cost at most: its other wheel may slip. Beside a wheel that does not turn no other hypothesis
+/// says so in traction; in a slide the silent wheel may be locked, and "both slip" says that.
+fn beside_dead(one: &Shown, other: &Shown, [first_dead, second_dead]: [&State; 2]) -> Lanes {
+    let [spins, slides] = BESIDE_DEAD;
+    let cost = one.t * if one.side < 0.0 { spins } else { slides };
+    let mut least = Lanes::all(f64::NEG_INFINITY);
+    let [.., of_first, of_second] = &mut least.0;
+    *of_first = one.dead() + other.slips(first_dead) - cost;
+    *of_second = one.slips(second_dead) + other.dead() - cost;
+    least
 }
 
 /// Both wheels creep alike.

@@ -70,6 +70,13 @@ impl Lanes {
         Self(self.0.map(|value| smaller(value, most)))
     }
 
+    /// Element by element, the larger of both numbers.
+    #[inline]
+    #[expect(clippy::indexing_slicing, reason = "below the width of both")]
+    pub(super) fn or_if_larger(self, other: Self) -> Self {
+        Self(array::from_fn(|lane| larger(self.0[lane], other.0[lane])))
+    }
+
     /// The reciprocals.
     #[inline]
     pub(super) fn inverse(self) -> Self {

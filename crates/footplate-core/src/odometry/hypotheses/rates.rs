@@ -47,6 +47,8 @@ const BOTH_CREEP: (f64, f64) = (2e-7, 2e-5);
 const INDEPENDENT: f64 = 0.3;
 /// Sensors that fail (1/s): one in 300 hours.
 const SENSOR_FAILS: f64 = 1e-6;
+/// The same of one that was found dead and has not counted since, and how often it is dead again when another hypothesis ends.
+const STAYS_DEAD: f64 = 0.1;
 /// How often each hypothesis ends (1/s): slides last seconds, steady creep and dead sensors longer.
 const ENDS: Lanes = Lanes([0.0, 0.5, 0.5, 0.4, 0.15, 0.2, 0.02, 0.02]);
 /// What follows when another hypothesis than "both roll" ends; the rest stays with it.
@@ -64,14 +66,19 @@ pub(super) struct Transitions {
     pub(super) after_others: Lanes,
 }
 
-/// The transitions of a period of `t` seconds.
-pub(super) fn transitions(scene: &Scene, t: f64) -> Transitions {
+/// The transitions of a period of `t` seconds; which sensors were `found_dead`.
+pub(super) fn transitions(scene: &Scene, found_dead: [bool; 2], t: f64) -> Transitions {
     let effort = if scene.commanded.is_some() { scene.brake + scene.traction } else { UNKNOWN_EFFORT };
     let possible = if scene.slide || scene.slip { 1.0 } else { 1e-3 };
     let rate = |(least, added): (f64, f64)| possible * (least + added * effort) * t;
     let one = rate(ONE_SLIPS);
     let alike = rate(BOTH_CREEP) * if scene.independent { INDEPENDENT } else { 1.0 };
-    let dead = SENSOR_FAILS * t;
-    let begins = [0.0, one, one, rate(BOTH_SLIP), alike, STOPS * t, dead, dead];
-    Transitions { ends: ENDS * t, after_rolling: Lanes(begins), after_others: FOLLOWS }
+    let [first_dead, second_dead] = found_dead.map(|found| t * if found { STAYS_DEAD } else { SENSOR_FAILS });
+    let begins = [0.0, one, one, rate(BOTH_SLIP), alike, STOPS * t, first_dead, second_dead];
+    let mut follows = FOLLOWS;
+    let [.., of_first, of_second] = &mut follows.0;
+    for (share, found) in [of_first, of_second].into_iter().zip(found_dead) {
+        *share = if found { STAYS_DEAD } else { *share };
+    }
+    Transitions { ends: ENDS * t, after_rolling: Lanes(begins), after_others: follows }
 }

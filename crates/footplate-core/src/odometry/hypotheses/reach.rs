@@ -41,6 +41,11 @@ const ROLLS_AFTER_S: f64 = 5.0;
 const GRADIENT: f64 = 0.35;
 /// ... and how much it decelerates at least with locked wheels (m/s²): by ice of 0.012 of which a fifth is left.
 const LOCKED: f64 = 0.025;
+/// Wheels that slipped and accelerate towards the train by more than this beyond the command (m/s²) are on their way back: a
+/// converter brings them back by no less, and in this time after the command ended (s). Without a recorded command, longer times would
+/// take every train that is driven for one whose wheels return.
+const RETURNS: f64 = 0.1;
+const RETURNS_FOR_S: f64 = 15.0;
 /// Least effort that makes wheels creep.
 const EFFORT: f64 = 0.02;
 /// Acceleration of wheels by which a train without a recorded command is braked or driven (m/s²).
@@ -53,6 +58,8 @@ pub(super) struct Reach {
     speed: Range,
     /// Both were seen to slip, and have not had to roll since.
     slipped: bool,
+    /// On which side of the train they were then: 1 where they turned slower, −1 where faster.
+    side: f64,
     alike_for: f64,
     /// Time since brake and traction acted (s).
     since: [f64; 2],
@@ -68,6 +75,7 @@ impl Reach {
         Self {
             speed,
             slipped: false,
+            side: 1.0,
             alike_for: 0.0,
             since: [f64::INFINITY; 2],
             since_rolling: f64::INFINITY,
@@ -88,12 +96,12 @@ impl Reach {
         scene: &Scene,
         wheels: &[Compared; 2],
         p: [f64; 8],
-        (since_touch, wheels_a): (f64, f64),
+        (since_touch, wheels_a, side): (f64, f64, f64),
         t: f64,
     ) -> Range {
         let [.., slip, creep, _, first_dead, second_dead] = p;
         let silent = wheels.iter().all(|wheel| wheel.speed.abs() < SILENT);
-        let [brakes, drives] = self.acts(scene, silent, wheels_a);
+        let [brakes, drives] = self.acts(scene, silent, wheels_a, [first_dead, second_dead]);
         for (since, acts) in self.since.iter_mut().zip([brakes, drives]) {
             *since = if acts { 0.0 } else { *since + t };
         }
@@ -103,7 +111,14 @@ impl Reach {
         let creeps_at_most = slip + creep < ALIKE && turn_alike && !(silent && self.slipped && brakes);
         self.alike_for = if creeps_at_most { self.alike_for + t } else { 0.0 };
         let alike = self.alike_for >= ALIKE_FOR_S;
-        let free = brake <= 0.0 && traction <= 0.0;
+        // Wheels that slipped and still accelerate towards the train beyond the command are on their way back.
+        if slip + creep > SEEN {
+            self.side = side;
+        }
+        let beyond = self.side * (wheels_a - scene.commanded.unwrap_or(0.0));
+        let lately = self.since.iter().any(|since| *since < RETURNS_FOR_S);
+        let returns = self.slipped && lately && beyond > RETURNS;
+        let free = brake <= 0.0 && traction <= 0.0 && !returns;
         // A wheel that spins is slowed down to no certain speed.
         let is_known = scene.commanded.is_some() && traction <= 0.0;
         let touched = is_known && since_touch < TOUCHED_S && slip + creep + dead < ROLLS;
@@ -137,7 +152,15 @@ impl Reach {
         };
         let unseen = if scene.commanded.is_some() { UNSEEN } else { UNSEEN_UNTOLD };
         let [of_brake, of_traction] = unseen.map(creeps);
-        let about = Range { low: likely.low - traction * of_traction, high: likely.high + brake * of_brake };
+        let [towards_low, towards_high] = match (returns, self.side > 0.0) {
+            (true, true) => [traction, 1.0],
+            (true, false) => [1.0, brake],
+            (false, _) => [traction, brake],
+        };
+        let about = Range {
+            low: likely.low - towards_low * of_traction,
+            high: likely.high + towards_high * of_brake,
+        };
         let reached = if alike || free && !self.slipped { reaches.and(about) } else { reaches };
         self.speed = Range { low: smaller(reached.low, likely.low), high: larger(reached.high, likely.high) };
         if dead > SEEN && !turn_alike {
@@ -151,14 +174,17 @@ impl Reach {
     }
 
     /// Whether brake and traction act on both wheelsets.
-    fn acts(&self, scene: &Scene, silent: bool, wheels_a: f64) -> [bool; 2] {
+    fn acts(&self, scene: &Scene, silent: bool, wheels_a: f64, dead: [f64; 2]) -> [bool; 2] {
         let [brakes, drives] = match scene.commanded {
             Some(commanded) => [commanded < -EFFORT, commanded > EFFORT],
             // Wheels that a brake has locked show nothing more of it.
             None if silent => self.since.map(|since| since <= 0.0),
             None => [wheels_a < -TREND, wheels_a > TREND],
         };
-        let all = |of: fn(&WheelScene) -> bool| scene.wheels.iter().all(of);
+        // A dead sensor shows no wheel that rolls.
+        let all = |of: fn(&WheelScene) -> bool| {
+            scene.wheels.iter().zip(dead).all(|(wheel, dead)| dead > SEEN || of(wheel))
+        };
         [brakes && all(|wheel| wheel.braked), drives && all(|wheel| wheel.driven)]
     }
 }
@@ -214,12 +240,12 @@ mod tests {
             independent: false,
             top_speed: 40.0,
         };
-        let compared = [Compared { speed: 20.0, variance: 0.0025 }; 2];
+        let compared = [Compared { speed: 20.0, variance: 0.0025, dead: false }; 2];
         let p = [1.0 - slip, 0.0, 0.0, slip, 0.0, 0.0, 0.0, 0.0];
         let likely = Range { low: 19.8, high: 20.2 };
         let mut high = 0.0;
         for _ in 0..(seconds / 0.05) as usize {
-            high = reach.widen(likely, &scene, &compared, p, (f64::INFINITY, 0.0), 0.05).high;
+            high = reach.widen(likely, &scene, &compared, p, (f64::INFINITY, 0.0, 1.0), 0.05).high;
         }
         high - likely.high
     }

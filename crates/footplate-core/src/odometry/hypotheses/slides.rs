@@ -16,6 +16,9 @@ const MOVES: [usize; 7] = [0, 1, 2, SLIPS, CREEPS, 6, 7];
 /// A train in which both wheelsets slide decelerates by this much, or as commanded if that is less (m/s²), and within
 /// this deviation (m/s², part of it); adhesion of 0.02 to 0.08 and the brakes of the other wheelsets.
 const SLIDES_BY: f64 = 0.5;
+/// A train whose wheels spin accelerates by this much, or as commanded if that is less (m/s²). With 0.5 the rms while both slip is
+/// 2.8 to 3.5 m/s on sixty random worlds, with 0.3 2.3 to 2.8.
+const SPINS_BY: f64 = 0.3;
 const SLIDES_WITHIN: (f64, f64) = (0.1, 0.3);
 /// Correlation time of that deceleration (s). Longer times are truer on long ice and worse in every family of scenarios.
 const SLIDES_FOR_S: f64 = 2.0;
@@ -41,7 +44,8 @@ impl Bank {
         let side = self.side;
         // How fast the train can change its speed with both wheelsets slipping.
         let wanted = scene.commanded.unwrap_or(-side * SLIDES_BY);
-        let slides = -side * smaller(larger(-side * wanted, 0.0), SLIDES_BY);
+        let most = if side > 0.0 { SLIDES_BY } else { SPINS_BY };
+        let slides = -side * smaller(larger(-side * wanted, 0.0), most);
         let usual = lasting(SLIDES_WITHIN.0 + SLIDES_WITHIN.1 * slides.abs(), SLIDES_FOR_S, t);
         let mut slip = self.filters.state(SLIPS);
         slip.acceleration(slides - slip.a, usual);
@@ -81,9 +85,12 @@ impl Bank {
         for ((touch, wheel), scale) in self.touches.iter_mut().zip(&scene.wheels).zip(scales) {
             let speed = touch.follow((wheel.counted - wheel.late) * scale / t, train.a, t);
             let has_reached = touch.reached(self.side * (wheel.acceleration - train.a), t);
-            self.since_touch = if has_reached { 0.0 } else { self.since_touch };
             if !wheel.read || wheel.stuck || speed.abs() < SILENT {
                 continue;
+            }
+            // A wheel that spun and was braked may have passed the train.
+            if has_reached && self.side > 0.0 {
+                self.since_touch = 0.0;
             }
             let y = speed - train.v;
             let pushes = if self.side * y > 0.0 { t / (FOLLOWED_S * PUSHES * PUSHES) } else { 0.0 };

@@ -152,7 +152,7 @@ impl Session<'_> {
         let dashboard = self
             .serve
             .map(|at| {
-                let set_up = SetUpRoute::of_session(self.set_up.cloned(), SetUpMode::Calibrating);
+                let set_up = SetUpRoute::of_session(self.set_up.cloned(), SetUpMode::Calibrating, false);
                 open_dashboard(at, on, store(), set_up)
             })
             .transpose()?;

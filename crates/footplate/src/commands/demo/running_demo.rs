@@ -83,8 +83,8 @@ impl<'r, 'l, 'o> Demo<'r, 'l, 'o> {
     /// Runs one turn of the loop; returns its notices.
     pub(super) fn advance<M: Machine>(&mut self, machine: &mut M) -> anyhow::Result<Vec<M::Notice>> {
         let notices = self.railway.advance(machine)?;
-        if self.dashboard_view.as_ref().is_some_and(|dashboard_view| dashboard_view.is_halted(DRIVES_ITSELF))
-        {
+        let now = self.now();
+        if self.dashboard_view.as_mut().is_some_and(|dashboard| dashboard.is_halted(now, DRIVES_ITSELF)) {
             anyhow::bail!("emergency stop from the dashboard: all trains stopped, track power off");
         }
         self.report_faults()?;

@@ -14,7 +14,7 @@ use footplate_wire::{CommandError, LinkNotice};
 use super::script_runner::ScriptRunner;
 use super::session_message::{Ended, SessionMessage};
 use crate::clock::Stopwatch;
-use crate::dashboard::{Alarm, Answer, Board, Painter, Request};
+use crate::dashboard::{Alarm, Answer, Board, Painter, PendingRequest, Request};
 use crate::recorded::{Input, Recorded};
 use crate::runtime::{Attendant, Wish};
 
@@ -64,6 +64,8 @@ pub(super) struct Console {
     news: Vec<LinkNews>,
     /// Messages that are scored against the simulated truth before time moves on.
     pub(super) for_scoring: Vec<SessionMessage>,
+    /// Requests for the simulated truth.
+    pub(super) for_truth: Vec<PendingRequest>,
     pub(super) is_over: bool,
 }
 
@@ -76,9 +78,33 @@ struct LiveView {
 }
 
 impl LiveView {
-    fn attend(&mut self, now: Timestamp, script_runner: &mut Recorded<ScriptRunner>) {
+    /// Answers all requests but those for the simulated truth, which it returns.
+    fn attend(&mut self, now: Timestamp, script_runner: &mut Recorded<ScriptRunner>) -> Vec<PendingRequest> {
+        let mut for_truth = Vec::new();
         while let Some(asked) = self.board.next_request() {
             let answer = match &asked.request {
+                Request::Truth => {
+                    for_truth.push(asked);
+                    continue;
+                }
+                Request::CheckSchedule(schedule) => match script_runner.machine().read_schedule(schedule) {
+                    Ok(_) => Answer::Taken,
+                    Err(mistakes) => Answer::Refused(mistakes),
+                },
+                Request::RunSchedule(schedule) => match script_runner.machine().check_run(schedule) {
+                    Ok(()) => {
+                        script_runner.handle_word(now, &Input::Schedule(schedule.clone()));
+                        Answer::Taken
+                    }
+                    Err(why) => Answer::Refused(why),
+                },
+                Request::EndSchedule(name) if script_runner.machine().runs(name) => {
+                    script_runner.handle_word(now, &Input::EndSchedule(name.clone()));
+                    Answer::Taken
+                }
+                Request::EndSchedule(name) => Answer::Refused(format!("no schedule `{name}` runs")),
+                Request::EndAlarm(id) if self.painter.end_alarm(now, *id) => Answer::Taken,
+                Request::EndAlarm(id) => Answer::Refused(format!("alarm {id} is over already")),
                 Request::EmergencyStop => {
                     script_runner.handle_word(now, &Input::EmergencyStop);
                     Answer::Taken
@@ -99,6 +125,7 @@ impl LiveView {
             self.painted = (self.painted + PICTURE_INTERVAL).max(elapsed.saturating_sub(PICTURE_INTERVAL));
             script_runner.machine().show(&mut self.painter, now);
         }
+        for_truth
     }
 }
 
@@ -138,7 +165,15 @@ impl Console {
         let prompts =
             lines.is_some() && !json && std::io::stdin().is_terminal() && std::io::stdout().is_terminal();
         let screen = Screen { to_stderr: json, prompts, is_silent: false };
-        Self { lines, screen, live_view, news: Vec::new(), for_scoring: Vec::new(), is_over: false }
+        Self {
+            lines,
+            screen,
+            live_view,
+            news: Vec::new(),
+            for_scoring: Vec::new(),
+            for_truth: Vec::new(),
+            is_over: false,
+        }
     }
 
     pub(super) fn say(&self, text: &str, status: &str) {
@@ -164,6 +199,8 @@ impl Attendant<Recorded<ScriptRunner>> for Console {
                 if let Some(live_view) = &self.live_view {
                     live_view.board.say((now - Timestamp::ZERO).as_s(), &text);
                 }
+                let alarms = self.live_view.as_ref().and_then(|live_view| live_view.painter.alarm_summary());
+                let status = alarms.map_or_else(|| status.clone(), |alarms| format!("{status}; {alarms}"));
                 self.screen.say(&text, &status);
             }
             SessionMessage::Passed(passed) => {
@@ -209,9 +246,10 @@ impl Attendant<Recorded<ScriptRunner>> for Console {
             }
         }
         if let Some(live_view) = &mut self.live_view {
-            live_view.attend(now, script_runner);
+            self.for_truth.extend(live_view.attend(now, script_runner));
         }
-        if self.is_over || !self.for_scoring.is_empty() { Wish::Finish } else { Wish::GoOn }
+        let leaves_loop = self.is_over || !self.for_scoring.is_empty() || !self.for_truth.is_empty();
+        if leaves_loop { Wish::Finish } else { Wish::GoOn }
     }
 }
 

@@ -27,6 +27,7 @@ pub(super) const fn verb(instruction: &Instruction) -> &'static str {
         Instruction::Order(Order::Hold { .. }) => "hold",
         Instruction::Order(Order::Follow { .. }) => "follow",
         Instruction::Order(Order::Arrive { .. }) => "arrive",
+        Instruction::Find(_) => "find",
         Instruction::Place(..) => "place",
         Instruction::Length(..) => "length",
         Instruction::Function(..) => "function",

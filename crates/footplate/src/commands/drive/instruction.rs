@@ -11,6 +11,8 @@ pub(super) enum Instruction {
     Order(Order),
     /// Send a train to a place; the dispatcher chooses the route.
     Go(TrainId, Journey),
+    /// Have a train creep to the next sensor and stop there, so that its position is known.
+    Find(TrainId),
     /// Throw all turnouts straight, one after the other.
     Straighten,
     /// The operator says where a train at rest is.
@@ -31,6 +33,17 @@ pub(super) enum Instruction {
     Help,
     /// Stop all trains and end the session.
     Quit,
+}
+
+impl Instruction {
+    /// The train that it drives or locates, if it does.
+    pub(super) fn driven(self) -> Option<TrainId> {
+        match self {
+            Self::Order(order) => order.train(),
+            Self::Go(train, _) | Self::Find(train) | Self::Place(train, _) => Some(train),
+            _ => None,
+        }
+    }
 }
 
 /// The condition of a `wait`.
@@ -63,6 +76,7 @@ move 24 37mm                      from standstill, move on by 37 mm
 hold 24 250mm/s                   run at a mean speed, also between throttle steps
 follow 58 behind 24 by 1.5s       keep 1.5 s behind train 24, sensor by sensor (or by 150mm)
 arrive 24 at D5+40mm in 12s       come to rest there in 12 s
+find 24                           creep to the next sensor and stop there: then its position is known
 place 24 at C13+120mm             train 24 is there: you put it there, or you see it there
 length 24 pickup 45mm overhang 110mm   length of train 24: its pickup, and from there to its further end
 light 24 on                       switch the light of train 24 on (or off); the same as function 24 0 on

@@ -7,9 +7,9 @@ use super::instruction::{Instruction, Until};
 use super::reader::{Known, Words};
 use super::words::{Mistake, meant, words};
 
-const VERBS: [&str; 18] = [
-    "speed", "reverse", "turnout", "stop", "go", "move", "hold", "follow", "arrive", "place", "length",
-    "light", "function", "halt", "power", "where", "wait", "help",
+const VERBS: [&str; 19] = [
+    "speed", "reverse", "turnout", "stop", "go", "move", "hold", "follow", "arrive", "find", "place",
+    "length", "light", "function", "halt", "power", "where", "wait", "help",
 ];
 
 /// Parses one line; `None` for an empty line or a comment.
@@ -62,6 +62,7 @@ pub(super) fn parse(line: &str, known: Known<'_>) -> Result<Option<Instruction>,
             words.expect("in")?;
             Instruction::Order(Order::Arrive { train, target, within: words.span()? })
         }
+        "find" => Instruction::Find(words.train()?),
         "place" => {
             let train = words.train()?;
             words.expect("at")?;
@@ -260,6 +261,7 @@ mod tests {
         let function = |number| FunctionNumber::new(number).expect("a function");
         assert_eq!(read("light 24 off"), Ok(Some(Instruction::Function(train, function(0), false))));
         assert_eq!(read("function 24 28 on"), Ok(Some(Instruction::Function(train, function(28), true))));
+        assert_eq!(read("find 24"), Ok(Some(Instruction::Find(train))));
         assert_eq!(read("halt"), Ok(Some(Instruction::Halt)));
         assert_eq!(read("power on"), Ok(Some(Instruction::PowerOn)));
         assert_eq!(read("turnout all straight"), Ok(Some(Instruction::Straighten)));

@@ -11,6 +11,15 @@ use super::reader::Known;
 /// The largest script, in bytes: about a day of driving.
 const LONGEST: u64 = 1 << 20;
 
+/// The number of a queue of steps in a session.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct QueueId(pub(super) u32);
+
+impl QueueId {
+    /// The queue of the session: its script or its operator. Schedules have queues of their own.
+    pub(super) const SESSION: Self = Self(0);
+}
+
 /// One instruction and the text that it was parsed from.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Step {
@@ -21,6 +30,10 @@ pub(super) struct Step {
     pub(super) is_part: bool,
     /// Whether this is the second attempt, after its train was lost and located.
     pub(super) is_retry: bool,
+    /// The queue that it belongs to.
+    pub(super) queue: QueueId,
+    /// The number of its line in a schedule, from 0.
+    pub(super) line: usize,
 }
 
 /// Reads a script.
@@ -56,5 +69,7 @@ pub(super) fn step(line: &str, known: Known<'_>) -> Result<Option<Step>, super::
         instruction,
         is_part: false,
         is_retry: false,
+        queue: QueueId::SESSION,
+        line: 0,
     }))
 }

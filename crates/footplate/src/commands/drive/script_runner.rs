@@ -2,6 +2,8 @@
 //! reports their results.
 
 mod outcomes;
+mod queue;
+mod schedules;
 mod waiting;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -16,14 +18,15 @@ use footplate_core::tracking::PathPoint;
 use footplate_core::{Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 use serde::{Deserialize, Serialize};
 
+use self::queue::{Queues, StepQueue};
 use self::waiting::{CHECK_INTERVAL, Wait, is_open_ended};
 use super::formatter::NoticeFormatter;
 use super::instruction::{HELP, Instruction, Until};
 use super::learning::Learning;
 use super::reader::Known;
-use super::script::{Step, step};
+use super::script::{QueueId, Step, step};
 use super::session_message::SessionMessage;
-use crate::dashboard::{Painter, TrainTask};
+use crate::dashboard::{Painter, SchedulePicture, SessionState, TrainTask};
 use crate::recorded::{Input, Listener};
 
 /// The default limit of a wait: a creeping train completes one round of a layout within it.
@@ -51,16 +54,14 @@ pub(crate) struct ScriptRunner {
     learning: Learning,
     /// Refitted models that are used as soon as their trains are at rest.
     refitted: BTreeMap<TrainId, MotionModel>,
-    source: CommandSource,
-    steps: VecDeque<Step>,
+    queues: Queues,
+    /// The schedules that have ended, the newest last.
+    ended_schedules: Vec<SchedulePicture>,
     /// Whether no more lines will come.
     complete: bool,
     trains: BTreeMap<TrainId, SpeedStep>,
-    wait: Option<Wait>,
     /// The longest wait for a train; a `wait` for a time is not limited.
     wait_limit: TimeSpan,
-    /// Since when the next line has waited for a train that cannot be driven at present.
-    interrupted: Option<Timestamp>,
     pending: BTreeMap<OrderId, Step>,
     /// The last predicted interval of each order in progress.
     promises: BTreeMap<OrderId, Promise>,
@@ -91,13 +92,11 @@ impl ScriptRunner {
             dispatcher: Dispatcher::watched(Timestamp::ZERO, driver),
             learning,
             refitted: BTreeMap::new(),
-            source,
-            steps: steps.into(),
+            queues: Queues::new(StepQueue::new(source, steps)),
+            ended_schedules: Vec::new(),
             complete: false,
             trains,
-            wait: None,
             wait_limit: WAIT_LIMIT,
-            interrupted: None,
             pending: BTreeMap::new(),
             promises: BTreeMap::new(),
             changed: BTreeSet::new(),
@@ -113,9 +112,9 @@ impl ScriptRunner {
         }
     }
 
-    /// Whether an operator gives the instructions.
-    pub(super) fn is_interactive(&self) -> bool {
-        self.source == CommandSource::Person
+    /// The trains of the session.
+    pub(super) fn trains(&self) -> impl Iterator<Item = TrainId> {
+        self.trains.keys().copied()
     }
 
     fn driver(&self) -> &Driver {
@@ -151,10 +150,11 @@ impl ScriptRunner {
             Ok(Some(Step { instruction: Instruction::Halt, .. })) => return self.halt(now),
             Ok(heard) => {
                 // A new line from an operator ends the wait.
-                if heard.is_some() && self.source == CommandSource::Person {
-                    self.wait = None;
+                let ends_wait = heard.is_some() && self.is_interactive();
+                if let Some(session) = self.queues.get_mut(QueueId::SESSION) {
+                    session.wait = session.wait.filter(|_| !ends_wait);
+                    session.steps.extend(heard);
                 }
-                self.steps.extend(heard);
             }
             Err(mistake) => self.say(mistake.to_string()),
         }
@@ -189,22 +189,36 @@ impl ScriptRunner {
         self.last_event = now;
         self.forward_outputs(now);
         self.continue_refit(now);
-        while !self.is_over && self.may_advance(now) {
-            let Some(instruction) = self.steps.front().map(|step| step.instruction) else { break };
+        let mut queue = Some(QueueId::SESSION);
+        while let Some(id) = queue {
+            self.advance_queue(now, id);
+            self.continue_schedule(now, id);
+            queue = self.queues.after(id);
+        }
+        self.cancel_late_journeys(now);
+        let is_idle = |(_, queue): (_, &StepQueue)| {
+            queue.run.is_none() && queue.steps.is_empty() && queue.wait.is_none()
+        };
+        let idle = self.queues.iter().all(is_idle) && self.pending.values().all(is_open_ended);
+        if self.complete && idle && !self.is_over {
+            self.end();
+        }
+    }
+
+    /// Carries out the steps of a queue that need not wait.
+    fn advance_queue(&mut self, now: Timestamp, queue: QueueId) {
+        while !self.is_over && self.may_advance(now, queue) {
+            let front = self.queues.get(queue).and_then(|queue| queue.steps.front());
+            let Some(instruction) = front.map(|step| step.instruction) else { break };
             if self.waits_for_model(now, instruction)
-                || self.source == CommandSource::Script && self.must_wait(now, instruction)
+                || self.queues.is_script(queue) && self.must_wait(now, queue, instruction)
             {
                 break;
             }
-            if let Some(step) = self.steps.pop_front() {
+            if let Some(step) = self.queues.get_mut(queue).and_then(|queue| queue.steps.pop_front()) {
                 self.carry_out(now, step);
                 self.forward_outputs(now);
             }
-        }
-        self.cancel_late_journeys(now);
-        let idle = self.steps.is_empty() && self.wait.is_none() && self.pending.values().all(is_open_ended);
-        if self.complete && idle && !self.is_over {
-            self.end();
         }
     }
 
@@ -214,6 +228,9 @@ impl ScriptRunner {
     }
 
     fn carry_out(&mut self, now: Timestamp, step: Step) {
+        if let Some(train) = step.instruction.driven().filter(|_| step.queue == QueueId::SESSION) {
+            self.take_over(train);
+        }
         match step.instruction {
             Instruction::Order(order) => match self.give_order(now, order) {
                 Ok(id) => {
@@ -224,7 +241,7 @@ impl ScriptRunner {
                     }
                     self.pending.insert(id, step);
                 }
-                Err(Refusal::Lost { train }) if !step.is_retry => self.locate_first(train, step),
+                Err(Refusal::Lost { train }) if !step.is_retry => self.locate_first(train, &step),
                 Err(why) => self.refuse(now, &step, &why),
             },
             Instruction::Go(train, journey) => self.send(now, step, train, journey),
@@ -233,11 +250,14 @@ impl ScriptRunner {
                     self.driver().layout().turnouts().map(|(turnout, _)| turnout).collect();
                 for (place, turnout) in turnouts.into_iter().rev().enumerate() {
                     let instruction = Instruction::Order(Order::Turnout { turnout, curved: false });
-                    let part =
-                        Step { text: step.text.clone(), instruction, is_part: place > 0, is_retry: false };
-                    self.steps.push_front(part);
+                    self.queues.push_front(Step { instruction, is_part: place > 0, ..step.clone() });
                 }
             }
+            Instruction::Find(train) if self.driver().locate(train, now).is_some() => {
+                let line = self.formatter().whereabouts(train, now);
+                self.say(line);
+            }
+            Instruction::Find(train) => self.find(train, &step),
             Instruction::Place(train, at) => self.place(now, &step, train, at),
             Instruction::Length(train, lengths) => {
                 self.dispatcher.set_lengths(now, train, lengths);
@@ -264,10 +284,15 @@ impl ScriptRunner {
                     self.say(line);
                 }
             }
-            Instruction::Wait(until) => self.wait = Some(Wait { until, since: now, is_met: false }),
+            Instruction::Wait(until) => {
+                if let Some(queue) = self.queues.get_mut(step.queue) {
+                    queue.wait = Some(Wait { until, since: now, is_met: false, line: step.line });
+                }
+            }
             Instruction::Help => self.say(HELP.to_owned()),
             Instruction::Quit => {
-                self.steps.clear();
+                self.close_schedules();
+                self.queues.clear();
                 self.end();
             }
         }
@@ -297,7 +322,7 @@ impl ScriptRunner {
                 self.pending.insert(id, step);
             }
             Err(Refusal::Lost { train } | Refusal::OtherNowhere { other: train, .. }) if !step.is_retry => {
-                self.locate_first(train, step);
+                self.locate_first(train, &step);
             }
             Err(why) => self.refuse(now, &step, &why),
         }
@@ -305,8 +330,8 @@ impl ScriptRunner {
 
     /// Stops all trains, switches the track power off, and drops all waiting lines.
     fn halt(&mut self, now: Timestamp) {
-        self.steps.clear();
-        self.wait = None;
+        self.close_schedules();
+        self.queues.clear();
         for train in self.trains.keys().copied().collect::<Vec<_>>() {
             // Step 0 is a step of every train, so that nothing refuses it.
             let _ = self.give_order(now, Order::Speed { train, step: SpeedStep::STAND });
@@ -342,7 +367,9 @@ impl ScriptRunner {
             Some((train, TrainTask { text: step.text.clone(), target, promise }))
         };
         let tasks = self.trains.keys().copied().filter_map(task).collect();
-        painter.paint(&self.dispatcher, &tasks, &self.functions, now, self.began.unwrap_or(now));
+        let session =
+            SessionState { tasks, functions: self.functions.clone(), schedules: self.schedule_pictures() };
+        painter.paint(&self.dispatcher, session, now, self.began.unwrap_or(now));
     }
 
     /// Takes in the position of a train at rest from the operator.
@@ -393,15 +420,17 @@ impl Machine for ScriptRunner {
         if self.began.is_none() {
             return Some(Timestamp::ZERO);
         }
-        let waited_for = self.wait.map(|wait| match wait.until {
+        let ends = |wait: Wait| match wait.until {
             Until::Passed(span) => wait.since + span,
             Until::AtRest(_) => self.last_event + CHECK_INTERVAL,
             Until::At(..) | Until::Located(_) => wait.since + self.wait_limit,
-        });
+        };
+        let waited_for = self.queues.iter().filter_map(|(_, queue)| queue.wait.map(ends)).min();
         let learns = self.learning.is_refitting().then(|| self.last_event + FIT_INTERVAL);
-        let retried =
-            self.interrupted.map(|since| (self.last_event + CHECK_INTERVAL).min(since + self.wait_limit));
-        [self.dispatcher.next_timeout(), waited_for, self.journey_deadline(), retried, learns]
+        let retries = |since: Timestamp| (self.last_event + CHECK_INTERVAL).min(since + self.wait_limit);
+        let retried = self.queues.iter().filter_map(|(_, queue)| queue.interrupted.map(retries)).min();
+        let round = self.round_due();
+        [self.dispatcher.next_timeout(), waited_for, self.journey_deadline(), retried, learns, round]
             .into_iter()
             .flatten()
             .min()
@@ -413,6 +442,8 @@ impl Listener for ScriptRunner {
         match word {
             Input::Line(line) => self.handle_line(now, line),
             Input::EmergencyStop => self.halt(now),
+            Input::Schedule(schedule) => self.begin_schedule(now, schedule.clone()),
+            Input::EndSchedule(name) => self.end_schedule(now, name),
             Input::NoMoreLines => self.complete(),
             Input::Link(news) => {
                 self.dispatcher.handle_link(now, *news);

@@ -89,12 +89,14 @@ impl ViewThread {
     fn press(&mut self, key: KeyEvent) {
         let with_control = key.modifiers.contains(KeyModifiers::CONTROL);
         match key.code {
-            KeyCode::Char('c' | 'd') if with_control => self.ask(Request::Line("quit".to_owned())),
-            KeyCode::Char(' ') if self.prompt.text().is_empty() => self.ask(Request::EmergencyStop),
+            KeyCode::Char('c' | 'd') if with_control => self.ask("quit", Request::Line("quit".to_owned())),
+            KeyCode::Char(' ') if self.prompt.text().is_empty() => {
+                self.ask("emergency stop", Request::EmergencyStop);
+            }
             KeyCode::Char(letter) if !with_control => self.prompt.insert(letter),
             KeyCode::Enter => {
                 if let Some(line) = self.prompt.take() {
-                    self.ask(Request::Line(line));
+                    self.ask(&line.clone(), Request::Line(line));
                 }
             }
             KeyCode::PageUp => self.model.scroll(1),
@@ -103,11 +105,8 @@ impl ViewThread {
         }
     }
 
-    fn ask(&mut self, request: Request) {
-        self.model.say(match &request {
-            Request::EmergencyStop => "> emergency stop".to_owned(),
-            Request::Line(line) => format!("> {line}"),
-        });
+    fn ask(&mut self, said: &str, request: Request) {
+        self.model.say(format!("> {said}"));
         match self.board.ask(request) {
             Ok(answer) => self.asked.push(answer),
             Err(_) => {

@@ -1,15 +1,41 @@
-//! The true positions of a simulated layout, for the column `true_error_mm` of results; no driving code reads them.
+//! The true positions of a simulated layout, for the column `true_error_mm` of results and for operators who search a
+//! train; no driving code reads them.
 
 use std::collections::BTreeMap;
 
-use footplate_core::track::Layout;
-use footplate_core::{Length, TrainId};
+use footplate_core::track::{Landmark, Layout, Position};
+use footplate_core::{EdgeId, Length, TrainId};
+use serde::Serialize;
 
 use super::session_message::{Ended, Target};
 use crate::link::{Link, ObservedLink, SimulatedLink};
 
+/// The most edges between a train and the sensor that its place is named after: more than any layout has in a row.
+const MAX_EDGES_BEHIND: usize = 32;
+
+/// Where a simulated train really is.
+#[derive(Debug, Serialize)]
+pub(super) struct TrainWhereabouts {
+    train: u16,
+    /// The place of its pickup in its direction of travel, as `place` takes it; `None` while it is off the track.
+    at: Option<String>,
+    speed_mm_per_s: f64,
+    /// The parts of edges under it.
+    body: Vec<EdgePart>,
+}
+
+#[derive(Debug, Serialize)]
+struct EdgePart {
+    edge: u16,
+    from_mm: f64,
+    to_mm: f64,
+}
+
 /// The true state of the railway; `None` on a real one.
 pub(super) trait GroundTruth {
+    /// Where a train is.
+    fn whereabouts(&self, layout: &Layout, train: TrainId) -> Option<TrainWhereabouts>;
+
     /// The total distance of a train.
     fn odometer(&self, train: TrainId) -> Option<Length>;
 
@@ -17,7 +43,50 @@ pub(super) trait GroundTruth {
     fn beyond(&self, layout: &Layout, train: TrainId, target: Target) -> Option<Length>;
 }
 
+/// A position as a place: a sensor behind it, and the distance past it. `under` are edges that the train came along.
+fn place_of(layout: &Layout, position: Position, under: &[EdgeId]) -> Option<Landmark> {
+    let (mut edge, mut offset) = (position.edge, position.offset);
+    for _ in 0..MAX_EDGES_BEHIND {
+        let node = layout.edge(edge)?.from;
+        if layout.sensor_at(node).is_some() {
+            return Some(Landmark { node, offset });
+        }
+        let behind = || layout.edges().filter(|(_, behind)| behind.to == node);
+        let (id, found) = behind().find(|(id, _)| under.contains(id)).or_else(|| behind().next())?;
+        edge = id;
+        offset += found.length;
+    }
+    None
+}
+
+fn tenths(length: Length) -> f64 {
+    (length.as_mm() * 10.0).round() / 10.0
+}
+
 impl GroundTruth for SimulatedLink<'_> {
+    fn whereabouts(&self, layout: &Layout, train: TrainId) -> Option<TrainWhereabouts> {
+        let truth = self.station().world().truth();
+        let found = truth.train(train)?;
+        let under: Vec<(EdgeId, [Length; 2])> = truth.under(train).collect();
+        let edges: Vec<EdgeId> = under.iter().map(|(edge, _)| *edge).collect();
+        let at = found.position.and_then(|position| place_of(layout, position, &edges));
+        let at = at.map(|Landmark { node, offset }| {
+            let offset = Length::from_mm(offset.as_mm().round());
+            layout.display(Landmark { node, offset }).to_string()
+        });
+        let part = |(edge, [from, to]): (EdgeId, [Length; 2])| EdgePart {
+            edge: edge.0,
+            from_mm: tenths(from),
+            to_mm: tenths(to),
+        };
+        Some(TrainWhereabouts {
+            train: train.0,
+            at,
+            speed_mm_per_s: (found.speed.as_mm_per_s() * 10.0).round() / 10.0,
+            body: under.into_iter().map(part).collect(),
+        })
+    }
+
     fn odometer(&self, train: TrainId) -> Option<Length> {
         Some(self.station().world().truth().train(train)?.odometer)
     }
@@ -30,6 +99,10 @@ impl GroundTruth for SimulatedLink<'_> {
 }
 
 impl<L: Link + GroundTruth> GroundTruth for ObservedLink<L> {
+    fn whereabouts(&self, layout: &Layout, train: TrainId) -> Option<TrainWhereabouts> {
+        self.inner().whereabouts(layout, train)
+    }
+
     fn odometer(&self, train: TrainId) -> Option<Length> {
         self.inner().odometer(train)
     }
@@ -40,6 +113,10 @@ impl<L: Link + GroundTruth> GroundTruth for ObservedLink<L> {
 }
 
 impl GroundTruth for Box<dyn Link + '_> {
+    fn whereabouts(&self, _: &Layout, _: TrainId) -> Option<TrainWhereabouts> {
+        None
+    }
+
     fn odometer(&self, _: TrainId) -> Option<Length> {
         None
     }

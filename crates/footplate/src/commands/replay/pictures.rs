@@ -91,7 +91,7 @@ impl Walked {
                 self.draws(&beginning.layout)?;
                 let layout = WrittenLayout::of("the layout of the session", beginning.layout.clone())?.layout;
                 let look = |machine: &Driver, painter: &mut Painter, now| {
-                    painter.paint_undispatched(machine, &BTreeMap::new(), now, Timestamp::ZERO);
+                    painter.paint_undispatched(machine, BTreeMap::new(), now, Timestamp::ZERO);
                 };
                 self.tell(&mut beginning.driver(&layout), trace, Painter::new, look, |notice| {
                     of_driver(&notice)
@@ -103,7 +103,7 @@ impl Walked {
                 let layout = WrittenLayout::of("the layout of the session", beginning.layout.clone())?.layout;
                 let mut shadow = CalibrationFollower::new(&layout);
                 let look = |machine: &Calibrator<'_>, painter: &mut Painter, now| {
-                    painter.paint_undispatched(shadow.of(machine), &BTreeMap::new(), now, Timestamp::ZERO);
+                    painter.paint_undispatched(shadow.of(machine), BTreeMap::new(), now, Timestamp::ZERO);
                 };
                 let mut calibrator = beginning.calibrator(&layout);
                 let heard = |notice| Some(Shown::Calibration(notice));

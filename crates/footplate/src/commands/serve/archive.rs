@@ -14,6 +14,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use axum::Json;
+use axum::body::Body;
 use axum::extract::rejection::JsonRejection;
 use axum::extract::{Path, Query, State};
 use axum::http::StatusCode;
@@ -21,11 +22,11 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::get;
 use footplate_core::TrainId;
 use footplate_core::track::Layout;
-use footplate_store::{Batch, EventKey, MarkKind, RecordingKey, Store};
+use footplate_store::{Batch, EventKey, MarkKind, RecordingKey, Schedule, Store};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::answer_queue::{AnswerForm, AnswerQueue};
+use super::answer_queue::{AnswerForm, AnswerQueue, Rejection};
 use crate::clock::{now, rfc3339};
 use crate::commands::calibrate;
 use crate::commands::clerk::Question;
@@ -38,24 +39,16 @@ use crate::dashboard::Routes;
 /// The most events in one mark: more than a hop has, fewer than a session.
 const MAX_MARKED: usize = 1_000;
 
+/// The store of a session.
 #[derive(Clone)]
-struct Archive {
+pub(super) struct Archive {
     store: Option<Arc<PathBuf>>,
     layout: Arc<WrittenLayout>,
     answer_queue: AnswerQueue,
 }
 
 /// The routes; without a store they answer that there is none.
-pub(crate) fn archive_routes(
-    store: Option<PathBuf>,
-    layout: &WrittenLayout,
-    answer_queue: &AnswerQueue,
-) -> Routes {
-    let archive = Archive {
-        store: store.map(Arc::new),
-        layout: Arc::new(layout.clone()),
-        answer_queue: answer_queue.clone(),
-    };
+pub(super) fn archive_routes(archive: Archive) -> Routes {
     Routes::new(
         archive,
         [
@@ -69,13 +62,38 @@ pub(crate) fn archive_routes(
 }
 
 impl Archive {
-    async fn answer(&self, query: StoreQuery) -> Response {
+    pub(super) fn new(store: Option<PathBuf>, layout: &WrittenLayout, answer_queue: &AnswerQueue) -> Self {
+        Self {
+            store: store.map(Arc::new),
+            layout: Arc::new(layout.clone()),
+            answer_queue: answer_queue.clone(),
+        }
+    }
+
+    fn question(&self, query: StoreQuery) -> Result<Question, Rejection> {
         let Some(path) = &self.store else {
-            let why = "this session has no store: start it with `--store railway.db`";
-            return (StatusCode::NOT_FOUND, Json(json!({ "error": why }))).into_response();
+            let why = "this session has no store: start it with `--store railway.db`".to_owned();
+            return Err(Rejection(StatusCode::NOT_FOUND, why));
         };
-        let question = Question::Store { path: path.to_path_buf(), layout: self.layout.text.clone(), query };
-        self.answer_queue.answer(question).await
+        Ok(Question::Store { path: path.to_path_buf(), layout: self.layout.text.clone(), query })
+    }
+
+    pub(super) async fn answer(&self, query: StoreQuery) -> Response {
+        match self.question(query) {
+            Ok(question) => self.answer_queue.answer(question).await,
+            Err(rejection) => rejection.into_response(),
+        }
+    }
+
+    pub(super) const fn has_store(&self) -> bool {
+        self.store.is_some()
+    }
+
+    /// The saved schedules after a request for them, or one that changes them.
+    pub(super) async fn schedules(&self, query: StoreQuery) -> Result<Vec<Schedule>, Rejection> {
+        let text = self.answer_queue.ask(self.question(query)?, Body::empty(), 0).await?;
+        serde_json::from_str(&text)
+            .map_err(|error| Rejection(StatusCode::INTERNAL_SERVER_ERROR, error.to_string()))
     }
 }
 
@@ -88,6 +106,9 @@ pub(crate) enum StoreQuery {
     Why { train: String, number: String },
     Marks,
     Mark(NewMark),
+    Schedules,
+    KeepSchedule(Schedule),
+    WithdrawSchedule { name: String },
 }
 
 impl StoreQuery {
@@ -114,8 +135,21 @@ impl StoreQuery {
             }
             Self::Marks => marked(layout, &store),
             Self::Mark(new) => new.make(&mut store),
+            Self::Schedules => schedules(layout, &store),
+            Self::KeepSchedule(schedule) => {
+                store.keep_schedule(layout.name(), &schedule, now())?;
+                schedules(layout, &store)
+            }
+            Self::WithdrawSchedule { name } => {
+                store.withdraw_schedule(layout.name(), &name, now())?;
+                schedules(layout, &store)
+            }
         }
     }
+}
+
+fn schedules(layout: &Layout, store: &Store) -> anyhow::Result<String> {
+    Ok(serde_json::to_string(&store.schedules(layout.name())?)?)
 }
 
 fn train_of(text: &str) -> anyhow::Result<TrainId> {

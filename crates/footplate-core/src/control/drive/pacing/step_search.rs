@@ -120,7 +120,7 @@ impl<'a> StepSearch<'a> {
             let mut command_cost = 0.0;
             let mut left = budget;
             if let Some(step) = command {
-                let deviation = next.doubt_of_interruption(self.model, leaves);
+                let deviation = next.interruption_deviation(self.model, leaves);
                 command_cost = COMMAND_COST + END_WEIGHT * deviation * deviation;
                 next.command(self.model, leaves, *step);
                 left.record(time);

@@ -31,9 +31,10 @@ impl MotionFit {
     #[must_use]
     pub fn begin_refit(&self, sections: &SectionIndex) -> Refit {
         let mut fit = self.clone();
-        let passed = fit.chain.trips.iter().flat_map(|trip| &trip.contacts);
-        fit.prior.meet(passed.flat_map(|contact| &contact.sections));
-        fit.prior.meet_stops(fit.chain.trips.iter().filter_map(|trip| trip.rest_hop));
+        let passed = fit.chain.trips.iter().flat_map(|trip| &trip.detections);
+        fit.prior.meet(passed.flat_map(|detection| &detection.sections));
+        let stops = fit.chain.trips.iter().flat_map(|trip| &trip.stop_edges);
+        fit.prior.meet_stops(stops.map(|stop| stop.edge));
         let columns = fit.prior.columns();
         let values = fit.start(&columns);
         fit.compare_promises(&columns, &values);
@@ -131,6 +132,7 @@ impl Refit {
         let trips = fit.chain.trips.len();
         let scatter = fit.scatter_of(columns, values, trips);
         fit.model.learn(columns, &values.lasting, &solution, survey.scale, scatter, fit.date);
+        fit.model.sensor_variances = fit.steady.variances();
         fit.model.recount(&fit.prior.counts, &fit.chain.trips);
         if trips >= MOST_TRIPS {
             fit.condense(trips - KEPT_TRIPS);

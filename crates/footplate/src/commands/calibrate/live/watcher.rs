@@ -109,7 +109,7 @@ impl<'l> Attendant<Recorded<Calibrator<'l>>> for Watcher<'_> {
     fn attend(&mut self, now: Timestamp, machine: &mut Recorded<Calibrator<'l>>) -> Wish {
         if let Some(showing) = &mut self.showing {
             showing.calibrator(machine.machine(), now);
-            self.is_halted |= showing.is_halted(DRIVES_ITSELF);
+            self.is_halted |= showing.is_halted(now, DRIVES_ITSELF);
         }
         let is_over = machine.machine().ending().is_some() || self.other_layout.is_some() || self.is_halted;
         if is_over { Wish::Finish } else { Wish::GoOn }

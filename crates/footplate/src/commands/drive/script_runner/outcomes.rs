@@ -7,7 +7,7 @@ use footplate_core::model::MotionModel;
 use footplate_core::track::Landmark;
 use footplate_core::{Length, TimeSpan, Timestamp, TrainId};
 
-use super::{CommandSource, ScriptRunner};
+use super::ScriptRunner;
 use crate::commands::drive::formatter::{promises_broken, trains, verb};
 use crate::commands::drive::instruction::{Instruction, Until};
 use crate::commands::drive::script::Step;
@@ -24,6 +24,7 @@ const DUE_SOON: TimeSpan = TimeSpan::from_ms(50);
 impl ScriptRunner {
     pub(super) fn refuse(&mut self, now: Timestamp, step: &Step, why: &Refusal) {
         self.fell_short = true;
+        self.note_refusal(step, &why.to_string());
         self.say(format!("refused `{}`: {why}", step.text));
         let ended = Ended { refused: Some(why.to_string()), ..self.ended(now, step) };
         self.outputs.push_back(Output::Notice(SessionMessage::Ended(ended)));
@@ -64,7 +65,12 @@ impl ScriptRunner {
             if let Notice::AuthorityEnds { train } = notice {
                 let holders = self.dispatcher.holders_beyond(*train, now);
                 if !holders.is_empty() {
-                    line += &format!("; it is reserved for {}", trains(&holders));
+                    line = format!(
+                        "train {train} stopped: the track ahead is reserved for {}",
+                        trains(&holders)
+                    );
+                    let alarm = Alarm::track_reserved(*train, &holders).said(&line);
+                    self.outputs.push_back(Output::Notice(SessionMessage::Alarm(alarm)));
                 }
             }
             if let Some(alarm) = Alarm::of_notice(self.driver().layout(), notice) {
@@ -80,7 +86,7 @@ impl ScriptRunner {
                 let passed_by = TrainPassed { train: *train, passed: *passed, next: *next };
                 self.outputs.push_back(Output::Notice(SessionMessage::Passed(passed_by)));
                 self.learning.passed(*train, self.dispatcher.driver(), passed);
-                if let Some(wait) = &mut self.wait {
+                for wait in self.queues.waits_mut() {
                     wait.is_met |= wait.until == Until::At(*train, passed.sensor);
                 }
             }
@@ -109,7 +115,7 @@ impl ScriptRunner {
                 let step = self.pending.remove(order);
                 // No other line of a script replaces such a command: the recovery of its train did.
                 if let Some(step) =
-                    step.filter(|step| self.source == CommandSource::Script && ends_at_rest(step))
+                    step.filter(|step| self.queues.is_script(step.queue) && ends_at_rest(step))
                 {
                     self.cancelled(now, step, &Refusal::InDanger { train: *train });
                 }
@@ -147,7 +153,7 @@ impl ScriptRunner {
     fn cancelled(&mut self, now: Timestamp, step: Step, why: &Refusal) {
         if self.is_retried(&step, why) {
             self.say(format!("`{}` waits: {why}", step.text));
-            self.steps.push_front(Step { is_retry: true, ..step });
+            self.queues.push_front(Step { is_retry: true, ..step });
         } else {
             self.refuse(now, &step, why);
         }

@@ -1,11 +1,12 @@
 //! What the lines of a script wait for: a train that finishes an order or is recovered, a time, a detection.
 
-use footplate_core::control::{Order, Refusal};
+use footplate_core::control::{Order, OrderId, Refusal};
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use super::{CommandSource, ScriptRunner};
+use super::ScriptRunner;
+use super::queue::Queues;
 use crate::commands::drive::instruction::{Instruction, Until};
-use crate::commands::drive::script::Step;
+use crate::commands::drive::script::{QueueId, Step};
 
 /// How often to check whether a train is at rest.
 pub(super) const CHECK_INTERVAL: TimeSpan = TimeSpan::from_ms(100);
@@ -16,14 +17,20 @@ pub(super) struct Wait {
     pub(super) until: Until,
     pub(super) since: Timestamp,
     pub(super) is_met: bool,
+    /// The number of its line in a schedule, from 0.
+    pub(super) line: usize,
 }
 
 impl ScriptRunner {
     /// When the oldest journey of a script exceeds the wait limit.
     pub(super) fn journey_deadline(&self) -> Option<Timestamp> {
-        let asked = self.journeys.iter().filter(|(order, _)| self.pending.contains_key(order));
-        let first = asked.map(|(_, since)| *since).min().filter(|_| self.source == CommandSource::Script);
-        first.map(|since| since + self.wait_limit)
+        let first = self.journeys.iter().filter(|(order, _)| self.is_of_script(**order));
+        first.map(|(_, since)| *since + self.wait_limit).min()
+    }
+
+    /// Whether a script gave the order of a journey that has not ended.
+    fn is_of_script(&self, order: OrderId) -> bool {
+        self.pending.get(&order).is_some_and(|step| self.queues.is_script(step.queue))
     }
 
     /// Cancels the journeys of a script that exceed the wait limit.
@@ -33,7 +40,8 @@ impl ScriptRunner {
         }
         for train in self.trains.keys().copied().collect::<Vec<_>>() {
             let Some((order, _)) = self.dispatcher.journey(train) else { continue };
-            if self.journeys.get(&order).is_none_or(|since| now < *since + self.wait_limit) {
+            let is_early = self.journeys.get(&order).is_none_or(|since| now < *since + self.wait_limit);
+            if is_early || !self.is_of_script(order) {
                 continue;
             }
             self.dispatcher.cancel_journey(now, train);
@@ -47,7 +55,7 @@ impl ScriptRunner {
 
     /// Whether a line of a script has to wait: for the previous order of its train, for a turnout, or for a train that
     /// brakes or is being recovered.
-    pub(super) fn must_wait(&mut self, now: Timestamp, instruction: Instruction) -> bool {
+    pub(super) fn must_wait(&mut self, now: Timestamp, queue: QueueId, instruction: Instruction) -> bool {
         let is_turnout = |step: &Step| matches!(step.instruction, Instruction::Order(Order::Turnout { .. }));
         let (train, is_stop) = match instruction {
             Instruction::Order(order) => {
@@ -56,7 +64,7 @@ impl ScriptRunner {
             Instruction::Go(train, _) => (Some(train), false),
             _ => return false,
         };
-        if train.is_some_and(|train| !is_stop && self.is_blocked_for_now(now, train)) {
+        if train.is_some_and(|train| !is_stop && self.is_blocked_for_now(now, queue, train)) {
             return true;
         }
         let is_busy = train.is_some_and(|train| self.has_finite_order(train));
@@ -77,14 +85,16 @@ impl ScriptRunner {
 
     /// Whether a train cannot be driven at present but may be soon. Beyond the wait limit the order is tried anyway, so
     /// that its refusal says why.
-    fn is_blocked_for_now(&mut self, now: Timestamp, train: TrainId) -> bool {
+    fn is_blocked_for_now(&mut self, now: Timestamp, queue: QueueId, train: TrainId) -> bool {
         let comes_to_rest =
             self.driver().commanded(train) == SpeedStep::STAND && !self.driver().is_at_rest(train, now);
-        if !comes_to_rest && !self.dispatcher.is_interrupted(now, train) {
-            self.interrupted = None;
+        let is_blocked = comes_to_rest || self.dispatcher.is_interrupted(now, train);
+        let Some(queue) = self.queues.get_mut(queue) else { return false };
+        if !is_blocked {
+            queue.interrupted = None;
             return false;
         }
-        now - *self.interrupted.get_or_insert(now) < self.wait_limit
+        now - *queue.interrupted.get_or_insert(now) < self.wait_limit
     }
 
     /// Whether a given-up order is retried: in a script, once, if the order has a target and its train was lost on the
@@ -93,12 +103,18 @@ impl ScriptRunner {
         let is_to_place =
             matches!(step.instruction, Instruction::Order(Order::Stop(_) | Order::Arrive { .. }));
         let was_lost = matches!(why, Refusal::Lost { .. } | Refusal::InDanger { .. });
-        self.source == CommandSource::Script && !step.is_retry && is_to_place && was_lost
+        self.queues.is_script(step.queue) && !step.is_retry && is_to_place && was_lost
     }
 
     /// Has a lost train run to a sensor and stop before its order is carried out.
-    pub(super) fn locate_first(&mut self, train: TrainId, step: Step) {
+    pub(super) fn locate_first(&mut self, train: TrainId, step: &Step) {
         self.say(format!("train {train} is located first"));
+        self.queues.push_front(Step { is_retry: true, ..step.clone() });
+        self.find(train, step);
+    }
+
+    /// Has a train run to a sensor and stop there, before all other steps.
+    pub(super) fn find(&mut self, train: TrainId, step: &Step) {
         let speed = |step| Instruction::Order(Order::Speed { train, step });
         let parts = [
             speed(self.driver().finding_step(train)),
@@ -106,10 +122,9 @@ impl ScriptRunner {
             speed(SpeedStep::STAND),
             Instruction::Wait(Until::AtRest(train)),
         ];
-        let text = step.text.clone();
-        self.steps.push_front(Step { is_retry: true, ..step });
         for instruction in parts.into_iter().rev() {
-            self.steps.push_front(Step { text: text.clone(), instruction, is_part: true, is_retry: true });
+            let part = Step { instruction, is_part: true, is_retry: true, ..step.clone() };
+            self.queues.push_front(part);
         }
     }
 
@@ -125,8 +140,9 @@ impl ScriptRunner {
         self.driver().busy(train).is_none() && self.dispatcher.journey(train).is_none()
     }
 
-    pub(super) fn may_advance(&mut self, now: Timestamp) -> bool {
-        let Some(wait) = self.wait else { return true };
+    /// Whether the steps of a queue need not wait; a wait that is over is removed.
+    pub(super) fn may_advance(&mut self, now: Timestamp, queue: QueueId) -> bool {
+        let Some(wait) = self.queues.get(queue).and_then(|queue| queue.wait) else { return true };
         let met = wait.is_met
             || match wait.until {
                 Until::Passed(span) => now - wait.since >= span,
@@ -134,13 +150,14 @@ impl ScriptRunner {
                 Until::Located(train) => self.driver().locate(train, now).is_some(),
                 Until::At(..) => false,
             };
+        let end = |queues: &mut Queues| queues.get_mut(queue).map(|queue| queue.wait.take());
         if met {
-            self.wait = None;
+            end(&mut self.queues);
         } else if let Until::AtRest(train) = wait.until
             && self.is_idle(train)
             && self.driver().commanded(train) > SpeedStep::STAND
         {
-            self.wait = None;
+            end(&mut self.queues);
             self.fell_short = true;
             self.say(format!(
                 "train {train} has no command that would bring it to rest; the script goes \
@@ -148,7 +165,7 @@ impl ScriptRunner {
             ));
             return true;
         } else if !matches!(wait.until, Until::Passed(_)) && now - wait.since >= self.wait_limit {
-            self.wait = None;
+            end(&mut self.queues);
             self.fell_short = true;
             self.say(format!(
                 "nothing happened within {:.0} s; the script continues",

@@ -20,6 +20,8 @@ const TRACK_FROM_WIDTH: u16 = 90;
 const TRACK_FROM_HEIGHT: u16 = 20;
 /// The width of a train's card, in characters.
 const CARD: u16 = 46;
+/// The most alarms that are shown above the track.
+const ALARM_LINES: usize = 3;
 /// The height of a train's card, in lines.
 const CARD_LINES: u16 = 5;
 
@@ -31,14 +33,17 @@ pub(super) fn draw(frame: &mut Frame<'_>, model: &TerminalModel, prompt: &Prompt
     } else {
         cards
     };
-    let [head, upper, messages, line] = Layout::vertical([
+    let shown = model.picture.alarms.len().min(ALARM_LINES);
+    let [head, alarms, upper, messages, line] = Layout::vertical([
         Constraint::Length(1),
+        Constraint::Length(u16::try_from(shown).unwrap_or_default()),
         Constraint::Length(upper),
         Constraint::Min(3),
         Constraint::Length(1),
     ])
     .areas(area);
     head_line(frame, head, model);
+    draw_alarms(frame, alarms, model);
     if area.width >= TRACK_FROM_WIDTH && area.height >= TRACK_FROM_HEIGHT {
         let [track, trains] =
             Layout::horizontal([Constraint::Min(20), Constraint::Length(CARD)]).areas(upper);
@@ -59,6 +64,27 @@ fn head_line(frame: &mut Frame<'_>, area: Rect, model: &TerminalModel) {
         Span::from("   space on an empty line: emergency stop").light_red(),
     ]);
     frame.render_widget(line, area);
+}
+
+/// The active alarms, a line each; the last line counts those that have no room.
+fn draw_alarms(frame: &mut Frame<'_>, area: Rect, model: &TerminalModel) {
+    let alarms = &model.picture.alarms;
+    let beyond = alarms.len().saturating_sub(ALARM_LINES);
+    let lines: Vec<Line<'_>> = alarms
+        .iter()
+        .take(ALARM_LINES)
+        .enumerate()
+        .map(|(nth, alarm)| {
+            let more = if beyond > 0 && nth + 1 == ALARM_LINES {
+                format!("  (and {beyond} more)")
+            } else {
+                String::new()
+            };
+            let color = if alarm.grade == "danger" { Color::LightRed } else { Color::LightYellow };
+            Line::from(format!("! {}{more}", alarm.text)).fg(color).bold()
+        })
+        .collect();
+    frame.render_widget(Paragraph::new(lines), area);
 }
 
 fn draw_track(frame: &mut Frame<'_>, area: Rect, model: &TerminalModel) {

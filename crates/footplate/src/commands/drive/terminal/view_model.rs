@@ -37,6 +37,14 @@ pub(super) struct Rail {
 pub(super) struct Picture {
     pub(super) t_s: f64,
     pub(super) trains: Vec<Train>,
+    /// The active alarms, the most severe first.
+    pub(super) alarms: Vec<ActiveAlarm>,
+}
+
+#[derive(Debug, Deserialize)]
+pub(super) struct ActiveAlarm {
+    pub(super) grade: String,
+    pub(super) text: String,
 }
 
 #[derive(Debug, Deserialize)]

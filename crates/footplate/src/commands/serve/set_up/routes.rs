@@ -10,7 +10,8 @@
 //! POST /api/setup/again       {}: back to the set-up once this session has ended
 //! ```
 
-use std::path::PathBuf;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -56,6 +57,8 @@ pub(crate) enum SetUpMode {
 pub(crate) struct SetUpRoute {
     file: Option<PathBuf>,
     mode: SetUpMode,
+    /// Whether `/api/truth` answers: a simulated railway that is driven.
+    offers_truth: bool,
     instance: Instance,
 }
 
@@ -72,13 +75,13 @@ impl Instance {
 impl SetUpRoute {
     /// The route of a session that its command line describes.
     pub(crate) fn fixed() -> Self {
-        Self { file: None, mode: SetUpMode::Fixed, instance: Instance::new() }
+        Self { file: None, mode: SetUpMode::Fixed, offers_truth: false, instance: Instance::new() }
     }
 
     /// The route of a session; without a file it was not set up in the browser.
-    pub(crate) fn of_session(file: Option<PathBuf>, mode: SetUpMode) -> Self {
+    pub(crate) fn of_session(file: Option<PathBuf>, mode: SetUpMode, offers_truth: bool) -> Self {
         let mode = if file.is_some() { mode } else { SetUpMode::Fixed };
-        Self { file, mode, instance: Instance::new() }
+        Self { file, mode, offers_truth, instance: Instance::new() }
     }
 
     pub(crate) fn routes(self) -> Routes {
@@ -100,7 +103,9 @@ impl SetUpRoute {
 
 async fn state_of_session(State(route): State<SetUpRoute>) -> Response {
     let trains = route.file.as_deref().and_then(|file| SetUp::read(file).ok()).unwrap_or_default().trains;
-    answer(Ok(json!({ "mode": route.mode, "instance": route.instance, "trains": trains })))
+    answer(Ok(json!({
+        "mode": route.mode, "instance": route.instance, "offers_truth": route.offers_truth, "trains": trains,
+    })))
 }
 
 async fn again(State(route): State<SetUpRoute>) -> Response {
@@ -114,7 +119,7 @@ pub(super) struct Pages {
 }
 
 struct Shared {
-    set_up: Mutex<SetUp>,
+    kept: Mutex<Kept>,
     store: PathBuf,
     /// Why the last drive could not begin.
     problem: Option<String>,
@@ -122,6 +127,25 @@ struct Shared {
     instance: Instance,
     /// One check of the link at a time: a station takes one program.
     checking: tokio::sync::Semaphore,
+}
+
+/// The set-up, and what follows from it and the store. Only a change of the set-up opens the store: no other process
+/// writes to it while these pages are served.
+struct Kept {
+    set_up: SetUp,
+    calibrated: BTreeSet<u16>,
+    /// Why the store cannot be read.
+    problem: Option<String>,
+}
+
+impl Kept {
+    fn of(set_up: SetUp, store: &Path) -> Self {
+        let (calibrated, problem) = match set_up.calibrated(store) {
+            Ok(calibrated) => (calibrated, None),
+            Err(error) => (BTreeSet::new(), Some(format!("{error:#}"))),
+        };
+        Self { set_up, calibrated, problem }
+    }
 }
 
 /// One step: exactly one of its fields is given.
@@ -161,7 +185,7 @@ impl Pages {
         let checking = tokio::sync::Semaphore::new(1);
         Self {
             shared: Arc::new(Shared {
-                set_up: Mutex::new(set_up),
+                kept: Mutex::new(Kept::of(set_up, &store)),
                 store,
                 problem,
                 chosen,
@@ -181,37 +205,46 @@ impl Pages {
                 ("/api/setup/doctor", post(doctor)),
                 ("/api/setup/calibrate", post(calibrate)),
                 ("/api/setup/drive", post(drive)),
+                // Pages of a session that has ended still ask for these until they open the set-up.
+                ("/api/events", get(async || StatusCode::NO_CONTENT)),
+                ("/api/line", get(async || answer(Ok(Value::Null)))),
             ],
         )
     }
 
-    fn set_up(&self) -> MutexGuard<'_, SetUp> {
-        self.shared.set_up.lock().unwrap_or_else(PoisonError::into_inner)
+    fn kept(&self) -> MutexGuard<'_, Kept> {
+        self.shared.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn set_up(&self) -> SetUp {
+        self.kept().set_up.clone()
     }
 
     fn file(&self) -> PathBuf {
         super::file_beside(&self.shared.store)
     }
 
-    fn json(&self) -> anyhow::Result<Value> {
-        let set_up = self.set_up();
-        let calibrated = set_up.calibrated(&self.shared.store)?;
+    fn json(&self) -> Value {
+        let kept = self.kept();
+        let Kept { set_up, calibrated, problem } = &*kept;
         let trains = set_up.trains.iter().map(|SetUpTrain { address, name }| {
             json!({
                 "address": address, "name": name, "is_calibrated": calibrated.contains(address),
                 "calibration": set_up.calibrations.get(address),
             })
         });
-        Ok(json!({
-            "mode": SetUpMode::SettingUp, "instance": self.shared.instance, "store": self.shared.store, "layouts": BUILT_IN, "problem": self.shared.problem,
-            "link": set_up.link, "speed": set_up.speed, "layout": set_up.layout, "line": set_up.line,
-            "trains": trains.collect::<Vec<_>>(),
-        }))
+        let addresses =
+            set_up.station().map(|station| [*station.addresses().start(), *station.addresses().end()]);
+        json!({
+            "mode": SetUpMode::SettingUp, "instance": self.shared.instance, "store": self.shared.store, "layouts": BUILT_IN,
+            "problem": self.shared.problem.as_ref().or(problem.as_ref()), "link": set_up.link, "speed": set_up.speed,
+            "layout": set_up.layout, "line": set_up.line, "addresses": addresses, "trains": trains.collect::<Vec<_>>(),
+        })
     }
 
     /// Changes a copy, so that a rejected step changes nothing.
     fn change(&self, step: Step) -> anyhow::Result<Value> {
-        let mut changed = self.set_up().clone();
+        let mut changed = self.set_up();
         match step {
             Step { link: Some(link), speed, .. } => changed.set_link(&link, speed)?,
             Step { layout: Some(layout), .. } => changed.set_layout(&layout)?,
@@ -222,12 +255,12 @@ impl Pages {
             _ => bail!("name a step: `link`, `layout`, `drawn` or `trains`"),
         }
         self.write(changed)?;
-        self.json()
+        Ok(self.json())
     }
 
     fn write(&self, changed: SetUp) -> anyhow::Result<()> {
         changed.write(&self.file())?;
-        *self.set_up() = changed;
+        *self.kept() = Kept::of(changed, &self.shared.store);
         Ok(())
     }
 
@@ -262,7 +295,7 @@ impl Pages {
     }
 
     fn calibrate(&self, ToCalibrate { train, turnouts_are_clear }: &ToCalibrate) -> anyhow::Result<Value> {
-        let set_up = self.set_up().clone();
+        let set_up = self.set_up();
         set_up.calibration_link()?;
         set_up.layout()?;
         if !set_up.trains.iter().any(|named| named.address == *train) {
@@ -277,7 +310,7 @@ impl Pages {
     }
 
     fn drive(&self) -> anyhow::Result<Value> {
-        let mut changed = self.set_up().clone();
+        let mut changed = self.set_up();
         changed.link()?;
         changed.layout()?;
         if changed.trains.is_empty() {
@@ -309,7 +342,7 @@ fn read<T>(body: Result<Json<T>, JsonRejection>, work: impl FnOnce(T) -> anyhow:
 }
 
 async fn state(State(pages): State<Pages>) -> Response {
-    answer(pages.json())
+    answer(Ok(pages.json()))
 }
 
 async fn change(State(pages): State<Pages>, body: Result<Json<Step>, JsonRejection>) -> Response {
@@ -325,13 +358,13 @@ async fn doctor(State(pages): State<Pages>) -> Response {
     let Ok(_checking) = pages.shared.checking.try_acquire() else {
         return answer(Err(anyhow::anyhow!("the link is being checked already: wait for its result")));
     };
-    let (set_up, store) = (pages.set_up().clone(), pages.shared.store.clone());
+    let (set_up, store) = (pages.set_up(), pages.shared.store.clone());
     let checked = tokio::task::spawn_blocking(move || check_link(&set_up, &store)).await;
     let keep = |line| {
-        let mut changed = pages.set_up().clone();
+        let mut changed = pages.set_up();
         changed.line = Some(line);
         pages.write(changed)?;
-        pages.json()
+        Ok(pages.json())
     };
     answer(checked.map_err(anyhow::Error::from).and_then(|line| line).and_then(keep))
 }

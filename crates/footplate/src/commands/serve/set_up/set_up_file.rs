@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 
 use anyhow::{Context, bail};
-use footplate_core::TrainId;
+use footplate_core::{DecoderSteps, TrainId};
 use footplate_store::{Store, StoredModel, write_whole};
 use serde::{Deserialize, Serialize};
 
 use crate::clock::now;
 use crate::commands::written_layout::WrittenLayout;
-use crate::link::{Address, Speed, open_simulated};
+use crate::link::{Address, Speed, StationKind, open_simulated};
 
 /// The link of a simulated railway: its layout and trains are those of the set-up.
 pub(super) const SIMULATED: &str = "sim";
@@ -19,8 +19,6 @@ pub(super) const SIMULATED: &str = "sim";
 const SEED: u64 = 7;
 /// A calibration of a simulated train runs so many times as fast as real: five minutes in a quarter of one.
 const CALIBRATION_SPEED: f64 = 20.0;
-/// Addresses of locomotives that all stations have.
-const ADDRESSES: std::ops::RangeInclusive<u16> = 1..=80;
 /// The most trains, and the longest name of one, in characters.
 const MOST_TRAINS: usize = 16;
 const LONGEST_NAME: usize = 40;
@@ -154,8 +152,8 @@ impl SetUp {
         }
         let mut addresses = BTreeSet::new();
         for SetUpTrain { address, name } in &trains {
-            if !ADDRESSES.contains(address) {
-                bail!("{address} is not an address: use 1 to {}", ADDRESSES.end());
+            if *address == 0 {
+                bail!("0 is not an address of a train: addresses begin with 1");
             }
             if !addresses.insert(*address) {
                 bail!("address {address} is used twice: each train needs its own");
@@ -169,8 +167,22 @@ impl SetUp {
         self.check_world()
     }
 
-    /// Checks that the simulated railway exists.
+    /// The kind of the command station; `None` before one is chosen.
+    pub(super) fn station(&self) -> Option<StationKind> {
+        let link = self.link.as_deref()?;
+        if link == SIMULATED {
+            return Some(StationKind::default());
+        }
+        link.parse::<Address>().ok().map(|address| address.kind())
+    }
+
+    /// Checks that the station has the addresses of the trains, and that the simulated railway exists.
     fn check_world(&self) -> anyhow::Result<()> {
+        if let Some(station) = self.station() {
+            for SetUpTrain { address, .. } in &self.trains {
+                station.check(TrainId(*address), DecoderSteps::Fourteen).map_err(anyhow::Error::msg)?;
+            }
+        }
         let (Ok(link), Some(layout)) = (self.link(), &self.layout) else { return Ok(()) };
         if let Address::Simulated(simulated) = link.parse().map_err(anyhow::Error::msg)? {
             open_simulated(&simulated, &WrittenLayout::named(layout)?.layout, Speed::Unpaced)?;
@@ -269,9 +281,22 @@ mod tests {
         assert!(says(set_up.set_link("sim", Some(-1.0))).contains("up to 20"));
         assert!(says(set_up.set_layout("nowhere.toml")).contains("nowhere.toml"));
         assert!(says(set_up.set_trains(Vec::new())).contains("one train at least"));
-        assert!(says(set_up.set_trains(vec![train(0)])).contains("1 to 80"));
+        assert!(says(set_up.set_trains(vec![train(0)])).contains("begin with 1"));
         assert!(says(set_up.set_trains(vec![train(3), train(3)])).contains("twice"));
         assert_eq!(set_up, SetUp::default(), "nothing was changed");
+    }
+
+    #[test]
+    fn the_station_decides_which_addresses_trains_have() {
+        let mut set_up = SetUp::default();
+        set_up.set_link("z21:192.168.0.111", None).expect("a station");
+        set_up.set_trains(vec![train(3107)]).expect("an address of a Z21");
+        let station_first = set_up.set_link("marklin-serial:/dev/ttyUSB0", None).unwrap_err().to_string();
+        assert!(station_first.contains("train 3107") && station_first.contains("1 to 80"), "{station_first}");
+        let mut trains_first = SetUp::default();
+        trains_first.set_link("sim", None).expect("a simulation");
+        let wrong = trains_first.set_trains(vec![train(81)]).unwrap_err().to_string();
+        assert!(wrong.contains("train 81") && wrong.contains("a 6051"), "{wrong}");
     }
 
     #[test]

@@ -115,7 +115,7 @@ fn world_json(world: &ScoredWorld) -> Value {
         .iter()
         .map(|stop| {
             json!({
-                "session": stop.session, "step": stop.step.get(), "true_error_mm": stop.error,
+                "session": stop.session, "step": stop.step.get(), "target": stop.target, "true_error_mm": stop.error,
                 "promised_low_mm": stop.promised[0], "promised_high_mm": stop.promised[1], "kept": stop.is_kept(),
             })
         })

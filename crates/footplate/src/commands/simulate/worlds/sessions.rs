@@ -37,10 +37,12 @@ const EARLY: Length = Length::from_mm(45.0);
 const EARLY_STEP: u8 = 10;
 
 /// One stop that was carried out.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct ScoredStop {
     pub(super) session: u8,
     pub(super) step: SpeedStep,
+    /// Where it was to end.
+    pub(super) target: String,
     /// How far beyond the target the train really came to rest, in mm.
     pub(super) error: f64,
     /// What was promised of that.
@@ -197,7 +199,8 @@ impl Driven<'_, '_> {
                 match (ended.refused, ended.promise, self.beyond(node, offset)) {
                     (None, Some(promise), Some(error)) => {
                         let promised = [promise.low.as_mm(), promise.high.as_mm()];
-                        self.scored.stops.push(ScoredStop { session, step, error, promised });
+                        let target = format!("{}+{}mm", layout.node_name(node), offset.as_mm());
+                        self.scored.stops.push(ScoredStop { session, step, target, error, promised });
                     }
                     (refused, ..) => {
                         self.failed(&order, refused.as_deref().unwrap_or("no promise"));

@@ -49,7 +49,7 @@ impl MotionModel {
     }
 
     /// One standard deviation (m) of the stopping distance from a speed (m/s), by the uncertainty of the law.
-    pub(crate) fn stop_doubt(&self, speed: f64) -> f64 {
+    pub(crate) fn stop_deviation(&self, speed: f64) -> f64 {
         let [(low, left), (high, right)] = nodes_about(speed);
         let [delay, (lag, by_lag), kappa, rho] = self.law_slopes(DOWN, speed, 0.0);
         let (friction_by_lag, by_friction) = self.friction_slopes(speed);
@@ -60,7 +60,7 @@ impl MotionModel {
     }
 
     /// The same for the place of a train that has started to a speed, without the delay of the start.
-    pub(crate) fn start_doubt(&self, speed: f64) -> f64 {
+    pub(crate) fn start_deviation(&self, speed: f64) -> f64 {
         let [(low, left), (high, right)] = nodes_about(speed);
         let [_, lag, kappa, rho] = self.law_slopes(UP, 0.0, speed);
         let slopes = [lag, kappa, rho, (START_NODES + low, left), (START_NODES + high, right)];
@@ -68,7 +68,7 @@ impl MotionModel {
     }
 
     /// The same for a change from one speed to another.
-    pub(crate) fn change_doubt(&self, from: f64, to: f64) -> f64 {
+    pub(crate) fn change_deviation(&self, from: f64, to: f64) -> f64 {
         let slopes = self.law_slopes(if to > from { UP } else { DOWN }, from, to);
         libm::sqrt(self.spread.variance_along(&slopes))
     }
