@@ -22,6 +22,9 @@ pub struct Event {
 pub enum EventKind {
     /// A sensor reported a train.
     Sensor(Report),
+    /// The detector of a block reported that no train is in it any more. The rear of the train left the block earlier, by the
+    /// release delay of the detector.
+    Freed(Report),
     /// A throttle step was commanded.
     Speed {
         /// The train.

@@ -50,5 +50,11 @@ pub fn score(layout: &Layout, seed: u64, law: LawFamily, budget: TimeSpan) -> an
     let plan = Plan::new(&world, ordered);
     by.push(CourseProject::new(layout, &mut world, calibrated.turnouts).run(plan, COUNTS));
     let (calibration_s, ending) = (calibrated.seconds, calibrated.ending);
-    Ok(ScoredTrain { law, seed, calibration_s, ending, by })
+    let found = calibrated.model.train_length();
+    let truth = line.station.world().truth().sensed_length(TRAIN);
+    let length_error_mm = truth.filter(|_| !found.is_unknown()).map(|truth| {
+        let found = found.length();
+        [(found.value - truth).as_mm(), found.uncertainty.as_mm()]
+    });
+    Ok(ScoredTrain { law, seed, calibration_s, ending, length_error_mm, by })
 }

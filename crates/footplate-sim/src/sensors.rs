@@ -25,6 +25,8 @@ pub struct Faults {
     pub stuck: Ratio,
     /// Spurious actuations per minute over the whole layout, at most 6000.
     pub spurious_per_minute: f64,
+    /// Probability that a train's dirty wheels interrupt the current that the detector of a block senses.
+    pub flicker: Ratio,
 }
 
 impl Faults {

@@ -39,6 +39,9 @@ impl StopScatter {
     }
 }
 
+/// From the buffers of a carriage to its outermost axle (chosen: two-axle carriages of the gauge).
+const AXLE_INSET: Length = Length::from_mm(20.0);
+
 /// A train with all its parameters, each of which a test may set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Train {
@@ -80,6 +83,8 @@ pub struct Train {
     pub nose: Length,
     /// From the shoe's end at the tail to the end of the train.
     pub tail: Length,
+    /// Length of the carriages behind the engine, part of `tail`, whose axles detectors of blocks sense.
+    pub carriages: Length,
     /// Its special traits; none, unless the world draws from a wider range.
     pub traits: Traits,
 }
@@ -146,8 +151,21 @@ impl Train {
             // Measured: the shoe is 2 cm behind the front of a locomotive in one direction and 9 cm in the other.
             nose: Length::from_mm(draws.uniform(15.0..25.0)),
             tail: Length::from_mm(draws.uniform(80.0..100.0)),
+            carriages: Length::ZERO,
             traits: Traits::default(),
         }
+    }
+
+    /// Couples carriages to its rear.
+    pub(crate) fn couple(&mut self, carriages: Length) {
+        self.carriages += carriages;
+        self.tail += carriages;
+    }
+
+    /// From the shoe's end at the tail to the last axle that a detector senses.
+    #[must_use]
+    pub fn last_axle(&self) -> Length {
+        if self.carriages > Length::ZERO { self.tail - AXLE_INSET } else { Length::ZERO }
     }
 
     /// The stopping distance from the decoder's receipt of the command, on level straight track, in an average run

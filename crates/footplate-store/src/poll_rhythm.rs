@@ -15,7 +15,7 @@ where
         for event in run {
             match event.kind {
                 EventKind::Sensor(_) => timing.report(event.time),
-                EventKind::Stopped { .. } => {}
+                EventKind::Freed(_) | EventKind::Stopped { .. } => {}
                 EventKind::Speed { .. } | EventKind::Reverse { .. } | EventKind::Turnout { .. } => {
                     timing.command_sent();
                 }

@@ -8,7 +8,12 @@ pub trait SensorNames {
     /// The sensor of that name.
     fn sensor_named(&self, name: &str) -> Option<SensorId>;
 
-    /// The name of a sensor, as [`sensor_named`](Self::sensor_named) reads it.
+    /// The detector of the block of that name.
+    fn block_named(&self, _name: &str) -> Option<SensorId> {
+        None
+    }
+
+    /// The name of a sensor, as [`sensor_named`](Self::sensor_named) reads it, or of the block of a detector.
     fn name_of(&self, sensor: SensorId) -> Option<String>;
 
     /// What a right name looks like, to end the sentence "this should be …".
@@ -23,8 +28,13 @@ impl SensorNames for Layout {
         self.sensor_named(name)
     }
 
+    fn block_named(&self, name: &str) -> Option<SensorId> {
+        self.blocks().iter().find(|block| block.name == name).map(|block| block.detector)
+    }
+
     fn name_of(&self, sensor: SensorId) -> Option<String> {
-        self.sensor_node(sensor).map(|node| self.node_name(node).to_owned())
+        let is_known = self.sensor_node(sensor).is_some() || self.block_of_detector(sensor).is_some();
+        is_known.then(|| self.sensor_name(sensor).to_owned())
     }
 
     fn example(&self) -> String {

@@ -39,6 +39,8 @@ pub(crate) struct Dialogue<A: Awaited> {
     pub(crate) is_powered: bool,
     /// How much longer than usual for this station the line may delay a report.
     pub(crate) excess: TimeSpan,
+    /// The sensors that are also reported when they become free.
+    pub(crate) released: Vec<SensorId>,
     /// When the last message arrived.
     pub(crate) heard: Timestamp,
     /// Time of the last entry in the recording; entries stay in order.
@@ -72,6 +74,7 @@ impl<A: Awaited> Dialogue<A> {
             power: true,
             is_powered: false,
             excess: TimeSpan::ZERO,
+            released: Vec::new(),
             heard: now,
             last_entry: now,
             farewell: Farewell::default(),
@@ -110,6 +113,14 @@ impl<A: Awaited> Dialogue<A> {
     pub(crate) fn report(&mut self, sensor: SensorId, latest: Timestamp, width: TimeSpan) {
         let poll_interval = Some(width + self.excess);
         self.enter(latest, EventKind::Sensor(Report { sensor, poll_interval }));
+    }
+
+    /// A sensor became free within a span that ends at `latest`.
+    pub(crate) fn report_free(&mut self, sensor: SensorId, latest: Timestamp, width: TimeSpan) {
+        if self.released.contains(&sensor) {
+            let poll_interval = Some(width + self.excess);
+            self.enter(latest, EventKind::Freed(Report { sensor, poll_interval }));
+        }
     }
 
     pub(crate) fn write(&mut self, bytes: Vec<u8>) {

@@ -6,6 +6,7 @@
 
 extern crate alloc;
 
+mod blocks;
 pub mod dcc_ex;
 mod dialogue;
 mod farewell;
@@ -23,4 +24,5 @@ mod silence;
 pub mod withrottle;
 pub mod z21;
 
+pub use blocks::BlockReports;
 pub use session::{Closing, CommandError, Confirmation, LinkNotice, Session, Transmit};

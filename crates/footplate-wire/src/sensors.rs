@@ -13,7 +13,9 @@ pub(crate) enum Change {
     Occupied,
     /// It was occupied before it was first read.
     HeldFromStart,
-    /// No change, or free.
+    /// It became free.
+    Freed,
+    /// No change.
     None,
 }
 
@@ -30,6 +32,7 @@ impl Sensors {
         match (before, active) {
             (None, true) if listing => Change::HeldFromStart,
             (None | Some(false), true) => Change::Occupied,
+            (Some(true), false) => Change::Freed,
             _ => Change::None,
         }
     }
@@ -46,7 +49,7 @@ mod tests {
         assert_eq!(sensors.heard(3, true, true), Change::HeldFromStart);
         assert_eq!(sensors.heard(5, true, false), Change::Occupied);
         assert_eq!(sensors.heard(5, true, false), Change::None);
-        assert_eq!(sensors.heard(5, false, false), Change::None);
+        assert_eq!(sensors.heard(5, false, false), Change::Freed);
         assert_eq!(sensors.heard(3, true, false), Change::None);
         assert_eq!(sensors.heard(9, true, false), Change::Occupied, "defined while the line was open");
         // Asked for again after the line was lost: what has become occupied meanwhile is reported.

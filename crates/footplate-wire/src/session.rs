@@ -48,6 +48,9 @@ pub trait Session {
     /// Polls the module of this sensor often and others rarely; `None`: all alike. No effect on links that do not poll.
     fn watch(&mut self, _sensor: Option<SensorId>) {}
 
+    /// Also reports when one of these sensors becomes free: the detectors of blocks. Others report only trains.
+    fn report_releases(&mut self, _of: &[SensorId]) {}
+
     /// Sets how much longer than usual for this station the line may delay a report (as measured): a sensor may have become occupied
     /// that much earlier. No effect on links that poll, whose line is not shared.
     fn expect_delays(&mut self, _excess: TimeSpan) {}

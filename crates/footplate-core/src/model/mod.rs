@@ -10,6 +10,7 @@
 //! scatter  spread  variation           how single stops, runs and sessions differ
 //! sensor_scatter                       how exactly sensors trip
 //! expected_information  objective      what an experiment would teach
+//! train_length                         how long it is, where blocks report that it has left
 //! passage                              reports of a run, judged one by one
 //! fit/                                 from trips to a model
 //! report/                              runs beside the model, laws compared: for people
@@ -36,6 +37,7 @@ mod spread;
 mod standing_times;
 mod stop_offset;
 pub mod survey;
+mod train_length;
 mod variation;
 
 pub(crate) use change_deviations::OTHER_SHAPES;
@@ -52,3 +54,4 @@ pub(crate) use sensor_scatter::SensorScatter;
 pub use short_moves::ShortMoveForecast;
 pub(crate) use standing_times::StandingTimes;
 pub(crate) use stop_offset::StopEffect;
+pub use train_length::{BlockRelease, TrainLength};

@@ -13,6 +13,7 @@ use super::sensor_scatter::SensorVariances;
 use super::spread::Spread;
 use super::stop_offset::{StopOffsets, stop_offset_share};
 use super::survey::SectionIndex;
+use super::train_length::{BlockRelease, TrainLength};
 use super::variation::Variation;
 use crate::estimate::Estimate;
 use crate::event::Approach;
@@ -73,6 +74,9 @@ pub struct MotionModel {
     /// By how much stops are longer because of the track that they run over.
     #[cfg_attr(feature = "serde", serde(default))]
     pub(crate) stop_offsets: StopOffsets,
+    /// How long the train is, from releases of blocks.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "TrainLength::is_unknown"))]
+    pub(crate) train_length: TrainLength,
     /// By how much more than usual the laws of stops and of starts leave over: factors on a standard deviation.
     pub(crate) residual_scales: [f64; 2],
     pub(super) uses: Vec<StepUse>,
@@ -114,6 +118,7 @@ impl MotionModel {
             spread: Spread::prior(steps),
             sections: BTreeMap::new(),
             stop_offsets: StopOffsets::default(),
+            train_length: TrainLength::default(),
             residual_scales: [1.0; 2],
             uses: vec![StepUse::Untried; steps + 1],
             counts: vec![[Counts::default(); 2]; steps + 1],
@@ -128,6 +133,22 @@ impl MotionModel {
     #[must_use]
     pub const fn train(&self) -> TrainId {
         self.train
+    }
+
+    /// How long it is, from releases of blocks.
+    #[must_use]
+    pub const fn train_length(&self) -> &TrainLength {
+        &self.train_length
+    }
+
+    /// Takes the release of a block behind the train. Returns whether it agrees with those before.
+    pub fn take_release(&mut self, release: &BlockRelease) -> bool {
+        self.train_length.take(release)
+    }
+
+    /// Keeps the length that another copy of the model has measured better.
+    pub(crate) const fn keep_length(&mut self, other: &Self) {
+        self.train_length = self.train_length.or_better(other.train_length);
     }
 
     /// The highest step of its decoder.

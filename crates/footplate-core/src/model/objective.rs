@@ -19,7 +19,7 @@ use crate::ids::SpeedStep;
 /// From the last contact to the command a stop runs about this long (s), by its speed as it is known.
 const RUN_BEFORE_STOP: f64 = 0.5;
 
-/// A scatter counts as no less than this (m): nobody sees the difference on a railway of this size.
+/// A scatter counts as no less than this (m): no one sees the difference on a railway of this size.
 const LEAST_SCATTER: f64 = 0.006;
 
 /// Short moves that should be known: runs (s) at every second step ...

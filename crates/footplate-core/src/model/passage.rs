@@ -162,7 +162,7 @@ impl PassageTracker {
                 self.turnouts.set(turnout, Leg::from_curved(curved));
                 None
             }
-            EventKind::Stopped { .. } => None,
+            EventKind::Stopped { .. } | EventKind::Freed(_) => None,
         }
     }
 

@@ -1,7 +1,7 @@
 //! When a train that was commanded to stop stands, by the [kind of decoder](DecoderKind) that it most likely has.
 //!
 //! One set of numbers tells the ways of all decoders, and says little of their times: a stop that dies away and one that ends
-//! may be as long and half a second, or two, apart. Nobody sees a train come to rest, so that the kind is told by how ways
+//! may be as long and half a second, or two, apart. No sensor sees a train come to rest, so the kind shows in how distances
 //! grow with speed.
 //!
 //! | kind | stands after |

@@ -6,7 +6,7 @@ use alloc::string::String;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use crate::ids::{EdgeId, NodeId, TurnoutId};
+use crate::ids::{EdgeId, NodeId, SensorId, TurnoutId};
 use crate::track::hop::Hops;
 use crate::track::survey::surveyed_distances;
 use crate::track::{
@@ -21,12 +21,15 @@ const LARGEST_SCALE: f64 = 1.0;
 /// Nodes and edges are numbered by `u16`, two to a place and two to a stretch.
 const MAX_PAIRS: usize = 1 << (u16::BITS - 1);
 
+/// Sensors are numbered by `u16`; the last number is no sensor of a boundary.
+const MAX_SENSORS: usize = u16::MAX as usize;
+
 impl Layout {
     /// Checks a plan and makes the tables.
     ///
     /// # Errors
     /// The first invalid entry, in the order survey, places, stretches, rail ends without a stretch,
-    /// pairs, loops, zones.
+    /// pairs, blocks, loops, zones.
     pub fn build(plan: &LayoutPlan) -> Result<Self, LayoutError> {
         let uncertainty = plan.survey.uncertainty;
         if !is_plausible(uncertainty) {
@@ -35,7 +38,7 @@ impl Layout {
         if !(0.0..=LARGEST_SCALE).contains(&plan.survey.scale) {
             return Err(LayoutError::IllegalScale { found: plan.survey.scale });
         }
-        let places = place_nodes(&plan.places)?;
+        let places = place_nodes(plan)?;
         let (nodes, edges) = join(plan, &places)?;
         let partners = pair_turnouts(&plan.never_both_curved, &places)?;
         let layout = Self {
@@ -52,8 +55,10 @@ impl Layout {
             distances: BTreeMap::new(),
             zones: Vec::new(),
             restricted: BTreeMap::new(),
+            blocks: Vec::new(),
+            entered: BTreeMap::new(),
         };
-        let layout = layout.with_hops()?;
+        let layout = layout.with_blocks(&plan.blocks, &plan.places)?.with_hops()?;
         let zones = plan.zones.iter();
         zones
             .cloned()
@@ -135,15 +140,25 @@ struct Places {
     turnouts: BTreeMap<TurnoutId, NodeId>,
 }
 
-fn place_nodes(plan: &[Place]) -> Result<Places, LayoutError> {
-    if plan.len() > MAX_PAIRS {
-        return Err(LayoutError::TooMany { what: "places", found: plan.len(), limit: MAX_PAIRS });
+fn place_nodes(plan: &LayoutPlan) -> Result<Places, LayoutError> {
+    let found = plan.places.len();
+    if found > MAX_PAIRS {
+        return Err(LayoutError::TooMany { what: "places", found, limit: MAX_PAIRS });
     }
     let mut places = Places::default();
-    for (place, entry) in plan.iter().enumerate() {
-        let kinds = match *entry {
-            Place::Sensor { sensors: [one, other], .. } => [NodeKind::Sensor(one), NodeKind::Sensor(other)],
-            Place::Turnout { turnout, .. } => [NodeKind::Branch(turnout), NodeKind::Merge(turnout)],
+    let mut entries = first_entry(plan)..u16::MAX;
+    for (place, entry) in plan.places.iter().enumerate() {
+        let mut entry_of = |enters: &Option<String>| match enters {
+            None => Ok(NodeKind::Boundary),
+            Some(_) => entries
+                .next()
+                .map(|number| NodeKind::Sensor(SensorId(number)))
+                .ok_or(LayoutError::TooMany { what: "sensors", found: MAX_SENSORS + 1, limit: MAX_SENSORS }),
+        };
+        let kinds = match entry {
+            Place::Sensor { sensors: [one, other], .. } => [NodeKind::Sensor(*one), NodeKind::Sensor(*other)],
+            Place::Boundary { enters: [one, other], .. } => [entry_of(one)?, entry_of(other)?],
+            Place::Turnout { turnout, .. } => [NodeKind::Branch(*turnout), NodeKind::Merge(*turnout)],
             Place::End { .. } => [NodeKind::Enter, NodeKind::Exit],
         };
         let first = NodeId::first_of(place);
@@ -159,6 +174,16 @@ fn place_nodes(plan: &[Place]) -> Result<Places, LayoutError> {
         }
     }
     Ok(places)
+}
+
+/// The first number for the entries of blocks: above all sensors and detectors.
+fn first_entry(plan: &LayoutPlan) -> u16 {
+    let of_places = plan.places.iter().filter_map(|place| match place {
+        Place::Sensor { sensors: [one, other], .. } => Some(one.0.max(other.0)),
+        _ => None,
+    });
+    let used = of_places.chain(plan.blocks.iter().map(|block| block.detector.0));
+    used.max().map_or(0, |highest| highest.saturating_add(1))
 }
 
 impl Places {
@@ -188,7 +213,7 @@ impl Places {
                 }
                 self.turnouts.insert(turnout, node);
             }
-            NodeKind::Merge(_) | NodeKind::Enter | NodeKind::Exit => {}
+            NodeKind::Boundary | NodeKind::Merge(_) | NodeKind::Enter | NodeKind::Exit => {}
         }
         Ok(())
     }
@@ -282,7 +307,6 @@ fn join(plan: &LayoutPlan, places: &Places) -> Result<(Vec<Node>, Vec<Edge>), La
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ids::SensorId;
     use crate::track::example::{end, oval_plan, stretch, turnout};
     use crate::track::{PlanEntry, RailEnd, Stretch};
     use std::format;

@@ -213,6 +213,63 @@ pub enum LayoutError {
         /// Its name.
         name: String,
     },
+    /// A block's name that does not fit on one line.
+    IllegalBlockName {
+        /// The block.
+        block: usize,
+        /// Its name.
+        name: String,
+    },
+    /// Two blocks of one name.
+    DuplicateBlock {
+        /// The later block.
+        block: usize,
+        /// The name.
+        name: String,
+    },
+    /// A detector whose number another block or a sensor has.
+    DetectorTaken {
+        /// The later block.
+        block: usize,
+        /// The number.
+        detector: SensorId,
+        /// The name of the block or sensor that has it.
+        first: String,
+    },
+    /// A block that no boundary leads into.
+    BlockWithoutBoundary {
+        /// The block.
+        block: usize,
+        /// Its name.
+        name: String,
+    },
+    /// A boundary of a block that the plan does not have.
+    UnknownBlock {
+        /// The place.
+        place: usize,
+        /// The name of the block.
+        name: String,
+    },
+    /// The rails of a block end at a boundary that leads into another block, or into none.
+    BoundaryMissing {
+        /// The place of the boundary.
+        place: usize,
+        /// Its node that faces the block.
+        node: String,
+        /// The block of the rails.
+        block: String,
+        /// The block that the boundary names.
+        entered: Option<String>,
+    },
+    /// One stretch in two blocks.
+    BlocksOverlap {
+        /// The stretch.
+        stretch: usize,
+        /// The name of the block that has it.
+        first: String,
+        /// The name of the other block.
+        second: String,
+    },
 }
 
 /// The entry of a plan that an error is about.
@@ -232,6 +289,8 @@ pub enum PlanEntry {
     Pair(usize),
     /// A speed restriction.
     Zone(usize),
+    /// A block.
+    Block(usize),
 }
 
 impl LayoutError {
@@ -249,6 +308,8 @@ impl LayoutError {
             | Self::SensorPlacedTwice { place, .. }
             | Self::TurnoutPlacedTwice { place, .. }
             | Self::RailEndOpen { place, .. }
+            | Self::UnknownBlock { place, .. }
+            | Self::BoundaryMissing { place, .. }
             | Self::LoopWithoutLength { place, .. }
             | Self::TooManyHops { place, .. } => PlanEntry::Place(place),
             Self::UnknownNode { stretch, .. }
@@ -257,13 +318,18 @@ impl LayoutError {
             | Self::BeyondTrackEnd { stretch, .. }
             | Self::IllegalLength { stretch, .. }
             | Self::IllegalLengthUncertainty { stretch, .. }
-            | Self::RailEndTaken { stretch, .. } => PlanEntry::Stretch(stretch),
+            | Self::RailEndTaken { stretch, .. }
+            | Self::BlocksOverlap { stretch, .. } => PlanEntry::Stretch(stretch),
             Self::IllegalPair { pair, .. } => PlanEntry::Pair(pair),
             Self::IllegalZoneName { zone, .. }
             | Self::DuplicateZone { zone, .. }
             | Self::IllegalZoneLimit { zone, .. }
             | Self::RestrictedTwice { zone, .. }
             | Self::ZoneWithoutEdges { zone, .. } => PlanEntry::Zone(zone),
+            Self::IllegalBlockName { block, .. }
+            | Self::DuplicateBlock { block, .. }
+            | Self::DetectorTaken { block, .. }
+            | Self::BlockWithoutBoundary { block, .. } => PlanEntry::Block(block),
         }
     }
 }
@@ -385,6 +451,39 @@ impl fmt::Display for LayoutError {
             }
             Self::ZoneWithoutEdges { name, .. } => {
                 write!(f, "no edge is in zone `{name}`: write `zone = \"{name}\"` on the edges it restricts")
+            }
+            Self::IllegalBlockName { name, .. } => write!(
+                f,
+                "the block's name `{}` is not 1 to {MAX_NAME_CHARACTERS} characters on one line",
+                name.escape_debug()
+            ),
+            Self::DuplicateBlock { name, .. } => {
+                write!(f, "there is a block `{name}` already; every block needs its own name")
+            }
+            Self::DetectorTaken { detector, first, .. } => write!(
+                f,
+                "detector {detector} belongs to `{first}` already; give the number that this block reports"
+            ),
+            Self::BlockWithoutBoundary { name, .. } => {
+                write!(f, "no boundary leads into block `{name}`: name it in `enters` of its boundaries")
+            }
+            Self::UnknownBlock { name, .. } => {
+                let name = name.escape_debug();
+                write!(
+                    f,
+                    "no block is called `{name}`: add `{{ name = \"{name}\", number = .. }}` to `blocks`"
+                )
+            }
+            Self::BoundaryMissing { node, block, entered, .. } => {
+                write!(f, "the rails at `{node}` belong to block `{block}`, but trains enter ")?;
+                match entered {
+                    Some(entered) => write!(f, "`{entered}` there")?,
+                    None => write!(f, "no block there")?,
+                }
+                write!(f, ": write `{block}` in `enters`, or put a boundary between")
+            }
+            Self::BlocksOverlap { first, second, .. } => {
+                write!(f, "an edge is in block `{first}` and in block `{second}`: put a boundary between")
             }
         }
     }

@@ -11,7 +11,7 @@ use alloc::string::String;
 use alloc::vec;
 
 use crate::ids::{SensorId, TurnoutId};
-use crate::track::{Layout, LayoutPlan, Leg, Place, RailEnd, Stretch, Survey};
+use crate::track::{Layout, LayoutPlan, Leg, Place, PlannedBlock, RailEnd, Stretch, Survey};
 use crate::units::Length;
 
 pub(crate) fn oval() -> Layout {
@@ -50,6 +50,52 @@ pub(crate) fn oval_plan() -> LayoutPlan {
         ],
         never_both_curved: vec![],
         zones: vec![],
+        blocks: vec![],
+    }
+}
+
+/// An oval with a turnout in its station, and a siding that joins the main line without a detector.
+///
+/// ```text
+///              +-- 200 -- S3 ---- 800 ---- S7 -- 200 -+
+/// S1 -- 300 -- 1                                      2 -- 100 -- S1
+///              +-- 200 -- S5 - 300 - S9 --- 1000 -----+
+/// ```
+pub(crate) fn oval_of_blocks() -> Layout {
+    Layout::build(&oval_of_blocks_plan()).unwrap()
+}
+
+pub(crate) fn oval_of_blocks_plan() -> LayoutPlan {
+    let boundary = |first: u8, enters: [Option<&str>; 2]| Place::Boundary {
+        names: [format!("S{first}"), format!("S{}", first + 1)],
+        enters: enters.map(|name| name.map(Into::into)),
+    };
+    let block = |name: &str, number| PlannedBlock { name: name.into(), detector: SensorId(number) };
+    LayoutPlan {
+        name: "oval of blocks".into(),
+        survey: Survey::taped(Length::from_mm(2.0), "made up".into()),
+        places: vec![
+            boundary(1, [Some("station"), None]),
+            boundary(3, [Some("main"), Some("station")]),
+            boundary(5, [Some("siding"), Some("station")]),
+            boundary(7, [None, Some("main")]),
+            boundary(9, [None, Some("siding")]),
+            turnout(1),
+            turnout(2),
+        ],
+        stretches: vec![
+            stretch("S1", "BR1", 300.0),
+            stretch("BR1 straight", "S3", 200.0),
+            stretch("BR1 curved", "S5", 200.0),
+            stretch("S3", "S7", 800.0),
+            stretch("S7", "MR2 straight", 200.0),
+            stretch("S5", "S9", 300.0),
+            stretch("S9", "MR2 curved", 1_000.0),
+            stretch("MR2", "S1", 100.0),
+        ],
+        never_both_curved: vec![],
+        zones: vec![],
+        blocks: vec![block("station", 1), block("main", 2), block("siding", 3)],
     }
 }
 

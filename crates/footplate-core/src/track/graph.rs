@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 
 use crate::ids::{EdgeId, NodeId, SensorId, StretchId, TurnoutId};
 use crate::track::hop::Hops;
-use crate::track::{HopId, Leg, StretchLength, Survey, TurnoutStates, Zone};
+use crate::track::{Block, HopId, Leg, StretchLength, Survey, TurnoutStates, Zone};
 use crate::units::Length;
 
 impl NodeId {
@@ -60,8 +60,10 @@ pub struct Node {
 /// The kind of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum NodeKind {
-    /// A sensor.
+    /// A sensor, or the entry of a block.
     Sensor(SensorId),
+    /// The boundary of a block, in the direction that leads onto track without a detector.
+    Boundary,
     /// A turnout, approached at its toe.
     Branch(TurnoutId),
     /// A turnout, approached on one of its legs.
@@ -136,6 +138,9 @@ pub struct Layout {
     pub(crate) zones: Vec<Zone>,
     /// The zone of each restricted stretch, as an index into `zones`.
     pub(crate) restricted: BTreeMap<StretchId, usize>,
+    pub(crate) blocks: Vec<Block>,
+    /// The block of each entry, as an index into `blocks`.
+    pub(crate) entered: BTreeMap<SensorId, usize>,
 }
 
 impl Layout {
@@ -210,10 +215,11 @@ impl Layout {
         self.sensor_at(self.node_named(name)?)
     }
 
-    /// The name of a sensor, or `?` for a sensor of another layout.
+    /// The name of a sensor, the name of a detector's block, or `?` for a sensor of another layout.
     #[must_use]
     pub fn sensor_name(&self, sensor: SensorId) -> &str {
-        self.sensor_node(sensor).map_or("?", |node| self.node_name(node))
+        let of_block = || self.block_of_detector(sensor).map_or("?", |block| block.name.as_str());
+        self.sensor_node(sensor).map_or_else(of_block, |node| self.node_name(node))
     }
 
     /// All sensors in the order of their numbers.

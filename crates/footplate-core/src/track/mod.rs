@@ -6,9 +6,12 @@
 //! - [`Layout::hops_from`]: the sensors that a train may reach next, in nanoseconds, from a table made once;
 //! - [`Layout::reaches`]: the same if up to [`MAX_MISSED`] sensors on the path stay silent;
 //! - [`Layout::route`]: the shortest path between two nodes; [`Layout::circuit_from`]: a path that leads back;
+//! - [`Layout::blocks`]: sections with an occupancy detector, and where trains enter them;
+//! - [`Occupancy`]: from reports of their detectors to these entries;
 //! - [`Layout::zone`]: the speed restriction of an edge;
 //! - [`Position`] and [`Landmark`]: points on the rails, and their names.
 
+mod block;
 mod build;
 mod circuit;
 mod error;
@@ -17,6 +20,7 @@ pub(crate) mod example;
 mod graph;
 mod hop;
 mod landmark;
+mod occupancy;
 mod plan;
 mod position;
 mod reach;
@@ -26,12 +30,16 @@ mod survey;
 mod turnout;
 mod zone;
 
+pub use block::Block;
 pub use circuit::Circuit;
 pub use error::{LayoutError, PlanEntry};
 pub use graph::{Edge, Layout, Node, NodeKind, OutgoingEdges};
 pub use hop::{Hop, HopId};
 pub use landmark::{Landmark, LandmarkError};
-pub use plan::{LayoutPlan, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Place, PlannedZone, RailEnd, Stretch};
+pub use occupancy::{FLICKER_TIME, Occupancy};
+pub use plan::{
+    LayoutPlan, MAX_EDGE_LENGTH, MAX_NAME_CHARACTERS, Place, PlannedBlock, PlannedZone, RailEnd, Stretch,
+};
 pub use position::{PathError, Position};
 pub use reach::{MAX_MISSED, Reach, Reaches};
 pub use route::{Route, RouteError};

@@ -32,6 +32,17 @@ pub struct LayoutPlan {
     pub never_both_curved: Vec<[TurnoutId; 2]>,
     /// Speed restrictions.
     pub zones: Vec<PlannedZone>,
+    /// Blocks; the boundaries among the places say where they are.
+    pub blocks: Vec<PlannedBlock>,
+}
+
+/// A section of track with an occupancy detector.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PlannedBlock {
+    /// Its name.
+    pub name: String,
+    /// The number under which the station reports it.
+    pub detector: SensorId,
 }
 
 /// A speed restriction and its stretches.
@@ -53,6 +64,13 @@ pub enum Place {
         /// The sensors of the two directions.
         sensors: [SensorId; 2],
     },
+    /// The boundary of a block, where its insulated rail joint is.
+    Boundary {
+        /// The names of the two directions.
+        names: [String; 2],
+        /// The block that a train enters in each direction; `None` where no detector is.
+        enters: [Option<String>; 2],
+    },
     /// A turnout.
     Turnout {
         /// The name of the branch, approached at the toe, and of the merge, approached on a leg.
@@ -72,7 +90,10 @@ impl Place {
     #[must_use]
     pub const fn names(&self) -> &[String; 2] {
         match self {
-            Self::Sensor { names, .. } | Self::Turnout { names, .. } | Self::End { names } => names,
+            Self::Sensor { names, .. }
+            | Self::Boundary { names, .. }
+            | Self::Turnout { names, .. }
+            | Self::End { names } => names,
         }
     }
 }

@@ -108,7 +108,7 @@ impl SequenceTest {
                     }
                 }
             }
-            EventKind::Turnout { .. } | EventKind::Stopped { .. } => {}
+            EventKind::Turnout { .. } | EventKind::Stopped { .. } | EventKind::Freed(_) => {}
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! A [`MotionFilter`](super::MotionFilter) of a train that is driven knows its steps well, and has one letter for what its speed is off by: `ε`.
 //! Before a train is known a step may be off by a tenth or by half, which says nothing of the next one, and of a change of
-//! speed only what the new speed has made of the way so far. So each step has a letter of its own, `s`, and a change from
+//! speed only what the new speed has made of the distance so far. So each step has a letter of its own, `s`, and a change from
 //! one to another goes
 //!
 //! ```text

@@ -12,6 +12,7 @@
 mod apart;
 mod arrival;
 mod arrival_filter;
+mod block_release;
 mod claim;
 mod drift_test;
 mod filter_state;

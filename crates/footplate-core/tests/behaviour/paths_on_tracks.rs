@@ -38,6 +38,7 @@ fn any_plan() -> impl Strategy<Value = LayoutPlan> {
                 places,
                 never_both_curved: vec![],
                 zones: vec![],
+                blocks: vec![],
             }
         })
 }
@@ -72,7 +73,7 @@ fn rail_ends_of(place: &Place) -> Vec<RailEnd> {
     let [one, other] = place.names().clone();
     let end = |node: &String, leg| RailEnd { node: node.clone(), leg };
     match place {
-        Place::Sensor { .. } => vec![end(&one, None), end(&other, None)],
+        Place::Sensor { .. } | Place::Boundary { .. } => vec![end(&one, None), end(&other, None)],
         Place::Turnout { .. } => {
             vec![end(&one, Some(Leg::Straight)), end(&one, Some(Leg::Curved)), end(&other, None)]
         }

@@ -87,6 +87,7 @@ pub(crate) fn layout() -> Layout {
         ],
         never_both_curved: vec![],
         zones: vec![],
+        blocks: vec![],
     };
     Layout::build(&plan).expect("a layout")
 }

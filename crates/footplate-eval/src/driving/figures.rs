@@ -16,6 +16,8 @@ pub struct ScoredTrain {
     pub(super) calibration_s: f64,
     /// How the calibration ended.
     pub(super) ending: String,
+    /// By how much the learnt length of the train is wrong, and one standard deviation, in mm; `None` without blocks.
+    pub(super) length_error_mm: Option<[f64; 2]>,
     /// The results in the order of [`Driven::ALL`].
     pub(super) by: Vec<Results>,
 }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::figures::{Driven, Figures, ScoredTrain};
 use super::trial::{NOT_BEYOND_PERCENT, Results};
-use crate::figures::binomial_interval;
+use crate::figures::{binomial_interval, quantile};
 use crate::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
@@ -179,6 +179,17 @@ impl Page<'_> {
             "{} trains were calibrated in {middle:.0} s of track time (median), the longest in {longest:.0} s.",
             seconds.len(),
         )?;
+        let lengths: Vec<[f64; 2]> = self.trains.iter().filter_map(|train| train.length_error_mm).collect();
+        let within = |part: f64| quantile(lengths.iter().map(|[error, _]| error.abs()), part);
+        if let (Some(median), Some(high)) = (within(0.5), within(0.95)) {
+            let inside = lengths.iter().filter(|[error, deviation]| error.abs() <= 1.96 * deviation).count();
+            writeln!(
+                output,
+                "The length of {} trains was learnt from releases of blocks within {median:.1} mm (median), {high:.1} \
+                 mm (95 %); {inside} of the 95 % intervals held it.",
+                lengths.len(),
+            )?;
+        }
         for by in Driven::ALL {
             let figures = self.figures(None, by);
             let Some(covered) = figures.covered_pct() else { continue };

@@ -4,7 +4,7 @@ use footplate_core::control::{Machine, Output};
 use footplate_core::{Command, Timestamp};
 use footplate_sim::{FromStation, VirtualStation};
 use footplate_wire::marklin_serial::{EncodeError, Interface, Settings};
-use footplate_wire::{LinkNotice, Session, Transmit};
+use footplate_wire::{BlockReports, LinkNotice, Session, Transmit};
 
 /// S88 modules that the session polls: the five of the course layouts.
 const MODULES: u8 = 5;
@@ -15,6 +15,7 @@ pub struct VirtualLine<'l> {
     /// The station, with the world behind it.
     pub station: VirtualStation<'l>,
     interface: Interface,
+    blocks: Option<BlockReports>,
 }
 
 impl<'l> VirtualLine<'l> {
@@ -23,7 +24,8 @@ impl<'l> VirtualLine<'l> {
         let now = station.now();
         let mut interface = Interface::new(now, Settings::with_cts(MODULES))?;
         interface.handle_cts(now, station.cts());
-        Ok(Self { station, interface })
+        let blocks = BlockReports::of(station.world().layout(), &mut interface);
+        Ok(Self { station, interface, blocks })
     }
 
     /// The time of the station.
@@ -75,6 +77,12 @@ impl<'l> VirtualLine<'l> {
     ) -> Option<M::Notice> {
         loop {
             while let Some(transmit) = self.interface.poll_output() {
+                let Some(transmit) = (match &mut self.blocks {
+                    Some(blocks) => blocks.take(transmit),
+                    None => Some(transmit),
+                }) else {
+                    continue;
+                };
                 match transmit {
                     Transmit::Byte(byte) => self.station.write(byte),
                     Transmit::Message(bytes) => bytes.iter().for_each(|byte| self.station.write(*byte)),
@@ -85,7 +93,10 @@ impl<'l> VirtualLine<'l> {
             match machine.poll_output()? {
                 Output::Command(command) => self.command(command),
                 Output::HoldLine(until) => self.interface.hold_line(until),
-                Output::Watch(sensor) => self.interface.watch(sensor),
+                Output::Watch(sensor) => {
+                    let layout = self.station.world().layout();
+                    self.interface.watch(sensor.map(|sensor| layout.input(sensor)));
+                }
                 Output::Notice(notice) => return Some(notice),
             }
         }

@@ -1,7 +1,7 @@
 //! A train's body on the rails: what lies under it, and what its shoe comes to.
 //!
-//! Places are counted in mm along the train's own way, with the sign of travel; turning around turns the count
-//! around. The leading end of the shoe is the train's place. The way always reaches from the rear end to the edge
+//! Places are counted in mm along the train's own path, with the sign of travel; reversing turns the count
+//! around. The leading end of the shoe is the train's place. The path always reaches from the rear end to the edge
 //! that the front end is on, so that turnouts decide when the front end comes to them.
 
 use std::collections::VecDeque;
@@ -17,7 +17,7 @@ use crate::path::Point;
 
 /// Blades of a turnout reach so far from its toe into its legs (chosen: Märklin K and C track, a third of 17 cm).
 const BLADES_MM: f64 = 60.0;
-/// No way leads over more edges at one point (chosen: beyond that the layout has edges without length in a ring).
+/// No path leads over more edges at one point (chosen: beyond that the layout has edges without length in a ring).
 const MOST_EDGES_AT_ONCE: usize = 64;
 
 /// An edge under the train or ahead of it.
@@ -53,6 +53,8 @@ pub(crate) enum Met {
     Touches(Coming),
     /// The shoe leaves a contact that it holds.
     Leaves(Point<SensorId>),
+    /// The last axle that a detector senses leaves its block.
+    Vacates(Point<SensorId>),
     /// The shoe is on dirt.
     Dirt,
     /// The front end comes onto another edge, or the rear end leaves one.
@@ -66,19 +68,23 @@ pub(crate) enum Met {
 /// A train's body.
 #[derive(Debug, Clone)]
 pub(crate) struct Body {
-    way: VecDeque<Under>,
+    path: VecDeque<Under>,
     /// The leading end of the shoe.
     pub(crate) lead: f64,
     /// From there to the front end, the length of the shoe, and from its other end to the rear end.
     ahead: f64,
     shoe: f64,
     behind: f64,
+    /// From the leading end of the shoe to the first and back to the last part of the train that detectors sense.
+    sensed: [f64; 2],
+    /// Where blocks end that the train is in or comes to, in order.
+    block_ends: VecDeque<Point<SensorId>>,
     /// Contacts and dirty spots that the shoe has not come to, in order.
     contacts: VecDeque<Coming>,
     dirt: VecDeque<f64>,
     /// Contacts that the shoe holds closed.
     held: VecDeque<Point<SensorId>>,
-    /// Which of the way's edges the lead is on.
+    /// Which of the path's edges the lead is on.
     under: usize,
     /// What the rails there make of a speed, and their gradient.
     pub(crate) factor: f64,
@@ -98,15 +104,18 @@ impl Body {
         edge: EdgeId,
         offset: f64,
         [ahead, shoe, behind]: [f64; 3],
+        sensed: [f64; 2],
     ) -> Option<Self> {
         let length = rails.rail(edge)?.length_mm;
         let lead = offset.clamp(0.0, length);
         let mut body = Self {
-            way: VecDeque::new(),
+            path: VecDeque::new(),
             lead,
             ahead,
             shoe,
             behind,
+            sensed,
+            block_ends: VecDeque::new(),
             contacts: VecDeque::new(),
             dirt: VecDeque::new(),
             held: VecDeque::new(),
@@ -117,23 +126,23 @@ impl Body {
             dirty_until: f64::NEG_INFINITY,
             next: f64::INFINITY,
         };
-        body.way.push_back(Under { edge, begins: 0.0, ends: length, factor: 1.0, grade: 0.0 });
-        // Backwards is forwards seen the other way.
+        body.path.push_back(Under { edge, begins: 0.0, ends: length, factor: 1.0, grade: 0.0 });
+        // Backwards is forwards in the opposite direction.
         for _ in 0..MOST_EDGES_AT_ONCE {
-            let first = *body.way.front()?;
+            let first = *body.path.front()?;
             if first.begins <= body.rear() {
                 break;
             }
             let before = after(rails, lies, first.edge.twin())?.twin();
             let begins = first.begins - rails.rail(before)?.length_mm;
-            body.way.push_front(Under { edge: before, begins, ends: first.begins, factor: 1.0, grade: 0.0 });
+            body.path.push_front(Under { edge: before, begins, ends: first.begins, factor: 1.0, grade: 0.0 });
         }
-        for under in &mut body.way {
+        for under in &mut body.path {
             let rail = rails.rail(under.edge)?;
             (under.factor, under.grade) = (rail.factor, rail.grade);
         }
-        while body.way.back()?.ends < body.front() {
-            let next = after(rails, lies, body.way.back()?.edge)?;
+        while body.path.back()?.ends < body.front() {
+            let next = after(rails, lies, body.path.back()?.edge)?;
             body.append(rails, next);
         }
         body.look_ahead(rails);
@@ -150,7 +159,7 @@ impl Body {
 
     /// The edges under the train, each with the part of it that is.
     pub(crate) fn under(&self) -> impl Iterator<Item = (EdgeId, [f64; 2])> {
-        self.way.iter().filter_map(|under| {
+        self.path.iter().filter_map(|under| {
             let (from, to) = (self.rear().max(under.begins), self.front().min(under.ends));
             (from < to).then_some((under.edge, [from - under.begins, to - under.begins]))
         })
@@ -158,11 +167,11 @@ impl Body {
 
     /// The edge under the leading end of the shoe, and how far along it that is.
     pub(crate) fn place(&self) -> Option<(EdgeId, f64)> {
-        let under = self.way.get(self.under)?;
+        let under = self.path.get(self.under)?;
         Some((under.edge, self.lead - under.begins))
     }
 
-    /// The next thing that the train came to on its way to where it is; ask until `None`.
+    /// The next thing that the train came to on its path so far; ask until `None`.
     pub(crate) fn meet(
         &mut self,
         rails: &Rails<'_>,
@@ -180,6 +189,10 @@ impl Body {
         if let Some(held) = self.held.pop_front_if(|held| held.at_mm + self.shoe <= lead) {
             return Some(Met::Leaves(held));
         }
+        let last = lead - self.sensed[1];
+        if let Some(end) = self.block_ends.pop_front_if(|end| end.at_mm <= last) {
+            return Some(Met::Vacates(Point { at_mm: end.at_mm + self.sensed[1], ..end }));
+        }
         if let Some(contact) = self.contacts.pop_front_if(|coming| coming.contact.at_mm <= lead) {
             return Some(Met::Touches(contact));
         }
@@ -187,13 +200,13 @@ impl Body {
             self.dirty_until = spot + DIRTY_MM;
             return Some(Met::Dirt);
         }
-        while self.way.get(self.under).is_some_and(|under| under.ends <= lead)
-            && self.under + 1 < self.way.len()
+        while self.path.get(self.under).is_some_and(|under| under.ends <= lead)
+            && self.under + 1 < self.path.len()
         {
             self.under += 1;
             self.feel_rail();
         }
-        let last = *self.way.back()?;
+        let last = *self.path.back()?;
         if last.ends <= self.front() {
             let Some(next) = after(rails, lies, last.edge) else { return Some(Met::End) };
             if let Some(turnout) = illegal_pair(rails, lies, next) {
@@ -202,8 +215,8 @@ impl Body {
             self.append(rails, next);
             return Some(Met::OtherEdges);
         }
-        if self.under > 0 && self.way.front().is_some_and(|first| first.ends <= self.rear()) {
-            self.way.pop_front();
+        if self.under > 0 && self.path.front().is_some_and(|first| first.ends <= self.rear()) {
+            self.path.pop_front();
             self.under -= 1;
             return Some(Met::OtherEdges);
         }
@@ -220,16 +233,30 @@ impl Body {
         self.held.drain(..).map(|held| held.what)
     }
 
-    /// The other way round, where it stands.
+    /// The detectors of the blocks under the train, once for each time that it is in one.
+    pub(crate) fn blocks(&self, rails: &Rails<'_>) -> Vec<SensorId> {
+        let (first, last) = (self.lead + self.sensed[0], self.lead - self.sensed[1]);
+        let mut blocks = Vec::new();
+        for under in self.path.iter().filter(|under| under.ends > last && under.begins < first) {
+            let Some(rail) = rails.rail(under.edge) else { continue };
+            // Several edges of one block count once.
+            let is_new = under.begins <= last || rails.is_boundary(under.edge);
+            blocks.extend(rail.block.filter(|_| is_new));
+        }
+        blocks
+    }
+
+    /// Reverses it where it stands.
     pub(crate) fn turn(&mut self, rails: &Rails<'_>) {
-        let turned = self.way.iter().rev().filter_map(|under| {
+        let turned = self.path.iter().rev().filter_map(|under| {
             let edge = under.edge.twin();
             let Rail { factor, grade, .. } = *rails.rail(edge)?;
             Some(Under { edge, begins: -under.ends, ends: -under.begins, factor, grade })
         });
-        self.way = turned.collect();
+        self.path = turned.collect();
         self.lead = self.shoe - self.lead;
         std::mem::swap(&mut self.ahead, &mut self.behind);
+        self.sensed = [self.sensed[1] - self.shoe, self.sensed[0] + self.shoe];
         self.held = self.held.iter().rev().map(|held| Point { at_mm: -held.at_mm, ..*held }).collect();
         self.dirty_until = f64::NEG_INFINITY;
         self.look_ahead(rails);
@@ -237,7 +264,7 @@ impl Body {
 
     /// Where on a stretch the train is, in mm from the start of its first edge; `None` if it is not on it.
     fn reach_on(&self, edge: EdgeId) -> Option<[f64; 2]> {
-        let under = self.way.iter().find(|under| under.edge.stretch() == edge.stretch())?;
+        let under = self.path.iter().find(|under| under.edge.stretch() == edge.stretch())?;
         let (from, to) = (self.rear().max(under.begins), self.front().min(under.ends));
         let along = if under.edge < under.edge.twin() {
             [from - under.begins, to - under.begins]
@@ -249,8 +276,8 @@ impl Body {
 
     /// Whether two trains could touch: they share rails or the legs of a turnout.
     pub(crate) fn is_near(&self, rails: &Rails<'_>, other: &Self) -> bool {
-        self.way.iter().any(|mine| {
-            other.way.iter().any(|others| {
+        self.path.iter().any(|mine| {
+            other.path.iter().any(|others| {
                 mine.edge.stretch() == others.edge.stretch()
                     || legs(rails, mine.edge)
                         .any(|leg| legs(rails, others.edge).any(|theirs| theirs.0 == leg.0))
@@ -260,18 +287,18 @@ impl Body {
 
     /// Whether two trains touch.
     pub(crate) fn touches(&self, rails: &Rails<'_>, other: &Self) -> bool {
-        self.way.iter().any(|mine| {
+        self.path.iter().any(|mine| {
             let Some([from, to]) = self.reach_on(mine.edge) else { return false };
             let shares = other.reach_on(mine.edge).is_some_and(|[begins, ends]| begins < to && from < ends);
             shares
                 || legs(rails, mine.edge).any(|(turnout, leg)| {
                     let fouls =
-                        |way: &Self, under: &Under| way.way_from_toe(rails, under, turnout) < FOULING_MM;
+                        |path: &Self, under: &Under| path.way_from_toe(rails, under, turnout) < FOULING_MM;
                     let stands_beside = |theirs: &Under| {
                         legs(rails, theirs.edge).any(|(number, by)| number == turnout && by != leg)
                             && fouls(other, theirs)
                     };
-                    fouls(self, mine) && other.way.iter().any(stands_beside)
+                    fouls(self, mine) && other.path.iter().any(stands_beside)
                 })
         })
     }
@@ -279,7 +306,7 @@ impl Body {
     /// Whether points that have just moved moved under the train.
     pub(crate) fn is_on_blades(&self, rails: &Rails<'_>, turnout: TurnoutId) -> bool {
         let is_leg = |under: &&Under| legs(rails, under.edge).any(|(number, _)| number == turnout);
-        self.way.iter().filter(is_leg).any(|under| self.way_from_toe(rails, under, turnout) < BLADES_MM)
+        self.path.iter().filter(is_leg).any(|under| self.way_from_toe(rails, under, turnout) < BLADES_MM)
     }
 
     /// A turnout that lies wrong for a train which has one part before and one behind its toe.
@@ -288,7 +315,7 @@ impl Body {
         rails: &Rails<'_>,
         lies: &impl Fn(TurnoutId) -> Option<Leg>,
     ) -> Option<TurnoutId> {
-        self.way.iter().find_map(|under| {
+        self.path.iter().find_map(|under| {
             let (turnout, leg) = rails.rail(under.edge)?.leaves?;
             let is_across = self.rear() < under.begins && under.begins < self.front();
             (is_across && lies(turnout) != Some(leg)).then_some(turnout)
@@ -306,27 +333,44 @@ impl Body {
     }
 
     fn append(&mut self, rails: &Rails<'_>, edge: EdgeId) {
-        let Some((begins, rail)) = self.way.back().map(|last| last.ends).zip(rails.rail(edge)) else {
+        let Some((begins, rail)) = self.path.back().map(|last| last.ends).zip(rails.rail(edge)) else {
             return;
         };
         let Rail { length_mm, factor, grade, .. } = *rail;
-        self.way.push_back(Under { edge, begins, ends: begins + length_mm, factor, grade });
-        let coming = coming(&mut self.scatter, rails, rail, begins);
+        self.path.push_back(Under { edge, begins, ends: begins + length_mm, factor, grade });
+        let coming = coming(&mut self.scatter, rails, rail, [begins, self.sensed[0]]);
         self.contacts.extend(coming);
+        self.sort_contacts();
+        self.block_ends.extend(rail.ends_block.map(|what| Point { at_mm: begins, what }));
         self.dirt.extend(rail.dirty.iter().map(|at| begins + at));
+    }
+
+    /// Blocks are sensed further ahead than contacts where carriages lead.
+    fn sort_contacts(&mut self) {
+        if self.sensed[0] > 0.0 {
+            let by_place = |one: &Coming, other: &Coming| one.contact.at_mm.total_cmp(&other.contact.at_mm);
+            self.contacts.make_contiguous().sort_by(by_place);
+        }
     }
 
     /// Finds everything ahead of the shoe anew.
     fn look_ahead(&mut self, rails: &Rails<'_>) {
+        self.block_ends.clear();
+        let last = self.lead - self.sensed[1];
+        for under in self.path.iter().filter(|under| under.begins > last) {
+            let ended = rails.rail(under.edge).and_then(|rail| rail.ends_block);
+            self.block_ends.extend(ended.map(|what| Point { at_mm: under.begins, what }));
+        }
         self.contacts.clear();
         self.dirt.clear();
-        for under in &self.way {
+        for under in &self.path {
             let Some(rail) = rails.rail(under.edge) else { continue };
-            let coming = coming(&mut self.scatter, rails, rail, under.begins);
+            let coming = coming(&mut self.scatter, rails, rail, [under.begins, self.sensed[0]]);
             self.contacts.extend(coming.into_iter().filter(|coming| coming.contact.at_mm > self.lead));
             self.dirt.extend(rail.dirty.iter().map(|at| under.begins + at).filter(|at| *at > self.lead));
         }
-        self.under = self.way.iter().position(|under| self.lead < under.ends).unwrap_or(0);
+        self.sort_contacts();
+        self.under = self.path.iter().position(|under| self.lead < under.ends).unwrap_or(0);
         self.feel_rail();
         self.find_next();
     }
@@ -338,7 +382,7 @@ impl Body {
     }
 
     fn feel_rail(&mut self) {
-        let under = self.way.get(self.under);
+        let under = self.path.get(self.under);
         (self.factor, self.grade) = under.map_or((1.0, 0.0), |under| (under.factor, under.grade));
     }
 
@@ -346,17 +390,25 @@ impl Body {
         let contact = self.contacts.front().map_or(f64::INFINITY, |coming| coming.contact.at_mm);
         let left = self.held.front().map_or(f64::INFINITY, |held| held.at_mm + self.shoe);
         let dirt = self.dirt.front().copied().unwrap_or(f64::INFINITY);
-        let edge = self.way.get(self.under).map_or(f64::INFINITY, |under| under.ends);
-        let front = self.way.back().map_or(f64::INFINITY, |last| last.ends - self.ahead);
-        let rear = self.way.front().map_or(f64::INFINITY, |first| first.ends + self.shoe + self.behind);
-        self.next = contact.min(left).min(dirt).min(edge).min(front).min(rear);
+        let edge = self.path.get(self.under).map_or(f64::INFINITY, |under| under.ends);
+        let front = self.path.back().map_or(f64::INFINITY, |last| last.ends - self.ahead);
+        let rear = self.path.front().map_or(f64::INFINITY, |first| first.ends + self.shoe + self.behind);
+        let block = self.block_ends.front().map_or(f64::INFINITY, |end| end.at_mm + self.sensed[1]);
+        self.next = contact.min(left).min(dirt).min(edge).min(front).min(rear).min(block);
     }
 }
 
-/// The contacts of an edge that begins at a place, where they close this time.
-fn coming(scatter: &mut Option<Scatter>, rails: &Rails<'_>, rail: &Rail, begins: f64) -> Vec<Coming> {
+/// The contacts and entries of blocks of an edge that begins at a place, where the shoe is when they close this time.
+/// Detectors sense a train so far ahead of its shoe.
+fn coming(
+    scatter: &mut Option<Scatter>,
+    rails: &Rails<'_>,
+    rail: &Rail,
+    [begins, sensed_ahead]: [f64; 2],
+) -> Vec<Coming> {
     let contacts = rail.contacts.iter().map(|(at, what)| {
-        let usual_mm = begins + at;
+        let is_entry = rails.layout.block_of_entry(*what).is_some();
+        let usual_mm = begins + at - if is_entry { sensed_ahead } else { 0.0 };
         let by = scatter.as_mut().map_or(0.0, |scatter| {
             let sd = libm::hypot(rails.scatter_mm(*what), scatter.shoe_mm);
             scatter.draws.normal_within(0.0, sd, 2.5)

@@ -37,7 +37,8 @@ impl LivingLayout<'_> {
         self.trains[place].leads = leads;
         let lengths = self.trains[place].lengths();
         let lies = |turnout| self.points.lies(turnout);
-        let body = Body::put(&self.rails, &lies, at.edge, at.offset.as_mm(), lengths);
+        let sensed = self.trains[place].sensed();
+        let body = Body::put(&self.rails, &lies, at.edge, at.offset.as_mm(), lengths, sensed);
         let beside = body.as_ref().and_then(|body| {
             let others = self.trains.iter().filter(|other| other.id != train);
             let mut bodies = others.filter_map(|other| Some((other.id, other.body.as_ref()?)));
@@ -49,6 +50,10 @@ impl LivingLayout<'_> {
         }
         self.take_up(place);
         self.trains[place].is_wrecked = false;
+        let now = self.now();
+        for detector in body.iter().flat_map(|body| body.blocks(&self.rails)) {
+            self.s88.occupy(detector, now);
+        }
         self.trains[place].body = body;
         if let Some((draws, shoe_mm)) = self.trains[place].shoe_scatter(self.scatters)
             && let Some(body) = &mut self.trains[place].body
@@ -86,6 +91,7 @@ impl LivingLayout<'_> {
                     }
                 }
                 Met::Leaves(contact) => self.s88.leave(contact.what, now),
+                Met::Vacates(end) => self.s88.vacate(end.what, now),
                 Met::OtherEdges | Met::Dirt => {}
                 Met::End | Met::IllegalPair(_) => break,
             }
@@ -123,6 +129,9 @@ impl LivingLayout<'_> {
         let train: &mut LiveTrain = &mut self.trains[place];
         train.stand(now, &mut self.rests);
         if let Some(mut body) = train.body.take() {
+            for detector in body.blocks(&self.rails) {
+                self.s88.vacate(detector, now);
+            }
             for sensor in body.let_go() {
                 self.s88.leave(sensor, now);
             }

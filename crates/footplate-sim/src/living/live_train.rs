@@ -134,6 +134,17 @@ impl LiveTrain {
         }
     }
 
+    /// How far ahead of the leading end of its shoe detectors sense it, and how far behind, as it runs now, in mm: the engine
+    /// draws its current through the shoe, and carriages have axles with a resistor.
+    pub(crate) fn sensed(&self) -> [f64; 2] {
+        let shoe = self.train.shoe.as_mm().max(0.0);
+        let carriages = self.train.last_axle().as_mm();
+        match self.leads {
+            End::Nose => [0.0, shoe + carriages],
+            End::Tail => [carriages, shoe],
+        }
+    }
+
     /// An order has left the line; its decoder will have it some time later.
     pub(crate) fn tell(&mut self, order: Order, sent: Timestamp) {
         let delay = self.draws.normal(self.train.command_delay.as_s(), self.train.command_jitter.as_s());
@@ -246,6 +257,7 @@ impl LiveTrain {
                     Met::Leaves(contact) => {
                         around.s88.leave(contact.what, when(contact.at_mm + self.train.shoe.as_mm()));
                     }
+                    Met::Vacates(end) => around.s88.vacate(end.what, when(end.at_mm)),
                     Met::Dirt => {
                         if self.load.stalls(wheel) {
                             self.motor.cut_off();

@@ -11,6 +11,7 @@
 //! world  start  hands      several trains, a millisecond at a time; how they got there; what people do to them
 //! live_train  drive  mishap  one of them; what drives it; what can become of it
 //! body  points  s88        where it reaches, how turnouts lie, what contacts report
+//! detectors                how late the detectors of blocks report a train, and that it is gone
 //! rails  switches  truth   the rails underneath; how bad the world is; what really happened, for scorers only
 //! ```
 
@@ -22,6 +23,7 @@ mod central_station;
 mod cts;
 mod decoder;
 mod delivery;
+mod detectors;
 mod drive;
 mod hands;
 mod live_train;

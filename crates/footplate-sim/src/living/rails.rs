@@ -24,6 +24,10 @@ pub(crate) struct Rail {
     pub(crate) leaves: Option<(TurnoutId, Leg)>,
     /// The turnout into whose leg it leads.
     pub(crate) enters: Option<(TurnoutId, Leg)>,
+    /// The detector of the block that it is in, ...
+    pub(crate) block: Option<SensorId>,
+    /// ... and of the block that ends where it begins.
+    pub(crate) ends_block: Option<SensorId>,
 }
 
 /// What comes after an edge.
@@ -50,6 +54,9 @@ impl<'l> Rails<'l> {
         let mut scatter_mm = Vec::new();
         for (sensor, _) in layout.sensors() {
             let (further_mm, scatter) = range.sensor_offset_and_scatter(&mut draws);
+            // Where the rails are cut is the same place in both directions.
+            let is_entry = layout.block_of_entry(sensor).is_some();
+            let further_mm = if is_entry { -track.sensor_offset(sensor).as_mm() } else { further_mm };
             track.move_sensor(sensor, further_mm);
             let slot = usize::from(sensor.0);
             scatter_mm.resize(scatter_mm.len().max(slot + 1), 0.0);
@@ -68,6 +75,8 @@ impl<'l> Rails<'l> {
                 enters: layout
                     .edge(id.twin())
                     .and_then(|twin| Some((turnout_at(layout, twin.from)?, twin.leg?))),
+                block: layout.block_of_edge(id).map(|block| block.detector),
+                ends_block: layout.block_left_at(edge.from).map(|block| block.detector),
             })
             .collect();
         for (sensor, node) in layout.sensors() {
@@ -99,6 +108,11 @@ impl<'l> Rails<'l> {
     /// How much a contact scatters from pass to pass (standard deviation in mm).
     pub(crate) fn scatter_mm(&self, sensor: SensorId) -> f64 {
         self.scatter_mm.get(usize::from(sensor.0)).copied().unwrap_or(0.0)
+    }
+
+    /// Whether an edge begins at the boundary of a block.
+    pub(crate) fn is_boundary(&self, edge: EdgeId) -> bool {
+        self.layout.edge(edge).is_some_and(|edge| self.layout.is_boundary(edge.from))
     }
 
     pub(crate) fn rail(&self, edge: EdgeId) -> Option<&Rail> {

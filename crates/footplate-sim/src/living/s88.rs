@@ -1,13 +1,14 @@
-//! Contacts as the modules of an S88 bus see them: held, or remembered from when they were.
+//! Contacts and occupancy detectors as the modules of an S88 bus see them: closed, or remembered from when they were.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
 
 use footplate_core::track::Layout;
 use footplate_core::{SensorId, TimeSpan, Timestamp, TrainId};
 use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, ModuleState};
 
 use crate::draws::Draws;
+use crate::living::detectors::Detectors;
 use crate::living::truth::PassTruth;
 use crate::sensors::{Cause, Faults};
 
@@ -18,7 +19,18 @@ struct Change {
     /// Of changes at one time the one that was first caused.
     nth: u64,
     sensor: SensorId,
-    closes: bool,
+    what: Turn,
+}
+
+/// What changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Turn {
+    Opens,
+    Closes,
+    /// Dirty wheels interrupt the current that a detector senses, ...
+    Darkens,
+    /// ... and it flows again.
+    Lightens,
 }
 
 /// A sensor has become occupied, or free again.
@@ -34,8 +46,11 @@ pub(crate) struct Edge {
 pub(crate) struct S88 {
     faults: Faults,
     draws: Draws,
-    /// Contacts that exist, to draw spurious ones from.
+    /// Contacts and detectors that exist, to draw spurious reports from.
     sensors: Vec<SensorId>,
+    detectors: Detectors,
+    /// Detectors whose current is interrupted, and how often.
+    dark: BTreeMap<SensorId, u8>,
     /// By the contact's number: by how much it is held closed, and whether it was since it was last read.
     contacts: Vec<(u8, bool)>,
     changes: BinaryHeap<Reverse<Change>>,
@@ -50,7 +65,8 @@ pub(crate) struct S88 {
 impl S88 {
     /// All open; a few are remembered from before, if that is asked for.
     pub(crate) fn new(layout: &Layout, faults: &Faults, stale: bool, mut draws: Draws) -> Self {
-        let sensors: Vec<SensorId> = layout.sensors().map(|(sensor, _)| sensor).collect();
+        let detectors = Detectors::draw(layout, &mut draws);
+        let sensors = detectors.inputs(layout);
         let count = sensors.iter().map(|sensor| usize::from(sensor.0) + 1).max().unwrap_or(0);
         let mut contacts = vec![(0, false); count];
         if stale {
@@ -64,6 +80,8 @@ impl S88 {
             faults: faults.clone(),
             draws,
             sensors,
+            detectors,
+            dark: BTreeMap::new(),
             contacts,
             changes: BinaryHeap::new(),
             edges: None,
@@ -73,7 +91,7 @@ impl S88 {
         }
     }
 
-    /// A shoe comes onto a contact. Returns whether it closes.
+    /// A shoe comes onto a contact, or the front of a train into a block. Returns whether a contact closes.
     pub(crate) fn close(
         &mut self,
         sensor: SensorId,
@@ -81,19 +99,46 @@ impl S88 {
         train: TrainId,
         odometer_mm: f64,
     ) -> bool {
-        let closes = !self.faults.misses(sensor, &mut self.draws);
         let cause = Cause::Train;
+        if let Some(detector) = self.detectors.at(sensor) {
+            self.passes.push(PassTruth { sensor, at, train: Some(train), cause, closed: true, odometer_mm });
+            self.occupy(detector, at);
+            return false;
+        }
+        let closes = !self.faults.misses(sensor, &mut self.draws);
         self.passes.push(PassTruth { sensor, at, train: Some(train), cause, closed: closes, odometer_mm });
         if closes {
-            self.change(sensor, at, true);
+            self.change(sensor, at, Turn::Closes);
         }
         closes
+    }
+
+    /// A train is in a block that it was not in.
+    pub(crate) fn occupy(&mut self, detector: SensorId, at: Timestamp) {
+        let at = at + self.detectors.pickup(detector);
+        self.change(detector, at, Turn::Closes);
+        let chance = self.faults.flicker.as_parts();
+        if let Some([from, until]) = self.detectors.flicker(detector, chance) {
+            self.change(detector, at + from, Turn::Darkens);
+            self.change(detector, at + until, Turn::Lightens);
+        }
+    }
+
+    /// The rear of a train has left a block.
+    pub(crate) fn vacate(&mut self, detector: SensorId, at: Timestamp) {
+        let at = at + self.detectors.release(detector);
+        self.change(detector, at, Turn::Opens);
+    }
+
+    /// The usual release delay of a detector.
+    pub(crate) fn release_delay(&self, detector: SensorId) -> Option<TimeSpan> {
+        self.detectors.usual_release(detector)
     }
 
     /// A shoe leaves a contact that it had closed.
     pub(crate) fn leave(&mut self, sensor: SensorId, at: Timestamp) {
         let sticks = TimeSpan::from_s(self.faults.sticks_for_s(&mut self.draws));
-        self.change(sensor, at + sticks, false);
+        self.change(sensor, at + sticks, Turn::Opens);
     }
 
     /// What the modules show at a time, none earlier than before; `forget` clears what is only remembered.
@@ -102,10 +147,10 @@ impl S88 {
         self.settle(at);
         let first = u16::from(module.saturating_sub(1)) * CONTACTS_PER_MODULE;
         let numbers = first..first + CONTACTS_PER_MODULE;
-        let contacts = &mut self.contacts;
         let closed = numbers.filter_map(|number| {
-            let (held, remembered) = contacts.get_mut(usize::from(number))?;
-            let is_closed = *held > 0 || *remembered && latches;
+            let is_held = self.is_closed(SensorId(number));
+            let (_, remembered) = self.contacts.get_mut(usize::from(number))?;
+            let is_closed = is_held || *remembered && latches;
             if forget {
                 *remembered = false;
             }
@@ -122,7 +167,12 @@ impl S88 {
 
     /// Whether a sensor is occupied, as far as was looked; `None` if there is no such sensor.
     pub(crate) fn is_occupied(&self, sensor: SensorId) -> Option<bool> {
-        self.sensors.contains(&sensor).then(|| self.contacts[usize::from(sensor.0)].0 > 0)
+        self.sensors.contains(&sensor).then(|| self.is_closed(sensor))
+    }
+
+    fn is_closed(&self, sensor: SensorId) -> bool {
+        let is_dark = self.dark.get(&sensor).is_some_and(|times| *times > 0);
+        !is_dark && self.contacts.get(usize::from(sensor.0)).is_some_and(|(held, _)| *held > 0)
     }
 
     /// The sensors of the layout.
@@ -130,9 +180,9 @@ impl S88 {
         &self.sensors
     }
 
-    fn change(&mut self, sensor: SensorId, at: Timestamp, closes: bool) {
+    fn change(&mut self, sensor: SensorId, at: Timestamp, what: Turn) {
         self.caused += 1;
-        self.changes.push(Reverse(Change { at, nth: self.caused, sensor, closes }));
+        self.changes.push(Reverse(Change { at, nth: self.caused, sensor, what }));
     }
 
     /// Takes in everything that happened by a time.
@@ -142,25 +192,25 @@ impl S88 {
             let waiting = self.draws.waiting(self.faults.spurious_per_s()).min(FOREVER_S);
             self.next_spurious = at + TimeSpan::from_s(waiting);
             if let Some(&sensor) = self.sensors.get(self.draws.below(self.sensors.len())) {
-                self.change(sensor, at, true);
-                self.change(sensor, at + Faults::SPURIOUS, false);
+                self.change(sensor, at, Turn::Closes);
+                self.change(sensor, at + Faults::SPURIOUS, Turn::Opens);
                 let (train, cause) = (None, Cause::Spurious);
                 self.passes.push(PassTruth { sensor, at, train, cause, closed: true, odometer_mm: 0.0 });
             }
         }
         while let Some(Reverse(change)) = self.changes.peek().copied().filter(|next| next.0.at <= by) {
             self.changes.pop();
+            let was_occupied = self.is_closed(change.sensor);
             let Some((held, remembered)) = self.contacts.get_mut(usize::from(change.sensor.0)) else {
                 continue;
             };
-            let was_occupied = *held > 0;
-            if change.closes {
-                *held = held.saturating_add(1);
-                *remembered = true;
-            } else {
-                *held = held.saturating_sub(1);
+            match change.what {
+                Turn::Closes => (*held, *remembered) = (held.saturating_add(1), true),
+                Turn::Opens => *held = held.saturating_sub(1),
+                Turn::Darkens => *self.dark.entry(change.sensor).or_default() += 1,
+                Turn::Lightens => *self.dark.entry(change.sensor).or_default() -= 1,
             }
-            let is_occupied = *held > 0;
+            let is_occupied = self.is_closed(change.sensor);
             if let Some(edges) = self.edges.as_mut().filter(|_| is_occupied != was_occupied) {
                 edges.push(Edge { at: change.at, sensor: change.sensor, is_occupied });
             }

@@ -14,6 +14,8 @@ use crate::train::Train;
 
 /// What is left free before and behind a train that is put down (chosen: a finger's breadth).
 const FREE_MM: f64 = 15.0;
+/// The length of what a train pulls on a layout of blocks (chosen: none longer than the shortest block of a home layout).
+const CARRIAGES_MM: core::ops::Range<f64> = 100.0..500.0;
 /// Places tried for a train for which there is no circuit of its own.
 const TRIES: usize = 1000;
 
@@ -52,6 +54,9 @@ impl<'l> LivingLayout<'l> {
             let mut train = Train::draw(own, law);
             switches.physics.shape(own, &mut train);
             train.set_decoder(switches.decoder);
+            if !layout.blocks().is_empty() {
+                train.couple(Length::from_mm(Draws::new(own, Purpose::Living).uniform(CARRIAGES_MM)));
+            }
             let warmth = if switches.physics.includes(PhysicsRange::WarmUp) { 0.0 } else { switches.warmth };
             world.add(*id, train, warmth);
             let sidings = Circuit::sidings(layout, &every, nth);

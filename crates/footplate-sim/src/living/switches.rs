@@ -39,6 +39,7 @@ impl LivingSwitches {
                 missed: Ratio::from_percent(0.3),
                 stuck: Ratio::from_percent(0.1),
                 spurious_per_minute: 0.05,
+                flicker: Ratio::from_percent(1.0),
                 ..Faults::default()
             },
             turnout_failure: Ratio::from_percent(0.3),

@@ -1,7 +1,7 @@
 //! What really happens on a living layout: for scorers, and for nobody else.
 
 use footplate_core::track::Position;
-use footplate_core::{EdgeId, Length, SensorId, Speed, SpeedStep, Timestamp, TrainId};
+use footplate_core::{EdgeId, Length, SensorId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use crate::living::body::{Body, after};
 use crate::living::live_train::{End, LiveTrain};
@@ -119,15 +119,27 @@ impl<'w, 'l> Truth<'w, 'l> {
         Some(&*self.found(train)?.train)
     }
 
+    /// From the first to the last part of a train that detectors of blocks sense.
+    #[must_use]
+    pub fn sensed_length(&self, train: TrainId) -> Option<Length> {
+        Some(Length::from_mm(self.found(train)?.sensed().iter().sum()))
+    }
+
+    /// The usual release delay of a detector.
+    #[must_use]
+    pub fn release_delay(&self, detector: SensorId) -> Option<TimeSpan> {
+        self.world.s88.release_delay(detector)
+    }
+
     /// The rails as they are.
     #[must_use]
     pub fn track(&self) -> &'w TrueTrack {
         &self.world.rails.track
     }
 
-    /// How far the leading end of a train's shoe is past where it closes a contact, in true lengths, short of it if
-    /// negative: the way since it came by or, if that is nearer, the way to it as the turnouts lie. Nothing if neither
-    /// is less than 20 m.
+    /// How far the leading end of a train's shoe is past where it closes a contact, or the first part that detectors sense past
+    /// where it enters a block, in true lengths, short of it if negative: the way since it came by or, if that is nearer, the
+    /// way to it as the turnouts lie. Nothing if neither is less than 20 m.
     #[must_use]
     pub fn past(&self, train: TrainId, sensor: SensorId) -> Option<Length> {
         let found = self.found(train)?;
@@ -141,7 +153,9 @@ impl<'w, 'l> Truth<'w, 'l> {
         let just_past = self.contact(sensor).and_then(|usual| self.path_length(0.0, usual, place));
         let is_due = |mm: &f64| *mm < CLOSES_WITHIN_MM && since.is_none_or(|since| since > CLOSES_WITHIN_MM);
         let since = just_past.filter(is_due).or(since);
-        let before = self.way_to(place, sensor);
+        let is_entry = self.world.layout().block_of_entry(sensor).is_some();
+        let ahead = if is_entry { found.sensed()[0] } else { 0.0 };
+        let before = self.way_to((place.0, place.1 + ahead), sensor);
         let nearer = |since: f64, before: f64| if since <= before { since } else { -before };
         let mm = match (since, before) {
             (Some(since), Some(before)) => nearer(since, before),

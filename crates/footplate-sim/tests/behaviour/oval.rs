@@ -42,6 +42,7 @@ pub(crate) fn oval() -> Layout {
         stretches,
         never_both_curved: Vec::new(),
         zones: Vec::new(),
+        blocks: Vec::new(),
     })
     .unwrap()
 }

@@ -56,6 +56,7 @@ pub(crate) fn two_loops() -> Layout {
         stretches,
         never_both_curved: Vec::new(),
         zones: Vec::new(),
+        blocks: Vec::new(),
     })
     .unwrap()
 }

@@ -6,13 +6,15 @@ use super::drawing::LayoutFile;
 use super::error::LayoutFileError;
 use super::read::{parse_layout, read_layout};
 
-/// The built-in layouts by name: the two tracks of the course on real-time trains, and an earlier survey of the first.
-pub const BUILT_IN: [&str; 3] = ["track-a", "track-a-v1", "track-b"];
+/// The built-in layouts by name: the two tracks of the course on real-time trains, an earlier survey of the first, and an
+/// oval of blocks.
+pub const BUILT_IN: [&str; 4] = ["track-a", "track-a-v1", "track-b", "oval-blocks"];
 
-const TEXTS: [&str; 3] = [
+const TEXTS: [&str; 4] = [
     include_str!("../../layouts/track-a.toml"),
     include_str!("../../layouts/track-a-v1.toml"),
     include_str!("../../layouts/track-b.toml"),
+    include_str!("../../layouts/oval-blocks.toml"),
 ];
 
 /// A built-in layout.

@@ -73,7 +73,7 @@ pub fn draw_layout(file: &LayoutFile) -> Result<String, NothingToDraw> {
     let mut drawn: Vec<[f64; 2]> = Vec::new();
     for (id, kind, point) in places() {
         let (radius, colour) = match kind {
-            NodeKind::Sensor(_) => (SENSOR, "#c33"),
+            NodeKind::Sensor(_) | NodeKind::Boundary => (SENSOR, "#c33"),
             NodeKind::Branch(_) | NodeKind::Merge(_) => (TURNOUT, "#36c"),
             NodeKind::Enter | NodeKind::Exit => (TURNOUT, "#555"),
         };
@@ -93,7 +93,9 @@ pub fn draw_layout(file: &LayoutFile) -> Result<String, NothingToDraw> {
 /// The names of a node: both names of a sensor, the number of a turnout, the inbound name of an end.
 fn label(layout: &Layout, first: NodeId, kind: NodeKind) -> String {
     match kind {
-        NodeKind::Sensor(_) => format!("{} {}", layout.node_name(first), layout.node_name(first.reverse())),
+        NodeKind::Sensor(_) | NodeKind::Boundary => {
+            format!("{} {}", layout.node_name(first), layout.node_name(first.reverse()))
+        }
         NodeKind::Branch(turnout) | NodeKind::Merge(turnout) => turnout.to_string(),
         NodeKind::Enter | NodeKind::Exit => layout.node_name(first).to_owned(),
     }

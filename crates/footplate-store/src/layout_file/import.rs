@@ -50,6 +50,7 @@ pub fn import_layout<R: BufRead>(
         stretches: stretches.iter().map(|(_, stretch)| stretch.clone()).collect(),
         never_both_curved: context.never_both_curved.clone(),
         zones: Vec::new(),
+        blocks: Vec::new(),
     };
     let layout = Layout::build(&plan).map_err(|error| {
         let (file, line) = match error.entry() {
@@ -59,7 +60,8 @@ pub fn import_layout<R: BufRead>(
             | PlanEntry::Survey
             | PlanEntry::Distance(_)
             | PlanEntry::Pair(_)
-            | PlanEntry::Zone(_) => {
+            | PlanEntry::Zone(_)
+            | PlanEntry::Block(_) => {
                 return ImportError::Context(error);
             }
         };

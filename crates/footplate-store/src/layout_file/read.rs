@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use footplate_core::track::{
-    Layout, LayoutError, LayoutPlan, Leg, Place, PlanEntry, PlannedZone, RailEnd, Stretch, StretchLength,
-    Survey, SurveyedDistance, Zone,
+    Layout, LayoutError, LayoutPlan, Leg, Place, PlanEntry, PlannedBlock, PlannedZone, RailEnd, Stretch,
+    StretchLength, Survey, SurveyedDistance, Zone,
 };
-use footplate_core::{Length, Speed, StretchId, TurnoutId};
+use footplate_core::{Length, SensorId, Speed, StretchId, TurnoutId};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -116,6 +116,10 @@ struct Written {
     ends: Vec<Spanned<WrittenEnd>>,
     #[serde(default)]
     zones: Vec<Spanned<WrittenZone>>,
+    #[serde(default)]
+    blocks: Vec<Spanned<WrittenBlock>>,
+    #[serde(default)]
+    boundaries: Vec<Spanned<WrittenBoundary>>,
     edges: Vec<Spanned<WrittenEdge>>,
     #[serde(default)]
     distances: Vec<Spanned<WrittenDistance>>,
@@ -126,6 +130,22 @@ struct Written {
 struct WrittenSensor {
     names: [String; 2],
     numbers: Option<[u16; 2]>,
+    at: Option<Spanned<[f64; 2]>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenBlock {
+    name: String,
+    number: u16,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenBoundary {
+    names: [String; 2],
+    /// An empty name stands for track without a detector.
+    enters: [String; 2],
     at: Option<Spanned<[f64; 2]>>,
 }
 
@@ -171,7 +191,7 @@ struct WrittenZone {
 }
 
 impl Written {
-    /// The plan of the layout, in the order of the file: sensors, turnouts, ends.
+    /// The plan of the layout, with its places in the order sensors, turnouts, ends, boundaries.
     fn plan(&self) -> Result<LayoutPlan, Fault> {
         let sensors = self.sensors.iter().map(|sensor| sensor.get_ref().place(sensor.span().start));
         let turnouts = self.turnouts.iter().map(|turnout| {
@@ -179,6 +199,15 @@ impl Written {
             Ok(Place::Turnout { names: names.clone(), turnout: TurnoutId(*number) })
         });
         let ends = self.ends.iter().map(|end| Ok(Place::End { names: end.get_ref().names.clone() }));
+        let boundaries = self.boundaries.iter().map(|boundary| {
+            let WrittenBoundary { names, enters, .. } = boundary.get_ref();
+            let enters = enters.clone().map(|block| (!block.is_empty()).then_some(block));
+            Ok(Place::Boundary { names: names.clone(), enters })
+        });
+        let blocks = self.blocks.iter().map(|block| {
+            let WrittenBlock { name, number } = block.get_ref();
+            PlannedBlock { name: name.clone(), detector: SensorId(*number) }
+        });
         let stretches = self.edges.iter().map(|edge| {
             let WrittenEdge { from, to, .. } = edge.get_ref();
             Ok(Stretch { from: rail_end(from)?, to: rail_end(to)?, length: edge.get_ref().length()? })
@@ -194,7 +223,7 @@ impl Written {
                     .map_or(0.0, |part| part.get_ref() / 100.0),
                 distances: self.distances.iter().map(|distance| distance.get_ref().planned()).collect(),
             },
-            places: sensors.chain(turnouts).chain(ends).collect::<Result<_, _>>()?,
+            places: sensors.chain(turnouts).chain(ends).chain(boundaries).collect::<Result<_, _>>()?,
             stretches: stretches.collect::<Result<_, _>>()?,
             never_both_curved: self
                 .never_both_curved
@@ -202,6 +231,7 @@ impl Written {
                 .map(|pair| pair.get_ref().map(TurnoutId))
                 .collect(),
             zones: self.zones()?,
+            blocks: blocks.collect(),
         })
     }
 
@@ -232,14 +262,16 @@ impl Written {
         let sensors = self.sensors.iter().map(|sensor| sensor.get_ref().at.as_ref());
         let turnouts = self.turnouts.iter().map(|turnout| turnout.get_ref().at.as_ref());
         let ends = self.ends.iter().map(|end| end.get_ref().at.as_ref());
-        sensors.chain(turnouts).chain(ends)
+        let boundaries = self.boundaries.iter().map(|boundary| boundary.get_ref().at.as_ref());
+        sensors.chain(turnouts).chain(ends).chain(boundaries)
     }
 
     /// The byte that an error of the layout refers to.
     fn place_of(&self, error: &LayoutError) -> usize {
         let mut places = (self.sensors.iter().map(|sensor| sensor.span().start))
             .chain(self.turnouts.iter().map(|turnout| turnout.span().start))
-            .chain(self.ends.iter().map(|end| end.span().start));
+            .chain(self.ends.iter().map(|end| end.span().start))
+            .chain(self.boundaries.iter().map(|boundary| boundary.span().start));
         let start = match error.entry() {
             PlanEntry::Place(place) => places.nth(place),
             PlanEntry::Stretch(stretch) => self.edges.get(stretch).map(|edge| edge.get_ref().place_of(error)),
@@ -255,6 +287,7 @@ impl Written {
             PlanEntry::Distance(distance) => {
                 self.distances.get(distance).map(|distance| distance.span().start)
             }
+            PlanEntry::Block(block) => self.blocks.get(block).map(|block| block.span().start),
             PlanEntry::Plan => None,
         };
         start.unwrap_or(0)
@@ -269,7 +302,7 @@ impl WrittenSensor {
             ModuleLetters.sensor_named(name).ok_or_else(unknown)
         };
         let sensors = match self.numbers {
-            Some(numbers) => numbers.map(footplate_core::SensorId),
+            Some(numbers) => numbers.map(SensorId),
             None => [number_in(one)?, number_in(other)?],
         };
         Ok(Place::Sensor { names: self.names.clone(), sensors })

@@ -1,6 +1,8 @@
 //! Writes a layout as readable TOML that reads back as the same layout.
 
-use footplate_core::track::{Edge, Layout, Leg, Node, NodeKind, StretchLength, SurveyedDistance, Zone};
+use footplate_core::track::{
+    Block, Edge, Layout, Leg, Node, NodeKind, StretchLength, SurveyedDistance, Zone,
+};
 use footplate_core::{Length, NodeId};
 
 use super::drawing::{Drawing, LayoutFile};
@@ -33,16 +35,25 @@ pub fn write_layout(file: &LayoutFile) -> String {
     }
     let places = Places { layout, drawing };
     text += "\n# A sensor has one name for each direction of travel.\n";
-    text += &list("sensors", places.lines(|kind| matches!(kind, NodeKind::Sensor(_))));
+    text += &list(
+        "sensors",
+        places.lines(|layout, id, node| matches!(node.kind, NodeKind::Sensor(_)) && !layout.is_boundary(id)),
+    );
     text += "\n# A turnout has one name for trains from its toe, and one for trains from its legs.\n";
-    text += &list("turnouts", places.lines(|kind| matches!(kind, NodeKind::Branch(_))));
+    text += &list("turnouts", places.lines(|_, _, node| matches!(node.kind, NodeKind::Branch(_))));
     if !layout.never_both_curved().is_empty() {
         let pairs = layout.never_both_curved().iter().map(|[one, other]| format!("[{one}, {other}]"));
         text += "\n# Turnouts in one place, of which at most one may lie curved.\n";
         text += &format!("never_both_curved = [{}]\n", pairs.collect::<Vec<_>>().join(", "));
     }
     text += "\n# Track ends: first the name of the inbound direction, then of the outbound one.\n";
-    text += &list("ends", places.lines(|kind| matches!(kind, NodeKind::Enter)));
+    text += &list("ends", places.lines(|_, _, node| matches!(node.kind, NodeKind::Enter)));
+    if !layout.blocks().is_empty() {
+        text += "\n# Blocks have an occupancy detector, which reports this number.\n";
+        text += &list("blocks", layout.blocks().iter().map(block));
+        text += "\n# Their boundaries: one name for each direction of travel, and the block that a train enters there.\n";
+        text += &list("boundaries", places.lines(|layout, id, _| layout.is_boundary(id)));
+    }
     if !layout.zones().is_empty() {
         text += "\n# Speed restrictions: edges name the zone that they are in.\n";
         text += &list("zones", layout.zones().iter().map(zone));
@@ -76,9 +87,11 @@ struct Places<'f> {
 }
 
 impl<'f> Places<'f> {
-    fn lines(&self, is_wanted: impl Fn(NodeKind) -> bool) -> impl Iterator<Item = String> {
+    fn lines(&self, is_wanted: impl Fn(&Layout, NodeId, &Node) -> bool) -> impl Iterator<Item = String> {
         let firsts = self.layout.nodes().step_by(2);
-        firsts.filter(move |(_, node)| is_wanted(node.kind)).map(|(id, node)| self.line(id, node))
+        firsts
+            .filter(move |(id, node)| is_wanted(self.layout, *id, node))
+            .map(|(id, node)| self.line(id, node))
     }
 
     fn line(&self, id: NodeId, node: &Node) -> String {
@@ -88,7 +101,14 @@ impl<'f> Places<'f> {
             line += &format!("number = {turnout}, ");
         }
         line += &format!("names = [{}, {}]", quoted(&node.name), quoted(self.layout.node_name(other)));
-        if let (Some(one), Some(two)) = (self.layout.sensor_at(id), self.layout.sensor_at(other)) {
+        if self.layout.is_boundary(id) {
+            let enters = [id, other].map(|node| {
+                let entry = self.layout.sensor_at(node);
+                let block = entry.and_then(|entry| self.layout.block_of_entry(entry));
+                quoted(block.map_or("", |block| block.name.as_str()))
+            });
+            line += &format!(", enters = [{}]", enters.join(", "));
+        } else if let (Some(one), Some(two)) = (self.layout.sensor_at(id), self.layout.sensor_at(other)) {
             let stated =
                 [&node.name, self.layout.node_name(other)].map(|name| ModuleLetters.sensor_named(name));
             if stated != [Some(one), Some(two)] {
@@ -129,6 +149,10 @@ fn distance(distance: &SurveyedDistance) -> String {
     let SurveyedDistance { from, to, length, uncertainty } = distance;
     let (mm, uncertainty) = (millimetres(*length), millimetres(*uncertainty));
     format!("from = {}, to = {}, mm = {mm}, uncertainty_mm = {uncertainty}", quoted(from), quoted(to))
+}
+
+fn block(block: &Block) -> String {
+    format!("name = {}, number = {}", quoted(&block.name), block.detector)
 }
 
 fn zone(zone: &Zone) -> String {

@@ -67,6 +67,12 @@ impl<'a> OwnLog<'a> {
                 let sensor = row.read(column, &sensors.example(), |name| sensors.sensor_named(name))?;
                 EventKind::Sensor(Report { sensor, poll_interval: self.poll_interval(row)? })
             }
+            "freed" => {
+                let column = row.needs(self.name, "name", "a `freed` row")?;
+                let sensor =
+                    row.read(column, "the name of a block of this layout", |name| sensors.block_named(name))?;
+                EventKind::Freed(Report { sensor, poll_interval: self.poll_interval(row)? })
+            }
             "running" => {
                 let (train, step) = (self.train(row, run)?, self.step(row, "a `running` row")?);
                 return Ok(Entry::Running(TrainAtStart { train, step }));
@@ -99,7 +105,8 @@ impl<'a> OwnLog<'a> {
                 return Ok(Entry::Gate(row.read(column, "a gate such as `L0`", gate_named)?));
             }
             _ => {
-                let kinds = "`sensor`, `speed`, `reverse`, `turnout`, `stopped`, `running` or `gate`";
+                let kinds =
+                    "`sensor`, `freed`, `speed`, `reverse`, `turnout`, `stopped`, `running` or `gate`";
                 return Err(row.wrong(self.kind, kinds));
             }
         };
@@ -181,7 +188,7 @@ impl FormReader for OwnLog<'_> {
                     EventKind::Speed { train, .. }
                     | EventKind::Reverse { train }
                     | EventKind::Stopped { train, .. } => Some(train),
-                    EventKind::Sensor(_) | EventKind::Turnout { .. } => None,
+                    EventKind::Sensor(_) | EventKind::Freed(_) | EventKind::Turnout { .. } => None,
                 };
                 if let Some(train) = told.filter(|train| !run.knows(*train)) {
                     run.trains.push(TrainAtStart { train, step: SpeedStep::STAND });

@@ -47,10 +47,12 @@ pub fn write_sensor_log(
         for raw in &run.events {
             write!(out, "{},{},", run.id, seconds(run, raw.event.time))?;
             match raw.event.kind {
-                EventKind::Sensor(report) => {
+                EventKind::Sensor(report) | EventKind::Freed(report) => {
+                    let is_detection = matches!(raw.event.kind, EventKind::Sensor(_));
+                    let kind = if is_detection { "sensor" } else { "freed" };
                     let poll =
                         report.poll_interval.map_or_else(String::new, |span| unscaled(span.as_ns(), 6));
-                    writeln!(out, "sensor,{},,,,,,{poll}", name_of(report.sensor)?)?;
+                    writeln!(out, "{kind},{},,,,,,{poll}", name_of(report.sensor)?)?;
                 }
                 EventKind::Speed { train, step } => writeln!(out, "speed,,{train},{step},,,,")?,
                 EventKind::Reverse { train } => writeln!(out, "reverse,,{train},,,,,")?,

@@ -10,6 +10,10 @@ use super::checksum;
 use super::recordings::RunKey;
 use crate::recording::RawEvent;
 
+/// The step of a sensor's row that reports a block free. The schema knows no kind of its own for it, and older programs
+/// ignore the number of a detector.
+const FREE: u8 = 0;
+
 /// The columns that [`read`] expects, in its order.
 pub(super) const COLUMNS: &str =
     "line, time_ns, kind, sensor, poll_interval_ns, train, step, turnout, curved, offset_m";
@@ -29,9 +33,10 @@ pub(super) fn insert(
 ) -> rusqlite::Result<()> {
     let mut columns = Columns::default();
     let kind = match event.kind {
-        EventKind::Sensor(report) => {
+        EventKind::Sensor(report) | EventKind::Freed(report) => {
             columns.sensor = Some(report.sensor.0);
             columns.poll_interval_ns = report.poll_interval.map(TimeSpan::as_ns);
+            columns.step = matches!(event.kind, EventKind::Freed(_)).then_some(FREE);
             "sensor"
         }
         EventKind::Speed { train, step } => {
@@ -92,10 +97,9 @@ pub(super) fn read(row: &Row<'_>, first: usize) -> rusqlite::Result<RawEvent> {
     let kind = match kind.as_str() {
         "sensor" => {
             let poll_interval: Option<i64> = row.get(first + 4)?;
-            EventKind::Sensor(Report {
-                sensor: sensor()?,
-                poll_interval: poll_interval.map(TimeSpan::from_ns),
-            })
+            let report = Report { sensor: sensor()?, poll_interval: poll_interval.map(TimeSpan::from_ns) };
+            let state: Option<u8> = row.get(first + 6)?;
+            if state == Some(FREE) { EventKind::Freed(report) } else { EventKind::Sensor(report) }
         }
         "speed" => EventKind::Speed { train: train()?, step: step(row, first + 6)? },
         "reverse" => EventKind::Reverse { train: train()? },

@@ -295,3 +295,36 @@ fn a_file_that_is_not_there_or_too_large_is_named() {
             .starts_with("empty.toml, line 1, column 1: missing field")
     );
 }
+
+/// The message for the built-in oval of blocks with one thing changed.
+fn complaint_of_blocks(from: &str, to: &str) -> String {
+    let text = include_str!("../../layouts/oval-blocks.toml");
+    assert!(text.contains(from), "{from}");
+    let text = text.replace(from, to);
+    parse_layout("oval.toml", text.as_bytes()).unwrap_err().to_string()
+}
+
+#[test]
+fn a_block_that_is_wrong_is_named_with_its_place() {
+    assert_eq!(
+        complaint_of_blocks("enters = [\"right curve\"", "enters = [\"curve\""),
+        "oval.toml, line 35, column 3: no block is called `curve`: add `{ name = \"curve\", number = .. }` to `blocks`"
+    );
+    assert_eq!(
+        complaint_of_blocks("[\"back right\", \"right curve\"]", "[\"back right\", \"\"]"),
+        "oval.toml, line 36, column 3: the rails at `B8` belong to block `right curve`, but trains enter no block there: \
+         write `right curve` in `enters`, or put a boundary between"
+    );
+    assert_eq!(
+        complaint_of_blocks("number = 4", "number = 3"),
+        "oval.toml, line 27, column 3: detector 3 belongs to `back right` already; give the number that this block reports"
+    );
+    assert_eq!(
+        complaint_of_blocks("blocks = [\n", "blocks = [\n  { name = \"yard\", number = 9 },\n"),
+        "oval.toml, line 23, column 3: no boundary leads into block `yard`: name it in `enters` of its boundaries"
+    );
+    assert_eq!(
+        complaint_of_blocks("number = 5", "number = 65536"),
+        "oval.toml, line 28, column 36: invalid value: integer `65536`, expected a whole number from 0 to 65535"
+    );
+}

@@ -189,7 +189,7 @@ fn what_is_neither_built_in_nor_a_file_is_told_what_there_is() {
     let error = layout_named("track-c").unwrap_err();
     assert_eq!(
         error.to_string(),
-        "there is no layout `track-c`: give track-a or track-a-v1 or track-b, or the path of a layout file"
+        "there is no layout `track-c`: give track-a or track-a-v1 or track-b or oval-blocks, or the path of a layout file"
     );
     assert!(parse_layout("empty.toml", b"").is_err());
 }

@@ -103,6 +103,7 @@ fn tables(layout: &Layout) -> (String, String) {
             NodeKind::Sensor(sensor) => ("sensor", sensor.0),
             NodeKind::Branch(turnout) => ("branch", turnout.0),
             NodeKind::Merge(turnout) => ("merge", turnout.0),
+            NodeKind::Boundary => unreachable!("these layouts have no blocks"),
             NodeKind::Enter => ("enter", 1),
             NodeKind::Exit => ("exit", 1),
         };
@@ -179,11 +180,12 @@ fn any_layout() -> impl Strategy<Value = LayoutFile> {
                 to: plain("out".to_owned()),
                 length: mm(1.0).into(),
             });
-            // Files list sensors, turnouts, ends.
+            // Files list sensors, boundaries, turnouts, ends.
             places.sort_by_key(|place| match place {
                 Place::Sensor { .. } => 0,
-                Place::Turnout { .. } => 1,
-                Place::End { .. } => 2,
+                Place::Boundary { .. } => 1,
+                Place::Turnout { .. } => 2,
+                Place::End { .. } => 3,
             });
             // A zone on every third stretch from some place on.
             let zones = (0_u16..).zip(&limits).map(|(number, (um_s, from))| PlannedZone {
@@ -198,7 +200,15 @@ fn any_layout() -> impl Strategy<Value = LayoutFile> {
             });
             let zones = zones.collect();
             let survey = Survey::taped(Length::from_mm(2.5), "made up".to_owned());
-            let plan = LayoutPlan { name, survey, places, stretches, never_both_curved: vec![], zones };
+            let plan = LayoutPlan {
+                name,
+                survey,
+                places,
+                stretches,
+                never_both_curved: vec![],
+                zones,
+                blocks: vec![],
+            };
             let layout = Layout::build(&plan).unwrap();
             let mut drawing = Drawing::default();
             for (node, x, y) in points {

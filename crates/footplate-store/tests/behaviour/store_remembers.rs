@@ -56,13 +56,16 @@ fn events_of_a_live_session_come_in_as_they_happen() {
         }),
     };
     store.append(run, &[event(1, 10), event(2, 11)], minute(1)).unwrap();
-    store.append(run, &[event(3, 12)], minute(2)).unwrap();
+    let report = Report { sensor: SensorId(12), poll_interval: None };
+    let freed = Event { kind: EventKind::Freed(report), ..event(4, 12) };
+    store.append(run, &[event(3, 12), freed], minute(2)).unwrap();
 
     let [at_one, at_two] = [1, 2].map(|minutes| store.runs(recording, minute(minutes)).unwrap());
     assert_eq!(at_one[0].events.len(), 2);
     assert_eq!(at_two[0].accepted().reports().count(), 3);
     assert_eq!(at_two[0].trains, trains);
     assert_eq!(at_two[0].events[2].raw.event, event(3, 12));
+    assert_eq!(at_two[0].events[3].raw.event, freed, "the release of a block is no detection");
     let listed = &store.recordings(minute(1)).unwrap()[0];
     assert_eq!((listed.form.as_str(), listed.layout.as_str(), listed.events), ("live", "track-b", 2));
 }

@@ -6,7 +6,7 @@ use alloc::string::ToString;
 use alloc::vec::Vec;
 
 use footplate_core::{
-    Command, DecoderSteps, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+    Command, DecoderSteps, FunctionNumber, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
 };
 
 use super::framing::Framing;
@@ -242,6 +242,10 @@ impl Session for Client {
         self.dialogue.push(command)?;
         self.go_on(now);
         Ok(())
+    }
+
+    fn report_releases(&mut self, of: &[SensorId]) {
+        self.dialogue.released = of.to_vec();
     }
 
     fn expect_delays(&mut self, excess: TimeSpan) {

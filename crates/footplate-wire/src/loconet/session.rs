@@ -6,7 +6,8 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use footplate_core::{
-    Command, DecoderSteps, EventKind, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+    Command, DecoderSteps, EventKind, FunctionNumber, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId,
+    TurnoutId,
 };
 
 use super::line::{Line, Lines};
@@ -373,6 +374,10 @@ impl Session for Client {
         self.dialogue.push(command)?;
         self.go_on(now);
         Ok(())
+    }
+
+    fn report_releases(&mut self, of: &[SensorId]) {
+        self.dialogue.released = of.to_vec();
     }
 
     fn expect_delays(&mut self, excess: TimeSpan) {

@@ -32,11 +32,13 @@ pub(super) struct Contacts(Vec<Contact>);
 /// What a report means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum News {
-    /// The contact has become occupied, and when the station saw it.
+    /// It has become occupied, and when the station saw it.
     Occupied(Span),
+    /// It has become free, and when the station saw it.
+    Freed(Span),
     /// It was occupied before it was first read.
     HeldFromStart,
-    /// No change, or free.
+    /// No change.
     None,
 }
 
@@ -69,7 +71,7 @@ impl Contacts {
             return News::Occupied(seen);
         }
         if !is_inferred {
-            return News::None;
+            return News::Freed(seen);
         }
         let since = Span { earliest: known - NETWORK_LONGEST, latest: window.latest };
         News::Occupied(lasted.and_then(|ticks| window.earlier_by(ticks)?.and(since)).unwrap_or(since))
@@ -95,7 +97,7 @@ impl Contacts {
         }
         contact.seen = None;
         if !is_occupied {
-            return News::None;
+            return News::Freed(Span { earliest: known - NETWORK_LONGEST, latest: now });
         }
         // What follows as a report of this change is that change.
         let change = ContactChange { was_occupied: false, is_occupied: true, lasted: None };
@@ -133,6 +135,10 @@ mod tests {
         matches!(news, News::Occupied(_))
     }
 
+    fn is_freed(news: News) -> bool {
+        matches!(news, News::Freed(_))
+    }
+
     #[test]
     fn a_contact_is_reported_once_each_time_it_becomes_occupied() {
         let mut contacts = Contacts::default();
@@ -142,10 +148,10 @@ mod tests {
         // The same datagram again, and an answer that was made before.
         assert_eq!(contacts.changed(ms(2_030), 5, change(false, true, 200)), News::None);
         assert_eq!(contacts.asked(ms(2_040), 5, false, false), News::None);
-        assert_eq!(contacts.changed(ms(2_300), 5, change(true, false, 30)), News::None);
+        assert!(is_freed(contacts.changed(ms(2_300), 5, change(true, false, 30))));
         // A second occupation after exactly as long is another one.
         assert!(is_occupied(contacts.changed(ms(4_300), 5, change(false, true, 200))));
-        assert_eq!(contacts.changed(ms(9_000), 3, change(true, false, 900)), News::None);
+        assert!(is_freed(contacts.changed(ms(9_000), 3, change(true, false, 900))));
     }
 
     #[test]
@@ -163,7 +169,7 @@ mod tests {
         assert_eq!((span.earliest, span.latest), (ms(3_000) - NETWORK_LONGEST, ms(4_000)));
         // The report that was overtaken by the answer is no second one.
         assert_eq!(contacts.changed(ms(4_010), 5, change(false, true, 170)), News::None);
-        assert_eq!(contacts.changed(ms(4_500), 5, change(true, false, 50)), News::None);
+        assert!(is_freed(contacts.changed(ms(4_500), 5, change(true, false, 50))));
     }
 
     #[test]
@@ -177,7 +183,7 @@ mod tests {
         assert!(span.latest <= ms(3_210) && ms(3_200) <= span.latest, "{span:?}");
         // Without that time the span is as wide as the network makes it.
         let news = contacts.changed(ms(3_400), 5, ContactChange { lasted: None, ..change(true, false, 0) });
-        assert_eq!(news, News::None);
+        assert!(is_freed(news));
         let unknown = ContactChange { lasted: Some(0), ..change(false, true, 0) };
         let News::Occupied(span) = contacts.changed(ms(5_000), 5, unknown) else { panic!() };
         assert_eq!(span, Span::of_report(ms(5_000)));

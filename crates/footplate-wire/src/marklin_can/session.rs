@@ -5,7 +5,7 @@ mod hearing;
 
 use alloc::vec::Vec;
 
-use footplate_core::{Command, DecoderSteps, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Command, DecoderSteps, SensorId, TimeSpan, Timestamp, TrainId};
 
 use super::contacts::Contacts;
 use super::frame::hash_of;
@@ -253,6 +253,10 @@ impl Session for Client {
         self.dialogue.push(command)?;
         self.go_on(now);
         Ok(())
+    }
+
+    fn report_releases(&mut self, of: &[SensorId]) {
+        self.dialogue.released = of.to_vec();
     }
 
     fn expect_delays(&mut self, excess: TimeSpan) {

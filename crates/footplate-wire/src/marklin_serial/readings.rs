@@ -9,7 +9,7 @@ use super::s88::ModuleState;
 /// The last complete readings of all modules.
 ///
 /// A contact is reported once when it closes, not again at every poll that still sees it: it closed once, and only the
-/// first reading bounds when. What the first reading of a module shows may be a memory of before and is not reported.
+/// first reading bounds when. It is reported again when it opens. What the first reading of a module shows may be a memory of before and is not reported.
 #[derive(Debug, Clone)]
 pub(super) struct Readings {
     modules: Vec<Reading>,
@@ -29,6 +29,8 @@ struct Reading {
 pub(super) enum Read {
     /// It closed after the previous reading.
     Closed(Event),
+    /// It opened after the previous reading.
+    Opened(Event),
     /// It was closed from the start.
     Held(SensorId),
 }
@@ -54,9 +56,12 @@ impl Readings {
                 known.first_two = false;
                 known.state.both(state).closed().for_each(|sensor| found(Read::Held(sensor)));
             }
+            let report = |sensor| Report { sensor, poll_interval: Some(asked - before) };
             for sensor in state.since(known.state).closed() {
-                let report = Report { sensor, poll_interval: Some(asked - before) };
-                found(Read::Closed(Event { time: asked, kind: EventKind::Sensor(report) }));
+                found(Read::Closed(Event { time: asked, kind: EventKind::Sensor(report(sensor)) }));
+            }
+            for sensor in known.state.since(state).closed() {
+                found(Read::Opened(Event { time: asked, kind: EventKind::Freed(report(sensor)) }));
             }
         }
         known.asked = Some(asked);
@@ -96,13 +101,18 @@ mod tests {
         Read::Closed(Event { time: ms(asked), kind: EventKind::Sensor(report) })
     }
 
+    fn opened(asked: i64, sensor: u16, interval: i64) -> Read {
+        let report = Report { sensor: SensorId(sensor), poll_interval: Some(TimeSpan::from_ms(interval)) };
+        Read::Opened(Event { time: ms(asked), kind: EventKind::Freed(report) })
+    }
+
     #[test]
     fn a_contact_is_reported_once_each_time_it_closes() {
         let mut readings = Readings::new(1);
         assert_eq!(read(&mut readings, 0, &[]), []);
         assert_eq!(read(&mut readings, 60, &[3]), [closed(60, 3, 60)]);
         assert_eq!(read(&mut readings, 120, &[3]), []);
-        assert_eq!(read(&mut readings, 180, &[]), []);
+        assert_eq!(read(&mut readings, 180, &[]), [opened(180, 3, 60)]);
         assert_eq!(read(&mut readings, 250, &[3, 4]), [closed(250, 3, 70), closed(250, 4, 70)]);
     }
 
@@ -110,8 +120,8 @@ mod tests {
     fn a_memory_of_before_is_no_report() {
         let mut readings = Readings::new(1);
         assert_eq!(read(&mut readings, 0, &[3, 7]), []);
-        assert_eq!(read(&mut readings, 60, &[7]), [Read::Held(SensorId(7))]);
-        assert_eq!(read(&mut readings, 120, &[3]), [closed(120, 3, 60)]);
+        assert_eq!(read(&mut readings, 60, &[7]), [Read::Held(SensorId(7)), opened(60, 3, 60)]);
+        assert_eq!(read(&mut readings, 120, &[3]), [closed(120, 3, 60), opened(120, 7, 60)]);
         assert_eq!(read(&mut readings, 180, &[3, 7]), [closed(180, 7, 60)]);
     }
 

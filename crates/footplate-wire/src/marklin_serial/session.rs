@@ -44,6 +44,8 @@ pub struct Interface {
     solenoid: Solenoid,
     readings: Readings,
     polls: Polls,
+    /// The sensors that are also reported when they become free.
+    released: Vec<SensorId>,
     silence: Silence,
     reply_time: ReplyTime,
     recovery: Recovery,
@@ -83,6 +85,7 @@ impl Interface {
             solenoid: Solenoid::default(),
             readings: Readings::new(settings.modules),
             polls: Polls::new(settings.modules),
+            released: Vec::new(),
             silence: Silence::default(),
             reply_time: ReplyTime::new(settings.reply_allowance),
             recovery: Recovery::default(),
@@ -383,6 +386,10 @@ impl Session for Interface {
 
     fn watch(&mut self, sensor: Option<SensorId>) {
         self.polls.watch(sensor);
+    }
+
+    fn report_releases(&mut self, of: &[SensorId]) {
+        self.released = of.to_vec();
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {

@@ -30,7 +30,9 @@ pub(super) enum Change {
     Occupied { free_at: Option<Timestamp> },
     /// It was occupied before it was first read.
     HeldFromStart,
-    /// No change, or free.
+    /// It became free.
+    Freed,
+    /// No change.
     None,
 }
 
@@ -57,6 +59,7 @@ impl Sensors {
             sensor.free_at = Some(now);
             if was_occupied {
                 sensor.freed = Some(now);
+                return Change::Freed;
             }
         }
         if is_occupied && !was_occupied && !bounces { Change::Occupied { free_at } } else { Change::None }
@@ -79,7 +82,7 @@ mod tests {
         assert_eq!(sensors.heard(at(100), 5, false, false), Change::None);
         assert_eq!(sensors.heard(at(900), 5, true, false), Change::Occupied { free_at: Some(at(100)) });
         assert_eq!(sensors.heard(at(910), 5, true, false), Change::None, "it came twice");
-        assert_eq!(sensors.heard(at(1_300), 5, false, false), Change::None);
+        assert_eq!(sensors.heard(at(1_300), 5, false, false), Change::Freed);
         assert_eq!(sensors.heard(at(2_000), 5, true, false), Change::Occupied { free_at: Some(at(1_300)) });
         assert_eq!(sensors.heard(at(2_000), 9, true, false), Change::Occupied { free_at: None });
     }
@@ -90,11 +93,11 @@ mod tests {
         sensors.heard(at(0), 5, false, true);
         assert!(matches!(sensors.heard(at(1_000), 5, true, false), Change::Occupied { .. }));
         // The answer from before it was occupied comes late, and the next puts it right.
-        assert_eq!(sensors.heard(at(1_004), 5, false, false), Change::None);
+        assert_eq!(sensors.heard(at(1_004), 5, false, false), Change::Freed);
         assert_eq!(sensors.heard(at(1_200), 5, true, false), Change::None);
         // It is free, and the message of before comes late.
-        assert_eq!(sensors.heard(at(1_500), 5, false, false), Change::None);
+        assert_eq!(sensors.heard(at(1_500), 5, false, false), Change::Freed);
         assert_eq!(sensors.heard(at(1_520), 5, true, false), Change::None);
-        assert_eq!(sensors.heard(at(1_700), 5, false, false), Change::None);
+        assert_eq!(sensors.heard(at(1_700), 5, false, false), Change::Freed);
     }
 }

@@ -6,7 +6,9 @@ mod hearing;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use footplate_core::{Command, DecoderSteps, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{
+    Command, DecoderSteps, EventKind, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+};
 
 use super::broadcasts::Broadcasts;
 use super::outstanding::Awaited;
@@ -300,6 +302,10 @@ impl Session for Client {
         self.dialogue.push(command)?;
         self.go_on(now);
         Ok(())
+    }
+
+    fn report_releases(&mut self, of: &[SensorId]) {
+        self.dialogue.released = of.to_vec();
     }
 
     fn expect_delays(&mut self, excess: TimeSpan) {

@@ -28,9 +28,7 @@ use self::z21_figures::Z21Figures;
 use super::Outcome;
 use super::plot::PictureFile;
 use crate::clock::now;
-use crate::link::{
-    Address, Link, MeasuredLine, Passed, Speed, StationSession, TappedLink, open, open_session,
-};
+use crate::link::{Address, Link, MeasuredLine, Passed, Speed, Station, TappedLink, open, open_session};
 use crate::runtime::{Attendant, Ended, Runtime, StopFlag, Wish};
 
 /// A command now and then, to see what one costs; as rare as commands are when trains are driven.
@@ -101,16 +99,14 @@ impl Arguments {
         }
         let heard =
             Heard { passed: runtime.link().passed(), ear: &ear, has_cts: runtime.link().cts().is_some() };
-        let lost_share = match runtime.session() {
-            StationSession::Marklin(interface) => self.report_interface(interface, &heard, output)?,
-            StationSession::DccEx(_) => self.report(&BoardFigures::of(heard.passed), &heard, output)?,
-            StationSession::Z21(session) => {
+        let lost_share = match runtime.session().station() {
+            Station::Marklin(interface) => self.report_interface(interface, &heard, output)?,
+            Station::DccEx(_) => self.report(&BoardFigures::of(heard.passed), &heard, output)?,
+            Station::Z21(session) => {
                 self.report(&Z21Figures::of(heard.passed, session.settings()), &heard, output)?
             }
-            StationSession::Can(session) => {
-                self.report(&CanFigures::of(heard.passed, session), &heard, output)?
-            }
-            StationSession::LocoNet(session) => {
+            Station::Can(session) => self.report(&CanFigures::of(heard.passed, session), &heard, output)?,
+            Station::LocoNet(session) => {
                 self.report(&LocoNetFigures::of(heard.passed, session.settings()), &heard, output)?
             }
         };

@@ -230,7 +230,7 @@ impl LayoutPicture {
                 NodeKind::Sensor(sensor) => ("contact", Some(sensor.0)),
                 NodeKind::Branch(turnout) => ("branch", Some(turnout.0)),
                 NodeKind::Merge(turnout) => ("merge", Some(turnout.0)),
-                NodeKind::Enter | NodeKind::Exit => ("end", None),
+                NodeKind::Enter | NodeKind::Exit | NodeKind::Boundary => ("end", None),
             };
             NodePicture { id: id.0, name: node.name.clone(), kind, number, point: file.drawing.point(id) }
         };

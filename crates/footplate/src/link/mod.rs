@@ -56,5 +56,5 @@ pub(crate) use served::{Incoming, Server, listen_for_datagrams, listen_on, open_
 pub(crate) use simulated::SimulatedLink;
 pub(crate) use simulated_station::{FromSimulated, SimulatedStation};
 pub(crate) use station_kind::StationKind;
-pub(crate) use station_session::StationSession;
+pub(crate) use station_session::{Station, StationSession};
 pub(crate) use tapped::{Passed, TappedLink};

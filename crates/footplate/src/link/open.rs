@@ -91,9 +91,14 @@ pub(crate) fn station<'l>(
     })
 }
 
+/// The highest number under which the station reports a sensor of a layout.
+fn highest_input(layout: &Layout) -> u16 {
+    layout.sensors().map(|(sensor, _)| layout.input(sensor).0).max().unwrap_or_default()
+}
+
 /// How many modules the contacts of a layout are on.
 pub(crate) fn module_count(layout: &Layout) -> u8 {
-    let highest = layout.sensors().map(|(sensor, _)| sensor.0).max().unwrap_or_default();
+    let highest = highest_input(layout);
     u8::try_from(highest / CONTACTS_PER_MODULE + 1).unwrap_or(u8::MAX)
 }
 
@@ -107,7 +112,7 @@ pub(crate) fn open_session(
     layout: &Layout,
 ) -> anyhow::Result<StationSession> {
     let (now, modules) = (link.now(), module_count(layout));
-    Ok(match address {
+    let session: StationSession = match address {
         Address::Simulated(simulated) => match simulated.station {
             StationKind::Marklin => Interface::new(now, Settings::with_cts(modules))?.into(),
             StationKind::DccEx => dcc_ex::Client::new(now, dcc_ex::Settings::default()).into(),
@@ -130,19 +135,20 @@ pub(crate) fn open_session(
         Address::Z21(z21) => z21::Client::new(now, z21_settings(z21.settings, layout)).into(),
         Address::Can(can) => marklin_can::Client::new(now, can_settings(can, layout)).into(),
         Address::LocoNet(server) => loconet::Client::new(now, server.settings).into(),
-    })
+    };
+    Ok(session.with_blocks(layout))
 }
 
 /// Settings that know how many sensors the layout has.
 fn z21_settings(settings: z21::Settings, layout: &Layout) -> z21::Settings {
-    let highest = layout.sensors().map(|(sensor, _)| sensor.0).max().unwrap_or_default();
+    let highest = highest_input(layout);
     z21::Settings { last_sensor: highest.saturating_add(settings.first_sensor), ..settings }
 }
 
 /// Settings that know which modules the layout's contacts are on.
 fn can_settings(address: &CanAddress, layout: &Layout) -> marklin_can::Settings {
     let CanAddress { settings, modules, .. } = address;
-    let highest = layout.sensors().map(|(sensor, _)| sensor.0).max().unwrap_or_default();
+    let highest = highest_input(layout);
     let last = highest.saturating_add(settings.first_contact.max(1));
     let needed = u8::try_from(last.div_ceil(CONTACTS_PER_MODULE)).unwrap_or(u8::MAX);
     marklin_can::Settings { modules: modules.unwrap_or(needed), ..*settings }

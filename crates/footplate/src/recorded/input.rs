@@ -136,6 +136,7 @@ mod tests {
         let kinds = [
             EventKind::Sensor(report),
             EventKind::Sensor(Report { poll_interval: None, ..report }),
+            EventKind::Freed(report),
             EventKind::Speed { train, step },
             EventKind::Reverse { train },
             EventKind::Turnout { turnout: TurnoutId(11), curved: true },

@@ -162,6 +162,7 @@ fn two_ovals() -> Layout {
         stretches: (0..12).map(stretch).collect(),
         never_both_curved: Vec::new(),
         zones: Vec::new(),
+        blocks: Vec::new(),
     };
     Layout::build(&plan).expect("two ovals are a layout")
 }

@@ -57,7 +57,7 @@ fn every_line_of_the_log_that_needs_one_has_a_truth() {
                     EventKind::Sensor(report) => Some(("report", name(report.sensor))),
                     EventKind::Speed { step, .. } => Some(("command", step.to_string())),
                     EventKind::Stopped { landmark, .. } => Some(("stopped", name(landmark))),
-                    EventKind::Turnout { .. } | EventKind::Reverse { .. } => None,
+                    EventKind::Freed(_) | EventKind::Turnout { .. } | EventKind::Reverse { .. } => None,
                 });
             }
         }

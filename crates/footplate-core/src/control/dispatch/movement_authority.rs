@@ -22,7 +22,7 @@ pub(super) struct Start {
     pub(super) frozen: Vec<TurnoutNeed>,
     /// Its position once reversed, if it may reverse. A train that a sensor did not report runs ahead to be detected,
     /// and back only if no path leads ahead: it may be further back than estimated, and none of its reserved turnouts
-    /// is thrown then. A train on a turnout that it trailed continues: the turnout would derail it on the way back.
+    /// is thrown then. A train on a turnout that it trailed continues: the turnout would derail it going back.
     pub(super) reversed: Option<Position>,
     /// Whether it may back away from turnouts that it is too near to throw: not twice without a detection in between,
     /// because its position would become more and more uncertain.

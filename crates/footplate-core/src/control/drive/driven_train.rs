@@ -50,6 +50,8 @@ pub(super) struct DrivenTrain {
     pub(super) is_reversed: bool,
     /// The command that has not been sent yet, and since when it waits.
     unsent: Option<(Command, Timestamp)>,
+    /// When its speed is steady at the step sent last.
+    pub(super) steady_at: Timestamp,
     /// What should be reported next.
     pub(super) expected: Expectation,
     /// How often it was reported, and how often not.
@@ -78,6 +80,7 @@ impl DrivenTrain {
             commanded: SpeedStep::STAND,
             is_reversed: false,
             unsent: None,
+            steady_at: Timestamp::ZERO,
             expected: Expectation::default(),
             detections: DetectionCount::default(),
             end_of_authority: None,
@@ -90,8 +93,9 @@ impl DrivenTrain {
     }
 
     /// Replaces the motion model.
-    pub(super) fn set_model(&mut self, model: MotionModel) {
+    pub(super) fn set_model(&mut self, mut model: MotionModel) {
         self.widest_stop = widest_stop(&model);
+        model.keep_length(&self.model);
         self.model = model;
     }
 
@@ -222,6 +226,11 @@ impl DrivenTrain {
     ) {
         match event.kind {
             EventKind::Speed { step, .. } => {
+                let before =
+                    self.located(context, event.time).map_or(SpeedStep::STAND, |located| located.step);
+                if before != step {
+                    self.steady_at = event.time + self.model.settles_within(before, step);
+                }
                 self.locator.handle_command(context, &self.model, event);
                 let train = self.id();
                 let waits_for = self.unsent.map(|(command, _)| command);

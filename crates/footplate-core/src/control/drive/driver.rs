@@ -1,6 +1,6 @@
 //! The driver: carries out orders, one report at a time.
 
-use alloc::collections::BTreeMap;
+use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 
 use crate::control::{Machine, Notice, Output};
@@ -43,6 +43,8 @@ pub struct Driver {
     pub(super) outputs: Outputs,
     /// The last detection of each sensor.
     last_detections: BTreeMap<SensorId, Timestamp>,
+    /// The detectors of blocks that are occupied. They do not report a second train.
+    pub(super) occupied: BTreeSet<SensorId>,
     /// Turnout commands that have not been sent yet, with their orders.
     pending_turnouts: Vec<(TurnoutId, OrderId)>,
     pub(super) association: DataAssociation,
@@ -61,6 +63,7 @@ impl Driver {
             trains: BTreeMap::new(),
             outputs: Outputs::default(),
             last_detections: BTreeMap::new(),
+            occupied: BTreeSet::new(),
             pending_turnouts: Vec::new(),
             association: DataAssociation::default(),
             orders: 0,
@@ -294,10 +297,16 @@ impl Driver {
         }
     }
 
+    /// A report, and the window of its time.
+    pub(super) fn detection(&self, time: Timestamp, report: Report) -> Detection {
+        let interval = report.poll_interval.unwrap_or(self.link.report_window).abs();
+        Detection { sensor: report.sensor, window: ContactWindow { after: time - interval, until: time } }
+    }
+
     fn report(&mut self, now: Timestamp, time: Timestamp, report: Report) {
         let sensor = report.sensor;
-        let interval = report.poll_interval.unwrap_or(self.link.report_window).abs();
-        let window = ContactWindow { after: time - interval, until: time };
+        let detection = self.detection(time, report);
+        let interval = detection.window.width();
         let before = self.last_detections.insert(sensor, time);
         if before.is_some_and(|before| time - before <= BOUNCE_TIME.max(interval)) {
             return;
@@ -305,7 +314,8 @@ impl Driver {
         while let Some(sensor) = self.association.next_restored(now) {
             self.outputs.notify(Notice::SensorRestored { sensor });
         }
-        let detection = Detection { sensor, window };
+        let detection = self.likeliest_entry(now, detection);
+        let sensor = detection.sensor;
         match self.association.resolve(&self.trains, self.track.context(), now, detection) {
             Some(Resolution::Revised(branch)) => self.revise(now, *branch),
             Some(Resolution::Spurious(detection)) => {
@@ -419,6 +429,7 @@ impl Machine for Driver {
                 }
             }
             EventKind::Turnout { turnout, curved } => self.turnout_sent(now, turnout, curved),
+            EventKind::Freed(report) => self.freed(event.time, report),
             EventKind::Stopped { .. } => {}
         }
         self.supervise_speed(now);
@@ -427,6 +438,7 @@ impl Machine for Driver {
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
+        self.expect_beyond_occupied_blocks(now);
         let context = self.track.context();
         for train in self.trains.values_mut() {
             train.handle_timeout(context, now, &mut self.outputs);

@@ -147,6 +147,11 @@ impl DrivenTrain {
         }
     }
 
+    /// Whether the next detection is overdue at a sensor.
+    pub(super) fn is_overdue_at(&self, sensor: SensorId, now: Timestamp) -> bool {
+        self.due().is_some_and(|(due, _)| due == sensor) && self.next_overdue().is_some_and(|at| at <= now)
+    }
+
     /// A sensor reported it where it can be.
     pub(super) const fn clear_missed(&mut self) {
         self.expected.missed_sensor = None;
@@ -193,6 +198,18 @@ impl DrivenTrain {
             }
             _ => self.lose(now, out),
         }
+    }
+
+    /// The next detection does not come: the block there is still occupied by the train ahead, or its detector has not released
+    /// it. The one behind it is due.
+    pub(super) fn expect_beyond(&mut self, context: TrackContext<'_>, now: Timestamp) {
+        let Some(due) = self.expected.due else { return };
+        let next = self.locator.next_contact(context, &self.model, now);
+        let next = next.filter(|next| next.sensor != due.sensor);
+        self.expected.since = now;
+        self.expected.overdue_reported = next.is_none();
+        self.expected.due = next.or(self.expected.due);
+        self.expected.lost_by.get_or_insert(now + LOST);
     }
 
     /// Gives up the position and the task.

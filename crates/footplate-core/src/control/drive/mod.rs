@@ -6,6 +6,7 @@
 
 mod ambiguity;
 mod approach;
+mod blocks;
 mod command_time;
 mod data_association;
 mod driven_train;

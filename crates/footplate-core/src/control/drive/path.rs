@@ -205,6 +205,17 @@ const SHOE_LENGTH: Length = Length::from_mm(35.0);
 /// One standard deviation of that.
 const SHOE_DEVIATION: Length = Length::from_mm(12.0);
 
+/// From the first to the last part of a train that sensors detect, and one standard deviation: its pickup where a point sensor gave
+/// its position, all of it where a block did.
+fn sensed_length(context: TrackContext<'_>, model: &MotionModel, at: PathPoint) -> [Length; 2] {
+    let sensor = context.layout.sensor_at(at.node);
+    if sensor.and_then(|sensor| context.layout.block_of_entry(sensor)).is_none() {
+        return [SHOE_LENGTH, SHOE_DEVIATION];
+    }
+    let length = model.train_length().length();
+    [length.value, length.uncertainty]
+}
+
 /// The position of a train at rest after reversing, and one standard deviation. It is measured from the node behind
 /// the train: turnouts further away no longer affect it. `None` where the path back is unknown or does not lead to
 /// the train.
@@ -216,11 +227,12 @@ pub(super) fn reversed_location(
     let leading = reversed_position(context, model, located.at)?;
     let behind = context.layout.edge(leading.edge)?.from;
     let distance = distance_to(context, model, behind, leading)?;
-    let uncertainty = Length::from_m(libm::hypot(located.uncertainty.as_m(), SHOE_DEVIATION.as_m()));
+    let [_, deviation] = sensed_length(context, model, located.at);
+    let uncertainty = Length::from_m(libm::hypot(located.uncertainty.as_m(), deviation.as_m()));
     Some((PathPoint { node: behind, distance }, uncertainty))
 }
 
-/// Where the leading end of the pickup is once a train at rest has reversed.
+/// Where the part of a train that sensors detect first is once the train at rest has reversed.
 pub(super) fn reversed_position(
     context: TrackContext<'_>,
     model: &MotionModel,
@@ -229,20 +241,22 @@ pub(super) fn reversed_position(
     context.layout.reversed(trailing_position(context, model, at)?)
 }
 
-/// Where the trailing end of the pickup is, facing as the leading end does. Found along the path on which the train
-/// came: a trailing turnout on it may be set for the other leg by now, or may have been run through.
+/// Where the part that sensors detect last is, facing as the train does. Found along the path on which the train came: a
+/// trailing turnout on it may be set for the other leg by now, or may have been run through.
 pub(super) fn trailing_position(
     context: TrackContext<'_>,
     model: &MotionModel,
     at: PathPoint,
 ) -> Option<Position> {
-    if at.distance >= SHOE_LENGTH {
-        return place_of(context, model, PathPoint { distance: at.distance - SHOE_LENGTH, ..at });
+    let [length, _] = sensed_length(context, model, at);
+    if at.distance >= length {
+        return place_of(context, model, PathPoint { distance: at.distance - length, ..at });
     }
-    context.layout.reversed(reversed_on_current_path(context, place_of(context, model, at)?)?)
+    let back = context.layout.reversed(place_of(context, model, at)?)?;
+    context.layout.reversed(context.layout.advance(back, length, context.turnouts).ok()?)
 }
 
-/// The same for a train at rest at a position, whatever path it came on.
+/// Where the leading end of the pickup is once a train at rest at a position, whatever path it came on, has reversed.
 pub(super) fn reversed_on_current_path(context: TrackContext<'_>, place: Position) -> Option<Position> {
     context.layout.advance(context.layout.reversed(place)?, SHOE_LENGTH, context.turnouts).ok()
 }

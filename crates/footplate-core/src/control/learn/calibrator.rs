@@ -292,6 +292,17 @@ impl<'l> Calibrator<'l> {
         }
     }
 
+    /// A block is free that the train has left: its length shows if its speed was steady since.
+    fn handle_release(&mut self, event: &Event, report: Report) {
+        let interval = report.poll_interval.unwrap_or(PollTiming::ASSUMED.period).abs();
+        let window = ContactWindow { after: event.time - interval, until: event.time };
+        let release = self.locator.release_of(self.context(), self.model(), report.sensor, window);
+        let left = window.after - self.model().train_length().longest_delay();
+        if let Some(release) = release.filter(|_| left >= self.steady_at) {
+            self.fit.take_release(&release);
+        }
+    }
+
     /// Sets the positions of turnouts that the train passed and that were unknown.
     fn learn_legs(&mut self, from: Option<NodeId>, to: NodeId) {
         let hop = from.and_then(|from| self.only_hop(from, to));
@@ -350,6 +361,7 @@ impl Machine for Calibrator<'_> {
                 self.expect_detection(now);
             }
             EventKind::Sensor(report) if self.finished.is_none() => self.handle_report(now, event, report),
+            EventKind::Freed(report) => self.handle_release(event, report),
             _ => {}
         }
         self.on_clock(now);

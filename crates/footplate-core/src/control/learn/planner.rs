@@ -1,7 +1,7 @@
 //! Chooses the next experiment.
 //!
-//! First a staircase, because gains are unknown before a step was measured once: each step from below on the way up,
-//! and from above on the way down. Then, for the rest of the budget, the experiment with the largest [`gain`] per
+//! First a staircase, because gains are unknown before a step was measured once: each step from below going up,
+//! and from above going down. Then, for the rest of the budget, the experiment with the largest [`gain`] per
 //! second.
 
 use alloc::collections::BTreeMap;

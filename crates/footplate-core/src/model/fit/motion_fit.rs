@@ -26,6 +26,7 @@ use super::unknowns::Columns;
 use crate::event::{Event, EventKind};
 use crate::ids::{SensorId, SpeedStep, TrainId};
 use crate::linalg::{Eliminated, NormalEquations};
+use crate::model::BlockRelease;
 use crate::model::motion_model::{MotionModel, StepUse};
 use crate::model::parameters::{START_NODES, STOP_NODES};
 use crate::model::priors::{independent_nodes, section_variance};
@@ -368,6 +369,16 @@ impl MotionFit {
             sums.starts.take(found / start.variance * point.scatter.starts * point.scatter.starts);
         }
         sums
+    }
+
+    /// Takes the release of a block behind the train. Returns whether it agrees with those before.
+    pub fn take_release(&mut self, release: &BlockRelease) -> bool {
+        self.model.take_release(release)
+    }
+
+    /// Keeps the train's length if another copy of its model has measured it better.
+    pub const fn keep_length(&mut self, of: &MotionModel) {
+        self.model.keep_length(of);
     }
 
     /// The model as of the last fit.

@@ -73,7 +73,7 @@ impl LayoutTest {
                 self.end_stretch();
                 (self.last, self.steady_from) = (None, event.time + SETTLES);
             }
-            EventKind::Stopped { .. } => {}
+            EventKind::Stopped { .. } | EventKind::Freed(_) => {}
         }
     }
 

@@ -157,8 +157,10 @@ impl Reach {
             (true, false) => [1.0, brake],
             (false, _) => [traction, brake],
         };
-        let about =
-            Range { low: likely.low - towards_low * of_traction, high: likely.high + towards_high * of_brake };
+        let about = Range {
+            low: likely.low - towards_low * of_traction,
+            high: likely.high + towards_high * of_brake,
+        };
         let reached = if alike || free && !self.slipped { reaches.and(about) } else { reaches };
         self.speed = Range { low: smaller(reached.low, likely.low), high: larger(reached.high, likely.high) };
         if dead > SEEN && !turn_alike {

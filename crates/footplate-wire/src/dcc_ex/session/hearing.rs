@@ -160,6 +160,10 @@ impl Client {
                 let width = self.blind_since.map_or(width, |since| width.max(latest - since));
                 self.dialogue.report(sensor, latest, width);
             }
+            Change::Freed => {
+                let (latest, width) = occupied(now, self.dialogue.last_entry);
+                self.dialogue.report_free(sensor, latest, width);
+            }
             Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
             Change::None => {}
         }

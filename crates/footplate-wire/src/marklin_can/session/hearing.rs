@@ -258,6 +258,11 @@ impl Client {
                 let (latest, width) = span.entry(contact, self.settings.scan, order);
                 self.dialogue.report(sensor, latest, width);
             }
+            News::Freed(span) => {
+                let order = Order { not_before: self.dialogue.last_entry, now };
+                let (latest, width) = span.entry(contact, self.settings.scan, order);
+                self.dialogue.report_free(sensor, latest, width);
+            }
             News::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
             News::None => {}
         }

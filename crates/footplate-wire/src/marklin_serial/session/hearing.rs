@@ -1,6 +1,6 @@
 //! What becomes of the bytes that come: whole replies are read, all others dropped and the line brought into step.
 
-use footplate_core::{Command, SpeedStep, Timestamp};
+use footplate_core::{Command, Event, EventKind, Report, SpeedStep, Timestamp};
 
 use super::super::exchange::{Awaited, Exchange, Purpose, Quiet, Sending, reply_bytes};
 use super::super::module_reads::ModuleReads;
@@ -66,8 +66,14 @@ impl Interface {
         if let Ok(states) = decode_reply(awaited.request, self.reply.as_bytes()) {
             for state in states {
                 self.readings.take(awaited.asked, state, |read| {
+                    let is_released = |report: Report| self.released.contains(&report.sensor);
                     self.output.push_back(match read {
-                        Read::Closed(event) => Transmit::Event(event),
+                        Read::Opened(Event { kind: EventKind::Freed(report), .. })
+                            if !is_released(report) =>
+                        {
+                            return;
+                        }
+                        Read::Closed(event) | Read::Opened(event) => Transmit::Event(event),
                         Read::Held(sensor) => Transmit::Notice(LinkNotice::HeldClosed { sensor }),
                     });
                 });

@@ -216,6 +216,11 @@ impl Client {
                     occupied(now, self.dialogue.last_entry, self.settings.sensor_delay, free_at);
                 self.dialogue.report(sensor, latest, width);
             }
+            Change::Freed => {
+                let (latest, width) =
+                    occupied(now, self.dialogue.last_entry, self.settings.sensor_delay, None);
+                self.dialogue.report_free(sensor, latest, width);
+            }
             Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
             Change::None => {}
         }

@@ -50,6 +50,11 @@ impl Learning {
                 }
             }
             EventKind::Reverse { train } => self.learn(train, driver, event),
+            EventKind::Freed(_) => {
+                let fits = self.fits.iter_mut();
+                let known = fits.filter_map(|(train, fit)| Some((fit, driver.model(*train)?)));
+                known.for_each(|(fit, model)| fit.keep_length(model));
+            }
             _ => {}
         }
     }

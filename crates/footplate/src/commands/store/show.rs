@@ -208,6 +208,7 @@ fn write_events(
 pub(in crate::commands) fn words(kind: EventKind, names: Option<&dyn SensorNames>) -> String {
     match kind {
         EventKind::Sensor(report) => format!("sensor {}", sensor_name(report.sensor, names)),
+        EventKind::Freed(report) => format!("block {} free", sensor_name(report.sensor, names)),
         EventKind::Speed { train, step } => format!("train {train} to step {step}"),
         EventKind::Reverse { train } => format!("train {train} reversed"),
         EventKind::Turnout { turnout, curved } => {

@@ -280,7 +280,7 @@ impl DrivenTrain {
         Some(Beginning { after, left: at.distance.as_m() - place, speed })
     }
 
-    /// Starts the train before its plan and hands it to stop planning after it. Returns whether the plan applies now.
+    /// Starts the train before its plan and passes it to stop planning after it. Returns whether the plan applies now.
     pub(super) fn follows_plan(
         &mut self,
         context: TrackContext<'_>,

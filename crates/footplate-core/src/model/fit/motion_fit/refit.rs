@@ -44,7 +44,8 @@ impl MotionFit {
 
     /// Takes over the result of a fit that was begun here. Newer entries stay and are part of the next fit.
     pub fn adopt(&mut self, refit: Refit) {
-        let Refit { fit, condensed, .. } = refit;
+        let Refit { mut fit, condensed, .. } = refit;
+        fit.model.train_length = self.model.train_length;
         self.chain.trips.drain(..condensed.min(self.chain.trips.len()));
         let own = fit.chain.trips.into_iter().map(|trip| trip.own);
         for (trip, own) in self.chain.trips.iter_mut().zip(own) {

@@ -1,0 +1,3 @@
+//! What Footplate achieves in simulated worlds, by their truth.
+
+mod blocks;
