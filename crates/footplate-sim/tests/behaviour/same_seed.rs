@@ -17,7 +17,7 @@ fn fingerprint(recording: &SimulatedRecording) -> u64 {
         for event in &run.events {
             take(event.time.as_ns());
             match event.kind {
-                EventKind::Sensor(report) => take(i64::from(report.sensor.0)),
+                EventKind::Sensor(report) | EventKind::Freed(report) => take(i64::from(report.sensor.0)),
                 EventKind::Speed { step, .. } => take(i64::from(step.get())),
                 EventKind::Stopped { offset, .. } => take(offset.as_mm() as i64),
                 EventKind::Turnout { turnout, curved } => take(2 * i64::from(turnout.0) + i64::from(curved)),

@@ -23,7 +23,7 @@ fn counts(run: &SimulatedRun) -> [usize; 3] {
             EventKind::Sensor(_) => counts[0] += 1,
             EventKind::Speed { .. } => counts[1] += 1,
             EventKind::Stopped { .. } => counts[2] += 1,
-            EventKind::Turnout { .. } | EventKind::Reverse { .. } => {}
+            EventKind::Freed(_) | EventKind::Turnout { .. } | EventKind::Reverse { .. } => {}
         }
     }
     counts
