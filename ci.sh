@@ -153,7 +153,7 @@ each_table() {
   "$1" pacing-unseen simulate pacing --seeds 101..112 --markdown
   "$1" traffic simulate traffic --seeds 541..550 --hours 1 --baseline --markdown
   "$1" odometry simulate line --score --seeds 1..10 --teeth 80,100,200 --markdown
-  "$1" odometry-worlds simulate line --score --worlds fresh:100@ed4f08ac74207d1a7f8abbca4986bac37b9d40f0 --markdown
+  "$1" odometry-worlds simulate line --score --worlds fresh:200@ed55016fa23bf57e97b60a5bfd967cc0e765060c --markdown
   # Recordings that may not be copied: the table is made where they are.
   if [[ -n ${FOOTPLATE_DATA:-} ]]; then
     "$1" standstill odometry --imu "$FOOTPLATE_DATA"/paris-metro-accel/*_accel.csv --score --markdown

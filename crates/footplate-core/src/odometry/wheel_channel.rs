@@ -210,8 +210,8 @@ impl WheelChannel {
         let apart =
             (turned - other_turned).abs() > least + APART_PART * larger(turned.abs(), other_turned.abs());
         let tolerance = self.tolerance() + other.tolerance() + RAN_APART_PART;
-        self.compare_way(turned, other_turned);
-        other.compare_way(other_turned, turned);
+        self.compare_distance(turned, other_turned);
+        other.compare_distance(other_turned, turned);
         let moves = self.moves() && (apart || other.ran_apart(least, tolerance));
         let other_moves = other.moves() && (apart || self.ran_apart(least, tolerance));
         for (wheel, beside) in [(self, other_moves), (other, moves)] {
@@ -225,7 +225,7 @@ impl WheelChannel {
     }
 
     /// Adds up how far the other wheel turned beyond it (m) since its count has been constant.
-    fn compare_way(&mut self, turned: f64, other_turned: f64) {
+    fn compare_distance(&mut self, turned: f64, other_turned: f64) {
         if self.same_for > 0.0 {
             self.turned_same += turned.abs();
             self.other_further += other_turned - turned;

@@ -342,22 +342,22 @@ impl Locator {
         let node = self.node?;
         let time = self.seconds(now);
         let here = self.filter.place(model, time);
-        let mut way = Gaussian { mean: 0.0, variance: 0.0 };
+        let mut run = Gaussian { mean: 0.0, variance: 0.0 };
         for hop in context.hops_ahead(node).take(MOST_HOPS) {
             let reach = hop_length(context, model, &hop);
-            way = Gaussian { mean: way.mean + reach.mean, variance: way.variance + reach.variance };
-            let beyond = here.mean - way.mean;
-            let at = Gaussian { variance: way.variance + model.sensor_variance(hop.sensor), ..way };
+            run = Gaussian { mean: run.mean + reach.mean, variance: run.variance + reach.variance };
+            let beyond = here.mean - run.mean;
+            let at = Gaussian { variance: run.variance + model.sensor_variance(hop.sensor), ..run };
             if beyond > MISSED_BEYOND * libm::sqrt(here.variance + at.variance) {
                 continue;
             }
             let sensor = hop.sensor?;
-            let (due, doubt) = self.filter.reaches(model, at, time)?;
+            let (due, uncertain_s) = self.filter.reaches(model, at, time)?;
             let speed = self.filter.speed(model, due).mean;
             return Some(DueContact {
                 sensor,
                 time: self.timestamp(due),
-                uncertainty: TimeSpan::from_s(doubt),
+                uncertainty: TimeSpan::from_s(uncertain_s),
                 speed: Speed::from_m_per_s(speed),
             });
         }

@@ -110,7 +110,7 @@ fn keys_are_those_of_a_layout() {
         complaint("edges = [", "edge = ["),
         "oval.toml, line 18, column 1: unknown field `edge`, expected one of `format`, `name`, `about`, \
          `length_uncertainty_mm`, `length_origin`, `length_scale_uncertainty_percent`, `sensors`, `turnouts`, \
-         `never_both_curved`, `ends`, `zones`, `edges`, `distances`"
+         `never_both_curved`, `ends`, `zones`, `blocks`, `boundaries`, `edges`, `distances`"
     );
     assert_eq!(
         complaint("length_origin = \"tape measure\"\n", ""),
@@ -325,6 +325,6 @@ fn a_block_that_is_wrong_is_named_with_its_place() {
     );
     assert_eq!(
         complaint_of_blocks("number = 5", "number = 65536"),
-        "oval.toml, line 28, column 36: invalid value: integer `65536`, expected a whole number from 0 to 65535"
+        "oval.toml, line 28, column 35: invalid value: integer `65536`, expected a whole number from 0 to 65535"
     );
 }

@@ -58,7 +58,7 @@ fn a_wrong_field_is_named_with_its_place_and_what_is_right() {
         ),
         (
             format!("{OWN}0.5,whistle,,24,,1\n"),
-            "line 2, column 2 (kind): `whistle` should be `sensor`, `speed`, `reverse`, `turnout`, `stopped`, \
+            "line 2, column 2 (kind): `whistle` should be `sensor`, `freed`, `speed`, `reverse`, `turnout`, `stopped`, \
              `running` or `gate`",
         ),
         (

@@ -8,13 +8,12 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{Located, Locator, PassedContact, PathPoint, TrackContext, landmark_of};
 use crate::units::Length;
 
-use super::expectation::DetectionCount;
 use super::order::OrderId;
 use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
 use super::path::{reversed_location, sensors_within};
 use super::refusal::Refusal;
-use super::task::{Destination, Expectation, Goal, SpeedSupervision, Task, TaskPhase};
+use super::task::{Destination, DetectionCount, Expectation, Goal, SpeedSupervision, Task, TaskPhase};
 use crate::control::{Achieved, Finished, Notice, Promise};
 
 /// Time allowed beyond the predicted time to rest, fixed and as a part of it: decoders creep at the end, and nothing

@@ -20,16 +20,6 @@ const OVERDUE: TimeSpan = TimeSpan::from_ms(500);
 /// After one missed detection, the next is late this long after its 99.7 % bound: two polls of all modules. A
 /// follower is not kept waiting longer.
 const LATE: TimeSpan = TimeSpan::from_ms(250);
-/// The number of missed detections in a row after which a train is lost: sensors of a well-kept layout miss two in a row once in
-/// 100 000 times; trains stall, derail or are lifted ten times as often.
-const LOST_AFTER_MISSED: u8 = 2;
-/// The same where more than one detection in a hundred is missed, so that two in a row are as frequent as trains that stall: at an
-/// interface that does not latch, a fast train closes a sensor for less than a poll. Data association looks no further.
-const LOST_WHERE_MANY_ARE_MISSED: u8 = 3;
-const MANY_MISSED: f64 = 0.01;
-/// The share of missed detections of a well-kept layout, 0.3 %, counts as much as a hundred detections.
-const USUAL_MISSED: f64 = 0.3;
-const USUAL_DETECTIONS: f64 = 100.0;
 /// After a missed detection, the train is lost after this time, or twice the predicted travel time to the next sensor
 /// if that is longer.
 const LOST: TimeSpan = TimeSpan::from_s(10.0);
@@ -59,28 +49,6 @@ impl Driver {
     #[must_use]
     pub fn end_of_authority(&self, train: TrainId) -> Option<PathPoint> {
         self.trains.get(&train)?.end_of_authority
-    }
-}
-
-/// Detections of a train in this session, and how many were missed between them.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct DetectionCount {
-    passed: u32,
-    missed: u32,
-}
-
-impl DetectionCount {
-    /// A sensor reported the train, after so many that did not.
-    pub(super) fn take(&mut self, missed: usize) {
-        self.passed = self.passed.saturating_add(1);
-        self.missed = self.missed.saturating_add(u32::try_from(missed).unwrap_or(u32::MAX));
-    }
-
-    /// The number of missed detections in a row after which the train is lost.
-    fn lost_after(self) -> u8 {
-        let (passed, missed) = (f64::from(self.passed), f64::from(self.missed));
-        let share = (USUAL_MISSED + missed) / (USUAL_DETECTIONS + passed + missed);
-        if share > MANY_MISSED { LOST_WHERE_MANY_ARE_MISSED } else { LOST_AFTER_MISSED }
     }
 }
 
@@ -321,24 +289,5 @@ impl DrivenTrain {
             let counted = recount_from(context, &self.model, end, node);
             self.end_of_authority = Some(counted.unwrap_or(PathPoint { node, distance: Length::ZERO }));
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_train_is_lost_later_where_sensors_miss_it_often() {
-        let mut detections = DetectionCount::default();
-        assert_eq!(detections.lost_after(), 2);
-        for nth in 0..200 {
-            detections.take(usize::from(nth == 90));
-        }
-        assert_eq!(detections.lost_after(), 2, "one of 200");
-        for nth in 0..40 {
-            detections.take(usize::from(nth % 4 == 0));
-        }
-        assert_eq!(detections.lost_after(), 3, "a quarter of the last 40");
     }
 }

@@ -41,7 +41,7 @@ const ROLLS_AFTER_S: f64 = 5.0;
 const GRADIENT: f64 = 0.35;
 /// ... and how much it decelerates at least with locked wheels (m/s²): by ice of 0.012 of which a fifth is left.
 const LOCKED: f64 = 0.025;
-/// Wheels that slipped and accelerate towards the train by more than this beyond the command (m/s²) are on their way back: a
+/// Wheels that slipped and accelerate towards the train by more than this beyond the command (m/s²) are returning: a
 /// converter brings them back by no less, and in this time after the command ended (s). Without a recorded command, longer times would
 /// take every train that is driven for one whose wheels return.
 const RETURNS: f64 = 0.1;
@@ -111,7 +111,7 @@ impl Reach {
         let creeps_at_most = slip + creep < ALIKE && turn_alike && !(silent && self.slipped && brakes);
         self.alike_for = if creeps_at_most { self.alike_for + t } else { 0.0 };
         let alike = self.alike_for >= ALIKE_FOR_S;
-        // Wheels that slipped and still accelerate towards the train beyond the command are on their way back.
+        // Wheels that slipped and still accelerate towards the train beyond the command are returning.
         if slip + creep > SEEN {
             self.side = side;
         }
