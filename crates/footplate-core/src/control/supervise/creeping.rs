@@ -8,7 +8,7 @@ use crate::event::Approach;
 use crate::ids::{EdgeId, NodeId, SpeedStep, TrainId};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Layout, Position};
+use crate::track::{Layout, Position, TurnoutStates};
 use crate::units::Length;
 
 use super::danger::{BODY, CERTAIN, CLEAR, LOST_REACH, rails_within};
@@ -66,14 +66,15 @@ impl Watchdog {
         self.driver.set_end_of_authority(now, train, limit);
     }
 
-    /// Whether a lost train may creep ahead. From its last detection, over both legs of every turnout, and from
-    /// wherever it may be, [`SENSORS_AHEAD`] sensors come before the end of the track and before any track that is
+    /// Whether a lost train may creep ahead. From its last detection, over the leg to which each turnout is set or over both if
+    /// that is unknown, and from wherever it may be, [`SENSORS_AHEAD`] sensors come before the end of the track and before any track that is
     /// closed to it.
     pub(super) fn is_clear_ahead(&self, now: Timestamp, train: TrainId) -> bool {
         let Some(seen) = self.seen.get(&train) else { return false };
         let closed = self.closed_to(now, train);
         let ahead = Ahead { run: self.unheard_run(now, train), sensors: SENSORS_AHEAD };
-        reports_before(self.driver.layout(), alloc::vec![(seen.edge, seen.offset)], ahead, &closed)
+        let set = self.driver.turnouts();
+        reports_before(self.driver.layout(), set, alloc::vec![(seen.edge, seen.offset)], ahead, &closed)
     }
 
     /// The sensor to which a lost train may creep back, in its new direction: the one that reported it last. `None` if
@@ -87,7 +88,9 @@ impl Watchdog {
         let from = |(edge, left): (EdgeId, Length)| (edge.twin(), (length(edge) - left).max(Length::ZERO));
         let begins = reach.into_iter().map(from).collect();
         let back = Ahead { run: Length::ZERO, sensors: 1 };
-        reports_before(layout, begins, back, &self.closed_to(now, train)).then(|| behind.reverse())
+        // The train may have run over either leg of a turnout that was thrown since.
+        let set = TurnoutStates::unknown();
+        reports_before(layout, &set, begins, back, &self.closed_to(now, train)).then(|| behind.reverse())
     }
 
     /// The longest distance that a train can have run since its last detection.
@@ -153,10 +156,11 @@ struct Ahead {
     sensors: usize,
 }
 
-/// Whether on every path, over both legs of every turnout, a sensor comes before closed track and before the end of
+/// Whether on every path that the turnouts allow as they are `set`, a sensor comes before closed track and before the end of
 /// the track, with the length that a train needs to stop behind it.
 fn reports_before(
     layout: &Layout,
+    set: &TurnoutStates,
     begins: Vec<(EdgeId, Length)>,
     ahead: Ahead,
     closed: &Reservation,
@@ -180,7 +184,13 @@ fn reports_before(
             ahead.sensors = ahead.sensors.saturating_sub(1).max(usize::from(ahead.run > Length::ZERO));
         }
         let left = left.or_else(|| (ahead.sensors == 0).then_some(BODY + CLEAR));
-        let mut next = layout.outgoing(edge.to).edges().peekable();
+        let is_open = |next: &EdgeId| {
+            let leg = layout.edge(*next).and_then(|next| next.leg);
+            let turnout = layout.turnouts().find(|(_, branch)| *branch == edge.to);
+            let is_set = turnout.and_then(|(turnout, _)| set.get(turnout));
+            leg.zip(is_set).is_none_or(|(leg, set)| leg == set)
+        };
+        let mut next = layout.outgoing(edge.to).edges().filter(is_open).peekable();
         if next.peek().is_none() {
             return false;
         }
@@ -218,16 +228,47 @@ mod tests {
         };
         // It is somewhere between turnout 2 and D1, and creeps back over either leg: to B1 or C1.
         let begins = || alloc::vec![(edge("MR2", "D1").twin(), Length::ZERO)];
-        assert!(reports_before(&layout, begins(), BACK, &Reservation::empty()));
-        assert!(!reports_before(&layout, begins(), BACK, &closed("C1", "MR2", 100.0)));
-        assert!(!reports_before(&layout, begins(), BACK, &closed("B1", "MR2", 100.0)));
+        assert!(reports_before(&layout, &TurnoutStates::unknown(), begins(), BACK, &Reservation::empty()));
+        assert!(!reports_before(
+            &layout,
+            &TurnoutStates::unknown(),
+            begins(),
+            BACK,
+            &closed("C1", "MR2", 100.0)
+        ));
+        assert!(!reports_before(
+            &layout,
+            &TurnoutStates::unknown(),
+            begins(),
+            BACK,
+            &closed("B1", "MR2", 100.0)
+        ));
         // Beyond those sensors it needs 400 mm to stop, as far as 100 mm before D1.
-        assert!(!reports_before(&layout, begins(), BACK, &closed("A1", "BR1", 10.0)));
-        assert!(!reports_before(&layout, begins(), BACK, &closed("D1", "A1", 500.0)));
-        assert!(reports_before(&layout, begins(), BACK, &closed("D1", "A1", 390.0)));
+        assert!(!reports_before(
+            &layout,
+            &TurnoutStates::unknown(),
+            begins(),
+            BACK,
+            &closed("A1", "BR1", 10.0)
+        ));
+        assert!(!reports_before(
+            &layout,
+            &TurnoutStates::unknown(),
+            begins(),
+            BACK,
+            &closed("D1", "A1", 500.0)
+        ));
+        assert!(reports_before(
+            &layout,
+            &TurnoutStates::unknown(),
+            begins(),
+            BACK,
+            &closed("D1", "A1", 390.0)
+        ));
         // Track that ends is no better.
         assert!(!reports_before(
             &layout,
+            &TurnoutStates::unknown(),
             alloc::vec![(edge("EN1", "E1").twin(), Length::ZERO)],
             BACK,
             &Reservation::empty()
