@@ -100,7 +100,8 @@ fn a_train_of_any_law_is_calibrated_within_five_minutes_of_track_time() {
         let stops: u32 = accuracy.iter().map(|line| line.stops).sum();
         assert!(stops >= 5, "{}: {stops} stops", law.name());
         let middle = accuracy[accuracy.len() / 2];
-        assert!(middle.stop_within().as_mm() < 30.0, "{}: {middle:?}", law.name());
+        // 28 mm of scatter and of the law, and what edges add until stops have been made on them.
+        assert!(middle.stop_within().as_mm() < 31.0, "{}: {middle:?}", law.name());
     }
 }
 
