@@ -3,7 +3,7 @@
 use super::command_watch::Allowed;
 use super::wheels::{
     CountWindows, Expected, Heading, Period, Quality, Range, ReportedDirection, Tachometer, Vehicle,
-    WheelReading, WheelTracker, Wheelset, larger,
+    WheelReading, WheelTracker, Wheelset, larger, smaller,
 };
 
 /// A count of a rolling wheel differs from the expected one by no more than this (pulses): one for the phase at either end, one
@@ -19,10 +19,12 @@ const STUCK_AFTER_S: f64 = 0.7;
 /// Counts of rolling wheels differ by no more than these pulses, and this part of them (diameters, creepage in curves).
 const APART_PULSES: f64 = 2.0;
 const APART_PART: f64 = 0.03;
-/// Over a constant count that lasts this long (s), rolling wheels run equally far, to these pulses and this part of the distance
-/// (creepage in curves and under effort) beyond the tolerances of the diameters.
+/// Over a constant count that lasts this long (s), rolling wheels run as far as each other as they did before, to these pulses and
+/// this part of the distance (creepage in curves and under effort) beyond the tolerances of the diameters.
 const APART_AFTER_S: f64 = 1.5;
 const RAN_APART_PART: f64 = 0.005;
+/// How long distances count by which both wheels rolled before (s).
+const LATELY_S: f64 = 60.0;
 /// Readings after which the tracker's expectation is good enough to reject a count.
 const WARM: u32 = 8;
 /// How many times faster than the fastest train a wheel may turn: one that rolls or is braked, and one that a motor can
@@ -50,9 +52,11 @@ pub(super) struct WheelChannel {
     pub(super) missing_for: f64,
     /// How long its count has been the same and not zero (s).
     same_for: f64,
-    /// How far it turned in that time, and the other wheel less that (m).
+    /// How far it turned in that time, and how much farther the other wheel did (m).
     turned_same: f64,
     other_further: f64,
+    /// How far it and the other wheel turned lately while both seemed to roll (m).
+    turned_lately: [f64; 2],
     /// That count is no wheel's.
     pub(super) stuck: bool,
     /// How many pulses its last count may be wrong by.
@@ -85,6 +89,7 @@ impl WheelChannel {
             same_for: 0.0,
             turned_same: 0.0,
             other_further: 0.0,
+            turned_lately: [0.0; 2],
             stuck: false,
             doubt: 0.0,
             doubt_before: 0.0,
@@ -210,8 +215,9 @@ impl WheelChannel {
         let apart =
             (turned - other_turned).abs() > least + APART_PART * larger(turned.abs(), other_turned.abs());
         let tolerance = self.tolerance() + other.tolerance() + RAN_APART_PART;
-        self.compare_distance(turned, other_turned);
-        other.compare_distance(other_turned, turned);
+        let both_roll = !apart && self.moves() && other.moves();
+        self.compare_distance(turned, other_turned, both_roll, t);
+        other.compare_distance(other_turned, turned, both_roll, t);
         let moves = self.moves() && (apart || other.ran_apart(least, tolerance));
         let other_moves = other.moves() && (apart || self.ran_apart(least, tolerance));
         for (wheel, beside) in [(self, other_moves), (other, moves)] {
@@ -224,19 +230,29 @@ impl WheelChannel {
         }
     }
 
-    /// Adds up how far the other wheel turned beyond it (m) since its count has been constant.
-    fn compare_distance(&mut self, turned: f64, other_turned: f64) {
+    /// Adds up how far the other wheel turned beyond it (m) since its count has been constant, and how far both turned before.
+    fn compare_distance(&mut self, turned: f64, other_turned: f64, both_roll: bool, t: f64) {
+        if both_roll {
+            let kept = 1.0 - smaller(t / LATELY_S, 1.0);
+            let [own, other] = self.turned_lately;
+            self.turned_lately = [kept * own + turned.abs(), kept * other + other_turned.abs()];
+        }
         if self.same_for > 0.0 {
             self.turned_same += turned.abs();
-            self.other_further += other_turned - turned;
+            self.other_further += (other_turned - turned) * turned.signum();
         } else {
             (self.turned_same, self.other_further) = (0.0, 0.0);
         }
     }
 
-    /// Whether the other wheel turned farther or less far, while its count was constant, than rolling wheels do.
+    /// Whether the other wheel turned farther or less far, while its count was constant, than rolling wheels do. A tooth that is missing
+    /// makes one run less far all the time.
     fn ran_apart(&self, least: f64, part: f64) -> bool {
-        self.same_for > APART_AFTER_S && self.other_further.abs() > least + part * self.turned_same
+        let [own, other] = self.turned_lately;
+        let most = 1.0 / f64::from(self.wheelset.teeth);
+        let usual = if own > 0.0 { larger(smaller(other / own - 1.0, most), -most) } else { 0.0 };
+        let off = self.other_further - usual * self.turned_same;
+        self.same_for > APART_AFTER_S && off.abs() > least + part * self.turned_same
     }
 
     /// The true pitch lies within this part of the assumed one.

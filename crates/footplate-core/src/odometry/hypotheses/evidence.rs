@@ -222,15 +222,19 @@ impl Shown<'_> {
     }
 }
 
-/// What the hypotheses of a dead sensor cost at most: its other wheel may slip. Beside a wheel that does not turn no other hypothesis
-/// says so in traction; in a slide the silent wheel may be locked, and "both slip" says that.
+/// What the hypotheses of a dead sensor cost at most where the sensor was found dead before, or its count is stuck: the other wheel may
+/// slip. Beside a wheel that does not turn no other hypothesis says so in traction; in a slide the silent wheel may be locked, and
+/// "both slip" says that. Another silent sensor may be that of a wheel that still stands, beside one that spins at the start.
 fn beside_dead(one: &Shown, other: &Shown, [first_dead, second_dead]: [&State; 2]) -> Lanes {
     let [spins, slides] = BESIDE_DEAD;
     let cost = one.t * if one.side < 0.0 { spins } else { slides };
+    let of = |dead: &Shown, slips: &Shown, train: &State| {
+        if dead.compared.dead || dead.wheel.stuck { slips.slips(train) - cost } else { f64::NEG_INFINITY }
+    };
     let mut least = Lanes::all(f64::NEG_INFINITY);
     let [.., of_first, of_second] = &mut least.0;
-    *of_first = one.dead() + other.slips(first_dead) - cost;
-    *of_second = one.slips(second_dead) + other.dead() - cost;
+    *of_first = of(one, other, first_dead);
+    *of_second = of(other, one, second_dead);
     least
 }
 
