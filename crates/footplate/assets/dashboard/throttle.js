@@ -4,8 +4,10 @@ import { put } from "./dom.js";
 import { orderAtOnce } from "./server.js";
 import { say } from "./words.js";
 
-/** The functions that every station can switch: the light, which is F0, and F1 to F4. */
-const FUNCTIONS = [0, 1, 2, 3, 4];
+/** The functions of a decoder: F0, which is the light, to F28. */
+const FUNCTIONS = Array.from({ length: 29 }, (_, number) => number);
+/** The last function that every station can switch. */
+const LAST_OF_ALL = 4;
 
 export class Throttle {
   /** Whether the slider is being moved. */
@@ -34,7 +36,8 @@ export class Throttle {
       });
       return button;
     });
-    $("#functions").append(...this.#functions);
+    $("#functions").append(...this.#functions.slice(0, LAST_OF_ALL + 1));
+    $("#more-functions .functions").append(...this.#functions.slice(LAST_OF_ALL + 1));
     this.#lock.addEventListener("click", () => this.#lockTo(!this.isLocked));
     document.addEventListener("visibilitychange", this.#left);
     put(this.#lock, say("lock"));

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use footplate_core::control::{LinkNews, Machine as _};
 use footplate_core::{Command, Timestamp};
-use footplate_wire::{CommandError, LinkNotice};
+use footplate_wire::{BlockReports, CommandError, LinkNotice};
 
 use super::script_runner::ScriptRunner;
 use super::session_message::{Ended, SessionMessage};
@@ -221,6 +221,12 @@ impl Attendant<Recorded<ScriptRunner>> for Console {
         }
         if !matches!(notice, LinkNotice::Answers | LinkNotice::Closed(_)) {
             self.screen.say(&notice.to_string(), "");
+        }
+    }
+
+    fn see_blocks(&mut self, blocks: &BlockReports) {
+        if let Some(live_view) = &mut self.live_view {
+            live_view.painter.see_blocks(blocks.occupied());
         }
     }
 
