@@ -91,6 +91,10 @@ impl LiveView {
                     Ok(_) => Answer::Taken,
                     Err(mistakes) => Answer::Refused(mistakes),
                 },
+                Request::SavedSchedules(saved) => {
+                    script_runner.handle_word(now, &Input::Schedules(saved.clone()));
+                    Answer::Taken
+                }
                 Request::RunSchedule(schedule) => match script_runner.machine().check_run(schedule) {
                     Ok(()) => {
                         script_runner.handle_word(now, &Input::Schedule(schedule.clone()));
