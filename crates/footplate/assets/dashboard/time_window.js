@@ -31,8 +31,7 @@ export class TimeWindow {
 
   /** Shows this period of time (s). */
   select(from, to) {
-    if (to - from < SHORTEST_S) return;
-    this.#stop(to, to - from);
+    if (to - from >= SHORTEST_S) this.#stop(Math.min(to, this.#last), to - from);
   }
 
   /** Stops at a time, or goes on with `undefined`. */

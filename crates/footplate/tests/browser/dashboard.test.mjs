@@ -76,8 +76,7 @@ test("a train is located, driven by clicking, stopped at its target, and stopped
   assert.equal(trains[0].step, 0);
   // The command was sent and the station has answered since; the page never claims that the power is off.
   await page.waitForFunction(() => /NOT CONFIRMED, check that all trains have stopped/.test(document.querySelector("#halted").textContent), null, { timeout: PATIENCE });
-  await page.fill("#line", "power on");
-  await page.click("#order button");
+  await page.click("#power-on");
   await page.waitForFunction(() => document.querySelector("#halted").hidden, null, { timeout: PATIENCE });
   assert.deepEqual(complaints, []);
   await page.close();
