@@ -43,6 +43,7 @@ const LINES = [
   [/^schedule `(.*)` runs: round (\d+)(?: of (\d+))?$/, (_, name, round, rounds) => `Fahrplan \`${name}\` läuft: Runde ${round}${rounds ? ` von ${rounds}` : ""}`],
   [/^schedule `(.*)` was ended; .*$/, "Fahrplan `$1` wurde beendet; seine Züge führen ihre Befehle zu Ende"],
   [/^schedule `(.*)` ended: train (\d+) was commanded by hand$/, "Fahrplan `$1` beendet: Zug $2 erhielt einen Befehl von Hand"],
+  [/^refused `(.*)`: (.*)$/, (_, line, why) => `abgelehnt: \`${line}\`: ${logInGerman(why)}`],
   // Reasons of refused commands.
   [/^train (\d+) is stopped for safety until the incident is resolved$/, "Zug $1 steht zur Sicherheit, bis der Vorfall geklärt ist"],
   [/^the station does not answer$/, "die Zentrale antwortet nicht"], [/^track power is off: enter `power on`$/, "der Fahrstrom ist aus: `power on` eingeben"],
