@@ -176,7 +176,7 @@ test("a layout is drawn from nothing in the set-up, and a simulated train is cal
   await page.waitForFunction(() => document.querySelector(".cards .card p").textContent === "calibrated", null, { timeout: PATIENCE });
   const { trains: [train] } = await (await fetch(`${program.url}api/setup`)).json();
   assert.equal(train.is_calibrated, true);
-  assert.match(train.calibration.report, /train 24 on Oval with a siding/);
+  assert.match(train.calibration.report, /^Train 24 on Oval with a siding: \S+ of track time/);
   assert.deepEqual(complaints.filter((text) => !GOES_OVER.test(text)), []);
   await page.close();
   await ended(program);
