@@ -1,7 +1,7 @@
 // Draws the track: edges, sensors, turnout positions and trains.
 
 import { svg } from "./dom.js";
-import { cut, between, nearest, written } from "./plan_curve.js";
+import { cut, between, lengthOf, nearest, written } from "./plan_curve.js";
 import { planOf } from "./plan.js";
 import { placeOf } from "./places.js";
 import { Signals, showsSignals } from "./signals.js";
@@ -272,8 +272,11 @@ export class Track {
     for (const edge of this.#edges.values()) {
       const from = this.#nodes.get(edge.from);
       if (!from || !isNamed(from)) continue;
-      const { away, part } = nearest(this.#curve(edge.id), point);
-      found.push({ away, rail: edge.id >> 1, name: from.name, mm: Math.round(part * edge.length_mm), block: this.#blocks.get(edge.block)?.name });
+      const curve = this.#curve(edge.id);
+      const { away, part } = nearest(curve, point);
+      // A click on the mark of a sensor means the sensor.
+      const mm = part * lengthOf(curve) < this.#unit ? 0 : Math.round(part * edge.length_mm);
+      found.push({ away, rail: edge.id >> 1, name: from.name, mm, block: this.#blocks.get(edge.block)?.name });
     }
     found.sort((one, other) => one.away - other.away || one.mm - other.mm);
     const [best] = found;
