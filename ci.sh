@@ -10,7 +10,7 @@
 #   docs         rustdoc without a warning; every relative link in the documentation leads somewhere
 #   examples     the numbered examples print what is committed in testdata/examples
 #   scenarios    the tables in docs/tables are what the program and its examples print
-#   browser      a report opens in a browser: every chart drawn, dark and light, on a phone, by keyboard
+#   browser      set-up, pages and reports in a browser: driven, drawn, dark and light, on a phone, in German, by keyboard, axe
 #   stations     programs of others drive trains behind our virtual stations
 #   fuzz         random bytes against every decoder, session and reader, a minute in all; ./ci.sh fuzz --seconds 3600 an hour each
 #

@@ -39,6 +39,11 @@ impl BlockReports {
         }
     }
 
+    /// The detectors that report their blocks as occupied, those in which a train stood from the start among them.
+    pub fn occupied(&self) -> impl Iterator<Item = SensorId> {
+        self.occupancy.occupied_blocks(&self.layout).map(|block| block.detector)
+    }
+
     /// The number by which the station knows a sensor.
     #[must_use]
     pub fn input(&self, sensor: SensorId) -> SensorId {

@@ -41,11 +41,10 @@ impl Occupancy {
         Self { blocks, turnouts: TurnoutStates::unknown() }
     }
 
-    /// Whether a block is occupied.
-    #[must_use]
-    pub fn is_occupied(&self, layout: &Layout, block: &Block) -> bool {
-        let place = layout.blocks().iter().position(|known| known == block);
-        place.and_then(|place| self.blocks.get(place)).is_some_and(|state| state.is_occupied)
+    /// The blocks that are occupied.
+    pub fn occupied_blocks<'l>(&self, layout: &'l Layout) -> impl Iterator<Item = &'l Block> {
+        let states = layout.blocks().iter().zip(&self.blocks);
+        states.filter(|(_, state)| state.is_occupied).map(|(block, _)| block)
     }
 
     /// A detector was occupied when it was first read. Returns whether there is such a detector.
@@ -172,9 +171,14 @@ mod tests {
         let mut scene = Scene::new(false);
         let station = scene.layout.block_of_detector(SensorId(1)).unwrap().detector;
         assert!(scene.occupancy.occupied_from_start(&scene.layout, station));
+        let occupied = |scene: &Scene| -> Vec<_> {
+            scene.occupancy.occupied_blocks(&scene.layout).map(|block| block.detector).collect()
+        };
+        assert_eq!(occupied(&scene), [station], "its detector reports it before any train is known");
         assert_eq!(scene.occupied(5.0, "main"), Some("S3"));
         assert_eq!(scene.freed(7.0, "station"), Some("station"));
         assert_eq!(scene.freed(12.0, "main"), Some("main"), "it runs on where no detector is");
+        assert_eq!(occupied(&scene), []);
         assert_eq!(scene.occupied(16.0, "station"), Some("S1"), "and comes back from there");
         assert_eq!(scene.occupied(20.0, "main"), Some("S3"));
     }

@@ -71,9 +71,13 @@ export class LiveChart {
     this.#u.redraw(false);
   }
 
+  /** Replaces the data. The part that a reader has zoomed to stays. */
   set(data) {
+    const { min, max } = this.#u.scales.x;
+    const isZoomed = this.#options().zooms !== false && (min > this.#data[0][0] || max < this.#data[0].at(-1));
     this.#data = data;
-    this.#u.setData(data);
+    this.#u.setData(data, !isZoomed);
+    if (isZoomed) this.#u.redraw();
   }
 
   /** Saves the values that are drawn as a table: a column for the x axis, and one for each series. */

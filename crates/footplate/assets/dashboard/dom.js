@@ -12,6 +12,16 @@ export function make(name, properties = {}, ...inside) {
   return made;
 }
 
+const SVG = "http://www.w3.org/2000/svg";
+
+/** A part of a drawing, appended to another one. */
+export function svg(name, attributes, parent) {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  parent?.append(made);
+  return made;
+}
+
 /** Replaces the text of an element, unless it is the same. */
 export function put(element, text) {
   if (element.textContent !== text) element.textContent = text;

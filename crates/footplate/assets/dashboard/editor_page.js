@@ -1,18 +1,20 @@
 // The editor: draws a layout from the pieces of a track system, and saves it as a layout file.
 
-import { make, put } from "./dom.js";
+import { make, put, svg } from "./dom.js";
 import { Draft } from "./draft.js";
 import { arcOf, LIBRARIES } from "./pieces.js";
 import { written } from "./plan_curve.js";
 import { ask } from "./server.js";
+import { colourOf } from "./track.js";
 import { View } from "./view.js";
 import { say } from "./words.js";
 
-const SVG = "http://www.w3.org/2000/svg";
 const KEPT_AS = "draft";
 /** The least area shown (mm), and the reach of a click. */
 const LEAST_SHOWN = 1200;
 const TOUCH = 40;
+/** The program checks the file when the drawing has rested for this time. */
+const CHECKED_AFTER_MS = 300;
 const START = { x: 0, y: 0, heading: 0, ends: [] };
 
 function kept() {
@@ -30,10 +32,10 @@ export function editorPage(root, live) {
   let side = -1;
   /** The place of the next piece, or the selected joint. */
   let chosen = draft.joints().find(({ ends }) => ends.length === 1) ?? START;
-  const svg = $("#draft");
+  const drawing = $("#draft");
   const whole = [0, 0, 0, 0];
   measure();
-  const view = new View(svg, whole, press);
+  const view = new View(drawing, whole, press);
 
   function measure() {
     const points = [...draft.pieces.flatMap((piece) => draft.curves(piece).flat()), [0, 0]];
@@ -43,32 +45,34 @@ export function editorPage(root, live) {
     whole.splice(0, 4, x - wide / 2 - 100, y - high / 2 - 100, wide + 200, high + 200);
   }
 
-  function element(name, attributes) {
-    const made = document.createElementNS(SVG, name);
-    for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-    svg.append(made);
-    return made;
-  }
-
   const isOpen = () => chosen === START ? draft.pieces.length === 0 : chosen.ends.length === 1;
   const isSame = (one, other) => Math.hypot(one.x - other.x, one.y - other.y) < 1;
 
   function draw() {
-    svg.replaceChildren();
+    drawing.replaceChildren();
+    const sections = draft.sections();
+    for (const [nth, { pieces, isWatched }] of sections.entries()) {
+      for (const curve of pieces.flatMap((piece) => (isWatched ? draft.curves(draft.pieces[piece]) : []))) svg("path", { d: written(curve), class: "held", stroke: colourOf(nth), "stroke-width": 60 }, drawing);
+    }
     for (const piece of draft.pieces) {
-      for (const curve of draft.curves(piece)) element("path", { d: written(curve), class: "rail", "stroke-width": 12 });
+      for (const curve of draft.curves(piece)) svg("path", { d: written(curve), class: "rail", "stroke-width": 12 }, drawing);
     }
     for (const joint of draft.joints()) {
-      const isSensor = draft.sensorAt(joint) >= 0;
+      if (joint.ends.length === 2 && draft.has("boundaries", joint)) {
+        const [dx, dy] = [30 * Math.cos(joint.heading), 30 * Math.sin(joint.heading)];
+        svg("path", { d: `M${joint.x - dy} ${joint.y + dx}L${joint.x + dy} ${joint.y - dx}`, class: "joint boundary", "stroke-width": 12 }, drawing);
+        continue;
+      }
+      const isSensor = draft.has("sensors", joint);
       const word = isSensor ? "sensor" : joint.ends.length === 1 ? "open" : "joined";
-      element("circle", { cx: joint.x, cy: joint.y, r: word === "joined" ? 9 : 16, class: `joint ${word}`, "stroke-width": 5 });
+      svg("circle", { cx: joint.x, cy: joint.y, r: word === "joined" ? 9 : 16, class: `joint ${word}`, "stroke-width": 5 }, drawing);
     }
     const [x, y] = [chosen.x, chosen.y];
     if (isOpen()) {
       const [dx, dy] = [Math.cos(chosen.heading), Math.sin(chosen.heading)];
-      element("path", { d: `M${x - dy * 26} ${y + dx * 26}L${x + dx * 52} ${y + dy * 52}L${x + dy * 26} ${y - dx * 26}Z`, class: "next" });
+      svg("path", { d: `M${x - dy * 26} ${y + dx * 26}L${x + dx * 52} ${y + dy * 52}L${x + dy * 26} ${y - dx * 26}Z`, class: "next" }, drawing);
     } else {
-      element("circle", { cx: x, cy: y, r: 28, class: "picked", "stroke-width": 6 });
+      svg("circle", { cx: x, cy: y, r: 28, class: "picked", "stroke-width": 6 }, drawing);
     }
     const problems = draft.problems();
     const toml = draft.toml($("#draft-name").value);
@@ -80,14 +84,58 @@ export function editorPage(root, live) {
     $("#draft-undo").disabled = !draft.canUndo;
     $("#draft-redo").disabled = !draft.canRedo;
     $("#draft-remove").disabled = chosen.ends.length === 0;
-    $("#draft-sensor").disabled = chosen.ends.length !== 2;
-    put($("#draft-sensor"), say(chosen.ends.length === 2 && draft.sensorAt(chosen) >= 0 ? "draft-no-sensor-here" : "draft-sensor"));
+    for (const [kind, id] of [["sensors", "draft-sensor"], ["boundaries", "draft-boundary"]]) {
+      $(`#${id}`).disabled = chosen.ends.length !== 2;
+      put($(`#${id}`), say(chosen.ends.length === 2 && draft.has(kind, chosen) ? `${id}-not` : id));
+    }
+    listBlocks(sections);
+    if (toml !== checked) check(toml);
     for (const button of $("#pieces").querySelectorAll("button")) button.disabled = !isOpen();
     put($("#draft-next"), say(isOpen() ? "draft-next" : "draft-joint"));
     try {
       localStorage.setItem(KEPT_AS, JSON.stringify({ draft: draft.kept, name: $("#draft-name").value, library: $("#library").value }));
     } catch {
       // A browser without storage starts with an empty draft next time.
+    }
+  }
+
+  let listed;
+  /** The blocks between boundaries, to be named and numbered. */
+  function listBlocks(sections) {
+    if (JSON.stringify(sections) === listed) return;
+    listed = JSON.stringify(sections);
+    $("#draft-blocks").hidden = sections.length === 0;
+    $("#block-rows").replaceChildren(...sections.map((section, nth) => {
+      const field = (word, value, more) => {
+        const input = make("input", { value, autocomplete: "off", disabled: !section.isWatched, ...more });
+        return [input, make("label", {}, make("span", {}, say(word)), input)];
+      };
+      const [name, named] = field("draft-block-name", section.name, { maxLength: 32 });
+      const [number, numbered] = field("draft-block-number", String(section.number), { type: "number", min: 0, max: 65535 });
+      const watched = make("input", { type: "checkbox", checked: section.isWatched });
+      const row = make("div", { class: "does fields", role: "group", "aria-label": section.name }, named, numbered, make("label", { class: "check" }, watched, say("draft-block-watched")));
+      row.style.borderLeft = `0.4rem solid ${section.isWatched ? colourOf(nth) : "transparent"}`;
+      row.addEventListener("change", () => {
+        draft.describe(section, { name: name.value.trim() || section.name, number: Number(number.value) || 0, isWatched: watched.checked });
+        draw();
+      });
+      return row;
+    }));
+  }
+
+  /** What the program says of the file, as `footplate layout check` does. */
+  let checked;
+  async function check(toml) {
+    checked = toml;
+    $("#draft-refused").replaceChildren();
+    await new Promise((passed) => { setTimeout(passed, CHECKED_AFTER_MS); });
+    if (!toml || toml !== checked) return;
+    try {
+      await ask("/api/layout/check", { toml });
+    } catch ({ message }) {
+      if (toml !== checked) return;
+      $("#draft-refused").replaceChildren(make("li", { class: "danger" }, message));
+      $("#draft-use").disabled = true;
     }
   }
 
@@ -158,7 +206,8 @@ export function editorPage(root, live) {
   $("#draft-undo").addEventListener("click", () => { draft.undo(); goesOn(); });
   $("#draft-redo").addEventListener("click", () => { draft.redo(); goesOn(); });
   $("#draft-clear").addEventListener("click", () => { draft.clear(); goesOn(START); });
-  $("#draft-sensor").addEventListener("click", () => { draft.toggleSensor(chosen); draw(); });
+  $("#draft-sensor").addEventListener("click", () => { draft.toggle("sensors", chosen); draw(); });
+  $("#draft-boundary").addEventListener("click", () => { draft.toggle("boundaries", chosen); draw(); });
   $("#draft-remove").addEventListener("click", () => {
     draft.remove(Math.max(...chosen.ends.map(({ piece }) => piece)));
     goesOn();

@@ -30,7 +30,7 @@ const PHRASES = [
 ];
 /** Lines of the result of a calibration. */
 const RESULT = [
-  [/^Train (\d+) on (\S+): (\S+) of track time, (.*)$/, (_, train, layout, time, why) => `Zug ${train} auf ${layout}: ${time} Fahrzeit, ${WHYS[why] ?? why}`],
+  [/^Train (\d+) on (.+?): (\S+) of track time, (.*)$/, (_, train, layout, time, why) => `Zug ${train} auf ${layout}: ${time} Fahrzeit, ${WHYS[why] ?? why}`],
   [/^ {2}step {2}reached from {3}speed mm\/s {9}stop mm {5}std dev {3}95 % of stops within {3}stops$/, " Stufe  erreicht von   Tempo mm/s     Halteweg mm    Streuung   95 % der Halte unter   Halte"],
   [/^( +\d+ {2})below {5}/, "$1unten     "], [/^( +\d+ {2})above {5}/, "$1oben      "],
   [/^value ± one standard deviation of the estimate; std dev is the repeatability of a single stop$/, "Wert ± eine Standardabweichung der Schätzung; Streuung: die Wiederholgenauigkeit eines einzelnen Halts"],

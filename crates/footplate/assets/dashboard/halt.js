@@ -1,11 +1,12 @@
 // The emergency stop: on all pages, by one key, and never shown as more certain than it is.
 
-import { ask, get } from "./server.js";
+import { ask, get, order } from "./server.js";
 import { say } from "./words.js";
 
 /** Interval between two requests for the power state (ms). */
 const LOOKED_EVERY_MS = 1000;
 const banner = document.getElementById("halted");
+const powerOn = document.getElementById("power-on");
 /** An emergency stop of this page that the link has not confirmed yet. */
 let asked = false;
 
@@ -36,6 +37,7 @@ async function look() {
     // The state of the connection shows the failure; the banner keeps its text.
     return;
   }
+  powerOn.hidden = !power || power.is_on;
   if (power && !power.is_on) {
     asked = false;
     tell(power.has_answered ? "halt-heard" : "halt-told");
@@ -45,6 +47,7 @@ async function look() {
 }
 
 document.getElementById("halt").addEventListener("click", halt);
+powerOn.addEventListener("click", () => order("power on").then(look, ({ message }) => tell("power-failed", message)));
 document.addEventListener("keydown", (event) => {
   // In a text field or on a button, the space bar has its usual function.
   const writes = event.target.closest?.("input:not([type=range]), textarea, select, button, summary");

@@ -5,9 +5,11 @@ import { Guide } from "./guide.js";
 import { RouteButtons } from "./route_buttons.js";
 import { order } from "./server.js";
 import { PickTrack } from "./pick_track.js";
+import { portrait } from "./portrait.js";
 import { SCALES, chooseScale, kmPerHour, scale } from "./scale.js";
+import { chooseSignals, showsSignals } from "./signals.js";
 import { colourOf } from "./track.js";
-import { say } from "./words.js";
+import { logged, say } from "./words.js";
 
 /** The most lines shown. */
 const LINES_SHOWN = 400;
@@ -30,11 +32,13 @@ export function layoutPage(root, live, about) {
     made.addEventListener("click", does);
     return made;
   };
-  const orderButton = (text, line, answer = $("#here-answer")) => {
+  /** `undoes` returns the command that takes this one back, if there is one. */
+  const orderButton = (text, line, undoes = () => undefined) => {
     const made = make("button", { type: "button" }, text);
-    made.addEventListener("click", () => give(line(), answer));
+    made.addEventListener("click", () => give(line(), $("#here-answer"), undoes()));
     return made;
   };
+  const ofTrain = (train) => live.picture?.trains.find((one) => one.train === train);
 
   function take(train) {
     taken = train;
@@ -50,14 +54,14 @@ export function layoutPage(root, live, about) {
   function showPlace(place) {
     thrown = undefined;
     put($("#here-answer"), "");
-    picked.textContent = place ? say("picked", place) : say("pick-hint");
+    picked.textContent = !place ? say("pick-hint") : track.block ? say("picked-in", place, track.block) : say("picked", place);
     here.hidden = !place || taken === undefined;
     if (here.hidden) return;
     const at = () => track.place;
     $("#here-does").replaceChildren(
       orderButton(say("stop-train-here", taken), () => `stop ${taken} at ${at()}`),
       orderButton(say("go-train-here", taken), () => `go ${taken} to ${at()}`),
-      orderButton(say("put-train-here", taken), () => `place ${taken} at ${at()}`));
+      orderButton(say("put-train-here", taken), () => `place ${taken} at ${at()}`, () => ofTrain(taken)?.at && `place ${taken} at ${ofTrain(taken).at}`));
     if (taken === sought) $("#here-does").prepend($("#here-does").lastElementChild);
     if (!track.other) return;
     $("#here-does").append(button("other-direction", () => { track.turn(); showPlace(track.place); }, { title: track.other }));
@@ -77,10 +81,10 @@ export function layoutPage(root, live, about) {
     const lies = live.picture?.turnouts[turnout];
     here.hidden = false;
     put($("#here-answer"), "");
-    const throws = (to) => orderButton(say(`throw-${to}`), () => `turnout ${turnout} ${to}`);
+    const throws = (to) => orderButton(say(`throw-${to}`), () => `turnout ${turnout} ${to}`, () => lies && `turnout ${turnout} ${lies}`);
     $("#here-does").replaceChildren(...(lies ? [throws(other(lies))] : [throws("straight"), throws("curved")]));
     put(picked, stands(turnout, lies));
-    if (lies) give(`turnout ${turnout} ${other(lies)}`, $("#here-answer"));
+    if (lies) give(`turnout ${turnout} ${other(lies)}`, $("#here-answer"), `turnout ${turnout} ${lies}`);
   }
 
   /** The turnouts as a list, for keyboard and screen reader. */
@@ -91,6 +95,8 @@ export function layoutPage(root, live, about) {
         turnouts.set(number, { button: button("", () => pressed(Number(number))) });
         $("#turnout-list").append(turnouts.get(number).button);
         $("#turnouts").hidden = false;
+        // Trains are sent nowhere over a turnout of unknown position.
+        $("#turnouts").open ||= !lies;
       }
       const one = turnouts.get(number);
       if (one.lies === lies) continue;
@@ -103,10 +109,19 @@ export function layoutPage(root, live, about) {
     }
   }
 
+  /** The blocks as a list, for screen readers. */
+  const blocks = live.layout.blocks.map(({ name, detector }) => ({ name, detector, row: make("li") }));
+  $("#block-list").append(...blocks.map(({ row }) => row));
+  const { nodes } = live.layout;
+  const has = { blocks: blocks.length > 0, turnouts: nodes.some(({ kind }) => kind === "branch"), sensors: nodes.some(({ kind, is_boundary: isBoundary }) => kind === "contact" && !isBoundary) };
+  for (const [what, is] of Object.entries(has)) for (const part of root.querySelectorAll(`.of-${what}`)) part.hidden = !is;
+
   const scales = $("#scale");
-  scales.append(...Object.keys(SCALES).map((name) => new Option(`${name} (1:${SCALES[name]})`, name)));
+  scales.append(...Object.keys(SCALES).sort((one, other) => SCALES[other] - SCALES[one]).map((name) => new Option(`${name} (1:${SCALES[name]})`, name)));
   scales.value = scale();
   scales.addEventListener("change", () => chooseScale(scales.value));
+  $("#signals").checked = showsSignals();
+  $("#signals").addEventListener("change", ({ target }) => chooseSignals(target.checked));
   const zones = new Map(live.layout.edges.filter((edge) => edge.zone).map(({ zone }) => [zone.name, say("zone", zone.name, zone.max_mm_s)]));
   $("#zones").hidden = zones.size === 0;
   $("#zones span").textContent = say("zones", [...zones.values()].join("; "));
@@ -114,12 +129,25 @@ export function layoutPage(root, live, about) {
   $("#zoom-out").addEventListener("click", () => track.view.zoom(1.4));
   $("#zoom-all").addEventListener("click", () => track.view.all());
 
+  $("#all-straight").addEventListener("click", () => give("turnout all straight", $("#turnouts-answer")));
+
+  /** The command that takes the last one back. */
+  let undo;
+  function offerUndo(answer) {
+    if (!undo) return;
+    const line = undo;
+    answer.append(" ", button("undo", () => give(line, answer), { class: "small", title: line }));
+  }
+
   /** Sends a command; the result is shown beside the control. */
-  async function give(line, answer) {
+  async function give(line, answer, undoes) {
+    undo = undefined;
     answer.className = "answer";
     put(answer, say("sent", line));
     try {
       await order(line);
+      undo = undoes;
+      offerUndo(answer);
       return true;
     } catch (error) {
       answer.className = "answer bad";
@@ -141,13 +169,13 @@ export function layoutPage(root, live, about) {
     const step = make("input", { id, type: "number", min: 0, max: 126, inputMode: "numeric", value: String(train.step), "aria-label": say("step-of", train.train) });
     const stopHere = button("stop-here", () => track.place && give(`stop ${train.train} at ${track.place}`, answer));
     const takes = button("take", () => take(train.train), { "aria-pressed": "false" });
-    const made = make("article", { class: "train" },
+    const made = make("article", { class: "train" }, ...portrait(train.train),
       make("h3", {}, make("a", { href: `#/train/${train.train}` }, live.called(train.train))),
       make("dl", {}, make("dt", {}, say("at")), at, make("dt", {}, say("speed")), speed, make("dt", {}, say("busy")), busy),
       make("div", { class: "does" },
         button("stop", () => give(`stop ${train.train}`, answer)), stopHere,
         make("label", { htmlFor: id }, say("step")), step,
-        button("set", () => give(`speed ${train.train} ${step.value}`, answer)), takes),
+        button("set", () => give(`speed ${train.train} ${step.value}`, answer, `speed ${train.train} ${ofTrain(train.train).step}`)), takes),
       answer);
     made.style.borderLeftColor = colourOf(nth);
     if (cards.size === 0) $("#trains").replaceChildren();
@@ -163,6 +191,7 @@ export function layoutPage(root, live, about) {
     guide?.show(picture);
     routes.show(picture);
     listTurnouts(picture);
+    for (const { name, detector, row } of blocks) put(row, say("block-is", name, say(`block-${picture.blocks?.[detector] ?? "unknown"}`)));
     picture.trains.forEach((train, nth) => {
       const parts = cards.get(train.train) ?? card(train, nth);
       put(parts.at, train.at ? `${train.at} ± ${train.half_mm.toFixed(0)} mm` : say("nowhere"));
@@ -186,29 +215,23 @@ export function layoutPage(root, live, about) {
   function write(text) {
     const list = $("#said");
     const atEnd = list.scrollTop + list.clientHeight >= list.scrollHeight - 8;
-    list.append(make("li", {}, text));
+    list.append(make("li", {}, logged(text)));
     while (list.childElementCount > LINES_SHOWN) list.firstElementChild.remove();
     if (atEnd) list.scrollTop = list.scrollHeight;
   }
 
-  /** Sensors that missed a detection are crossed out until their next one. */
-  function fails({ what, blanks }) {
-    if (what === "contact-stuck") track.fails(blanks[0]);
-  }
-
-  live.alarms.forEach(fails);
   for (const { text } of live.lines.slice(-LINES_SHOWN)) write(text);
   return {
     picture: show,
     line: ({ text }) => write(text),
-    alarm: fails,
     ended({ train, command, refused }) {
       const answer = cards.get(train)?.answer ?? $("#here-answer");
       if (refused) {
         answer.className = "answer bad";
-        put(answer, say("refused", refused));
+        put(answer, say("refused", logged(refused)));
       } else if (command === "turnout" && answer.textContent) {
         put(answer, say("done"));
+        offerUndo(answer);
       }
     },
     gap: (count) => write(say("gap", count)),

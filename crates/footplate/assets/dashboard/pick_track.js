@@ -4,14 +4,15 @@ import { Track } from "./track.js";
 import { View } from "./view.js";
 
 export class PickTrack {
-  /** The selected place, as the prompt names it, and its name in the other direction. */
-  place; other; view; #track;
+  /** The selected place, as the prompt names it, its name in the other direction, and its block. */
+  place; other; block; view; #track;
 
   /** `onPick` receives places; `onMeant` receives trains and turnouts, if given. */
   constructor(svg, layout, onPick, onMeant) {
     this.#track = new Track(svg, layout);
     this.view = new View(svg, this.#track.whole, (point) => {
       const meant = onMeant ? this.#track.meant(point) : { places: this.#track.nearest(point)?.names };
+      this.block = meant.block;
       if (meant.train !== undefined || meant.turnout !== undefined) return onMeant(meant);
       [this.place, this.other] = meant.places ?? [];
       this.#track.pick(this.place);
@@ -31,9 +32,5 @@ export class PickTrack {
   /** Outlines where trains really are. */
   truth(trains) {
     this.#track.truth(trains);
-  }
-
-  fails(name) {
-    this.#track.fails(name);
   }
 }

@@ -2,7 +2,7 @@
 
 import { make, put } from "./dom.js";
 import { ask, get } from "./server.js";
-import { say } from "./words.js";
+import { logged, say } from "./words.js";
 
 export class RouteButtons {
   #place; #answer; #buttons = new Map();
@@ -49,7 +49,7 @@ export class RouteButtons {
       const why = Object.values(refused)[0];
       if (isOver && why && this.#buttons.has(name) && this.#answer.textContent === say("schedule-begins", name)) {
         this.#answer.className = "answer bad";
-        put(this.#answer, say("refused", why));
+        put(this.#answer, say("refused", logged(why)));
       }
     }
   }

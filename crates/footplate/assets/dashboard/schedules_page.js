@@ -2,7 +2,7 @@
 
 import { make, put } from "./dom.js";
 import { ask, get } from "./server.js";
-import { say } from "./words.js";
+import { logged, say } from "./words.js";
 
 /** The marks of lines: what they are is also said in words for screen readers. */
 const MARKS = { done: "✓", active: "▶", refused: "✗", next: "·", later: " " };
@@ -80,7 +80,7 @@ export function schedulesPage(root, live) {
         if (row.dataset.state === is) return;
         row.dataset.state = is;
         put(row.firstElementChild, MARKS[is]);
-        put(row.lastElementChild, is === "refused" ? ` ${say("refused", state.refused[nth])}` : state && is !== "later" ? ` ${say(`line-${is}`)}` : "");
+        put(row.lastElementChild, is === "refused" ? ` ${say("refused", logged(state.refused[nth]))}` : state && is !== "later" ? ` ${say(`line-${is}`)}` : "");
       });
     }
     choices(live.picture);

@@ -3,7 +3,7 @@
 import { aboutCalibration } from "./calibration_page.js";
 import { make, put, shown, signed } from "./dom.js";
 import { ask, get, order } from "./server.js";
-import { inOwnLanguage, say } from "./words.js";
+import { inOwnLanguage, logged, say } from "./words.js";
 
 const STEPS = ["station", "layout", "trains", "link", "calibrate", "stop"];
 /** The stations that a serial port may lead to. */
@@ -243,7 +243,7 @@ export function setupPage(root, live, wanted) {
 
   const lines = () => {
     if (!$("#told")) return;
-    $("#told").replaceChildren(...live.lines.slice(-12).map(({ text }) => make("li", {}, text)));
+    $("#told").replaceChildren(...live.lines.slice(-12).map(({ text }) => make("li", {}, logged(text))));
   };
   lines();
   return {
@@ -266,7 +266,7 @@ export function setupPage(root, live, wanted) {
     line: lines,
     ended({ train, achieved, error_mm: error, promised_low_mm: low, promised_high_mm: high, refused, true_error_mm: truth }) {
       if (!$("#first-result") || (achieved == null && !refused)) return;
-      const parts = refused ? [say("refused", refused)] : [say("setup-stopped", train, achieved ?? "", error == null ? "" : signed(error, 1)),
+      const parts = refused ? [say("refused", logged(refused))] : [say("setup-stopped", train, achieved ?? "", error == null ? "" : signed(error, 1)),
         low == null ? "" : say("setup-promised", signed(low), signed(high)), truth == null ? "" : say("setup-truth", signed(truth, 1))];
       put($("#first-result"), parts.filter(Boolean).join(" "));
     },

@@ -4,13 +4,17 @@ import { put } from "./dom.js";
 import { orderAtOnce } from "./server.js";
 import { say } from "./words.js";
 
-/** The functions that every station can switch: the light, which is F0, and F1 to F4. */
-const FUNCTIONS = [0, 1, 2, 3, 4];
+/** The functions of a decoder: F0, which is the light, to F28. */
+const FUNCTIONS = Array.from({ length: 29 }, (_, number) => number);
+/** A step that was asked for is shown for this time, until the train has it (ms): presses in quick succession count on from it. */
+const ASKED_FOR_MS = 1500;
+/** The last function that every station can switch. */
+const LAST_OF_ALL = 4;
 
 export class Throttle {
   /** Whether the slider is being moved. */
   isDragged = false;
-  #slider; #shown; #train; #lock; #give; #functions; #step = 0;
+  #slider; #shown; #train; #lock; #give; #functions; #step = 0; #asked; #askedAt = 0;
 
   /** `give` sends a command and shows its result beside the throttle. */
   constructor(root, train, give) {
@@ -34,7 +38,8 @@ export class Throttle {
       });
       return button;
     });
-    $("#functions").append(...this.#functions);
+    $("#functions").append(...this.#functions.slice(0, LAST_OF_ALL + 1));
+    $("#more-functions .functions").append(...this.#functions.slice(LAST_OF_ALL + 1));
     this.#lock.addEventListener("click", () => this.#lockTo(!this.isLocked));
     document.addEventListener("visibilitychange", this.#left);
     put(this.#lock, say("lock"));
@@ -47,6 +52,8 @@ export class Throttle {
   #runAt(step) {
     const within = Math.min(Math.max(step, 0), Number(this.#slider.max));
     this.#slider.value = String(within);
+    put(this.#shown, String(within));
+    [this.#asked, this.#askedAt] = [within, performance.now()];
     this.#give(`speed ${this.#train} ${within}`);
   }
 
@@ -66,7 +73,8 @@ export class Throttle {
     this.#step = step;
     FUNCTIONS.forEach((number) => this.#functions[number].setAttribute("aria-pressed", String(functions.includes(number))));
     if (highest) this.#slider.max = String(highest);
-    if (this.isDragged) return;
+    if (step === this.#asked || performance.now() - this.#askedAt > ASKED_FOR_MS) this.#asked = undefined;
+    if (this.isDragged || this.#asked !== undefined) return;
     if (document.activeElement !== this.#slider) this.#slider.value = String(step);
     put(this.#shown, String(step));
   }

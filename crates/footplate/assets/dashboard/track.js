@@ -1,11 +1,12 @@
 // Draws the track: edges, sensors, turnout positions and trains.
 
-import { cut, between, nearest, written } from "./plan_curve.js";
+import { svg } from "./dom.js";
+import { cut, between, lengthOf, nearest, written } from "./plan_curve.js";
 import { planOf } from "./plan.js";
 import { placeOf } from "./places.js";
+import { Signals, showsSignals } from "./signals.js";
 import { say } from "./words.js";
 
-const SVG = "http://www.w3.org/2000/svg";
 /** Width of a letter in a name, in units of the drawing. */
 const LETTER = 1.12;
 /** The reach of a click (units of the drawing), and the drawn length of a turnout's blade. */
@@ -18,20 +19,16 @@ const MOST_WIDE = 160;
 /** The number of train colours. */
 export const COLOURS = 6;
 
-function element(name, attributes, parent) {
-  const made = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  parent?.append(made);
-  return made;
-}
+/** Whether places are named after a node. */
+const isNamed = ({ kind, is_boundary: isBoundary }) => kind === "contact" || isBoundary;
 
 /** The colour of the train at a place of the list. */
 export const colourOf = (place) => `var(--t${place % COLOURS})`;
 
 export class Track {
-  #nodes; #edges; #plan; #blades = []; #contacts = new Map(); #layer; #truth; #numbers; #trains = new Map(); #unit; #picked; #turnouts = new Map();
+  #nodes; #edges; #plan; #blades = []; #contacts = new Map(); #blocks; #layer; #truth; #numbers; #trains = new Map(); #unit; #picked; #turnouts = new Map(); #signals;
 
-  constructor(svg, layout) {
+  constructor(drawing, layout) {
     this.#nodes = new Map(layout.nodes.map((node) => [node.id, node]));
     this.#edges = new Map(layout.edges.map((edge) => [edge.id, edge]));
     this.#plan = planOf(layout);
@@ -39,25 +36,30 @@ export class Track {
     const [left, right, top, foot] = [0, 0, 1, 1].map((axis, nth) => Math[nth % 2 ? "max" : "min"](...all.map((point) => point[axis])));
     const side = Math.max(right - left, foot - top) || 1;
     // On a phone, names are larger so that they can be read.
-    this.#unit = side / Math.min(Math.max((svg.clientWidth || MOST_WIDE) / 4, LEAST_WIDE), MOST_WIDE);
+    this.#unit = side / Math.min(Math.max((drawing.clientWidth || MOST_WIDE) / 4, LEAST_WIDE), MOST_WIDE);
     const margin = side * 0.05;
     this.whole = [left - margin, top - margin, right - left + 2 * margin, foot - top + 2 * margin];
-    svg.style.aspectRatio = `${this.whole[2]} / ${this.whole[3]}`;
-    const rails = element("g", {}, svg);
+    // Patterns of broken lines.
+    drawing.style.setProperty("--unit", `${this.#unit}px`);
+    drawing.style.aspectRatio = `${this.whole[2]} / ${this.whole[3]}`;
+    const rails = svg("g", {}, drawing);
+    this.#blocks = new Map(layout.blocks.map(({ name, detector }) => [detector, { name, rails: [] }]));
     for (const edge of layout.edges) {
       if (edge.id % 2) continue;
-      const rail = element("path", { d: written(this.#curve(edge.id)), class: "rail", "stroke-width": this.#unit * 0.7 }, rails);
+      const rail = svg("path", { d: written(this.#curve(edge.id)), class: "rail", "stroke-width": this.#unit * 0.7 }, rails);
+      this.#blocks.get(edge.block)?.rails.push({ rail, edge });
       if (!edge.zone) continue;
       rail.classList.add("restricted");
-      element("title", {}, rail).textContent = say("zone", edge.zone.name, edge.zone.max_mm_s);
+      svg("title", {}, rail).textContent = say("zone", edge.zone.name, edge.zone.max_mm_s);
     }
-    this.#bladesOf(layout, element("g", {}, svg));
-    this.#truth = element("g", {}, svg);
-    this.#layer = element("g", {}, svg);
-    this.#mark(layout.nodes, element("g", {}, svg));
+    this.#bladesOf(layout, svg("g", {}, drawing));
+    this.#truth = svg("g", {}, drawing);
+    this.#layer = svg("g", {}, drawing);
+    this.#signals = new Signals(this.#edges, this.#nodes, (id) => this.#curve(id), this.#unit, svg("g", {}, drawing));
+    this.#mark(layout.nodes, svg("g", {}, drawing));
     // The train number must be readable over anything.
-    this.#numbers = element("g", {}, svg);
-    this.#picked = element("path", { class: "picked", "stroke-width": this.#unit * 0.5 }, svg);
+    this.#numbers = svg("g", {}, drawing);
+    this.#picked = svg("path", { class: "picked", "stroke-width": this.#unit * 0.5 }, drawing);
     this.#picked.style.display = "none";
   }
 
@@ -75,7 +77,7 @@ export class Track {
       const curve = this.#curve(edge.id);
       const long = curve.slice(1).reduce((sum, [x, y], nth) => sum + Math.hypot(x - curve[nth][0], y - curve[nth][1]), 0);
       const blade = cut(curve, 0, Math.min(0.5, BLADE * this.#unit / (long || 1)));
-      const path = element("path", { d: written(blade), class: "blade", "stroke-width": this.#unit * 1.1 }, layer);
+      const path = svg("path", { d: written(blade), class: "blade", "stroke-width": this.#unit * 1.1 }, layer);
       this.#blades.push({ path, turnout: from.number, leg: edge.leg });
       this.#turnouts.set(from.number, this.#plan.points.get(placeOf(edge.from)));
     }
@@ -84,35 +86,49 @@ export class Track {
   #mark(nodes, marks) {
     const named = new Map();
     for (const node of nodes) {
-      if (node.kind !== "contact" && node.kind !== "branch") continue;
+      if (!isNamed(node) && node.kind !== "branch") continue;
       const point = this.#plan.points.get(placeOf(node.id));
       const key = point.join();
       const [x, y] = point;
-      if (node.kind === "contact") {
-        let spot = this.#contacts.get(`at ${key}`);
-        if (!spot) {
-          spot = element("circle", { cx: x, cy: y, r: this.#unit * 0.9, class: "contact", "stroke-width": this.#unit * 0.4 }, marks);
-          element("title", {}, spot);
-          this.#contacts.set(`at ${key}`, spot);
-        }
-        this.#contacts.set(node.number, spot);
-        this.#contacts.set(`named ${node.name}`, spot);
+      if (isNamed(node)) {
+        const spot = this.#contacts.get(`at ${key}`) ?? this.#spot(node, point, marks);
+        this.#contacts.set(`at ${key}`, spot);
+        if (node.number != null) this.#contacts.set(node.number, spot);
       }
-      const text = node.kind === "contact" ? node.name : `⟨${node.number}⟩`;
-      named.set(key, { x, y, kind: node.kind, texts: [...(named.get(key)?.texts ?? []), text] });
+      const text = isNamed(node) ? node.name : `⟨${node.number}⟩`;
+      named.set(key, { x, y, rank: isNamed(node) ? 0 : 1, texts: [...(named.get(key)?.texts ?? []), text] });
+    }
+    for (const [detector, { name, rails }] of this.#blocks) {
+      const [longest] = rails.map(({ edge }) => edge).sort((one, other) => other.length_mm - one.length_mm);
+      const [x, y] = this.point(longest.id, longest.length_mm / 2);
+      // Towards the middle of the drawing, where the rail does not cross the name.
+      const [dx, dy] = [this.whole[0] + this.whole[2] / 2 - x, this.whole[1] + this.whole[3] / 2 - y];
+      const [across, down] = [dx, dy].map((part) => part / (Math.hypot(dx, dy) || 1));
+      const half = name.length * LETTER / 2;
+      named.set(`block ${detector}`, { x: x + this.#unit * across * (half + 1.2), y: y + this.#unit * (2.2 * down + 2), rank: 2, texts: [name] });
     }
     // Sensors first: places are named after them.
-    const [contacts, others] = [[], []];
-    for (const name of named.values()) (name.kind === "contact" ? contacts : others).push(name);
+    const ranked = [...named.values()].sort((one, other) => one.rank - other.rank);
     const taken = [];
-    for (const { x, y, texts } of [...contacts, ...others]) {
+    for (const { x, y, rank, texts } of ranked) {
       const text = texts.join(" ");
       const half = text.length * this.#unit * LETTER / 2;
       const [dx, dy] = this.#room(x, y, half, taken);
       taken.push([x + dx - half, x + dx + half, y + dy]);
-      const name = element("text", { x: x + dx, y: y + dy, "font-size": this.#unit * 2, "stroke-width": this.#unit * 0.5, class: "name" }, marks);
+      const name = svg("text", { x: x + dx, y: y + dy, "font-size": this.#unit * 2, "stroke-width": this.#unit * 0.5, class: rank === 2 ? "name of-block" : "name" }, marks);
       name.textContent = text;
     }
+  }
+
+  /** The mark of a sensor, or of the boundary of a block: an insulated joint. */
+  #spot({ id, is_boundary: isBoundary }, [x, y], marks) {
+    const stroke = { "stroke-width": this.#unit * 0.4 };
+    if (!isBoundary) return svg("circle", { cx: x, cy: y, r: this.#unit * 0.9, class: "contact", ...stroke }, marks);
+    const leaving = [...this.#edges.values()].find(({ from }) => from === id || from === (id ^ 1));
+    const [one, other] = this.#curve(leaving.id);
+    const long = Math.hypot(other[0] - one[0], other[1] - one[1]) || 1;
+    const [dx, dy] = [other[0] - one[0], other[1] - one[1]].map((part) => 1.4 * this.#unit * part / long);
+    return svg("path", { d: `M${x - dy} ${y + dx}L${x + dy} ${y - dx}`, class: "contact", "stroke-width": this.#unit * 0.8 }, marks);
   }
 
   /** The place for a name of this width: above its point, or where it covers no other name. */
@@ -153,12 +169,21 @@ export class Track {
       blade.path.setAttribute("class", `blade ${look}`);
     }
     for (const [key, spot] of this.#contacts) {
-      if (typeof key === "string") spot.classList.remove("passed");
+      if (typeof key === "string") spot.classList.remove("passed", "failed");
     }
-    for (const number of Object.keys(picture.passed)) {
-      this.#contacts.get(Number(number))?.classList.add("passed");
-      this.#contacts.get(Number(number))?.classList.remove("failed");
+    for (const number of Object.keys(picture.passed)) this.#contacts.get(Number(number))?.classList.add("passed");
+    for (const number of picture.ignored) this.#contacts.get(number)?.classList.add("failed");
+    for (const [detector, block] of this.#blocks) {
+      const state = picture.blocks?.[detector];
+      if (state === block.state) continue;
+      for (const { rail } of block.rails) {
+        rail.classList.remove(block.state);
+        if (state) rail.classList.add(state);
+        rail.setAttribute("stroke-width", this.#unit * (state === "occupied" ? 1.3 : 0.7));
+      }
+      block.state = state;
     }
+    this.#signals.show(picture, showsSignals());
     picture.trains.forEach((train, place) => this.#train(train, place));
     for (const [number, { parts }] of this.#trains) {
       if (picture.trains.some(({ train }) => train === number)) continue;
@@ -167,26 +192,21 @@ export class Track {
     }
   }
 
-  /** Marks a sensor that missed a detection, until its next one. */
-  fails(name) {
-    this.#contacts.get(`named ${name}`)?.classList.add("failed");
-  }
-
   /** Outlines where the simulated trains really are; without trains, removes the outlines. */
   truth(trains) {
-    this.#truth.replaceChildren(...trains.map(({ body }) => element("path", { class: "truth", d: this.#path(body), "stroke-width": this.#unit * 3.4 })));
+    this.#truth.replaceChildren(...trains.map(({ body }) => svg("path", { class: "truth", d: this.#path(body), "stroke-width": this.#unit * 3.4 })));
   }
 
   #partsOf(train, place) {
     const stroke = colourOf(place);
     const wide = this.#unit;
     const parts = {
-      held: element("path", { class: "held", stroke, "stroke-width": wide * 2.6 }, this.#layer),
-      haze: element("path", { class: "haze", stroke, "stroke-width": wide * 3 }, this.#layer),
-      rests: element("path", { class: "rests", stroke, "stroke-width": wide * 2 }, this.#layer),
-      body: element("path", { class: "body", stroke, "stroke-width": wide * 1.6 }, this.#layer),
-      target: element("circle", { class: "target", stroke, "stroke-width": wide * 0.4, r: wide * 1.2 }, this.#layer),
-      number: element("text", { class: "number", "font-size": wide * 2.4, "stroke-width": wide * 0.6 }, this.#numbers),
+      held: svg("path", { class: "held", stroke, "stroke-width": wide * 2.6 }, this.#layer),
+      haze: svg("path", { class: "haze", stroke, "stroke-width": wide * 3 }, this.#layer),
+      rests: svg("path", { class: "rests", stroke, "stroke-width": wide * 2 }, this.#layer),
+      body: svg("path", { class: "body", stroke, "stroke-width": wide * 1.6 }, this.#layer),
+      target: svg("circle", { class: "target", stroke, "stroke-width": wide * 0.4, r: wide * 1.2 }, this.#layer),
+      number: svg("text", { class: "number", "font-size": wide * 2.4, "stroke-width": wide * 0.6 }, this.#numbers),
     };
     parts.number.textContent = String(train.train);
     const made = { parts, drawn: {} };
@@ -243,7 +263,7 @@ export class Track {
     const places = this.nearest(point);
     // A sensor beside a turnout has the same reach as the turnout.
     if (turnout && !(places && places.away < this.#unit && places.mm[0] === 0)) return { turnout: turnout.number };
-    return places ? { places: places.names } : {};
+    return places ? { places: places.names, block: places.block } : {};
   }
 
   /** The place nearest to a point of the drawing, named in both directions: after the last sensor before it. */
@@ -251,15 +271,18 @@ export class Track {
     const found = [];
     for (const edge of this.#edges.values()) {
       const from = this.#nodes.get(edge.from);
-      if (from?.kind !== "contact") continue;
-      const { away, part } = nearest(this.#curve(edge.id), point);
-      found.push({ away, rail: edge.id >> 1, name: from.name, mm: Math.round(part * edge.length_mm) });
+      if (!from || !isNamed(from)) continue;
+      const curve = this.#curve(edge.id);
+      const { away, part } = nearest(curve, point);
+      // A click on the mark of a sensor means the sensor.
+      const mm = part * lengthOf(curve) < this.#unit ? 0 : Math.round(part * edge.length_mm);
+      found.push({ away, rail: edge.id >> 1, name: from.name, mm, block: this.#blocks.get(edge.block)?.name });
     }
     found.sort((one, other) => one.away - other.away || one.mm - other.mm);
     const [best] = found;
     if (!best || best.away > this.#unit * REACH) return undefined;
     const same = found.filter(({ away, name }) => away - best.away < this.#unit * 0.01 && name !== undefined).slice(0, 2);
     const names = same.map(({ name, mm }) => (mm > 0 ? `${name}+${mm}mm` : name));
-    return { away: best.away, mm: same.map(({ mm }) => mm), names };
+    return { away: best.away, mm: same.map(({ mm }) => mm), names, block: best.block };
   }
 }

@@ -3,6 +3,7 @@
 import { colour, dots, line } from "./chart.js";
 import { LiveChart } from "./charts.js";
 import { get } from "./server.js";
+import { TimeWindow } from "./time_window.js";
 import { say } from "./words.js";
 
 /** Samples kept: as many as the server keeps, five minutes at 10 Hz. */
@@ -50,20 +51,15 @@ function steps(history) {
 export class TrainCharts {
   highest;
   #root; #live; #train; #history = Object.fromEntries(COLUMNS.map((name) => [name, []]));
-  #window = 60; #charts = []; #passed; #stops; #speed; #timer; #asked = false; #fresh = false;
+  #window; #charts = []; #passed; #stops; #speed; #timer; #asked = false; #fresh = false;
 
   constructor(root, live, train) {
     [this.#root, this.#live, this.#train] = [root, live, train];
     this.#passed = live.passed.filter((passed) => passed.train === train);
+    this.#window = new TimeWindow(root, () => { this.#fresh = true; });
     this.#load();
     this.#build();
     this.#timer = setInterval(() => this.#draw(), DRAWN_EVERY_MS);
-  }
-
-  /** Shows the last seconds. */
-  shows(seconds) {
-    this.#window = seconds;
-    this.#fresh = true;
   }
 
   /** Adds a sample. */
@@ -117,17 +113,9 @@ export class TrainCharts {
     this.#fresh = true;
   }
 
-  /** The ends of the period shown. */
-  #ends() {
-    const { t_s: times } = this.#history;
-    const [first, last] = [times[0] ?? 0, times.at(-1) ?? 0];
-    const from = Math.max(first, last - this.#window);
-    return [from, Math.max(last, from + this.#window)];
-  }
-
   /** The 97th percentile of the values shown: outliers must not flatten the rest. */
   #most(times, sizes, least) {
-    const [from, to] = this.#ends();
+    const [from, to] = this.#window.ends();
     const seen = sizes.filter((size, i) => size != null && times[i] >= from && times[i] <= to).sort((one, other) => one - other);
     return 1.2 * Math.max(least, seen[Math.floor(0.97 * (seen.length - 1))] ?? 0);
   }
@@ -140,7 +128,8 @@ export class TrainCharts {
 
   #build() {
     const x = { label: say("axis-time"), unit: "s", digits: 1 };
-    const range = { x: { range: () => this.#ends() } };
+    const range = { x: { range: () => this.#window.ends() } };
+    const selects = (from, to) => this.#window.select(from, to);
     const sync = `train-${this.#train}`;
     const band = (label, unit, digits) => [
       { ...line(label, "band", unit, digits), width: 1 },
@@ -155,7 +144,7 @@ export class TrainCharts {
     };
     add("speed", () => ({
       name: say("chart-speed"), x, y: say("axis-speed"), sync, range: { ...range, y: { range: () => [0, this.#most(this.#history.t_s, this.#history.speed_mm_per_s, 60)] } },
-      zooms: false, below: marks, bands: shade(),
+      zooms: false, selects, below: marks, bands: shade(),
       series: [...band(say("band-95"), "mm/s", 0), line(say("estimated"), "first", "mm/s", 0), dots(say("mean-between"), "second", "mm/s", 0)],
     }), () => {
       const { t_s: t, speed_mm_per_s: v, speed_half_mm_per_s: half } = this.#history;
@@ -164,7 +153,7 @@ export class TrainCharts {
       return uPlot.join([[t, edge(1), edge(-1), v], [means.map(([at]) => at), means.map(([, speed]) => speed)]]);
     });
     add("sure", () => ({
-      name: say("chart-sure"), x, y: say("axis-sure"), sync, height: STRIP, zero: true, zooms: false, below: marks, bands: shade(),
+      name: say("chart-sure"), x, y: say("axis-sure"), sync, height: STRIP, zero: true, zooms: false, selects, below: marks, bands: shade(),
       range: { ...range, y: { range: () => {
         const { t_s: t, half_mm: half } = this.#history;
         const own = this.#passed.filter(({ short_mm }) => short_mm != null);
@@ -177,7 +166,7 @@ export class TrainCharts {
       return uPlot.join([[t, half, half.map((value) => (value == null ? null : -value))], [own.map(({ t_s }) => t_s), own.map(({ short_mm }) => -short_mm)]]);
     });
     add("way", () => ({
-      name: say("chart-way"), x, y: say("axis-way"), sync, height: STRIP, range, zooms: false, below: marks,
+      name: say("chart-way"), x, y: say("axis-way"), sync, height: STRIP, range, zooms: false, selects, below: marks,
       series: [line(say("estimated"), "first", "m", 2), dots(say("contact"), "second", "m", 2)],
     }), () => {
       const { t_s: t, way_mm: distance } = this.#history;
@@ -186,7 +175,7 @@ export class TrainCharts {
     });
     const late = [];
     add("late", () => ({
-      name: say("chart-late"), x, y: say("axis-late"), height: STRIP, zero: true, zooms: false, bars: [[late, "first"]],
+      name: say("chart-late"), x, y: say("axis-late"), sync, height: STRIP, zero: true, zooms: false, selects, bars: [[late, "first"]],
       range: { ...range, y: { range: () => this.#reach(late.map(({ x: at }) => at), late.map(({ y, dy }) => Math.abs(y) + dy), 50) } },
       series: [dots(say("later"), "first", "ms", 0)],
     }), () => {
@@ -230,6 +219,8 @@ export class TrainCharts {
   #draw() {
     if (!this.#fresh) return;
     this.#fresh = false;
+    const { t_s: times } = this.#history;
+    this.#window.holds(times[0] ?? 0, times.at(-1) ?? 0);
     for (const { chart, data } of this.#charts) chart.set(data());
   }
 }

@@ -4,10 +4,11 @@ import { TrainCharts } from "./train_charts.js";
 import { make, put, shown, signed } from "./dom.js";
 import { doingNow } from "./doing_now.js";
 import { PickTrack } from "./pick_track.js";
+import { showPortrait } from "./portrait.js";
 import { kmPerHour } from "./scale.js";
 import { order } from "./server.js";
 import { Throttle } from "./throttle.js";
-import { say } from "./words.js";
+import { logged, say } from "./words.js";
 
 /** Detections in the list; the charts show more. */
 const LISTED = 40;
@@ -16,6 +17,7 @@ export function trainPage(root, live, number) {
   const train = Number(number);
   const $ = (selector) => root.querySelector(selector);
   $("h2").textContent = live.called(train);
+  showPortrait($("#portrait"), train);
   const charts = new TrainCharts(root, live, train);
   /** Where the result of the last command is shown: beside its control. */
   let answer = $("#answer");
@@ -40,19 +42,28 @@ export function trainPage(root, live, number) {
   const track = new PickTrack($("#track"), live.layout, (place) => {
     put($("#picked"), place ? say("picked-for", place, train) : say("pick-hint"));
     put($("#stop-at"), say("stop-here", place ?? "…"));
-    $("#stop-at").disabled = !place;
+    put($("#go-to"), say("go-here", place ?? "…"));
+    for (const id of ["#stop-at", "#go-to"]) $(id).disabled = !place;
     if (place) $("#arrive-at").value = place;
   });
 
   put($("#stop-at"), say("stop-here", "…"));
+  put($("#go-to"), say("go-here", "…"));
+  put($("#find"), say("find-train", train));
+  put($("#say-where"), say("act-place", train));
+  $("#say-where").href = `#/layout/${train}`;
+  $("#find").addEventListener("click", () => give(`find ${train}`));
+  const aim = () => ($("#not-beyond").checked ? " not-beyond 0.1%" : "");
   const throttle = new Throttle(root, train, give);
-  $("#stop-at").addEventListener("click", () => track.place && give(`stop ${train} at ${track.place}`, $("#stop-answer")));
+  $("#stop-at").addEventListener("click", () => track.place && give(`stop ${train} at ${track.place}${aim()}`, $("#stop-answer")));
+  $("#go-to").addEventListener("click", () => track.place && give(`go ${train} to ${track.place}${aim()}`, $("#stop-answer")));
   const asks = (form, line) => $(form).addEventListener("submit", (event) => {
     event.preventDefault();
     give(line(new FormData(event.target)), event.target.querySelector(".answer"));
   });
   asks("#hold", (said) => `hold ${train} ${said.get("speed")}mm/s`);
-  asks("#follow", (said) => `follow ${train} behind ${said.get("leader")} by ${said.get("gap")}s`);
+  asks("#follow", (said) => `follow ${train} behind ${said.get("leader")} by ${said.get("gap")}${said.get("unit")}`);
+  asks("#length", (said) => `length ${train} pickup ${said.get("pickup")}mm overhang ${said.get("overhang")}mm`);
   asks("#arrive", (said) => `arrive ${train} at ${said.get("at")} in ${said.get("in")}s`);
   asks("#move", (said) => `move ${train} ${said.get("way")}mm`);
 
@@ -92,7 +103,6 @@ export function trainPage(root, live, number) {
 
   list();
   ends();
-  $("#window").addEventListener("change", (event) => charts.shows(Number(event.target.value)));
 
   return {
     picture(picture) {
@@ -103,6 +113,7 @@ export function trainPage(root, live, number) {
       if (!own) return put($("#unknown"), say("no-such-train", train));
       charts.goesOn(picture.t_s, own);
       put($("#now"), doingNow(own));
+      $("#lost-does").hidden = Boolean(own.at);
       put($("#at"), own.at ? `${own.at} ± ${shown(own.half_mm)} mm` : say("nowhere"));
       put($("#speed"), own.at ? `${shown(own.speed_mm_per_s)} ± ${shown(own.speed_half_mm_per_s)} mm/s` : "–");
       put($("#km-per-hour"), own.at ? kmPerHour(own.speed_mm_per_s) : "–");
@@ -117,7 +128,7 @@ export function trainPage(root, live, number) {
     },
     ended(ended) {
       if (ended.train !== train) return;
-      if (ended.refused) refused(say("refused", ended.refused));
+      if (ended.refused) refused(say("refused", logged(ended.refused)));
       else if (ended.achieved) put(answer, say("achieved", ended.achieved));
       ends();
     },

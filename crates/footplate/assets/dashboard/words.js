@@ -2,6 +2,7 @@
 
 import { ENGLISH } from "./english.js";
 import { GERMAN } from "./german.js";
+import { logInGerman } from "./german_log.js";
 import { inGerman } from "./german_report.js";
 
 const isGerman = navigator.language.toLowerCase().startsWith("de");
@@ -16,6 +17,9 @@ export function say(word, ...blanks) {
 
 /** A report of another verb in the reader's language. */
 export const inOwnLanguage = (report) => (isGerman ? inGerman(report) : report);
+
+/** A line of the log in the reader's language. */
+export const logged = (line) => (isGerman ? logInGerman(line) : line);
 
 /** Fills in all texts of a part of the page. */
 export function translate(root) {

@@ -119,6 +119,14 @@ const keysSaid = () => pick(
   "Pfeiltasten gehen die Werte entlang, Plus und Minus vergrößern, Escape zeigt alles.",
 );
 
+/** Passes on the range that was dragged over, and removes its mark. */
+function selected(u, selects) {
+  const { left, width } = u.select;
+  if (width <= 0) return;
+  selects(u.posToVal(left, "x"), u.posToVal(left + width, "x"));
+  u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+}
+
 function onKey(u, event, zooms) {
   const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
   const part = { "+": 0.5, "=": 0.5, "-": 2 }[event.key];
@@ -136,9 +144,12 @@ function onKey(u, event, zooms) {
   event.preventDefault();
 }
 
-/** Puts a chart into a figure; `below` draws between grid and lines. The chart can be zoomed unless its range is fixed. */
+/**
+ * Puts a chart into a figure; `below` draws between grid and lines. The chart can be zoomed unless its range is fixed; `selects` then
+ * receives the range of the x axis over which the reader drags.
+ */
 function chart(figure, {
-  name, x, y, series, data, height = HEIGHT, bars = [], zero = false, sync, range, bands, ticks, below = [], zooms = true, keys = keysSaid(),
+  name, x, y, series, data, height = HEIGHT, bars = [], zero = false, sync, range, bands, ticks, below = [], zooms = true, selects, keys = keysSaid(),
 }) {
   const draw = bars.map(([points, colourName]) => errorBars(points, colourName));
   const u = new uPlot({
@@ -146,7 +157,7 @@ function chart(figure, {
     pxAlign: 0,
     width: figure.clientWidth - 2 * parseFloat(getComputedStyle(figure).paddingLeft), height,
     cursor: {
-      dataIdx: nearest, y: false, drag: { x: zooms, y: false }, points: { size: 9 },
+      dataIdx: nearest, y: false, drag: { x: zooms || Boolean(selects), y: false, setScale: zooms }, points: { size: 9 },
       ...(sync && { sync: { key: sync, scales: ["x", null] } }),
     },
     legend: { live: true },
@@ -154,7 +165,7 @@ function chart(figure, {
     axes: [axis(x.label, { incrs: ticks }), axis(y, { vertical: true, space: height < HEIGHT ? TIGHT : ROOMY })],
     series: [{ label: x.label.split(" (")[0], value: x.value ?? withUnit(x.unit, x.digits) }, ...series],
     bands,
-    hooks: { drawAxes: [...below, ...(zero ? [zeroLine] : [])], draw },
+    hooks: { drawAxes: [...below, ...(zero ? [zeroLine] : [])], draw, setSelect: selects ? [(u) => selected(u, selects)] : [] },
   }, data, figure);
   u.over.tabIndex = 0;
   u.over.setAttribute("role", "application");

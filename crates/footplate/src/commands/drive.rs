@@ -24,7 +24,7 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{DecoderSteps, Timestamp, TurnoutId};
-use footplate_store::{Journal, NewMachine, Store, layout_named, parse_layout};
+use footplate_store::{Journal, NewMachine, Schedule, Store, layout_named, parse_layout};
 use footplate_wire::Session as _;
 
 pub(crate) use self::beginning::DriveBeginning;
@@ -192,8 +192,10 @@ impl Arguments {
             layout,
             Sources { files: &self.railway.models, store: store.as_mut(), named, station },
         )?;
+        let saved = |store: &Store| store.schedules(layout.name());
+        let schedules = store.as_ref().map_or_else(|| Ok(Vec::new()), saved)?;
         drop(store);
-        let beginning = self.beginning(&written, known)?;
+        let beginning = self.beginning(&written, known, schedules)?;
         let dashboard = self.dashboard(&written)?;
         match address {
             Address::Simulated(simulated) => {
@@ -225,7 +227,12 @@ impl Arguments {
         WrittenLayout::named(named)
     }
 
-    fn beginning(&self, written: &WrittenLayout, known: KnownTrains) -> anyhow::Result<DriveBeginning> {
+    fn beginning(
+        &self,
+        written: &WrittenLayout,
+        known: KnownTrains,
+        schedules: Vec<Schedule>,
+    ) -> anyhow::Result<DriveBeginning> {
         let layout = &written.layout;
         let mut turnouts = known.turnouts;
         for (turnout, leg) in &self.railway.turnouts {
@@ -243,7 +250,10 @@ impl Arguments {
         let highest: BTreeMap<_, _> =
             known.models.iter().map(|(train, model)| (*train, model.highest())).collect();
         let (source, steps) = match &self.script {
-            Some(path) => (CommandSource::Script, read_script(path, Known { layout, trains: &highest })?),
+            Some(path) => {
+                let known = Known { layout, trains: &highest, schedules: &schedules };
+                (CommandSource::Script, read_script(path, known)?)
+            }
             None if std::io::stdin().is_terminal() || self.is_headless() => {
                 (CommandSource::Person, Vec::new())
             }
@@ -258,6 +268,7 @@ impl Arguments {
             script: steps.into_iter().map(|step| step.text).collect(),
             is_complete: self.script.is_some(),
             wait_limit_s: self.wait_limit,
+            schedules,
             link: self.railway.station()?.time_model(self.railway.line()?.as_ref()),
         })
     }

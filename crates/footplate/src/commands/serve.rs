@@ -2,6 +2,7 @@
 
 mod answer_queue;
 mod archive;
+mod drawn_layout;
 mod odometry_pages;
 mod schedules;
 mod set_up;
@@ -24,6 +25,7 @@ use crate::link::Address;
 pub(crate) use answer_queue::{AnswerForm, AnswerQueue};
 pub(crate) use archive::StoreQuery;
 use archive::{Archive, archive_routes};
+use drawn_layout::drawn_layout_routes;
 use odometry_pages::odometry_routes;
 use schedules::schedule_routes;
 #[cfg(test)]
@@ -86,6 +88,7 @@ fn session_routes(archive: Archive, answer_queue: &AnswerQueue, board: &Arc<Boar
         .and(schedule_routes(archive, Arc::clone(board)))
         .and(odometry_routes(answer_queue))
         .and(slide_routes())
+        .and(drawn_layout_routes())
 }
 
 /// The same for the test of the description.

@@ -61,6 +61,8 @@ pub(crate) enum Request {
     Truth,
     /// Whether the lines of a schedule can be read.
     CheckSchedule(Schedule),
+    /// The saved schedules have changed.
+    SavedSchedules(Vec<Schedule>),
     /// Begin a schedule.
     RunSchedule(Schedule),
     /// End the schedule of this name.

@@ -1,6 +1,6 @@
 //! Composes the picture of the current state, the histories and the detections from the state of a driver.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use footplate_core::control::learn::CalibrationNotice;
@@ -17,7 +17,9 @@ use super::alarm_list::{ActiveAlarm, AlarmList};
 use super::board::Board;
 use super::calibration_picture::CalibrationPicture;
 use super::history::Sample;
-use super::picture::{Picture, SessionState, TrainTask, millis, paint_train, tenths};
+use super::picture::{
+    Picture, SessionState, TrainTask, block_states, ignored_sensors, millis, paint_train, tenths,
+};
 use super::spans::reserved_spans;
 use super::travelled_distance::TravelledDistance;
 
@@ -51,6 +53,8 @@ pub(crate) struct Painter {
     sampled: Option<Timestamp>,
     drifts: BTreeMap<TrainId, DriftTest>,
     alarms: AlarmList,
+    /// The detectors of blocks that are occupied; `None` before the first look at them.
+    occupied: Option<BTreeSet<SensorId>>,
     /// When the session began, by the clock of the link.
     began: Option<Timestamp>,
     models: BTreeMap<TrainId, MotionModel>,
@@ -119,6 +123,7 @@ impl Painter {
             sampled: None,
             drifts: BTreeMap::new(),
             alarms: AlarmList::default(),
+            occupied: None,
             began: None,
             models: BTreeMap::new(),
             models_published: None,
@@ -157,6 +162,11 @@ impl Painter {
         self.flashes.insert(passed.passed.sensor, passed.passed.window.middle());
         self.alarms.detect(passed.train, passed.passed.sensor, passed.passed.window.middle());
         self.unpublished.push(passed);
+    }
+
+    /// Takes in which blocks are occupied, by their detectors.
+    pub(crate) fn see_blocks(&mut self, occupied: impl Iterator<Item = SensorId>) {
+        self.occupied = Some(occupied.collect());
     }
 
     /// Raises an alarm, or resolves those that a message of the kind `over` is about.
@@ -279,6 +289,11 @@ impl Painter {
                     (turnout.0, leg.map(|leg| if leg.is_curved() { "curved" } else { "straight" }))
                 })
                 .collect(),
+            blocks: self
+                .occupied
+                .as_ref()
+                .map_or_else(BTreeMap::new, |occupied| block_states(driver, occupied)),
+            ignored: ignored_sensors(driver),
             calibration: self.calibration.clone(),
             alarms: self.alarms.ranked(),
             schedules: session.schedules,

@@ -1,11 +1,11 @@
 //! The current state, as sent to browsers.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use footplate_core::control::Driver;
-use footplate_core::track::{Landmark, NodeKind};
+use footplate_core::track::{Block, Landmark, NodeKind};
 use footplate_core::tracking::PathPoint;
-use footplate_core::{HALF_95, Length, SpeedStep, Timestamp, TrainId};
+use footplate_core::{HALF_95, Length, SensorId, SpeedStep, Timestamp, TrainId};
 use footplate_store::LayoutFile;
 use serde::Serialize;
 
@@ -66,6 +66,11 @@ pub(super) struct Picture {
     pub(super) turnouts: BTreeMap<u16, Option<&'static str>>,
     /// Recent detections: sensor, and seconds since.
     pub(super) passed: BTreeMap<u16, f64>,
+    /// The sensors whose reports are ignored.
+    pub(super) ignored: Vec<u16>,
+    /// The state of each block, by the number of its detector; nothing until detectors were read.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub(super) blocks: BTreeMap<u16, BlockState>,
     /// The active alarms, the most severe first.
     pub(super) alarms: Vec<ActiveAlarm>,
     /// The schedules that run, and those that have ended.
@@ -73,6 +78,36 @@ pub(super) struct Picture {
     /// A calibration in progress.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) calibration: Option<CalibrationPicture>,
+}
+
+/// What the detector of a block says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum BlockState {
+    Free,
+    Occupied,
+    /// It reported repeatedly where no train can be.
+    Ignored,
+}
+
+/// The state of every block, from the detectors that report an occupied one.
+pub(super) fn block_states(driver: &Driver, occupied: &BTreeSet<SensorId>) -> BTreeMap<u16, BlockState> {
+    let state = |block: &Block| {
+        if block.entries.iter().any(|entry| driver.ignores(*entry)) {
+            BlockState::Ignored
+        } else if occupied.contains(&block.detector) {
+            BlockState::Occupied
+        } else {
+            BlockState::Free
+        }
+    };
+    driver.layout().blocks().iter().map(|block| (block.detector.0, state(block))).collect()
+}
+
+/// The sensors whose reports are ignored.
+pub(super) fn ignored_sensors(driver: &Driver) -> Vec<u16> {
+    let sensors = driver.layout().sensors().map(|(sensor, _)| sensor);
+    sensors.filter(|sensor| driver.ignores(*sensor)).map(|sensor| sensor.0).collect()
 }
 
 /// The state of one train.
@@ -193,6 +228,14 @@ pub(crate) struct LayoutPicture {
     name: String,
     nodes: Vec<NodePicture>,
     edges: Vec<EdgePicture>,
+    blocks: Vec<BlockPicture>,
+}
+
+#[derive(Debug, Serialize)]
+struct BlockPicture {
+    name: String,
+    /// The number of its detector.
+    detector: u16,
 }
 
 #[derive(Debug, Serialize)]
@@ -203,6 +246,8 @@ struct NodePicture {
     /// The number of its sensor or turnout.
     number: Option<u16>,
     point: Option<[f64; 2]>,
+    /// Whether it is at the boundary of a block.
+    is_boundary: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -214,6 +259,8 @@ struct EdgePicture {
     length_mm: f64,
     /// Its speed restriction.
     zone: Option<ZonePicture>,
+    /// The detector of its block.
+    block: Option<u16>,
 }
 
 #[derive(Debug, Serialize)]
@@ -230,9 +277,17 @@ impl LayoutPicture {
                 NodeKind::Sensor(sensor) => ("contact", Some(sensor.0)),
                 NodeKind::Branch(turnout) => ("branch", Some(turnout.0)),
                 NodeKind::Merge(turnout) => ("merge", Some(turnout.0)),
-                NodeKind::Enter | NodeKind::Exit | NodeKind::Boundary => ("end", None),
+                NodeKind::Boundary => ("boundary", None),
+                NodeKind::Enter | NodeKind::Exit => ("end", None),
             };
-            NodePicture { id: id.0, name: node.name.clone(), kind, number, point: file.drawing.point(id) }
+            NodePicture {
+                id: id.0,
+                name: node.name.clone(),
+                kind,
+                number,
+                point: file.drawing.point(id),
+                is_boundary: layout.is_boundary(id),
+            }
         };
         let edge = |(id, edge): (footplate_core::EdgeId, &footplate_core::track::Edge)| EdgePicture {
             id: id.0,
@@ -244,11 +299,17 @@ impl LayoutPicture {
                 name: zone.name.clone(),
                 max_mm_s: tenths(zone.limit.as_mm_per_s()),
             }),
+            block: layout.block_of_edge(id).map(|block| block.detector.0),
         };
         Self {
             name: layout.name().to_owned(),
             nodes: layout.nodes().map(node).collect(),
             edges: layout.edges().map(edge).collect(),
+            blocks: layout
+                .blocks()
+                .iter()
+                .map(|block| BlockPicture { name: block.name.clone(), detector: block.detector.0 })
+                .collect(),
         }
     }
 }

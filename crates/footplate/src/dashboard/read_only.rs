@@ -8,6 +8,7 @@ use footplate_core::control::Driver;
 use footplate_core::control::learn::{CalibrationNotice, Calibrator};
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{Timestamp, TrainId};
+use footplate_wire::BlockReports;
 
 use super::alarm::Alarm;
 use super::board::{Answer, Board, Request};
@@ -76,6 +77,11 @@ impl ReadOnlyDashboard {
     /// Displays an alarm.
     pub(crate) fn alarm(&mut self, now: Timestamp, alarm: &Alarm) {
         self.painter.alarm(now, alarm);
+    }
+
+    /// Displays which blocks are occupied.
+    pub(crate) fn see_blocks(&mut self, blocks: &BlockReports) {
+        self.painter.see_blocks(blocks.occupied());
     }
 
     /// Takes in a notice of a calibration; `said` is the line that was printed for it.

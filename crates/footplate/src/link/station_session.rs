@@ -26,6 +26,11 @@ impl StationSession {
         &self.station
     }
 
+    /// What the detectors of blocks report; `None` for a layout without blocks.
+    pub(crate) const fn blocks(&self) -> Option<&BlockReports> {
+        self.blocks.as_ref()
+    }
+
     /// Reports trains that come into the blocks of a layout.
     pub(crate) fn with_blocks(mut self, layout: &Layout) -> Self {
         self.blocks = BlockReports::of(layout, self.station.any_mut());

@@ -20,6 +20,8 @@ pub(crate) enum Input {
     Line(String),
     /// A schedule begins.
     Schedule(Schedule),
+    /// The saved schedules of the layout have changed.
+    Schedules(Vec<Schedule>),
     /// The schedule of this name ends.
     EndSchedule(String),
     /// An emergency stop: all trains stop, and the track power goes off.
@@ -71,6 +73,7 @@ impl Input {
             Self::Timeout => ("timeout", String::new()),
             Self::Line(line) => ("line", line.clone()),
             Self::Schedule(schedule) => ("schedule", serde_json::to_string(schedule).unwrap_or_default()),
+            Self::Schedules(saved) => ("schedules", serde_json::to_string(saved).unwrap_or_default()),
             Self::EndSchedule(name) => ("end-schedule", name.clone()),
             Self::EmergencyStop => ("emergency-stop", String::new()),
             Self::NoMoreLines => ("no-more-lines", String::new()),
@@ -101,6 +104,7 @@ impl Input {
             "timeout" => Self::Timeout,
             "line" => Self::Line(text.to_owned()),
             "schedule" => Self::Schedule(of_json(kind, text)?),
+            "schedules" => Self::Schedules(of_json(kind, text)?),
             "end-schedule" => Self::EndSchedule(text.to_owned()),
             "emergency-stop" => Self::EmergencyStop,
             "no-more-lines" => Self::NoMoreLines,
@@ -153,6 +157,12 @@ mod tests {
                 rounds: None,
                 is_button: true,
             }),
+            Input::Schedules(vec![Schedule {
+                name: "Abend".to_owned(),
+                lines: vec!["light 24 on".to_owned()],
+                rounds: Some(2),
+                is_button: false,
+            }]),
             Input::EndSchedule("Abend".to_owned()),
             Input::EmergencyStop,
             Input::NoMoreLines,

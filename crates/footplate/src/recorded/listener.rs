@@ -19,6 +19,7 @@ pub(crate) trait Listener: Machine<Notice: Debug> {
             Input::Timeout => self.handle_timeout(now),
             Input::Line(_)
             | Input::Schedule(_)
+            | Input::Schedules(_)
             | Input::EndSchedule(_)
             | Input::EmergencyStop
             | Input::NoMoreLines

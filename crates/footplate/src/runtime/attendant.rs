@@ -2,7 +2,7 @@
 
 use footplate_core::control::Machine;
 use footplate_core::{Command, Event, Timestamp};
-use footplate_wire::{CommandError, LinkNotice};
+use footplate_wire::{BlockReports, CommandError, LinkNotice};
 
 /// Records the entries of a run before the machine receives them.
 pub(crate) trait Recorder {
@@ -29,6 +29,9 @@ pub(crate) trait Attendant<M: Machine> {
 
     /// A notice of the session about the line.
     fn hear_of_line(&mut self, now: Timestamp, notice: &LinkNotice);
+
+    /// What the detectors of blocks report now; called before [`attend`](Self::attend) on a layout with blocks.
+    fn see_blocks(&mut self, _blocks: &BlockReports) {}
 
     /// A message about the line for people to read.
     fn read(&mut self, words: &str) {

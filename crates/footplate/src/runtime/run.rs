@@ -126,6 +126,9 @@ impl<'r, L: Link> Runtime<'r, L> {
                     return Ok(Ended::Interrupted);
                 }
                 self.ask(machine, attendant);
+                if let Some(blocks) = self.session.blocks() {
+                    attendant.see_blocks(blocks);
+                }
                 if attendant.attend(now, machine) == Wish::Finish {
                     return Ok(Ended::Finished);
                 }

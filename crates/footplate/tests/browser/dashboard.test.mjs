@@ -76,8 +76,7 @@ test("a train is located, driven by clicking, stopped at its target, and stopped
   assert.equal(trains[0].step, 0);
   // The command was sent and the station has answered since; the page never claims that the power is off.
   await page.waitForFunction(() => /NOT CONFIRMED, check that all trains have stopped/.test(document.querySelector("#halted").textContent), null, { timeout: PATIENCE });
-  await page.fill("#line", "power on");
-  await page.click("#order button");
+  await page.click("#power-on");
   await page.waitForFunction(() => document.querySelector("#halted").hidden, null, { timeout: PATIENCE });
   assert.deepEqual(complaints, []);
   await page.close();
@@ -118,6 +117,22 @@ test("other machines need the token, and the page works with it", async () => {
   assert.deepEqual(complaints, []);
   await page.close();
   await end(open);
+});
+
+test("the dashboard can be installed, and opens without its server", async () => {
+  const installed = await serve(store, 0);
+  const manifest = await (await fetch(`${installed.url}manifest.webmanifest`)).json();
+  assert.ok(manifest.name && manifest.start_url && manifest.display === "standalone", JSON.stringify(manifest));
+  for (const { src } of manifest.icons) assert.equal((await fetch(new URL(src, installed.url))).status, 200, src);
+  const { page } = await openQuietly(browser, installed.url);
+  await page.waitForSelector(".train");
+  // The worker has taken over, and has kept the page and its modules.
+  await page.waitForFunction(async () => (await (await caches.open("shell")).keys()).length > 20, null, { timeout: PATIENCE });
+  await end(installed);
+  await page.reload();
+  await page.waitForSelector("#connection.red", { timeout: PATIENCE });
+  assert.equal(await page.locator("#halt").textContent(), "Emergency stop");
+  await page.close();
 });
 
 test("the dashboard fits a phone, in the dark and in German, and reconnects to a restarted server", async () => {

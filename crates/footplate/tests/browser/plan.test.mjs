@@ -100,13 +100,15 @@ test("a click asks for the position of a turnout, then throws it, and is refused
   assert.equal((await lies())[12], "straight");
   await press(page, "⟨12⟩", 4);
   await until(page, () => document.querySelector("#picked").textContent === "Turnout 12 is set to curved.");
-  await until(page, () => document.querySelector("#here-answer").textContent === "Done.");
+  await until(page, () => document.querySelector("#here-answer").textContent === "Done. Undo");
+  await page.locator("#here-answer button").click();
+  await until(page, () => document.querySelector("#picked").textContent === "Turnout 12 is set to straight.");
+  assert.equal((await lies())[12], "straight", "undone");
   // The operator places a train on turnout 11 by a click.
-  await say(program, "turnout all straight");
+  await page.click("#all-straight");
   await until(page, () => document.querySelectorAll("#track .blade.unknown").length === 0);
   await say(program, "place 24 at C14+160mm");
   await until(page, () => document.querySelector("#track .body").getAttribute("d") !== "M0 0");
-  await page.click("#turnouts summary");
   await page.locator("#turnout-list button", { hasText: "11:" }).click();
   await until(page, () => /refused: train 24 is on turnout 11/.test(document.querySelector("#here-answer").textContent));
   assert.equal((await lies())[11], "straight");
@@ -123,6 +125,16 @@ test("a click asks for the position of a turnout, then throws it, and is refused
   await until(page, (name) => document.querySelector(".train dd").textContent.startsWith(name), name);
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "plan.png") });
+
+  // Signals follow from reservations: all show stop while no train is to run, and some proceed ahead of one that runs.
+  await page.check("#signals");
+  await page.waitForSelector("#track .signal.stop");
+  assert.equal(await page.locator("#track .signal.proceed").count(), 0);
+  await say(program, "speed 24 8");
+  await page.waitForSelector("#track .signal.proceed", { timeout: PATIENCE });
+  await page.screenshot({ path: join(AT, "signals.png") });
+  await say(program, "stop 24");
+  await until(page, () => document.querySelectorAll("#track .signal.proceed").length === 0);
   assert.deepEqual(complaints, []);
   await page.close();
   const phone = await openQuietly(browser, program.url, { viewport: { width: 390, height: 800 }, locale: "de-DE", colorScheme: "dark", hasTouch: true });

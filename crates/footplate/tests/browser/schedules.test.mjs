@@ -86,6 +86,26 @@ test("a command by hand ends the schedule of its train, and a refused line is ma
   assert.deepEqual(after.trains[0].functions, []);
 });
 
+test("the prompt lists, begins and ends saved schedules by name", async () => {
+  const { page } = await openQuietly(browser, program.url);
+  await page.waitForSelector(".train");
+  const give = async (line) => {
+    await page.fill("#line", line);
+    await page.click("#order button");
+  };
+  const log = (what) => until(page, (text) => document.querySelector("#said").textContent.includes(text), what);
+  await give("schedule run Round and rund");
+  await until(page, () => /did you mean `Round and round`/.test(document.querySelector("#answer").textContent));
+  await give('schedule run "Round and round"');
+  await log("schedule `Round and round` begins");
+  await give("schedule list");
+  await log("schedule `Round and round` runs: round 1");
+  await log("schedule `Evening` is saved");
+  await give("schedule end Round and round");
+  await log("schedule `Round and round` was ended");
+  await page.close();
+});
+
 test("saved turnouts are a button beside the track, on a phone, in the dark and in German, and survive the program", async () => {
   await end(program);
   // Schedules are among the recorded inputs: a replay decides the same.

@@ -9,6 +9,7 @@ import { after, before, test } from "node:test";
 
 import { findings } from "./axe.mjs";
 import { AT, launch, openQuietly, width } from "./browser.mjs";
+import { drawOval } from "./oval.mjs";
 import { PATIENCE, begin, end } from "./railway.mjs";
 
 /** The time limit of a calibration: five minutes at twenty times real time, on a busy machine. */
@@ -151,6 +152,33 @@ test("a drawn layout becomes a file beside the store", async () => {
   assert.equal((await post("api/setup", { colour: "red" }))[0], 422);
   assert.match((await post("api/setup/drive", {}))[1].error, /command station first/);
   assert.ok(existsSync(join(folder, "drawn.setup.json")));
+  await ended(program);
+});
+
+test("a layout is drawn from nothing in the set-up, and a simulated train is calibrated on it", async () => {
+  const program = await started("oval.db");
+  const { page, complaints } = await openQuietly(browser, program.url);
+  await page.click("#use-simulated");
+  await page.click("#draw");
+  await isShown(page, "#pieces button");
+  await drawOval(page);
+  await page.fill("#draft-name", "Oval with a siding");
+  await page.click("#draft-use");
+  await isShown(page, "#save-trains");
+  assert.match(await page.locator("#setup-chosen").textContent(), /oval-with-a-siding\.toml/);
+  await page.click("#save-trains");
+  await isShown(page, "#check-link");
+  await page.goto(`${program.url}#/setup/calibrate`);
+  await page.check("#turnouts-clear");
+  await page.click("[data-calibrate='24']");
+  await isShown(page, "#calibrates");
+  await isShown(page, "#turnouts-clear", CALIBRATED_MS);
+  await page.waitForFunction(() => document.querySelector(".cards .card p").textContent === "calibrated", null, { timeout: PATIENCE });
+  const { trains: [train] } = await (await fetch(`${program.url}api/setup`)).json();
+  assert.equal(train.is_calibrated, true);
+  assert.match(train.calibration.report, /^Train 24 on Oval with a siding: \S+ of track time/);
+  assert.deepEqual(complaints.filter((text) => !GOES_OVER.test(text)), []);
+  await page.close();
   await ended(program);
 });
 

@@ -51,6 +51,39 @@ test("a train runs at the step of its slider, and its charts show the detections
   assert.equal(times.length, way.length);
   assert.ok(times.at(-1) - times[0] > 10, `${times.length} moments`);
   assert.ok(way.at(-1) > 1000, `${way.at(-1)} mm`);
+
+  // The charts of a live page can be paused, moved over the minutes that are kept, zoomed by dragging, and go on again.
+  const shown = () => page.inputValue("#until").then(Number);
+  await page.click("#live");
+  assert.equal(await page.getAttribute("#live", "aria-pressed"), "false");
+  const paused = await shown();
+  await page.locator("#until").focus();
+  for (let nth = 0; nth < 30; nth++) await page.keyboard.press("ArrowLeft");
+  await until(page, () => /^\d+ s ago$/.test(document.querySelector("#until-told").textContent));
+  assert.ok(Math.abs(await shown() - (paused - 3)) < 0.3, "thirty steps of a tenth of a second");
+  const over = page.locator("figure[data-chart=speed] .u-over");
+  const { x, y, width: wide } = await over.boundingBox();
+  await page.mouse.move(x + 0.25 * wide, y + 40);
+  await page.mouse.down();
+  await page.mouse.move(x + 0.75 * wide, y + 40, { steps: 5 });
+  await page.mouse.up();
+  const selected = await shown();
+  const [first, last] = await page.$eval("#until", ({ min, max }) => [Number(min), Number(max)]);
+  // A minute was shown, and its part from a quarter to three quarters was selected; no data is later than the last.
+  const from = Math.max(first, paused - 3 - 60);
+  assert.ok(Math.abs(selected - Math.min(from + 45, last)) < 1.5, `the selection ends at ${selected} of ${from} to ${last}`);
+  await page.waitForTimeout(1000);
+  assert.ok(Math.abs(await shown() - selected) < 0.1, "new samples do not move a paused chart");
+  await page.screenshot({ path: join(AT, "train-paused.png"), fullPage: true });
+  await page.click("#live");
+  await until(page, () => document.querySelector("#until-told").textContent === "now");
+
+  // An owner's picture is kept in this browser, and shown with the train on the layout.
+  await page.locator("summary", { hasText: "Picture" }).click();
+  await page.setInputFiles("#portrait input", new URL("../../assets/dashboard/icon.png", import.meta.url).pathname);
+  await page.waitForSelector("#portrait .portrait");
+  await page.goto(`${running.url}#/layout`);
+  await page.waitForSelector(".train .portrait");
   assert.deepEqual(complaints, []);
   await page.close();
 });
@@ -83,7 +116,7 @@ test("a train is stopped at a clicked place, and an impossible command is refuse
   await until(page, () => /Z99/.test(document.querySelector("#arrive .answer").textContent));
   assert.equal(await text(page, "#hold .answer"), "", "what comes of an order is said beside it, and nowhere else");
   assert.deepEqual(await page.$$eval(".orders label span", (all) => all.map((one) => one.textContent)),
-    ["Place of arrival", "Arrive in (s)", "Speed to hold (mm/s)", "Distance to move (mm)", "Train to follow", "Time gap (s)"]);
+    ["at most 1 of 1000 beyond it", "Place of arrival", "Arrive in (s)", "Speed to hold (mm/s)", "Distance to move (mm)", "Train to follow", "Gap to it", "in", "Choose a picture; it stays in this browser", "Pickup (mm)", "From there to the far end (mm)"]);
   // The browser logs the refusal of the last command as an error of the page.
   assert.deepEqual(complaints.filter((complaint) => !/422/.test(complaint)), []);
   await page.close();

@@ -62,6 +62,11 @@ pub(super) struct DataAssociation {
 }
 
 impl DataAssociation {
+    /// Whether the reports of a sensor are ignored.
+    pub(super) fn ignores(&self, sensor: SensorId) -> bool {
+        self.faults.is_stuck(sensor)
+    }
+
     /// A stuck sensor whose reports are used again; call until `None`.
     pub(super) fn next_restored(&mut self, now: Timestamp) -> Option<SensorId> {
         self.faults.next_restored(now)

@@ -120,6 +120,12 @@ impl Driver {
         &self.track.turnouts
     }
 
+    /// Whether the reports of a sensor are ignored, because it reported repeatedly where no train can be.
+    #[must_use]
+    pub fn ignores(&self, sensor: SensorId) -> bool {
+        self.association.ignores(sensor)
+    }
+
     /// Where a train is at a time not before the last event; `None` if its position is unknown.
     #[must_use]
     pub fn locate(&self, train: TrainId, now: Timestamp) -> Option<Located> {

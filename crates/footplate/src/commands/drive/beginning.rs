@@ -7,6 +7,7 @@ use footplate_core::model::MotionFit;
 use footplate_core::model::MotionModel;
 use footplate_core::track::{Leg, TurnoutStates};
 use footplate_core::{SpeedStep, TimeSpan, TrainId, TurnoutId};
+use footplate_store::Schedule;
 use serde::{Deserialize, Serialize};
 
 use super::learning::Learning;
@@ -34,6 +35,9 @@ pub(crate) struct DriveBeginning {
     /// The longest wait, in seconds; `None` for the default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) wait_limit_s: Option<f64>,
+    /// The saved schedules of the layout.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) schedules: Vec<Schedule>,
     /// The delays of the link; sessions of older versions assumed the slowest link.
     #[serde(default)]
     pub(super) link: TimeModel,
@@ -58,6 +62,7 @@ impl DriveBeginning {
             script: Vec::new(),
             is_complete: false,
             wait_limit_s: None,
+            schedules: Vec::new(),
             link: TimeModel::default(),
         }
     }
@@ -74,7 +79,7 @@ impl DriveBeginning {
         let layout = WrittenLayout::of("the layout of the session", self.layout)?.layout;
         let highest = self.models.iter().map(|model| (model.train(), model.highest()));
         let highest: std::collections::BTreeMap<TrainId, SpeedStep> = highest.collect();
-        let known = Known { layout: &layout, trains: &highest };
+        let known = Known { layout: &layout, trains: &highest, schedules: &self.schedules };
         let mut steps = Vec::new();
         for line in &self.script {
             let read = step(line, known).map_err(|mistake| anyhow::anyhow!("{mistake}"));
@@ -85,6 +90,7 @@ impl DriveBeginning {
         self.models.into_iter().for_each(|model| driver.add_train(model));
         let mut script_runner =
             ScriptRunner::new(driver, Learning::new(&layout, self.fits), self.source, steps);
+        script_runner.set_saved(self.schedules);
         if let Some(seconds) = self.wait_limit_s {
             script_runner.set_wait_limit(TimeSpan::from_s(seconds));
         }

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use footplate_core::control::{LinkNews, Machine as _};
 use footplate_core::{Command, Timestamp};
-use footplate_wire::{CommandError, LinkNotice};
+use footplate_wire::{BlockReports, CommandError, LinkNotice};
 
 use super::script_runner::ScriptRunner;
 use super::session_message::{Ended, SessionMessage};
@@ -91,6 +91,10 @@ impl LiveView {
                     Ok(_) => Answer::Taken,
                     Err(mistakes) => Answer::Refused(mistakes),
                 },
+                Request::SavedSchedules(saved) => {
+                    script_runner.handle_word(now, &Input::Schedules(saved.clone()));
+                    Answer::Taken
+                }
                 Request::RunSchedule(schedule) => match script_runner.machine().check_run(schedule) {
                     Ok(()) => {
                         script_runner.handle_word(now, &Input::Schedule(schedule.clone()));
@@ -221,6 +225,12 @@ impl Attendant<Recorded<ScriptRunner>> for Console {
         }
         if !matches!(notice, LinkNotice::Answers | LinkNotice::Closed(_)) {
             self.screen.say(&notice.to_string(), "");
+        }
+    }
+
+    fn see_blocks(&mut self, blocks: &BlockReports) {
+        if let Some(live_view) = &mut self.live_view {
+            live_view.painter.see_blocks(blocks.occupied());
         }
     }
 

@@ -35,6 +35,7 @@ pub(super) const fn verb(instruction: &Instruction) -> &'static str {
         Instruction::PowerOn => "power",
         Instruction::Where(_) => "where",
         Instruction::Wait(_) => "wait",
+        Instruction::ListSchedules | Instruction::RunSchedule(_) | Instruction::EndSchedule(_) => "schedule",
         Instruction::Help => "help",
         Instruction::Quit => "quit",
     }

@@ -3,9 +3,10 @@
 use footplate_core::control::{Journey, Order, TrainLengths};
 use footplate_core::track::Landmark;
 use footplate_core::{FunctionNumber, SensorId, TimeSpan, TrainId};
+use footplate_store::Schedule;
 
 /// One line of a script or of the prompt.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) enum Instruction {
     /// An order of the driver.
     Order(Order),
@@ -29,6 +30,12 @@ pub(super) enum Instruction {
     Where(Option<TrainId>),
     /// Continue with the next line when a condition is met.
     Wait(Until),
+    /// Print the saved schedules, and how far those have come that run.
+    ListSchedules,
+    /// Begin a saved schedule.
+    RunSchedule(Schedule),
+    /// End the schedule of this name.
+    EndSchedule(String),
     /// Print the list of instructions.
     Help,
     /// Stop all trains and end the session.
@@ -37,10 +44,10 @@ pub(super) enum Instruction {
 
 impl Instruction {
     /// The train that it drives or locates, if it does.
-    pub(super) fn driven(self) -> Option<TrainId> {
+    pub(super) fn driven(&self) -> Option<TrainId> {
         match self {
             Self::Order(order) => order.train(),
-            Self::Go(train, _) | Self::Find(train) | Self::Place(train, _) => Some(train),
+            Self::Go(train, _) | Self::Find(train) | Self::Place(train, _) => Some(*train),
             _ => None,
         }
     }
@@ -88,6 +95,9 @@ wait 2s                           go on after 2 seconds (also 500ms)
 wait 24 at rest                   go on when train 24 has finished its command and is at rest
 wait 24 at C13                    go on when train 24 passes sensor C13
 wait 24 located                   go on when the position of train 24 is known
+schedule list                     the saved schedules, and how far those have come that run
+schedule run Evening              begin the saved schedule `Evening`; it runs beside the prompt
+schedule end Evening              end it; its trains finish the commands that they have
 help                              show this list
 quit                              stop all trains and end
 # comment";

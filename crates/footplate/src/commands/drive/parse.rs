@@ -7,9 +7,9 @@ use super::instruction::{Instruction, Until};
 use super::reader::{Known, Words};
 use super::words::{Mistake, meant, words};
 
-const VERBS: [&str; 19] = [
+const VERBS: [&str; 20] = [
     "speed", "reverse", "turnout", "stop", "go", "move", "hold", "follow", "arrive", "find", "place",
-    "length", "light", "function", "halt", "power", "where", "wait", "help",
+    "length", "light", "function", "halt", "power", "where", "wait", "schedule", "help",
 ];
 
 /// Parses one line; `None` for an empty line or a comment.
@@ -92,6 +92,7 @@ pub(super) fn parse(line: &str, known: Known<'_>) -> Result<Option<Instruction>,
         "where" if words.rest.is_empty() => Instruction::Where(None),
         "where" => Instruction::Where(Some(words.train()?)),
         "wait" => Instruction::Wait(words.until()?),
+        "schedule" => words.schedules()?,
         "help" => Instruction::Help,
         "quit" | "exit" => Instruction::Quit,
         other => {
@@ -159,6 +160,19 @@ impl Words<'_, '_, '_> {
         Ok(Instruction::Go(train, journey))
     }
 
+    fn schedules(&mut self) -> Result<Instruction, Mistake> {
+        let word = self.next("`list`, `run` or `end`")?;
+        match word.text {
+            "list" => Ok(Instruction::ListSchedules),
+            "run" => Ok(Instruction::RunSchedule(self.schedule()?)),
+            "end" => Ok(Instruction::EndSchedule(self.schedule_name()?.1)),
+            other => {
+                let near = meant(other, ["list", "run", "end"].into_iter(), "");
+                Err(word.mistake(format!("should be `list`, `run` or `end`{near}")))
+            }
+        }
+    }
+
     fn follow(&mut self) -> Result<Instruction, Mistake> {
         let train = self.train()?;
         self.expect("behind")?;
@@ -192,15 +206,22 @@ impl Words<'_, '_, '_> {
 #[cfg(test)]
 mod tests {
     use footplate_core::{Length, Ratio, Speed, TimeSpan, TrainId, TurnoutId};
-    use footplate_store::layout_named;
+    use footplate_store::{Schedule, layout_named};
 
     use super::*;
+
+    fn evening() -> Schedule {
+        let lines = vec!["light 24 on".to_owned()];
+        Schedule { name: "Late evening".to_owned(), lines, rounds: Some(2), is_button: false }
+    }
 
     fn read(line: &str) -> Result<Option<Instruction>, String> {
         let layout = layout_named("track-a").expect("a built-in layout").layout;
         let highest = SpeedStep::new(14).expect("a step");
         let trains = [24, 58].map(|train| (TrainId(train), highest)).into_iter().collect();
-        parse(line, Known { layout: &layout, trains: &trains }).map_err(|mistake| mistake.to_string())
+        let schedules = [evening()];
+        let known = Known { layout: &layout, trains: &trains, schedules: &schedules };
+        parse(line, known).map_err(|mistake| mistake.to_string())
     }
 
     fn order(line: &str) -> Order {
@@ -265,6 +286,11 @@ mod tests {
         assert_eq!(read("halt"), Ok(Some(Instruction::Halt)));
         assert_eq!(read("power on"), Ok(Some(Instruction::PowerOn)));
         assert_eq!(read("turnout all straight"), Ok(Some(Instruction::Straighten)));
+        assert_eq!(read("schedule list"), Ok(Some(Instruction::ListSchedules)));
+        assert_eq!(read("schedule run Late evening"), Ok(Some(Instruction::RunSchedule(evening()))));
+        assert_eq!(read("schedule run \"Late evening\""), Ok(Some(Instruction::RunSchedule(evening()))));
+        let ends = Instruction::EndSchedule("Late evening".to_owned());
+        assert_eq!(read("schedule end Late evening # now"), Ok(Some(ends)));
         assert_eq!(read("where"), Ok(Some(Instruction::Where(None))));
         assert_eq!(read("  # nothing but a remark"), Ok(None));
     }
@@ -305,6 +331,13 @@ mod tests {
             ("function 24 29 on", "column 13: `29` should be a function from 0 (the light) to 28"),
             ("light 24 onn", "column 10: `onn` should be `on` or `off`: did you mean `on`?"),
             ("power off", "column 7: `off` should be `on`"),
+            ("schedule", "column 10: `list`, `run` or `end` is missing after `schedule`"),
+            ("schedule rum X", "column 10: `rum` should be `list`, `run` or `end`: did you mean `run`?"),
+            (
+                "schedule run Late evenin",
+                "column 14: `Late evenin` is not a saved schedule: did you mean `Late evening`?",
+            ),
+            ("schedule run Morning", "is not a saved schedule: write one of Late evening"),
             ("wait", "a time such as 2s, or a train such as 24 is missing after `wait`"),
             ("wait 24 at C99", "column 12: `C99` is not a sensor of track-a"),
         ]

@@ -6,14 +6,16 @@ use footplate_core::track::{Landmark, Layout, PathError, TurnoutStates};
 use footplate_core::{
     FunctionNumber, Length, Ratio, SensorId, Speed, SpeedStep, TimeSpan, TrainId, TurnoutId,
 };
+use footplate_store::Schedule;
 
 use super::words::{Mistake, Word, meant};
 
-/// What a line may refer to: a layout, and trains with their highest steps.
+/// What a line may refer to: a layout, trains with their highest steps, and saved schedules.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Known<'k> {
     pub(super) layout: &'k Layout,
     pub(super) trains: &'k BTreeMap<TrainId, SpeedStep>,
+    pub(super) schedules: &'k [Schedule],
 }
 
 /// The words that are not parsed yet.
@@ -157,6 +159,31 @@ impl<'t> Words<'_, 't, '_> {
             let all = layout.sensors().map(|(sensor, _)| layout.sensor_name(sensor));
             let near = meant(word.text, all, ": write a name such as `C13`");
             word.mistake(format!("is not a sensor of {}{near}", layout.name()))
+        })
+    }
+
+    /// The name of a schedule, of all words that are left, in quotation marks or not; and its column.
+    pub(super) fn schedule_name(&mut self) -> Result<(usize, String), Mistake> {
+        let first = self.next("the name of a schedule")?;
+        let words = std::iter::once(first).chain(self.rest.iter().copied());
+        let name = words.map(|word| word.text).collect::<Vec<_>>().join(" ");
+        self.rest = &[];
+        Ok((first.column, name.trim_matches('"').to_owned()))
+    }
+
+    /// A saved schedule by its name.
+    pub(super) fn schedule(&mut self) -> Result<Schedule, Mistake> {
+        let (column, name) = self.schedule_name()?;
+        let saved = self.known.schedules;
+        saved.iter().find(|schedule| schedule.name == name).cloned().ok_or_else(|| {
+            let names = || saved.iter().map(|schedule| schedule.name.as_str());
+            let all = match saved.len() {
+                0 => ": none is saved; the page `Schedules` of the dashboard writes them".to_owned(),
+                _ => format!(": write one of {}", names().collect::<Vec<_>>().join(", ")),
+            };
+            let what =
+                format!("`{}` is not a saved schedule{}", name.escape_debug(), meant(&name, names(), &all));
+            Mistake { column, what }
         })
     }
 

@@ -16,6 +16,7 @@ use footplate_core::model::MotionModel;
 use footplate_core::track::Landmark;
 use footplate_core::tracking::PathPoint;
 use footplate_core::{Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_store::Schedule;
 use serde::{Deserialize, Serialize};
 
 use self::queue::{Queues, StepQueue};
@@ -55,6 +56,8 @@ pub(crate) struct ScriptRunner {
     /// Refitted models that are used as soon as their trains are at rest.
     refitted: BTreeMap<TrainId, MotionModel>,
     queues: Queues,
+    /// The saved schedules of the layout.
+    saved: Vec<Schedule>,
     /// The schedules that have ended, the newest last.
     ended_schedules: Vec<SchedulePicture>,
     /// Whether no more lines will come.
@@ -93,6 +96,7 @@ impl ScriptRunner {
             learning,
             refitted: BTreeMap::new(),
             queues: Queues::new(StepQueue::new(source, steps)),
+            saved: Vec::new(),
             ended_schedules: Vec::new(),
             complete: false,
             trains,
@@ -121,6 +125,11 @@ impl ScriptRunner {
         self.dispatcher.driver()
     }
 
+    /// What a line may refer to.
+    fn known(&self) -> Known<'_> {
+        Known { layout: self.driver().layout(), trains: &self.trains, schedules: &self.saved }
+    }
+
     /// Whether an order was refused or given up.
     pub(super) const fn fell_short(&self) -> bool {
         self.fell_short
@@ -145,8 +154,7 @@ impl ScriptRunner {
 
     /// Takes in a line of the operator.
     fn handle_line(&mut self, now: Timestamp, line: &str) {
-        let known = Known { layout: self.driver().layout(), trains: &self.trains };
-        match step(line, known) {
+        match step(line, self.known()) {
             Ok(Some(Step { instruction: Instruction::Halt, .. })) => return self.halt(now),
             Ok(heard) => {
                 // A new line from an operator ends the wait.
@@ -159,6 +167,11 @@ impl ScriptRunner {
             Err(mistake) => self.say(mistake.to_string()),
         }
         self.advance(now);
+    }
+
+    /// States the saved schedules of the layout.
+    pub(super) fn set_saved(&mut self, saved: Vec<Schedule>) {
+        self.saved = saved;
     }
 
     pub(super) const fn set_wait_limit(&mut self, limit: TimeSpan) {
@@ -209,9 +222,9 @@ impl ScriptRunner {
     fn advance_queue(&mut self, now: Timestamp, queue: QueueId) {
         while !self.is_over && self.may_advance(now, queue) {
             let front = self.queues.get(queue).and_then(|queue| queue.steps.front());
-            let Some(instruction) = front.map(|step| step.instruction) else { break };
-            if self.waits_for_model(now, instruction)
-                || self.queues.is_script(queue) && self.must_wait(now, queue, instruction)
+            let Some(instruction) = front.map(|step| step.instruction.clone()) else { break };
+            if self.waits_for_model(now, &instruction)
+                || self.queues.is_script(queue) && self.must_wait(now, queue, &instruction)
             {
                 break;
             }
@@ -289,6 +302,9 @@ impl ScriptRunner {
                     queue.wait = Some(Wait { until, since: now, is_met: false, line: step.line });
                 }
             }
+            Instruction::ListSchedules => self.list_schedules(),
+            Instruction::RunSchedule(schedule) => self.begin_schedule(now, schedule),
+            Instruction::EndSchedule(name) => self.end_schedule(now, &name),
             Instruction::Help => self.say(HELP.to_owned()),
             Instruction::Quit => {
                 self.close_schedules();
@@ -344,8 +360,7 @@ impl ScriptRunner {
 
     /// The mistake in a line, if there is one.
     pub(super) fn mistake(&self, line: &str) -> Option<String> {
-        let known = Known { layout: self.driver().layout(), trains: &self.trains };
-        step(line, known).err().map(|mistake| mistake.to_string())
+        step(line, self.known()).err().map(|mistake| mistake.to_string())
     }
 
     /// Paints the current state for dashboard and terminal.
@@ -444,6 +459,7 @@ impl Listener for ScriptRunner {
             Input::EmergencyStop => self.halt(now),
             Input::Schedule(schedule) => self.begin_schedule(now, schedule.clone()),
             Input::EndSchedule(name) => self.end_schedule(now, name),
+            Input::Schedules(saved) => self.set_saved(saved.clone()),
             Input::NoMoreLines => self.complete(),
             Input::Link(news) => {
                 self.dispatcher.handle_link(now, *news);

@@ -88,7 +88,11 @@ impl Schedules {
     /// The saved schedules after a request to the store.
     async fn changed(&self, query: StoreQuery) -> Result<Vec<Schedule>, Rejection> {
         let saved = self.archive.schedules(query).await?;
-        *self.known() = Some(saved.clone());
+        let known = self.known().replace(saved.clone());
+        // The prompt runs them by name. A session that is ending need not know.
+        if known.as_ref() != Some(&saved) {
+            let _ = self.board.ask(Request::SavedSchedules(saved.clone()));
+        }
         Ok(saved)
     }
 

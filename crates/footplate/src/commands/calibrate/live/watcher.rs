@@ -3,7 +3,7 @@
 use footplate_core::control::learn::{CalibrationNotice, Calibrator, Fault};
 use footplate_core::track::Layout;
 use footplate_core::{Command, TimeSpan, Timestamp, TrainId};
-use footplate_wire::{CommandError, LinkNotice};
+use footplate_wire::{BlockReports, CommandError, LinkNotice};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::figures::minutes;
@@ -97,6 +97,12 @@ impl<'l> Attendant<Recorded<Calibrator<'l>>> for Watcher<'_> {
             showing.alarm(now, &alarm.said(&notice.to_string()));
         }
         self.say(now, &notice.to_string());
+    }
+
+    fn see_blocks(&mut self, blocks: &BlockReports) {
+        if let Some(showing) = &mut self.showing {
+            showing.see_blocks(blocks);
+        }
     }
 
     fn hear_of_refusal(&mut self, now: Timestamp, command: Command, error: CommandError) {

@@ -6,7 +6,6 @@ use footplate_store::Schedule;
 use super::waiting::is_open_ended;
 use super::{CommandSource, ScriptRunner};
 use crate::commands::drive::instruction::Instruction;
-use crate::commands::drive::reader::Known;
 use crate::commands::drive::script::{QueueId, Step, step};
 use crate::dashboard::SchedulePicture;
 
@@ -32,11 +31,18 @@ impl ScriptRunner {
         if schedule.rounds == Some(0) {
             return Err("0 rounds: use 1 or more, or leave it open".to_owned());
         }
-        let known = Known { layout: self.driver().layout(), trains: &self.trains };
         let (mut steps, mut mistakes) = (Vec::new(), Vec::new());
         for (line, text) in schedule.lines.iter().enumerate() {
-            match step(text, known) {
-                Ok(Some(Step { instruction: Instruction::Quit | Instruction::Help, .. })) => {
+            match step(text, self.known()) {
+                Ok(Some(Step {
+                    instruction:
+                        Instruction::Quit
+                        | Instruction::Help
+                        | Instruction::ListSchedules
+                        | Instruction::RunSchedule(_)
+                        | Instruction::EndSchedule(_),
+                    ..
+                })) => {
                     mistakes.push(format!("line {}: `{}` is not for schedules", line + 1, text.trim()));
                 }
                 Ok(read) => steps.extend(read.map(|step| Step { line, ..step })),
@@ -84,9 +90,30 @@ impl ScriptRunner {
                 self.say(format!("schedule `{}` begins", schedule.name));
                 self.queues.add(now, schedule, steps);
             }
-            Err(why) => self.say(why),
+            Err(why) => {
+                self.fell_short = true;
+                self.say(why);
+            }
         }
         self.advance(now);
+    }
+
+    /// Prints the saved schedules, and how far those have come that run.
+    pub(super) fn list_schedules(&mut self) {
+        let states = self.schedule_pictures();
+        let mut lines: Vec<String> =
+            states.iter().filter(|state| !state.is_over).map(Self::progress).collect();
+        let idle = self.saved.iter().filter(|schedule| !self.runs(&schedule.name));
+        lines.extend(idle.map(|schedule| format!("schedule `{}` is saved", schedule.name)));
+        if lines.is_empty() {
+            lines.push("no schedule is saved: the page `Schedules` of the dashboard writes them".to_owned());
+        }
+        lines.into_iter().for_each(|line| self.say(line));
+    }
+
+    fn progress(state: &SchedulePicture) -> String {
+        let rounds = state.rounds.map_or_else(String::new, |rounds| format!(" of {rounds}"));
+        format!("schedule `{}` runs: round {}{rounds}", state.name, state.round)
     }
 
     /// Whether a schedule of this name runs.
@@ -97,8 +124,9 @@ impl ScriptRunner {
     /// Ends a schedule; its trains finish the orders that they have.
     pub(super) fn end_schedule(&mut self, now: Timestamp, name: &str) {
         let found = self.queues.runs().find(|(_, run)| run.schedule.name == name).map(|(id, _)| id);
-        if let Some(id) = found {
-            self.close_schedule(id, "was ended; its trains finish their present commands");
+        match found {
+            Some(id) => self.close_schedule(id, "was ended; its trains finish their present commands"),
+            None => self.say(format!("no schedule `{name}` runs")),
         }
         self.advance(now);
     }
@@ -211,6 +239,7 @@ mod tests {
 
     use super::*;
     use crate::commands::drive::learning::Learning;
+    use crate::commands::drive::session_message::SessionMessage;
     use crate::recorded::{Input, Listener as _};
 
     fn schedule(name: &str, lines: &[&str], rounds: Option<u32>) -> Schedule {
@@ -273,6 +302,38 @@ mod tests {
         let [after] = runner.schedule_pictures().try_into().expect("one schedule");
         assert!(after.is_over && after.active.is_empty());
         assert_eq!(runner.check_run(&schedule("night", &["speed 24 2"], Some(1))), Ok(()));
+    }
+
+    #[test]
+    fn a_line_begins_and_ends_a_saved_schedule_by_its_name() {
+        let mut runner = runner();
+        let at = Timestamp::from_s;
+        let said = |runner: &mut ScriptRunner| {
+            let outputs = std::iter::from_fn(|| runner.poll_output());
+            let lines = outputs.filter_map(|output| match output {
+                footplate_core::control::Output::Notice(SessionMessage::Line { text, .. }) => Some(text),
+                _ => None,
+            });
+            lines.collect::<Vec<_>>()
+        };
+        let line = |text: &str| Input::Line(text.to_owned());
+        let lights = schedule("all lights", &["light 24 on", "wait 60s"], Some(2));
+        runner.handle_word(at(1.0), &Input::Schedules(vec![lights, schedule("night", &["stop 24"], None)]));
+        runner.handle_word(at(2.0), &line("schedule run all lights"));
+        assert!(runner.runs("all lights"));
+        said(&mut runner);
+        runner.handle_word(at(3.0), &line("schedule list"));
+        assert_eq!(
+            said(&mut runner),
+            ["schedule `all lights` runs: round 1 of 2", "schedule `night` is saved"]
+        );
+        assert_eq!(runner.functions.get(&TrainId(24)), Some(&1), "its first line has been carried out");
+        runner.handle_word(at(4.0), &line("schedule end all lights"));
+        assert!(!runner.runs("all lights"));
+        runner.handle_word(at(5.0), &line("schedule end all lights"));
+        assert_eq!(said(&mut runner).last().map(String::as_str), Some("no schedule `all lights` runs"));
+        let mistakes = runner.read_schedule(&schedule("x", &["schedule run night"], None)).unwrap_err();
+        assert_eq!(mistakes, "line 1: `schedule run night` is not for schedules");
     }
 
     #[test]

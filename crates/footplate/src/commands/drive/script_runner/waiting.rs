@@ -55,13 +55,13 @@ impl ScriptRunner {
 
     /// Whether a line of a script has to wait: for the previous order of its train, for a turnout, or for a train that
     /// brakes or is being recovered.
-    pub(super) fn must_wait(&mut self, now: Timestamp, queue: QueueId, instruction: Instruction) -> bool {
+    pub(super) fn must_wait(&mut self, now: Timestamp, queue: QueueId, instruction: &Instruction) -> bool {
         let is_turnout = |step: &Step| matches!(step.instruction, Instruction::Order(Order::Turnout { .. }));
         let (train, is_stop) = match instruction {
             Instruction::Order(order) => {
                 (order.train(), matches!(order, Order::Speed { step: SpeedStep::STAND, .. }))
             }
-            Instruction::Go(train, _) => (Some(train), false),
+            Instruction::Go(train, _) => (Some(*train), false),
             _ => return false,
         };
         if train.is_some_and(|train| !is_stop && self.is_blocked_for_now(now, queue, train)) {
@@ -73,10 +73,10 @@ impl ScriptRunner {
     }
 
     /// Whether the train is at rest and its model is being refitted.
-    pub(super) fn waits_for_model(&self, now: Timestamp, instruction: Instruction) -> bool {
+    pub(super) fn waits_for_model(&self, now: Timestamp, instruction: &Instruction) -> bool {
         let train = match instruction {
             Instruction::Order(order) => order.train(),
-            Instruction::Go(train, _) => Some(train),
+            Instruction::Go(train, _) => Some(*train),
             _ => None,
         };
         train

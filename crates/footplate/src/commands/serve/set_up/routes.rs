@@ -28,15 +28,12 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::super::answer_queue::Rejection;
+use super::super::drawn_layout::{DrawnLayout, LARGEST_LAYOUT, drawn_layout_routes};
 use super::set_up_file::{SetUp, SetUpTrain};
 use super::{Next, check_link};
 use crate::clock::now;
-use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::Routes;
 use crate::link::find_stations;
-
-/// The largest layout that is taken, in bytes: thousands of nodes.
-const LARGEST_LAYOUT: usize = 1 << 20;
 
 /// What the program that answers does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -160,13 +157,6 @@ struct Step {
     trains: Option<Vec<SetUpTrain>>,
 }
 
-/// A layout as text.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct DrawnLayout {
-    toml: String,
-}
-
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ToCalibrate {
@@ -210,6 +200,7 @@ impl Pages {
                 ("/api/line", get(async || answer(Ok(Value::Null)))),
             ],
         )
+        .and(drawn_layout_routes())
     }
 
     fn kept(&self) -> MutexGuard<'_, Kept> {
@@ -266,7 +257,7 @@ impl Pages {
 
     /// Writes a layout to a file beside the store, named after it; returns the path.
     fn keep_drawn(&self, drawn: &DrawnLayout, present: Option<&str>) -> anyhow::Result<String> {
-        let layout = WrittenLayout::of("the drawn layout", drawn.toml.clone())?.layout;
+        let layout = drawn.written()?.layout;
         let letters = layout.name().to_lowercase();
         let words = letters.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
         let name = words.collect::<Vec<_>>().join("-");

@@ -1,0 +1,107 @@
+// The text of a layout file from a drawing: sensors, boundaries, turnouts and open ends are its nodes; the pieces between them form its
+// edges.
+
+import { arcOf } from "./pieces.js";
+
+/** Standard deviation of a catalogue length with its joint (mm). */
+const LENGTH_UNCERTAINTY_MM = 1;
+const S88_INPUTS = 16;
+const S88_MODULES = "ABCDE";
+
+const quoted = (text) => JSON.stringify(text.replace(/[\u0000-\u001f\u007f]/g, " ").trim() || "my layout");
+const point = ({ x, y }) => `[${Math.round(x)}, ${Math.round(y)}]`;
+
+export class DraftFile {
+  #draft; #name; #joints; #jointOf = new Map(); #sensors = []; #boundaries = []; #turnouts = []; #ends = []; #sections;
+
+  constructor(draft, name) {
+    [this.#draft, this.#name, this.#joints] = [draft, name, draft.joints()];
+    for (const joint of this.#joints) for (const { piece, port } of joint.ends) this.#jointOf.set(`${piece} ${port}`, joint);
+    for (const joint of this.#joints) {
+      if (joint.ends.length === 1) {
+        joint.end = this.#ends.push(joint);
+      } else if (draft.has("sensors", joint)) {
+        const input = 2 * this.#sensors.length;
+        const named = (nth) => `${S88_MODULES[Math.floor(input / S88_INPUTS)]}${input % S88_INPUTS + nth}`;
+        joint.names = [named(1), named(2)];
+        this.#sensors.push(joint);
+      } else if (draft.has("boundaries", joint)) {
+        const nth = 2 * this.#boundaries.push(joint);
+        joint.names = [`P${nth - 1}`, `P${nth}`];
+      }
+    }
+    this.#sections = draft.sections();
+    for (const [piece, laid] of draft.pieces.entries()) {
+      if (laid.kind === "turnout") this.#turnouts.push({ piece, number: this.#turnouts.length + 1, toe: this.#jointOf.get(`${piece} 0`) });
+    }
+  }
+
+  /** Leaves a piece through an end, after `mm` so far: the node that is reached, the distance, and its name from this side. */
+  #reach(piece, port, mm) {
+    const joint = this.#jointOf.get(`${piece} ${port}`);
+    if (joint.end) return { name: `EX${joint.end}`, mm };
+    const isFirst = joint.ends[0].piece === piece && joint.ends[0].port === port;
+    if (joint.names) return { name: joint.names[isFirst ? 0 : 1], mm };
+    const next = joint.ends[isFirst ? 1 : 0];
+    return this.#through(next.piece, next.port, mm);
+  }
+
+  /** Enters a piece through an end. */
+  #through(piece, port, mm) {
+    const laid = this.#draft.pieces[piece];
+    if (laid.kind !== "turnout") return this.#reach(piece, 1 - port, mm + (laid.kind === "straight" ? laid.mm : arcOf(laid)));
+    const { number } = this.#turnouts.find((one) => one.piece === piece);
+    if (port === 0) return { name: `BR${number}`, mm };
+    return port === 1 ? { name: `MR${number} straight`, mm: mm + laid.mm } : { name: `MR${number} curved`, mm: mm + arcOf(laid) };
+  }
+
+  /** Every path out of a node, by the name of the node in this direction, and its name in the other direction. */
+  #paths() {
+    const paths = [];
+    for (const { ends: [one, other], names: [ahead, back] } of [...this.#sensors, ...this.#boundaries]) {
+      paths.push({ from: ahead, back, ...this.#through(other.piece, other.port, 0) });
+      paths.push({ from: back, back: ahead, ...this.#through(one.piece, one.port, 0) });
+    }
+    for (const { piece, number } of this.#turnouts) {
+      const laid = this.#draft.pieces[piece];
+      paths.push({ from: `MR${number}`, back: `BR${number}`, ...this.#reach(piece, 0, 0) });
+      paths.push({ from: `BR${number} straight`, back: `MR${number} straight`, ...this.#reach(piece, 1, laid.mm) });
+      paths.push({ from: `BR${number} curved`, back: `MR${number} curved`, ...this.#reach(piece, 2, arcOf(laid)) });
+    }
+    for (const joint of this.#ends) {
+      const [{ piece, port }] = joint.ends;
+      paths.push({ from: `EN${joint.end}`, back: `EX${joint.end}`, ...this.#through(piece, port, 0) });
+    }
+    return paths;
+  }
+
+  /** The block that a train comes into on a piece; empty where no detector is. */
+  #block({ piece }) {
+    const { isWatched, name } = this.#sections.find(({ pieces }) => pieces.includes(piece));
+    return isWatched ? quoted(name) : '""';
+  }
+
+  text() {
+    const written = new Set();
+    const edges = [];
+    for (const { from, back, name, mm } of this.#paths()) {
+      // Each edge is found from both of its ends.
+      if (written.has(`${from} ${name}`)) continue;
+      written.add(`${from} ${name}`);
+      const other = this.#paths().find((path) => path.back === name && path.name === back);
+      if (other) written.add(`${other.from} ${other.name}`);
+      edges.push(`  { from = "${from}", to = "${name}", mm = ${mm.toFixed(1)} },`);
+    }
+    const list = (key, rows) => (rows.length > 0 ? [`${key} = [`, ...rows, "]"] : []);
+    return [
+      "format = 1", `name = ${quoted(this.#name)}`, 'about = "Drawn with the editor of the dashboard from catalogue pieces."',
+      `length_uncertainty_mm = ${LENGTH_UNCERTAINTY_MM}`, 'length_origin = "catalogue lengths of the pieces"', "",
+      ...list("sensors", this.#sensors.map((joint) => `  { names = ["${joint.names.join('", "')}"], at = ${point(joint)} },`)),
+      ...list("blocks", this.#sections.filter(({ isWatched }) => isWatched).map(({ name, number }) => `  { name = ${quoted(name)}, number = ${number} },`)),
+      ...list("boundaries", this.#boundaries.map((joint) => `  { names = ["${joint.names.join('", "')}"], enters = [${this.#block(joint.ends[1])}, ${this.#block(joint.ends[0])}], at = ${point(joint)} },`)),
+      ...list("turnouts", this.#turnouts.map(({ number, toe }) => `  { number = ${number}, names = ["BR${number}", "MR${number}"], at = ${point(toe)} },`)),
+      ...list("ends", this.#ends.map((joint) => `  { names = ["EN${joint.end}", "EX${joint.end}"], at = ${point(joint)} },`)),
+      ...list("edges", edges), "",
+    ].join("\n");
+  }
+}
