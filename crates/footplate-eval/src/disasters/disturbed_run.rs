@@ -91,7 +91,7 @@ impl<'l> DisturbedRun<'l> {
         });
         let lap_mm =
             circuit.edges.iter().map(|edge| prepared.world().truth().track().length(*edge).as_mm()).sum();
-        let faults = prepared.world().mishaps().len();
+        let faults = prepared.world().incidents().len();
         Ok(Self {
             layout,
             prepared,
@@ -215,7 +215,7 @@ impl<'l> DisturbedRun<'l> {
         if kind == Kind::Faultless {
             self.wait(UNDISTURBED_TIME);
             self.result.watched_s = (self.now() - began).as_s();
-            self.result.faults = self.prepared.world().mishaps().len() - self.faults;
+            self.result.faults = self.prepared.world().incidents().len() - self.faults;
             return Ok(self.result);
         }
         self.result.watched_s = (self.now() - began).as_s();
@@ -249,7 +249,7 @@ impl<'l> DisturbedRun<'l> {
                 self.result.after.extend(error);
             }
         }
-        self.result.faults = self.prepared.world().mishaps().len() - self.faults;
+        self.result.faults = self.prepared.world().incidents().len() - self.faults;
         Ok(self.result)
     }
 }

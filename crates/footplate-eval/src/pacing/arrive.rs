@@ -213,7 +213,7 @@ impl Trip<'_, '_> {
             order = self.order(target, within, mean);
         }
         arrived.asked = [within.as_s(), way];
-        let (by, mishaps) = (self.now() + within, self.stage.world().mishaps().len());
+        let (by, incidents) = (self.now() + within, self.stage.world().incidents().len());
         match order {
             Ok(order) => {
                 if let Err(trouble) = self.until_done(order, by + TimeSpan::from_s(PATIENCE)) {
@@ -224,7 +224,7 @@ impl Trip<'_, '_> {
         }
         let until = self.now() + TimeSpan::from_s(STANDS_WITHIN);
         while self.counted.drive(&mut self.stage.line, until).is_some() {}
-        if self.stage.world().mishaps().len() > mishaps {
+        if self.stage.world().incidents().len() > incidents {
             arrived.trouble = Some("it came to grief".to_owned());
         }
         arrived.commands = self.counted.steps(self.train) - before;

@@ -186,7 +186,7 @@ impl<'a, 'l> Row<'a, 'l> {
     }
 
     fn run(mut self, lasts: f64) -> Vec<Followed> {
-        let mishaps = self.stage.world().mishaps().len();
+        let incidents = self.stage.world().incidents().len();
         for place in 1..self.trains.len() {
             self.drive(HEAD_START);
             self.begin(place);
@@ -199,7 +199,7 @@ impl<'a, 'l> Row<'a, 'l> {
         let (since, before) =
             (self.now(), self.trains.iter().map(|train| self.counted.steps(*train)).collect::<Vec<_>>());
         self.drive(lasts);
-        let grief = self.stage.world().mishaps().len() > mishaps;
+        let grief = self.stage.world().incidents().len() > incidents;
         let truth = self.stage.world().truth();
         for followed in &mut self.followed {
             let leader = self.trains[followed.place - 1];

@@ -168,7 +168,7 @@ fn held(layout: &Layout, mut stage: PreparedTrains<'_>, train: TrainId, by: By, 
         held.trouble = Some(why.to_string());
         return held;
     }
-    let before = stage.world().mishaps().len();
+    let before = stage.world().incidents().len();
     let mut odometer = Odometer::default();
     let mut believed: Vec<(Timestamp, f64)> = Vec::new();
     let mut ideal: Option<(Ideal, usize)> = None;
@@ -201,7 +201,7 @@ fn held(layout: &Layout, mut stage: PreparedTrains<'_>, train: TrainId, by: By, 
             until = stage.line.now() + TimeSpan::from_s(HELD_FOR);
         }
     }
-    if stage.world().mishaps().len() > before {
+    if stage.world().incidents().len() > before {
         held.trouble = Some("it came to grief".to_owned());
     }
     let Some((ideal, commands)) = ideal else {

@@ -77,11 +77,11 @@ impl<'l> PreparedTrains<'l> {
             let starts = starts_at.iter().cycle().skip(nth).take(trains.len()).flatten();
             let mut model = None;
             for (position, leads) in starts {
-                let faults = line.station.world().mishaps().len();
+                let faults = line.station.world().incidents().len();
                 line.station.world_mut().place(*train, *position, *leads)?;
                 model = Some(calibrate(assumed, &mut line, *train, budget).model);
                 line.station.world_mut().lift(*train);
-                if line.station.world().mishaps().len() == faults {
+                if line.station.world().incidents().len() == faults {
                     break;
                 }
             }
@@ -175,7 +175,7 @@ mod tests {
             let located = driver.locate(train, prepared.line.now()).expect("placed");
             assert_eq!(located.at.node, node);
             let sensor = layout.sensor_at(node).expect("a sensor");
-            let past = prepared.world().truth().felt_past(train, sensor).expect("near");
+            let past = prepared.world().truth().path_length_past(train, sensor).expect("near");
             assert!((past - located.at.distance).abs() < Length::from_mm(30.0), "{past:?}");
             assert!(driver.is_at_rest(train, prepared.line.now()));
         }

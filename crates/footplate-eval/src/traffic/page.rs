@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use footplate_sim::MishapKind;
+use footplate_sim::IncidentKind;
 use serde_json::{Value, json};
 
 use super::session::Tally;
@@ -72,12 +72,12 @@ impl WrittenScores for Page<'_> {
     }
 
     fn rates(&self) -> Vec<Rate> {
-        let mishaps = self.tallies.iter().filter(|tally| !tally.mishaps.is_empty()).count();
+        let incidents = self.tallies.iter().filter(|tally| !tally.incidents.is_empty()).count();
         let sum = |of: fn(&Tally) -> usize| self.tallies.iter().map(of).sum::<usize>();
         let runs = sum(|tally| tally.routes as usize + tally.turns);
         let stuck = self.tallies.iter().filter(|tally| tally.starved > LONGEST_NOWHERE_S).count();
         vec![
-            Rate::grief(mishaps, self.tallies.len()),
+            Rate::grief(incidents, self.tallies.len()),
             Rate::new("runs onto track of others", sum(|tally| tally.intrusions.len()), runs),
             Rate::new("sessions with a train nowhere for more than 900 s", stuck, self.tallies.len()),
             Rate::new("trains that needed a person", sum(|tally| tally.hands as usize), runs),
@@ -96,7 +96,7 @@ fn seeds(tallies: &[Tally]) -> Value {
                 "hands": tally.hands, "rests": tally.beliefs, "mistaken": tally.mistaken, "refused": tally.refused, "withdrawn": tally.withdrawn,
                 "intrusions": tally.intrusions.iter().map(|(at, train)| json!([at.as_s(), train.0]))
                     .collect::<Vec<Value>>(),
-                "mishaps": tally.mishaps.iter().map(|mishap| format!("{mishap:?}")).collect::<Vec<_>>(),
+                "mishaps": tally.incidents.iter().map(|incident| format!("{incident:?}")).collect::<Vec<_>>(),
         })
     };
     tallies.iter().map(one).collect()
@@ -121,9 +121,9 @@ fn row(output: &mut dyn Write, name: &str, tallies: &[&Tally]) -> io::Result<()>
         mean(|tally| &tally.took),
         sum(|tally| tally.routes as usize + tally.turns),
         sum(|tally| tally.aside as usize),
-        sum(|tally| mishaps(tally, |kind| matches!(kind, MishapKind::Collision { .. })) / 2),
-        sum(|tally| mishaps(tally, |kind| matches!(kind, MishapKind::Derailment { .. }))),
-        sum(|tally| mishaps(tally, |kind| matches!(kind, MishapKind::Overrun))),
+        sum(|tally| incidents(tally, |kind| matches!(kind, IncidentKind::Collision { .. })) / 2),
+        sum(|tally| incidents(tally, |kind| matches!(kind, IncidentKind::Derailment { .. }))),
+        sum(|tally| incidents(tally, |kind| matches!(kind, IncidentKind::Overrun))),
         sum(|tally| tally.intrusions.len()),
         sum(|tally| tally.mistaken as usize),
         sum(|tally| tally.beliefs as usize),
@@ -134,7 +134,7 @@ fn row(output: &mut dyn Write, name: &str, tallies: &[&Tally]) -> io::Result<()>
     )
 }
 
-/// How many mishaps are of a kind; every collision has two entries.
-fn mishaps(tally: &Tally, is: fn(MishapKind) -> bool) -> usize {
-    tally.mishaps.iter().filter(|mishap| is(mishap.kind)).count()
+/// How many incidents are of a kind; every collision has two entries.
+fn incidents(tally: &Tally, is: fn(IncidentKind) -> bool) -> usize {
+    tally.incidents.iter().filter(|incident| is(incident.kind)).count()
 }

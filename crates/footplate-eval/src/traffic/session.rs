@@ -7,7 +7,7 @@ use footplate_core::control::{Dispatcher, Finished, Journey, Notice, Span, Train
 use footplate_core::track::{Landmark, Layout, Position};
 use footplate_core::tracking::PathPoint;
 use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
-use footplate_sim::{LivingLayout, LivingSwitches, Mishap};
+use footplate_sim::{Incident, LivingLayout, LivingSwitches};
 use footplate_wire::LinkNotice;
 
 use crate::seeds::Choice;
@@ -78,7 +78,7 @@ pub struct Tally {
     /// Interventions of a person.
     pub hands: u32,
     /// Trains that touched, derailed or ran off the track.
-    pub mishaps: Vec<Mishap>,
+    pub incidents: Vec<Incident>,
     /// Times that a train came to be on track that it did not hold.
     pub intrusions: Vec<(Timestamp, TrainId)>,
     /// How long trains waited for their routes, in s.
@@ -174,11 +174,11 @@ impl<'l> Session<'l> {
     pub fn run(mut self, time: TimeSpan) -> Tally {
         let began = self.rehearsal.line.now();
         let end = began + time;
-        let before = self.rehearsal.world().mishaps().len();
+        let before = self.rehearsal.world().incidents().len();
         for train in self.trains.clone() {
             self.send(train);
         }
-        while self.rehearsal.line.now() < end && self.rehearsal.world().mishaps().len() == before {
+        while self.rehearsal.line.now() < end && self.rehearsal.world().incidents().len() == before {
             let until = end.min(self.rehearsal.line.now() + LOOK);
             let hear_of_line = |dispatcher: &mut Dispatcher, now, notice: &LinkNotice| {
                 if let Some(news) = notice.news() {
@@ -196,9 +196,9 @@ impl<'l> Session<'l> {
         for train in self.trains.clone() {
             self.came_somewhere(train, now);
         }
-        self.tally.mishaps = self.rehearsal.world().mishaps().iter().skip(before).copied().collect();
-        for mishap in self.tally.mishaps.iter().filter(|_| self.talk) {
-            eprintln!("{:9.2} {:?}", mishap.at.as_s(), mishap.kind);
+        self.tally.incidents = self.rehearsal.world().incidents().iter().skip(before).copied().collect();
+        for incident in self.tally.incidents.iter().filter(|_| self.talk) {
+            eprintln!("{:9.2} {:?}", incident.at.as_s(), incident.kind);
         }
         self.trains.iter().filter(|_| self.talk).for_each(|train| self.tell_truth(*train));
         self.tally

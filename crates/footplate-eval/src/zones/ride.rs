@@ -122,7 +122,7 @@ impl Ride<'_, '_> {
         let began = self.stage.line.now();
         let until = began + TimeSpan::from_s(RIDES_FOR);
         let odometer = self.odometer();
-        let mishaps = self.stage.world().mishaps().len();
+        let incidents = self.stage.world().incidents().len();
         let (mut done, mut trouble) = (0, None);
         let mut busy = None;
         let mut next = Some(began);
@@ -153,7 +153,7 @@ impl Ride<'_, '_> {
             }
             watched.look(self.stage.world().truth(), self.stage.line.now());
         }
-        if self.stage.world().mishaps().len() > mishaps {
+        if self.stage.world().incidents().len() > incidents {
             trouble = Some("it came to grief".to_owned());
         }
         Ridden {

@@ -2,25 +2,24 @@
 //!
 //! What comes in is read with the codec that the program writes with; when things come and go is decided here, by what was
 //! measured on the real firmware. Directions are absolute, the decoders know 14 speed steps, sensors report by themselves.
-//! Whoever spoke to it is not watched: trains run on when they are gone.
+//! It does not watch its clients: trains run on when they are gone.
 
 mod obeying;
 
 use std::collections::VecDeque;
 
-use footplate_core::track::{Layout, Leg};
+use footplate_core::track::Leg;
 use footplate_core::{Ratio, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
 use footplate_wire::dcc_ex::{
     ANSWER_LONGEST, ANSWER_SHORTEST, Framing, Reply, Request, SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST,
     Throttle,
 };
 
-use crate::circuit::CircuitError;
 use crate::draws::{Draws, Purpose};
 use crate::living::board_switches::BoardSwitches;
 use crate::living::delivery::Outgoing;
+use crate::living::due_queue::DueQueue;
 use crate::living::s88::Edge;
-use crate::living::switches::LivingSwitches;
 use crate::living::world::LivingLayout;
 
 /// What it says of itself.
@@ -72,7 +71,7 @@ pub struct VirtualBoard<'l> {
     framing: Framing,
     /// Replies and messages of sensors that are still to be said.
     replies: VecDeque<(Timestamp, String)>,
-    pushes: Vec<(Timestamp, SensorId, bool)>,
+    pushes: DueQueue<(SensorId, bool)>,
     outgoing: Outgoing,
     slots: Vec<Slot>,
     turnouts: Vec<(TurnoutId, bool)>,
@@ -118,26 +117,12 @@ impl<'l> VirtualBoard<'l> {
             busy_until: now,
             framing: Framing::default(),
             replies: VecDeque::new(),
-            pushes: Vec::new(),
+            pushes: DueQueue::new(),
             outgoing: Outgoing::new(now, switches.delivery, LINE_TIME),
             slots,
             turnouts,
             dark_until: None,
         }
-    }
-
-    /// A board and a layout on which trains have been put: see [`LivingLayout::draw`].
-    ///
-    /// # Errors
-    /// [`CircuitError`] when no train can run round on the layout.
-    pub fn draw(
-        layout: &'l Layout,
-        seed: u64,
-        trains: &[TrainId],
-        switches: &LivingSwitches,
-        board: BoardSwitches,
-    ) -> Result<Self, CircuitError> {
-        Ok(Self::new(LivingLayout::draw(layout, seed, trains, switches)?, seed, board))
     }
 
     /// The time.
@@ -152,7 +137,7 @@ impl<'l> VirtualBoard<'l> {
         &self.world
     }
 
-    /// The layout, for a person's hands.
+    /// The layout, for operator intervention.
     pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
         &mut self.world
     }
@@ -162,7 +147,7 @@ impl<'l> VirtualBoard<'l> {
     pub fn restart(&mut self) {
         let now = self.now;
         self.world.power(false, now);
-        self.world.forget_all_told();
+        self.world.forget_commands();
         self.slots.clear();
         self.buffer.clear();
         self.replies.clear();
@@ -173,7 +158,7 @@ impl<'l> VirtualBoard<'l> {
         self.dark_until = Some(now + BOOT);
     }
 
-    /// The host puts bytes on the line, behind those that are still on their way.
+    /// The host puts bytes on the line, behind those that have not arrived yet.
     pub fn write(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.host_is_free = self.host_is_free.max(self.now) + BYTE_TIME;
@@ -208,12 +193,11 @@ impl<'l> VirtualBoard<'l> {
     /// What happens next, and when; of things at one time the first in the order of this list.
     fn next(&self) -> Option<(Timestamp, Next)> {
         let reads = (!self.buffer.is_empty() && self.dark_until.is_none()).then_some(self.busy_until);
-        let pushes = self.pushes.iter().map(|(at, ..)| *at).min();
         let coming = [
             (self.incoming.front().map(|(at, _)| *at), Next::Incoming),
             (reads, Next::Reads),
             (self.replies.front().map(|(at, _)| *at), Next::Reply),
-            (pushes, Next::Push),
+            (self.pushes.due(), Next::Push),
             (self.outgoing.due(), Next::Outgoing),
             (self.dark_until, Next::Light),
         ];
@@ -239,9 +223,7 @@ impl<'l> VirtualBoard<'l> {
                 }
             }
             Next::Push => {
-                let first = self.pushes.iter().enumerate().min_by_key(|(_, (at, ..))| *at);
-                if let Some(at) = first.map(|(at, _)| at) {
-                    let (_, sensor, active) = self.pushes.remove(at);
+                if let Some((sensor, active)) = self.pushes.take() {
                     self.say(&line(&Reply::Sensor { id: sensor.0, active }));
                 }
             }
@@ -258,7 +240,7 @@ impl<'l> VirtualBoard<'l> {
         }
     }
 
-    /// What is on its way and due: one portion, less what the line loses of it.
+    /// The portion that arrives next, without the bytes that the line loses.
     fn portion(&mut self) -> Option<Vec<u8>> {
         let mut bytes = self.outgoing.take()?;
         if self.switches.lost > Ratio::ZERO {
@@ -272,18 +254,15 @@ impl<'l> VirtualBoard<'l> {
         lost > Ratio::ZERO && self.draws.chance(lost.as_parts())
     }
 
-    /// Sees which sensors have changed, and when that will be said.
+    /// Finds the sensors that have changed, and when the board will report them.
     fn look(&mut self, by: Timestamp) {
         for Edge { at, sensor, is_occupied } in self.world.s88.take_edges(by) {
             if self.dark_until.is_some() {
                 continue;
             }
             let delays = SENSOR_DELAY_SHORTEST.as_s()..SENSOR_DELAY_LONGEST.as_s();
-            let due = at + TimeSpan::from_s(self.draws.uniform(delays));
-            // What is said of one sensor stays in order.
-            let last = self.pushes.iter().filter(|(_, other, _)| *other == sensor).map(|(at, ..)| *at).max();
-            let due = last.map_or(due, |last| due.max(last + TimeSpan::from_us(100))).max(self.now);
-            self.pushes.push((due, sensor, is_occupied));
+            let due = (at + TimeSpan::from_s(self.draws.uniform(delays))).max(self.now);
+            self.pushes.add_report(due, (sensor, is_occupied), |(other, _)| *other == sensor);
         }
     }
 
@@ -309,7 +288,7 @@ impl<'l> VirtualBoard<'l> {
         }
     }
 
-    /// Puts a text on its way to the host.
+    /// Sends a text to the host.
     fn say(&mut self, text: &str) {
         let chatter = self.switches.chatter;
         if chatter > Ratio::ZERO && self.draws.chance(chatter.as_parts()) {

@@ -15,7 +15,7 @@ pub struct BoardSwitches {
     pub answers_unchanged: bool,
     /// Whether bytes are lost that its input buffer of 64 does not hold.
     pub overruns: bool,
-    /// How often a byte is lost on the line, either way.
+    /// How often a byte is lost on the line, in either direction.
     pub lost: Ratio,
     /// How its messages are cut.
     pub delivery: Delivery,

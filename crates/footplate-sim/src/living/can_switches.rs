@@ -20,7 +20,7 @@ pub enum CanTransport {
 pub struct CanSwitches {
     /// How frames travel.
     pub transport: CanTransport,
-    /// How often a datagram is lost, either way.
+    /// How often a datagram is lost, in either direction.
     pub lost: Ratio,
     /// How often one comes twice.
     pub duplicated: Ratio,
@@ -30,7 +30,7 @@ pub struct CanSwitches {
     pub is_split: bool,
     /// Whether it does what is commanded without confirming it, as one program that serves does.
     pub is_mute: bool,
-    /// Whether reports of contacts say how long the state before lasted.
+    /// Whether reports of sensors include how long the previous state lasted.
     pub has_times: bool,
     /// Whether it answers when it is asked for its modules.
     pub answers_polls: bool,
@@ -38,7 +38,7 @@ pub struct CanSwitches {
     pub has_list: bool,
     /// What the decoders of its locomotives understand.
     pub locomotives: LocomotiveProtocol,
-    /// How often it reads its contacts; 100 ms unless its owner has set it (Link S88).
+    /// How often it reads its sensors; 100 ms unless its owner has set it (Link S88).
     pub scan: TimeSpan,
 }
 

@@ -1,9 +1,8 @@
 //! The virtual Central Station: a living layout behind the frames of Märklin's CAN bus, over datagrams, a stream or a serial adapter.
 //!
-//! What comes in is read with the codec that the program writes with; when things come and go is decided here. All contacts are
+//! What comes in is read with the codec that the program writes with; when things come and go is decided here. All inputs are
 //! loaded into the S88 bus at once, a cycle apart, and remembered until then; one after the other is shifted out and reported.
-//! Directions are absolute, the decoders know 14 speed steps. Whoever spoke to it is not watched: trains run on when they are
-//! gone.
+//! Directions are absolute, the decoders know 14 speed steps. It does not watch its clients: trains run on when they are gone.
 
 mod adapter;
 mod obeying;
@@ -11,17 +10,15 @@ mod scanning;
 
 use std::collections::VecDeque;
 
-use footplate_core::track::{Layout, Leg};
+use footplate_core::track::Leg;
 use footplate_core::{TimeSpan, Timestamp, TrainId, TurnoutId};
 use footplate_wire::marklin_can::{AccessoryProtocol, Frame, Framing, Message, Transport, Uid};
 
 use self::adapter::Adapter;
 use self::scanning::Scanning;
-use crate::circuit::CircuitError;
 use crate::draws::{Draws, Purpose};
 use crate::living::can_switches::{CanSwitches, CanTransport};
 use crate::living::network::{Disturbances, Network};
-use crate::living::switches::LivingSwitches;
 use crate::living::world::LivingLayout;
 
 /// A frame with eight bytes on the bus: about 130 bits at 250 kbit/s.
@@ -63,7 +60,7 @@ pub struct VirtualCentralStation<'l> {
     framing: Framing,
     /// Frames that the bytes of a stream or an adapter made, and when the station reads each.
     incoming: VecDeque<(Timestamp, Frame)>,
-    /// Bytes on their way to the host of a stream or an adapter.
+    /// Bytes that the host of a stream or an adapter will receive.
     outgoing: VecDeque<(Timestamp, Vec<u8>)>,
     bus_is_free: Timestamp,
     slots: Vec<Slot>,
@@ -88,7 +85,7 @@ enum Next {
 
 impl<'l> VirtualCentralStation<'l> {
     /// A station in front of a layout, which has been driving the trains on it: it knows which end of each leads. The track has no
-    /// power yet. The layout's sensor 0 is contact 1, its turnout 1 is the first.
+    /// power yet. The layout's sensor 0 is input 1, its turnout 1 is the first.
     #[must_use]
     pub fn new(mut world: LivingLayout<'l>, seed: u64, switches: CanSwitches) -> Self {
         let now = world.now();
@@ -122,20 +119,6 @@ impl<'l> VirtualCentralStation<'l> {
         }
     }
 
-    /// A station and a layout on which trains have been put: see [`LivingLayout::draw`].
-    ///
-    /// # Errors
-    /// [`CircuitError`] when no train can run round on the layout.
-    pub fn draw(
-        layout: &'l Layout,
-        seed: u64,
-        trains: &[TrainId],
-        switches: &LivingSwitches,
-        can: CanSwitches,
-    ) -> Result<Self, CircuitError> {
-        Ok(Self::new(LivingLayout::draw(layout, seed, trains, switches)?, seed, can))
-    }
-
     /// The time.
     #[must_use]
     pub const fn now(&self) -> Timestamp {
@@ -148,7 +131,7 @@ impl<'l> VirtualCentralStation<'l> {
         &self.world
     }
 
-    /// The layout, for a person's hands.
+    /// The layout, for operator intervention.
     pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
         &mut self.world
     }
@@ -164,7 +147,7 @@ impl<'l> VirtualCentralStation<'l> {
     pub fn restart(&mut self) {
         let now = self.now;
         self.world.power(false, now);
-        self.world.forget_all_told();
+        self.world.forget_commands();
         self.slots.iter_mut().for_each(|slot| slot.speed = 0);
         self.network.clear();
         self.incoming.clear();

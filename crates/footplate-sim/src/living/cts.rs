@@ -18,7 +18,7 @@ pub enum CtsSwitch {
         /// The longest.
         most: TimeSpan,
     },
-    /// The wire is not there, and every byte is taken; only answers stand in the way of questions.
+    /// There is no such wire: the station accepts every byte, except while it answers.
     None,
 }
 

@@ -23,15 +23,15 @@ impl LivingLayout<'_> {
     /// The track carries a locomotive's direction and speed.
     pub(crate) fn carry(&mut self, train: TrainId, forward: bool, speed: DecoderSpeed, at: Timestamp) {
         if self.runs_forward(train) == Some(!forward) {
-            self.turn(train, at);
+            self.reverse(train, at);
         }
         match speed {
             DecoderSpeed::Step { step, highest } => {
                 let own = self.decoder(train).highest().get();
-                self.tell(train, nearest(step, highest, own), at);
+                self.command(train, nearest(step, highest, own), at);
             }
             // What is turned around twice while it runs stops at once and leads with the same end.
-            DecoderSpeed::EmergencyStop => (0..2).for_each(|_| self.turn(train, at)),
+            DecoderSpeed::EmergencyStop => (0..2).for_each(|_| self.reverse(train, at)),
         }
     }
 }

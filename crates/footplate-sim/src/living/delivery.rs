@@ -1,4 +1,4 @@
-//! How what a station says in a stream is cut into portions on its way.
+//! The portions in which the stream of a station reaches the host.
 
 use std::collections::VecDeque;
 
@@ -23,7 +23,7 @@ pub enum Delivery {
     Split,
 }
 
-/// What is on its way to the host, and when it arrives.
+/// Portions that the host will receive, and when.
 #[derive(Debug, Clone)]
 pub(crate) struct Outgoing {
     delivery: Delivery,
@@ -58,7 +58,7 @@ impl Outgoing {
         Some(bytes)
     }
 
-    /// Puts lines on their way.
+    /// Sends lines.
     pub(crate) fn post(&mut self, now: Timestamp, bytes: &[u8], draws: &mut Draws) {
         let last = self.portions.back().map_or(now, |(last, _)| (*last).max(now));
         match self.delivery {

@@ -1,35 +1,35 @@
-//! What can become of trains and turnouts.
+//! Incidents: collisions, derailments, overruns and burnt coils.
 
 use footplate_core::{Timestamp, TrainId, TurnoutId};
 
-/// Something that a person has to set right.
+/// An event that an operator has to set right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Mishap {
+pub struct Incident {
     /// When it happened.
     pub at: Timestamp,
-    /// The train it happened to, if to one.
+    /// The train concerned, if there is one.
     pub train: Option<TrainId>,
-    /// What.
-    pub kind: MishapKind,
+    /// What happened.
+    pub kind: IncidentKind,
 }
 
-/// What happened. Trains concerned stop dead and stay where they are until a hand puts them elsewhere.
+/// The kinds of incidents. Trains concerned stop dead, and stay there until an operator places them elsewhere.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum MishapKind {
-    /// Two trains touch: the other one. It has an entry of its own.
+pub enum IncidentKind {
+    /// Two trains touched; each of them has an entry.
     Collision {
-        /// The train that it touches.
+        /// The other train.
         with: TrainId,
     },
-    /// The points moved under it, or it backed over points that lay for the other leg than it came by, or it met a
-    /// pair of turnouts in one place that both lay curved.
+    /// The points moved under the train, or it reversed over points that were set for the other leg, or it met a double
+    /// slip with both turnouts curved.
     Derailment {
         /// The turnout.
         turnout: TurnoutId,
     },
-    /// It ran past the end of its track.
+    /// The train ran past the end of its track.
     Overrun,
-    /// A solenoid was left powered until its coil burnt; the turnout lies as it does for good.
+    /// A solenoid was left powered until its coil burnt; the turnout keeps its position.
     CoilBurnt {
         /// The turnout.
         turnout: TurnoutId,

@@ -1,22 +1,19 @@
 //! A virtual command station on LocoNet behind a server (LbServer): lines in and out, at the pace of the bus.
 //!
 //! The bus carries one message after the other, of the host, of the station and of detectors alike. Locomotives are driven through
-//! slots; a slot whose locomotive is not commanded for long is given away. Whoever spoke to it is not watched: trains run on when they
-//! are gone.
+//! slots; a slot whose locomotive is not commanded for long is given away. It does not watch its clients: trains run on when they are
+//! gone.
 
 mod obeying;
 
 use std::collections::VecDeque;
 
-use footplate_core::track::Layout;
 use footplate_core::{Ratio, SensorId, TimeSpan, Timestamp, TrainId};
 use footplate_wire::loconet::{BUS_BYTE, Line, Lines, Message, SentReport, SlotData, SlotUse};
 
-use crate::circuit::CircuitError;
 use crate::draws::{Draws, Purpose};
 use crate::living::delivery::{Delivery, Outgoing};
 use crate::living::s88::Edge;
-use crate::living::switches::LivingSwitches;
 use crate::living::world::LivingLayout;
 
 /// What the server says of itself.
@@ -89,7 +86,7 @@ pub struct VirtualLocoNet<'l> {
     switches: LocoNetSwitches,
     draws: Draws,
     now: Timestamp,
-    /// Lines on their way from the host.
+    /// Lines from the host that have not arrived yet.
     incoming: VecDeque<(Timestamp, Vec<u8>)>,
     lines: Lines,
     waiting: Vec<Waiting>,
@@ -117,7 +114,7 @@ enum Next {
 }
 
 impl<'l> VirtualLocoNet<'l> {
-    /// A station in front of a layout, which has been driving the trains on it: it has slots for them, used by nobody. The track has no
+    /// A station in front of a layout, which has been driving the trains on it: it has slots for them, which are not in use. The track has no
     /// power yet. Sensor 0 of the layout is input 1.
     #[must_use]
     pub fn new(mut world: LivingLayout<'l>, seed: u64, switches: LocoNetSwitches) -> Self {
@@ -152,20 +149,6 @@ impl<'l> VirtualLocoNet<'l> {
         station
     }
 
-    /// A station and a layout on which trains have been put: see [`LivingLayout::draw`].
-    ///
-    /// # Errors
-    /// [`CircuitError`] when no train can run round on the layout.
-    pub fn draw(
-        layout: &'l Layout,
-        seed: u64,
-        trains: &[TrainId],
-        switches: &LivingSwitches,
-        station: LocoNetSwitches,
-    ) -> Result<Self, CircuitError> {
-        Ok(Self::new(LivingLayout::draw(layout, seed, trains, switches)?, seed, station))
-    }
-
     /// The time.
     #[must_use]
     pub const fn now(&self) -> Timestamp {
@@ -178,7 +161,7 @@ impl<'l> VirtualLocoNet<'l> {
         &self.world
     }
 
-    /// The layout, for a person's hands.
+    /// The layout, for operator intervention.
     pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
         &mut self.world
     }
@@ -187,7 +170,7 @@ impl<'l> VirtualLocoNet<'l> {
     pub fn restart(&mut self) {
         let now = self.now;
         self.world.power(false, now);
-        self.world.forget_all_told();
+        self.world.forget_commands();
         self.slots.clear();
         self.waiting.retain(|waiting| waiting.sender == Sender::Host);
         self.is_stopped = false;
@@ -330,7 +313,7 @@ const fn number_of(sensor: SensorId) -> u16 {
     sensor.0 + 1
 }
 
-/// A slot that nobody uses, with a decoder of 128 steps.
+/// A slot that is not in use, with a decoder of 128 steps.
 const fn free_slot(slot: u8) -> SlotData {
     SlotData { slot, status: 3, address: 0, speed: 0, forward: true, functions: 0, track: 0, rest: [0; 4] }
 }

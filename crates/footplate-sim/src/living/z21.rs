@@ -1,25 +1,24 @@
 //! The virtual Z21: a living layout behind the datagrams that such a station exchanges with up to twenty clients.
 //!
 //! What comes in is read with the codec that the program writes with; when things come and go is decided here. Nothing is known of a
-//! real station's times but that its bus of feedback modules is asked in a cycle: that cycle is simulated. Whoever spoke to it
-//! is forgotten after a minute and otherwise not watched: trains run on when they are gone.
+//! real station's times but that its bus of feedback modules is asked in a cycle: that cycle is simulated. It forgets
+//! silent clients after a minute and does not watch them otherwise: trains run on when they are gone.
 
 mod obeying;
 
 use std::collections::VecDeque;
 
-use footplate_core::track::{Layout, Leg};
+use footplate_core::track::Leg;
 use footplate_core::{DecoderSteps, SensorId, TimeSpan, Timestamp, TrainId};
 use footplate_wire::z21::{
     Broadcasts, CanDetection, CentralState, Feedback, GROUP_INPUTS, GROUP_MODULES, LocoNetDetection, RailCom,
     Reply, Throttle, TurnoutPosition,
 };
 
-use crate::circuit::CircuitError;
 use crate::draws::{Draws, Purpose};
+use crate::living::due_queue::DueQueue;
 use crate::living::network::{Disturbances, Network};
 use crate::living::s88::Edge;
-use crate::living::switches::LivingSwitches;
 use crate::living::world::LivingLayout;
 use crate::living::z21_switches::Z21Switches;
 
@@ -39,7 +38,7 @@ const MODULE_INPUTS: u16 = 8;
 const MOST_CLIENTS: usize = 20;
 /// A client that says nothing for so long is forgotten.
 const FORGOTTEN_AFTER: TimeSpan = TimeSpan::from_ms(60_000);
-/// Locomotives of which a client is told.
+/// Locomotives that a client may subscribe to.
 const MOST_SUBSCRIBED: usize = 16;
 /// From power on until it answers.
 const BOOT: TimeSpan = TimeSpan::from_ms(4_000);
@@ -52,7 +51,7 @@ const SCALE_KM_H: f64 = 87.0 * 3.6e-3;
 #[derive(Debug, Clone)]
 struct Connected {
     id: usize,
-    told: Broadcasts,
+    broadcasts: Broadcasts,
     subscribed: VecDeque<u16>,
     heard: Timestamp,
 }
@@ -81,7 +80,7 @@ pub struct VirtualZ21<'l> {
     turnouts: Vec<(u16, TurnoutPosition)>,
     /// What the station knows of its sensors, and what it will know when.
     occupied: Vec<SensorId>,
-    changes: Vec<(Timestamp, SensorId, bool)>,
+    changes: DueQueue<(SensorId, bool)>,
     /// When each module is asked within the cycle of the bus.
     phases: Vec<TimeSpan>,
     central: CentralState,
@@ -134,27 +133,13 @@ impl<'l> VirtualZ21<'l> {
             clients: Vec::new(),
             slots,
             turnouts: Vec::new(),
-            changes: Vec::new(),
+            changes: DueQueue::new(),
             phases,
             central: CentralState(CentralState::POWER_OFF),
             rail_com_due: now + RAIL_COM_EVERY,
             loses_next_subscription: switches.loses_first_subscription,
             dark_until: None,
         }
-    }
-
-    /// A station and a layout on which trains have been put: see [`LivingLayout::draw`].
-    ///
-    /// # Errors
-    /// [`CircuitError`] when no train can run round on the layout.
-    pub fn draw(
-        layout: &'l Layout,
-        seed: u64,
-        trains: &[TrainId],
-        switches: &LivingSwitches,
-        z21: Z21Switches,
-    ) -> Result<Self, CircuitError> {
-        Ok(Self::new(LivingLayout::draw(layout, seed, trains, switches)?, seed, z21))
     }
 
     /// The time.
@@ -169,7 +154,7 @@ impl<'l> VirtualZ21<'l> {
         &self.world
     }
 
-    /// The layout, for a person's hands.
+    /// The layout, for operator intervention.
     pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
         &mut self.world
     }
@@ -178,7 +163,7 @@ impl<'l> VirtualZ21<'l> {
     pub fn restart(&mut self) {
         let now = self.now;
         self.world.power(false, now);
-        self.world.forget_all_told();
+        self.world.forget_commands();
         self.clients.clear();
         self.slots.clear();
         self.turnouts.clear();
@@ -217,7 +202,7 @@ impl<'l> VirtualZ21<'l> {
         let rail_com = self.switches.rail_com.then_some(self.rail_com_due);
         let coming = [
             (self.network.next_to_station(), Next::Incoming),
-            (self.changes.iter().map(|(at, ..)| *at).min(), Next::Change),
+            (self.changes.due(), Next::Change),
             (self.network.next_to_client(), Next::Outgoing),
             (rail_com, Next::RailCom),
             (self.dark_until, Next::Light),
@@ -235,9 +220,7 @@ impl<'l> VirtualZ21<'l> {
                 }
             }
             Next::Change => {
-                let first = self.changes.iter().enumerate().min_by_key(|(_, (at, ..))| *at);
-                if let Some(at) = first.map(|(at, _)| at) {
-                    let (_, sensor, is_occupied) = self.changes.remove(at);
+                if let Some((sensor, is_occupied)) = self.changes.take() {
                     self.change(sensor, is_occupied);
                 }
             }
@@ -265,10 +248,8 @@ impl<'l> VirtualZ21<'l> {
                 }
                 Feedback::Can | Feedback::LocoNet => at + TimeSpan::from_s(self.draws.uniform(DETECTOR_S)),
             };
-            // What is known of one sensor stays in order.
-            let last = self.changes.iter().filter(|(_, other, _)| *other == sensor).map(|(at, ..)| *at).max();
-            let due = last.map_or(due, |last| due.max(last + TimeSpan::from_us(100))).max(self.now);
-            self.changes.push((due, sensor, is_occupied));
+            let change = (sensor, is_occupied);
+            self.changes.add_report(due.max(self.now), change, |(other, _)| *other == sensor);
         }
     }
 
@@ -314,8 +295,9 @@ impl<'l> VirtualZ21<'l> {
             let slot = self.slots[at];
             let rail_com = Reply::RailCom(self.rail_com(&slot));
             let wants = |client: &Connected| {
-                client.told.has(Broadcasts::ALL_RAIL_COM)
-                    || client.told.has(Broadcasts::RAIL_COM) && client.subscribed.contains(&slot.address)
+                client.broadcasts.has(Broadcasts::ALL_RAIL_COM)
+                    || client.broadcasts.has(Broadcasts::RAIL_COM)
+                        && client.subscribed.contains(&slot.address)
             };
             let ids: Vec<usize> =
                 self.clients.iter().filter(|client| wants(client)).map(|client| client.id).collect();

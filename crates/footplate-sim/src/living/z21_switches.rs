@@ -6,7 +6,7 @@ use footplate_wire::z21::Feedback;
 /// How the station and the network behave.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Z21Switches {
-    /// How often a datagram is lost, either way.
+    /// How often a datagram is lost, in either direction.
     pub lost: Ratio,
     /// How often one comes twice.
     pub duplicated: Ratio,

@@ -1,7 +1,7 @@
 //! The virtual 6051 keeps the times and the habits of the real one.
 
 use footplate_core::{Ratio, TimeSpan, Timestamp, TurnoutId};
-use footplate_sim::{CtsSwitch, FromStation, LivingSwitches, MishapKind, StationSwitches, VirtualStation};
+use footplate_sim::{CtsSwitch, FromStation, IncidentKind, LivingSwitches, StationSwitches, VirtualStation};
 
 use crate::yard::{OTHER, TRAIN, ask, empty, put, say, two_loops, wait};
 
@@ -158,8 +158,8 @@ fn a_solenoid_left_on_raises_an_alarm_and_burns() {
     wait(&mut station, 0.2);
     assert_eq!(station.alarms().iter().map(|alarm| alarm.turnout).collect::<Vec<_>>(), [TurnoutId(3)]);
     wait(&mut station, 6.0);
-    let kinds: Vec<MishapKind> = station.world().mishaps().iter().map(|mishap| mishap.kind).collect();
-    assert_eq!(kinds, [MishapKind::CoilBurnt { turnout: TurnoutId(3) }]);
+    let kinds: Vec<IncidentKind> = station.world().incidents().iter().map(|incident| incident.kind).collect();
+    assert_eq!(kinds, [IncidentKind::CoilBurnt { turnout: TurnoutId(3) }]);
 }
 
 #[test]
@@ -192,7 +192,7 @@ fn seen(seed: u64) -> (Vec<(Timestamp, FromStation)>, String) {
         }
     }
     let truth = station.world().truth();
-    (seen, format!("{:?} {:?} {:?}", truth.passes(), truth.rests(), station.world().mishaps()))
+    (seen, format!("{:?} {:?} {:?}", truth.passes(), truth.rests(), station.world().incidents()))
 }
 
 #[test]

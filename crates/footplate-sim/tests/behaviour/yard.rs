@@ -63,7 +63,7 @@ pub(crate) fn two_loops() -> Layout {
 
 /// A station before a faultless layout with surveyed rails, all turnouts straight, without trains.
 pub(crate) fn empty(layout: &Layout, switches: StationSwitches) -> VirtualStation<'_> {
-    let calm = LivingSwitches { true_rails: false, stale_contacts: false, ..LivingSwitches::faultless() };
+    let calm = LivingSwitches { true_rails: false, stale_detections: false, ..LivingSwitches::faultless() };
     let mut world = LivingLayout::without_trains(layout, 7, &calm);
     for number in 1..=3 {
         world.lay(TurnoutId(number), Leg::Straight);

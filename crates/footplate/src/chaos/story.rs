@@ -84,7 +84,7 @@ pub(crate) struct Fate {
     pub(crate) alarms: u32,
     pub(crate) grants: u32,
     pub(crate) intrusions: u32,
-    /// Mishaps while no command could reach the station.
+    /// Incidents while no command could reach the station.
     pub(crate) out_of_reach: u32,
     /// From each death until all trains were stopped, in ms.
     pub(crate) stopped_ms: Vec<f64>,
@@ -271,7 +271,7 @@ impl<'l> Teller<'_, 'l> {
     fn live(&mut self, planned: &PlannedLife) -> anyhow::Result<()> {
         self.stop_left_running()?;
         self.await_rest();
-        let mishaps = self.station.borrow().world().mishaps().len();
+        let incidents = self.station.borrow().world().incidents().len();
         self.fate.lives += 1;
         let life = Rc::new(Life::new(planned.ends));
         self.note(format!(
@@ -328,7 +328,7 @@ impl<'l> Teller<'_, 'l> {
             self.fail(format!("the journal failed: {trouble}"));
         }
         let unreachable = line.unreachable();
-        self.check_mishaps(mishaps, &unreachable);
+        self.check_incidents(incidents, &unreachable);
         self.bury(death, began, closing.is_complete(), &mut line, disk)
     }
 
@@ -343,19 +343,20 @@ impl<'l> Teller<'_, 'l> {
         }
     }
 
-    /// Checks the mishaps of a life. Those while no command reaches the station, and until trains have stopped after that, are
+    /// Checks the incidents of a life. Those while no command reaches the station, and until trains have stopped after that, are
     /// counted apart: no program could have prevented them.
-    fn check_mishaps(&mut self, before: usize, unreachable: &[Spell]) {
-        let mishaps: Vec<_> = self.station.borrow().world().mishaps().iter().skip(before).copied().collect();
-        for mishap in mishaps {
+    fn check_incidents(&mut self, before: usize, unreachable: &[Spell]) {
+        let incidents: Vec<_> =
+            self.station.borrow().world().incidents().iter().skip(before).copied().collect();
+        for incident in incidents {
             let is_helpless =
-                |spell: &Spell| Spell { until: spell.until + BRAKES_WITHIN, ..*spell }.covers(mishap.at);
+                |spell: &Spell| Spell { until: spell.until + BRAKES_WITHIN, ..*spell }.covers(incident.at);
             if unreachable.iter().any(is_helpless) {
-                self.note(format!("out of reach: {:?} of {:?}", mishap.kind, mishap.train));
+                self.note(format!("out of reach: {:?} of {:?}", incident.kind, incident.train));
                 self.fate.out_of_reach += 1;
                 continue;
             }
-            self.fail(format!("{:?} of {:?} at {:.2} s", mishap.kind, mishap.train, mishap.at.as_s()));
+            self.fail(format!("{:?} of {:?} at {:.2} s", incident.kind, incident.train, incident.at.as_s()));
         }
     }
 

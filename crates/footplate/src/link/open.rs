@@ -3,7 +3,8 @@
 use footplate_core::track::Layout;
 use footplate_core::{Ratio, TimeSpan};
 use footplate_sim::living::{
-    LivingSwitches, VirtualBoard, VirtualCentralStation, VirtualLocoNet, VirtualStation, VirtualZ21,
+    LivingLayout, LivingSwitches, VirtualBoard, VirtualCentralStation, VirtualLocoNet, VirtualStation,
+    VirtualZ21,
 };
 use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, Interface, Pace, Settings};
 use footplate_wire::{dcc_ex, loconet, marklin_can, z21};
@@ -75,19 +76,14 @@ pub(crate) fn station<'l>(
     if !address.faults {
         switches.turnout_failure = Ratio::ZERO;
     }
-    let SimulatedAddress { seed, trains, .. } = address;
+    let SimulatedAddress { seed, trains, quirks, .. } = address;
+    let world = || LivingLayout::draw(layout, *seed, trains, &switches);
     Ok(match address.station {
         StationKind::Marklin => VirtualStation::draw(layout, *seed, trains, &switches)?.into(),
-        StationKind::DccEx => {
-            VirtualBoard::draw(layout, *seed, trains, &switches, address.quirks.board)?.into()
-        }
-        StationKind::Z21 => VirtualZ21::draw(layout, *seed, trains, &switches, address.quirks.z21)?.into(),
-        StationKind::MarklinCan => {
-            VirtualCentralStation::draw(layout, *seed, trains, &switches, address.quirks.can)?.into()
-        }
-        StationKind::LocoNet => {
-            VirtualLocoNet::draw(layout, *seed, trains, &switches, address.quirks.loconet)?.into()
-        }
+        StationKind::DccEx => VirtualBoard::new(world()?, *seed, quirks.board).into(),
+        StationKind::Z21 => VirtualZ21::new(world()?, *seed, quirks.z21).into(),
+        StationKind::MarklinCan => VirtualCentralStation::new(world()?, *seed, quirks.can).into(),
+        StationKind::LocoNet => VirtualLocoNet::new(world()?, *seed, quirks.loconet).into(),
     })
 }
 

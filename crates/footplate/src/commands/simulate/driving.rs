@@ -69,14 +69,14 @@ impl Arguments {
 
     /// What went wrong with a train that we drove: how others drive it is no check of ours.
     fn failure(&self, train: &ScoredTrain) -> Option<FailedRun> {
-        let mishaps = train.faults();
-        (mishaps > 0).then(|| {
+        let incidents = train.faults();
+        (incidents > 0).then(|| {
             let (seed, law) = (train.seed, train.law);
             let mut again = format!("simulate driving --seed {seed} --law {law} --budget {}", self.budget);
             if self.layout != TRACK_A {
                 again += &format!(" --layout {}", self.layout);
             }
-            let what = format!("seed {seed}, law {law}: {} on the way", counted(mishaps, "mishap"));
+            let what = format!("seed {seed}, law {law}: {} on the way", counted(incidents, "incident"));
             FailedRun { what, again }
         })
     }

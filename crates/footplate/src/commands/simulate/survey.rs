@@ -65,7 +65,7 @@ impl Arguments {
 
     fn failure(&self, world: &Surveyed) -> Option<FailedRun> {
         (world.faults > 0).then(|| FailedRun {
-            what: format!("seed {}: {} on the way", world.seed, counted(world.faults, "mishap")),
+            what: format!("seed {}: {} on the way", world.seed, counted(world.faults, "incident")),
             again: format!("simulate survey {}", self.asked_of(&world.seed.to_string())),
         })
     }

@@ -77,7 +77,7 @@ impl Arguments {
 
     /// What must never become of trains, if it did, and how to have it again with all that is said.
     fn failed(&self, tally: &Tally) -> Option<FailedRun> {
-        let mut what: Vec<String> = tally.mishaps.iter().map(|mishap| format!("{mishap:?}")).collect();
+        let mut what: Vec<String> = tally.incidents.iter().map(|incident| format!("{incident:?}")).collect();
         let intrusions = tally.intrusions.iter();
         what.extend(intrusions.map(|(at, train)| {
             format!("train {train} on track that it does not hold at {:.2} s", at.as_s())

@@ -95,8 +95,8 @@ impl Arguments {
 
     /// A world in which a train came to grief.
     fn failure(&self, world: &ScoredWorld) -> Option<FailedRun> {
-        (world.mishaps > 0).then(|| FailedRun {
-            what: format!("seed {}, {}: {}", world.seed, world.name, counted(world.mishaps, "mishap")),
+        (world.incidents > 0).then(|| FailedRun {
+            what: format!("seed {}, {}: {}", world.seed, world.name, counted(world.incidents, "incident")),
             again: format!("simulate worlds --seed {} --world {}{}", world.seed, world.name, self.settings()),
         })
     }
