@@ -82,13 +82,7 @@ impl<'l> DisturbedRun<'l> {
             }
         }
         let watchdog = Watchdog::new(prepared.driver(), prepared.line.now());
-        let step = prepared.models.get(&TRAIN).map_or(SpeedStep::STAND, |model| {
-            let off = |step: &SpeedStep| {
-                (model.speed(*step, footplate_core::Approach::Below).value.as_mm_per_s() - SPEED).abs()
-            };
-            let all = (1..=model.highest().get()).filter_map(SpeedStep::new);
-            all.min_by(|one, other| off(one).total_cmp(&off(other))).unwrap_or(SpeedStep::STAND)
-        });
+        let step = prepared.nearest_step(TRAIN, SPEED);
         let lap_mm =
             circuit.edges.iter().map(|edge| prepared.world().truth().track().length(*edge).as_mm()).sum();
         let faults = prepared.world().incidents().len();

@@ -5,10 +5,10 @@ use std::ops::Range;
 
 use serde_json::{Value, json};
 
-use super::Scored;
 use super::arrive::{self, Arrived};
 use super::follow::{self, Followed, Kept};
-use super::hold::{By, Held, HoldRecord};
+use super::hold::{Held, HoldRecord};
+use super::{By, Scored};
 use crate::figures::{quantile, root_mean_square, shown, within_pct};
 use crate::written_scores::{Rate, WrittenScores};
 
@@ -54,6 +54,11 @@ const FOLLOW_BY_LENGTH: &str = "\
 The same with a gap in length, from the rear of the train ahead to the front of the follower, as long as the driver was told that
 trains are; *off* is what that differs from the one kept, twenty times a second.
 ";
+
+/// The simple drivers in the three tables.
+const HELD_BY: &str = "nearest step";
+const ARRIVED_BY: &str = "step of the mean speed";
+const FOLLOWED_BY: &str = "a step up or down";
 
 /// What is asked of a mean speed (%), ...
 const MEAN_WITHIN: f64 = 0.5;
@@ -105,7 +110,7 @@ impl WrittenScores for Page<'_> {
             scored.held.iter().map(move |held| {
                 let figures = Figures::of(core::iter::once(held), |held| &held.course, 0.0..f64::INFINITY);
                 json!({
-                    "seed": scored.seed, "train": held.train.0, "by": held.by.key(), "mm_per_s": held.speed,
+                    "seed": scored.seed, "train": held.train.0, "by": held.by.key(HELD_BY), "mm_per_s": held.speed,
                     "means_within_0_5_pct": figures.means_within_pct, "mean_off_pct_p95": figures.mean_off,
                     "place_off_mm_p95": figures.place_off, "place_off_mm_most": figures.farthest,
                     "commands_per_s": figures.commands_per_s, "trouble": held.trouble,
@@ -115,7 +120,7 @@ impl WrittenScores for Page<'_> {
         let arrived = self.scored.iter().flat_map(|scored| {
             scored.arrived.iter().map(move |arrived| {
                 json!({
-                    "seed": scored.seed, "train": arrived.train.0, "by": arrived.by.key(), "from": arrived.from.key(),
+                    "seed": scored.seed, "train": arrived.train.0, "by": arrived.by.key(ARRIVED_BY), "from": arrived.from.key(),
                     "within_s": arrived.asked[0], "way_mm": arrived.asked[1], "offered": arrived.refused,
                     "late_s": arrived.late_and_beyond.map(|[late, _]| late),
                     "beyond_mm": arrived.late_and_beyond.map(|[_, beyond]| beyond),
@@ -131,7 +136,7 @@ impl WrittenScores for Page<'_> {
                 };
                 let off = || run.off.iter().map(|off| scale * off);
                 json!({
-                    "seed": scored.seed, "train": run.train.0, "by": run.by.key(), "place": run.place, "gap_in": kept,
+                    "seed": scored.seed, "train": run.train.0, "by": run.by.key(FOLLOWED_BY), "place": run.place, "gap_in": kept,
                     "gap": run.gaps[0], "kept": run.gaps[1], "rms_ms_or_mm": root_mean_square(off()),
                     "mean_ms_or_mm": off().sum::<f64>() / run.off.len().max(1) as f64, "looks": run.off.len(),
                     "nearest_mm": run.nearest, "held_back": run.held_back,
@@ -152,7 +157,7 @@ impl WrittenScores for Page<'_> {
             .scored
             .iter()
             .flat_map(|scored| &scored.arrived)
-            .filter(|arrived| arrived.by == arrive::By::Driver)
+            .filter(|arrived| arrived.by == By::Footplate)
             .filter_map(|arrived| arrived.late_and_beyond)
             .collect();
         let is_off =
@@ -179,7 +184,7 @@ impl Page<'_> {
                  | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
             )?;
             let gaps = super::GAPS.into_iter().filter(|(of, _)| *of == kept);
-            let rows = gaps.flat_map(|(_, gap)| follow::By::ALL.map(|by| (gap, by)));
+            let rows = gaps.flat_map(|(_, gap)| follow::DRIVERS.map(|by| (gap, by)));
             for (gap, by, place) in rows.flat_map(|(gap, by)| [(gap, by, 1), (gap, by, 2)]) {
                 self.write_gap(output, (kept, gap), by, place)?;
             }
@@ -194,7 +199,7 @@ impl Page<'_> {
         &self,
         output: &mut dyn Write,
         (kept, gap): (Kept, f64),
-        by: follow::By,
+        by: By,
         place: usize,
     ) -> io::Result<()> {
         let is_of = |run: &&Followed| {
@@ -218,7 +223,7 @@ impl Page<'_> {
         writeln!(
             output,
             "| {} | {gap} | {} | {} | {least:.digits$} to {most:.digits$} | {} | {} | {} | {} | {} | {} | {:.2} |",
-            by.key(),
+            by.key(FOLLOWED_BY),
             ["first", "second"][place - 1],
             all.len(),
             shown(root_mean_square(off()), 0),
@@ -231,7 +236,7 @@ impl Page<'_> {
         )
     }
 
-    fn arrived(&self, by: arrive::By, from: arrive::Began) -> impl Iterator<Item = &Arrived> {
+    fn arrived(&self, by: By, from: arrive::Began) -> impl Iterator<Item = &Arrived> {
         let all = self.scored.iter().flat_map(|scored| &scored.arrived);
         all.filter(move |arrived| arrived.by == by && arrived.from == from)
     }
@@ -242,8 +247,7 @@ impl Page<'_> {
             "| driven by | asked | orders | other time offered | failed | late or early s | off mm | commands each |\n\
              | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |"
         )?;
-        for (by, from) in arrive::By::ALL.into_iter().flat_map(|by| arrive::Began::ALL.map(|from| (by, from)))
-        {
+        for (by, from) in By::ALL.into_iter().flat_map(|by| arrive::Began::ALL.map(|from| (by, from))) {
             let all: Vec<&Arrived> = self.arrived(by, from).collect();
             let off = |which: usize| {
                 let values = all.iter().filter_map(|arrived| arrived.late_and_beyond);
@@ -255,7 +259,7 @@ impl Page<'_> {
             writeln!(
                 output,
                 "| {} | {} | {} | {} | {} | {} / {} | {} / {} | {:.1} |",
-                by.key(),
+                by.key(ARRIVED_BY),
                 from.key(),
                 all.len(),
                 all.iter().filter(|arrived| arrived.refused).count(),
@@ -310,9 +314,9 @@ struct HeldRow {
 
 /// All rows, for each part of a run.
 fn held_rows() -> impl Iterator<Item = (HeldRow, &'static str, Range<f64>)> {
-    let row = |by: By| HeldRow { name: by.key(), by, course: |held| &held.course };
-    let believed = HeldRow { name: "as believed", by: By::Driver, course: |held| &held.believed };
-    let rows = [row(By::Driver), believed, row(By::Told), row(By::Step)];
+    let row = |by: By| HeldRow { name: by.key(HELD_BY), by, course: |held| &held.course };
+    let estimated = HeldRow { name: "as believed", by: By::Footplate, course: |held| &held.estimated };
+    let rows = [row(By::Footplate), estimated, row(By::Oracle), row(By::Step)];
     rows.into_iter().flat_map(|row| MINUTES.map(|(minute, span)| (row, minute, span)))
 }
 

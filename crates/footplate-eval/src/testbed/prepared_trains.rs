@@ -7,7 +7,7 @@ use footplate_core::control::{Driver, Machine};
 use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg, Position, TurnoutStates};
 use footplate_core::tracking::PathPoint;
-use footplate_core::{Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Approach, Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::living::{End, LivingLayout, LivingSwitches, VirtualStation};
 
 use super::{VirtualLine, calibrate};
@@ -121,6 +121,11 @@ impl<'l> PreparedTrains<'l> {
         Ok(())
     }
 
+    /// The step of a train whose speed is nearest to one in mm/s; 0 for an unknown train.
+    pub fn nearest_step(&self, train: TrainId, mm_per_s: f64) -> SpeedStep {
+        self.models.get(&train).map_or(SpeedStep::STAND, |model| nearest_step(model, steps(model), mm_per_s))
+    }
+
     /// A driver that knows the trains and their places.
     pub fn driver(&self) -> Driver {
         self.driver_on(self.layout)
@@ -137,6 +142,26 @@ impl<'l> PreparedTrains<'l> {
         }
         driver
     }
+}
+
+/// All steps of a train except 0.
+pub(crate) fn steps(model: &MotionModel) -> impl Iterator<Item = SpeedStep> + use<> {
+    (1..=model.highest().get()).filter_map(SpeedStep::new)
+}
+
+/// The estimated speed of a step, reached from below, in mm/s.
+pub(crate) fn speed(model: &MotionModel, step: SpeedStep) -> f64 {
+    model.speed(step, Approach::Below).value.as_mm_per_s()
+}
+
+/// The one of several steps whose speed is nearest to one in mm/s.
+pub(crate) fn nearest_step(
+    model: &MotionModel,
+    steps: impl Iterator<Item = SpeedStep>,
+    mm_per_s: f64,
+) -> SpeedStep {
+    let off = |step: &SpeedStep| (speed(model, *step) - mm_per_s).abs();
+    steps.min_by(|one, other| off(one).total_cmp(&off(other))).unwrap_or(SpeedStep::STAND)
 }
 
 /// A machine that sends no commands.

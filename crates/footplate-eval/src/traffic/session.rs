@@ -98,7 +98,7 @@ pub struct Tally {
 /// Some hours of traffic.
 pub struct Session<'l> {
     layout: &'l Layout,
-    rehearsal: PreparedTrains<'l>,
+    prepared: PreparedTrains<'l>,
     dispatcher: Dispatcher,
     choice: Choice,
     tally: Tally,
@@ -123,17 +123,17 @@ impl<'l> Session<'l> {
         let trains: Vec<TrainId> =
             [24, 58, 1, 43, 54, 35].into_iter().map(TrainId).take(asked.trains).collect();
         let switches = LivingSwitches::well_kept();
-        let mut rehearsal = PreparedTrains::prepare(layout, seed, &trains, &switches, asked.budget)?;
+        let mut prepared = PreparedTrains::prepare(layout, seed, &trains, &switches, asked.budget)?;
         let mut choice = Choice::new(seed);
         let sensors: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
         for nth in 0..trains.len() {
             let mut is_put = false;
             for _ in 0..TRIES {
                 let Some(node) = choice.of(&sensors) else { break };
-                if rehearsal.put(trains[nth], *node, PAST).is_err() {
+                if prepared.put(trains[nth], *node, PAST).is_err() {
                     continue;
                 }
-                let dispatcher = dispatcher(&rehearsal, asked.by_blocks);
+                let dispatcher = dispatcher(&prepared, asked.by_blocks);
                 let holds = |train: &TrainId| dispatcher.reservation(*train);
                 let is_apart = trains[..nth].iter().all(|other| {
                     holds(other).zip(holds(&trains[nth])).is_some_and(|(one, two)| !one.meets(two))
@@ -150,13 +150,13 @@ impl<'l> Session<'l> {
                 bail!("there is no room for {} trains on this layout; ask for fewer", asked.trains);
             }
         }
-        let dispatcher = dispatcher(&rehearsal, asked.by_blocks);
-        let began = rehearsal.line.now();
+        let dispatcher = dispatcher(&prepared, asked.by_blocks);
+        let began = prepared.line.now();
         let tally =
             Tally { seed, trains: trains.len(), hours: asked.time.as_s() / 3600.0, ..Tally::default() };
         Ok(Self {
             layout,
-            rehearsal,
+            prepared,
             dispatcher,
             choice,
             tally,
@@ -172,31 +172,31 @@ impl<'l> Session<'l> {
 
     /// Runs for so long.
     pub fn run(mut self, time: TimeSpan) -> Tally {
-        let began = self.rehearsal.line.now();
+        let began = self.prepared.line.now();
         let end = began + time;
-        let before = self.rehearsal.world().incidents().len();
+        let before = self.prepared.world().incidents().len();
         for train in self.trains.clone() {
             self.send(train);
         }
-        while self.rehearsal.line.now() < end && self.rehearsal.world().incidents().len() == before {
-            let until = end.min(self.rehearsal.line.now() + LOOK);
+        while self.prepared.line.now() < end && self.prepared.world().incidents().len() == before {
+            let until = end.min(self.prepared.line.now() + LOOK);
             let hear_of_line = |dispatcher: &mut Dispatcher, now, notice: &LinkNotice| {
                 if let Some(news) = notice.news() {
                     dispatcher.handle_link(now, news);
                 }
             };
-            let notice = self.rehearsal.line.drive_hearing(&mut self.dispatcher, until, hear_of_line);
+            let notice = self.prepared.line.drive_hearing(&mut self.dispatcher, until, hear_of_line);
             match notice {
                 Some(notice) => self.hear(&notice),
                 None => self.look(),
             }
         }
-        let now = self.rehearsal.line.now();
+        let now = self.prepared.line.now();
         self.tally.hours = (now - began).as_s() / 3600.0;
         for train in self.trains.clone() {
             self.came_somewhere(train, now);
         }
-        self.tally.incidents = self.rehearsal.world().incidents().iter().skip(before).copied().collect();
+        self.tally.incidents = self.prepared.world().incidents().iter().skip(before).copied().collect();
         for incident in self.tally.incidents.iter().filter(|_| self.talk) {
             eprintln!("{:9.2} {:?}", incident.at.as_s(), incident.kind);
         }
@@ -205,7 +205,7 @@ impl<'l> Session<'l> {
     }
 
     fn hear(&mut self, notice: &Notice) {
-        let now = self.rehearsal.line.now();
+        let now = self.prepared.line.now();
         if self.talk && !matches!(notice, Notice::Planned(_)) {
             eprintln!("{:9.2} {notice:?}", now.as_s());
         }
@@ -267,7 +267,7 @@ impl<'l> Session<'l> {
             let offset =
                 Length::from_mm(self.choice.between(0.0, length.map_or(0.0, |edge| edge.length.as_mm())));
             let journey = Journey::to(Landmark { node, offset });
-            let now = self.rehearsal.line.now();
+            let now = self.prepared.line.now();
             if self.dispatcher.go(now, train, journey).is_ok() {
                 self.waits.insert(train, now);
                 return;
@@ -277,13 +277,12 @@ impl<'l> Session<'l> {
 
     /// Compares what trains are on with what they hold, and helps those that are lost.
     fn look(&mut self) {
-        let now = self.rehearsal.line.now();
+        let now = self.prepared.line.now();
         if self.warned.is_some_and(|since| now - since >= HELP_AFTER) {
             self.dispatcher.switch_power(now, true);
         }
         for train in self.trains.clone() {
-            let is_inside =
-                is_on_reserved_track(self.layout, self.rehearsal.world(), &self.dispatcher, train);
+            let is_inside = is_on_reserved_track(self.layout, self.prepared.world(), &self.dispatcher, train);
             if let Some(was) = self.is_inside.insert(train, is_inside)
                 && was
                 && !is_inside
@@ -305,7 +304,7 @@ impl<'l> Session<'l> {
 
     /// Compares where a train stands with where it is believed to.
     fn check_belief(&mut self, finished: &Finished) {
-        let truth = self.rehearsal.world().truth();
+        let truth = self.prepared.world().truth();
         let Some(achieved) = finished.achieved else { return };
         let sensor = self.layout.sensor_at(achieved.at.node);
         let Some(past) = sensor.and_then(|sensor| truth.past(finished.train, sensor)) else { return };
@@ -327,7 +326,7 @@ impl<'l> Session<'l> {
 
     /// What a train and the turnouts really do, where that is not what is believed.
     fn tell_truth(&self, train: TrainId) {
-        let (truth, driver) = (self.rehearsal.world().truth(), self.dispatcher.driver());
+        let (truth, driver) = (self.prepared.world().truth(), self.dispatcher.driver());
         let name = |edge| {
             let edge = self.layout.edge(edge)?;
             Some([edge.from, edge.to].map(|node| self.layout.node_name(node)).join(" to "))
@@ -336,15 +335,15 @@ impl<'l> Session<'l> {
             format!("{:.0} mm from {}", place.offset.as_mm(), name(place.edge).unwrap_or_default())
         };
         let really = truth.train(train).and_then(|train| train.position).map(place);
-        let believed = driver.position(train, self.rehearsal.line.now()).map(place);
+        let believed = driver.position(train, self.prepared.line.now()).map(place);
         let journey = self.dispatcher.journey(train).map(|(_, journey)| self.layout.display(journey.target));
         let journey = journey.map(|to| to.to_string());
         eprintln!("          {train} wants to {journey:?}, is really {really:?}, believed {believed:?}");
-        let under = driver.turnouts_under(train, self.rehearsal.line.now()).into_iter();
+        let under = driver.turnouts_under(train, self.prepared.line.now()).into_iter();
         let under: Vec<_> = under.map(|turnout| (turnout.0, driver.turnouts().get(turnout))).collect();
         eprintln!("          on turnouts {under:?}");
         for (turnout, _) in self.layout.turnouts() {
-            let (lies, known) = (self.rehearsal.world().lies(turnout), driver.turnouts().get(turnout));
+            let (lies, known) = (self.prepared.world().lies(turnout), driver.turnouts().get(turnout));
             if lies != known {
                 eprintln!("          turnout {turnout} lies {lies:?}, believed {known:?}");
             }
@@ -354,7 +353,7 @@ impl<'l> Session<'l> {
     /// A person reads off where a train stands.
     fn help(&mut self, train: TrainId, now: Timestamp) {
         self.needs_person.remove(&train);
-        let Some(at) = place_by_hand(self.layout, self.rehearsal.world(), train) else { return };
+        let Some(at) = place_by_hand(self.layout, self.prepared.world(), train) else { return };
         self.tally.hands += 1;
         self.dispatcher.place(now, train, at, HAND);
     }
@@ -393,9 +392,9 @@ pub fn place_by_hand(layout: &Layout, world: &LivingLayout<'_>, train: TrainId) 
     Some(PathPoint { node: edge.from, distance: position.offset * scale })
 }
 
-fn dispatcher(rehearsal: &PreparedTrains<'_>, by_blocks: bool) -> Dispatcher {
-    let now = rehearsal.line.now();
-    let mut dispatcher = Dispatcher::watched(now, rehearsal.driver());
+fn dispatcher(prepared: &PreparedTrains<'_>, by_blocks: bool) -> Dispatcher {
+    let now = prepared.line.now();
+    let mut dispatcher = Dispatcher::watched(now, prepared.driver());
     if by_blocks {
         dispatcher.reserve_blocks();
     }

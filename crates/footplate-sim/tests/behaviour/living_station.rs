@@ -109,7 +109,7 @@ fn without_the_wire_bytes_may_follow_each_other() {
 }
 
 #[test]
-fn contacts_are_remembered_until_they_are_read_module_by_module() {
+fn detections_are_remembered_until_they_are_read_module_by_module() {
     let layout = two_loops();
     let mut station = empty(&layout, StationSwitches::default());
     put(&mut station, TRAIN, "S1", "S2", 800.0);
@@ -130,7 +130,7 @@ fn contacts_are_remembered_until_they_are_read_module_by_module() {
 }
 
 #[test]
-fn a_held_contact_is_seen_again_and_again() {
+fn a_sensor_that_stays_closed_is_seen_again_and_again() {
     let layout = two_loops();
     let mut station = empty(&layout, StationSwitches::default());
     put(&mut station, TRAIN, "S1", "S2", 890.0);

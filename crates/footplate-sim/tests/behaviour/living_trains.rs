@@ -12,7 +12,7 @@ fn sensors_passed(station: &footplate_sim::VirtualStation<'_>) -> Vec<u16> {
 }
 
 #[test]
-fn a_train_goes_round_and_closes_only_the_contacts_of_its_direction() {
+fn a_train_goes_round_and_closes_only_the_sensors_of_its_direction() {
     let layout = two_loops();
     let mut station = empty(&layout, StationSwitches::default());
     put(&mut station, TRAIN, "S1", "S2", 300.0);
@@ -38,12 +38,12 @@ fn it_goes_where_the_turnout_lies_when_it_comes_to_it() {
     wait(&mut station, 20.0);
     let passed = sensors_passed(&station);
     assert_eq!(passed.get(..4), Some([0, 10, 12, 14].as_slice()), "over S0 into the inner loop: {passed:?}");
-    // Märklin's points give way to a train that comes from the wrong leg.
+    // Märklin's points are moved by a train that comes from the wrong leg.
     assert!(station.world().incidents().is_empty(), "{:?}", station.world().incidents());
 }
 
 #[test]
-fn a_train_told_to_turn_stops_dead_and_comes_back() {
+fn a_reversed_train_stops_dead_and_comes_back() {
     let layout = two_loops();
     let mut station = empty(&layout, StationSwitches::default());
     put(&mut station, TRAIN, "S1", "S2", 300.0);
@@ -64,7 +64,7 @@ fn a_train_told_to_turn_stops_dead_and_comes_back() {
     wait(&mut station, 8.0);
     let passes = station.world().truth().passes();
     let next = passes.iter().find(|pass| pass.at > last.at).unwrap();
-    assert_eq!(next.sensor, SensorId(last.sensor.0 ^ 1), "the same place, the other way");
+    assert_eq!(next.sensor, SensorId(last.sensor.0 ^ 1), "the same place, in the other direction");
     assert!(layout.edge(edge_before).is_some());
 }
 
@@ -184,7 +184,7 @@ fn hands_lift_push_dirty_and_swap() {
 }
 
 #[test]
-fn what_a_train_passed_before_a_hand_took_it_elsewhere_is_no_way_from_there() {
+fn what_a_train_passed_before_it_was_lifted_is_no_distance_from_there() {
     let layout = two_loops();
     let mut station = empty(&layout, StationSwitches::default());
     put(&mut station, TRAIN, "S1", "S2", 300.0);
@@ -224,7 +224,7 @@ fn every_train_drawn_can_run_round_its_circuit_while_the_others_stand() {
             say(&mut station, &[11, train.0 as u8]);
             wait(&mut station, 30.0);
             assert!(station.world().incidents().is_empty(), "seed {seed}: {:?}", station.world().incidents());
-            // One way round or the other.
+            // In one direction of the circuit or the other.
             let met = |sensor: SensorId| {
                 let passes = station.world().truth().passes();
                 passes.iter().any(|pass| pass.sensor == sensor || pass.sensor.0 == sensor.0 ^ 1)

@@ -140,7 +140,7 @@ fn directions_are_absolute() {
 }
 
 #[test]
-fn trains_run_on_when_nobody_writes_and_stop_when_the_board_is_reset() {
+fn trains_run_on_without_commands_and_stop_when_the_board_is_reset() {
     let layout = two_loops();
     let mut board = board(&layout, End::Nose, BoardSwitches::default());
     answer(&mut board, "<1>");

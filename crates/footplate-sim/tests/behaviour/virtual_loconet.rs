@@ -51,7 +51,7 @@ fn requests_are_answered_as_the_protocols_say() {
             &["RECEIVE BB 00 00 44", "SENT OK", "RECEIVE E7 0E 00 03 00 00 00 02 00 00 00 00 00 17"],
         ),
         ("SEND 83 7C", &["RECEIVE 83 7C", "SENT OK"]),
-        // Train 24 is in slot 1, used by nobody; then by this throttle.
+        // Train 24 is in slot 1, which is not in use; then by this throttle.
         (
             "SEND BF 00 18 58",
             &["RECEIVE BF 00 18 58", "SENT OK", "RECEIVE E7 0E 01 13 18 00 00 03 00 00 00 00 00 1F"],
