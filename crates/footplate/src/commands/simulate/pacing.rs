@@ -25,7 +25,7 @@ pub(super) struct Arguments {
 impl Arguments {
     pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let scored = self.series.score("pacing", score)?;
-        let page = Page { scored: &scored, asked: self.series.asked() };
+        let page = Page { scored: &scored, asked: self.series.asked("") };
         self.form.write(&page, output)?;
         let failed: Vec<FailedRun> = scored.iter().filter_map(|scored| self.failure(scored)).collect();
         Ok(name_failed(&failed))
@@ -34,7 +34,7 @@ impl Arguments {
     /// What the driver did not carry out, or trains came to grief over: how others drive them is no check of ours.
     fn failure(&self, scored: &Scored) -> Option<FailedRun> {
         let (train, trouble) = scored.troubles().next()?;
-        let again = self.series.again("pacing", scored.seed);
+        let again = self.series.again("pacing", scored.seed, "");
         Some(FailedRun { what: format!("seed {}, train {train}: {trouble}", scored.seed), again })
     }
 }

@@ -25,7 +25,7 @@ pub(super) struct Arguments {
 impl Arguments {
     pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let scored = self.series.score("zones", score)?;
-        let page = Page { scored: &scored, asked: self.series.asked() };
+        let page = Page { scored: &scored, asked: self.series.asked("") };
         self.form.write(&page, output)?;
         let failed: Vec<FailedRun> = scored.iter().filter_map(|scored| self.failure(scored)).collect();
         Ok(name_failed(&failed))
@@ -33,7 +33,7 @@ impl Arguments {
 
     fn failure(&self, scored: &Scored) -> Option<FailedRun> {
         let (train, trouble) = scored.trouble()?;
-        let again = self.series.again("zones", scored.seed);
+        let again = self.series.again("zones", scored.seed, "");
         Some(FailedRun { what: format!("seed {}, train {train}: {trouble}", scored.seed), again })
     }
 }
