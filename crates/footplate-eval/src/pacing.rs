@@ -43,7 +43,7 @@ impl By {
     const fn key(self, step: &'static str) -> &'static str {
         match self {
             Self::Footplate => "footplate",
-            Self::Oracle => "footplate, told the train",
+            Self::Oracle => "oracle",
             Self::Step => step,
         }
     }

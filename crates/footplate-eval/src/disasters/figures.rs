@@ -53,7 +53,7 @@ impl Figures {
             "run_until_then_mm": both(self.noticed.iter().map(|[_, mm]| *mm)),
             "recovered": self.recovered.len(), "recovered_s": both(self.recovered.iter().copied()),
             "as_before": as_before, "rescaled": rescaled, "learnt_anew": anew,
-            "needed_person": self.needed_operator, "powered_off": self.powered_off, "mishaps": self.faults,
+            "needed_person": self.needed_operator, "powered_off": self.powered_off, "incidents": self.faults,
             "stops_before": self.before.len(), "before_mm": both(self.before.iter().copied()),
             "stops_after": self.after.len(), "after_mm": both(self.after.iter().copied()),
         })

@@ -15,12 +15,12 @@ const HEAD: &str = "\
 # What becomes of trains that something happens to
 
 Random simulated trains, calibrated over the bytes of a virtual 6051 and driven round and round under a watchdog, beside
-another train that stands. Contacts and turnouts fail now and then. Then something happens, of which the program is told
-nothing. The simulator's truth is used for these figures alone.
+another train that stands. Sensors and turnouts fail now and then. Then something happens that is not reported to the
+program. The simulator's truth is used for these figures alone.
 ";
 
 const LEGEND: &str = "\
-*Noticed* is from what happened until the train is told to stand for it, and how far it ran in between; *known again* until
+*Noticed* is from what happened until the train is commanded to stop for it, and how far it ran in between; *known again* until
 the train stands, is located again and measured, and may be ordered again: as it was before, its model rescaled, or learnt
 anew. *Stops* are at random places, from the step with about 280 mm/s, as far from there as the truth says (mm, median /
 95th percentile), before and afterwards. *Grief* counts collisions, derailments and trains that ran past the end of
@@ -45,7 +45,7 @@ impl WrittenScores for Page<'_> {
     fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
         writeln!(
             output,
-            "| what happened | runs | noticed | after s | way mm | known again | after s | as before | rescaled | \
+            "| what happened | runs | noticed | after s | distance mm | known again | after s | as before | rescaled | \
              anew | person | power off | stops before | mm | stops after | mm | grief |\n\
              | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | \
              ---: | ---: | ---: |"
@@ -74,12 +74,12 @@ impl WrittenScores for Page<'_> {
         let (alarms, hours) = self.alarms();
         writeln!(
             output,
-            "\nFalse alarms: {alarms} in {hours:.1} hours of running with nothing but the usual faults of contacts and \
+            "\nFalse alarms: {alarms} in {hours:.1} hours of running with nothing but the usual faults of sensors and \
              turnouts.\n\n## Who is where\n"
         )?;
         writeln!(
             output,
-            "| trains running | contacts closed by them | laid to the right one | to another | to nobody | closed by \
+            "| trains running | detections of them | associated with the right one | with another | with none | closed by \
              themselves | of these laid to a train |\n| ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
         )?;
         for (trains, counted) in self.associations() {
@@ -104,7 +104,7 @@ impl WrittenScores for Page<'_> {
         let runs = runs.map(|(seed, (kind, run))| {
             json!({
                 "seed": seed, "kind": kind.key(), "noticed": run.noticed, "recovered": run.recovered,
-                "needed_person": run.needed_operator, "false_alarms": run.false_alarms, "mishaps": run.faults,
+                "needed_person": run.needed_operator, "false_alarms": run.false_alarms, "incidents": run.faults,
                 "before_mm": run.before, "after_mm": run.after, "said": run.notices,
             })
         });

@@ -136,7 +136,7 @@ impl Figures {
             "mid_stop_mm": self.mid, "mid_stops": self.stops[0], "top_stop_mm": self.top,
             "top_stops": self.stops[1], "move_mm": self.moves, "moves": self.good_moves[1],
             "moves_within_8_mm_or_5_pct": self.good_moves[0], "not_beyond": beyond,
-            "position_inside_pct": self.covered_pct(), "failed": self.failed, "mishaps": self.faults,
+            "position_inside_pct": self.covered_pct(), "failed": self.failed, "incidents": self.faults,
         })
     }
 }

@@ -14,14 +14,14 @@ const HEAD: &str = "\
 # How well trains are driven
 
 Random simulated trains, each from nothing known: calibrated over the bytes of a virtual 6051, then driven to random
-places. Contacts and turnouts fail now and then. The simulator shares no formula with what drives, and its truth is used
+places. Sensors and turnouts fail now and then. The simulator shares no formula with what drives, and its truth is used
 for these figures alone.
 ";
 
 const LEGEND: &str = "\
-*Stops* are at a random contact and a random offset past it, from steps with true speeds of 200 to 450 mm/s (mid) and
+*Stops* are at a random sensor and a random offset past it, from steps with true speeds of 200 to 450 mm/s (mid) and
 from 500 mm/s on (top); *moves* are of 20 to 400 mm. Errors are true millimetres, median / 95th percentile. The *oracle* is
-the same driver with a model made of the truth: what remains is what nobody can know, scatter of stops first of all. The
+the same driver with a model made of the truth: what remains cannot be known, scatter of stops first of all. The
 *course project* does what published projects do: a constant speed a step, stopping distances by bisection, v²/2a in
 between (for moves, too: tables of those that some projects have are left out), no feedback from errors, a position counted
 on from the last report; it may measure for as long as it likes.

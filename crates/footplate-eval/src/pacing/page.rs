@@ -15,28 +15,28 @@ use crate::written_scores::{Rate, WrittenScores};
 const HEAD: &str = "\
 # How well trains keep to a pace
 
-Random simulated trains, three on a layout, each calibrated from nothing known over the bytes of a virtual 6051. Contacts
+Random simulated trains, three on a layout, each calibrated from nothing known over the bytes of a virtual 6051. Sensors
 fail now and then. The simulator shares no formula with what drives, and its truth is used for these figures alone.
 ";
 
 const HOLD: &str = "\
 ## A speed held
 
-Speeds of 200 to 450 mm/s, each held for two minutes, on a way round of which the calibration has seen what it chose to. *Mean speed* is over every 3 m (asked: within 0.5 %), *position* is that
-of a train that had always run at the speed, from the contact at which the driver says it begins (asked: within 15 mm in
-95 % of the time). Both are counted on the map, on which a contact is where it was surveyed, and a train between two of them
-as far along as it truly is. *As believed* is where the driver took the same trains to be at the same moments: off is what
-its choice of steps and its answers to what contacts say come to, and the rest is what it did not know. *Told the train* is the
-same driver with a model made of the truth. The *nearest step* is what there was before.
+Speeds of 200 to 450 mm/s, each held for two minutes on a circuit that the calibration has partly seen. *Mean speed* is over every 3 m (asked: within 0.5 %). *Position* is relative
+to that of a train that always ran at the speed, from the sensor at which the driver says it begins (asked: within 15 mm in
+95 % of the time). Both are in surveyed lengths: a sensor is at its surveyed place, and between two sensors a train has run the
+same share of the surveyed distance as of the true one. *As estimated* is the position that the driver estimated at the same
+times: its error comes from the choice of steps and the response to detections, the rest from what the driver did not know. The
+*oracle* is the same driver with a model made of the truth. The *nearest step* is the simple driver.
 ";
 
 const ARRIVE: &str = "\
 ## In time at a place
 
-Places 1.8 to 6 m ahead, each to be stood at after a time that asks for 170 to 320 mm/s on the way; every other train runs
-when it is asked. *Near by* are places that turn out to lie less than 1.8 m ahead of a train at rest, as those a round and a
+Places 1.8 to 6 m ahead, each to be reached after a time that needs a mean speed of 170 to 320 mm/s; every other train runs
+when it is ordered. *Near by* are places that turn out to lie less than 1.8 m ahead of a train at rest, as those a round and a
 little ahead do: it waits, and moves up. Who cannot be in time is asked again for the time that it offers. True times and places
-of rest (asked: 0.3 s and 25 mm at the 95th percentile), median / 95th percentile. *Told the train* is the same driver with a
+of rest (asked: 0.3 s and 25 mm at the 95th percentile), median / 95th percentile. The *oracle* is the same driver with a
 model made of the truth. The *step of the mean speed* stops at the same place.
 ";
 
@@ -44,15 +44,15 @@ const FOLLOW: &str = "\
 ## Behind each other
 
 Three trains in a row for ten minutes, behind one that runs at 200 to 320 mm/s and changes its speed every 15 to 40 s. The
-*gap* is the true time from the train ahead at a contact to the follower there; *off* is what it differs from the one asked
+*gap* is the true time from the train ahead at a sensor to the follower there; *off* is what it differs from the one asked
 for, root mean square (asked: 60 ms), mean, and 95th percentile. A gap that would not be safe is refused, and the shortest
 safe one and 5 % kept instead. *Nearest* is truly from bumper to bumper (never less than 50 mm is promised). The follower
 beside it runs at the step nearest to its leader's speed, and one up or down while it is off by more than 100 ms.
 ";
 
 const FOLLOW_BY_LENGTH: &str = "\
-The same with a gap in length, from the rear of the train ahead to the front of the follower, as long as the driver was told that
-trains are; *off* is what that differs from the one kept, twenty times a second.
+The same with a gap in length, from the rear of the train ahead to the front of the follower, with the lengths that the driver
+knows; *off* is what that differs from the one kept, twenty times a second.
 ";
 
 /// The simple drivers in the three tables.
@@ -121,7 +121,7 @@ impl WrittenScores for Page<'_> {
             scored.arrived.iter().map(move |arrived| {
                 json!({
                     "seed": scored.seed, "train": arrived.train.0, "by": arrived.by.key(ARRIVED_BY), "from": arrived.from.key(),
-                    "within_s": arrived.asked[0], "way_mm": arrived.asked[1], "offered": arrived.refused,
+                    "within_s": arrived.asked[0], "distance_mm": arrived.asked[1], "offered": arrived.refused,
                     "late_s": arrived.late_and_beyond.map(|[late, _]| late),
                     "beyond_mm": arrived.late_and_beyond.map(|[_, beyond]| beyond),
                     "commands": arrived.commands, "trouble": arrived.trouble,
@@ -315,7 +315,7 @@ struct HeldRow {
 /// All rows, for each part of a run.
 fn held_rows() -> impl Iterator<Item = (HeldRow, &'static str, Range<f64>)> {
     let row = |by: By| HeldRow { name: by.key(HELD_BY), by, course: |held| &held.course };
-    let estimated = HeldRow { name: "as believed", by: By::Footplate, course: |held| &held.estimated };
+    let estimated = HeldRow { name: "as estimated", by: By::Footplate, course: |held| &held.estimated };
     let rows = [row(By::Footplate), estimated, row(By::Oracle), row(By::Step)];
     rows.into_iter().flat_map(|row| MINUTES.map(|(minute, span)| (row, minute, span)))
 }

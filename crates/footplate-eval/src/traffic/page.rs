@@ -22,7 +22,7 @@ const LEGEND: &str = "\
 a train came to no destination. *Runs*: of these, one in a thousand may end beyond its reservation. *Intrusions*: times that any
 part of a train was on track that it had not reserved. *Mistaken*: of all rests past a sensor, those more than four standard
 deviations from the estimate. *Alarms*: times that the watchdog stopped a train to locate it again. *Person*: times that it
-needed a person to read off where the train was. *No way*: destinations too near to the end of a track, for which another was
+needed a person to read off where the train was. *No route*: destinations too near to the end of a track, for which another was
 drawn. *By blocks*: the same trains, orders and stops, but the track between sensors is reserved as a whole, with all its
 turnouts, as block systems do.
 ";
@@ -51,7 +51,7 @@ impl WrittenScores for Page<'_> {
         writeln!(
             output,
             "| seed | hours | arrivals | per hour and train | waited s | took s | nowhere s | runs | stepped aside | \
-             collisions | derailments | overruns | intrusions | mistaken | wrong legs | alarms | person | no way |\n\
+             collisions | derailments | overruns | intrusions | mistaken | wrong legs | alarms | person | no route |\n\
              | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | \
              ---: | ---: | ---: |"
         )?;
@@ -93,10 +93,10 @@ fn seeds(tallies: &[Tally]) -> Value {
                 "waited_s": tally.waits, "took_s": tally.took, "nowhere_s": tally.starved,
                 "errors_mm": tally.errors, "routes": tally.routes, "turns": tally.turns, "aside": tally.aside,
                 "deadlocks": tally.deadlocks, "diverged": tally.diverged, "lost": tally.lost, "alarms": tally.dangers,
-                "hands": tally.hands, "rests": tally.beliefs, "mistaken": tally.mistaken, "refused": tally.refused, "withdrawn": tally.withdrawn,
+                "hands": tally.hands, "rests": tally.rests, "mistaken": tally.mistaken, "refused": tally.refused, "withdrawn": tally.withdrawn,
                 "intrusions": tally.intrusions.iter().map(|(at, train)| json!([at.as_s(), train.0]))
                     .collect::<Vec<Value>>(),
-                "mishaps": tally.incidents.iter().map(|incident| format!("{incident:?}")).collect::<Vec<_>>(),
+                "incidents": tally.incidents.iter().map(|incident| format!("{incident:?}")).collect::<Vec<_>>(),
         })
     };
     tallies.iter().map(one).collect()
@@ -126,7 +126,7 @@ fn row(output: &mut dyn Write, name: &str, tallies: &[&Tally]) -> io::Result<()>
         sum(|tally| incidents(tally, |kind| matches!(kind, IncidentKind::Overrun))),
         sum(|tally| tally.intrusions.len()),
         sum(|tally| tally.mistaken as usize),
-        sum(|tally| tally.beliefs as usize),
+        sum(|tally| tally.rests as usize),
         sum(|tally| tally.diverged as usize),
         sum(|tally| tally.dangers as usize),
         sum(|tally| tally.hands as usize),
@@ -134,7 +134,7 @@ fn row(output: &mut dyn Write, name: &str, tallies: &[&Tally]) -> io::Result<()>
     )
 }
 
-/// How many incidents are of a kind; every collision has two entries.
+/// The number of incidents of a kind; every collision has two entries.
 fn incidents(tally: &Tally, is: fn(IncidentKind) -> bool) -> usize {
     tally.incidents.iter().filter(|incident| is(incident.kind)).count()
 }

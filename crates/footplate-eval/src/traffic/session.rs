@@ -1,4 +1,4 @@
-//! Some hours of traffic on one simulated layout, watched by its truth.
+//! Some hours of traffic on one simulated layout, compared with its truth.
 
 use std::collections::BTreeMap;
 
@@ -13,27 +13,27 @@ use footplate_wire::LinkNotice;
 use crate::seeds::Choice;
 use crate::testbed::PreparedTrains;
 
-/// How often the truth is compared with what trains hold.
+/// The interval at which the truth is compared with reservations.
 const LOOK: TimeSpan = TimeSpan::from_ms(50);
-/// Rounding of places that are told in true lengths and in surveyed ones.
+/// Rounding between true and surveyed lengths.
 const ROUNDING: Length = Length::from_mm(1.0);
-/// What a person measured of the engines: the longer overhang and the pickup, rounded up to a centimetre.
+/// The longer overhang and the pickup of the engines, measured and rounded up to a centimetre.
 pub const LENGTHS: TrainLengths =
     TrainLengths { overhang: Length::from_mm(110.0), pickup: Length::from_mm(45.0) };
-/// How well a person reads off where a train stands.
+/// The standard deviation of a position that an operator reads off.
 pub const HAND: Length = Length::from_mm(12.0);
-/// No train should be further from where it is believed to stand, in standard deviations: one time in 15 000.
+/// The largest error of an estimated position at rest, in standard deviations: exceeded once in 15 000.
 const CERTAIN: f64 = 4.0;
-/// Who is so far from where it is believed to stand was counted from a contact that it passed the other way.
+/// A larger error is counted from a sensor that the train passed in the opposite direction.
 const FAR: Length = Length::from_mm(1_000.0);
-/// A person comes to the help of a lost train after this long.
+/// The time after which an operator helps a lost train.
 const HELP_AFTER: TimeSpan = TimeSpan::from_s(20.0);
-/// Where trains stand past a contact in the beginning.
+/// The distance of trains past a sensor at the start.
 const PAST: Length = Length::from_mm(150.0);
-/// Places tried for a train in the beginning.
+/// Places tried for a train at the start.
 const TRIES: usize = 1_000;
 
-/// What is asked of a session.
+/// The settings of a session.
 #[derive(Debug, Clone, Copy)]
 pub struct Asked {
     /// How many trains.
@@ -42,11 +42,11 @@ pub struct Asked {
     pub time: TimeSpan,
     /// Track time that the calibration of each train may take.
     pub budget: TimeSpan,
-    /// Whether the track between contacts is reserved as a whole.
+    /// Whether the track between sensors is reserved as a whole.
     pub by_blocks: bool,
 }
 
-/// What came of one.
+/// The counts of a session.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     /// The seed.
@@ -57,41 +57,41 @@ pub struct Tally {
     pub trains: usize,
     /// Destinations reached.
     pub arrivals: u32,
-    /// Destinations to which there is no way, and orders that were given up.
+    /// Destinations without a route, and orders that failed, by their reasons.
     pub refused: BTreeMap<String, u32>,
-    /// Grants that the driver could not run and that were taken back.
+    /// Routes that the driver refused and that were withdrawn, by their reasons.
     pub withdrawn: BTreeMap<String, u32>,
     /// Routes that were set, and reversals on them.
     pub routes: u32,
     /// Reversals on these routes.
     pub turns: usize,
-    /// Trains sent out of the way of others.
+    /// Trains that made room for others.
     pub aside: u32,
-    /// Trains at rest in each other's way.
+    /// Deadlocks.
     pub deadlocks: u32,
-    /// Trains that were elsewhere than they should be.
+    /// Trains found on another route.
     pub diverged: u32,
     /// Trains whose position became unknown.
     pub lost: u32,
     /// Times that the watchdog stopped a train because it did not run as it should.
     pub dangers: u32,
-    /// Interventions of a person.
+    /// Interventions of the operator.
     pub hands: u32,
-    /// Trains that touched, derailed or ran off the track.
+    /// Collisions, derailments and overruns.
     pub incidents: Vec<Incident>,
-    /// Times that a train came to be on track that it did not hold.
+    /// Times that a train entered track without a reservation.
     pub intrusions: Vec<(Timestamp, TrainId)>,
     /// How long trains waited for their routes, in s.
     pub waits: Vec<f64>,
     /// How long journeys took, in s.
     pub took: Vec<f64>,
-    /// The longest time that a train came nowhere, in s.
+    /// The longest time without an arrival of a train, in s.
     pub starved: f64,
-    /// Rests past a contact, and those at which a train was further from where it was believed than ever should be.
-    pub beliefs: u32,
-    /// Of these, those that were wrong.
+    /// Rests past a sensor at which the position was compared with the truth.
+    pub rests: u32,
+    /// Of these, those with too large an error.
     pub mistaken: u32,
-    /// Errors of arrivals as believed, in mm.
+    /// Estimated errors of arrivals, in mm.
     pub errors: Vec<f64>,
 }
 
@@ -104,12 +104,12 @@ pub struct Session<'l> {
     tally: Tally,
     trains: Vec<TrainId>,
     is_inside: BTreeMap<TrainId, bool>,
-    /// Since when each train has been on its way to nowhere.
+    /// When each train arrived last.
     since: BTreeMap<TrainId, Timestamp>,
     waits: BTreeMap<TrainId, Timestamp>,
-    /// Since when each train has needed a person.
+    /// When each train first needed an operator.
     needs_person: BTreeMap<TrainId, Timestamp>,
-    /// Since when something seems to move that no session drives.
+    /// When an unauthorised movement was first reported.
     warned: Option<Timestamp>,
     talk: bool,
 }
@@ -200,7 +200,7 @@ impl<'l> Session<'l> {
         for incident in self.tally.incidents.iter().filter(|_| self.talk) {
             eprintln!("{:9.2} {:?}", incident.at.as_s(), incident.kind);
         }
-        self.trains.iter().filter(|_| self.talk).for_each(|train| self.tell_truth(*train));
+        self.trains.iter().filter(|_| self.talk).for_each(|train| self.print_truth(*train));
         self.tally
     }
 
@@ -230,11 +230,11 @@ impl<'l> Session<'l> {
             }
             Notice::Withdrawn { train, why } => {
                 if self.talk {
-                    self.tell_truth(*train);
+                    self.print_truth(*train);
                 }
                 *self.tally.withdrawn.entry(kind_of(&format!("{why:?}"))).or_default() += 1;
             }
-            Notice::Done(finished) => self.check_belief(finished),
+            Notice::Done(finished) => self.check_position(finished),
             Notice::StepsAside { .. } => self.tally.aside += 1,
             Notice::Deadlock { .. } => self.tally.deadlocks += 1,
             Notice::Diverged { .. } => self.tally.diverged += 1,
@@ -275,7 +275,7 @@ impl<'l> Session<'l> {
         }
     }
 
-    /// Compares what trains are on with what they hold, and helps those that are lost.
+    /// Compares the track under trains with their reservations, and helps those that are lost.
     fn look(&mut self) {
         let now = self.prepared.line.now();
         if self.warned.is_some_and(|since| now - since >= HELP_AFTER) {
@@ -290,7 +290,7 @@ impl<'l> Session<'l> {
                 self.tally.intrusions.push((now, train));
                 if self.talk {
                     eprintln!("{:9.2} train {train} is on track that it does not hold", now.as_s());
-                    self.tell_truth(train);
+                    self.print_truth(train);
                 }
             }
             if self.needs_person.get(&train).is_some_and(|since| now - *since >= HELP_AFTER) {
@@ -302,19 +302,19 @@ impl<'l> Session<'l> {
         }
     }
 
-    /// Compares where a train stands with where it is believed to.
-    fn check_belief(&mut self, finished: &Finished) {
+    /// Compares the estimated position of a train at rest with the truth.
+    fn check_position(&mut self, finished: &Finished) {
         let truth = self.prepared.world().truth();
         let Some(achieved) = finished.achieved else { return };
         let sensor = self.layout.sensor_at(achieved.at.node);
         let Some(past) = sensor.and_then(|sensor| truth.past(finished.train, sensor)) else { return };
         let error = past - achieved.at.offset;
-        // Who has turned around since did not come from that contact.
+        // A train that has reversed since does not come from that sensor.
         if error.abs() > FAR {
             return;
         }
         let sigmas = error / achieved.uncertainty;
-        self.tally.beliefs += 1;
+        self.tally.rests += 1;
         if sigmas.abs() > CERTAIN {
             self.tally.mistaken += 1;
             if self.talk {
@@ -324,8 +324,8 @@ impl<'l> Session<'l> {
         }
     }
 
-    /// What a train and the turnouts really do, where that is not what is believed.
-    fn tell_truth(&self, train: TrainId) {
+    /// Prints the true and the estimated state of a train, and turnouts whose state is not the known one.
+    fn print_truth(&self, train: TrainId) {
         let (truth, driver) = (self.prepared.world().truth(), self.dispatcher.driver());
         let name = |edge| {
             let edge = self.layout.edge(edge)?;
@@ -335,22 +335,22 @@ impl<'l> Session<'l> {
             format!("{:.0} mm from {}", place.offset.as_mm(), name(place.edge).unwrap_or_default())
         };
         let really = truth.train(train).and_then(|train| train.position).map(place);
-        let believed = driver.position(train, self.prepared.line.now()).map(place);
+        let estimated = driver.position(train, self.prepared.line.now()).map(place);
         let journey = self.dispatcher.journey(train).map(|(_, journey)| self.layout.display(journey.target));
         let journey = journey.map(|to| to.to_string());
-        eprintln!("          {train} wants to {journey:?}, is really {really:?}, believed {believed:?}");
+        eprintln!("          {train} wants to {journey:?}, is really {really:?}, estimated {estimated:?}");
         let under = driver.turnouts_under(train, self.prepared.line.now()).into_iter();
         let under: Vec<_> = under.map(|turnout| (turnout.0, driver.turnouts().get(turnout))).collect();
         eprintln!("          on turnouts {under:?}");
         for (turnout, _) in self.layout.turnouts() {
             let (lies, known) = (self.prepared.world().lies(turnout), driver.turnouts().get(turnout));
             if lies != known {
-                eprintln!("          turnout {turnout} lies {lies:?}, believed {known:?}");
+                eprintln!("          turnout {turnout} lies {lies:?}, known as {known:?}");
             }
         }
     }
 
-    /// A person reads off where a train stands.
+    /// An operator reads off the position of a train.
     fn help(&mut self, train: TrainId, now: Timestamp) {
         self.needs_person.remove(&train);
         let Some(at) = place_by_hand(self.layout, self.prepared.world(), train) else { return };
@@ -359,7 +359,7 @@ impl<'l> Session<'l> {
     }
 }
 
-/// Whether all track that is really under a train is reserved for it.
+/// Whether all track under a train is truly reserved for it.
 #[must_use]
 pub fn is_on_reserved_track(
     layout: &Layout,
@@ -382,7 +382,7 @@ pub fn is_on_reserved_track(
     })
 }
 
-/// Where a person who looks at a train would say that it is, in lengths of the surveyed layout.
+/// The position that an operator would read off, in surveyed lengths.
 #[must_use]
 pub fn place_by_hand(layout: &Layout, world: &LivingLayout<'_>, train: TrainId) -> Option<PathPoint> {
     let truth = world.truth();

@@ -14,7 +14,7 @@ const HEAD: &str = "\
 # How well trains keep to speed restrictions
 
 Random simulated trains, three on a layout, each calibrated from nothing known over the bytes of a virtual 6051. For each of them two
-stretches of 25 cm and more of its way round are restricted to 170 to 280 mm/s, and it is told for two minutes each to run at a step
+stretches of 25 cm and more of its circuit are restricted to 170 to 280 mm/s, and it is commanded for two minutes each to run at a step
 (300 to 450 mm/s), to stop at one place after the other, to hold a speed (300 to 450 mm/s), to arrive at places in time, and to follow
 another train. The simulator shares no formula with what drives, and its truth is used for these figures alone.
 ";
@@ -23,7 +23,7 @@ const LEGEND: &str = "\
 A *passage* is from the front end's coming into a zone until the rear end has left it; it is *too fast* if the train was ever faster
 than the limit meanwhile (asked: no more than 1 % of them for the place and 1 % for the speed), and the *worst* is by how much. What it
 costs: the *mean* speed in the zone as part of the limit, and how far before the zone the train was *early* within the limit for the last
-time (median). *Way* is the way run in two minutes as part of that of the same train where nobody heeds zones.
+time (median). *Distance* is that run in two minutes as part of that of the same train on a layout without zones.
 ";
 
 /// All that was scored.
@@ -81,7 +81,7 @@ impl WrittenScores for Page<'_> {
         writeln!(output, "{LEGEND}")?;
         writeln!(
             output,
-            "| told to | rides | failed | passages | too fast | worst mm/s | worst % | mean of the limit | early mm | way |\n\
+            "| order | rides | failed | passages | too fast | worst mm/s | worst % | mean of the limit | early mm | distance |\n\
              | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
         )?;
         for task in Task::ALL {
@@ -118,11 +118,11 @@ impl WrittenScores for Page<'_> {
             let passages = ride.passages.iter().map(|passage| {
                 json!({
                     "limit_mm_s": passage.limit, "fastest_mm_s": passage.fastest, "seconds": passage.seconds,
-                    "way_mm": passage.distance, "early_mm": passage.early.is_finite().then_some(passage.early),
+                    "distance_mm": passage.distance, "early_mm": passage.early.is_finite().then_some(passage.early),
                 })
             });
             json!({
-                "seed": scored.seed, "train": ride.train.0, "told": ride.task.key(), "way_mm": ride.distance,
+                "seed": scored.seed, "train": ride.train.0, "order": ride.task.key(), "distance_mm": ride.distance,
                 "seconds": ride.seconds, "done": ride.done, "trouble": ride.trouble,
                 "passages": passages.collect::<Vec<_>>(),
             })

@@ -35,7 +35,7 @@ pub(super) struct Seen {
     pub(super) grants: u32,
     /// When the program was stuck without an alarm.
     pub(super) stuck: Option<Timestamp>,
-    pub(super) told: Vec<(Timestamp, String)>,
+    pub(super) notes: Vec<(Timestamp, String)>,
 }
 
 /// The operator of the railway in one life of the program.
@@ -98,7 +98,7 @@ impl<'p, 'l> People<'p, 'l> {
     }
 
     fn tell(&mut self, now: Timestamp, words: String) {
-        self.seen.told.push((now, words));
+        self.seen.notes.push((now, words));
     }
 
     fn alarm(&mut self, now: Timestamp, train: TrainId) {

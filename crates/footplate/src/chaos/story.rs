@@ -91,7 +91,7 @@ pub(crate) struct Fate {
     /// Violated invariants.
     pub(crate) failures: Vec<String>,
     /// The events of the story.
-    pub(crate) told: Vec<(Timestamp, String)>,
+    pub(crate) notes: Vec<(Timestamp, String)>,
 }
 
 /// Runs the story of a seed. `store` is the path of its store, which does not exist yet.
@@ -122,7 +122,7 @@ pub(crate) fn story(stage: &Stage<'_>, seed: u64, store: &Path) -> anyhow::Resul
         }
     }
     teller.fate.seconds = (teller.now() - began).as_s();
-    teller.fate.told.sort_by_key(|(at, _)| *at);
+    teller.fate.notes.sort_by_key(|(at, _)| *at);
     Ok(teller.fate)
 }
 
@@ -214,7 +214,7 @@ impl<'l> Teller<'_, 'l> {
 
     fn note(&mut self, words: String) {
         let now = self.now();
-        self.fate.told.push((now, words));
+        self.fate.notes.push((now, words));
     }
 
     /// Notes the steps that decoders received last, and the leading ends of trains.
@@ -315,7 +315,7 @@ impl<'l> Teller<'_, 'l> {
         drop(people);
         drop(recorder);
         let disk = Rc::into_inner(disk).context("a disk that is still in use")?.into_inner();
-        self.fate.told.append(&mut line.told);
+        self.fate.notes.append(&mut line.notes);
         self.count(seen);
         let ended = match ended {
             Ok(Ended::Finished) => "finished".to_owned(),
@@ -333,7 +333,7 @@ impl<'l> Teller<'_, 'l> {
     }
 
     fn count(&mut self, mut seen: Seen) {
-        self.fate.told.append(&mut seen.told);
+        self.fate.notes.append(&mut seen.notes);
         self.fate.arrivals += seen.arrivals;
         self.fate.alarms += seen.alarms;
         self.fate.grants += seen.grants;
@@ -412,7 +412,7 @@ impl<'l> Teller<'_, 'l> {
             since = self.now();
         }
         let is_said = carry_out(line, &will);
-        self.fate.told.append(&mut line.told);
+        self.fate.notes.append(&mut line.notes);
         match line.stopped_at {
             Some(at) => {
                 let took = (at - since).max(TimeSpan::ZERO);

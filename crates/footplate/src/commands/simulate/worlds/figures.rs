@@ -64,7 +64,7 @@ impl Figures {
             "sessions": self.sessions, "sessions_below_85_pct": self.below, "worst_session": worst,
             "error_median_mm": self.errors[0], "error_p95_mm": self.errors[1], "bias_mm": self.bias,
             "width_kept_mm": self.widths[0], "width_broken_mm": self.widths[1],
-            "failed": self.failed, "mishaps": self.incidents,
+            "failed": self.failed, "incidents": self.incidents,
         })
     }
 }

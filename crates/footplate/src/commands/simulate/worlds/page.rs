@@ -123,7 +123,7 @@ fn world_json(world: &ScoredWorld) -> Value {
     let per_stop = 1e3 * world.taken.as_secs_f64() / world.stops.len().max(1) as f64;
     json!({
         "world": world.name.to_string(), "seed": world.seed, "calibration_s": world.calibration_s,
-        "ending": world.ending, "mishaps": world.incidents, "sessions_warned": world.sessions_warned, "failures": world.failures,
+        "ending": world.ending, "incidents": world.incidents, "sessions_warned": world.sessions_warned, "failures": world.failures,
         "computing_ms_per_stop": per_stop, "computing_ms_longest": 1e3 * world.longest.as_secs_f64(), "stops": stops,
     })
 }

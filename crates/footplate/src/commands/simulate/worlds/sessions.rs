@@ -215,7 +215,7 @@ impl Driven<'_, '_> {
         }
     }
 
-    /// A person does what is said to one: lets the train stand, and then run over a contact.
+    /// Does what the program asks an operator to do: stops the train, and then runs it over a sensor.
     fn seek(&mut self, machine: &mut Timed) {
         self.say(machine, &format!("speed {TRAIN} 0"));
         self.until_at_rest(machine);
