@@ -59,8 +59,13 @@ pub struct Scored {
 }
 
 impl Scored {
-    /// The trains that Footplate drove and whose order failed, and why.
-    pub fn troubles(&self) -> impl Iterator<Item = (TrainId, &str)> {
+    /// The first train that Footplate drove and whose order failed, and why.
+    #[must_use]
+    pub fn failures(&self) -> Vec<String> {
+        self.troubles().take(1).map(|(train, trouble)| format!("train {train}: {trouble}")).collect()
+    }
+
+    fn troubles(&self) -> impl Iterator<Item = (TrainId, &str)> {
         let held = self.held.iter().map(|held| (held.by, held.train, &held.trouble));
         let arrived = self.arrived.iter().map(|arrived| (arrived.by, arrived.train, &arrived.trouble));
         let followed = self.followed.iter().map(|run| (run.by, run.train, &run.trouble));

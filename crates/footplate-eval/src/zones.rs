@@ -32,8 +32,9 @@ pub struct Scored {
 impl Scored {
     /// The first train that did not carry out its order, and why.
     #[must_use]
-    pub fn trouble(&self) -> Option<(TrainId, &str)> {
-        self.rides.iter().find_map(|ride| Some((ride.train, ride.trouble.as_deref()?)))
+    pub fn failures(&self) -> Vec<String> {
+        let failed = |ride: &Ridden| Some(format!("train {}: {}", ride.train, ride.trouble.as_deref()?));
+        self.rides.iter().find_map(failed).into_iter().collect()
     }
 }
 

@@ -7,8 +7,9 @@ use serde_json::{Value, json};
 use super::Scored;
 use super::association::AssociationCounts;
 use super::disturbed_run::Outcomes;
-use super::figures::{Figures, both};
+use super::figures::Figures;
 use super::kind::Kind;
+use crate::figures::{median_and_high, shown_pair};
 use crate::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
@@ -28,14 +29,14 @@ their track.
 ";
 
 /// The content of the page.
-pub struct Page<'r> {
+pub struct Page {
     /// The results of all seeds.
-    pub scored: &'r [Scored],
+    pub scored: Vec<Scored>,
     /// The arguments of the command line.
     pub asked: String,
 }
 
-impl WrittenScores for Page<'_> {
+impl WrittenScores for Page {
     const SCORER: &'static str = "disasters";
 
     fn head(&self) -> String {
@@ -58,16 +59,16 @@ impl WrittenScores for Page<'_> {
                 figures.kind.description(),
                 figures.runs,
                 figures.noticed.len(),
-                shown(both(figures.noticed.iter().map(|[seconds, _]| *seconds))),
-                shown(both(figures.noticed.iter().map(|[_, mm]| *mm))),
+                shown_pair(median_and_high(figures.noticed.iter().map(|[seconds, _]| *seconds))),
+                shown_pair(median_and_high(figures.noticed.iter().map(|[_, mm]| *mm))),
                 figures.recovered.len(),
-                shown(both(figures.recovered.iter().copied())),
+                shown_pair(median_and_high(figures.recovered.iter().copied())),
                 figures.needed_operator,
                 figures.powered_off,
                 figures.before.len(),
-                shown(both(figures.before.iter().copied())),
+                shown_pair(median_and_high(figures.before.iter().copied())),
                 figures.after.len(),
-                shown(both(figures.after.iter().copied())),
+                shown_pair(median_and_high(figures.after.iter().copied())),
                 figures.faults,
             )?;
         }
@@ -79,8 +80,8 @@ impl WrittenScores for Page<'_> {
         )?;
         writeln!(
             output,
-            "| trains running | detections of them | associated with the right one | with another | with none | closed by \
-             themselves | of these laid to a train |\n| ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
+            "| trains running | detections of them | associated with the right one | with another | with none | spurious | of these \
+             associated |\n| ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
         )?;
         for (trains, counted) in self.associations() {
             let AssociationCounts { right, wrong, rejected, taken, spurious } = counted;
@@ -140,7 +141,7 @@ impl WrittenScores for Page<'_> {
     }
 }
 
-impl Page<'_> {
+impl Page {
     fn runs(&self, kind: Kind) -> Vec<&Outcomes> {
         self.scored
             .iter()
@@ -170,10 +171,6 @@ impl Page<'_> {
         }
         sums
     }
-}
-
-fn shown(of: Option<[f64; 2]>) -> String {
-    of.map_or_else(|| "–".to_owned(), |[middle, high]| format!("{middle:.1} / {high:.1}"))
 }
 
 fn share(of: usize, all: usize) -> String {

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::figures::{Driven, Figures, ScoredTrain};
 use super::trial::{NOT_BEYOND_PERCENT, Results};
-use crate::figures::{binomial_interval, quantile};
+use crate::figures::{binomial_interval, quantile, shown_pair};
 use crate::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
@@ -133,10 +133,10 @@ impl Page<'_> {
                     law.map_or("all", LawFamily::name),
                     by.key(),
                     figures.stops[0],
-                    both(figures.mid),
+                    shown_pair(figures.mid),
                     figures.stops[1],
-                    both(figures.top),
-                    both(figures.moves),
+                    shown_pair(figures.top),
+                    shown_pair(figures.moves),
                     share(good, moves),
                 )?;
             }
@@ -206,10 +206,6 @@ impl Page<'_> {
         writeln!(output, "Orders not carried out: {}.", counted(|figures| figures.failed as usize))?;
         writeln!(output, "Trains that came to grief: {}.", counted(|figures| figures.faults))
     }
-}
-
-fn both(of: Option<[f64; 2]>) -> String {
-    of.map_or_else(none, |[middle, high]| format!("{middle:.1} / {high:.1}"))
 }
 
 fn share(of: usize, all: usize) -> String {

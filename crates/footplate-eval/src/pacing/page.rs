@@ -73,14 +73,14 @@ const ARRIVES_WITHIN: [f64; 2] = [0.3, 25.0];
 const MINUTES: [(&str, Range<f64>); 2] = [("first", 0.0..60.0), ("second", 60.0..f64::INFINITY)];
 
 /// All that was scored.
-pub struct Page<'r> {
+pub struct Page {
     /// What every seed came to.
-    pub scored: &'r [Scored],
+    pub scored: Vec<Scored>,
     /// What was asked for, as on the command line.
     pub asked: String,
 }
 
-impl WrittenScores for Page<'_> {
+impl WrittenScores for Page {
     const SCORER: &'static str = "pacing";
 
     fn head(&self) -> String {
@@ -174,7 +174,7 @@ impl WrittenScores for Page<'_> {
     }
 }
 
-impl Page<'_> {
+impl Page {
     fn write_followed(&self, output: &mut dyn Write) -> io::Result<()> {
         for (kept, unit, off_in) in [(Kept::Time, "s", "ms"), (Kept::Length, "mm", "mm")] {
             writeln!(

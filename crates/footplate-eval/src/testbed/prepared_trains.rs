@@ -200,7 +200,7 @@ mod tests {
             let located = driver.locate(train, prepared.line.now()).expect("placed");
             assert_eq!(located.at.node, node);
             let sensor = layout.sensor_at(node).expect("a sensor");
-            let past = prepared.world().truth().path_length_past(train, sensor).expect("near");
+            let past = prepared.world().truth().past(train, sensor).expect("near");
             assert!((past - located.at.distance).abs() < Length::from_mm(30.0), "{past:?}");
             assert!(driver.is_at_rest(train, prepared.line.now()));
         }

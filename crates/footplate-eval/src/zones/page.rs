@@ -27,9 +27,9 @@ time (median). *Distance* is that run in two minutes as part of that of the same
 ";
 
 /// All that was scored.
-pub struct Page<'r> {
+pub struct Page {
     /// What every seed came to.
-    pub scored: &'r [Scored],
+    pub scored: Vec<Scored>,
     /// What was asked for, as on the command line.
     pub asked: String,
 }
@@ -70,7 +70,7 @@ impl Figures {
     }
 }
 
-impl WrittenScores for Page<'_> {
+impl WrittenScores for Page {
     const SCORER: &'static str = "zones";
 
     fn head(&self) -> String {
@@ -143,7 +143,7 @@ impl WrittenScores for Page<'_> {
     }
 }
 
-impl Page<'_> {
+impl Page {
     fn rides(&self, task: Task) -> impl Iterator<Item = &Ridden> {
         self.scored.iter().flat_map(|scored| &scored.rides).filter(move |ride| ride.task == task)
     }

@@ -150,7 +150,7 @@ impl<'w, 'l> Truth<'w, 'l> {
         let passed = passed.filter(|pass| pass.odometer_mm >= found.put_down_at);
         let since = passed.map(|pass| found.odometer - pass.odometer_mm).filter(|mm| *mm < FAR_MM);
         // Past its usual place, and it has not closed yet this time.
-        let just_past = self.closes_at(sensor).and_then(|usual| self.path_length_between(0.0, usual, place));
+        let just_past = self.closes_at(sensor).and_then(|usual| self.distance_between(usual, place));
         let is_due = |mm: &f64| *mm < CLOSES_WITHIN_MM && since.is_none_or(|since| since > CLOSES_WITHIN_MM);
         let since = just_past.filter(is_due).or(since);
         let is_entry = self.world.layout().block_of_entry(sensor).is_some();
@@ -184,18 +184,6 @@ impl<'w, 'l> Truth<'w, 'l> {
         Some(length - offset(from, edges.first()) + offset(to, edges.last()))
     }
 
-    /// The same as [`past`](Self::past) as a path length; only up to 5 m.
-    #[must_use]
-    pub fn path_length_past(&self, train: TrainId, sensor: SensorId) -> Option<Length> {
-        let found = self.found(train)?;
-        let place = found.body.as_ref()?.place()?;
-        let closes = self.closes_at(sensor)?;
-        let sensitivity = found.train.curve_sensitivity;
-        let past = self.path_length_between(sensitivity, closes, place);
-        let short = || self.path_length_between(sensitivity, place, closes).map(|mm| -mm);
-        past.or_else(short).map(Length::from_mm)
-    }
-
     /// Where a sensor closes on average.
     fn closes_at(&self, sensor: SensorId) -> Option<(EdgeId, f64)> {
         let layout = self.world.layout();
@@ -205,18 +193,17 @@ impl<'w, 'l> Truth<'w, 'l> {
         })
     }
 
-    /// The path length from one place to another ahead as the turnouts lie, for a train with a curve sensitivity, in mm.
-    fn path_length_between(&self, sensitivity: f64, from: (EdgeId, f64), to: (EdgeId, f64)) -> Option<f64> {
+    /// The true distance from one place to another ahead as the turnouts lie, in mm.
+    fn distance_between(&self, from: (EdgeId, f64), to: (EdgeId, f64)) -> Option<f64> {
         let rails = &self.world.rails;
         let lies = |turnout| self.world.points.lies(turnout);
         let (mut edge, mut begins, mut length) = (from.0, from.1, 0.0);
         while length < NEAR_MM {
             let rail = rails.rail(edge)?;
-            let slower = 1.0 + sensitivity * (rail.factor - 1.0);
             if edge == to.0 && begins <= to.1 {
-                return Some(length + (to.1 - begins) / slower);
+                return Some(length + (to.1 - begins));
             }
-            length += ((rail.length_mm - begins) / slower).max(f64::MIN_POSITIVE);
+            length += (rail.length_mm - begins).max(f64::MIN_POSITIVE);
             (edge, begins) = (after(rails, &lies, edge)?, 0.0);
         }
         None

@@ -13,10 +13,7 @@ use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_eval::seeds::Choice;
 use footplate_eval::testbed::PreparedTrains;
 use footplate_eval::traffic::{HAND, LENGTHS, place_by_hand};
-use footplate_sim::{
-    BoardSwitches, CanSwitches, LivingLayout, LivingSwitches, LocoNetSwitches, StationSwitches, VirtualBoard,
-    VirtualCentralStation, VirtualLocoNet, VirtualStation, VirtualZ21, Z21Switches,
-};
+use footplate_sim::{LivingLayout, LivingSwitches, StationSwitches};
 use footplate_store::Store;
 
 use super::disk::FaultyDisk;
@@ -25,7 +22,7 @@ use super::line::{FaultyLine, LATE, SharedStation};
 use super::people::{People, Seen, SharedDisk};
 use super::plan::{Plan, PlannedLife};
 use crate::commands::stop_all;
-use crate::link::{Address, Link, SimulatedStation, StationKind, StationSession, open_session};
+use crate::link::{Address, Link, Quirks, SimulatedStation, StationSession, open_session};
 use crate::runtime::{Ended, Runtime, carry_out};
 
 /// Trains of every story.
@@ -105,16 +102,20 @@ pub(crate) fn story(stage: &Stage<'_>, seed: u64, store: &Path) -> anyhow::Resul
     put_trains(stage, &mut world, &mut choice)?;
     let mut teller = Teller {
         stage,
-        address: format!("sim:track-a?station={}", name_of(plan.station))
-            .parse()
-            .map_err(anyhow::Error::msg)?,
-        station: Rc::new(RefCell::new(station_of(plan.station, world, stage.number))),
+        address: format!("sim:track-a?station={}", plan.station.key()).parse().map_err(anyhow::Error::msg)?,
+        station: Rc::new(RefCell::new(SimulatedStation::new(
+            plan.station,
+            world,
+            stage.number,
+            StationSwitches::default(),
+            Quirks::default(),
+        ))),
         store,
         choice,
         fate: Fate { seed, ..Fate::default() },
     };
     let began = teller.now();
-    teller.note(format!("a {}", name_of(plan.station)));
+    teller.note(format!("a {}", plan.station.key()));
     for life in &plan.lives {
         teller.live(life)?;
         if !teller.fate.failures.is_empty() {
@@ -124,26 +125,6 @@ pub(crate) fn story(stage: &Stage<'_>, seed: u64, store: &Path) -> anyhow::Resul
     teller.fate.seconds = (teller.now() - began).as_s();
     teller.fate.notes.sort_by_key(|(at, _)| *at);
     Ok(teller.fate)
-}
-
-const fn name_of(kind: StationKind) -> &'static str {
-    match kind {
-        StationKind::Marklin => "marklin",
-        StationKind::DccEx => "dcc-ex",
-        StationKind::Z21 => "z21",
-        StationKind::MarklinCan => "marklin-can",
-        StationKind::LocoNet => "loconet",
-    }
-}
-
-fn station_of(kind: StationKind, world: LivingLayout<'_>, seed: u64) -> SimulatedStation<'_> {
-    match kind {
-        StationKind::Marklin => VirtualStation::new(world, seed, StationSwitches::default()).into(),
-        StationKind::DccEx => VirtualBoard::new(world, seed, BoardSwitches::default()).into(),
-        StationKind::Z21 => VirtualZ21::new(world, seed, Z21Switches::default()).into(),
-        StationKind::MarklinCan => VirtualCentralStation::new(world, seed, CanSwitches::default()).into(),
-        StationKind::LocoNet => VirtualLocoNet::new(world, seed, LocoNetSwitches::default()).into(),
-    }
 }
 
 /// Places trains on reservations that do not overlap, clear of turnouts.
