@@ -1,6 +1,6 @@
 //! The virtual DCC-EX board: a living layout behind the texts that an EX-CommandStation exchanges.
 //!
-//! What comes in is read with the codec that the program writes with; when things come and go is decided here, by what was
+//! The codec is that of the program; the times are the simulation's own, by what was
 //! measured on the real firmware. Directions are absolute, the decoders know 14 speed steps, sensors report by themselves.
 //! It does not watch its clients: trains run on when they are gone.
 
@@ -22,24 +22,24 @@ use crate::living::due_queue::DueQueue;
 use crate::living::s88::Edge;
 use crate::living::world::LivingLayout;
 
-/// What it says of itself.
+/// Its identity.
 const IDENTITY: &str = "DCC-EX V-5.6.0 / SIMULATED / FOOTPLATE G-virtual";
 /// One byte on a serial line of 115200 baud: ten bits.
 const BYTE_TIME: TimeSpan = TimeSpan::from_ns(10 * 1_000_000_000 / 115_200);
-/// What the input buffer holds.
+/// The size of the input buffer, in bytes.
 const BUFFER: usize = 64;
-/// How long the board is busy with one request (chosen so that about half of 100 requests that are written without a pause
+/// The time that the board needs for one request (chosen so that about half of 100 requests that are written without a pause
 /// are answered: on the firmware 54 were).
 const BUSY: TimeSpan = TimeSpan::from_us(1_400);
-/// The shape of the time to an answer between its limits: with u^1.6, half of the answers come within 3.4 ms, as measured.
+/// The exponent of the distribution of the answer time between its limits: with u^1.6, half of the answers come within 3.4 ms, as measured.
 const ANSWER_SHAPE: f64 = 1.6;
-/// From a reset until the board says what it is (2 to 6 s are reported).
+/// The time from a reset to the identity (2 to 6 s are reported).
 const BOOT: TimeSpan = TimeSpan::from_ms(2_000);
-/// From one line to the next when each arrives by itself: what 15 characters take at 115200 baud, and a little.
+/// The time between two lines that arrive separately: a little more than 15 characters take at 115200 baud.
 const LINE_TIME: TimeSpan = TimeSpan::from_us(1_500);
-/// The world goes on in such steps, so that no sensor is seen later than its message is due: less than the shortest delay.
+/// The longest step of the world: less than the shortest delay of a report.
 const LOOK_EVERY: TimeSpan = TimeSpan::from_ms(3);
-/// What is printed between replies when it chatters.
+/// Diagnostic texts between replies.
 const CHATTER: [&str; 3] = [
     "<* LCD1: Free RAM= 5538b\n(largest <block> 5500b) *>\n",
     "<@ 0 3 \"Ready\">\n",
@@ -65,21 +65,21 @@ pub struct VirtualBoard<'l> {
     /// Bytes on the line from the host.
     incoming: VecDeque<(Timestamp, u8)>,
     host_is_free: Timestamp,
-    /// Bytes that wait to be read, and when the board reads again.
+    /// Bytes that have not been read, and when the board reads again.
     buffer: VecDeque<u8>,
     busy_until: Timestamp,
     framing: Framing,
-    /// Replies and messages of sensors that are still to be said.
+    /// Replies and reports of sensors that have not been sent.
     replies: VecDeque<(Timestamp, String)>,
     pushes: DueQueue<(SensorId, bool)>,
     outgoing: Outgoing,
     slots: Vec<Slot>,
     turnouts: Vec<(TurnoutId, bool)>,
-    /// Until when it is without power or starting.
+    /// The end of a power cut or a start.
     dark_until: Option<Timestamp>,
 }
 
-/// What happens next.
+/// An occurrence in the station or on its line.
 #[derive(Debug, Clone, Copy)]
 enum Next {
     Incoming,
@@ -142,8 +142,8 @@ impl<'l> VirtualBoard<'l> {
         &mut self.world
     }
 
-    /// Somebody presses its reset button, or opens its serial port: the track loses power, and for some seconds nothing is
-    /// read. Then it says what it is, if it does, and knows no locomotive.
+    /// The operator presses its reset button, or opens its serial port: the track loses power, and the board reads nothing for
+    /// some seconds. Then it sends its identity, if it has a banner, and has forgotten all locomotives.
     pub fn restart(&mut self) {
         let now = self.now;
         self.world.power(false, now);
@@ -166,7 +166,7 @@ impl<'l> VirtualBoard<'l> {
         }
     }
 
-    /// Goes on until a time, or until something reaches the host before it: the bytes of one portion.
+    /// Advances to a time, or until something reaches the host before it: the bytes of one portion.
     pub fn advance(&mut self, until: Timestamp) -> Option<Vec<u8>> {
         loop {
             let next = self.next().filter(|(at, _)| *at <= until);
@@ -190,7 +190,7 @@ impl<'l> VirtualBoard<'l> {
         }
     }
 
-    /// What happens next, and when; of things at one time the first in the order of this list.
+    /// The next occurrence and its time; of simultaneous ones, the first of this list.
     fn next(&self) -> Option<(Timestamp, Next)> {
         let reads = (!self.buffer.is_empty() && self.dark_until.is_none()).then_some(self.busy_until);
         let coming = [
@@ -266,7 +266,7 @@ impl<'l> VirtualBoard<'l> {
         }
     }
 
-    /// Reads what waits until a request is complete, and does it.
+    /// Reads bytes until a request is complete, and executes it.
     fn read(&mut self) {
         let at = self.busy_until.max(self.now);
         while let Some(byte) = self.buffer.pop_front() {
@@ -303,7 +303,7 @@ impl<'l> VirtualBoard<'l> {
     }
 }
 
-/// A message as it is printed: a line.
+/// The line of a message.
 fn line(reply: &Reply) -> String {
     format!("{reply}\n")
 }

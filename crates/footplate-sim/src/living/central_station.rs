@@ -1,6 +1,6 @@
 //! The virtual Central Station: a living layout behind the frames of Märklin's CAN bus, over datagrams, a stream or a serial adapter.
 //!
-//! What comes in is read with the codec that the program writes with; when things come and go is decided here. All inputs are
+//! The codec is that of the program; the times are the simulation's own. All inputs are
 //! loaded into the S88 bus at once, a cycle apart, and remembered until then; one after the other is shifted out and reported.
 //! Directions are absolute, the decoders know 14 speed steps. It does not watch its clients: trains run on when they are gone.
 
@@ -23,22 +23,22 @@ use crate::living::world::LivingLayout;
 
 /// A frame with eight bytes on the bus: about 130 bits at 250 kbit/s.
 const FRAME_TIME: TimeSpan = TimeSpan::from_us(520);
-/// What the station needs for an answer (s; chosen: stations answer within some milliseconds).
+/// The answer time (s; chosen: stations answer within some milliseconds).
 const ANSWER_S: std::ops::Range<f64> = 0.001..0.006;
-/// What bytes of a stream or of an adapter take (s; chosen).
+/// The transit time of bytes in a stream or an adapter (s; chosen).
 const LINE_S: std::ops::Range<f64> = 0.000_2..0.001_5;
-/// The second part of a frame that is cut comes so much later (s; chosen).
+/// The delay of the second part of a split frame (s; chosen).
 const SPLIT_S: std::ops::Range<f64> = 0.000_5..0.005;
-/// How often the station asks who is there.
+/// The interval of pings.
 const PING_EVERY: TimeSpan = TimeSpan::from_ms(10_000);
-/// From power on until it answers (chosen: a box, not the half minute of a screen).
+/// The time from power on to the first answer (chosen: a box, not the half minute of a screen).
 const BOOT: TimeSpan = TimeSpan::from_ms(4_000);
 /// The hash of its frames, seen on a real track box; the published formula does not yield it.
 const HASH: u16 = 0x9346;
-/// Clients that datagrams are sent to at most; more than any layout has.
+/// The most clients; more than any layout has.
 const MOST_CLIENTS: usize = 64;
 
-/// A locomotive that was ever spoken of.
+/// A locomotive that was in any message.
 #[derive(Debug, Clone, Copy)]
 struct Slot {
     uid: Uid,
@@ -66,11 +66,11 @@ pub struct VirtualCentralStation<'l> {
     slots: Vec<Slot>,
     scanning: Scanning,
     ping_due: Timestamp,
-    /// Until when it is starting.
+    /// The end of its start.
     dark_until: Option<Timestamp>,
 }
 
-/// What happens next.
+/// An occurrence in the station or on its line.
 #[derive(Debug, Clone, Copy)]
 enum Next {
     Datagram,
@@ -142,8 +142,7 @@ impl<'l> VirtualCentralStation<'l> {
         self.switches.transport
     }
 
-    /// It is switched off and on: the track loses power, and for some seconds nothing is read. Then it knows no locomotive's
-    /// speed.
+    /// It is switched off and on: the track loses power, and it reads nothing for some seconds. Then all speeds are 0.
     pub fn restart(&mut self) {
         let now = self.now;
         self.world.power(false, now);
@@ -186,7 +185,7 @@ impl<'l> VirtualCentralStation<'l> {
         }
     }
 
-    /// Goes on until a time, or until bytes reach a client before it.
+    /// Advances to a time, or until bytes reach a client before it.
     pub fn advance(&mut self, until: Timestamp) -> Option<(usize, Vec<u8>)> {
         loop {
             let next = self.next().filter(|(at, _)| *at <= until);
@@ -201,7 +200,7 @@ impl<'l> VirtualCentralStation<'l> {
         }
     }
 
-    /// What happens next, and when; of things at one time the first in the order of this list.
+    /// The next occurrence and its time; of simultaneous ones, the first of this list.
     fn next(&self) -> Option<(Timestamp, Next)> {
         let coming = [
             (self.network.next_to_station(), Next::Datagram),
@@ -252,20 +251,20 @@ impl<'l> VirtualCentralStation<'l> {
         }
     }
 
-    /// A frame has come whole from the host of a stream or an adapter.
+    /// A frame from the host of a stream or an adapter is complete.
     fn take_in(&mut self, frame: Frame) {
         let due = self.now + TimeSpan::from_s(self.draws.uniform(LINE_S));
         let due = self.incoming.back().map_or(due, |(last, _)| due.max(*last));
         self.incoming.push_back((due, frame));
     }
 
-    /// Says something in a while.
+    /// Sends a message after the answer time.
     fn say(&mut self, message: Message) {
         let due = self.now + TimeSpan::from_s(self.draws.uniform(ANSWER_S));
         self.post(due, message, true);
     }
 
-    /// Puts a frame on the bus, behind those that are on it.
+    /// Sends a frame on the bus, after those before it.
     fn post(&mut self, due: Timestamp, message: Message, is_response: bool) {
         let leaves = self.bus_is_free.max(due) + FRAME_TIME;
         self.bus_is_free = leaves;
@@ -284,7 +283,7 @@ impl<'l> VirtualCentralStation<'l> {
         }
     }
 
-    /// Bytes leave for the host of a stream or an adapter; what left before arrives before.
+    /// Sends bytes to the host of a stream or an adapter, in order.
     fn put_out(&mut self, leaves: Timestamp, mut bytes: Vec<u8>) {
         let due = leaves + TimeSpan::from_s(self.draws.uniform(LINE_S));
         let mut due = self.outgoing.back().map_or(due, |(last, _)| due.max(*last));

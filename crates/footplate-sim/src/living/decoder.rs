@@ -4,12 +4,12 @@ use footplate_core::{DecoderSteps, SpeedStep, Timestamp, TrainId};
 
 use crate::living::world::LivingLayout;
 
-/// What a station carries to a decoder.
+/// A speed command on the track.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum DecoderSpeed {
-    /// A step of so many; 0 stops as the decoder brakes.
+    /// A step of `highest` steps; 0 stops with the braking of the decoder.
     Step { step: u8, highest: u8 },
-    /// It stops at once.
+    /// An immediate stop.
     EmergencyStop,
 }
 
@@ -20,7 +20,7 @@ impl LivingLayout<'_> {
         engine.map_or(DecoderSteps::Fourteen, |engine| DecoderSteps::with(engine.speeds.highest()))
     }
 
-    /// The track carries a locomotive's direction and speed.
+    /// Sends direction and speed to a locomotive over the track.
     pub(crate) fn carry(&mut self, train: TrainId, forward: bool, speed: DecoderSpeed, at: Timestamp) {
         if self.runs_forward(train) == Some(!forward) {
             self.reverse(train, at);
@@ -36,7 +36,7 @@ impl LivingLayout<'_> {
     }
 }
 
-/// The step of a decoder, of `own` steps, that is nearest to one of so many; none but 0 stops.
+/// The step of a decoder with `own` steps that is nearest to a step of `highest`; only 0 gives 0.
 fn nearest(step: u8, highest: u8, own: u8) -> SpeedStep {
     if step == 0 {
         return SpeedStep::STAND;

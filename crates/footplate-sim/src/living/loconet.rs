@@ -16,37 +16,37 @@ use crate::living::delivery::{Delivery, Outgoing};
 use crate::living::s88::Edge;
 use crate::living::world::LivingLayout;
 
-/// What the server says of itself.
+/// The version of the server.
 const VERSION: &str = "LbServer (simulated by Footplate)";
-/// What a line takes through the network (s; chosen: a wired one).
+/// The transit time of a line through the network (s; chosen: a wired one).
 const NETWORK_S: std::ops::Range<f64> = 0.000_2..0.001;
-/// The silence before a message and what a sender waits more by its priority (s; 1.2 ms and up to 1.5 ms).
+/// The silence before a message, with the additional wait by priority (s; 1.2 ms and up to 1.5 ms).
 const SILENCE_S: std::ops::Range<f64> = 0.001_2..0.002_7;
-/// What the station needs to answer (s; chosen).
+/// The answer time (s; chosen).
 const ANSWER_S: std::ops::Range<f64> = 0.001..0.008;
-/// From a sensor being occupied until its detector reports (s; chosen: a scan of its inputs).
+/// The time from occupancy to the report of the detector (s; chosen: a scan of its inputs).
 const DETECTION_S: std::ops::Range<f64> = 0.0..0.02;
-/// A slot whose locomotive is not commanded for so long is given away.
+/// The time without commands after which a slot is given away.
 const PURGED_AFTER: TimeSpan = TimeSpan::from_ms(200_000);
-/// How often the station looks for such slots.
+/// The interval of the search for such slots.
 const PURGES_EVERY: TimeSpan = TimeSpan::from_ms(1_000);
-/// From a reset until it hears again.
+/// The time from a reset until it receives messages.
 const BOOT: TimeSpan = TimeSpan::from_ms(2_000);
-/// The world goes on in such steps, so that no sensor is seen later than its report is due.
+/// The longest step of the world, so that no report is late.
 const LOOK_EVERY: TimeSpan = TimeSpan::from_ms(1);
 
-/// How the station and its server behave, each as it was seen of real ones or reported of them.
+/// The properties of the station and its server, as observed on real ones or reported of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocoNetSwitches {
-    /// Whether the server says what it is when somebody connects.
+    /// Whether the server sends its version to a new client.
     pub has_version: bool,
     /// Whether the server repeats what a client sends, as a message that it has received.
     pub echoes: bool,
-    /// How often a message of the host does not come to the bus, of which the server reports.
+    /// How often a message of the host fails to reach the bus, which the server reports.
     pub refused: Ratio,
-    /// How many slots there are.
+    /// The number of slots.
     pub slots: u8,
-    /// How lines are cut.
+    /// The portions in which lines arrive.
     pub delivery: Delivery,
 }
 
@@ -63,7 +63,7 @@ struct Slot {
     commanded: Timestamp,
 }
 
-/// Who puts a message on the bus.
+/// The sender of a message on the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sender {
     Host,
@@ -97,12 +97,12 @@ pub struct VirtualLocoNet<'l> {
     slots: Vec<Slot>,
     /// All locomotives were stopped, and the power was not switched since.
     is_stopped: bool,
-    /// Until when it is without power or starting.
+    /// The end of a power cut or a start.
     dark_until: Option<Timestamp>,
     purges: Timestamp,
 }
 
-/// What happens next.
+/// An occurrence in the station or on its line.
 #[derive(Debug, Clone, Copy)]
 enum Next {
     Incoming,
@@ -184,7 +184,7 @@ impl<'l> VirtualLocoNet<'l> {
         self.incoming.push_back((arrives.max(last), bytes.to_vec()));
     }
 
-    /// Goes on until a time, or until something reaches the host before it: the bytes of one portion.
+    /// Advances to a time, or until something reaches the host before it: the bytes of one portion.
     pub fn advance(&mut self, until: Timestamp) -> Option<Vec<u8>> {
         loop {
             let next = self.next().filter(|(at, _)| *at <= until);
@@ -204,7 +204,7 @@ impl<'l> VirtualLocoNet<'l> {
         }
     }
 
-    /// What happens next, and when; of things at one time the first in the order of this list.
+    /// The next occurrence and its time; of simultaneous ones, the first of this list.
     fn next(&self) -> Option<(Timestamp, Next)> {
         let first = self.waiting.iter().enumerate().min_by_key(|(_, waiting)| waiting.ready);
         let begins = first.filter(|_| self.on_bus.is_none());
@@ -258,7 +258,7 @@ impl<'l> VirtualLocoNet<'l> {
         }
     }
 
-    /// A message has passed on the bus: the server says so, and the station hears it.
+    /// A message has passed on the bus: the server reports it, and the station executes it.
     fn passed(&mut self, sender: Sender, message: Message) {
         let is_host = sender == Sender::Host;
         let refused = self.switches.refused;
@@ -276,7 +276,7 @@ impl<'l> VirtualLocoNet<'l> {
         }
     }
 
-    /// Sees which sensors have changed, and when their detectors report that.
+    /// Finds the sensors that have changed, and when their detectors report it.
     fn look(&mut self, by: Timestamp) {
         for Edge { at, sensor, is_occupied } in self.world.s88.take_edges(by) {
             if self.dark_until.is_some() {

@@ -1,15 +1,15 @@
-//! The network between clients and a station: datagrams take their time, and may be lost, come twice or be overtaken.
+//! The network between clients and a station: datagrams are delayed, and may be lost, duplicated or overtaken.
 
 use footplate_core::{Ratio, TimeSpan, Timestamp};
 
 use crate::draws::Draws;
 use crate::living::due_queue::DueQueue;
 
-/// What a datagram takes (s; a wired network and a wireless one that is not busy).
+/// The transit time of a datagram (s; a wired network, or a wireless one that is not busy).
 const TAKES_S: std::ops::Range<f64> = 0.000_2..0.002;
-/// The same in a wireless network that others use, too (s; chosen).
+/// The same in a busy wireless network (s; chosen).
 const TAKES_SLOW_S: std::ops::Range<f64> = 0.002..0.06;
-/// What one takes more that is overtaken (s; chosen).
+/// The additional transit time of a datagram that is overtaken (s; chosen).
 const OVERTAKEN_S: std::ops::Range<f64> = 0.005..0.04;
 
 /// The faults of a network, with their rates.
@@ -18,7 +18,7 @@ pub(crate) struct Disturbances {
     pub(crate) lost: Ratio,
     pub(crate) duplicated: Ratio,
     pub(crate) overtaken: Ratio,
-    /// Whether others use it, too.
+    /// Whether it is a busy wireless network.
     pub(crate) is_slow: bool,
 }
 

@@ -1,6 +1,6 @@
 //! The virtual 6051: a living layout behind the bytes of its serial line.
 //!
-//! What comes in is read with the codec that the program writes with; when things come and go is decided here, by
+//! The codec is that of the program; the times are the simulation's own, by
 //! what is known of the real box. One byte takes 4.583 ms in either direction. A command acts when its last byte
 //! has arrived; sensors are read when the request for them has.
 
@@ -17,20 +17,20 @@ use crate::living::switches::LivingSwitches;
 use crate::living::world::LivingLayout;
 use crate::physics_range::PhysicsRange;
 
-/// From the last bit of a request until the sensors are read (chosen: the modules are clocked out within it).
+/// The time from the last bit of a request to the reading of the sensors (chosen: the modules are clocked out within it).
 const READING: TimeSpan = TimeSpan::from_us(300);
-/// A coil that has been powered for so long has burnt (chosen: ten times what is allowed).
+/// The time after which a powered coil burns (chosen: ten times what is allowed).
 const BURNS: TimeSpan = TimeSpan::from_ms(5000);
 
-/// How the box and its line behave.
+/// The properties of a 6051 and its line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StationSwitches {
-    /// How it says that it is ready.
+    /// How it signals that it is ready.
     pub cts: CtsSwitch,
     /// The shortest time from the last bit of a request until the first byte of the answer begins (chosen: with it a
     /// poll of five modules takes the 55 to 60 ms that are reported).
     pub turnaround: TimeSpan,
-    /// By how much that varies from request to request, evenly (measured: about 5 ms).
+    /// The range of an additional random time, with equal probability (measured: about 5 ms).
     pub turnaround_spread: TimeSpan,
     /// Whether a byte that arrives while the station is not ready is lost, together with a byte of the present answer.
     /// Otherwise it waits.
@@ -41,13 +41,13 @@ pub struct StationSwitches {
     pub lost_replies: Ratio,
     /// Whether modules remember sensors that closed since the last reading.
     pub latches: bool,
-    /// Whether it knows the question for a single module; otherwise it is silent to it, as to any unknown byte.
+    /// Whether it answers a request for a single module; otherwise it ignores the request, like any unknown byte.
     pub reads_single_modules: bool,
 }
 
 impl StationSwitches {
-    /// Interfaces as they are met in the field: latching or not, answers within 10 to 100 ms, 2 % of answers lost, and one in
-    /// three that knows no question for a single module.
+    /// Interfaces as they occur: latching or not, with answers within 10 to 100 ms, 2 % of answers lost, and one in three that
+    /// does not answer requests for a single module.
     #[must_use]
     pub fn draw(seed: u64, physics: PhysicsRange) -> Self {
         if !physics.includes(PhysicsRange::Interface) {
@@ -93,7 +93,7 @@ pub enum FromStation {
 pub struct CoilAlarm {
     /// The turnout.
     pub turnout: TurnoutId,
-    /// Since when its solenoid was powered.
+    /// The time at which its solenoid was powered.
     pub since: Timestamp,
 }
 
@@ -113,7 +113,7 @@ pub struct VirtualStation<'l> {
     draws: Draws,
     now: Timestamp,
     cts: Cts,
-    /// Bytes from the host, when their last bit arrives and whether the station was ready when they began.
+    /// Bytes from the host, each with the arrival of its last bit, and whether the station was ready when it began.
     incoming: VecDeque<(Timestamp, u8, bool)>,
     host_is_free: Timestamp,
     /// The first byte of a message of two.
@@ -124,13 +124,13 @@ pub struct VirtualStation<'l> {
     /// When the last byte of the present answer has been sent.
     answers_until: Timestamp,
     forgets: bool,
-    /// Until when it is switched off.
+    /// The end of a power cut.
     dark_until: Option<Timestamp>,
     coil: Option<Coil>,
     alarms: Vec<CoilAlarm>,
 }
 
-/// What happens next.
+/// An occurrence in the station or on its line.
 #[derive(Debug, Clone, Copy)]
 enum Next {
     Incoming,
@@ -165,10 +165,10 @@ impl<'l> VirtualStation<'l> {
         }
     }
 
-    /// A station and a layout on which trains have been put: see [`LivingLayout::draw`].
+    /// A station in front of a layout with trains: see [`LivingLayout::draw`].
     ///
     /// # Errors
-    /// [`CircuitError`] when no train can run round on the layout.
+    /// [`CircuitError`] when the layout has no circuit.
     pub fn draw(
         layout: &'l Layout,
         seed: u64,
@@ -232,7 +232,7 @@ impl<'l> VirtualStation<'l> {
         self.incoming.push_back((self.host_is_free, byte, is_heard));
     }
 
-    /// Goes on until a time, or until something reaches the host before it.
+    /// Advances to a time, or until something reaches the host before it.
     pub fn advance(&mut self, until: Timestamp) -> Option<FromStation> {
         while let Some((at, next)) = self.next().filter(|(at, _)| *at <= until) {
             self.world.advance(at);
@@ -270,7 +270,7 @@ impl<'l> VirtualStation<'l> {
         None
     }
 
-    /// What happens next, and when; of things at one time the first in the order of this list.
+    /// The next occurrence and its time; of simultaneous ones, the first of this list.
     fn next(&self) -> Option<(Timestamp, Next)> {
         let mut next = self.incoming.front().map(|(at, ..)| (*at, Next::Incoming));
         let mut or = |at: Option<Timestamp>, what| {
@@ -321,7 +321,7 @@ impl<'l> VirtualStation<'l> {
         self.cts.received(at, busy_until, &mut self.draws);
     }
 
-    /// Does what a message says; returns until when the station has its hands full with it.
+    /// Executes a message; returns the time until which the station is busy.
     fn obey(&mut self, at: Timestamp, message: Message) -> Timestamp {
         match message {
             Message::Drive { train, step, .. } => self.world.command(train, step, at),

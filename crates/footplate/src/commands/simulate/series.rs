@@ -22,9 +22,10 @@ pub(super) struct Series<const BUDGET_S: u16 = 300> {
     /// The seed of a world, or of many: 1..30.
     #[arg(long, visible_alias = "seed", value_name = "N", default_value = "1", value_parser = Seeds::parse)]
     pub(super) seeds: Seeds,
-    /// Track time that each calibration may take, in seconds.
-    #[arg(long, value_name = "S", default_value_t = BUDGET_S, value_parser = clap::value_parser!(u16).range(30..=3600))]
-    budget: u16,
+    // Clap keeps one default for all `BUDGET_S`.
+    #[arg(long, value_name = "S", value_parser = clap::value_parser!(u16).range(30..=3600),
+          help = format!("Track time that each calibration may take, in seconds [default: {BUDGET_S}]"))]
+    budget: Option<u16>,
     /// How many runs at once; without it, as many as there are cores. The result is the same.
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
@@ -41,7 +42,7 @@ impl<const BUDGET_S: u16> Series<BUDGET_S> {
 
     /// Track time that each calibration may take.
     pub(super) fn budget(&self) -> TimeSpan {
-        TimeSpan::from_s(f64::from(self.budget))
+        TimeSpan::from_s(f64::from(self.budget.unwrap_or(BUDGET_S)))
     }
 
     /// Does `work` for each job on several threads; `what` is shown beside the bar.
@@ -80,8 +81,8 @@ impl<const BUDGET_S: u16> Series<BUDGET_S> {
         if self.layout != TRACK_A {
             settings += &format!(" --layout {}", self.layout);
         }
-        if self.budget != BUDGET_S {
-            settings += &format!(" --budget {}", self.budget);
+        if let Some(budget) = self.budget.filter(|budget| *budget != BUDGET_S) {
+            settings += &format!(" --budget {budget}");
         }
         settings
     }
