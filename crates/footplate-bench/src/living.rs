@@ -1,6 +1,6 @@
 //! A living layout: how much faster than real time two trains run, every byte of the line included.
 //!
-//! The layout is two plain ovals of six contacts, so that the trains never meet and nobody has to look after them.
+//! The layout is two plain ovals of six sensors, so that the trains never meet.
 //! One operation is one second of the layout's time, so 200 µs are 5000 times real time. The host polls five modules
 //! without a pause, as programs for real layouts do, and tells one of the trains another step every 10 s.
 
@@ -14,7 +14,7 @@ const TRAINS: [u16; 2] = [24, 58];
 /// Read modules 1 to 5.
 const POLL: u8 = 133;
 const ANSWER_BYTES: u8 = 10;
-/// Between commands, and the steps that trains are told in turn: mostly running, now and then standing.
+/// Between commands, and the steps that trains are commanded in turn: mostly running, now and then standing.
 const BETWEEN_COMMANDS_S: u32 = 10;
 const STEPS: [u8; 6] = [8, 12, 10, 6, 0, 11];
 
@@ -49,12 +49,12 @@ fn seconds_of(runs: bool) -> impl FnMut(usize) -> f64 {
             second += 1;
             host.attend(&mut station);
         }
-        assert!(station.world().mishaps().is_empty(), "{:?}", station.world().mishaps());
+        assert!(station.world().incidents().is_empty(), "{:?}", station.world().incidents());
         f64::from(host.closed)
     }
 }
 
-/// Two ovals of six contacts, 60 cm apart.
+/// Two ovals of six sensors, 60 cm apart.
 fn two_ovals() -> Layout {
     let end = |number: u16| RailEnd { node: format!("S{number}"), leg: None };
     let sensor = |number: u16| Place::Sensor {

@@ -30,9 +30,9 @@ pub fn operations() -> Vec<Operation> {
     let between_stations = inputs.stops(200.0, 5000.0);
     let stops = inputs.stops(0.5, 5000.0);
     let tasks = inputs.tasks();
-    let to = |way| MotionState::at_rest(Length::from_m(way));
-    let curve = move |way: &f64| SCurve::between(MotionState::default(), to(*way), limits);
-    let even = move |way: &f64| Trapezoid::between(MotionState::default(), to(*way), limits);
+    let to = |distance| MotionState::at_rest(Length::from_m(distance));
+    let curve = move |distance: &f64| SCurve::between(MotionState::default(), to(*distance), limits);
+    let even = move |distance: &f64| Trapezoid::between(MotionState::default(), to(*distance), limits);
     let curves: Vec<SCurve> = stops.iter().take(PROFILES).flat_map(curve).collect();
     let evens: Vec<Trapezoid> = stops.iter().take(PROFILES).flat_map(even).collect();
     let questions = inputs.questions(&curves);

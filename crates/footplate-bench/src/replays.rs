@@ -1,7 +1,7 @@
 //! Recorded sensor logs through the full estimator: what one entry of a log costs, forecasts and their scores
 //! included.
 //!
-//! An entry is a report of a contact, repeats included, or a command. For every passage the estimator learns, and
+//! An entry is a report of a sensor, repeats included, or a command. For every passage the estimator learns, and
 //! it is counted in which of the stated intervals the report lay and how far off it was; everything that a live
 //! run needs, and no rival.
 

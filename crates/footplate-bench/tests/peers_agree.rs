@@ -29,7 +29,7 @@ fn state(distance: f64, speed: f64, acceleration: f64) -> MotionState {
     }
 }
 
-/// Seconds that Ruckig takes, if it finds a way.
+/// Seconds that Ruckig takes, if it finds a profile.
 fn ruckig(from: MotionState, to: MotionState, limits: &Limits) -> Option<f64> {
     let mut input = InputParameter::<1>::new(None);
     input.current_velocity[0] = from.speed.as_m_per_s();

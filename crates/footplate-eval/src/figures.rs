@@ -10,6 +10,13 @@ pub fn quantile(values: impl Iterator<Item = f64>, part: f64) -> Option<f64> {
     values.get((last as f64 * part).round() as usize).copied()
 }
 
+/// The median and the 95th percentile.
+pub(crate) fn median_and_high(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
+    let values: Vec<f64> = values.collect();
+    let at = |part| quantile(values.iter().copied(), part);
+    Some([at(0.5)?, at(0.95)?])
+}
+
 /// The share of absolute values within a bound, in percent.
 pub(crate) fn within_pct(values: impl Iterator<Item = f64>, bound: f64) -> Option<f64> {
     let [mut within, mut all] = [0_usize; 2];
@@ -29,6 +36,11 @@ pub(crate) fn root_mean_square(values: impl Iterator<Item = f64>) -> Option<f64>
 /// A figure as the tables show it.
 pub fn shown(figure: Option<f64>, digits: usize) -> String {
     figure.map_or_else(|| "–".to_owned(), |figure| format!("{figure:.digits$}"))
+}
+
+/// A median and a high percentile as the tables show them.
+pub(crate) fn shown_pair(pair: Option<[f64; 2]>) -> String {
+    pair.map_or_else(|| shown(None, 0), |[median, high]| format!("{median:.1} / {high:.1}"))
 }
 
 /// The 95 % interval of a probability after `of` successes in `all` trials (Wilson, 1927).
@@ -53,6 +65,8 @@ mod tests {
         // 9 + 16 + 0 + 25 = 50, a fourth of it is 12.5.
         assert_eq!(root_mean_square(values()), Some(12.5_f64.sqrt()));
         assert_eq!(quantile(core::iter::empty(), 0.5), None);
+        assert_eq!(median_and_high((0..=100).rev().map(f64::from)), Some([50.0, 95.0]));
+        assert_eq!(median_and_high(core::iter::empty()), None);
     }
 
     #[test]

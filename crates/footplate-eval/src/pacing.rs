@@ -1,4 +1,4 @@
-//! Trains hold speeds that none of their steps has, arrive in time and follow each other; so does a simpler driver.
+//! Holding speeds between those of steps, arriving in time and following another train, compared with simpler drivers.
 
 mod arrive;
 mod counted;
@@ -19,14 +19,37 @@ pub use self::page::Page;
 use crate::seeds::Choice;
 use crate::testbed::{LongestCircuit, PreparedTrains};
 
-/// Three trains, in the order in which they would follow each other.
+/// Three trains, in the order in which they follow each other.
 const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(63)];
 
 /// Gaps between them (s or mm), and for how long each is kept (s).
 const GAPS: [(Kept, f64); 3] = [(Kept::Time, 1.5), (Kept::Time, 3.0), (Kept::Length, 150.0)];
 const FOLLOWED_FOR: f64 = 600.0;
 
-/// All of one seed.
+/// The driver of a train.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum By {
+    Footplate,
+    /// Footplate with a motion model made from the truth: what is left is what no calibration could remove.
+    Oracle,
+    /// A driver that only knows the speeds of steps.
+    Step,
+}
+
+impl By {
+    const ALL: [Self; 3] = [Self::Footplate, Self::Oracle, Self::Step];
+
+    /// Its name in tables; `step` is what the one does that only knows the speeds of steps.
+    const fn key(self, step: &'static str) -> &'static str {
+        match self {
+            Self::Footplate => "footplate",
+            Self::Oracle => "oracle",
+            Self::Step => step,
+        }
+    }
+}
+
+/// The results of one seed.
 pub struct Scored {
     /// The seed.
     pub seed: u64,
@@ -36,32 +59,35 @@ pub struct Scored {
 }
 
 impl Scored {
-    /// What went wrong with trains that we drove.
-    pub fn troubles(&self) -> impl Iterator<Item = (TrainId, &str)> {
-        let held = self.held.iter().filter(|held| held.by == hold::By::Driver);
-        let held = held.filter_map(|held| Some((held.train, held.trouble.as_deref()?)));
-        let arrived = self.arrived.iter().filter(|arrived| arrived.by == arrive::By::Driver);
-        let arrived = arrived.filter_map(|arrived| Some((arrived.train, arrived.trouble.as_deref()?)));
-        let followed = self.followed.iter().filter(|followed| followed.by == follow::By::Driver);
-        let followed = followed.filter_map(|followed| Some((followed.train, followed.trouble.as_deref()?)));
-        held.chain(arrived).chain(followed)
+    /// The first train that Footplate drove and whose order failed, and why.
+    #[must_use]
+    pub fn failures(&self) -> Vec<String> {
+        self.troubles().take(1).map(|(train, trouble)| format!("train {train}: {trouble}")).collect()
+    }
+
+    fn troubles(&self) -> impl Iterator<Item = (TrainId, &str)> {
+        let held = self.held.iter().map(|held| (held.by, held.train, &held.trouble));
+        let arrived = self.arrived.iter().map(|arrived| (arrived.by, arrived.train, &arrived.trouble));
+        let followed = self.followed.iter().map(|run| (run.by, run.train, &run.trouble));
+        let ours = held.chain(arrived).chain(followed).filter(|(by, ..)| *by == By::Footplate);
+        ours.filter_map(|(_, train, trouble)| Some((train, trouble.as_deref()?)))
     }
 }
 
-/// Everything that is asked of the trains of one seed.
+/// Scores the trains of one seed.
 ///
 /// # Errors
-/// When no train can run round on the layout.
+/// The layout has no circuit, or no room for a train.
 pub fn score(layout: &Layout, seed: u64, budget: TimeSpan) -> anyhow::Result<Scored> {
-    let way = LongestCircuit::of(layout);
-    ensure!(!way.nodes.is_empty(), "no train can run round on this layout with all turnouts straight");
-    let stage = PreparedTrains::prepare(layout, seed, &TRAINS, &LivingSwitches::well_kept(), budget)?;
+    let circuit = LongestCircuit::of(layout);
+    ensure!(!circuit.nodes.is_empty(), "no train can run round on this layout with all turnouts straight");
+    let prepared = PreparedTrains::prepare(layout, seed, &TRAINS, &LivingSwitches::well_kept(), budget)?;
     let mut choice = Choice::new(seed);
     let (mut held, mut arrived) = (Vec::new(), Vec::new());
     for train in TRAINS {
-        held.extend(hold(layout, &stage, &way, train, &mut choice)?);
-        arrived.extend(arrive(layout, &stage, &way, train, &mut choice)?);
+        held.extend(hold(layout, &prepared, &circuit, train, &mut choice)?);
+        arrived.extend(arrive(layout, &prepared, &circuit, train, &mut choice)?);
     }
-    let followed = follow(&stage, &way, &TRAINS, (&GAPS, FOLLOWED_FOR), &mut choice)?;
+    let followed = follow(&prepared, &circuit, &TRAINS, (&GAPS, FOLLOWED_FOR), &mut choice)?;
     Ok(Scored { seed, held, arrived, followed })
 }

@@ -11,7 +11,7 @@ const MAX_SEEDS: u64 = 100_000;
 pub const FRESH: &str = "fresh:";
 
 const OF_FRESH_SEEDS: &str =
-    "The seeds are fresh: the commit behind the `@` drew them, and nobody chose them.";
+    "The seeds are fresh: the commit behind the `@` drew them, so they were not chosen.";
 const OF_REGRESSION_SEEDS: &str = "The seeds are regression seeds: they were looked at while the program was made. `./ci.sh fresh` draws others.";
 
 /// Says on a page who chose its seeds.

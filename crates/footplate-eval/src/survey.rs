@@ -41,7 +41,7 @@ pub fn score(
         distances: Vec::new(),
         not_run: 0,
         scale: survey.scale(),
-        faults: prepared.world().mishaps().len(),
+        faults: prepared.world().incidents().len(),
     };
     let mut seen = Vec::new();
     let known_hop = layout
@@ -148,7 +148,7 @@ fn path_length_mm(
     let [Some([from, from_back]), Some([to, to_back])] = sensors else { return None };
     let truth = prepared.world().truth();
     let path_length = trains.iter().flat_map(|train| {
-        [truth.felt(*train, hop.edges, from, to), truth.felt(*train, &back, to_back, from_back)]
+        [truth.path_length(*train, hop.edges, from, to), truth.path_length(*train, &back, to_back, from_back)]
     });
     let path_length: Vec<f64> = path_length.flatten().map(Length::as_mm).collect();
     Some(path_length.iter().sum::<f64>() / path_length.len().max(1) as f64)

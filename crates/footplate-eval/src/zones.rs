@@ -1,4 +1,4 @@
-//! Trains run over speed restrictions, whatever they are ordered to do, and are scored by their true speeds there.
+//! Trains with orders of every kind run through zones, and are scored by their true speeds there.
 
 mod page;
 mod passage;
@@ -10,19 +10,19 @@ use footplate_core::{EdgeId, Length, Speed, StretchId, TimeSpan, TrainId};
 use footplate_sim::LivingSwitches;
 
 pub use self::page::Page;
-use self::ride::{Ridden, Told, ride};
+use self::ride::{Ridden, Task, ride};
 use crate::seeds::Choice;
 use crate::testbed::{LongestCircuit, PreparedTrains};
 
 const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(63)];
-/// Zones at once on a way round, ...
+/// Zones at once on the circuit, ...
 const ZONES: usize = 2;
-/// ... each of edges next to each other of at least so many mm, ...
+/// ... each of neighbouring edges with at least this length (mm), ...
 const LONG_ENOUGH: f64 = 250.0;
 /// ... with limits between these (mm/s): faster than the slowest step of most trains, slower than any runs.
 const LIMITS: [f64; 2] = [170.0, 280.0];
 
-/// All of one seed.
+/// The results of one seed.
 pub struct Scored {
     /// The seed.
     pub seed: u64,
@@ -30,43 +30,45 @@ pub struct Scored {
 }
 
 impl Scored {
-    /// The first train that did not do what it was ordered, and why.
+    /// The first train that did not carry out its order, and why.
     #[must_use]
-    pub fn trouble(&self) -> Option<(TrainId, &str)> {
-        self.rides.iter().find_map(|ride| Some((ride.train, ride.trouble.as_deref()?)))
+    pub fn failures(&self) -> Vec<String> {
+        let failed = |ride: &Ridden| Some(format!("train {}: {}", ride.train, ride.trouble.as_deref()?));
+        self.rides.iter().find_map(failed).into_iter().collect()
     }
 }
 
-/// Everything that is asked of the trains of one seed.
+/// Scores the trains of one seed.
 ///
 /// # Errors
-/// When no train can run round on the layout.
+/// The layout has no circuit, or no room for a train.
 pub fn score(layout: &Layout, seed: u64, budget: TimeSpan) -> anyhow::Result<Scored> {
-    let way = LongestCircuit::of(layout);
-    ensure!(!way.nodes.is_empty(), "no train can run round on this layout with all turnouts straight");
-    let stage = PreparedTrains::prepare(layout, seed, &TRAINS, &LivingSwitches::well_kept(), budget)?;
+    let circuit = LongestCircuit::of(layout);
+    ensure!(!circuit.nodes.is_empty(), "no train can run round on this layout with all turnouts straight");
+    let prepared = PreparedTrains::prepare(layout, seed, &TRAINS, &LivingSwitches::well_kept(), budget)?;
     let mut choice = Choice::new(seed);
     let mut rides = Vec::new();
     for nth in 0..TRAINS.len() {
-        let restricted = restricted(layout, &way, &mut choice)?;
+        let restricted = restricted(layout, &circuit, &mut choice)?;
         let draw = choice.between(0.0, 1e9) as u64;
-        for told in Told::ALL {
-            // Whoever follows has the train before it in the list ahead.
+        for task in Task::ALL {
+            // A follower has the next train of the list ahead.
             let trains = [TRAINS[nth], TRAINS[(nth + 1) % TRAINS.len()]];
-            rides.push(ride([layout, &restricted], &stage, &way, trains, told, draw)?);
+            rides.push(ride([layout, &restricted], &prepared, &circuit, trains, task, draw)?);
         }
     }
     Ok(Scored { seed, rides })
 }
 
-/// The layout with zones on the way round.
-fn restricted(layout: &Layout, way: &LongestCircuit, choice: &mut Choice) -> anyhow::Result<Layout> {
+/// The layout with zones on the circuit.
+fn restricted(layout: &Layout, circuit: &LongestCircuit, choice: &mut Choice) -> anyhow::Result<Layout> {
     let mut taken: Vec<StretchId> = Vec::new();
     let mut found = layout.clone();
     for nth in 0..ZONES {
         let stretches = loop {
-            let begins = choice.between(0.0, way.edges.len() as f64) as usize;
-            let stretches = some_of(layout, way.edges.iter().cycle().skip(begins).take(way.edges.len()));
+            let begins = choice.between(0.0, circuit.edges.len() as f64) as usize;
+            let stretches =
+                some_of(layout, circuit.edges.iter().cycle().skip(begins).take(circuit.edges.len()));
             if stretches.iter().all(|stretch| !taken.contains(stretch)) {
                 break stretches;
             }
@@ -79,7 +81,7 @@ fn restricted(layout: &Layout, way: &LongestCircuit, choice: &mut Choice) -> any
     Ok(found)
 }
 
-/// As many edges from the first on as make a zone.
+/// The edges of a zone that begins with the first.
 fn some_of<'e>(layout: &Layout, edges: impl Iterator<Item = &'e EdgeId>) -> Vec<StretchId> {
     let mut length = Length::ZERO;
     let long_enough = |edge: &&EdgeId| {

@@ -54,9 +54,9 @@ pub use gates::GatePass;
 pub use law::{Law, LawFamily};
 pub use living::{
     BoardSwitches, CanSwitches, CanTransport, CoilAlarm, CtsSwitch, Delivery, End, FromStation, HandError,
-    LivingLayout, LivingSwitches, LocoNetSwitches, Mishap, MishapKind, PassTruth, RestTruth, StationSwitches,
-    TrainTruth, Truth, VirtualBoard, VirtualCentralStation, VirtualLocoNet, VirtualStation, VirtualZ21,
-    Z21Switches,
+    Incident, IncidentKind, LivingLayout, LivingSwitches, LocoNetSwitches, PassTruth, RestTruth,
+    StationSwitches, TrainTruth, Truth, VirtualBoard, VirtualCentralStation, VirtualLocoNet, VirtualStation,
+    VirtualZ21, Z21Switches,
 };
 pub use other_law::OtherLaw;
 pub use physics_range::PhysicsRange;

@@ -249,7 +249,7 @@ impl<T: Deref<Target = Train> + Clone> Motor<T> {
         }
     }
 
-    /// Loses rail contact at low speed: the wheels stick until a higher step is commanded.
+    /// Loses the current from the rail at low speed: the wheels stick until a higher step is commanded.
     pub(crate) fn stall(&mut self) {
         self.breakaway = Some(f64::INFINITY);
     }

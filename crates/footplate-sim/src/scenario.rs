@@ -212,10 +212,10 @@ fn change(number: u8, highest: u8, draws: &mut Draws) -> Script {
 }
 
 /// From rest to a step, via a faster one if given; stopped at a report and measured.
-fn stop(number: u8, by_way_of: Option<u8>, draws: &mut Draws) -> Script {
-    let first = by_way_of.unwrap_or(number);
+fn stop(number: u8, via: Option<u8>, draws: &mut Draws) -> Script {
+    let first = via.unwrap_or(number);
     let mut script = Script { lasts: seconds(240), ..start(first, draws) };
-    if by_way_of.is_some() {
+    if via.is_some() {
         script = script.then(on_report(4), What::Speed(step(number)));
     }
     script

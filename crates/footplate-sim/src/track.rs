@@ -8,7 +8,7 @@ use footplate_core::{EdgeId, Length, Ratio, SensorId};
 use crate::draws::{Draws, Purpose};
 
 /// Standard deviation of a sensor's true place about its node (chosen: half of a survey's 10 mm).
-const CONTACT_SD_MM: f64 = 5.0;
+const SENSOR_SD_MM: f64 = 5.0;
 /// Share of stretches that are curves (chosen: a loop's ends and the legs of its turnouts).
 const CURVED: f64 = 0.4;
 /// Mean speed on a curve over that on a straight (measured: section means of trains 54 and 55 spread by 1 to 2 %).
@@ -38,7 +38,7 @@ struct Rail {
 pub struct TrueTrack {
     /// By stretch number.
     rails: Vec<Rail>,
-    contact_offsets_mm: BTreeMap<SensorId, f64>,
+    sensor_offsets_mm: BTreeMap<SensorId, f64>,
 }
 
 impl TrueTrack {
@@ -66,9 +66,9 @@ impl TrueTrack {
             }
             rails.push(Rail { length_mm, factor, dirty });
         }
-        let mut track = Self { rails, contact_offsets_mm: BTreeMap::new() };
+        let mut track = Self { rails, sensor_offsets_mm: BTreeMap::new() };
         for (sensor, _) in layout.sensors() {
-            track.contact_offsets_mm.insert(sensor, draws.normal_within(0.0, CONTACT_SD_MM, MAX_SDS));
+            track.sensor_offsets_mm.insert(sensor, draws.normal_within(0.0, SENSOR_SD_MM, MAX_SDS));
         }
         track
     }
@@ -79,7 +79,7 @@ impl TrueTrack {
         let rail = |length: Length| Rail { length_mm: length.as_mm(), factor: 1.0, dirty: Vec::new() };
         Self {
             rails: layout.edges().step_by(2).map(|(_, edge)| rail(edge.length)).collect(),
-            contact_offsets_mm: BTreeMap::new(),
+            sensor_offsets_mm: BTreeMap::new(),
         }
     }
 
@@ -92,12 +92,12 @@ impl TrueTrack {
     /// How far past its node, in its own direction of travel, a sensor really closes.
     #[must_use]
     pub fn sensor_offset(&self, sensor: SensorId) -> Length {
-        Length::from_mm(self.contact_offsets_mm.get(&sensor).copied().unwrap_or(0.0))
+        Length::from_mm(self.sensor_offsets_mm.get(&sensor).copied().unwrap_or(0.0))
     }
 
     /// Moves the place where a sensor closes further along, in mm.
     pub(crate) fn move_sensor(&mut self, sensor: SensorId, by_mm: f64) {
-        *self.contact_offsets_mm.entry(sensor).or_insert(0.0) += by_mm;
+        *self.sensor_offsets_mm.entry(sensor).or_insert(0.0) += by_mm;
     }
 
     /// The speed factor of an edge relative to level straight track, for a train with full curve sensitivity.

@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn ways_to_rest_are_those_of_real_engines() {
+    fn stopping_distances_are_those_of_real_engines() {
         // Real stopping distances at top step: 817 mm (train 47) to 1588 mm (train 77); emergency stops of 13 trains
         // from 580 to 640 mm.
         for family in LawFamily::ALL {

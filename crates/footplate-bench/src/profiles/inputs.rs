@@ -66,8 +66,9 @@ impl Inputs {
                     continue;
                 };
                 let target = quickest.state_at(quickest.duration());
-                let way = quickest.distance() + Length::from_m(0.5 * libm::pow(10_000.0, inputs.share()));
-                let to = MotionState::cruising(way, target.speed);
+                let distance =
+                    quickest.distance() + Length::from_m(0.5 * libm::pow(10_000.0, inputs.share()));
+                let to = MotionState::cruising(distance, target.speed);
                 // A start that the limits force above the speed limit is another problem.
                 let leveled = speed.as_m_per_s()
                     + acceleration.as_m_per_s2().powi(2) / (2.0 * LIMITS.jerk.as_m_per_s3());

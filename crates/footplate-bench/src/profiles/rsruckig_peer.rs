@@ -24,8 +24,8 @@ fn planner() -> Ruckig<1, ThrowErrorHandler> {
 
 pub(super) fn build(group: &'static str, stops: Vec<f64>) -> Operation {
     let (mut planner, mut input, mut trajectory) = (planner(), input(), Trajectory::new(None));
-    Operation::new(group, MEANS, stops, move |way| {
-        input.target_position[0] = *way;
+    Operation::new(group, MEANS, stops, move |distance| {
+        input.target_position[0] = *distance;
         planner.calculate(&input, &mut trajectory).map_or(0.0, |_| trajectory.get_duration())
     })
 }
@@ -43,9 +43,9 @@ pub(super) fn build_from_any_state(group: &'static str, tasks: Vec<Task>) -> Ope
 
 fn trajectories(stops: &[f64]) -> Vec<Trajectory<1>> {
     let (mut planner, mut input) = (planner(), input());
-    let planned = stops.iter().take(PROFILES).filter_map(|&way| {
+    let planned = stops.iter().take(PROFILES).filter_map(|&distance| {
         let mut trajectory = Trajectory::new(None);
-        input.target_position[0] = way;
+        input.target_position[0] = distance;
         planner.calculate(&input, &mut trajectory).ok().map(|_| trajectory)
     });
     planned.collect()

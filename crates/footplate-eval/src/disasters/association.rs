@@ -2,7 +2,7 @@
 //! them.
 
 use footplate_core::control::{Notice, Order};
-use footplate_core::{Approach, Length, NodeId, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Length, NodeId, SensorId, TimeSpan, Timestamp, TrainId};
 use footplate_sim::Cause;
 
 use crate::testbed::{LongestCircuit, PreparedTrains};
@@ -50,12 +50,7 @@ pub(super) fn associations(
     }
     let mut driver = prepared.driver();
     for train in trains {
-        let step = prepared.models.get(train).map_or(SpeedStep::STAND, |model| {
-            let off =
-                |step: &SpeedStep| (model.speed(*step, Approach::Below).value.as_mm_per_s() - SPEED).abs();
-            let all = (1..=model.highest().get()).filter_map(SpeedStep::new);
-            all.min_by(|one, other| off(one).total_cmp(&off(other))).unwrap_or(SpeedStep::STAND)
-        });
+        let step = prepared.nearest_step(*train, SPEED);
         let _ = driver.order(prepared.line.now(), Order::Speed { train: *train, step });
     }
     let began = prepared.line.now();

@@ -82,16 +82,10 @@ impl<'l> DisturbedRun<'l> {
             }
         }
         let watchdog = Watchdog::new(prepared.driver(), prepared.line.now());
-        let step = prepared.models.get(&TRAIN).map_or(SpeedStep::STAND, |model| {
-            let off = |step: &SpeedStep| {
-                (model.speed(*step, footplate_core::Approach::Below).value.as_mm_per_s() - SPEED).abs()
-            };
-            let all = (1..=model.highest().get()).filter_map(SpeedStep::new);
-            all.min_by(|one, other| off(one).total_cmp(&off(other))).unwrap_or(SpeedStep::STAND)
-        });
+        let step = prepared.nearest_step(TRAIN, SPEED);
         let lap_mm =
             circuit.edges.iter().map(|edge| prepared.world().truth().track().length(*edge).as_mm()).sum();
-        let faults = prepared.world().mishaps().len();
+        let faults = prepared.world().incidents().len();
         Ok(Self {
             layout,
             prepared,
@@ -215,7 +209,7 @@ impl<'l> DisturbedRun<'l> {
         if kind == Kind::Faultless {
             self.wait(UNDISTURBED_TIME);
             self.result.watched_s = (self.now() - began).as_s();
-            self.result.faults = self.prepared.world().mishaps().len() - self.faults;
+            self.result.faults = self.prepared.world().incidents().len() - self.faults;
             return Ok(self.result);
         }
         self.result.watched_s = (self.now() - began).as_s();
@@ -249,7 +243,7 @@ impl<'l> DisturbedRun<'l> {
                 self.result.after.extend(error);
             }
         }
-        self.result.faults = self.prepared.world().mishaps().len() - self.faults;
+        self.result.faults = self.prepared.world().incidents().len() - self.faults;
         Ok(self.result)
     }
 }

@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use super::disturbed_run::Outcomes;
 use super::kind::Kind;
+use crate::figures::median_and_high;
 
 /// The statistics of one kind.
 pub(super) struct Figures {
@@ -49,22 +50,13 @@ impl Figures {
         let [as_before, rescaled, anew] = self.outcomes;
         json!({
             "kind": self.kind.key(), "runs": self.runs, "noticed": self.noticed.len(),
-            "noticed_s": both(self.noticed.iter().map(|[seconds, _]| *seconds)),
-            "run_until_then_mm": both(self.noticed.iter().map(|[_, mm]| *mm)),
-            "recovered": self.recovered.len(), "recovered_s": both(self.recovered.iter().copied()),
+            "noticed_s": median_and_high(self.noticed.iter().map(|[seconds, _]| *seconds)),
+            "run_until_then_mm": median_and_high(self.noticed.iter().map(|[_, mm]| *mm)),
+            "recovered": self.recovered.len(), "recovered_s": median_and_high(self.recovered.iter().copied()),
             "as_before": as_before, "rescaled": rescaled, "learnt_anew": anew,
-            "needed_person": self.needed_operator, "powered_off": self.powered_off, "mishaps": self.faults,
-            "stops_before": self.before.len(), "before_mm": both(self.before.iter().copied()),
-            "stops_after": self.after.len(), "after_mm": both(self.after.iter().copied()),
+            "needed_person": self.needed_operator, "powered_off": self.powered_off, "incidents": self.faults,
+            "stops_before": self.before.len(), "before_mm": median_and_high(self.before.iter().copied()),
+            "stops_after": self.after.len(), "after_mm": median_and_high(self.after.iter().copied()),
         })
     }
-}
-
-/// Median and 95th percentile.
-pub(super) fn both(values: impl Iterator<Item = f64>) -> Option<[f64; 2]> {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    let last = values.len().checked_sub(1)?;
-    let at = |part: f64| values.get((last as f64 * part).round() as usize).copied();
-    Some([at(0.5)?, at(0.95)?])
 }

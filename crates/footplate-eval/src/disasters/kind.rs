@@ -41,7 +41,7 @@ impl Kind {
             Self::Dirty => "dirty wheels, 20 % slower",
             Self::Restarted => "station restarted, 4 s dark",
             Self::Lifted => "lifted and put elsewhere",
-            Self::Turned => "the same, facing the other way",
+            Self::Turned => "the same, in the opposite direction",
         }
     }
 

@@ -7,20 +7,21 @@ use serde_json::{Value, json};
 use super::Scored;
 use super::association::AssociationCounts;
 use super::disturbed_run::Outcomes;
-use super::figures::{Figures, both};
+use super::figures::Figures;
 use super::kind::Kind;
+use crate::figures::{median_and_high, shown_pair};
 use crate::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
 # What becomes of trains that something happens to
 
 Random simulated trains, calibrated over the bytes of a virtual 6051 and driven round and round under a watchdog, beside
-another train that stands. Contacts and turnouts fail now and then. Then something happens, of which the program is told
-nothing. The simulator's truth is used for these figures alone.
+another train that stands. Sensors and turnouts fail now and then. Then something happens that is not reported to the
+program. The simulator's truth is used for these figures alone.
 ";
 
 const LEGEND: &str = "\
-*Noticed* is from what happened until the train is told to stand for it, and how far it ran in between; *known again* until
+*Noticed* is from what happened until the train is commanded to stop for it, and how far it ran in between; *known again* until
 the train stands, is located again and measured, and may be ordered again: as it was before, its model rescaled, or learnt
 anew. *Stops* are at random places, from the step with about 280 mm/s, as far from there as the truth says (mm, median /
 95th percentile), before and afterwards. *Grief* counts collisions, derailments and trains that ran past the end of
@@ -28,14 +29,14 @@ their track.
 ";
 
 /// The content of the page.
-pub struct Page<'r> {
+pub struct Page {
     /// The results of all seeds.
-    pub scored: &'r [Scored],
+    pub scored: Vec<Scored>,
     /// The arguments of the command line.
     pub asked: String,
 }
 
-impl WrittenScores for Page<'_> {
+impl WrittenScores for Page {
     const SCORER: &'static str = "disasters";
 
     fn head(&self) -> String {
@@ -45,7 +46,7 @@ impl WrittenScores for Page<'_> {
     fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
         writeln!(
             output,
-            "| what happened | runs | noticed | after s | way mm | known again | after s | as before | rescaled | \
+            "| what happened | runs | noticed | after s | distance mm | known again | after s | as before | rescaled | \
              anew | person | power off | stops before | mm | stops after | mm | grief |\n\
              | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | \
              ---: | ---: | ---: |"
@@ -58,29 +59,29 @@ impl WrittenScores for Page<'_> {
                 figures.kind.description(),
                 figures.runs,
                 figures.noticed.len(),
-                shown(both(figures.noticed.iter().map(|[seconds, _]| *seconds))),
-                shown(both(figures.noticed.iter().map(|[_, mm]| *mm))),
+                shown_pair(median_and_high(figures.noticed.iter().map(|[seconds, _]| *seconds))),
+                shown_pair(median_and_high(figures.noticed.iter().map(|[_, mm]| *mm))),
                 figures.recovered.len(),
-                shown(both(figures.recovered.iter().copied())),
+                shown_pair(median_and_high(figures.recovered.iter().copied())),
                 figures.needed_operator,
                 figures.powered_off,
                 figures.before.len(),
-                shown(both(figures.before.iter().copied())),
+                shown_pair(median_and_high(figures.before.iter().copied())),
                 figures.after.len(),
-                shown(both(figures.after.iter().copied())),
+                shown_pair(median_and_high(figures.after.iter().copied())),
                 figures.faults,
             )?;
         }
         let (alarms, hours) = self.alarms();
         writeln!(
             output,
-            "\nFalse alarms: {alarms} in {hours:.1} hours of running with nothing but the usual faults of contacts and \
+            "\nFalse alarms: {alarms} in {hours:.1} hours of running with nothing but the usual faults of sensors and \
              turnouts.\n\n## Who is where\n"
         )?;
         writeln!(
             output,
-            "| trains running | contacts closed by them | laid to the right one | to another | to nobody | closed by \
-             themselves | of these laid to a train |\n| ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
+            "| trains running | detections of them | associated with the right one | with another | with none | spurious | of these \
+             associated |\n| ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
         )?;
         for (trains, counted) in self.associations() {
             let AssociationCounts { right, wrong, rejected, taken, spurious } = counted;
@@ -104,7 +105,7 @@ impl WrittenScores for Page<'_> {
         let runs = runs.map(|(seed, (kind, run))| {
             json!({
                 "seed": seed, "kind": kind.key(), "noticed": run.noticed, "recovered": run.recovered,
-                "needed_person": run.needed_operator, "false_alarms": run.false_alarms, "mishaps": run.faults,
+                "needed_person": run.needed_operator, "false_alarms": run.false_alarms, "incidents": run.faults,
                 "before_mm": run.before, "after_mm": run.after, "said": run.notices,
             })
         });
@@ -140,7 +141,7 @@ impl WrittenScores for Page<'_> {
     }
 }
 
-impl Page<'_> {
+impl Page {
     fn runs(&self, kind: Kind) -> Vec<&Outcomes> {
         self.scored
             .iter()
@@ -170,10 +171,6 @@ impl Page<'_> {
         }
         sums
     }
-}
-
-fn shown(of: Option<[f64; 2]>) -> String {
-    of.map_or_else(|| "–".to_owned(), |[middle, high]| format!("{middle:.1} / {high:.1}"))
 }
 
 fn share(of: usize, all: usize) -> String {

@@ -107,7 +107,7 @@ impl<'a, 'l> CourseProject<'a, 'l> {
             let moved = step.and_then(|step| self.short_move(ordered, step));
             results.moves.extend(moved.map(|moved| [ordered, moved]));
         }
-        results.faults = self.line.station.world().mishaps().len();
+        results.faults = self.line.station.world().incidents().len();
         results
     }
 

@@ -4,7 +4,7 @@ use footplate_sim::LawFamily;
 use serde_json::{Value, json};
 
 use super::trial::{NOT_BEYOND_PERCENT, Results};
-use crate::figures::{binomial_interval, quantile};
+use crate::figures::{binomial_interval, median_and_high, quantile};
 
 /// One train with the results of all drivers.
 pub struct ScoredTrain {
@@ -97,11 +97,9 @@ impl Figures {
         let sum = |each: fn(&Results) -> u64| results.clone().map(each).sum::<u64>();
         Self {
             stops: [mid.len(), top.len()],
-            mid: median_and_high(&mid),
-            top: median_and_high(&top),
-            moves: median_and_high(
-                &moves.iter().map(|[ordered, moved]| (moved - ordered).abs()).collect::<Vec<_>>(),
-            ),
+            mid: median_and_high(mid.iter().copied()),
+            top: median_and_high(top.iter().copied()),
+            moves: median_and_high(moves.iter().map(|[ordered, moved]| (moved - ordered).abs())),
             good_moves: [moves.iter().filter(is_good).count(), moves.len()],
             beyond: [overruns(&beyond(0)), overruns(&beyond(1))],
             median_rest: [quantile(beyond(0).into_iter(), 0.5), quantile(beyond(1).into_iter(), 0.5)],
@@ -136,23 +134,7 @@ impl Figures {
             "mid_stop_mm": self.mid, "mid_stops": self.stops[0], "top_stop_mm": self.top,
             "top_stops": self.stops[1], "move_mm": self.moves, "moves": self.good_moves[1],
             "moves_within_8_mm_or_5_pct": self.good_moves[0], "not_beyond": beyond,
-            "position_inside_pct": self.covered_pct(), "failed": self.failed, "mishaps": self.faults,
+            "position_inside_pct": self.covered_pct(), "failed": self.failed, "incidents": self.faults,
         })
-    }
-}
-
-fn median_and_high(errors: &[f64]) -> Option<[f64; 2]> {
-    let at = |part| quantile(errors.iter().copied(), part);
-    Some([at(0.5)?, at(0.95)?])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn quantiles_are_values_that_were_there() {
-        assert_eq!(median_and_high(&(0..=100).rev().map(f64::from).collect::<Vec<_>>()), Some([50.0, 95.0]));
-        assert_eq!(median_and_high(&[]), None);
     }
 }

@@ -159,7 +159,7 @@ fn sections(
     for node in ahead {
         for hop in context.layout.hops_from(*node) {
             let (Some(from), Some(to)) = (context.layout.sensor_at(*node), hop.sensor) else { continue };
-            let path_length = truth.felt(train, hop.edges, from, to);
+            let path_length = truth.path_length(train, hop.edges, from, to);
             if let (Some(section), Some(path_length)) = (context.sections.section(hop.id), path_length)
                 && !found.iter().any(|(known, ..)| *known == section)
             {

@@ -7,21 +7,21 @@ use serde_json::{Value, json};
 
 use super::figures::{Driven, Figures, ScoredTrain};
 use super::trial::{NOT_BEYOND_PERCENT, Results};
-use crate::figures::{binomial_interval, quantile};
+use crate::figures::{binomial_interval, quantile, shown_pair};
 use crate::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
 # How well trains are driven
 
 Random simulated trains, each from nothing known: calibrated over the bytes of a virtual 6051, then driven to random
-places. Contacts and turnouts fail now and then. The simulator shares no formula with what drives, and its truth is used
+places. Sensors and turnouts fail now and then. The simulator shares no formula with what drives, and its truth is used
 for these figures alone.
 ";
 
 const LEGEND: &str = "\
-*Stops* are at a random contact and a random offset past it, from steps with true speeds of 200 to 450 mm/s (mid) and
+*Stops* are at a random sensor and a random offset past it, from steps with true speeds of 200 to 450 mm/s (mid) and
 from 500 mm/s on (top); *moves* are of 20 to 400 mm. Errors are true millimetres, median / 95th percentile. The *oracle* is
-the same driver with a model made of the truth: what remains is what nobody can know, scatter of stops first of all. The
+the same driver with a model made of the truth: what remains cannot be known, scatter of stops first of all. The
 *course project* does what published projects do: a constant speed a step, stopping distances by bisection, v²/2a in
 between (for moves, too: tables of those that some projects have are left out), no feedback from errors, a position counted
 on from the last report; it may measure for as long as it likes.
@@ -133,10 +133,10 @@ impl Page<'_> {
                     law.map_or("all", LawFamily::name),
                     by.key(),
                     figures.stops[0],
-                    both(figures.mid),
+                    shown_pair(figures.mid),
                     figures.stops[1],
-                    both(figures.top),
-                    both(figures.moves),
+                    shown_pair(figures.top),
+                    shown_pair(figures.moves),
                     share(good, moves),
                 )?;
             }
@@ -206,10 +206,6 @@ impl Page<'_> {
         writeln!(output, "Orders not carried out: {}.", counted(|figures| figures.failed as usize))?;
         writeln!(output, "Trains that came to grief: {}.", counted(|figures| figures.faults))
     }
-}
-
-fn both(of: Option<[f64; 2]>) -> String {
-    of.map_or_else(none, |[middle, high]| format!("{middle:.1} / {high:.1}"))
 }
 
 fn share(of: usize, all: usize) -> String {

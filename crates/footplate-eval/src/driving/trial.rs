@@ -159,7 +159,7 @@ impl<'a, 'l> Trial<'a, 'l> {
         for _ in 0..counts.moves {
             self.short_move();
         }
-        self.results.faults = self.line.station.world().mishaps().len();
+        self.results.faults = self.line.station.world().incidents().len();
     }
 
     fn truth(&self) -> Option<TrainTruth> {

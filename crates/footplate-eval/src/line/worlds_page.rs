@@ -61,14 +61,14 @@ pub struct WorldsPage {
 const HEAD: &str = "\
 # The odometer on random worlds
 
-Speed, distance and their intervals on worlds that nobody chose: train, rail, driver, slide protection and faults are
+Speed, distance and their intervals on random worlds: train, rail, driver, slide protection and faults are
 drawn from ranges that the [simulator's page](../theory/line_simulator.md#random-worlds) states. An operator of level
 *L0* knows teeth, diameters and limits; *L1* adds the recorded command; *L2* adds brake, slide protection and gradients.
 ";
 
 const LEGEND: &str = "\
 Shares are over all periods. *Guaranteed* and *99.99 %* are the shares whose true speed lies within the interval, rounded
-down. The *oracle* is told which wheelset slips, and when. *ETCS* is the share of periods whose speed is off by more than
+down. The *oracle* knows which wheelset slips, and when. *ETCS* is the share of periods whose speed is off by more than
 ETCS allows; *hindsight* is an odometer that knows the true speed but while both slip, and then the speed at which that began
 and the mean acceleration until one of them rolls again. A train rolls *again* for 20 s after a wheelset slipped.
 ";

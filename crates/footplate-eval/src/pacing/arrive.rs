@@ -1,65 +1,43 @@
-//! Trains commanded to stop at a place in time, beside trains that run there at the step with the mean speed.
+//! Arriving at a place in time, compared with running there at the step with the mean speed.
 
 use anyhow::Context;
 use footplate_core::control::{Notice, Order, OrderId, Refusal, StopOrder};
 use footplate_core::track::{Landmark, Layout};
-use footplate_core::{Length, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Length, TimeSpan, Timestamp, TrainId};
 
+use super::By;
 use super::counted::{Counted, cut_short};
-use super::hold::{speed, steps, told_the_truth};
+use super::hold::oracle_model;
 use super::tracked::LOOK;
 use crate::seeds::Choice;
 use crate::testbed::{LongestCircuit, PreparedTrains};
 
-/// How often each train is asked.
+/// Orders for each train.
 const ASKED_EACH: usize = 6;
-/// How far it is (mm), ...
+/// The distances of the places (mm), ...
 const FAR: [f64; 2] = [1800.0, 6000.0];
-/// ... and with which mean speed that would be in time (mm/s), ...
+/// ... the mean speeds that are needed (mm/s), ...
 const MEAN: [f64; 2] = [170.0, 320.0];
-/// ... beside what a start and a stop take (s).
+/// ... and the additional time for a start and a stop (s).
 const START_AND_STOP: f64 = 1.5;
-/// Who is asked on the run runs at about this speed (mm/s), for so long (s) before.
+/// The approximate speed (mm/s) of a train that is running when it is ordered, and for how long it has run (s).
 const RUNS_AT: f64 = 250.0;
 const RUNS_FOR: f64 = 5.0;
-/// Who could not be in time is asked again, with the time that was offered and so much more.
+/// An order that would be late is repeated with the offered time, and this factor.
 const OFFERED: f64 = 1.02;
-/// An order that is not carried out so long (s) after its time has failed.
+/// An order fails if it is not carried out this long (s) after its time.
 const PATIENCE: f64 = 30.0;
-/// A train that has been commanded to stop stands after so long (s), whatever is believed.
+/// A train that was commanded to stop is at rest after this time (s), whatever the estimate says.
 const STANDS_WITHIN: f64 = 4.0;
 
-/// Who drove.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum By {
-    /// The driver, in time.
-    Driver,
-    /// The same driver with a model made of the truth: what is left is what no calibration could take away.
-    Told,
-    /// The driver, which stops there from the step with the mean speed.
-    Step,
-}
-
-impl By {
-    pub(super) const ALL: [Self; 3] = [Self::Driver, Self::Told, Self::Step];
-
-    pub(super) const fn key(self) -> &'static str {
-        match self {
-            Self::Driver => "footplate",
-            Self::Told => "footplate, told the train",
-            Self::Step => "step of the mean speed",
-        }
-    }
-}
-
-/// What the train does that is asked.
+/// The motion of the train when it is ordered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Began {
-    /// It stands, far from the place.
+    /// At rest, far from the place.
     Rest,
-    /// It stands less than that before the place, as it comes to those that are a round and a little ahead.
+    /// At rest, and nearer to the place: its place is a little more than a lap ahead.
     RestNearBy,
-    /// It runs.
+    /// Running.
     Run,
 }
 
@@ -81,42 +59,42 @@ pub(super) struct Arrived {
     pub(super) by: By,
     pub(super) train: TrainId,
     pub(super) from: Began,
-    /// The time that was asked for (s) and the way (mm).
+    /// The time that was ordered (s), and the distance (mm).
     pub(super) asked: [f64; 2],
-    /// How late it stood (s), and how far beyond (mm).
+    /// How late it was at rest (s), and how far beyond the place (mm).
     pub(super) late_and_beyond: Option<[f64; 2]>,
-    /// Whether the time that was asked for first could not be, and another was offered.
+    /// Whether the first time was refused, and another one offered.
     pub(super) refused: bool,
     pub(super) commands: usize,
     pub(super) trouble: Option<String>,
 }
 
-/// Everything that one train is asked, by everybody.
+/// Orders one train to several places, with each driver.
 pub(super) fn arrive(
     layout: &Layout,
-    stage: &PreparedTrains<'_>,
-    way: &LongestCircuit,
+    prepared: &PreparedTrains<'_>,
+    circuit: &LongestCircuit,
     train: TrainId,
     choice: &mut Choice,
 ) -> anyhow::Result<Vec<Arrived>> {
-    let start = *choice.of(&way.nodes).context("a way without a contact")?;
+    let start = *choice.of(&circuit.nodes).context("a circuit without a sensor")?;
     let seed = choice.between(0.0, 1e9) as u64;
     let mut all = Vec::new();
     for by in By::ALL {
-        let mut stage = stage.clone();
-        stage.put(train, start, Length::from_mm(60.0))?;
-        if by == By::Told {
-            let told = told_the_truth(layout, &stage, way, train)?;
-            stage.models.insert(train, told);
+        let mut prepared = prepared.clone();
+        prepared.put(train, start, Length::from_mm(60.0))?;
+        if by == By::Oracle {
+            let model = oracle_model(layout, &prepared, circuit, train)?;
+            prepared.models.insert(train, model);
         }
         let mut trip = Trip {
             layout,
-            way,
+            circuit,
             train,
             by,
             choice: Choice::new(seed),
-            counted: Counted::dispatched(stage.line.now(), stage.driver()),
-            stage,
+            counted: Counted::dispatched(prepared.line.now(), prepared.driver()),
+            prepared,
         };
         for nth in 0..ASKED_EACH {
             let arrived = trip.ask(nth % 2 == 0);
@@ -130,50 +108,30 @@ pub(super) fn arrive(
     Ok(all)
 }
 
-/// One train on its way from target to target.
+/// One train that runs from target to target.
 struct Trip<'a, 'l> {
     layout: &'l Layout,
-    way: &'a LongestCircuit,
+    circuit: &'a LongestCircuit,
     train: TrainId,
     by: By,
     choice: Choice,
-    stage: PreparedTrains<'l>,
+    prepared: PreparedTrains<'l>,
     counted: Counted,
 }
 
 impl Trip<'_, '_> {
     fn now(&self) -> Timestamp {
-        self.stage.line.now()
+        self.prepared.line.now()
     }
 
-    fn nearest(&self, mm_per_s: f64) -> SpeedStep {
-        let model = self.stage.models.get(&self.train);
-        let off = |step: &SpeedStep| model.map_or(0.0, |model| (speed(model, *step) - mm_per_s).abs());
-        let nearest =
-            model.and_then(|model| steps(model).min_by(|one, other| off(one).total_cmp(&off(other))));
-        nearest.unwrap_or(SpeedStep::STAND)
-    }
-
-    /// A place about so far ahead (mm), and how far exactly it is to where it comes first: further than a round is beyond the
-    /// place at which it was a round before.
-    fn target(&mut self, far: f64, from_rest: bool) -> Option<(Landmark, f64)> {
+    /// The place `far` mm ahead, and the distance (mm) after which the train reaches it for the first time: a place more than
+    /// a lap ahead of a train at rest is reached a lap earlier.
+    fn target(&self, far: f64, from_rest: bool) -> Option<(Landmark, f64)> {
         let located = self.counted.driver().locate(self.train, self.now())?;
-        let mut at = self.way.nodes.iter().position(|node| *node == located.at.node)?;
-        let mut way = -located.at.distance.as_mm();
-        loop {
-            let node = *self.way.nodes.get(at)?;
-            let length = self.layout.open_hops_from(node, &self.stage.turnouts).next()?.length.as_mm();
-            if way + length >= far {
-                let offset = (far - way).max(0.0);
-                let round = self.way.surveyed(self.layout, self.way.edges.len());
-                // Who runs cannot stop for what is too near, and takes it the next time.
-                let is_first = from_rest && way + offset > round;
-                let ahead = if is_first { way + offset - round } else { way + offset };
-                return Some((Landmark { node, offset: Length::from_mm(offset) }, ahead));
-            }
-            way += length;
-            at = (at + 1) % self.way.nodes.len();
-        }
+        let (target, ahead) = self.circuit.ahead(self.layout, &self.prepared.turnouts, located.at, far)?;
+        let lap = self.circuit.surveyed(self.layout, self.circuit.edges.len());
+        // A running train cannot stop at a place that is too near, and stops there a lap later.
+        Some((target, if from_rest && ahead > lap { ahead - lap } else { ahead }))
     }
 
     /// One order, from rest or on the run.
@@ -189,18 +147,19 @@ impl Trip<'_, '_> {
             trouble: None,
         };
         if !from_rest {
-            let run = Order::Speed { train: self.train, step: self.nearest(RUNS_AT) };
+            let run =
+                Order::Speed { train: self.train, step: self.prepared.nearest_step(self.train, RUNS_AT) };
             let _ = self.counted.order(self.now(), run);
             let until = self.now() + TimeSpan::from_s(RUNS_FOR);
-            while self.counted.drive(&mut self.stage.line, until).is_some() {}
+            while self.counted.drive(&mut self.prepared.line, until).is_some() {}
         }
         let far = self.choice.between(FAR[0], FAR[1]);
         let mean = self.choice.between(MEAN[0], MEAN[1]);
-        let Some((target, way)) = self.target(far, from_rest) else {
-            arrived.trouble = Some("nobody knows where it is".to_owned());
+        let Some((target, distance)) = self.target(far, from_rest) else {
+            arrived.trouble = Some("its position is unknown".to_owned());
             return arrived;
         };
-        if from_rest && way < FAR[0] {
+        if from_rest && distance < FAR[0] {
             arrived.from = Began::RestNearBy;
         }
         let mut within = TimeSpan::from_s(far / mean + if from_rest { START_AND_STOP } else { 0.0 });
@@ -212,8 +171,8 @@ impl Trip<'_, '_> {
             arrived.refused = true;
             order = self.order(target, within, mean);
         }
-        arrived.asked = [within.as_s(), way];
-        let (by, mishaps) = (self.now() + within, self.stage.world().mishaps().len());
+        arrived.asked = [within.as_s(), distance];
+        let (by, incidents) = (self.now() + within, self.prepared.world().incidents().len());
         match order {
             Ok(order) => {
                 if let Err(trouble) = self.until_done(order, by + TimeSpan::from_s(PATIENCE)) {
@@ -223,8 +182,8 @@ impl Trip<'_, '_> {
             Err(why) => arrived.trouble = Some(why.to_string()),
         }
         let until = self.now() + TimeSpan::from_s(STANDS_WITHIN);
-        while self.counted.drive(&mut self.stage.line, until).is_some() {}
-        if self.stage.world().mishaps().len() > mishaps {
+        while self.counted.drive(&mut self.prepared.line, until).is_some() {}
+        if self.prepared.world().incidents().len() > incidents {
             arrived.trouble = Some("it came to grief".to_owned());
         }
         arrived.commands = self.counted.steps(self.train) - before;
@@ -237,19 +196,19 @@ impl Trip<'_, '_> {
     fn order(&mut self, target: Landmark, within: TimeSpan, mean: f64) -> Result<OrderId, Refusal> {
         let train = self.train;
         let order = match self.by {
-            By::Driver | By::Told => Order::Arrive { train, target, within },
+            By::Footplate | By::Oracle => Order::Arrive { train, target, within },
             By::Step => {
-                let step = Some(self.nearest(mean));
+                let step = Some(self.prepared.nearest_step(self.train, mean));
                 Order::Stop(StopOrder { step, ..StopOrder::at(train, target) })
             }
         };
-        self.counted.order(self.stage.line.now(), order)
+        self.counted.order(self.prepared.line.now(), order)
     }
 
     fn until_done(&mut self, order: OrderId, patience: Timestamp) -> Result<(), String> {
         while self.now() < patience {
             let look = patience.min(self.now() + LOOK);
-            let notice = self.counted.drive(&mut self.stage.line, look);
+            let notice = self.counted.drive(&mut self.prepared.line, look);
             if let Some((_, ended, why)) = notice.as_ref().and_then(cut_short)
                 && ended.is_none_or(|ended| ended == order)
             {
@@ -265,12 +224,12 @@ impl Trip<'_, '_> {
     }
 
     fn late_and_beyond(&self, target: Landmark, by: Timestamp) -> Option<[f64; 2]> {
-        let truth = self.stage.world().truth();
+        let truth = self.prepared.world().truth();
         let stood = truth.train(self.train)?.at_rest_since?;
         let past = truth.past(self.train, self.layout.sensor_at(target.node)?)?;
         let beyond = (past - target.offset).as_mm();
-        let lap: f64 = self.way.edges.iter().map(|edge| truth.track().length(*edge).as_mm()).sum();
-        // A contact that it has not come by yet is a round behind it, and the one behind it a round ahead.
+        let lap: f64 = self.circuit.edges.iter().map(|edge| truth.track().length(*edge).as_mm()).sum();
+        // A sensor that it has not passed yet is a lap behind it, and one that it has passed may be a lap ahead.
         let beyond = beyond - lap * (beyond / lap).round();
         Some([(stood - by).as_s(), beyond])
     }

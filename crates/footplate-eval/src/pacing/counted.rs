@@ -1,4 +1,4 @@
-//! What drives the trains of a scorer, with its commands counted on their way out.
+//! The driver of the trains of a score, with a count of its commands.
 
 use std::collections::BTreeMap;
 
@@ -10,28 +10,28 @@ use footplate_wire::LinkNotice;
 
 use crate::testbed::VirtualLine;
 
-/// What passes orders on to the driver.
+/// What is above the driver.
 enum Control {
-    /// The dispatcher with its watchdog: what people drive.
+    /// The dispatcher with its watchdog, as in operation.
     Dispatched(Box<Dispatcher>),
-    /// The driver alone, for simpler ways to drive that are compared with it.
+    /// The driver alone, for simpler methods.
     Bare(Box<Driver>),
 }
 
-/// Passes everything on, and counts the steps told to each train.
+/// A driver that counts the steps commanded to each train.
 pub(super) struct Counted {
     control: Control,
     steps: BTreeMap<TrainId, usize>,
 }
 
 impl Counted {
-    /// Drives as people do, through the dispatcher and its watchdog.
+    /// Drives through the dispatcher and its watchdog.
     pub(super) fn dispatched(now: Timestamp, driver: Driver) -> Self {
         let control = Control::Dispatched(Box::new(Dispatcher::watched(now, driver)));
         Self { control, steps: BTreeMap::new() }
     }
 
-    /// Drives without anything above the driver.
+    /// Drives with the driver alone.
     pub(super) fn bare(driver: Driver) -> Self {
         Self { control: Control::Bare(Box::new(driver)), steps: BTreeMap::new() }
     }
@@ -43,7 +43,7 @@ impl Counted {
         }
     }
 
-    /// A person says how long a train is.
+    /// Sets the lengths of a train.
     pub(super) fn set_lengths(&mut self, now: Timestamp, train: TrainId, lengths: TrainLengths) {
         match &mut self.control {
             Control::Dispatched(dispatcher) => dispatcher.set_lengths(now, train, lengths),
@@ -58,12 +58,12 @@ impl Counted {
         }
     }
 
-    /// How many steps a train has been told so far.
+    /// The number of steps commanded to a train so far.
     pub(super) fn steps(&self, train: TrainId) -> usize {
         self.steps.get(&train).copied().unwrap_or_default()
     }
 
-    /// Lets it drive until it has something to say or a time has come.
+    /// Drives until a notice or a time.
     pub(super) fn drive(&mut self, line: &mut VirtualLine<'_>, until: Timestamp) -> Option<Notice> {
         line.drive_hearing(self, until, |counted, now, notice: &LinkNotice| {
             if let (Control::Dispatched(dispatcher), Some(news)) = (&mut counted.control, notice.news()) {
@@ -73,7 +73,7 @@ impl Counted {
     }
 }
 
-/// The train whose order a notice ends before it was carried out, with the order where it has a number, and why.
+/// The train whose order failed according to a notice, with the number of the order if there is one, and the reason.
 pub(super) fn cut_short(notice: &Notice) -> Option<(TrainId, Option<OrderId>, String)> {
     match notice {
         Notice::GivenUp { train, order, why } => Some((*train, Some(*order), why.to_string())),

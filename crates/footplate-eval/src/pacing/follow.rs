@@ -1,4 +1,4 @@
-//! Three trains in a row behind one that changes its speed, beside followers that go a step up or down.
+//! Following a train that changes its speed, compared with followers that change their step by one.
 
 use std::collections::BTreeMap;
 
@@ -7,57 +7,40 @@ use footplate_core::control::{Gap, Notice, Order, Refusal, TrainLengths};
 use footplate_core::{Length, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::living::Truth;
 
+use super::By;
 use super::counted::{Counted, cut_short};
-use super::hold::{speed, steps};
 use super::tracked::{LOOK, Odometer};
 use crate::seeds::Choice;
-use crate::testbed::{LongestCircuit, PreparedTrains};
+use crate::testbed::{LongestCircuit, PreparedTrains, speed};
 
 /// The leader runs at speeds between these (mm/s), each for a time between those (s).
 const LEADS_AT: [f64; 2] = [200.0, 320.0];
 const CHANGES_AFTER: [f64; 2] = [15.0, 40.0];
-/// Contacts from one train to the next when they are put down.
+/// Sensors from one train to the next at the start.
 const APART: usize = 2;
-/// The leader is on its way for so long (s) before the next follows it.
+/// The time between the starts of two trains (s).
 const HEAD_START: f64 = 3.0;
-/// Followers find their gaps within this (s).
+/// The time for followers to reach their gaps (s).
 const FINDS_WITHIN: f64 = 60.0;
-/// The other follower runs at the step that is nearest to its leader's speed, and one above or below while it is off by more
-/// (s).
+/// The simple follower runs at the step nearest to its leader's speed, and at one above or below while the error of its gap
+/// is larger (s).
 const STEPS_BEYOND: f64 = 0.1;
-/// A person measures the trains with a ruler: the longest overhang and the longest shoe of any of them.
+/// The longest overhang and the longest shoe of any train, measured with a ruler.
 const LENGTHS: TrainLengths =
     TrainLengths { overhang: Length::from_mm(100.0), pickup: Length::from_mm(45.0) };
 
-/// What is said of trains that touched, derailed or ran off the track.
+/// The failure of trains that touched, derailed or ran off the track.
 pub(super) const GRIEF: &str = "they came to grief";
 
-/// Who drove.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum By {
-    /// The driver.
-    Driver,
-    /// A step up or down at a contact.
-    Steps,
-}
+/// The drivers of followers.
+pub(super) const DRIVERS: [By; 2] = [By::Footplate, By::Step];
 
-impl By {
-    pub(super) const ALL: [Self; 2] = [Self::Driver, Self::Steps];
-
-    pub(super) const fn key(self) -> &'static str {
-        match self {
-            Self::Driver => "footplate",
-            Self::Steps => "a step up or down",
-        }
-    }
-}
-
-/// What is to be kept.
+/// The kind of gap.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Kept {
-    /// A time from contact to contact.
+    /// A time between two trains at one sensor.
     Time,
-    /// A length from bumper to bumper.
+    /// A distance from buffer to buffer.
     Length,
 }
 
@@ -79,49 +62,49 @@ pub(super) struct Followed {
     pub(super) train: TrainId,
     /// Its place behind the first.
     pub(super) place: usize,
-    /// The gap that was asked for first, and the one that was kept (s or mm).
+    /// The gap that was ordered first, and the accepted one (s or mm).
     pub(super) gaps: [f64; 2],
-    /// How much later than asked the train came by each contact (s), or how much farther behind than asked it was at each
-    /// look (mm).
+    /// The errors of the gap: at each sensor in s, or at each sample in mm; positive if it was too large.
     pub(super) off: Vec<f64>,
-    /// The least distance from bumper to bumper (mm).
+    /// The least distance from buffer to buffer (mm).
     pub(super) nearest: f64,
-    /// How often it was held back.
+    /// How often speed supervision slowed it.
     pub(super) held_back: usize,
     pub(super) seconds: f64,
     pub(super) commands: usize,
     pub(super) trouble: Option<String>,
 }
 
-/// All gaps by everybody, for so long (s). Who goes up or down by steps keeps times.
+/// Keeps each gap with each driver for a time (s); the simple follower keeps times only.
 pub(super) fn follow(
-    stage: &PreparedTrains<'_>,
-    way: &LongestCircuit,
+    prepared: &PreparedTrains<'_>,
+    circuit: &LongestCircuit,
     trains: &[TrainId],
     (gaps, lasts): (&[(Kept, f64)], f64),
     choice: &mut Choice,
 ) -> anyhow::Result<Vec<Followed>> {
     let seed = choice.between(0.0, 1e9) as u64;
-    let start = (choice.between(0.0, 1e6) as usize) % way.nodes.len().max(1);
+    let start = (choice.between(0.0, 1e6) as usize) % circuit.nodes.len().max(1);
     let mut all = Vec::new();
     for (kept, gap) in gaps {
-        for by in By::ALL.into_iter().filter(|by| *by == By::Driver || *kept == Kept::Time) {
-            let mut stage = stage.clone();
+        for by in DRIVERS.into_iter().filter(|by| *by == By::Footplate || *kept == Kept::Time) {
+            let mut prepared = prepared.clone();
             for (nth, train) in trains.iter().enumerate() {
                 let at = start + APART * (trains.len() - nth);
-                let node = *way.nodes.get(at % way.nodes.len()).context("a way without a contact")?;
-                stage.put(*train, node, Length::from_mm(60.0))?;
+                let node =
+                    *circuit.nodes.get(at % circuit.nodes.len()).context("a circuit without a sensor")?;
+                prepared.put(*train, node, Length::from_mm(60.0))?;
             }
-            let row = Row::new(stage, trains, (*kept, *gap), by, Choice::new(seed));
+            let row = Row::new(prepared, trains, (*kept, *gap), by, Choice::new(seed));
             all.extend(row.run(lasts));
         }
     }
     Ok(all)
 }
 
-/// Trains in a row.
+/// Trains in a row, each following the one ahead.
 struct Row<'a, 'l> {
-    stage: PreparedTrains<'l>,
+    prepared: PreparedTrains<'l>,
     counted: Counted,
     trains: &'a [TrainId],
     kept: Kept,
@@ -131,23 +114,23 @@ struct Row<'a, 'l> {
     odometers: BTreeMap<TrainId, Odometer>,
     /// When the leader changes its speed.
     changes: Timestamp,
-    /// When each train was reported at each contact, for those that go up or down by steps.
+    /// When each train was detected at each sensor, for the simple follower.
     reported: BTreeMap<(TrainId, SensorId), Timestamp>,
     followed: Vec<Followed>,
 }
 
 impl<'a, 'l> Row<'a, 'l> {
     fn new(
-        stage: PreparedTrains<'l>,
+        prepared: PreparedTrains<'l>,
         trains: &'a [TrainId],
         (kept, gap): (Kept, f64),
         by: By,
         choice: Choice,
     ) -> Self {
-        let now = stage.line.now();
+        let now = prepared.line.now();
         let mut counted = match by {
-            By::Driver => Counted::dispatched(now, stage.driver()),
-            By::Steps => Counted::bare(stage.driver()),
+            By::Footplate => Counted::dispatched(now, prepared.driver()),
+            By::Oracle | By::Step => Counted::bare(prepared.driver()),
         };
         trains.iter().for_each(|train| counted.set_lengths(now, *train, LENGTHS));
         let followed = (1..trains.len()).map(|place| Followed {
@@ -164,10 +147,10 @@ impl<'a, 'l> Row<'a, 'l> {
             trouble: None,
         });
         let odometers = trains.iter().map(|train| (*train, Odometer::default())).collect();
-        let changes = stage.line.now();
+        let changes = prepared.line.now();
         let followed = followed.collect();
         Self {
-            stage,
+            prepared,
             counted,
             trains,
             kept,
@@ -182,15 +165,15 @@ impl<'a, 'l> Row<'a, 'l> {
     }
 
     fn now(&self) -> Timestamp {
-        self.stage.line.now()
+        self.prepared.line.now()
     }
 
     fn run(mut self, lasts: f64) -> Vec<Followed> {
-        let mishaps = self.stage.world().mishaps().len();
+        let incidents = self.prepared.world().incidents().len();
         for place in 1..self.trains.len() {
             self.drive(HEAD_START);
             self.begin(place);
-            // A train that stands where others come round would be run into: no row, no figures.
+            // The others would run into a train that stays at rest: no figures.
             if self.followed[place - 1].trouble.is_some() {
                 return self.followed;
             }
@@ -199,8 +182,8 @@ impl<'a, 'l> Row<'a, 'l> {
         let (since, before) =
             (self.now(), self.trains.iter().map(|train| self.counted.steps(*train)).collect::<Vec<_>>());
         self.drive(lasts);
-        let grief = self.stage.world().mishaps().len() > mishaps;
-        let truth = self.stage.world().truth();
+        let grief = self.prepared.world().incidents().len() > incidents;
+        let truth = self.prepared.world().truth();
         for followed in &mut self.followed {
             let leader = self.trains[followed.place - 1];
             followed.seconds = lasts;
@@ -213,13 +196,11 @@ impl<'a, 'l> Row<'a, 'l> {
         self.followed
     }
 
-    /// One more train follows.
+    /// Starts the next train.
     fn begin(&mut self, place: usize) {
         let [leader, train] = [self.trains[place - 1], self.trains[place]];
-        if self.by == By::Steps {
-            let step = self.counted.driver().commanded(leader);
-            let leads_at = self.stage.models.get(&leader).map_or(0.0, |model| speed(model, step));
-            let step = self.nearest(train, leads_at);
+        if self.by == By::Step {
+            let step = self.step_like(leader, train);
             let _ = self.counted.order(self.now(), Order::Speed { train, step });
             return;
         }
@@ -242,12 +223,11 @@ impl<'a, 'l> Row<'a, 'l> {
         }
     }
 
-    fn nearest(&self, train: TrainId, mm_per_s: f64) -> SpeedStep {
-        let model = self.stage.models.get(&train);
-        let off = |step: &SpeedStep| model.map_or(0.0, |model| (speed(model, *step) - mm_per_s).abs());
-        let nearest =
-            model.and_then(|model| steps(model).min_by(|one, other| off(one).total_cmp(&off(other))));
-        nearest.unwrap_or(SpeedStep::STAND)
+    /// The step of a train that is nearest to the speed of its leader.
+    fn step_like(&self, leader: TrainId, train: TrainId) -> SpeedStep {
+        let step = self.counted.driver().commanded(leader);
+        let leads_at = self.prepared.models.get(&leader).map_or(0.0, |model| speed(model, step));
+        self.prepared.nearest_step(train, leads_at)
     }
 
     fn drive(&mut self, seconds: f64) {
@@ -258,11 +238,11 @@ impl<'a, 'l> Row<'a, 'l> {
                 let after = self.choice.between(CHANGES_AFTER[0], CHANGES_AFTER[1]);
                 self.changes = self.now() + TimeSpan::from_s(after);
                 let train = self.trains[0];
-                let order = Order::Speed { train, step: self.nearest(train, speed) };
+                let order = Order::Speed { train, step: self.prepared.nearest_step(train, speed) };
                 let _ = self.counted.order(self.now(), order);
             }
             let look = until.min(self.now() + LOOK);
-            let notice = self.counted.drive(&mut self.stage.line, look);
+            let notice = self.counted.drive(&mut self.prepared.line, look);
             if let Some((train, _, why)) = notice.as_ref().and_then(cut_short) {
                 let of = self.followed.iter_mut().find(|followed| followed.train == train);
                 of.into_iter().for_each(|followed| followed.trouble = Some(why.clone()));
@@ -272,13 +252,13 @@ impl<'a, 'l> Row<'a, 'l> {
                     let held = self.followed.iter_mut().find(|followed| followed.train == train);
                     held.into_iter().for_each(|followed| followed.held_back += 1);
                 }
-                Some(Notice::Passed { train, passed, .. }) if self.by == By::Steps => {
+                Some(Notice::Passed { train, passed, .. }) if self.by == By::Step => {
                     self.step_up_or_down(train, passed.sensor, passed.window.middle());
                 }
                 Some(_) => {}
                 None => {
                     for (train, odometer) in &mut self.odometers {
-                        odometer.look(&self.stage.line, *train);
+                        odometer.look(&self.prepared.line, *train);
                     }
                 }
             }
@@ -291,9 +271,7 @@ impl<'a, 'l> Row<'a, 'l> {
         let Some(leader) = place.checked_sub(1).map(|ahead| self.trains[ahead]) else { return };
         let Some(led) = self.reported.get(&(leader, sensor)) else { return };
         let late = (at - *led).as_s() - self.gap;
-        let told = self.counted.driver().commanded(leader);
-        let leads_at = self.stage.models.get(&leader).map_or(0.0, |model| speed(model, told));
-        let like = self.nearest(train, leads_at).get();
+        let like = self.step_like(leader, train).get();
         let step = match late {
             late if late > STEPS_BEYOND => like.saturating_add(1),
             late if late < -STEPS_BEYOND => like.saturating_sub(1).max(1),
@@ -306,7 +284,7 @@ impl<'a, 'l> Row<'a, 'l> {
 }
 
 impl Followed {
-    /// Gaps and distances as they truly were.
+    /// Adds the true gaps and distances.
     fn compare(
         &mut self,
         truth: Truth<'_, '_>,
@@ -333,11 +311,11 @@ impl Followed {
         for (lead, follow) in
             both.into_iter().flat_map(|(one, other)| one.since(since).zip(other.since(since)))
         {
-            let way = lead.1 - follow.1 - ahead;
-            self.nearest = self.nearest.min(way - between);
+            let distance = lead.1 - follow.1 - ahead;
+            self.nearest = self.nearest.min(distance - between);
             if self.kept == Kept::Length {
-                // By the lengths that the driver has been told.
-                self.off.push(way - (LENGTHS.ahead() + LENGTHS.behind()).as_mm() - self.gaps[1]);
+                // By the lengths that the driver knows.
+                self.off.push(distance - (LENGTHS.ahead() + LENGTHS.behind()).as_mm() - self.gaps[1]);
             }
         }
     }

@@ -5,38 +5,38 @@ use std::ops::Range;
 
 use serde_json::{Value, json};
 
-use super::Scored;
 use super::arrive::{self, Arrived};
 use super::follow::{self, Followed, Kept};
-use super::hold::{By, Held, HoldRecord};
+use super::hold::{Held, HoldRecord};
+use super::{By, Scored};
 use crate::figures::{quantile, root_mean_square, shown, within_pct};
 use crate::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
 # How well trains keep to a pace
 
-Random simulated trains, three on a layout, each calibrated from nothing known over the bytes of a virtual 6051. Contacts
+Random simulated trains, three on a layout, each calibrated from nothing known over the bytes of a virtual 6051. Sensors
 fail now and then. The simulator shares no formula with what drives, and its truth is used for these figures alone.
 ";
 
 const HOLD: &str = "\
 ## A speed held
 
-Speeds of 200 to 450 mm/s, each held for two minutes, on a way round of which the calibration has seen what it chose to. *Mean speed* is over every 3 m (asked: within 0.5 %), *position* is that
-of a train that had always run at the speed, from the contact at which the driver says it begins (asked: within 15 mm in
-95 % of the time). Both are counted on the map, on which a contact is where it was surveyed, and a train between two of them
-as far along as it truly is. *As believed* is where the driver took the same trains to be at the same moments: off is what
-its choice of steps and its answers to what contacts say come to, and the rest is what it did not know. *Told the train* is the
-same driver with a model made of the truth. The *nearest step* is what there was before.
+Speeds of 200 to 450 mm/s, each held for two minutes on a circuit that the calibration has partly seen. *Mean speed* is over every 3 m (asked: within 0.5 %). *Position* is relative
+to that of a train that always ran at the speed, from the sensor at which the driver says it begins (asked: within 15 mm in
+95 % of the time). Both are in surveyed lengths: a sensor is at its surveyed place, and between two sensors a train has run the
+same share of the surveyed distance as of the true one. *As estimated* is the position that the driver estimated at the same
+times: its error comes from the choice of steps and the response to detections, the rest from what the driver did not know. The
+*oracle* is the same driver with a model made of the truth. The *nearest step* is the simple driver.
 ";
 
 const ARRIVE: &str = "\
 ## In time at a place
 
-Places 1.8 to 6 m ahead, each to be stood at after a time that asks for 170 to 320 mm/s on the way; every other train runs
-when it is asked. *Near by* are places that turn out to lie less than 1.8 m ahead of a train at rest, as those a round and a
+Places 1.8 to 6 m ahead, each to be reached after a time that needs a mean speed of 170 to 320 mm/s; every other train runs
+when it is ordered. *Near by* are places that turn out to lie less than 1.8 m ahead of a train at rest, as those a round and a
 little ahead do: it waits, and moves up. Who cannot be in time is asked again for the time that it offers. True times and places
-of rest (asked: 0.3 s and 25 mm at the 95th percentile), median / 95th percentile. *Told the train* is the same driver with a
+of rest (asked: 0.3 s and 25 mm at the 95th percentile), median / 95th percentile. The *oracle* is the same driver with a
 model made of the truth. The *step of the mean speed* stops at the same place.
 ";
 
@@ -44,16 +44,21 @@ const FOLLOW: &str = "\
 ## Behind each other
 
 Three trains in a row for ten minutes, behind one that runs at 200 to 320 mm/s and changes its speed every 15 to 40 s. The
-*gap* is the true time from the train ahead at a contact to the follower there; *off* is what it differs from the one asked
+*gap* is the true time from the train ahead at a sensor to the follower there; *off* is what it differs from the one asked
 for, root mean square (asked: 60 ms), mean, and 95th percentile. A gap that would not be safe is refused, and the shortest
 safe one and 5 % kept instead. *Nearest* is truly from bumper to bumper (never less than 50 mm is promised). The follower
 beside it runs at the step nearest to its leader's speed, and one up or down while it is off by more than 100 ms.
 ";
 
 const FOLLOW_BY_LENGTH: &str = "\
-The same with a gap in length, from the rear of the train ahead to the front of the follower, as long as the driver was told that
-trains are; *off* is what that differs from the one kept, twenty times a second.
+The same with a gap in length, from the rear of the train ahead to the front of the follower, with the lengths that the driver
+knows; *off* is what that differs from the one kept, twenty times a second.
 ";
+
+/// The simple drivers in the three tables.
+const HELD_BY: &str = "nearest step";
+const ARRIVED_BY: &str = "step of the mean speed";
+const FOLLOWED_BY: &str = "a step up or down";
 
 /// What is asked of a mean speed (%), ...
 const MEAN_WITHIN: f64 = 0.5;
@@ -68,14 +73,14 @@ const ARRIVES_WITHIN: [f64; 2] = [0.3, 25.0];
 const MINUTES: [(&str, Range<f64>); 2] = [("first", 0.0..60.0), ("second", 60.0..f64::INFINITY)];
 
 /// All that was scored.
-pub struct Page<'r> {
+pub struct Page {
     /// What every seed came to.
-    pub scored: &'r [Scored],
+    pub scored: Vec<Scored>,
     /// What was asked for, as on the command line.
     pub asked: String,
 }
 
-impl WrittenScores for Page<'_> {
+impl WrittenScores for Page {
     const SCORER: &'static str = "pacing";
 
     fn head(&self) -> String {
@@ -105,7 +110,7 @@ impl WrittenScores for Page<'_> {
             scored.held.iter().map(move |held| {
                 let figures = Figures::of(core::iter::once(held), |held| &held.course, 0.0..f64::INFINITY);
                 json!({
-                    "seed": scored.seed, "train": held.train.0, "by": held.by.key(), "mm_per_s": held.speed,
+                    "seed": scored.seed, "train": held.train.0, "by": held.by.key(HELD_BY), "mm_per_s": held.speed,
                     "means_within_0_5_pct": figures.means_within_pct, "mean_off_pct_p95": figures.mean_off,
                     "place_off_mm_p95": figures.place_off, "place_off_mm_most": figures.farthest,
                     "commands_per_s": figures.commands_per_s, "trouble": held.trouble,
@@ -115,8 +120,8 @@ impl WrittenScores for Page<'_> {
         let arrived = self.scored.iter().flat_map(|scored| {
             scored.arrived.iter().map(move |arrived| {
                 json!({
-                    "seed": scored.seed, "train": arrived.train.0, "by": arrived.by.key(), "from": arrived.from.key(),
-                    "within_s": arrived.asked[0], "way_mm": arrived.asked[1], "offered": arrived.refused,
+                    "seed": scored.seed, "train": arrived.train.0, "by": arrived.by.key(ARRIVED_BY), "from": arrived.from.key(),
+                    "within_s": arrived.asked[0], "distance_mm": arrived.asked[1], "offered": arrived.refused,
                     "late_s": arrived.late_and_beyond.map(|[late, _]| late),
                     "beyond_mm": arrived.late_and_beyond.map(|[_, beyond]| beyond),
                     "commands": arrived.commands, "trouble": arrived.trouble,
@@ -131,7 +136,7 @@ impl WrittenScores for Page<'_> {
                 };
                 let off = || run.off.iter().map(|off| scale * off);
                 json!({
-                    "seed": scored.seed, "train": run.train.0, "by": run.by.key(), "place": run.place, "gap_in": kept,
+                    "seed": scored.seed, "train": run.train.0, "by": run.by.key(FOLLOWED_BY), "place": run.place, "gap_in": kept,
                     "gap": run.gaps[0], "kept": run.gaps[1], "rms_ms_or_mm": root_mean_square(off()),
                     "mean_ms_or_mm": off().sum::<f64>() / run.off.len().max(1) as f64, "looks": run.off.len(),
                     "nearest_mm": run.nearest, "held_back": run.held_back,
@@ -152,7 +157,7 @@ impl WrittenScores for Page<'_> {
             .scored
             .iter()
             .flat_map(|scored| &scored.arrived)
-            .filter(|arrived| arrived.by == arrive::By::Driver)
+            .filter(|arrived| arrived.by == By::Footplate)
             .filter_map(|arrived| arrived.late_and_beyond)
             .collect();
         let is_off =
@@ -169,7 +174,7 @@ impl WrittenScores for Page<'_> {
     }
 }
 
-impl Page<'_> {
+impl Page {
     fn write_followed(&self, output: &mut dyn Write) -> io::Result<()> {
         for (kept, unit, off_in) in [(Kept::Time, "s", "ms"), (Kept::Length, "mm", "mm")] {
             writeln!(
@@ -179,7 +184,7 @@ impl Page<'_> {
                  | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
             )?;
             let gaps = super::GAPS.into_iter().filter(|(of, _)| *of == kept);
-            let rows = gaps.flat_map(|(_, gap)| follow::By::ALL.map(|by| (gap, by)));
+            let rows = gaps.flat_map(|(_, gap)| follow::DRIVERS.map(|by| (gap, by)));
             for (gap, by, place) in rows.flat_map(|(gap, by)| [(gap, by, 1), (gap, by, 2)]) {
                 self.write_gap(output, (kept, gap), by, place)?;
             }
@@ -194,7 +199,7 @@ impl Page<'_> {
         &self,
         output: &mut dyn Write,
         (kept, gap): (Kept, f64),
-        by: follow::By,
+        by: By,
         place: usize,
     ) -> io::Result<()> {
         let is_of = |run: &&Followed| {
@@ -218,7 +223,7 @@ impl Page<'_> {
         writeln!(
             output,
             "| {} | {gap} | {} | {} | {least:.digits$} to {most:.digits$} | {} | {} | {} | {} | {} | {} | {:.2} |",
-            by.key(),
+            by.key(FOLLOWED_BY),
             ["first", "second"][place - 1],
             all.len(),
             shown(root_mean_square(off()), 0),
@@ -231,7 +236,7 @@ impl Page<'_> {
         )
     }
 
-    fn arrived(&self, by: arrive::By, from: arrive::Began) -> impl Iterator<Item = &Arrived> {
+    fn arrived(&self, by: By, from: arrive::Began) -> impl Iterator<Item = &Arrived> {
         let all = self.scored.iter().flat_map(|scored| &scored.arrived);
         all.filter(move |arrived| arrived.by == by && arrived.from == from)
     }
@@ -242,8 +247,7 @@ impl Page<'_> {
             "| driven by | asked | orders | other time offered | failed | late or early s | off mm | commands each |\n\
              | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: |"
         )?;
-        for (by, from) in arrive::By::ALL.into_iter().flat_map(|by| arrive::Began::ALL.map(|from| (by, from)))
-        {
+        for (by, from) in By::ALL.into_iter().flat_map(|by| arrive::Began::ALL.map(|from| (by, from))) {
             let all: Vec<&Arrived> = self.arrived(by, from).collect();
             let off = |which: usize| {
                 let values = all.iter().filter_map(|arrived| arrived.late_and_beyond);
@@ -255,7 +259,7 @@ impl Page<'_> {
             writeln!(
                 output,
                 "| {} | {} | {} | {} | {} | {} / {} | {} / {} | {:.1} |",
-                by.key(),
+                by.key(ARRIVED_BY),
                 from.key(),
                 all.len(),
                 all.iter().filter(|arrived| arrived.refused).count(),
@@ -310,9 +314,9 @@ struct HeldRow {
 
 /// All rows, for each part of a run.
 fn held_rows() -> impl Iterator<Item = (HeldRow, &'static str, Range<f64>)> {
-    let row = |by: By| HeldRow { name: by.key(), by, course: |held| &held.course };
-    let believed = HeldRow { name: "as believed", by: By::Driver, course: |held| &held.believed };
-    let rows = [row(By::Driver), believed, row(By::Told), row(By::Step)];
+    let row = |by: By| HeldRow { name: by.key(HELD_BY), by, course: |held| &held.course };
+    let estimated = HeldRow { name: "as estimated", by: By::Footplate, course: |held| &held.estimated };
+    let rows = [row(By::Footplate), estimated, row(By::Oracle), row(By::Step)];
     rows.into_iter().flat_map(|row| MINUTES.map(|(minute, span)| (row, minute, span)))
 }
 

@@ -1,8 +1,8 @@
-//! Where a train really went, counted on the map that everybody has.
+//! The true motion of a train in surveyed lengths.
 //!
-//! Rails are not as long as they were surveyed, and nobody can keep a train to a millimetre of a map that is centimetres
-//! off. What counts is where the train is between its contacts: a contact is where the map has it, and between two of them
-//! the train is as far along the surveyed way as it is along the true one.
+//! True lengths differ from surveyed ones by centimetres, which no driver can know. So positions are relative to sensors: a
+//! sensor is at its surveyed place, and between two sensors the train has run the same share of the surveyed distance as of
+//! the true one.
 
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{NodeId, TimeSpan, Timestamp, TrainId};
@@ -10,44 +10,44 @@ use footplate_sim::living::Truth;
 
 use crate::testbed::VirtualLine;
 
-/// How often it is looked where a train is: a straight line between two looks is off by a tenth of a millimetre.
+/// The interval of samples: between two of them, linear interpolation is accurate to a tenth of a millimetre.
 pub(super) const LOOK: TimeSpan = TimeSpan::from_ms(50);
 
-/// What one train's odometer showed, look by look.
+/// The samples of the odometer of one train.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Odometer(Vec<(Timestamp, f64)>);
 
 impl Odometer {
-    /// Looks once.
+    /// Takes a sample.
     pub(super) fn look(&mut self, line: &VirtualLine<'_>, train: TrainId) {
         let truth = line.station.world().truth().train(train);
         self.0.extend(truth.map(|truth| (line.now(), truth.odometer.as_mm())));
     }
 
-    /// Looks since a time: when, and what it showed (mm).
+    /// The samples since a time: when, and the distance (mm).
     pub(super) fn since(&self, since: Timestamp) -> impl Iterator<Item = (Timestamp, f64)> {
         self.0.iter().copied().filter(move |(at, _)| *at >= since)
     }
 }
 
-/// A train came to a contact.
+/// A passage of a sensor.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mark {
     pub(super) node: NodeId,
     pub(super) at: Timestamp,
     odometer: f64,
-    /// Surveyed way since the first of them (mm).
+    /// The surveyed distance from the first sensor (mm).
     pub(super) surveyed: f64,
 }
 
-/// A train's way from contact to contact.
+/// The path of a train from sensor to sensor.
 #[derive(Debug, Clone, Default)]
-pub(super) struct TrueWay {
+pub(super) struct TruePath {
     pub(super) marks: Vec<Mark>,
 }
 
-impl TrueWay {
-    /// The way of a train since a time, as far as it went from contact to contact of the map.
+impl TruePath {
+    /// The path of a train since a time, up to the first passage that the layout does not explain.
     pub(super) fn since(
         layout: &Layout,
         turnouts: &TurnoutStates,
@@ -74,7 +74,7 @@ impl TrueWay {
         Self { marks }
     }
 
-    /// The surveyed way (mm) where the odometer shows something; `None` before the first contact and behind the last.
+    /// The surveyed distance (mm) at a reading of the odometer; `None` before the first sensor and after the last.
     pub(super) fn surveyed(&self, odometer: f64) -> Option<f64> {
         let next = self.marks.partition_point(|mark| mark.odometer <= odometer);
         let [from, to] = [self.marks.get(next.checked_sub(1)?)?, self.marks.get(next)?];
@@ -82,7 +82,7 @@ impl TrueWay {
         Some(from.surveyed + part * (to.surveyed - from.surveyed))
     }
 
-    /// The last contact before a time.
+    /// The last passage before a time.
     pub(super) fn before(&self, at: Timestamp) -> Option<&Mark> {
         self.marks.iter().rev().find(|mark| mark.at <= at)
     }

@@ -17,9 +17,9 @@ formula with what drives, and its truth is used for these figures alone.
 
 const LEGEND: &str = "\
 Distances are sums of edges between neighbouring sensors, in true millimetres. *Off* is the root mean square of what the
-survey is off, *worst* the farthest; *inside* is how many true distances lie in their 95 % interval. *As felt* is the root mean
-square of a survey that knows exactly how long trains feel every distance, and the known one: speed on curves and slopes is
-not that on the straight, and contacts do not close where a tape would be laid; no survey by timing is nearer in the mean.
+survey is off, *worst* the farthest; *inside* is how many true distances lie in their 95 % interval. *Path* is the root mean
+square of a survey that knows all path lengths exactly, and the known distance: speed on curves and slopes is
+not that on the straight, and sensors do not close where a tape would be laid; no survey by timing is nearer in the mean.
 *Scale* is by how much all distances are longer in common, and what the survey says of that (one standard deviation).
 *Unseen* are distances over which no train ran.
 ";
@@ -48,7 +48,7 @@ impl WrittenScores for Page<'_> {
     fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
         writeln!(
             output,
-            "| seed | distances | unseen | off mm | worst mm | as felt mm | inside % | scale % | said ± % |\n\
+            "| seed | distances | unseen | off mm | worst mm | path mm | inside % | scale % | said ± % |\n\
              | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
         )?;
         for world in self.worlds {
@@ -92,13 +92,13 @@ impl WrittenScores for Page<'_> {
             let distances = world.distances.iter().map(|distance| {
                 json!({
                     "from": distance.from, "to": distance.to, "true_mm": distance.true_mm, "off_mm": distance.off_mm,
-                    "uncertainty_mm": distance.uncertainty_mm, "felt_off_mm": distance.path_off_mm,
+                    "uncertainty_mm": distance.uncertainty_mm, "path_off_mm": distance.path_off_mm,
                 })
             });
             json!({
-                "seed": world.seed, "rms_mm": figures.off, "worst_mm": figures.worst, "felt_rms_mm": figures.path_length,
+                "seed": world.seed, "rms_mm": figures.off, "worst_mm": figures.worst, "path_rms_mm": figures.path_length,
                 "inside_pct": figures.inside_pct, "scale_pct": figures.scale_pct, "said_scale_pct": 100.0 * world.scale,
-                "unseen": world.not_run, "mishaps": world.faults, "distances": distances.collect::<Vec<Value>>(),
+                "unseen": world.not_run, "incidents": world.faults, "distances": distances.collect::<Vec<Value>>(),
             })
         });
         let all = Figures::of(self.worlds.iter().flat_map(Surveyed::scored));
@@ -106,7 +106,7 @@ impl WrittenScores for Page<'_> {
         writeln!(
             output,
             "{}",
-            json!({ "rms_mm": off, "felt_rms_mm": all.path_length, "inside_pct": inside, "worlds": worlds.collect::<Vec<Value>>() })
+            json!({ "rms_mm": off, "path_rms_mm": all.path_length, "inside_pct": inside, "worlds": worlds.collect::<Vec<Value>>() })
         )
     }
 }

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use footplate_core::track::{Layout, Leg, TurnoutStates};
+use footplate_core::track::{Landmark, Layout, Leg, TurnoutStates};
+use footplate_core::tracking::PathPoint;
 use footplate_core::{EdgeId, Length, NodeId};
 
 /// The least length of an edge that a train may rest on beside the circuit, and its place past the sensor.
@@ -25,6 +26,29 @@ impl LongestCircuit {
     pub fn surveyed(&self, layout: &Layout, edges: usize) -> f64 {
         let edges = self.edges.iter().take(edges).filter_map(|edge| layout.edge(*edge));
         edges.map(|edge| edge.length.as_mm()).sum()
+    }
+
+    /// The place `far_mm` ahead of a train's position on it, and the distance (mm) to that place; a train that is past it
+    /// already gets the place of the next sensor.
+    pub fn ahead(
+        &self,
+        layout: &Layout,
+        turnouts: &TurnoutStates,
+        from: PathPoint,
+        far_mm: f64,
+    ) -> Option<(Landmark, f64)> {
+        let mut at = self.nodes.iter().position(|node| *node == from.node)?;
+        let mut distance = -from.distance.as_mm();
+        loop {
+            let node = *self.nodes.get(at)?;
+            let length = layout.open_hops_from(node, turnouts).next()?.length.as_mm();
+            if distance + length >= far_mm {
+                let offset = (far_mm - distance).max(0.0);
+                return Some((Landmark { node, offset: Length::from_mm(offset) }, distance + offset));
+            }
+            distance += length;
+            at = (at + 1) % self.nodes.len();
+        }
     }
 
     /// Finds the circuit with the most sensors; empty if there is none.

@@ -7,7 +7,7 @@ use footplate_core::control::{Driver, Machine};
 use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg, Position, TurnoutStates};
 use footplate_core::tracking::PathPoint;
-use footplate_core::{Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Approach, Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::living::{End, LivingLayout, LivingSwitches, VirtualStation};
 
 use super::{VirtualLine, calibrate};
@@ -77,11 +77,11 @@ impl<'l> PreparedTrains<'l> {
             let starts = starts_at.iter().cycle().skip(nth).take(trains.len()).flatten();
             let mut model = None;
             for (position, leads) in starts {
-                let faults = line.station.world().mishaps().len();
+                let faults = line.station.world().incidents().len();
                 line.station.world_mut().place(*train, *position, *leads)?;
                 model = Some(calibrate(assumed, &mut line, *train, budget).model);
                 line.station.world_mut().lift(*train);
-                if line.station.world().mishaps().len() == faults {
+                if line.station.world().incidents().len() == faults {
                     break;
                 }
             }
@@ -121,6 +121,11 @@ impl<'l> PreparedTrains<'l> {
         Ok(())
     }
 
+    /// The step of a train whose speed is nearest to one in mm/s; 0 for an unknown train.
+    pub fn nearest_step(&self, train: TrainId, mm_per_s: f64) -> SpeedStep {
+        self.models.get(&train).map_or(SpeedStep::STAND, |model| nearest_step(model, steps(model), mm_per_s))
+    }
+
     /// A driver that knows the trains and their places.
     pub fn driver(&self) -> Driver {
         self.driver_on(self.layout)
@@ -137,6 +142,26 @@ impl<'l> PreparedTrains<'l> {
         }
         driver
     }
+}
+
+/// All steps of a train except 0.
+pub(crate) fn steps(model: &MotionModel) -> impl Iterator<Item = SpeedStep> + use<> {
+    (1..=model.highest().get()).filter_map(SpeedStep::new)
+}
+
+/// The estimated speed of a step, reached from below, in mm/s.
+pub(crate) fn speed(model: &MotionModel, step: SpeedStep) -> f64 {
+    model.speed(step, Approach::Below).value.as_mm_per_s()
+}
+
+/// The one of several steps whose speed is nearest to one in mm/s.
+pub(crate) fn nearest_step(
+    model: &MotionModel,
+    steps: impl Iterator<Item = SpeedStep>,
+    mm_per_s: f64,
+) -> SpeedStep {
+    let off = |step: &SpeedStep| (speed(model, *step) - mm_per_s).abs();
+    steps.min_by(|one, other| off(one).total_cmp(&off(other))).unwrap_or(SpeedStep::STAND)
 }
 
 /// A machine that sends no commands.
@@ -175,7 +200,7 @@ mod tests {
             let located = driver.locate(train, prepared.line.now()).expect("placed");
             assert_eq!(located.at.node, node);
             let sensor = layout.sensor_at(node).expect("a sensor");
-            let past = prepared.world().truth().felt_past(train, sensor).expect("near");
+            let past = prepared.world().truth().past(train, sensor).expect("near");
             assert!((past - located.at.distance).abs() < Length::from_mm(30.0), "{past:?}");
             assert!(driver.is_at_rest(train, prepared.line.now()));
         }

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use footplate_sim::MishapKind;
+use footplate_sim::IncidentKind;
 use serde_json::{Value, json};
 
 use super::session::Tally;
@@ -22,7 +22,7 @@ const LEGEND: &str = "\
 a train came to no destination. *Runs*: of these, one in a thousand may end beyond its reservation. *Intrusions*: times that any
 part of a train was on track that it had not reserved. *Mistaken*: of all rests past a sensor, those more than four standard
 deviations from the estimate. *Alarms*: times that the watchdog stopped a train to locate it again. *Person*: times that it
-needed a person to read off where the train was. *No way*: destinations too near to the end of a track, for which another was
+needed a person to read off where the train was. *No route*: destinations too near to the end of a track, for which another was
 drawn. *By blocks*: the same trains, orders and stops, but the track between sensors is reserved as a whole, with all its
 turnouts, as block systems do.
 ";
@@ -51,7 +51,7 @@ impl WrittenScores for Page<'_> {
         writeln!(
             output,
             "| seed | hours | arrivals | per hour and train | waited s | took s | nowhere s | runs | stepped aside | \
-             collisions | derailments | overruns | intrusions | mistaken | wrong legs | alarms | person | no way |\n\
+             collisions | derailments | overruns | intrusions | mistaken | wrong legs | alarms | person | no route |\n\
              | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | \
              ---: | ---: | ---: |"
         )?;
@@ -72,12 +72,12 @@ impl WrittenScores for Page<'_> {
     }
 
     fn rates(&self) -> Vec<Rate> {
-        let mishaps = self.tallies.iter().filter(|tally| !tally.mishaps.is_empty()).count();
+        let incidents = self.tallies.iter().filter(|tally| !tally.incidents.is_empty()).count();
         let sum = |of: fn(&Tally) -> usize| self.tallies.iter().map(of).sum::<usize>();
         let runs = sum(|tally| tally.routes as usize + tally.turns);
         let stuck = self.tallies.iter().filter(|tally| tally.starved > LONGEST_NOWHERE_S).count();
         vec![
-            Rate::grief(mishaps, self.tallies.len()),
+            Rate::grief(incidents, self.tallies.len()),
             Rate::new("runs onto track of others", sum(|tally| tally.intrusions.len()), runs),
             Rate::new("sessions with a train nowhere for more than 900 s", stuck, self.tallies.len()),
             Rate::new("trains that needed a person", sum(|tally| tally.hands as usize), runs),
@@ -93,10 +93,10 @@ fn seeds(tallies: &[Tally]) -> Value {
                 "waited_s": tally.waits, "took_s": tally.took, "nowhere_s": tally.starved,
                 "errors_mm": tally.errors, "routes": tally.routes, "turns": tally.turns, "aside": tally.aside,
                 "deadlocks": tally.deadlocks, "diverged": tally.diverged, "lost": tally.lost, "alarms": tally.dangers,
-                "hands": tally.hands, "rests": tally.beliefs, "mistaken": tally.mistaken, "refused": tally.refused, "withdrawn": tally.withdrawn,
+                "hands": tally.hands, "rests": tally.rests, "mistaken": tally.mistaken, "refused": tally.refused, "withdrawn": tally.withdrawn,
                 "intrusions": tally.intrusions.iter().map(|(at, train)| json!([at.as_s(), train.0]))
                     .collect::<Vec<Value>>(),
-                "mishaps": tally.mishaps.iter().map(|mishap| format!("{mishap:?}")).collect::<Vec<_>>(),
+                "incidents": tally.incidents.iter().map(|incident| format!("{incident:?}")).collect::<Vec<_>>(),
         })
     };
     tallies.iter().map(one).collect()
@@ -121,12 +121,12 @@ fn row(output: &mut dyn Write, name: &str, tallies: &[&Tally]) -> io::Result<()>
         mean(|tally| &tally.took),
         sum(|tally| tally.routes as usize + tally.turns),
         sum(|tally| tally.aside as usize),
-        sum(|tally| mishaps(tally, |kind| matches!(kind, MishapKind::Collision { .. })) / 2),
-        sum(|tally| mishaps(tally, |kind| matches!(kind, MishapKind::Derailment { .. }))),
-        sum(|tally| mishaps(tally, |kind| matches!(kind, MishapKind::Overrun))),
+        sum(|tally| incidents(tally, |kind| matches!(kind, IncidentKind::Collision { .. })) / 2),
+        sum(|tally| incidents(tally, |kind| matches!(kind, IncidentKind::Derailment { .. }))),
+        sum(|tally| incidents(tally, |kind| matches!(kind, IncidentKind::Overrun))),
         sum(|tally| tally.intrusions.len()),
         sum(|tally| tally.mistaken as usize),
-        sum(|tally| tally.beliefs as usize),
+        sum(|tally| tally.rests as usize),
         sum(|tally| tally.diverged as usize),
         sum(|tally| tally.dangers as usize),
         sum(|tally| tally.hands as usize),
@@ -134,7 +134,7 @@ fn row(output: &mut dyn Write, name: &str, tallies: &[&Tally]) -> io::Result<()>
     )
 }
 
-/// How many mishaps are of a kind; every collision has two entries.
-fn mishaps(tally: &Tally, is: fn(MishapKind) -> bool) -> usize {
-    tally.mishaps.iter().filter(|mishap| is(mishap.kind)).count()
+/// The number of incidents of a kind; every collision has two entries.
+fn incidents(tally: &Tally, is: fn(IncidentKind) -> bool) -> usize {
+    tally.incidents.iter().filter(|incident| is(incident.kind)).count()
 }

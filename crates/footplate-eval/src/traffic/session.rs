@@ -1,4 +1,4 @@
-//! Some hours of traffic on one simulated layout, watched by its truth.
+//! Some hours of traffic on one simulated layout, compared with its truth.
 
 use std::collections::BTreeMap;
 
@@ -7,33 +7,33 @@ use footplate_core::control::{Dispatcher, Finished, Journey, Notice, Span, Train
 use footplate_core::track::{Landmark, Layout, Position};
 use footplate_core::tracking::PathPoint;
 use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
-use footplate_sim::{LivingLayout, LivingSwitches, Mishap};
+use footplate_sim::{Incident, LivingLayout, LivingSwitches};
 use footplate_wire::LinkNotice;
 
 use crate::seeds::Choice;
 use crate::testbed::PreparedTrains;
 
-/// How often the truth is compared with what trains hold.
+/// The interval at which the truth is compared with reservations.
 const LOOK: TimeSpan = TimeSpan::from_ms(50);
-/// Rounding of places that are told in true lengths and in surveyed ones.
+/// Rounding between true and surveyed lengths.
 const ROUNDING: Length = Length::from_mm(1.0);
-/// What a person measured of the engines: the longer overhang and the pickup, rounded up to a centimetre.
+/// The longer overhang and the pickup of the engines, measured and rounded up to a centimetre.
 pub const LENGTHS: TrainLengths =
     TrainLengths { overhang: Length::from_mm(110.0), pickup: Length::from_mm(45.0) };
-/// How well a person reads off where a train stands.
+/// The standard deviation of a position that an operator reads off.
 pub const HAND: Length = Length::from_mm(12.0);
-/// No train should be further from where it is believed to stand, in standard deviations: one time in 15 000.
+/// The largest error of an estimated position at rest, in standard deviations: exceeded once in 15 000.
 const CERTAIN: f64 = 4.0;
-/// Who is so far from where it is believed to stand was counted from a contact that it passed the other way.
+/// A larger error is counted from a sensor that the train passed in the opposite direction.
 const FAR: Length = Length::from_mm(1_000.0);
-/// A person comes to the help of a lost train after this long.
+/// The time after which an operator helps a lost train.
 const HELP_AFTER: TimeSpan = TimeSpan::from_s(20.0);
-/// Where trains stand past a contact in the beginning.
+/// The distance of trains past a sensor at the start.
 const PAST: Length = Length::from_mm(150.0);
-/// Places tried for a train in the beginning.
+/// Places tried for a train at the start.
 const TRIES: usize = 1_000;
 
-/// What is asked of a session.
+/// The settings of a session.
 #[derive(Debug, Clone, Copy)]
 pub struct Asked {
     /// How many trains.
@@ -42,11 +42,11 @@ pub struct Asked {
     pub time: TimeSpan,
     /// Track time that the calibration of each train may take.
     pub budget: TimeSpan,
-    /// Whether the track between contacts is reserved as a whole.
+    /// Whether the track between sensors is reserved as a whole.
     pub by_blocks: bool,
 }
 
-/// What came of one.
+/// The counts of a session.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     /// The seed.
@@ -57,59 +57,59 @@ pub struct Tally {
     pub trains: usize,
     /// Destinations reached.
     pub arrivals: u32,
-    /// Destinations to which there is no way, and orders that were given up.
+    /// Destinations without a route, and orders that failed, by their reasons.
     pub refused: BTreeMap<String, u32>,
-    /// Grants that the driver could not run and that were taken back.
+    /// Routes that the driver refused and that were withdrawn, by their reasons.
     pub withdrawn: BTreeMap<String, u32>,
     /// Routes that were set, and reversals on them.
     pub routes: u32,
     /// Reversals on these routes.
     pub turns: usize,
-    /// Trains sent out of the way of others.
+    /// Trains that made room for others.
     pub aside: u32,
-    /// Trains at rest in each other's way.
+    /// Deadlocks.
     pub deadlocks: u32,
-    /// Trains that were elsewhere than they should be.
+    /// Trains found on another route.
     pub diverged: u32,
     /// Trains whose position became unknown.
     pub lost: u32,
     /// Times that the watchdog stopped a train because it did not run as it should.
     pub dangers: u32,
-    /// Interventions of a person.
+    /// Interventions of the operator.
     pub hands: u32,
-    /// Trains that touched, derailed or ran off the track.
-    pub mishaps: Vec<Mishap>,
-    /// Times that a train came to be on track that it did not hold.
+    /// Collisions, derailments and overruns.
+    pub incidents: Vec<Incident>,
+    /// Times that a train entered track without a reservation.
     pub intrusions: Vec<(Timestamp, TrainId)>,
     /// How long trains waited for their routes, in s.
     pub waits: Vec<f64>,
     /// How long journeys took, in s.
     pub took: Vec<f64>,
-    /// The longest time that a train came nowhere, in s.
+    /// The longest time without an arrival of a train, in s.
     pub starved: f64,
-    /// Rests past a contact, and those at which a train was further from where it was believed than ever should be.
-    pub beliefs: u32,
-    /// Of these, those that were wrong.
+    /// Rests past a sensor at which the position was compared with the truth.
+    pub rests: u32,
+    /// Of these, those with too large an error.
     pub mistaken: u32,
-    /// Errors of arrivals as believed, in mm.
+    /// Estimated errors of arrivals, in mm.
     pub errors: Vec<f64>,
 }
 
 /// Some hours of traffic.
 pub struct Session<'l> {
     layout: &'l Layout,
-    rehearsal: PreparedTrains<'l>,
+    prepared: PreparedTrains<'l>,
     dispatcher: Dispatcher,
     choice: Choice,
     tally: Tally,
     trains: Vec<TrainId>,
     is_inside: BTreeMap<TrainId, bool>,
-    /// Since when each train has been on its way to nowhere.
+    /// When each train arrived last.
     since: BTreeMap<TrainId, Timestamp>,
     waits: BTreeMap<TrainId, Timestamp>,
-    /// Since when each train has needed a person.
+    /// When each train first needed an operator.
     needs_person: BTreeMap<TrainId, Timestamp>,
-    /// Since when something seems to move that no session drives.
+    /// When an unauthorised movement was first reported.
     warned: Option<Timestamp>,
     talk: bool,
 }
@@ -123,17 +123,17 @@ impl<'l> Session<'l> {
         let trains: Vec<TrainId> =
             [24, 58, 1, 43, 54, 35].into_iter().map(TrainId).take(asked.trains).collect();
         let switches = LivingSwitches::well_kept();
-        let mut rehearsal = PreparedTrains::prepare(layout, seed, &trains, &switches, asked.budget)?;
+        let mut prepared = PreparedTrains::prepare(layout, seed, &trains, &switches, asked.budget)?;
         let mut choice = Choice::new(seed);
         let sensors: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
         for nth in 0..trains.len() {
             let mut is_put = false;
             for _ in 0..TRIES {
                 let Some(node) = choice.of(&sensors) else { break };
-                if rehearsal.put(trains[nth], *node, PAST).is_err() {
+                if prepared.put(trains[nth], *node, PAST).is_err() {
                     continue;
                 }
-                let dispatcher = dispatcher(&rehearsal, asked.by_blocks);
+                let dispatcher = dispatcher(&prepared, asked.by_blocks);
                 let holds = |train: &TrainId| dispatcher.reservation(*train);
                 let is_apart = trains[..nth].iter().all(|other| {
                     holds(other).zip(holds(&trains[nth])).is_some_and(|(one, two)| !one.meets(two))
@@ -150,13 +150,13 @@ impl<'l> Session<'l> {
                 bail!("there is no room for {} trains on this layout; ask for fewer", asked.trains);
             }
         }
-        let dispatcher = dispatcher(&rehearsal, asked.by_blocks);
-        let began = rehearsal.line.now();
+        let dispatcher = dispatcher(&prepared, asked.by_blocks);
+        let began = prepared.line.now();
         let tally =
             Tally { seed, trains: trains.len(), hours: asked.time.as_s() / 3600.0, ..Tally::default() };
         Ok(Self {
             layout,
-            rehearsal,
+            prepared,
             dispatcher,
             choice,
             tally,
@@ -172,40 +172,40 @@ impl<'l> Session<'l> {
 
     /// Runs for so long.
     pub fn run(mut self, time: TimeSpan) -> Tally {
-        let began = self.rehearsal.line.now();
+        let began = self.prepared.line.now();
         let end = began + time;
-        let before = self.rehearsal.world().mishaps().len();
+        let before = self.prepared.world().incidents().len();
         for train in self.trains.clone() {
             self.send(train);
         }
-        while self.rehearsal.line.now() < end && self.rehearsal.world().mishaps().len() == before {
-            let until = end.min(self.rehearsal.line.now() + LOOK);
+        while self.prepared.line.now() < end && self.prepared.world().incidents().len() == before {
+            let until = end.min(self.prepared.line.now() + LOOK);
             let hear_of_line = |dispatcher: &mut Dispatcher, now, notice: &LinkNotice| {
                 if let Some(news) = notice.news() {
                     dispatcher.handle_link(now, news);
                 }
             };
-            let notice = self.rehearsal.line.drive_hearing(&mut self.dispatcher, until, hear_of_line);
+            let notice = self.prepared.line.drive_hearing(&mut self.dispatcher, until, hear_of_line);
             match notice {
                 Some(notice) => self.hear(&notice),
                 None => self.look(),
             }
         }
-        let now = self.rehearsal.line.now();
+        let now = self.prepared.line.now();
         self.tally.hours = (now - began).as_s() / 3600.0;
         for train in self.trains.clone() {
             self.came_somewhere(train, now);
         }
-        self.tally.mishaps = self.rehearsal.world().mishaps().iter().skip(before).copied().collect();
-        for mishap in self.tally.mishaps.iter().filter(|_| self.talk) {
-            eprintln!("{:9.2} {:?}", mishap.at.as_s(), mishap.kind);
+        self.tally.incidents = self.prepared.world().incidents().iter().skip(before).copied().collect();
+        for incident in self.tally.incidents.iter().filter(|_| self.talk) {
+            eprintln!("{:9.2} {:?}", incident.at.as_s(), incident.kind);
         }
-        self.trains.iter().filter(|_| self.talk).for_each(|train| self.tell_truth(*train));
+        self.trains.iter().filter(|_| self.talk).for_each(|train| self.print_truth(*train));
         self.tally
     }
 
     fn hear(&mut self, notice: &Notice) {
-        let now = self.rehearsal.line.now();
+        let now = self.prepared.line.now();
         if self.talk && !matches!(notice, Notice::Planned(_)) {
             eprintln!("{:9.2} {notice:?}", now.as_s());
         }
@@ -230,11 +230,11 @@ impl<'l> Session<'l> {
             }
             Notice::Withdrawn { train, why } => {
                 if self.talk {
-                    self.tell_truth(*train);
+                    self.print_truth(*train);
                 }
                 *self.tally.withdrawn.entry(kind_of(&format!("{why:?}"))).or_default() += 1;
             }
-            Notice::Done(finished) => self.check_belief(finished),
+            Notice::Done(finished) => self.check_position(finished),
             Notice::StepsAside { .. } => self.tally.aside += 1,
             Notice::Deadlock { .. } => self.tally.deadlocks += 1,
             Notice::Diverged { .. } => self.tally.diverged += 1,
@@ -267,7 +267,7 @@ impl<'l> Session<'l> {
             let offset =
                 Length::from_mm(self.choice.between(0.0, length.map_or(0.0, |edge| edge.length.as_mm())));
             let journey = Journey::to(Landmark { node, offset });
-            let now = self.rehearsal.line.now();
+            let now = self.prepared.line.now();
             if self.dispatcher.go(now, train, journey).is_ok() {
                 self.waits.insert(train, now);
                 return;
@@ -275,15 +275,14 @@ impl<'l> Session<'l> {
         }
     }
 
-    /// Compares what trains are on with what they hold, and helps those that are lost.
+    /// Compares the track under trains with their reservations, and helps those that are lost.
     fn look(&mut self) {
-        let now = self.rehearsal.line.now();
+        let now = self.prepared.line.now();
         if self.warned.is_some_and(|since| now - since >= HELP_AFTER) {
             self.dispatcher.switch_power(now, true);
         }
         for train in self.trains.clone() {
-            let is_inside =
-                is_on_reserved_track(self.layout, self.rehearsal.world(), &self.dispatcher, train);
+            let is_inside = is_on_reserved_track(self.layout, self.prepared.world(), &self.dispatcher, train);
             if let Some(was) = self.is_inside.insert(train, is_inside)
                 && was
                 && !is_inside
@@ -291,7 +290,7 @@ impl<'l> Session<'l> {
                 self.tally.intrusions.push((now, train));
                 if self.talk {
                     eprintln!("{:9.2} train {train} is on track that it does not hold", now.as_s());
-                    self.tell_truth(train);
+                    self.print_truth(train);
                 }
             }
             if self.needs_person.get(&train).is_some_and(|since| now - *since >= HELP_AFTER) {
@@ -303,19 +302,19 @@ impl<'l> Session<'l> {
         }
     }
 
-    /// Compares where a train stands with where it is believed to.
-    fn check_belief(&mut self, finished: &Finished) {
-        let truth = self.rehearsal.world().truth();
+    /// Compares the estimated position of a train at rest with the truth.
+    fn check_position(&mut self, finished: &Finished) {
+        let truth = self.prepared.world().truth();
         let Some(achieved) = finished.achieved else { return };
         let sensor = self.layout.sensor_at(achieved.at.node);
         let Some(past) = sensor.and_then(|sensor| truth.past(finished.train, sensor)) else { return };
         let error = past - achieved.at.offset;
-        // Who has turned around since did not come from that contact.
+        // A train that has reversed since does not come from that sensor.
         if error.abs() > FAR {
             return;
         }
         let sigmas = error / achieved.uncertainty;
-        self.tally.beliefs += 1;
+        self.tally.rests += 1;
         if sigmas.abs() > CERTAIN {
             self.tally.mistaken += 1;
             if self.talk {
@@ -325,9 +324,9 @@ impl<'l> Session<'l> {
         }
     }
 
-    /// What a train and the turnouts really do, where that is not what is believed.
-    fn tell_truth(&self, train: TrainId) {
-        let (truth, driver) = (self.rehearsal.world().truth(), self.dispatcher.driver());
+    /// Prints the true and the estimated state of a train, and turnouts whose state is not the known one.
+    fn print_truth(&self, train: TrainId) {
+        let (truth, driver) = (self.prepared.world().truth(), self.dispatcher.driver());
         let name = |edge| {
             let edge = self.layout.edge(edge)?;
             Some([edge.from, edge.to].map(|node| self.layout.node_name(node)).join(" to "))
@@ -336,31 +335,31 @@ impl<'l> Session<'l> {
             format!("{:.0} mm from {}", place.offset.as_mm(), name(place.edge).unwrap_or_default())
         };
         let really = truth.train(train).and_then(|train| train.position).map(place);
-        let believed = driver.position(train, self.rehearsal.line.now()).map(place);
+        let estimated = driver.position(train, self.prepared.line.now()).map(place);
         let journey = self.dispatcher.journey(train).map(|(_, journey)| self.layout.display(journey.target));
         let journey = journey.map(|to| to.to_string());
-        eprintln!("          {train} wants to {journey:?}, is really {really:?}, believed {believed:?}");
-        let under = driver.turnouts_under(train, self.rehearsal.line.now()).into_iter();
+        eprintln!("          {train} wants to {journey:?}, is really {really:?}, estimated {estimated:?}");
+        let under = driver.turnouts_under(train, self.prepared.line.now()).into_iter();
         let under: Vec<_> = under.map(|turnout| (turnout.0, driver.turnouts().get(turnout))).collect();
         eprintln!("          on turnouts {under:?}");
         for (turnout, _) in self.layout.turnouts() {
-            let (lies, known) = (self.rehearsal.world().lies(turnout), driver.turnouts().get(turnout));
+            let (lies, known) = (self.prepared.world().lies(turnout), driver.turnouts().get(turnout));
             if lies != known {
-                eprintln!("          turnout {turnout} lies {lies:?}, believed {known:?}");
+                eprintln!("          turnout {turnout} lies {lies:?}, known as {known:?}");
             }
         }
     }
 
-    /// A person reads off where a train stands.
+    /// An operator reads off the position of a train.
     fn help(&mut self, train: TrainId, now: Timestamp) {
         self.needs_person.remove(&train);
-        let Some(at) = place_by_hand(self.layout, self.rehearsal.world(), train) else { return };
+        let Some(at) = place_by_hand(self.layout, self.prepared.world(), train) else { return };
         self.tally.hands += 1;
         self.dispatcher.place(now, train, at, HAND);
     }
 }
 
-/// Whether all track that is really under a train is reserved for it.
+/// Whether all track under a train is truly reserved for it.
 #[must_use]
 pub fn is_on_reserved_track(
     layout: &Layout,
@@ -383,7 +382,7 @@ pub fn is_on_reserved_track(
     })
 }
 
-/// Where a person who looks at a train would say that it is, in lengths of the surveyed layout.
+/// The position that an operator would read off, in surveyed lengths.
 #[must_use]
 pub fn place_by_hand(layout: &Layout, world: &LivingLayout<'_>, train: TrainId) -> Option<PathPoint> {
     let truth = world.truth();
@@ -393,9 +392,9 @@ pub fn place_by_hand(layout: &Layout, world: &LivingLayout<'_>, train: TrainId) 
     Some(PathPoint { node: edge.from, distance: position.offset * scale })
 }
 
-fn dispatcher(rehearsal: &PreparedTrains<'_>, by_blocks: bool) -> Dispatcher {
-    let now = rehearsal.line.now();
-    let mut dispatcher = Dispatcher::watched(now, rehearsal.driver());
+fn dispatcher(prepared: &PreparedTrains<'_>, by_blocks: bool) -> Dispatcher {
+    let now = prepared.line.now();
+    let mut dispatcher = Dispatcher::watched(now, prepared.driver());
     if by_blocks {
         dispatcher.reserve_blocks();
     }

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::Scored;
 use super::passage::Passage;
-use super::ride::{Ridden, Told};
+use super::ride::{Ridden, Task};
 use crate::figures::{quantile, shown};
 use crate::written_scores::{Rate, WrittenScores};
 
@@ -14,7 +14,7 @@ const HEAD: &str = "\
 # How well trains keep to speed restrictions
 
 Random simulated trains, three on a layout, each calibrated from nothing known over the bytes of a virtual 6051. For each of them two
-stretches of 25 cm and more of its way round are restricted to 170 to 280 mm/s, and it is told for two minutes each to run at a step
+stretches of 25 cm and more of its circuit are restricted to 170 to 280 mm/s, and it is commanded for two minutes each to run at a step
 (300 to 450 mm/s), to stop at one place after the other, to hold a speed (300 to 450 mm/s), to arrive at places in time, and to follow
 another train. The simulator shares no formula with what drives, and its truth is used for these figures alone.
 ";
@@ -23,13 +23,13 @@ const LEGEND: &str = "\
 A *passage* is from the front end's coming into a zone until the rear end has left it; it is *too fast* if the train was ever faster
 than the limit meanwhile (asked: no more than 1 % of them for the place and 1 % for the speed), and the *worst* is by how much. What it
 costs: the *mean* speed in the zone as part of the limit, and how far before the zone the train was *early* within the limit for the last
-time (median). *Way* is the way run in two minutes as part of that of the same train where nobody heeds zones.
+time (median). *Distance* is that run in two minutes as part of that of the same train on a layout without zones.
 ";
 
 /// All that was scored.
-pub struct Page<'r> {
+pub struct Page {
     /// What every seed came to.
-    pub scored: &'r [Scored],
+    pub scored: Vec<Scored>,
     /// What was asked for, as on the command line.
     pub asked: String,
 }
@@ -53,7 +53,7 @@ impl Figures {
         let beyond = |passage: &Passage| passage.fastest - passage.limit;
         let too_fast = passages.clone().filter(|passage| beyond(passage) > 0.0);
         let run = passages.clone().filter(|passage| passage.seconds > 0.0);
-        let means = run.map(|passage| 100.0 * passage.way / passage.seconds / passage.limit);
+        let means = run.map(|passage| 100.0 * passage.distance / passage.seconds / passage.limit);
         let early = passages.clone().map(|passage| passage.early).filter(|early| early.is_finite());
         Self {
             passages: passages.count(),
@@ -70,7 +70,7 @@ impl Figures {
     }
 }
 
-impl WrittenScores for Page<'_> {
+impl WrittenScores for Page {
     const SCORER: &'static str = "zones";
 
     fn head(&self) -> String {
@@ -81,18 +81,18 @@ impl WrittenScores for Page<'_> {
         writeln!(output, "{LEGEND}")?;
         writeln!(
             output,
-            "| told to | rides | failed | passages | too fast | worst mm/s | worst % | mean of the limit | early mm | way |\n\
+            "| order | rides | failed | passages | too fast | worst mm/s | worst % | mean of the limit | early mm | distance |\n\
              | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
         )?;
-        for told in Told::ALL {
-            let rides: Vec<&Ridden> = self.rides(told).collect();
+        for task in Task::ALL {
+            let rides: Vec<&Ridden> = self.rides(task).collect();
             let found = Figures::of(rides.iter().flat_map(|ride| &ride.passages));
-            let way = rides.iter().map(|ride| ride.way).sum::<f64>();
-            let free = self.rides(Told::Unheeding).map(|ride| ride.way).sum::<f64>();
+            let distance = rides.iter().map(|ride| ride.distance).sum::<f64>();
+            let free = self.rides(Task::Unheeding).map(|ride| ride.distance).sum::<f64>();
             writeln!(
                 output,
                 "| {} | {} | {} | {} | {:.1} % | {:.1} | {:.1} | {} % | {} | {} |",
-                told.key(),
+                task.key(),
                 rides.len(),
                 rides.iter().filter(|ride| ride.trouble.is_some()).count(),
                 found.passages,
@@ -102,8 +102,8 @@ impl WrittenScores for Page<'_> {
                 shown(found.mean, 0),
                 shown(found.early, 0),
                 // Who stops again and again runs less for other reasons.
-                if matches!(told, Told::Unheeding | Told::Speed) {
-                    format!("{:.0} %", 100.0 * way / free.max(1.0))
+                if matches!(task, Task::Unheeding | Task::Speed) {
+                    format!("{:.0} %", 100.0 * distance / free.max(1.0))
                 } else {
                     "–".to_owned()
                 },
@@ -118,11 +118,11 @@ impl WrittenScores for Page<'_> {
             let passages = ride.passages.iter().map(|passage| {
                 json!({
                     "limit_mm_s": passage.limit, "fastest_mm_s": passage.fastest, "seconds": passage.seconds,
-                    "way_mm": passage.way, "early_mm": passage.early.is_finite().then_some(passage.early),
+                    "distance_mm": passage.distance, "early_mm": passage.early.is_finite().then_some(passage.early),
                 })
             });
             json!({
-                "seed": scored.seed, "train": ride.train.0, "told": ride.told.key(), "way_mm": ride.way,
+                "seed": scored.seed, "train": ride.train.0, "order": ride.task.key(), "distance_mm": ride.distance,
                 "seconds": ride.seconds, "done": ride.done, "trouble": ride.trouble,
                 "passages": passages.collect::<Vec<_>>(),
             })
@@ -133,7 +133,7 @@ impl WrittenScores for Page<'_> {
 
     fn rates(&self) -> Vec<Rate> {
         let rides: Vec<&Ridden> = self.scored.iter().flat_map(|scored| &scored.rides).collect();
-        let heeding = rides.iter().filter(|ride| ride.told != Told::Unheeding);
+        let heeding = rides.iter().filter(|ride| ride.task != Task::Unheeding);
         let found = Figures::of(heeding.flat_map(|ride| &ride.passages).collect::<Vec<_>>().into_iter());
         let failed = rides.iter().filter(|ride| ride.trouble.is_some()).count();
         vec![
@@ -143,8 +143,8 @@ impl WrittenScores for Page<'_> {
     }
 }
 
-impl Page<'_> {
-    fn rides(&self, told: Told) -> impl Iterator<Item = &Ridden> {
-        self.scored.iter().flat_map(|scored| &scored.rides).filter(move |ride| ride.told == told)
+impl Page {
+    fn rides(&self, task: Task) -> impl Iterator<Item = &Ridden> {
+        self.scored.iter().flat_map(|scored| &scored.rides).filter(move |ride| ride.task == task)
     }
 }

@@ -1,4 +1,4 @@
-//! Trains in zones as they really were: how fast, and how long.
+//! The true passages of trains through zones: speed, time and distance.
 
 use std::collections::BTreeMap;
 
@@ -6,27 +6,27 @@ use footplate_core::track::{Layout, Zone};
 use footplate_core::{Timestamp, TrainId};
 use footplate_sim::living::Truth;
 
-/// One train's way through one zone, from its front end's coming there until its rear end has left.
+/// The passage of one train through one zone, from the entry of its front end until its rear end has left.
 #[derive(Debug, Clone)]
 pub(super) struct Passage {
     /// The zone's limit (mm/s).
     pub(super) limit: f64,
-    /// The fastest that it was (mm/s).
+    /// Its highest speed (mm/s).
     pub(super) fastest: f64,
-    /// How long it took (s), and how far the train ran meanwhile (mm).
+    /// Its time (s), and the distance that the train ran meanwhile (mm).
     pub(super) seconds: f64,
-    pub(super) way: f64,
-    /// How far it ran within the limit before it came there (mm).
+    pub(super) distance: f64,
+    /// The distance that the train ran within the limit before the zone (mm).
     pub(super) early: f64,
 }
 
-/// A train that is looked at again and again.
+/// A train whose true position and speed are sampled.
 pub(super) struct Watched<'l> {
     layout: &'l Layout,
     train: TrainId,
-    /// What is under way, by the zone's name: the passage, when it began and what the odometer showed.
+    /// Unfinished passages by the name of the zone, each with the time and the odometer (mm) at its start.
     open: BTreeMap<String, (Passage, Timestamp, f64)>,
-    /// What the odometer showed when the train was faster than each limit for the last time.
+    /// The odometer when the train was last faster than each limit (mm).
     faster: BTreeMap<String, f64>,
     pub(super) passages: Vec<Passage>,
 }
@@ -36,7 +36,7 @@ impl<'l> Watched<'l> {
         Self { layout, train, open: BTreeMap::new(), faster: BTreeMap::new(), passages: Vec::new() }
     }
 
-    /// Looks once.
+    /// Takes a sample.
     pub(super) fn look(&mut self, truth: Truth<'_, '_>, now: Timestamp) {
         let Some(train) = truth.train(self.train) else { return };
         let (speed, odometer) = (train.speed.as_mm_per_s(), train.odometer.as_mm());
@@ -46,7 +46,7 @@ impl<'l> Watched<'l> {
             let limit = zone.limit.as_mm_per_s();
             let early = self.faster.get(&zone.name).map_or(f64::INFINITY, |faster| odometer - faster);
             let (passage, ..) = self.open.entry(zone.name.clone()).or_insert_with(|| {
-                (Passage { limit, fastest: 0.0, seconds: 0.0, way: 0.0, early }, now, odometer)
+                (Passage { limit, fastest: 0.0, seconds: 0.0, distance: 0.0, early }, now, odometer)
             });
             passage.fastest = passage.fastest.max(speed);
         }
@@ -57,8 +57,8 @@ impl<'l> Watched<'l> {
         self.open.retain(|name, (passage, since, from)| {
             let is_under = under.iter().any(|zone| zone.name == *name);
             if !is_under {
-                let (seconds, way) = ((now - *since).as_s(), odometer - *from);
-                passages.push(Passage { seconds, way, ..passage.clone() });
+                let (seconds, distance) = ((now - *since).as_s(), odometer - *from);
+                passages.push(Passage { seconds, distance, ..passage.clone() });
             }
             is_under
         });

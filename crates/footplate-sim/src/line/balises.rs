@@ -8,7 +8,7 @@ const APART_M: (f64, f64) = (1350.0, 1650.0);
 const FIRST_M: (f64, f64) = (150.0, 600.0);
 /// How well places are surveyed (m, one standard deviation; the worst is three times that).
 const PLACE_M: f64 = 0.3;
-/// The antenna sits this far from where it is believed to be (m, one standard deviation).
+/// The error of the assumed place of the antenna (m, one standard deviation).
 const ANTENNA_M: f64 = 0.02;
 /// What the reader takes to report (s).
 const LATENCY_S: (f64, f64) = (0.008, 0.012);

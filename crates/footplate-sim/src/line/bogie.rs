@@ -65,7 +65,7 @@ impl Bogie {
         Self { acts, conduct: Conduct::Follows, time, target: 0.0, crept: 0.0, apart: 0.0 }
     }
 
-    /// Goes on by `dt` seconds, with what the brake of the train is told to do (m/s²), its effort, and the speeds of the
+    /// Advances by `dt` seconds, with the commanded deceleration of the train (m/s²), its effort, and the speeds of the
     /// train and of the treads.
     pub(crate) fn step(&mut self, dt: f64, commanded: f64, effort: f64, train: f64, speeds: [f64; 2]) {
         self.time += dt;
@@ -163,7 +163,7 @@ mod tests {
     use crate::line::creep_force::Film;
 
     #[test]
-    fn a_converter_draws_the_wheel_away_at_the_rate_it_is_told() {
+    fn a_converter_draws_the_wheel_away_at_the_commanded_rate() {
         let mut bogie = Bogie::new(vec![(1.0, Conduct::DrawnAway(0.5)), (6.0, Conduct::Follows)], 0.0);
         let mut wheel =
             Rotation { inertia: 200.0, radius: 0.43, load: 140e3, angle: 0.0, omega: 30.0 / 0.43 };
@@ -193,6 +193,6 @@ mod tests {
         let at = |second: usize| targets[1000 * second];
         assert!(!at(2).1 && at(4).1 && !at(16).1, "from 3 s, 8 s long, and 4 s back");
         assert!((at(6).2 - 18.0).abs() < 1e-6, "{}", at(6).2);
-        assert!((at(13).2 - 19.0).abs() < 0.01, "half way back: {}", at(13).2);
+        assert!((at(13).2 - 19.0).abs() < 0.01, "halfway back: {}", at(13).2);
     }
 }

@@ -46,7 +46,7 @@ impl Default for BrakeTimes {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct CommandLine {
     arrived: f64,
-    /// Which way the pressure follows the demand, if it does.
+    /// Whether the pressure rises or falls towards the demand, if it does.
     follows: Option<bool>,
     /// How long another demand has waited, and how long there has been none (s).
     waited: f64,

@@ -11,7 +11,7 @@ use crate::draws::Draws;
 
 /// The wheelsets that are not followed one by one are gathered in so many groups along the train.
 const GROUPS: usize = 6;
-/// What all measured wheels are believed to measure (m): the usual size of multiple units, half worn.
+/// The assumed diameter of all measured wheels (m): the usual size of multiple units, half worn.
 pub(crate) const DIAMETER_M: f64 = 0.86;
 /// A wheelset without and with a motor and its gear (kg m²): drawn from these.
 const TRAILING_KG_M2: Range<f64> = 75.0..115.0;
@@ -41,7 +41,7 @@ pub(crate) struct Design {
 }
 
 impl Design {
-    /// A train of which wheelsets and motors are not told: as many as carry it, and as many driven as need be.
+    /// A train with unknown wheelsets and motors: as many as carry it, and as many driven as needed.
     pub(crate) fn of(train: Train) -> Self {
         let bogies = (train.mass_kg * GRAVITY / (2.0 * USUAL_LOAD_N)).ceil().clamp(2.0, 1e6);
         let load = train.mass_kg * GRAVITY / (2.0 * bogies);

@@ -8,7 +8,7 @@
 //!
 //! Letters: `mu0` coefficient of friction at no creepage, `A` the part of it that is left at large creepage, `B` how
 //! fast it falls (s/m), `kA` and `kS` how much softer the area of adhesion and the area of slip are than steel on clean
-//! steel, `Q` wheel load, `a`, `b` half axes of the ellipse of contact, `c11` Kalker's coefficient, `G` shear modulus.
+//! steel, `Q` wheel load, `a`, `b` half axes of the Hertzian ellipse, `c11` Kalker's coefficient, `G` shear modulus.
 //!
 //! Source: O. Polach, Creep forces in simulations of traction vehicles running on adhesion limit, Wear 258 (2005).
 

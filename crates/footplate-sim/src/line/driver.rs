@@ -4,7 +4,7 @@
 //! driver takes a single body through a line ([`Journey`](super::Journey)) and one on wheels that slip.
 //!
 //! Braking to a place is steered by the deceleration that is still needed, `(v² - v_target²) / 2d`: it is begun when
-//! that reaches the planned one, and what was braked too little is made up on the way.
+//! that reaches the planned one, and what was braked too little is made up later.
 
 use core::fmt;
 
@@ -25,7 +25,7 @@ const GIVEN_UP: f64 = 0.8;
 const MAKING_UP: f64 = 1.5;
 /// Within this share of the limit a train counts as running at it.
 const AT_LIMIT: f64 = 0.995;
-/// From the gentlest start to what nobody on board would stand (m/s³); 0.3 to 0.8 is usual.
+/// From the gentlest start to what would knock passengers over (m/s³); 0.3 to 0.8 is usual.
 const JERKS_M_PER_S3: [f64; 2] = [0.01, 100.0];
 /// Slower than any driver or brake (s).
 const LONGEST_DELAY_S: f64 = 60.0;
@@ -142,7 +142,7 @@ struct Target {
     speed: f64,
 }
 
-/// A driver on the way along a line.
+/// A driver on a run along a line.
 #[derive(Debug, Clone)]
 pub struct Driver {
     train: Train,
@@ -201,7 +201,7 @@ impl Driver {
         &self.line
     }
 
-    /// Which of the line's stops the train stands at, or is on its way to.
+    /// The stop of the line at which the train is at rest, or the next one.
     #[must_use]
     pub const fn stop(&self) -> usize {
         self.next_stop
@@ -230,8 +230,8 @@ impl Driver {
             self.next_stop += 1;
         }
         let stops_at = self.line.stops().get(self.next_stop).map_or(state.front, |stop| stop.at);
-        let way_left = (stops_at - state.front).as_m();
-        if state.speed.as_m_per_s() < STANDING_M_PER_S && way_left < STOP_WINDOW_M {
+        let distance_left = (stops_at - state.front).as_m();
+        if state.speed.as_m_per_s() < STANDING_M_PER_S && distance_left < STOP_WINDOW_M {
             self.standing = self.line.stops().get(self.next_stop).map(|stop| stop.dwell - step);
             (self.braking_to, self.coasting, self.acceleration) = (None, false, 0.0);
             return self.hold(state);
@@ -305,10 +305,10 @@ impl Driver {
         let (front, meets) = self.when_brake_bites(state, planned, jerk);
 
         let needed = |target: &Target| {
-            let way = (target.at - eased(planned, target.speed, jerk) - front).max(0.0);
+            let distance = (target.at - eased(planned, target.speed, jerk) - front).max(0.0);
             let faster = meets * meets - target.speed * target.speed;
-            // No way left asks for the most there is.
-            if faster <= 0.0 { 0.0 } else { (faster / (2.0 * way)).min(MAKING_UP * planned) }
+            // Without any distance left, the strongest braking.
+            if faster <= 0.0 { 0.0 } else { (faster / (2.0 * distance)).min(MAKING_UP * planned) }
         };
         // The command holds for a step, so that easing off looks one step ahead.
         let after = speed + self.acceleration.min(0.0) * step.as_s();
@@ -348,7 +348,7 @@ impl Driver {
     fn when_brake_bites(&self, state: State, planned: f64, jerk: f64) -> (f64, f64) {
         let (early, now) = (self.style.anticipation.as_s(), self.acceleration);
         let speed = (state.speed.as_m_per_s() + now * early).max(0.0);
-        let way = (state.speed.as_m_per_s() + speed) * 0.5 * early;
+        let distance = (state.speed.as_m_per_s() + speed) * 0.5 * early;
         // Until traction has gone: a / j long.
         let pull = now.max(0.0);
         let fastest = speed + pull * pull / (2.0 * jerk);
@@ -356,11 +356,11 @@ impl Driver {
         // A brake that comes on evenly is as good as all of it half of that time later.
         let missing = (planned + now.min(0.0)).max(0.0);
         let late = missing * missing / (2.0 * jerk * planned);
-        (state.front.as_m() + way + pulled + fastest * late, fastest)
+        (state.front.as_m() + distance + pulled + fastest * late, fastest)
     }
 }
 
-/// The way (m) that easing off takes beyond braking evenly down to a speed: v b / 2j + b³ / 24 j².
+/// The distance (m) that easing off takes beyond braking evenly down to a speed: v b / 2j + b³ / 24 j².
 fn eased(braking: f64, speed: f64, jerk: f64) -> f64 {
     braking * (speed / (2.0 * jerk) + braking * braking / (24.0 * jerk * jerk))
 }

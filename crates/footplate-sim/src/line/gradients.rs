@@ -101,7 +101,7 @@ mod tests {
             assert!((gradient - last).abs() <= 0.024 / 80.0 + 1e-12);
             last = gradient;
         }
-        assert_eq!(line.at(300.0), line.clone().at(300.0), "the way there does not matter");
+        assert_eq!(line.at(300.0), line.clone().at(300.0), "the path to it does not matter");
     }
 
     #[test]

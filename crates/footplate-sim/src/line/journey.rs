@@ -1,4 +1,4 @@
-//! A run along a line as one body, from the first stop to the last: running times, places and speeds on the way.
+//! A run along a line as one body, from the first stop to the last: running times, places and speeds.
 //!
 //! The motion is integrated by the midpoint rule; the driver's effort holds for a step. The work of every force is
 //! added up beside it, so that energy can be balanced.
@@ -164,18 +164,18 @@ impl Journey {
         let forces = forces(middle);
         let mean = acceleration(forces);
         let reached = state.speed + mean * step;
-        let way = if reached < Speed::ZERO {
+        let distance = if reached < Speed::ZERO {
             let (v, a) = (state.speed.as_m_per_s(), mean.as_m_per_s2());
             state.speed = Speed::ZERO;
             Length::from_m(-v * v / (2.0 * a))
         } else {
-            let way = (state.speed + reached) * half;
+            let distance = (state.speed + reached) * half;
             state.speed = reached;
-            way
+            distance
         };
-        state.front += way;
+        state.front += distance;
         let (force, line, resistance) = forces;
-        let metres = way.as_m();
+        let metres = distance.as_m();
         self.work.traction_j += force.max(0.0) * metres;
         self.work.brake_j += (-force).max(0.0) * metres;
         self.work.resistance_j += resistance * metres;
@@ -196,7 +196,7 @@ impl Journey {
         let Some(from) = next.checked_sub(1).and_then(|before| self.moments.get(before)) else {
             return (to.front == place).then_some(*to);
         };
-        // Acceleration is even within a step, so v² grows evenly with the way.
+        // Acceleration is even within a step, so v² grows evenly with the distance.
         let share = (place - from.front) / (to.front - from.front);
         let squared = |moment: &Moment| moment.speed.as_m_per_s() * moment.speed.as_m_per_s();
         let speed = libm::sqrt(squared(from) + share * (squared(to) - squared(from)));
@@ -242,7 +242,7 @@ pub enum JourneyError {
         /// Where.
         at_m: f64,
     },
-    /// The train is still on its way after two days.
+    /// The train has not arrived after two days.
     #[error("after two days the train is at {at_m:.0} m; can it climb what lies there?")]
     TooSlow {
         /// Where.

@@ -225,20 +225,20 @@ impl Motion {
         let most = dt * (outer.brake + outer.resistance) / mass;
         self.speed = if free.abs() > most { free - most.copysign(free) } else { 0.0 };
         self.acceleration = (self.speed - before) / dt;
-        let way = 0.5 * dt * (before + self.speed);
-        self.place += way;
+        let distance = 0.5 * dt * (before + self.speed);
+        self.place += distance;
 
         let energy = &mut self.energy;
         for ((step, wheel), turned) in steps.iter().zip(&self.wheels).zip(turned) {
             let angle = 0.5 * dt * (turned + wheel.omega);
             energy.driven_j += step.driven * angle;
             energy.braked_j += step.braked * angle;
-            energy.crept_j += step.force * (wheel.radius * angle - way);
+            energy.crept_j += step.force * (wheel.radius * angle - distance);
         }
-        let rubbed = (free - self.speed) * mass / dt * way;
+        let rubbed = (free - self.speed) * mass / dt * distance;
         let by_resistance = outer.resistance / (outer.brake + outer.resistance);
-        energy.driven_j += outer.pull * way;
-        energy.climbed_j += outer.climb * way;
+        energy.driven_j += outer.pull * distance;
+        energy.climbed_j += outer.climb * distance;
         energy.resisted_j += by_resistance * rubbed;
         energy.braked_j += (1.0 - by_resistance) * rubbed;
     }

@@ -16,9 +16,9 @@ pub(crate) enum Until {
     Time(f64),
     /// After a time in this stage (s).
     For(f64),
-    /// When the train is at least so fast (m/s), either way.
+    /// When the train is at least so fast (m/s), in either direction.
     Faster(f64),
-    /// When it is at most so fast (m/s), either way.
+    /// When it is at most so fast (m/s), in either direction.
     Slower(f64),
 }
 
@@ -51,7 +51,7 @@ const PER_M: f64 = 0.03;
 /// How much the second may add up to.
 const LARGEST_TRIM: f64 = 0.6;
 
-/// A driver on the way through the stages; stays in the last.
+/// A driver in one of the stages; stays in the last.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
     stages: Vec<Stage>,

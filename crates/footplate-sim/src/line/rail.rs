@@ -154,7 +154,7 @@ mod tests {
         let mut rail = rail(5);
         rail.lay(Patch { from: 0.0, to: 1000.0, onset: 400.0, film: Film::LOW, cleaning: 1.0 });
         let kept: Vec<f64> = [1.0, 100.0, 200.0, 400.0, 900.0].map(|at| rail.at(at, 0).fall).into();
-        assert!((kept[2] - 0.4).abs() < 1e-12, "half way between 0.6 and 0.2");
+        assert!((kept[2] - 0.4).abs() < 1e-12, "halfway between 0.6 and 0.2");
         assert!(kept.windows(2).all(|pair| pair[0] >= pair[1]));
         assert!((kept[4] - 0.2).abs() < 1e-12);
     }

@@ -1,4 +1,4 @@
-//! Worlds that nobody chose: train, rail, driver, protection and faults, all drawn from stated ranges.
+//! Random worlds: train, rail, driver, protection and faults, all drawn from stated ranges.
 //!
 //! Most of it is independent of each other, so that things meet that no scenario brings together. The ranges stand here
 //! and in docs/theory/line_simulator.md. A seed is one world, whatever its operator knows of it: [`LineLevel`] changes
@@ -48,7 +48,7 @@ const EMPTY_S: (f64, f64) = (0.2, 1.2);
 /// Adhesion: base of the rail, and of what lies on it (coefficient of friction).
 const BASE: (f64, f64) = (0.15, 0.55);
 const LOW: (f64, f64) = (0.012, 0.12);
-/// What is left of it at large creepage, how fast it falls (s/m), and how soft the contact is.
+/// What is left of it at large creepage, how fast it falls (s/m), and how soft the wheel and rail are.
 const KEPT: (f64, f64) = (0.2, 0.8);
 const FALL: (f64, f64) = (0.03, 0.8);
 const ADHERING: (f64, f64) = (0.1, 1.0);

@@ -28,7 +28,7 @@ pub struct LineSample {
     pub time: Timestamp,
     /// What the two tachometers said.
     pub wheels: [WheelSample; 2],
-    /// The driver's command: −1 full brake, 0 nothing, 1 full traction, whichever way the train goes; absent where it is
+    /// The driver's command: −1 full brake, 0 nothing, 1 full traction, in the direction of travel; absent where it is
     /// not recorded.
     pub effort: Option<f64>,
     /// Along the track from an inertial sensor, where the train has one.
@@ -42,23 +42,23 @@ pub struct LineSample {
 /// What one tachometer said in one period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WheelSample {
-    /// Pulses within the period, both ways together; absent if there was no report.
+    /// Pulses within the period, both directions together; absent if there was no report.
     pub pulses: Option<i64>,
     /// The running counter, which goes on where a report is lost: forward less backward pulses, modulo
     /// [`counter_modulus`](super::LineVehicle::counter_modulus).
     pub counter: Option<i64>,
-    /// Which way the phases of the sensor say that it turned last; absent if it has not turned yet or cannot tell.
+    /// The last direction of rotation by the phases of the sensor; absent before the first pulse, or with one phase only.
     pub turned: Option<Turned>,
     /// When the last pulse of the period came, to a microsecond.
     pub last_edge: Option<Timestamp>,
 }
 
-/// Which way a wheel turned.
+/// The direction of rotation of a wheel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Turned {
-    /// The way in which distance grows.
+    /// The direction in which distance grows.
     Forward,
-    /// The other way.
+    /// The opposite direction.
     Backward,
 }
 
@@ -171,7 +171,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wheel_is_judged_by_how_it_differs_from_the_train_whichever_way_that_goes() {
+    fn a_wheel_is_judged_by_its_difference_from_the_train_in_either_direction() {
         let judged =
             [(10.05, 10.0), (10.2, 10.0), (9.0, 10.0), (0.0, 10.0), (-3.0, -2.0), (-1.0, -2.0), (0.0, 0.05)];
         assert_eq!(

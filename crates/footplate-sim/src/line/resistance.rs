@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn forces_of_vehicles_add_up_and_do_not_ask_which_way() {
+    fn forces_of_vehicles_add_up_in_either_direction() {
         let train = Resistance::davis(1000.0, 20.0, 3.0) + Resistance::davis(500.0, 0.0, 1.0);
         assert_eq!(train.at(Speed::from_m_per_s(10.0)), 2100.0);
         assert_eq!(train.at(Speed::from_m_per_s(-10.0)), 2100.0);

@@ -32,7 +32,7 @@ pub(crate) struct Rotation {
 pub(crate) struct Torques {
     /// Of the motor, forward positive (N m).
     pub(crate) drive: f64,
-    /// How much of it goes away with each rad/s more (N m s): large for a motor that is told its speed.
+    /// How much of it goes away with each rad/s more (N m s): large for a motor with speed control.
     pub(crate) drive_stiffness: f64,
     /// What the brake can hold (N m); it acts against the rotation and never turns the wheel.
     pub(crate) brake: f64,
@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn a_wheelset_locks_as_fast_as_its_inertia_allows() {
         // (brake - mu N) r^2 / J with J = 100 kg m²: 13 m/s² on 0.05 and 19 m/s² on 0.025, with the creep force on its
-        // way down from the peak in between.
+        // fall from the peak in between.
         let (hard, time) = lock_up(Film::LOW.with_friction(0.05), 20.0 / 3.6);
         assert!((11.0..17.0).contains(&hard), "{hard}");
         assert!((0.3..0.55).contains(&time), "{time}");

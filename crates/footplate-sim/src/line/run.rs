@@ -28,7 +28,7 @@ pub struct LineConditions {
     pub teeth: u32,
     /// From one sample to the next.
     pub period: TimeSpan,
-    /// Whether the believed diameters are the true ones.
+    /// Whether the assumed diameters are the true ones.
     pub exact_diameters: bool,
     /// Whether there is an inertial sensor.
     pub inertial_sensor: bool,

@@ -107,7 +107,7 @@ impl SlideProtection {
         self.quiet_for < OVER_S
     }
 
-    /// The valves after `dt` more seconds, from the speeds of the wheels and of the train (m/s, either way).
+    /// The valves after `dt` more seconds, from the speeds of the wheels and of the train (m/s, in either direction).
     pub(crate) fn step(&mut self, dt: f64, speeds: [f64; 2], train: f64, braking: bool) -> [Valve; 2] {
         if let ProtectionStyle::Proportional { creepage } = self.style {
             return self.keep(creepage, dt, speeds.map(f64::abs), train.abs(), braking);

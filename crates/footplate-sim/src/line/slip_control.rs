@@ -20,7 +20,7 @@ pub(crate) struct SlipControl {
 }
 
 impl SlipControl {
-    /// A control that starts at a speed (m/s, either way).
+    /// A control that starts at a speed (m/s, in either direction).
     pub(crate) const fn new(speed: f64) -> Self {
         Self { reference: speed, spinning_for: [0.0; 2], shares: [1.0; 2] }
     }

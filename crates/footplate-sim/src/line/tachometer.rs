@@ -163,17 +163,17 @@ impl Tachometer {
             return;
         }
         // Away over the edge, and back the next time.
-        let way = match self.toggled {
+        let turned = match self.toggled {
             0 if below => 1,
             0 => -1,
             away => -away,
         };
-        if way > 0 {
+        if turned > 0 {
             seen.forward += 1;
         } else {
             seen.backward += 1;
         }
-        self.toggled += way;
+        self.toggled += turned;
         seen.last = Some(time - self.draws.uniform(0.0..period));
     }
 }
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn backward_pulses_are_told_from_forward_ones() {
+    fn backward_pulses_are_distinguished_from_forward_ones() {
         let mut sensor = tachometer(80);
         sensor.follow(TAU, 0.0, 1.0);
         sensor.follow(0.0, 1.0, 2.0);

@@ -10,7 +10,7 @@ use super::random_world::LineLevel;
 use super::recording::LineRun;
 use super::vehicle::{LineBrake, LineSlideProtection};
 
-/// A test is believed with this margin: a part of what it found, and so much more (s).
+/// The result of a test is claimed with this margin: a part of what it found, and so much more (s).
 const MARGIN: f64 = 1.2;
 const MARGIN_S: f64 = 1.0;
 /// Wheels with less creepage than this turn with the train, as far as a claim of release goes: a part of its speed, and at

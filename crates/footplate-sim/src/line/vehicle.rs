@@ -32,14 +32,14 @@ pub struct LineVehicle {
     pub counter_modulus: i64,
 }
 
-/// A wheelset with a tachometer, as it is believed to be.
+/// A wheelset with a tachometer, as its owner knows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineWheelset {
     /// Pulses per revolution.
     pub teeth: u32,
-    /// The diameter it is believed to have.
+    /// The assumed diameter.
     pub diameter: Length,
-    /// The true diameter lies within this part of it, either way.
+    /// The true diameter lies within this part of it, above or below.
     pub diameter_tolerance: f64,
     /// Whether a motor drives it; all wheelsets are braked.
     pub is_powered: bool,
@@ -50,9 +50,9 @@ pub struct LineWheelset {
 pub struct LineBrake {
     /// Deceleration at effort −1 on level track; proportional below.
     pub full: Acceleration,
-    /// The true deceleration lies within this part of it, either way.
+    /// The true deceleration lies within this part of it, above or below.
     pub tolerance: f64,
-    /// What gradients may add to it, either way.
+    /// What gradients may add to it, above or below.
     pub gradient: Acceleration,
     /// What running resistance adds to it at most; it never takes away.
     pub resistance: Acceleration,

@@ -46,7 +46,7 @@ pub(crate) struct World {
 }
 
 impl World {
-    /// The world of a setup, one period (s) before its first sample. Diameters are those believed unless they are drawn.
+    /// The world of a setup, one period (s) before its first sample. Diameters are the assumed ones unless they are drawn.
     pub(crate) fn new(setup: Setup, seed: u64, teeth: [u32; 2], draws_diameters: bool, period: f64) -> Self {
         let mut of_train = Draws::new(seed, Purpose::Train);
         let mut of_line = Draws::new(seed, Purpose::Line);

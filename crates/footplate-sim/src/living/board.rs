@@ -1,46 +1,45 @@
 //! The virtual DCC-EX board: a living layout behind the texts that an EX-CommandStation exchanges.
 //!
-//! What comes in is read with the codec that the program writes with; when things come and go is decided here, by what was
+//! The codec is that of the program; the times are the simulation's own, by what was
 //! measured on the real firmware. Directions are absolute, the decoders know 14 speed steps, sensors report by themselves.
-//! Whoever spoke to it is not watched: trains run on when they are gone.
+//! It does not watch its clients: trains run on when they are gone.
 
 mod obeying;
 
 use std::collections::VecDeque;
 
-use footplate_core::track::{Layout, Leg};
+use footplate_core::track::Leg;
 use footplate_core::{Ratio, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
 use footplate_wire::dcc_ex::{
     ANSWER_LONGEST, ANSWER_SHORTEST, Framing, Reply, Request, SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST,
     Throttle,
 };
 
-use crate::circuit::CircuitError;
 use crate::draws::{Draws, Purpose};
 use crate::living::board_switches::BoardSwitches;
 use crate::living::delivery::Outgoing;
+use crate::living::due_queue::DueQueue;
 use crate::living::s88::Edge;
-use crate::living::switches::LivingSwitches;
 use crate::living::world::LivingLayout;
 
-/// What it says of itself.
+/// Its identity.
 const IDENTITY: &str = "DCC-EX V-5.6.0 / SIMULATED / FOOTPLATE G-virtual";
 /// One byte on a serial line of 115200 baud: ten bits.
 const BYTE_TIME: TimeSpan = TimeSpan::from_ns(10 * 1_000_000_000 / 115_200);
-/// What the input buffer holds.
+/// The size of the input buffer, in bytes.
 const BUFFER: usize = 64;
-/// How long the board is busy with one request (chosen so that about half of 100 requests that are written without a pause
+/// The time that the board needs for one request (chosen so that about half of 100 requests that are written without a pause
 /// are answered: on the firmware 54 were).
 const BUSY: TimeSpan = TimeSpan::from_us(1_400);
-/// The shape of the time to an answer between its limits: with u^1.6, half of the answers come within 3.4 ms, as measured.
+/// The exponent of the distribution of the answer time between its limits: with u^1.6, half of the answers come within 3.4 ms, as measured.
 const ANSWER_SHAPE: f64 = 1.6;
-/// From a reset until the board says what it is (2 to 6 s are reported).
+/// The time from a reset to the identity (2 to 6 s are reported).
 const BOOT: TimeSpan = TimeSpan::from_ms(2_000);
-/// From one line to the next when each arrives by itself: what 15 characters take at 115200 baud, and a little.
+/// The time between two lines that arrive separately: a little more than 15 characters take at 115200 baud.
 const LINE_TIME: TimeSpan = TimeSpan::from_us(1_500);
-/// The world goes on in such steps, so that no sensor is seen later than its message is due: less than the shortest delay.
+/// The longest step of the world: less than the shortest delay of a report.
 const LOOK_EVERY: TimeSpan = TimeSpan::from_ms(3);
-/// What is printed between replies when it chatters.
+/// Diagnostic texts between replies.
 const CHATTER: [&str; 3] = [
     "<* LCD1: Free RAM= 5538b\n(largest <block> 5500b) *>\n",
     "<@ 0 3 \"Ready\">\n",
@@ -66,21 +65,21 @@ pub struct VirtualBoard<'l> {
     /// Bytes on the line from the host.
     incoming: VecDeque<(Timestamp, u8)>,
     host_is_free: Timestamp,
-    /// Bytes that wait to be read, and when the board reads again.
+    /// Bytes that have not been read, and when the board reads again.
     buffer: VecDeque<u8>,
     busy_until: Timestamp,
     framing: Framing,
-    /// Replies and messages of sensors that are still to be said.
+    /// Replies and reports of sensors that have not been sent.
     replies: VecDeque<(Timestamp, String)>,
-    pushes: Vec<(Timestamp, SensorId, bool)>,
+    pushes: DueQueue<(SensorId, bool)>,
     outgoing: Outgoing,
     slots: Vec<Slot>,
     turnouts: Vec<(TurnoutId, bool)>,
-    /// Until when it is without power or starting.
+    /// The end of a power cut or a start.
     dark_until: Option<Timestamp>,
 }
 
-/// What happens next.
+/// An occurrence in the station or on its line.
 #[derive(Debug, Clone, Copy)]
 enum Next {
     Incoming,
@@ -118,26 +117,12 @@ impl<'l> VirtualBoard<'l> {
             busy_until: now,
             framing: Framing::default(),
             replies: VecDeque::new(),
-            pushes: Vec::new(),
+            pushes: DueQueue::new(),
             outgoing: Outgoing::new(now, switches.delivery, LINE_TIME),
             slots,
             turnouts,
             dark_until: None,
         }
-    }
-
-    /// A board and a layout on which trains have been put: see [`LivingLayout::draw`].
-    ///
-    /// # Errors
-    /// [`CircuitError`] when no train can run round on the layout.
-    pub fn draw(
-        layout: &'l Layout,
-        seed: u64,
-        trains: &[TrainId],
-        switches: &LivingSwitches,
-        board: BoardSwitches,
-    ) -> Result<Self, CircuitError> {
-        Ok(Self::new(LivingLayout::draw(layout, seed, trains, switches)?, seed, board))
     }
 
     /// The time.
@@ -152,17 +137,17 @@ impl<'l> VirtualBoard<'l> {
         &self.world
     }
 
-    /// The layout, for a person's hands.
+    /// The layout, for operator intervention.
     pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
         &mut self.world
     }
 
-    /// Somebody presses its reset button, or opens its serial port: the track loses power, and for some seconds nothing is
-    /// read. Then it says what it is, if it does, and knows no locomotive.
+    /// The operator presses its reset button, or opens its serial port: the track loses power, and the board reads nothing for
+    /// some seconds. Then it sends its identity, if it has a banner, and has forgotten all locomotives.
     pub fn restart(&mut self) {
         let now = self.now;
         self.world.power(false, now);
-        self.world.forget_all_told();
+        self.world.forget_commands();
         self.slots.clear();
         self.buffer.clear();
         self.replies.clear();
@@ -173,7 +158,7 @@ impl<'l> VirtualBoard<'l> {
         self.dark_until = Some(now + BOOT);
     }
 
-    /// The host puts bytes on the line, behind those that are still on their way.
+    /// The host puts bytes on the line, behind those that have not arrived yet.
     pub fn write(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.host_is_free = self.host_is_free.max(self.now) + BYTE_TIME;
@@ -181,7 +166,7 @@ impl<'l> VirtualBoard<'l> {
         }
     }
 
-    /// Goes on until a time, or until something reaches the host before it: the bytes of one portion.
+    /// Advances to a time, or until something reaches the host before it: the bytes of one portion.
     pub fn advance(&mut self, until: Timestamp) -> Option<Vec<u8>> {
         loop {
             let next = self.next().filter(|(at, _)| *at <= until);
@@ -205,15 +190,14 @@ impl<'l> VirtualBoard<'l> {
         }
     }
 
-    /// What happens next, and when; of things at one time the first in the order of this list.
+    /// The next occurrence and its time; of simultaneous ones, the first of this list.
     fn next(&self) -> Option<(Timestamp, Next)> {
         let reads = (!self.buffer.is_empty() && self.dark_until.is_none()).then_some(self.busy_until);
-        let pushes = self.pushes.iter().map(|(at, ..)| *at).min();
         let coming = [
             (self.incoming.front().map(|(at, _)| *at), Next::Incoming),
             (reads, Next::Reads),
             (self.replies.front().map(|(at, _)| *at), Next::Reply),
-            (pushes, Next::Push),
+            (self.pushes.due(), Next::Push),
             (self.outgoing.due(), Next::Outgoing),
             (self.dark_until, Next::Light),
         ];
@@ -239,9 +223,7 @@ impl<'l> VirtualBoard<'l> {
                 }
             }
             Next::Push => {
-                let first = self.pushes.iter().enumerate().min_by_key(|(_, (at, ..))| *at);
-                if let Some(at) = first.map(|(at, _)| at) {
-                    let (_, sensor, active) = self.pushes.remove(at);
+                if let Some((sensor, active)) = self.pushes.take() {
                     self.say(&line(&Reply::Sensor { id: sensor.0, active }));
                 }
             }
@@ -258,7 +240,7 @@ impl<'l> VirtualBoard<'l> {
         }
     }
 
-    /// What is on its way and due: one portion, less what the line loses of it.
+    /// The portion that arrives next, without the bytes that the line loses.
     fn portion(&mut self) -> Option<Vec<u8>> {
         let mut bytes = self.outgoing.take()?;
         if self.switches.lost > Ratio::ZERO {
@@ -272,22 +254,19 @@ impl<'l> VirtualBoard<'l> {
         lost > Ratio::ZERO && self.draws.chance(lost.as_parts())
     }
 
-    /// Sees which sensors have changed, and when that will be said.
+    /// Finds the sensors that have changed, and when the board will report them.
     fn look(&mut self, by: Timestamp) {
         for Edge { at, sensor, is_occupied } in self.world.s88.take_edges(by) {
             if self.dark_until.is_some() {
                 continue;
             }
             let delays = SENSOR_DELAY_SHORTEST.as_s()..SENSOR_DELAY_LONGEST.as_s();
-            let due = at + TimeSpan::from_s(self.draws.uniform(delays));
-            // What is said of one sensor stays in order.
-            let last = self.pushes.iter().filter(|(_, other, _)| *other == sensor).map(|(at, ..)| *at).max();
-            let due = last.map_or(due, |last| due.max(last + TimeSpan::from_us(100))).max(self.now);
-            self.pushes.push((due, sensor, is_occupied));
+            let due = (at + TimeSpan::from_s(self.draws.uniform(delays))).max(self.now);
+            self.pushes.add_report(due, (sensor, is_occupied), |(other, _)| *other == sensor);
         }
     }
 
-    /// Reads what waits until a request is complete, and does it.
+    /// Reads bytes until a request is complete, and executes it.
     fn read(&mut self) {
         let at = self.busy_until.max(self.now);
         while let Some(byte) = self.buffer.pop_front() {
@@ -309,7 +288,7 @@ impl<'l> VirtualBoard<'l> {
         }
     }
 
-    /// Puts a text on its way to the host.
+    /// Sends a text to the host.
     fn say(&mut self, text: &str) {
         let chatter = self.switches.chatter;
         if chatter > Ratio::ZERO && self.draws.chance(chatter.as_parts()) {
@@ -324,7 +303,7 @@ impl<'l> VirtualBoard<'l> {
     }
 }
 
-/// A message as it is printed: a line.
+/// The line of a message.
 fn line(reply: &Reply) -> String {
     format!("{reply}\n")
 }

@@ -1,23 +1,23 @@
-//! How a virtual DCC-EX board behaves, each as it was seen on the real firmware or reported of it.
+//! The properties of a virtual DCC-EX board, as observed on the real firmware or reported of it.
 
 use footplate_core::Ratio;
 
 use crate::living::delivery::Delivery;
 
-/// How the board and its line behave.
+/// The properties of the board and its line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoardSwitches {
-    /// Whether it says after a reset what it is, with the text around that.
+    /// Whether it sends its identity after a reset, with the text around it.
     pub has_banner: bool,
     /// How often a message has a diagnostic or display text before it.
     pub chatter: Ratio,
-    /// Whether a turnout is answered that lies as it should already.
+    /// Whether it confirms a command to a turnout that is already in that position.
     pub answers_unchanged: bool,
-    /// Whether bytes are lost that its input buffer of 64 does not hold.
+    /// Whether bytes beyond its input buffer of 64 are lost.
     pub overruns: bool,
-    /// How often a byte is lost on the line, either way.
+    /// How often a byte is lost on the line, in either direction.
     pub lost: Ratio,
-    /// How its messages are cut.
+    /// The portions in which its messages arrive.
     pub delivery: Delivery,
 }
 

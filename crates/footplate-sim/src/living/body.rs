@@ -30,16 +30,16 @@ struct Under {
     grade: f64,
 }
 
-/// A contact ahead of the shoe.
+/// A sensor ahead of the shoe.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Coming {
     /// Where it closes this time.
-    pub(crate) contact: Point<SensorId>,
+    pub(crate) sensor: Point<SensorId>,
     /// Where it closes on average.
     pub(crate) usual_mm: f64,
 }
 
-/// How this train closes contacts a little before or behind where they usually close.
+/// How this train closes sensors a little before or behind where they usually close.
 #[derive(Debug, Clone)]
 struct Scatter {
     draws: Draws,
@@ -49,9 +49,9 @@ struct Scatter {
 /// What the train comes to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Met {
-    /// The shoe touches a contact.
+    /// The shoe touches a sensor.
     Touches(Coming),
-    /// The shoe leaves a contact that it holds.
+    /// The shoe leaves a sensor that it holds.
     Leaves(Point<SensorId>),
     /// The last axle that a detector senses leaves its block.
     Vacates(Point<SensorId>),
@@ -79,10 +79,10 @@ pub(crate) struct Body {
     sensed: [f64; 2],
     /// Where blocks end that the train is in or comes to, in order.
     block_ends: VecDeque<Point<SensorId>>,
-    /// Contacts and dirty spots that the shoe has not come to, in order.
-    contacts: VecDeque<Coming>,
+    /// Sensors and dirty spots that the shoe has not come to, in order.
+    sensors: VecDeque<Coming>,
     dirt: VecDeque<f64>,
-    /// Contacts that the shoe holds closed.
+    /// Sensors that the shoe holds closed.
     held: VecDeque<Point<SensorId>>,
     /// Which of the path's edges the lead is on.
     under: usize,
@@ -116,7 +116,7 @@ impl Body {
             behind,
             sensed,
             block_ends: VecDeque::new(),
-            contacts: VecDeque::new(),
+            sensors: VecDeque::new(),
             dirt: VecDeque::new(),
             held: VecDeque::new(),
             under: 0,
@@ -193,8 +193,8 @@ impl Body {
         if let Some(end) = self.block_ends.pop_front_if(|end| end.at_mm <= last) {
             return Some(Met::Vacates(Point { at_mm: end.at_mm + self.sensed[1], ..end }));
         }
-        if let Some(contact) = self.contacts.pop_front_if(|coming| coming.contact.at_mm <= lead) {
-            return Some(Met::Touches(contact));
+        if let Some(sensor) = self.sensors.pop_front_if(|coming| coming.sensor.at_mm <= lead) {
+            return Some(Met::Touches(sensor));
         }
         if let Some(spot) = self.dirt.pop_front_if(|spot| *spot <= lead) {
             self.dirty_until = spot + DIRTY_MM;
@@ -223,12 +223,12 @@ impl Body {
         None
     }
 
-    /// A contact that closed is held until the shoe has passed.
-    pub(crate) fn hold(&mut self, contact: Point<SensorId>) {
-        self.held.push_back(contact);
+    /// A sensor that closed is held until the shoe has passed.
+    pub(crate) fn hold(&mut self, sensor: Point<SensorId>) {
+        self.held.push_back(sensor);
     }
 
-    /// All contacts that the shoe holds, which it lets go.
+    /// All sensors that the shoe holds, which it lets go.
     pub(crate) fn let_go(&mut self) -> impl Iterator<Item = SensorId> + '_ {
         self.held.drain(..).map(|held| held.what)
     }
@@ -292,8 +292,9 @@ impl Body {
             let shares = other.reach_on(mine.edge).is_some_and(|[begins, ends]| begins < to && from < ends);
             shares
                 || legs(rails, mine.edge).any(|(turnout, leg)| {
-                    let fouls =
-                        |path: &Self, under: &Under| path.way_from_toe(rails, under, turnout) < FOULING_MM;
+                    let fouls = |path: &Self, under: &Under| {
+                        path.distance_from_toe(rails, under, turnout) < FOULING_MM
+                    };
                     let stands_beside = |theirs: &Under| {
                         legs(rails, theirs.edge).any(|(number, by)| number == turnout && by != leg)
                             && fouls(other, theirs)
@@ -306,7 +307,7 @@ impl Body {
     /// Whether points that have just moved moved under the train.
     pub(crate) fn is_on_blades(&self, rails: &Rails<'_>, turnout: TurnoutId) -> bool {
         let is_leg = |under: &&Under| legs(rails, under.edge).any(|(number, _)| number == turnout);
-        self.path.iter().filter(is_leg).any(|under| self.way_from_toe(rails, under, turnout) < BLADES_MM)
+        self.path.iter().filter(is_leg).any(|under| self.distance_from_toe(rails, under, turnout) < BLADES_MM)
     }
 
     /// A turnout that lies wrong for a train which has one part before and one behind its toe.
@@ -323,7 +324,7 @@ impl Body {
     }
 
     /// How far the nearest part of the train on a leg is from the toe of its turnout; infinite if none is on it.
-    fn way_from_toe(&self, rails: &Rails<'_>, under: &Under, turnout: TurnoutId) -> f64 {
+    fn distance_from_toe(&self, rails: &Rails<'_>, under: &Under, turnout: TurnoutId) -> f64 {
         let (from, to) = (self.rear().max(under.begins), self.front().min(under.ends));
         let Some(rail) = rails.rail(under.edge).filter(|_| from < to) else { return f64::INFINITY };
         match (rail.leaves, rail.enters) {
@@ -339,17 +340,17 @@ impl Body {
         let Rail { length_mm, factor, grade, .. } = *rail;
         self.path.push_back(Under { edge, begins, ends: begins + length_mm, factor, grade });
         let coming = coming(&mut self.scatter, rails, rail, [begins, self.sensed[0]]);
-        self.contacts.extend(coming);
-        self.sort_contacts();
+        self.sensors.extend(coming);
+        self.sort_sensors();
         self.block_ends.extend(rail.ends_block.map(|what| Point { at_mm: begins, what }));
         self.dirt.extend(rail.dirty.iter().map(|at| begins + at));
     }
 
-    /// Blocks are sensed further ahead than contacts where carriages lead.
-    fn sort_contacts(&mut self) {
+    /// Blocks are sensed further ahead than sensors where carriages lead.
+    fn sort_sensors(&mut self) {
         if self.sensed[0] > 0.0 {
-            let by_place = |one: &Coming, other: &Coming| one.contact.at_mm.total_cmp(&other.contact.at_mm);
-            self.contacts.make_contiguous().sort_by(by_place);
+            let by_place = |one: &Coming, other: &Coming| one.sensor.at_mm.total_cmp(&other.sensor.at_mm);
+            self.sensors.make_contiguous().sort_by(by_place);
         }
     }
 
@@ -361,21 +362,21 @@ impl Body {
             let ended = rails.rail(under.edge).and_then(|rail| rail.ends_block);
             self.block_ends.extend(ended.map(|what| Point { at_mm: under.begins, what }));
         }
-        self.contacts.clear();
+        self.sensors.clear();
         self.dirt.clear();
         for under in &self.path {
             let Some(rail) = rails.rail(under.edge) else { continue };
             let coming = coming(&mut self.scatter, rails, rail, [under.begins, self.sensed[0]]);
-            self.contacts.extend(coming.into_iter().filter(|coming| coming.contact.at_mm > self.lead));
+            self.sensors.extend(coming.into_iter().filter(|coming| coming.sensor.at_mm > self.lead));
             self.dirt.extend(rail.dirty.iter().map(|at| under.begins + at).filter(|at| *at > self.lead));
         }
-        self.sort_contacts();
+        self.sort_sensors();
         self.under = self.path.iter().position(|under| self.lead < under.ends).unwrap_or(0);
         self.feel_rail();
         self.find_next();
     }
 
-    /// Closes contacts a little before or behind where they usually close.
+    /// Closes sensors a little before or behind where they usually close.
     pub(crate) fn scatter(&mut self, rails: &Rails<'_>, draws: Draws, shoe_mm: f64) {
         self.scatter = Some(Scatter { draws, shoe_mm });
         self.look_ahead(rails);
@@ -387,18 +388,18 @@ impl Body {
     }
 
     fn find_next(&mut self) {
-        let contact = self.contacts.front().map_or(f64::INFINITY, |coming| coming.contact.at_mm);
+        let sensor = self.sensors.front().map_or(f64::INFINITY, |coming| coming.sensor.at_mm);
         let left = self.held.front().map_or(f64::INFINITY, |held| held.at_mm + self.shoe);
         let dirt = self.dirt.front().copied().unwrap_or(f64::INFINITY);
         let edge = self.path.get(self.under).map_or(f64::INFINITY, |under| under.ends);
         let front = self.path.back().map_or(f64::INFINITY, |last| last.ends - self.ahead);
         let rear = self.path.front().map_or(f64::INFINITY, |first| first.ends + self.shoe + self.behind);
         let block = self.block_ends.front().map_or(f64::INFINITY, |end| end.at_mm + self.sensed[1]);
-        self.next = contact.min(left).min(dirt).min(edge).min(front).min(rear).min(block);
+        self.next = sensor.min(left).min(dirt).min(edge).min(front).min(rear).min(block);
     }
 }
 
-/// The contacts and entries of blocks of an edge that begins at a place, where the shoe is when they close this time.
+/// The sensors and entries of blocks of an edge that begins at a place, where the shoe is when they close this time.
 /// Detectors sense a train so far ahead of its shoe.
 fn coming(
     scatter: &mut Option<Scatter>,
@@ -406,16 +407,16 @@ fn coming(
     rail: &Rail,
     [begins, sensed_ahead]: [f64; 2],
 ) -> Vec<Coming> {
-    let contacts = rail.contacts.iter().map(|(at, what)| {
+    let sensors = rail.sensors.iter().map(|(at, what)| {
         let is_entry = rails.layout.block_of_entry(*what).is_some();
         let usual_mm = begins + at - if is_entry { sensed_ahead } else { 0.0 };
         let by = scatter.as_mut().map_or(0.0, |scatter| {
             let sd = libm::hypot(rails.scatter_mm(*what), scatter.shoe_mm);
             scatter.draws.normal_within(0.0, sd, 2.5)
         });
-        Coming { contact: Point { at_mm: usual_mm + by, what: *what }, usual_mm }
+        Coming { sensor: Point { at_mm: usual_mm + by, what: *what }, usual_mm }
     });
-    contacts.collect()
+    sensors.collect()
 }
 
 /// The edge after an edge while turnouts lie as they do.

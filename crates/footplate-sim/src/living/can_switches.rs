@@ -1,9 +1,9 @@
-//! How a virtual Central Station and the line to it behave, each as it was seen on real ones or reported of them.
+//! The properties of a virtual Central Station and its line, as observed on real ones or reported of them.
 
 use footplate_core::{Ratio, TimeSpan};
 use footplate_wire::marklin_can::LocomotiveProtocol;
 
-/// How frames travel.
+/// The transport of frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum CanTransport {
     /// Each in a datagram, to every client.
@@ -15,30 +15,30 @@ pub enum CanTransport {
     Adapter,
 }
 
-/// How the station and the line behave.
+/// The properties of the station and its line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CanSwitches {
-    /// How frames travel.
+    /// The transport of frames.
     pub transport: CanTransport,
-    /// How often a datagram is lost, either way.
+    /// How often a datagram is lost, in either direction.
     pub lost: Ratio,
-    /// How often one comes twice.
+    /// How often one is duplicated.
     pub duplicated: Ratio,
     /// How often one is overtaken by those that follow it.
     pub overtaken: Ratio,
-    /// Whether a stream arrives in parts that are cut anywhere.
+    /// Whether a stream arrives in random parts.
     pub is_split: bool,
-    /// Whether it does what is commanded without confirming it, as one program that serves does.
+    /// Whether it does what is commanded without confirming it, as one server program does.
     pub is_mute: bool,
-    /// Whether reports of contacts say how long the state before lasted.
+    /// Whether reports of sensors include how long the previous state lasted.
     pub has_times: bool,
-    /// Whether it answers when it is asked for its modules.
+    /// Whether it answers polls of its modules.
     pub answers_polls: bool,
-    /// Whether it has a list of its locomotives to give.
+    /// Whether it sends a list of its locomotives.
     pub has_list: bool,
-    /// What the decoders of its locomotives understand.
+    /// The protocol of its locomotives.
     pub locomotives: LocomotiveProtocol,
-    /// How often it reads its contacts; 100 ms unless its owner has set it (Link S88).
+    /// How often it reads its sensors; 100 ms unless its owner has set it (Link S88).
     pub scan: TimeSpan,
 }
 

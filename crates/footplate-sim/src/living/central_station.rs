@@ -1,9 +1,8 @@
 //! The virtual Central Station: a living layout behind the frames of Märklin's CAN bus, over datagrams, a stream or a serial adapter.
 //!
-//! What comes in is read with the codec that the program writes with; when things come and go is decided here. All contacts are
+//! The codec is that of the program; the times are the simulation's own. All inputs are
 //! loaded into the S88 bus at once, a cycle apart, and remembered until then; one after the other is shifted out and reported.
-//! Directions are absolute, the decoders know 14 speed steps. Whoever spoke to it is not watched: trains run on when they are
-//! gone.
+//! Directions are absolute, the decoders know 14 speed steps. It does not watch its clients: trains run on when they are gone.
 
 mod adapter;
 mod obeying;
@@ -11,37 +10,35 @@ mod scanning;
 
 use std::collections::VecDeque;
 
-use footplate_core::track::{Layout, Leg};
+use footplate_core::track::Leg;
 use footplate_core::{TimeSpan, Timestamp, TrainId, TurnoutId};
 use footplate_wire::marklin_can::{AccessoryProtocol, Frame, Framing, Message, Transport, Uid};
 
 use self::adapter::Adapter;
 use self::scanning::Scanning;
-use crate::circuit::CircuitError;
 use crate::draws::{Draws, Purpose};
 use crate::living::can_switches::{CanSwitches, CanTransport};
 use crate::living::network::{Disturbances, Network};
-use crate::living::switches::LivingSwitches;
 use crate::living::world::LivingLayout;
 
 /// A frame with eight bytes on the bus: about 130 bits at 250 kbit/s.
 const FRAME_TIME: TimeSpan = TimeSpan::from_us(520);
-/// What the station needs for an answer (s; chosen: stations answer within some milliseconds).
+/// The answer time (s; chosen: stations answer within some milliseconds).
 const ANSWER_S: std::ops::Range<f64> = 0.001..0.006;
-/// What bytes of a stream or of an adapter take (s; chosen).
+/// The transit time of bytes in a stream or an adapter (s; chosen).
 const LINE_S: std::ops::Range<f64> = 0.000_2..0.001_5;
-/// The second part of a frame that is cut comes so much later (s; chosen).
+/// The delay of the second part of a split frame (s; chosen).
 const SPLIT_S: std::ops::Range<f64> = 0.000_5..0.005;
-/// How often the station asks who is there.
+/// The interval of pings.
 const PING_EVERY: TimeSpan = TimeSpan::from_ms(10_000);
-/// From power on until it answers (chosen: a box, not the half minute of a screen).
+/// The time from power on to the first answer (chosen: a box, not the half minute of a screen).
 const BOOT: TimeSpan = TimeSpan::from_ms(4_000);
 /// The hash of its frames, seen on a real track box; the published formula does not yield it.
 const HASH: u16 = 0x9346;
-/// Clients that datagrams are sent to at most; more than any layout has.
+/// The most clients; more than any layout has.
 const MOST_CLIENTS: usize = 64;
 
-/// A locomotive that was ever spoken of.
+/// A locomotive that was in any message.
 #[derive(Debug, Clone, Copy)]
 struct Slot {
     uid: Uid,
@@ -63,17 +60,17 @@ pub struct VirtualCentralStation<'l> {
     framing: Framing,
     /// Frames that the bytes of a stream or an adapter made, and when the station reads each.
     incoming: VecDeque<(Timestamp, Frame)>,
-    /// Bytes on their way to the host of a stream or an adapter.
+    /// Bytes that the host of a stream or an adapter will receive.
     outgoing: VecDeque<(Timestamp, Vec<u8>)>,
     bus_is_free: Timestamp,
     slots: Vec<Slot>,
     scanning: Scanning,
     ping_due: Timestamp,
-    /// Until when it is starting.
+    /// The end of its start.
     dark_until: Option<Timestamp>,
 }
 
-/// What happens next.
+/// An occurrence in the station or on its line.
 #[derive(Debug, Clone, Copy)]
 enum Next {
     Datagram,
@@ -88,7 +85,7 @@ enum Next {
 
 impl<'l> VirtualCentralStation<'l> {
     /// A station in front of a layout, which has been driving the trains on it: it knows which end of each leads. The track has no
-    /// power yet. The layout's sensor 0 is contact 1, its turnout 1 is the first.
+    /// power yet. The layout's sensor 0 is input 1, its turnout 1 is the first.
     #[must_use]
     pub fn new(mut world: LivingLayout<'l>, seed: u64, switches: CanSwitches) -> Self {
         let now = world.now();
@@ -122,20 +119,6 @@ impl<'l> VirtualCentralStation<'l> {
         }
     }
 
-    /// A station and a layout on which trains have been put: see [`LivingLayout::draw`].
-    ///
-    /// # Errors
-    /// [`CircuitError`] when no train can run round on the layout.
-    pub fn draw(
-        layout: &'l Layout,
-        seed: u64,
-        trains: &[TrainId],
-        switches: &LivingSwitches,
-        can: CanSwitches,
-    ) -> Result<Self, CircuitError> {
-        Ok(Self::new(LivingLayout::draw(layout, seed, trains, switches)?, seed, can))
-    }
-
     /// The time.
     #[must_use]
     pub const fn now(&self) -> Timestamp {
@@ -148,7 +131,7 @@ impl<'l> VirtualCentralStation<'l> {
         &self.world
     }
 
-    /// The layout, for a person's hands.
+    /// The layout, for operator intervention.
     pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
         &mut self.world
     }
@@ -159,12 +142,11 @@ impl<'l> VirtualCentralStation<'l> {
         self.switches.transport
     }
 
-    /// It is switched off and on: the track loses power, and for some seconds nothing is read. Then it knows no locomotive's
-    /// speed.
+    /// It is switched off and on: the track loses power, and it reads nothing for some seconds. Then all speeds are 0.
     pub fn restart(&mut self) {
         let now = self.now;
         self.world.power(false, now);
-        self.world.forget_all_told();
+        self.world.forget_commands();
         self.slots.iter_mut().for_each(|slot| slot.speed = 0);
         self.network.clear();
         self.incoming.clear();
@@ -203,7 +185,7 @@ impl<'l> VirtualCentralStation<'l> {
         }
     }
 
-    /// Goes on until a time, or until bytes reach a client before it.
+    /// Advances to a time, or until bytes reach a client before it.
     pub fn advance(&mut self, until: Timestamp) -> Option<(usize, Vec<u8>)> {
         loop {
             let next = self.next().filter(|(at, _)| *at <= until);
@@ -218,7 +200,7 @@ impl<'l> VirtualCentralStation<'l> {
         }
     }
 
-    /// What happens next, and when; of things at one time the first in the order of this list.
+    /// The next occurrence and its time; of simultaneous ones, the first of this list.
     fn next(&self) -> Option<(Timestamp, Next)> {
         let coming = [
             (self.network.next_to_station(), Next::Datagram),
@@ -269,20 +251,20 @@ impl<'l> VirtualCentralStation<'l> {
         }
     }
 
-    /// A frame has come whole from the host of a stream or an adapter.
+    /// A frame from the host of a stream or an adapter is complete.
     fn take_in(&mut self, frame: Frame) {
         let due = self.now + TimeSpan::from_s(self.draws.uniform(LINE_S));
         let due = self.incoming.back().map_or(due, |(last, _)| due.max(*last));
         self.incoming.push_back((due, frame));
     }
 
-    /// Says something in a while.
+    /// Sends a message after the answer time.
     fn say(&mut self, message: Message) {
         let due = self.now + TimeSpan::from_s(self.draws.uniform(ANSWER_S));
         self.post(due, message, true);
     }
 
-    /// Puts a frame on the bus, behind those that are on it.
+    /// Sends a frame on the bus, after those before it.
     fn post(&mut self, due: Timestamp, message: Message, is_response: bool) {
         let leaves = self.bus_is_free.max(due) + FRAME_TIME;
         self.bus_is_free = leaves;
@@ -301,7 +283,7 @@ impl<'l> VirtualCentralStation<'l> {
         }
     }
 
-    /// Bytes leave for the host of a stream or an adapter; what left before arrives before.
+    /// Sends bytes to the host of a stream or an adapter, in order.
     fn put_out(&mut self, leaves: Timestamp, mut bytes: Vec<u8>) {
         let due = leaves + TimeSpan::from_s(self.draws.uniform(LINE_S));
         let mut due = self.outgoing.back().map_or(due, |(last, _)| due.max(*last));

@@ -1,36 +1,36 @@
-//! When the station is ready for the next byte, and how it says so.
+//! The hand-shake line (CTS): when the station is ready for the next byte.
 
 use footplate_core::{TimeSpan, Timestamp};
 
 use crate::draws::Draws;
 
-/// From the last bit of a byte until the station takes its readiness back (chosen: a few instructions of a slow
+/// The time from the last bit of a byte until the line falls (chosen: a few instructions of a slow
 /// processor; programs that look only at the level lose bytes by it).
 const FALL: TimeSpan = TimeSpan::from_us(200);
 
-/// How the station uses the wire that says whether it is ready.
+/// The use of the hand-shake line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CtsSwitch {
-    /// It says so, byte by byte.
+    /// It falls after every byte.
     PerByte {
         /// The shortest time from the last bit of a byte until it is ready again.
         least: TimeSpan,
         /// The longest.
         most: TimeSpan,
     },
-    /// The wire is not there, and every byte is taken; only answers stand in the way of questions.
+    /// There is no such line: the station accepts every byte, except while it answers.
     None,
 }
 
 impl CtsSwitch {
-    /// A box that wants to be asked (times chosen: a fraction of a byte).
+    /// A station that needs the hand-shake (times chosen: a fraction of a byte).
     #[must_use]
     pub const fn per_byte() -> Self {
         Self::PerByte { least: TimeSpan::from_us(500), most: TimeSpan::from_us(2000) }
     }
 }
 
-/// Whether the station is ready, and when that will change.
+/// The state of the line, and its next changes.
 #[derive(Debug, Clone)]
 pub(crate) struct Cts {
     switch: CtsSwitch,
@@ -52,12 +52,12 @@ impl Cts {
         self.rises = Some((busy_until + takes).max(at + FALL + FALL));
     }
 
-    /// When it changes next.
+    /// The time of its next change.
     pub(crate) fn next(&self) -> Option<Timestamp> {
         self.falls.or(self.rises)
     }
 
-    /// It changes; returns what it is now.
+    /// Changes it; returns its new state.
     pub(crate) fn change(&mut self) -> bool {
         if self.falls.take().is_some() {
             self.is_up = false;
@@ -68,7 +68,7 @@ impl Cts {
         self.is_up
     }
 
-    /// Whether a byte that begins now is heard.
+    /// Whether the station receives a byte that begins now.
     pub(crate) fn hears(&self) -> bool {
         self.switch == CtsSwitch::None || (self.is_up && self.falls.is_none())
     }

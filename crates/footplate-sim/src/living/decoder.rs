@@ -4,12 +4,12 @@ use footplate_core::{DecoderSteps, SpeedStep, Timestamp, TrainId};
 
 use crate::living::world::LivingLayout;
 
-/// What a station carries to a decoder.
+/// A speed command on the track.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum DecoderSpeed {
-    /// A step of so many; 0 stops as the decoder brakes.
+    /// A step of `highest` steps; 0 stops with the braking of the decoder.
     Step { step: u8, highest: u8 },
-    /// It stops at once.
+    /// An immediate stop.
     EmergencyStop,
 }
 
@@ -20,23 +20,23 @@ impl LivingLayout<'_> {
         engine.map_or(DecoderSteps::Fourteen, |engine| DecoderSteps::with(engine.speeds.highest()))
     }
 
-    /// The track carries a locomotive's direction and speed.
+    /// Sends direction and speed to a locomotive over the track.
     pub(crate) fn carry(&mut self, train: TrainId, forward: bool, speed: DecoderSpeed, at: Timestamp) {
         if self.runs_forward(train) == Some(!forward) {
-            self.turn(train, at);
+            self.reverse(train, at);
         }
         match speed {
             DecoderSpeed::Step { step, highest } => {
                 let own = self.decoder(train).highest().get();
-                self.tell(train, nearest(step, highest, own), at);
+                self.command(train, nearest(step, highest, own), at);
             }
             // What is turned around twice while it runs stops at once and leads with the same end.
-            DecoderSpeed::EmergencyStop => (0..2).for_each(|_| self.turn(train, at)),
+            DecoderSpeed::EmergencyStop => (0..2).for_each(|_| self.reverse(train, at)),
         }
     }
 }
 
-/// The step of a decoder, of `own` steps, that is nearest to one of so many; none but 0 stops.
+/// The step of a decoder with `own` steps that is nearest to a step of `highest`; only 0 gives 0.
 fn nearest(step: u8, highest: u8, own: u8) -> SpeedStep {
     if step == 0 {
         return SpeedStep::STAND;

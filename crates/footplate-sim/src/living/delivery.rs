@@ -1,4 +1,4 @@
-//! How what a station says in a stream is cut into portions on its way.
+//! The portions in which the stream of a station reaches the host.
 
 use std::collections::VecDeque;
 
@@ -6,28 +6,28 @@ use footplate_core::{TimeSpan, Timestamp};
 
 use crate::draws::Draws;
 
-/// Messages that are merged wait for others for up to so long.
+/// The longest wait of a message for others in the same portion.
 const MERGED_EVERY: TimeSpan = TimeSpan::from_ms(20);
-/// The second part of a split message comes so much later (s).
+/// The delay of the second part of a split message (s).
 const SPLIT_S: std::ops::Range<f64> = 0.000_5..0.005;
 
-/// How messages are cut.
+/// The portions in which messages arrive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Delivery {
-    /// A message arrives by itself.
+    /// Each message separately.
     #[default]
     Each,
-    /// What is said within 20 ms arrives together.
+    /// All messages of 20 ms together.
     Merged,
-    /// A message arrives in two parts.
+    /// Each message in two parts.
     Split,
 }
 
-/// What is on its way to the host, and when it arrives.
+/// Portions that the host will receive, and when.
 #[derive(Debug, Clone)]
 pub(crate) struct Outgoing {
     delivery: Delivery,
-    /// From one line to the next when each arrives by itself.
+    /// The time between two lines that arrive separately.
     line_time: TimeSpan,
     line_is_free: Timestamp,
     portions: VecDeque<(Timestamp, Vec<u8>)>,
@@ -58,7 +58,7 @@ impl Outgoing {
         Some(bytes)
     }
 
-    /// Puts lines on their way.
+    /// Sends lines.
     pub(crate) fn post(&mut self, now: Timestamp, bytes: &[u8], draws: &mut Draws) {
         let last = self.portions.back().map_or(now, |(last, _)| (*last).max(now));
         match self.delivery {

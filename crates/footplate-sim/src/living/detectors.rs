@@ -55,15 +55,15 @@ impl Detectors {
         Self { entries, delays, draws }
     }
 
-    /// The detector that a train trips at a sensor; `None` for a contact.
+    /// The detector that a train trips at a sensor; `None` where a shoe closes the sensor.
     pub(crate) fn at(&self, sensor: SensorId) -> Option<SensorId> {
         self.entries.get(&sensor).copied()
     }
 
-    /// The sensors of a layout as the station knows them: contacts and detectors.
+    /// The sensors of a layout as the station knows them: those that shoes close, and detectors.
     pub(crate) fn inputs(&self, layout: &Layout) -> Vec<SensorId> {
-        let contacts = layout.sensors().map(|(sensor, _)| sensor).filter(|sensor| self.at(*sensor).is_none());
-        contacts.chain(self.delays.keys().copied()).collect()
+        let closed = layout.sensors().map(|(sensor, _)| sensor).filter(|sensor| self.at(*sensor).is_none());
+        closed.chain(self.delays.keys().copied()).collect()
     }
 
     /// How long after a train came in its detector reports it.

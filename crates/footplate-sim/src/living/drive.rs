@@ -1,4 +1,4 @@
-//! What drives a train of a living layout: the usual model or the second one.
+//! Decoder and motor of a train on a living layout, by the usual model or the second one.
 
 use std::sync::Arc;
 
@@ -10,8 +10,8 @@ use crate::motor::Motor;
 use crate::train::Train;
 use crate::traits::Session;
 
-/// How a gradient slows down a train of the usual model that nothing drives, in mm/s² for each unit of gradient and of
-/// what the train feels of it (chosen: gears take most of the 9810).
+/// The deceleration of an undriven train of the usual model by a gradient, in mm/s² per unit of gradient and of the train's
+/// sensitivity to it (chosen: gears take most of the 9810).
 const SLOPE_MM_PER_S2: f64 = 1000.0;
 
 /// Decoder and motor of one train.
@@ -31,7 +31,7 @@ impl Drive {
         }
     }
 
-    /// It stands, and its decoder knows nothing any more.
+    /// Stops it; its decoder forgets its commands.
     pub(crate) fn reset(&mut self) {
         match self {
             Self::Usual(motor) => *motor = motor.reset(),
@@ -70,7 +70,7 @@ impl Drive {
         self.speed() == 0.0
     }
 
-    /// Nothing that was commanded will move it.
+    /// None of its commands will move it.
     pub(crate) fn stays_at_rest(&self) -> bool {
         match self {
             Self::Usual(motor) => motor.stays_at_rest(),
@@ -85,7 +85,7 @@ impl Drive {
         }
     }
 
-    /// It stands without a current until a higher step is commanded.
+    /// Cuts its current until a higher step is commanded.
     pub(crate) fn cut_off(&mut self) {
         match self {
             Self::Usual(motor) => motor.stall(),

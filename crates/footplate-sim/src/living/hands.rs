@@ -1,4 +1,4 @@
-//! What a person does to trains and turnouts.
+//! Operator intervention: trains are placed, lifted, pushed and exchanged, turnouts thrown by hand.
 
 use footplate_core::track::{Leg, Position};
 use footplate_core::{Length, TrainId, TurnoutId};
@@ -8,28 +8,28 @@ use crate::living::live_train::{End, LiveTrain};
 use crate::living::world::LivingLayout;
 use crate::train::Train;
 
-/// Why a hand cannot do that.
+/// Why an intervention is impossible.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum HandError {
     /// There is no such train.
     #[error("there is no train {0}; name one that the layout was made with")]
     NoTrain(TrainId),
-    /// It would stand beyond the end of the track.
+    /// The train would reach beyond the end of the track.
     #[error("the track ends under the train there; put it further from the end")]
     NoTrack,
-    /// Another train stands there.
+    /// Another train is there.
     #[error("train {0} is there already; put this one elsewhere or lift the other first")]
     Occupied(TrainId),
 }
 
 impl LivingLayout<'_> {
-    /// Puts a train on the rails, standing, with the leading end of its shoe at a place in true lengths. It will run
-    /// in the direction of the place's edge when it is told a step, with the end in front that is given. A wrecked
-    /// train is sound again. What the station told it last it is commanded again, and so may start at once.
+    /// Puts a train on the rails, at rest, with the leading end of its shoe at a place in true lengths. It faces in the
+    /// direction of the place's edge, with the given end in front. A wrecked train is repaired. The station repeats its
+    /// last command, so the train may start at once.
     ///
     /// # Errors
-    /// [`HandError`] when there is no such train or no room for it; it is where it was then.
+    /// [`HandError`] when there is no such train or no room for it; the train stays where it was.
     pub fn place(&mut self, train: TrainId, at: Position, leads: End) -> Result<(), HandError> {
         let place =
             self.trains.iter().position(|found| found.id == train).ok_or(HandError::NoTrain(train))?;
@@ -62,7 +62,7 @@ impl LivingLayout<'_> {
         }
         self.trains[place].put_down_at = self.trains[place].odometer;
         self.find_near();
-        self.remind(place, self.now());
+        self.repeat_command(place, self.now());
         Ok(())
     }
 
@@ -74,23 +74,23 @@ impl LivingLayout<'_> {
         }
     }
 
-    /// Pushes a train along its direction of travel; what its shoe touches on the way closes now.
+    /// Pushes a train in its direction of travel; the sensors that its shoe reaches close at once.
     pub fn push(&mut self, train: TrainId, by: Length) {
         let now = self.now();
         let Some(place) = self.trains.iter().position(|found| found.id == train) else { return };
         let lies = |turnout| self.points.lies(turnout);
         let pushed = &mut self.trains[place];
         let Some(body) = &mut pushed.body else { return };
-        // Not further than from one end of the room to the other.
+        // At most the length of a room.
         body.lead += by.as_mm().clamp(0.0, 10_000.0);
         while let Some(met) = body.meet(&self.rails, &lies) {
             match met {
-                Met::Touches(Coming { contact, .. }) => {
-                    if self.s88.close(contact.what, now, train, pushed.odometer) {
-                        body.hold(contact);
+                Met::Touches(Coming { sensor, .. }) => {
+                    if self.s88.close(sensor.what, now, train, pushed.odometer) {
+                        body.hold(sensor);
                     }
                 }
-                Met::Leaves(contact) => self.s88.leave(contact.what, now),
+                Met::Leaves(sensor) => self.s88.leave(sensor.what, now),
                 Met::Vacates(end) => self.s88.vacate(end.what, now),
                 Met::OtherEdges | Met::Dirt => {}
                 Met::End | Met::IllegalPair(_) => break,
@@ -99,17 +99,17 @@ impl LivingLayout<'_> {
         self.find_near();
     }
 
-    /// Makes the wheels of a train dirty, or cleans them: how fast it is over how fast it would be clean.
+    /// Sets how dirty the wheels of a train are: its speed over its speed with clean wheels.
     pub fn dirty_wheels(&mut self, train: TrainId, speed: f64) {
         if let Some(found) = self.trains.iter_mut().find(|found| found.id == train) {
             found.wheels = speed.clamp(0.0, 2.0);
         }
     }
 
-    /// Puts another engine in the place of one, under its address.
+    /// Exchanges the engine of a train for another one under the same address.
     ///
     /// # Errors
-    /// [`HandError`] when there is no such train or the other one finds no room.
+    /// [`HandError`] when there is no such train or no room for the other engine.
     pub fn swap(&mut self, train: TrainId, other: Train, warmth: f64) -> Result<(), HandError> {
         let now = self.truth().train(train).ok_or(HandError::NoTrain(train))?;
         self.lift(train);
@@ -117,7 +117,7 @@ impl LivingLayout<'_> {
         now.position.map_or(Ok(()), |position| self.place(train, position, now.leads))
     }
 
-    /// Moves the points of a turnout. Whatever stands on them is not looked at.
+    /// Throws a turnout by hand, even under a train.
     pub fn lay(&mut self, turnout: TurnoutId, leg: Leg) {
         if self.points.lies(turnout).is_some() {
             self.points.lay(turnout, leg);

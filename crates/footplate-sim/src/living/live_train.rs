@@ -1,4 +1,4 @@
-//! One train of a living layout: what it was told, what drives it, and where it is.
+//! One train of a living layout: its commands, what drives it, and where it is.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use crate::draws::Draws;
 use crate::electric::Surroundings;
 use crate::living::body::{Body, Coming, Met};
 use crate::living::drive::Drive;
-use crate::living::mishap::MishapKind;
+use crate::living::incident::IncidentKind;
 use crate::living::rails::Rails;
 use crate::living::s88::S88;
 use crate::living::truth::RestTruth;
@@ -46,7 +46,7 @@ impl End {
     }
 }
 
-/// What a decoder hears.
+/// A command to a decoder.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Order {
     Step(SpeedStep),
@@ -64,9 +64,9 @@ pub(crate) struct LiveTrain {
     /// Nothing while it is lifted.
     pub(crate) body: Option<Body>,
     pub(crate) leads: End,
-    /// Orders on their way to the decoder, and when it has them.
+    /// Commands that the decoder has not received yet, and when it does.
     orders: VecDeque<(Timestamp, Order)>,
-    /// The step that its decoder heard last.
+    /// The step that its decoder received last.
     pub(crate) heard: SpeedStep,
     /// Stopping without its decoder: by how much each second, in mm/s², and how fast the wheels still turn.
     halting: Option<(f64, f64)>,
@@ -78,7 +78,7 @@ pub(crate) struct LiveTrain {
     pub(crate) put_down_at: f64,
     /// Since when it has stood, while it stands.
     pub(crate) stands_since: Option<Timestamp>,
-    /// Nothing that it was told will move it.
+    /// None of its commands will move it.
     pub(crate) sleeps: bool,
     pub(crate) is_wrecked: bool,
 }
@@ -96,7 +96,7 @@ pub(crate) struct Around<'a, 'l, L: Fn(TurnoutId) -> Option<Leg>> {
 pub(crate) struct Stepped {
     /// It is on other edges than before.
     pub(crate) other_edges: bool,
-    pub(crate) mishap: Option<MishapKind>,
+    pub(crate) incident: Option<IncidentKind>,
 }
 
 impl LiveTrain {
@@ -145,30 +145,30 @@ impl LiveTrain {
         }
     }
 
-    /// An order has left the line; its decoder will have it some time later.
-    pub(crate) fn tell(&mut self, order: Order, sent: Timestamp) {
+    /// A command has left the line; its decoder receives it some time later.
+    pub(crate) fn send(&mut self, order: Order, sent: Timestamp) {
         let delay = self.draws.normal(self.train.command_delay.as_s(), self.train.command_jitter.as_s());
         let last = self.orders.back().map_or(sent, |(heard, _)| *heard);
-        // Nothing is heard before the step that is under way has ended, and no order overtakes another.
+        // The decoder receives nothing before the present step has ended, and no command overtakes another.
         let heard = (sent + TimeSpan::from_s(delay.clamp(0.0, 1.0))).max(sent + STEP).max(last);
         self.orders.push_back((heard, order));
         self.sleeps = false;
     }
 
-    /// Whether its front end leads once it has heard the orders that are on their way.
+    /// Whether its front end leads once it has received all commands that were sent.
     pub(crate) fn runs_forward(&self) -> bool {
         let turns = self.orders.iter().filter(|(_, order)| matches!(order, Order::Turn)).count();
         (self.leads == End::Nose) == turns.is_multiple_of(2)
     }
 
-    /// Its decoder has lost power and forgets everything.
+    /// Its decoder loses power and forgets everything.
     pub(crate) fn lose_power(&mut self) {
         self.orders.clear();
         self.heard = SpeedStep::STAND;
         self.halt(POWERLESS_MM_PER_S2);
     }
 
-    /// It stands at once, and its decoder knows nothing any more.
+    /// Stops it at once; its decoder forgets its commands.
     pub(crate) fn stand(&mut self, now: Timestamp, rests: &mut Vec<RestTruth>) {
         self.halting = None;
         self.orders.clear();
@@ -220,8 +220,9 @@ impl LiveTrain {
                 if let Some(last) = around.rests.iter_mut().rev().find(|rest| rest.train == self.id) {
                     last.until = Some(now);
                 }
-                stepped.mishap =
-                    body.splits(around.rails, around.lies).map(|turnout| MishapKind::Derailment { turnout });
+                stepped.incident = body
+                    .splits(around.rails, around.lies)
+                    .map(|turnout| IncidentKind::Derailment { turnout });
             }
         } else if self.speed == 0.0 {
             self.fall_asleep();
@@ -248,14 +249,13 @@ impl LiveTrain {
             let counted = self.odometer - there;
             while let Some(met) = body.meet(around.rails, around.lies) {
                 match met {
-                    Met::Touches(Coming { contact, usual_mm }) => {
-                        let (sensor, at_mm) = (contact.what, contact.at_mm);
-                        if around.s88.close(sensor, when(at_mm), self.id, counted + usual_mm) {
-                            body.hold(contact);
+                    Met::Touches(Coming { sensor, usual_mm }) => {
+                        if around.s88.close(sensor.what, when(sensor.at_mm), self.id, counted + usual_mm) {
+                            body.hold(sensor);
                         }
                     }
-                    Met::Leaves(contact) => {
-                        around.s88.leave(contact.what, when(contact.at_mm + self.train.shoe.as_mm()));
+                    Met::Leaves(sensor) => {
+                        around.s88.leave(sensor.what, when(sensor.at_mm + self.train.shoe.as_mm()));
                     }
                     Met::Vacates(end) => around.s88.vacate(end.what, when(end.at_mm)),
                     Met::Dirt => {
@@ -265,11 +265,11 @@ impl LiveTrain {
                     }
                     Met::OtherEdges => stepped.other_edges = true,
                     Met::IllegalPair(turnout) => {
-                        stepped.mishap = Some(MishapKind::Derailment { turnout });
+                        stepped.incident = Some(IncidentKind::Derailment { turnout });
                         break;
                     }
                     Met::End => {
-                        stepped.mishap = Some(MishapKind::Overrun);
+                        stepped.incident = Some(IncidentKind::Overrun);
                         break;
                     }
                 }
@@ -301,10 +301,10 @@ impl LiveTrain {
         wheel
     }
 
-    /// Its decoder has an order. Returns whether the train is on other edges than before.
+    /// Its decoder executes a command. Returns whether the train is on other edges than before.
     fn obey(&mut self, order: Order, rails: &Rails<'_>) -> bool {
         match order {
-            // Stations say the same over and over; a decoder does not begin again.
+            // Stations repeat commands; a decoder does not begin again.
             Order::Step(step) if step == self.heard => false,
             Order::Step(step) => {
                 self.heard = step;
@@ -317,7 +317,7 @@ impl LiveTrain {
                 self.heard = SpeedStep::STAND;
                 self.halt(TURNED_MM_PER_S2);
                 if self.halting.is_some() {
-                    // It turns when it stands.
+                    // It reverses at rest.
                     self.orders.push_front((Timestamp::ZERO, Order::Turn));
                     return false;
                 }
@@ -330,7 +330,7 @@ impl LiveTrain {
         }
     }
 
-    /// What scatters where it closes contacts, if anything does.
+    /// The scatter of the places where it closes sensors, if the world has any: its draws and its standard deviation (mm).
     pub(crate) fn shoe_scatter(&mut self, scatters: bool) -> Option<(Draws, f64)> {
         scatters.then(|| (self.draws.split(), self.train.traits.shoe_scatter_mm))
     }

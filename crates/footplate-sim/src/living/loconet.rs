@@ -1,55 +1,52 @@
 //! A virtual command station on LocoNet behind a server (LbServer): lines in and out, at the pace of the bus.
 //!
 //! The bus carries one message after the other, of the host, of the station and of detectors alike. Locomotives are driven through
-//! slots; a slot whose locomotive is not commanded for long is given away. Whoever spoke to it is not watched: trains run on when they
-//! are gone.
+//! slots; a slot whose locomotive is not commanded for long is given away. It does not watch its clients: trains run on when they are
+//! gone.
 
 mod obeying;
 
 use std::collections::VecDeque;
 
-use footplate_core::track::Layout;
 use footplate_core::{Ratio, SensorId, TimeSpan, Timestamp, TrainId};
 use footplate_wire::loconet::{BUS_BYTE, Line, Lines, Message, SentReport, SlotData, SlotUse};
 
-use crate::circuit::CircuitError;
 use crate::draws::{Draws, Purpose};
 use crate::living::delivery::{Delivery, Outgoing};
 use crate::living::s88::Edge;
-use crate::living::switches::LivingSwitches;
 use crate::living::world::LivingLayout;
 
-/// What the server says of itself.
+/// The version of the server.
 const VERSION: &str = "LbServer (simulated by Footplate)";
-/// What a line takes through the network (s; chosen: a wired one).
+/// The transit time of a line through the network (s; chosen: a wired one).
 const NETWORK_S: std::ops::Range<f64> = 0.000_2..0.001;
-/// The silence before a message and what a sender waits more by its priority (s; 1.2 ms and up to 1.5 ms).
+/// The silence before a message, with the additional wait by priority (s; 1.2 ms and up to 1.5 ms).
 const SILENCE_S: std::ops::Range<f64> = 0.001_2..0.002_7;
-/// What the station needs to answer (s; chosen).
+/// The answer time (s; chosen).
 const ANSWER_S: std::ops::Range<f64> = 0.001..0.008;
-/// From a sensor being occupied until its detector reports (s; chosen: a scan of its inputs).
+/// The time from occupancy to the report of the detector (s; chosen: a scan of its inputs).
 const DETECTION_S: std::ops::Range<f64> = 0.0..0.02;
-/// A slot whose locomotive is not commanded for so long is given away.
+/// The time without commands after which a slot is given away.
 const PURGED_AFTER: TimeSpan = TimeSpan::from_ms(200_000);
-/// How often the station looks for such slots.
+/// The interval of the search for such slots.
 const PURGES_EVERY: TimeSpan = TimeSpan::from_ms(1_000);
-/// From a reset until it hears again.
+/// The time from a reset until it receives messages.
 const BOOT: TimeSpan = TimeSpan::from_ms(2_000);
-/// The world goes on in such steps, so that no sensor is seen later than its report is due.
+/// The longest step of the world, so that no report is late.
 const LOOK_EVERY: TimeSpan = TimeSpan::from_ms(1);
 
-/// How the station and its server behave, each as it was seen of real ones or reported of them.
+/// The properties of the station and its server, as observed on real ones or reported of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LocoNetSwitches {
-    /// Whether the server says what it is when somebody connects.
+    /// Whether the server sends its version to a new client.
     pub has_version: bool,
     /// Whether the server repeats what a client sends, as a message that it has received.
     pub echoes: bool,
-    /// How often a message of the host does not come to the bus, of which the server reports.
+    /// How often a message of the host fails to reach the bus, which the server reports.
     pub refused: Ratio,
-    /// How many slots there are.
+    /// The number of slots.
     pub slots: u8,
-    /// How lines are cut.
+    /// The portions in which lines arrive.
     pub delivery: Delivery,
 }
 
@@ -66,7 +63,7 @@ struct Slot {
     commanded: Timestamp,
 }
 
-/// Who puts a message on the bus.
+/// The sender of a message on the bus.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Sender {
     Host,
@@ -89,7 +86,7 @@ pub struct VirtualLocoNet<'l> {
     switches: LocoNetSwitches,
     draws: Draws,
     now: Timestamp,
-    /// Lines on their way from the host.
+    /// Lines from the host that have not arrived yet.
     incoming: VecDeque<(Timestamp, Vec<u8>)>,
     lines: Lines,
     waiting: Vec<Waiting>,
@@ -100,12 +97,12 @@ pub struct VirtualLocoNet<'l> {
     slots: Vec<Slot>,
     /// All locomotives were stopped, and the power was not switched since.
     is_stopped: bool,
-    /// Until when it is without power or starting.
+    /// The end of a power cut or a start.
     dark_until: Option<Timestamp>,
     purges: Timestamp,
 }
 
-/// What happens next.
+/// An occurrence in the station or on its line.
 #[derive(Debug, Clone, Copy)]
 enum Next {
     Incoming,
@@ -117,7 +114,7 @@ enum Next {
 }
 
 impl<'l> VirtualLocoNet<'l> {
-    /// A station in front of a layout, which has been driving the trains on it: it has slots for them, used by nobody. The track has no
+    /// A station in front of a layout, which has been driving the trains on it: it has slots for them, which are not in use. The track has no
     /// power yet. Sensor 0 of the layout is input 1.
     #[must_use]
     pub fn new(mut world: LivingLayout<'l>, seed: u64, switches: LocoNetSwitches) -> Self {
@@ -152,20 +149,6 @@ impl<'l> VirtualLocoNet<'l> {
         station
     }
 
-    /// A station and a layout on which trains have been put: see [`LivingLayout::draw`].
-    ///
-    /// # Errors
-    /// [`CircuitError`] when no train can run round on the layout.
-    pub fn draw(
-        layout: &'l Layout,
-        seed: u64,
-        trains: &[TrainId],
-        switches: &LivingSwitches,
-        station: LocoNetSwitches,
-    ) -> Result<Self, CircuitError> {
-        Ok(Self::new(LivingLayout::draw(layout, seed, trains, switches)?, seed, station))
-    }
-
     /// The time.
     #[must_use]
     pub const fn now(&self) -> Timestamp {
@@ -178,7 +161,7 @@ impl<'l> VirtualLocoNet<'l> {
         &self.world
     }
 
-    /// The layout, for a person's hands.
+    /// The layout, for operator intervention.
     pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
         &mut self.world
     }
@@ -187,7 +170,7 @@ impl<'l> VirtualLocoNet<'l> {
     pub fn restart(&mut self) {
         let now = self.now;
         self.world.power(false, now);
-        self.world.forget_all_told();
+        self.world.forget_commands();
         self.slots.clear();
         self.waiting.retain(|waiting| waiting.sender == Sender::Host);
         self.is_stopped = false;
@@ -201,7 +184,7 @@ impl<'l> VirtualLocoNet<'l> {
         self.incoming.push_back((arrives.max(last), bytes.to_vec()));
     }
 
-    /// Goes on until a time, or until something reaches the host before it: the bytes of one portion.
+    /// Advances to a time, or until something reaches the host before it: the bytes of one portion.
     pub fn advance(&mut self, until: Timestamp) -> Option<Vec<u8>> {
         loop {
             let next = self.next().filter(|(at, _)| *at <= until);
@@ -221,7 +204,7 @@ impl<'l> VirtualLocoNet<'l> {
         }
     }
 
-    /// What happens next, and when; of things at one time the first in the order of this list.
+    /// The next occurrence and its time; of simultaneous ones, the first of this list.
     fn next(&self) -> Option<(Timestamp, Next)> {
         let first = self.waiting.iter().enumerate().min_by_key(|(_, waiting)| waiting.ready);
         let begins = first.filter(|_| self.on_bus.is_none());
@@ -275,7 +258,7 @@ impl<'l> VirtualLocoNet<'l> {
         }
     }
 
-    /// A message has passed on the bus: the server says so, and the station hears it.
+    /// A message has passed on the bus: the server reports it, and the station executes it.
     fn passed(&mut self, sender: Sender, message: Message) {
         let is_host = sender == Sender::Host;
         let refused = self.switches.refused;
@@ -293,7 +276,7 @@ impl<'l> VirtualLocoNet<'l> {
         }
     }
 
-    /// Sees which sensors have changed, and when their detectors report that.
+    /// Finds the sensors that have changed, and when their detectors report it.
     fn look(&mut self, by: Timestamp) {
         for Edge { at, sensor, is_occupied } in self.world.s88.take_edges(by) {
             if self.dark_until.is_some() {
@@ -330,7 +313,7 @@ const fn number_of(sensor: SensorId) -> u16 {
     sensor.0 + 1
 }
 
-/// A slot that nobody uses, with a decoder of 128 steps.
+/// A slot that is not in use, with a decoder of 128 steps.
 const fn free_slot(slot: u8) -> SlotData {
     SlotData { slot, status: 3, address: 0, speed: 0, forward: true, functions: 0, track: 0, rest: [0; 4] }
 }

@@ -3,16 +3,17 @@
 //! ```text
 //! station  cts             the virtual 6051: bytes in, bytes out, at the pace of its line
 //! board  board_switches    the virtual DCC-EX board: requests in, replies and sensors out, with its delays
-//! z21  z21_switches        the virtual Z21: datagrams of many clients in and out, with what a network does to them
+//! z21  z21_switches        the virtual Z21: datagrams of many clients in and out, over a network with faults
 //! central_station  can_switches  the virtual Central Station: frames of Märklin's CAN bus over datagrams, a stream or an adapter
 //! loconet                  a command station on LocoNet behind a server: lines in and out, at the pace of its bus
-//! network  delivery        what a network does to datagrams; how a stream is cut
-//! decoder                  what the decoders of locomotives make of what a station carries
-//! world  start  hands      several trains, a millisecond at a time; how they got there; what people do to them
-//! live_train  drive  mishap  one of them; what drives it; what can become of it
-//! body  points  s88        where it reaches, how turnouts lie, what contacts report
-//! detectors                how late the detectors of blocks report a train, and that it is gone
-//! rails  switches  truth   the rails underneath; how bad the world is; what really happened, for scorers only
+//! network  delivery        datagrams through a network; the portions of a stream
+//! due_queue                what is due later
+//! decoder                  decoders of locomotives: the step nearest to a command
+//! world  start  hands      several trains, a millisecond at a time; their start; operator intervention
+//! live_train  drive  incident  one train; its motor; collisions, derailments and overruns
+//! body  points  s88        the track under a train; turnouts; sensors, and what modules remember of them
+//! detectors                the delays of the detectors of blocks
+//! rails  switches  truth   the rails; the faults of the world; the truth, for scorers only
 //! ```
 
 mod board;
@@ -25,10 +26,11 @@ mod decoder;
 mod delivery;
 mod detectors;
 mod drive;
+mod due_queue;
 mod hands;
+mod incident;
 mod live_train;
 mod loconet;
-mod mishap;
 mod network;
 mod points;
 mod rails;
@@ -48,9 +50,9 @@ pub use central_station::VirtualCentralStation;
 pub use cts::CtsSwitch;
 pub use delivery::Delivery;
 pub use hands::HandError;
+pub use incident::{Incident, IncidentKind};
 pub use live_train::End;
 pub use loconet::{LocoNetSwitches, VirtualLocoNet};
-pub use mishap::{Mishap, MishapKind};
 pub use station::{CoilAlarm, FromStation, StationSwitches, VirtualStation};
 pub use switches::LivingSwitches;
 pub use truth::{PassTruth, RestTruth, TrainTruth, Truth};

@@ -1,140 +1,106 @@
-//! The network between clients and a station: datagrams take their time, and may be lost, come twice or be overtaken.
+//! The network between clients and a station: datagrams are delayed, and may be lost, duplicated or overtaken.
 
 use footplate_core::{Ratio, TimeSpan, Timestamp};
 
 use crate::draws::Draws;
+use crate::living::due_queue::DueQueue;
 
-/// What a datagram takes (s; a wired network and a wireless one that is not busy).
+/// The transit time of a datagram (s; a wired network, or a wireless one that is not busy).
 const TAKES_S: std::ops::Range<f64> = 0.000_2..0.002;
-/// The same in a wireless network that others use, too (s; chosen).
+/// The same in a busy wireless network (s; chosen).
 const TAKES_SLOW_S: std::ops::Range<f64> = 0.002..0.06;
-/// What one takes more that is overtaken (s; chosen).
+/// The additional transit time of a datagram that is overtaken (s; chosen).
 const OVERTAKEN_S: std::ops::Range<f64> = 0.005..0.04;
 
-/// What happens to datagrams, and how often.
+/// The faults of a network, with their rates.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Disturbances {
     pub(crate) lost: Ratio,
     pub(crate) duplicated: Ratio,
     pub(crate) overtaken: Ratio,
-    /// Whether others use it, too.
+    /// Whether it is a busy wireless network.
     pub(crate) is_slow: bool,
 }
 
-/// A datagram on its way.
-#[derive(Debug, Clone)]
-struct OnItsWay {
-    due: Timestamp,
-    /// Of those that are due at one time the one that left first.
-    nth: u64,
-    client: usize,
-    datagram: Vec<u8>,
-}
-
-/// All datagrams on their way.
+/// Datagrams that have not arrived yet, each with its client.
 #[derive(Debug, Clone)]
 pub(crate) struct Network {
     draws: Draws,
     disturbances: Disturbances,
-    count: u64,
-    to_station: Way,
-    to_client: Way,
+    to_station: Direction,
+    to_client: Direction,
 }
 
 /// One direction.
 #[derive(Debug, Clone)]
-struct Way {
-    datagrams: Vec<OnItsWay>,
-    /// When the last one arrives that is not overtaken: the others stay in order.
+struct Direction {
+    datagrams: DueQueue<(usize, Vec<u8>)>,
+    /// When the last datagram arrives that is not overtaken: the others stay in order.
     last_due: Timestamp,
 }
 
 impl Network {
     pub(crate) fn new(draws: Draws, disturbances: Disturbances) -> Self {
-        let way = || Way { datagrams: Vec::new(), last_due: Timestamp::ZERO };
-        Self { draws, disturbances, count: 0, to_station: way(), to_client: way() }
+        let direction = || Direction { datagrams: DueQueue::new(), last_due: Timestamp::ZERO };
+        Self { draws, disturbances, to_station: direction(), to_client: direction() }
     }
 
     pub(crate) fn send_to_station(&mut self, now: Timestamp, client: usize, datagram: &[u8]) {
-        let last = self.to_station.last_due;
-        let (sent, last) = self.sent(now, last, client, datagram);
-        self.to_station.take(sent, last);
+        self.to_station.send(&mut self.draws, self.disturbances, now, (client, datagram));
     }
 
     pub(crate) fn send_to_client(&mut self, leaves: Timestamp, client: usize, datagram: &[u8]) {
-        let last = self.to_client.last_due;
-        let (sent, last) = self.sent(leaves, last, client, datagram);
-        self.to_client.take(sent, last);
+        self.to_client.send(&mut self.draws, self.disturbances, leaves, (client, datagram));
     }
 
     pub(crate) fn next_to_station(&self) -> Option<Timestamp> {
-        self.to_station.next()
+        self.to_station.datagrams.due()
     }
 
     pub(crate) fn next_to_client(&self) -> Option<Timestamp> {
-        self.to_client.next()
+        self.to_client.datagrams.due()
     }
 
     pub(crate) fn take_to_station(&mut self) -> Option<(usize, Vec<u8>)> {
-        self.to_station.take_first()
+        self.to_station.datagrams.take()
     }
 
     pub(crate) fn take_to_client(&mut self) -> Option<(usize, Vec<u8>)> {
-        self.to_client.take_first()
+        self.to_client.datagrams.take()
     }
 
     pub(crate) fn clear(&mut self) {
         self.to_station.datagrams.clear();
         self.to_client.datagrams.clear();
     }
+}
 
-    /// A datagram leaves: nothing of it arrives, or once or twice, none before `last`; returns the new last.
-    fn sent(
+impl Direction {
+    /// A datagram leaves: it is lost, or arrives once or twice.
+    fn send(
         &mut self,
+        draws: &mut Draws,
+        disturbances: Disturbances,
         leaves: Timestamp,
-        mut last: Timestamp,
-        client: usize,
-        datagram: &[u8],
-    ) -> (Vec<OnItsWay>, Timestamp) {
-        let copies = 1 + usize::from(self.happens(self.disturbances.duplicated));
-        let mut sent = Vec::with_capacity(copies);
+        (client, datagram): (usize, &[u8]),
+    ) {
+        let Disturbances { lost, duplicated, overtaken, is_slow } = disturbances;
+        let copies = 1 + usize::from(happens(draws, duplicated));
         for _ in 0..copies {
-            let takes_s = if self.disturbances.is_slow { TAKES_SLOW_S } else { TAKES_S };
-            let mut due = (leaves + TimeSpan::from_s(self.draws.uniform(takes_s))).max(last);
-            if self.happens(self.disturbances.overtaken) {
-                due += TimeSpan::from_s(self.draws.uniform(OVERTAKEN_S));
+            let takes_s = if is_slow { TAKES_SLOW_S } else { TAKES_S };
+            let mut due = (leaves + TimeSpan::from_s(draws.uniform(takes_s))).max(self.last_due);
+            if happens(draws, overtaken) {
+                due += TimeSpan::from_s(draws.uniform(OVERTAKEN_S));
             } else {
-                last = due;
+                self.last_due = due;
             }
-            if self.happens(self.disturbances.lost) {
-                continue;
+            if !happens(draws, lost) {
+                self.datagrams.add(due, (client, datagram.to_vec()));
             }
-            self.count += 1;
-            sent.push(OnItsWay { due, nth: self.count, client, datagram: datagram.to_vec() });
         }
-        (sent, last)
-    }
-
-    fn happens(&mut self, share: Ratio) -> bool {
-        share > Ratio::ZERO && self.draws.chance(share.as_parts())
     }
 }
 
-impl Way {
-    fn take(&mut self, sent: Vec<OnItsWay>, last_due: Timestamp) {
-        self.datagrams.extend(sent);
-        self.last_due = last_due;
-    }
-
-    fn next(&self) -> Option<Timestamp> {
-        self.datagrams.iter().map(|datagram| datagram.due).min()
-    }
-
-    fn take_first(&mut self) -> Option<(usize, Vec<u8>)> {
-        let first =
-            self.datagrams.iter().enumerate().min_by_key(|(_, datagram)| (datagram.due, datagram.nth));
-        let at = first.map(|(at, _)| at)?;
-        let OnItsWay { client, datagram, .. } = self.datagrams.swap_remove(at);
-        Some((client, datagram))
-    }
+fn happens(draws: &mut Draws, share: Ratio) -> bool {
+    share > Ratio::ZERO && draws.chance(share.as_parts())
 }

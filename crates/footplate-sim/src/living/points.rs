@@ -1,4 +1,4 @@
-//! Turnouts as they really lie: slow to move, and not always willing.
+//! The true positions of turnouts, which move with a delay and fail sometimes.
 
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{Ratio, TimeSpan, Timestamp, TurnoutId};
@@ -8,14 +8,14 @@ use crate::draws::Draws;
 /// From the solenoid's being powered until the points have moved, in s (as the brief of course reports: the 150 ms
 /// that programs wait are mostly enough, not always).
 const THROW_S: core::ops::Range<f64> = 0.1..0.3;
-/// A solenoid that is let go earlier has not thrown its points (Märklin: a tenth of a second at least).
+/// The shortest pulse that throws a turnout (Märklin: a tenth of a second at least).
 const SHORTEST_PULSE: TimeSpan = TimeSpan::from_ms(95);
 
 /// One turnout.
 #[derive(Debug, Clone, Copy)]
 struct Turnout {
     lies: Leg,
-    /// Where its points are moving to and when they get there.
+    /// The leg to which its points are moving, and when they arrive.
     moving: Option<(Leg, Timestamp)>,
     powered_at: Timestamp,
     is_burnt: bool,
@@ -31,7 +31,7 @@ pub(crate) struct Points {
 }
 
 impl Points {
-    /// Turnouts that lie anyhow, but never both of a pair curved that must not.
+    /// Turnouts in random positions, but never both curved in a double slip.
     pub(crate) fn draw(layout: &Layout, failure: Ratio, mut draws: Draws) -> Self {
         let mut points = Self { by_number: Vec::new(), failure, draws: draws.split(), next: None };
         for (turnout, _) in layout.turnouts() {
@@ -43,7 +43,7 @@ impl Points {
         points
     }
 
-    /// By hand.
+    /// Throws a turnout by hand.
     pub(crate) fn lay(&mut self, turnout: TurnoutId, leg: Leg) {
         let slot = usize::from(turnout.0);
         if self.by_number.len() <= slot {
@@ -58,7 +58,7 @@ impl Points {
         Some(self.by_number.get(usize::from(turnout.0))?.as_ref()?.lies)
     }
 
-    /// Its solenoid is powered.
+    /// Powers its solenoid.
     pub(crate) fn power(&mut self, turnout: TurnoutId, leg: Leg, now: Timestamp) {
         let Some(Some(found)) = self.by_number.get_mut(usize::from(turnout.0)) else { return };
         found.moving = None;
@@ -71,7 +71,7 @@ impl Points {
         self.look_ahead();
     }
 
-    /// Its solenoid is let go.
+    /// Ends the pulse of its solenoid.
     pub(crate) fn release(&mut self, turnout: TurnoutId, now: Timestamp) {
         let Some(Some(found)) = self.by_number.get_mut(usize::from(turnout.0)) else { return };
         if now - found.powered_at < SHORTEST_PULSE {
@@ -80,7 +80,7 @@ impl Points {
         }
     }
 
-    /// Its solenoid is beyond repair.
+    /// Burns its solenoid.
     pub(crate) fn burn(&mut self, turnout: TurnoutId) {
         if let Some(Some(found)) = self.by_number.get_mut(usize::from(turnout.0)) {
             found.is_burnt = true;
@@ -89,12 +89,12 @@ impl Points {
         self.look_ahead();
     }
 
-    /// When the next points will have moved.
+    /// The time at which the next points arrive.
     pub(crate) const fn next(&self) -> Option<Timestamp> {
         self.next
     }
 
-    /// A turnout whose points have moved by a time; ask until `None`.
+    /// The next turnout whose points have arrived by a time; call until `None`.
     pub(crate) fn moved(&mut self, by: Timestamp) -> Option<TurnoutId> {
         let is_due = |turnout: &Turnout| turnout.moving.is_some_and(|(_, at)| at <= by);
         let number = self.by_number.iter().position(|turnout| turnout.as_ref().is_some_and(is_due))?;

@@ -14,8 +14,8 @@ pub(crate) struct Rail {
     pub(crate) factor: f64,
     /// Gradient, upwards positive.
     pub(crate) grade: f64,
-    /// Contacts for this direction, in order, by how far along the edge they close.
-    pub(crate) contacts: Vec<(f64, SensorId)>,
+    /// Sensors for this direction, in order, by how far along the edge they close.
+    pub(crate) sensors: Vec<(f64, SensorId)>,
     /// Where dirty spots begin.
     pub(crate) dirty: Vec<f64>,
     /// What comes after it.
@@ -44,7 +44,7 @@ pub(crate) struct Rails<'l> {
     pub(crate) layout: &'l Layout,
     pub(crate) track: TrueTrack,
     rails: Vec<Rail>,
-    /// By the contact's number: how much it scatters from pass to pass (standard deviation in mm).
+    /// By the sensor's number: how much it scatters from pass to pass (standard deviation in mm).
     scatter_mm: Vec<f64>,
 }
 
@@ -68,7 +68,7 @@ impl<'l> Rails<'l> {
                 length_mm: track.length(id).as_mm(),
                 factor: track.speed_factor(id).as_parts(),
                 grade: 0.0,
-                contacts: Vec::new(),
+                sensors: Vec::new(),
                 dirty: track.dirty_mm(id),
                 ahead: ahead(layout, edge.to),
                 leaves: edge.leg.and_then(|leg| Some((turnout_at(layout, edge.from)?, leg))),
@@ -83,13 +83,13 @@ impl<'l> Rails<'l> {
             let offset_mm = track.sensor_offset(sensor).as_mm();
             let after = if offset_mm >= 0.0 { layout.outgoing(node).edges().next() } else { None };
             if let Some(rail) = after.and_then(|edge| rails.get_mut(usize::from(edge.0))) {
-                rail.contacts.push((offset_mm.min(rail.length_mm), sensor));
+                rail.sensors.push((offset_mm.min(rail.length_mm), sensor));
                 continue;
             }
             // Before its node, or where the track ends: on the rails that lead to it.
             for (id, edge) in layout.edges().filter(|(_, edge)| edge.to == node) {
                 if let (Some(rail), true) = (rails.get_mut(usize::from(id.0)), edge.to == node) {
-                    rail.contacts.push(((rail.length_mm + offset_mm).clamp(0.0, rail.length_mm), sensor));
+                    rail.sensors.push(((rail.length_mm + offset_mm).clamp(0.0, rail.length_mm), sensor));
                 }
             }
         }
@@ -100,12 +100,12 @@ impl<'l> Rails<'l> {
             }
         }
         for rail in &mut rails {
-            rail.contacts.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+            rail.sensors.sort_by(|(a, _), (b, _)| a.total_cmp(b));
         }
         Self { layout, track, rails, scatter_mm }
     }
 
-    /// How much a contact scatters from pass to pass (standard deviation in mm).
+    /// How much a sensor scatters from pass to pass (standard deviation in mm).
     pub(crate) fn scatter_mm(&self, sensor: SensorId) -> f64 {
         self.scatter_mm.get(usize::from(sensor.0)).copied().unwrap_or(0.0)
     }

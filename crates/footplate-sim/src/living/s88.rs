@@ -1,4 +1,4 @@
-//! Contacts and occupancy detectors as the modules of an S88 bus see them: closed, or remembered from when they were.
+//! Sensors as the modules of an S88 bus see them: closed, or remembered from when they were.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -12,7 +12,7 @@ use crate::living::detectors::Detectors;
 use crate::living::truth::PassTruth;
 use crate::sensors::{Cause, Faults};
 
-/// A contact closes or opens.
+/// A sensor closes or opens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Change {
     at: Timestamp,
@@ -41,24 +41,24 @@ pub(crate) struct Edge {
     pub(crate) is_occupied: bool,
 }
 
-/// All contacts and what is remembered of them.
+/// All sensors, and what is remembered of them.
 #[derive(Debug, Clone)]
 pub(crate) struct S88 {
     faults: Faults,
     draws: Draws,
-    /// Contacts and detectors that exist, to draw spurious reports from.
+    /// The sensors, from which spurious detections are drawn.
     sensors: Vec<SensorId>,
     detectors: Detectors,
     /// Detectors whose current is interrupted, and how often.
     dark: BTreeMap<SensorId, u8>,
-    /// By the contact's number: by how much it is held closed, and whether it was since it was last read.
-    contacts: Vec<(u8, bool)>,
+    /// By the sensor's number: how many hold it closed, and whether it closed since the last reading.
+    states: Vec<(u8, bool)>,
     changes: BinaryHeap<Reverse<Change>>,
     /// What has changed since a board looked last, if one does.
     edges: Option<Vec<Edge>>,
     caused: u64,
     next_spurious: Timestamp,
-    /// For scorers: every contact that a train came to, and every one that closed by itself.
+    /// For scorers: every passage of a sensor by a train, and every spurious detection.
     pub(crate) passes: Vec<PassTruth>,
 }
 
@@ -68,11 +68,11 @@ impl S88 {
         let detectors = Detectors::draw(layout, &mut draws);
         let sensors = detectors.inputs(layout);
         let count = sensors.iter().map(|sensor| usize::from(sensor.0) + 1).max().unwrap_or(0);
-        let mut contacts = vec![(0, false); count];
+        let mut states = vec![(0, false); count];
         if stale {
-            // Whoever ran trains last came past some of them (chosen: one in five).
+            // The trains of the session before passed some of them (chosen: one in five).
             for sensor in &sensors {
-                contacts[usize::from(sensor.0)].1 = draws.chance(0.2);
+                states[usize::from(sensor.0)].1 = draws.chance(0.2);
             }
         }
         let first = Timestamp::ZERO + TimeSpan::from_s(draws.waiting(faults.spurious_per_s()).min(FOREVER_S));
@@ -82,7 +82,7 @@ impl S88 {
             sensors,
             detectors,
             dark: BTreeMap::new(),
-            contacts,
+            states,
             changes: BinaryHeap::new(),
             edges: None,
             caused: 0,
@@ -91,7 +91,7 @@ impl S88 {
         }
     }
 
-    /// A shoe comes onto a contact, or the front of a train into a block. Returns whether a contact closes.
+    /// A shoe reaches a sensor, or the front of a train a block. Returns whether the shoe closes a sensor.
     pub(crate) fn close(
         &mut self,
         sensor: SensorId,
@@ -135,21 +135,21 @@ impl S88 {
         self.detectors.usual_release(detector)
     }
 
-    /// A shoe leaves a contact that it had closed.
+    /// A shoe leaves a sensor that it closed.
     pub(crate) fn leave(&mut self, sensor: SensorId, at: Timestamp) {
         let sticks = TimeSpan::from_s(self.faults.sticks_for_s(&mut self.draws));
         self.change(sensor, at + sticks, Turn::Opens);
     }
 
-    /// What the modules show at a time, none earlier than before; `forget` clears what is only remembered.
-    /// Without a latch nothing is remembered.
+    /// The state of a module at a time, not before that of the last call; `forget` clears what is only remembered.
+    /// Without latches nothing is remembered.
     pub(crate) fn read(&mut self, module: u8, at: Timestamp, forget: bool, latches: bool) -> ModuleState {
         self.settle(at);
         let first = u16::from(module.saturating_sub(1)) * CONTACTS_PER_MODULE;
         let numbers = first..first + CONTACTS_PER_MODULE;
         let closed = numbers.filter_map(|number| {
             let is_held = self.is_closed(SensorId(number));
-            let (_, remembered) = self.contacts.get_mut(usize::from(number))?;
+            let (_, remembered) = self.states.get_mut(usize::from(number))?;
             let is_closed = is_held || *remembered && latches;
             if forget {
                 *remembered = false;
@@ -172,7 +172,7 @@ impl S88 {
 
     fn is_closed(&self, sensor: SensorId) -> bool {
         let is_dark = self.dark.get(&sensor).is_some_and(|times| *times > 0);
-        !is_dark && self.contacts.get(usize::from(sensor.0)).is_some_and(|(held, _)| *held > 0)
+        !is_dark && self.states.get(usize::from(sensor.0)).is_some_and(|(held, _)| *held > 0)
     }
 
     /// The sensors of the layout.
@@ -201,7 +201,7 @@ impl S88 {
         while let Some(Reverse(change)) = self.changes.peek().copied().filter(|next| next.0.at <= by) {
             self.changes.pop();
             let was_occupied = self.is_closed(change.sensor);
-            let Some((held, remembered)) = self.contacts.get_mut(usize::from(change.sensor.0)) else {
+            let Some((held, remembered)) = self.states.get_mut(usize::from(change.sensor.0)) else {
                 continue;
             };
             match change.what {

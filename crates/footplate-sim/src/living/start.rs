@@ -1,4 +1,4 @@
-//! How trains get onto a living layout: drawn, and put down by a hand that does not measure.
+//! The trains of a living layout at its start: drawn from the seed, and put down without measuring.
 
 use footplate_core::track::{Layout, Position};
 use footplate_core::{EdgeId, Length, TrainId};
@@ -20,8 +20,8 @@ const CARRIAGES_MM: core::ops::Range<f64> = 100.0..500.0;
 const TRIES: usize = 1000;
 
 impl<'l> LivingLayout<'l> {
-    /// A layout with trains, all drawn from the seed, standing where a person has put them, facing either way,
-    /// somewhere between contacts: each on a circuit of its own (see [`homes`](Self::homes)) and off those of the
+    /// A layout with trains, all drawn from the seed, at rest where an operator has put them, facing either direction,
+    /// somewhere between sensors: each on a circuit of its own (see [`homes`](Self::homes)) and off those of the
     /// others, so that one at a time can run round; trains for which there is none, anywhere. Turnouts lie anyhow,
     /// unless the switches say otherwise.
     ///
@@ -66,7 +66,7 @@ impl<'l> LivingLayout<'l> {
         Ok(world)
     }
 
-    /// The circuits that whoever put the trains down had in mind for them: what a person could tell a program.
+    /// The circuit that each train was put on: what an operator could enter into a program.
     #[must_use]
     pub fn homes(&self) -> &[(TrainId, Circuit)] {
         &self.homes

@@ -1,8 +1,8 @@
 //! The virtual 6051: a living layout behind the bytes of its serial line.
 //!
-//! What comes in is read with the codec that the program writes with; when things come and go is decided here, by
+//! The codec is that of the program; the times are the simulation's own, by
 //! what is known of the real box. One byte takes 4.583 ms in either direction. A command acts when its last byte
-//! has arrived; contacts are read when the request for them has.
+//! has arrived; sensors are read when the request for them has.
 
 use std::collections::VecDeque;
 
@@ -17,37 +17,37 @@ use crate::living::switches::LivingSwitches;
 use crate::living::world::LivingLayout;
 use crate::physics_range::PhysicsRange;
 
-/// From the last bit of a request until the contacts are read (chosen: the modules are clocked out within it).
+/// The time from the last bit of a request to the reading of the sensors (chosen: the modules are clocked out within it).
 const READING: TimeSpan = TimeSpan::from_us(300);
-/// A coil that has been powered for so long has burnt (chosen: ten times what is allowed).
+/// The time after which a powered coil burns (chosen: ten times what is allowed).
 const BURNS: TimeSpan = TimeSpan::from_ms(5000);
 
-/// How the box and its line behave.
+/// The properties of a 6051 and its line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StationSwitches {
-    /// How it says that it is ready.
+    /// How it signals that it is ready.
     pub cts: CtsSwitch,
     /// The shortest time from the last bit of a request until the first byte of the answer begins (chosen: with it a
     /// poll of five modules takes the 55 to 60 ms that are reported).
     pub turnaround: TimeSpan,
-    /// By how much that varies from request to request, evenly (measured: about 5 ms).
+    /// The range of an additional random time, with equal probability (measured: about 5 ms).
     pub turnaround_spread: TimeSpan,
-    /// Whether a byte that comes while the station is not ready is lost, and takes a byte of the answer that is under
-    /// way with it. Otherwise it waits.
+    /// Whether a byte that arrives while the station is not ready is lost, together with a byte of the present answer.
+    /// Otherwise it waits.
     pub strict: bool,
-    /// How often a byte is lost on the line, either way.
+    /// How often a byte is lost on the line, in either direction.
     pub lost: Ratio,
     /// How often a whole answer is lost.
     pub lost_replies: Ratio,
-    /// Whether modules remember contacts that closed since they were last read.
+    /// Whether modules remember sensors that closed since the last reading.
     pub latches: bool,
-    /// Whether it knows the question for a single module; otherwise it is silent to it, as to any unknown byte.
+    /// Whether it answers a request for a single module; otherwise it ignores the request, like any unknown byte.
     pub reads_single_modules: bool,
 }
 
 impl StationSwitches {
-    /// Interfaces as they are met in the field: latching or not, answers within 10 to 100 ms, 2 % of answers lost, and one in
-    /// three that knows no question for a single module.
+    /// Interfaces as they occur: latching or not, with answers within 10 to 100 ms, 2 % of answers lost, and one in three that
+    /// does not answer requests for a single module.
     #[must_use]
     pub fn draw(seed: u64, physics: PhysicsRange) -> Self {
         if !physics.includes(PhysicsRange::Interface) {
@@ -93,7 +93,7 @@ pub enum FromStation {
 pub struct CoilAlarm {
     /// The turnout.
     pub turnout: TurnoutId,
-    /// Since when its solenoid was powered.
+    /// The time at which its solenoid was powered.
     pub since: Timestamp,
 }
 
@@ -113,24 +113,24 @@ pub struct VirtualStation<'l> {
     draws: Draws,
     now: Timestamp,
     cts: Cts,
-    /// Bytes from the host, when their last bit arrives and whether the station was ready when they began.
+    /// Bytes from the host, each with the arrival of its last bit, and whether the station was ready when it began.
     incoming: VecDeque<(Timestamp, u8, bool)>,
     host_is_free: Timestamp,
     /// The first byte of a message of two.
     begun: Option<u8>,
-    /// A request whose contacts have not been read.
+    /// A request whose sensors have not been read.
     asked: Option<(Timestamp, Message)>,
     reply: VecDeque<(Timestamp, u8)>,
-    /// When the last byte of the answer under way has gone.
+    /// When the last byte of the present answer has been sent.
     answers_until: Timestamp,
     forgets: bool,
-    /// Until when it is switched off.
+    /// The end of a power cut.
     dark_until: Option<Timestamp>,
     coil: Option<Coil>,
     alarms: Vec<CoilAlarm>,
 }
 
-/// What happens next.
+/// An occurrence in the station or on its line.
 #[derive(Debug, Clone, Copy)]
 enum Next {
     Incoming,
@@ -165,10 +165,10 @@ impl<'l> VirtualStation<'l> {
         }
     }
 
-    /// A station and a layout on which trains have been put: see [`LivingLayout::draw`].
+    /// A station in front of a layout with trains: see [`LivingLayout::draw`].
     ///
     /// # Errors
-    /// [`CircuitError`] when no train can run round on the layout.
+    /// [`CircuitError`] when the layout has no circuit.
     pub fn draw(
         layout: &'l Layout,
         seed: u64,
@@ -197,7 +197,7 @@ impl<'l> VirtualStation<'l> {
         &self.world
     }
 
-    /// The layout, for a person's hands.
+    /// The layout, for operator intervention.
     pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
         &mut self.world
     }
@@ -208,21 +208,21 @@ impl<'l> VirtualStation<'l> {
         &self.alarms
     }
 
-    /// Somebody pulls the plug and puts it in again some time later. In between nothing is heard and nothing answered, and
-    /// the rails are dead; afterwards the station knows nothing of what it told trains, remembers every contact until it is
-    /// told not to, and gives power.
+    /// The operator disconnects the station from the mains, and connects it again some time later. Meanwhile it neither
+    /// receives nor answers, and the rails have no power; afterwards it has forgotten its commands to trains, remembers
+    /// every detection until it is commanded not to, and switches the power on.
     pub fn restart(&mut self, dark_for: TimeSpan) {
         let now = self.now;
         self.let_go(now);
         self.world.power(false, now);
-        self.world.forget_all_told();
+        self.world.forget_commands();
         (self.begun, self.asked, self.forgets) = (None, None, false);
         self.reply.clear();
         self.answers_until = now;
         self.dark_until = Some(now + dark_for.max(TimeSpan::ZERO));
     }
 
-    /// The host puts a byte on the line, behind those that are still on their way; its last bit arrives 4.583 ms
+    /// The host puts a byte on the line, behind those that have not arrived yet; its last bit arrives 4.583 ms
     /// after it began.
     pub fn write(&mut self, byte: u8) {
         let begins = self.host_is_free.max(self.now);
@@ -232,7 +232,7 @@ impl<'l> VirtualStation<'l> {
         self.incoming.push_back((self.host_is_free, byte, is_heard));
     }
 
-    /// Goes on until a time, or until something reaches the host before it.
+    /// Advances to a time, or until something reaches the host before it.
     pub fn advance(&mut self, until: Timestamp) -> Option<FromStation> {
         while let Some((at, next)) = self.next().filter(|(at, _)| *at <= until) {
             self.world.advance(at);
@@ -270,7 +270,7 @@ impl<'l> VirtualStation<'l> {
         None
     }
 
-    /// What happens next, and when; of things at one time the first in the order of this list.
+    /// The next occurrence and its time; of simultaneous ones, the first of this list.
     fn next(&self) -> Option<(Timestamp, Next)> {
         let mut next = self.incoming.front().map(|(at, ..)| (*at, Next::Incoming));
         let mut or = |at: Option<Timestamp>, what| {
@@ -321,11 +321,11 @@ impl<'l> VirtualStation<'l> {
         self.cts.received(at, busy_until, &mut self.draws);
     }
 
-    /// Does what a message says; returns until when the station has its hands full with it.
+    /// Executes a message; returns the time until which the station is busy.
     fn obey(&mut self, at: Timestamp, message: Message) -> Timestamp {
         match message {
-            Message::Drive { train, step, .. } => self.world.tell(train, step, at),
-            Message::Reverse { train, .. } => self.world.turn(train, at),
+            Message::Drive { train, step, .. } => self.world.command(train, step, at),
+            Message::Reverse { train, .. } => self.world.reverse(train, at),
             Message::Turnout { turnout, curved } => {
                 self.let_go(at);
                 if self.world.is_powered() {
@@ -357,7 +357,7 @@ impl<'l> VirtualStation<'l> {
         self.answers_until
     }
 
-    /// Reads the contacts and sends what they show.
+    /// Reads the sensors and sends their states.
     fn answer(&mut self) {
         let Some((at, request)) = self.asked.take() else { return };
         let lost = self.switches.lost_replies;

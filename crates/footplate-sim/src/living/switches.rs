@@ -1,4 +1,4 @@
-//! How bad a living layout is.
+//! The faults of a living layout, and what its trains are like.
 
 use footplate_core::DecoderSteps;
 use footplate_core::Ratio;
@@ -7,23 +7,23 @@ use crate::law::LawFamily;
 use crate::physics_range::PhysicsRange;
 use crate::sensors::Faults;
 
-/// What goes wrong on a living layout, how often, and what its trains are like.
+/// The faults of a living layout with their rates, and what its trains are like.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LivingSwitches {
-    /// What goes wrong with contacts.
+    /// The faults of sensors.
     pub faults: Faults,
-    /// How often a turnout that was told to move does not.
+    /// How often a turnout does not obey a command.
     pub turnout_failure: Ratio,
     /// Whether rails differ from the layout's lengths and are curved and dirty, or are exactly as surveyed.
     pub true_rails: bool,
     /// The law of every train drawn; `None`: each train has the next one.
     pub law: Option<LawFamily>,
-    /// How warm trains are when they are put down, from 0, cold, to 1.
+    /// How warm trains are at the start, from 0, cold, to 1.
     pub warmth: f64,
-    /// Whether turnouts lie for the circuits that the trains were put on; otherwise they lie anyhow.
+    /// Whether turnouts are set for the circuits of the trains; otherwise at random.
     pub turnouts_set: bool,
-    /// Whether the station remembers contacts that were closed before it was first asked.
-    pub stale_contacts: bool,
+    /// Whether the station remembers detections from before the start.
+    pub stale_detections: bool,
     /// What is drawn from wider ranges than usual.
     pub physics: PhysicsRange,
     /// The decoders of all trains; those of published trains have 14 steps.
@@ -57,7 +57,7 @@ impl LivingSwitches {
             law: None,
             warmth: 0.5,
             turnouts_set: false,
-            stale_contacts: true,
+            stale_detections: true,
             physics: PhysicsRange::Usual,
             decoder: DecoderSteps::Fourteen,
         }

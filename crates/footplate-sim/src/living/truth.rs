@@ -1,4 +1,4 @@
-//! What really happens on a living layout: for scorers, and for nobody else.
+//! The truth of a living layout, which only scorers may see.
 
 use footplate_core::track::Position;
 use footplate_core::{EdgeId, Length, SensorId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
@@ -10,7 +10,7 @@ use crate::sensors::Cause;
 use crate::track::TrueTrack;
 use crate::train::Train;
 
-/// Further away than anybody asks (chosen: twice round a large layout).
+/// The longest distance that is measured (chosen: twice round a large layout).
 const FAR_MM: f64 = 20_000.0;
 /// A sensor that scatters closes no further than this beyond its usual place: 2.5 standard deviations of 15 mm and of 3 mm of the
 /// shoe.
@@ -35,7 +35,7 @@ pub struct TrainTruth {
     pub commanded: SpeedStep,
     /// Since when it has been standing, while it stands.
     pub at_rest_since: Option<Timestamp>,
-    /// All the way it has gone by itself.
+    /// The distance it has run under its own power.
     pub odometer: Length,
     /// Which of its ends is in front.
     pub leads: End,
@@ -58,7 +58,7 @@ pub struct RestTruth {
     pub since: Timestamp,
     /// When it moved again; nothing while it stands.
     pub until: Option<Timestamp>,
-    /// All the way it had gone by itself.
+    /// The distance it had run under its own power.
     pub odometer: Length,
 }
 
@@ -70,18 +70,18 @@ impl RestTruth {
     }
 }
 
-/// A contact had reason to close.
+/// A passage of a sensor, or a spurious detection.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PassTruth {
-    /// The contact.
+    /// The sensor.
     pub sensor: SensorId,
     /// When.
     pub at: Timestamp,
-    /// The train whose shoe came to it; nothing if it closed by itself.
+    /// The train whose shoe reached it; `None` for a spurious detection.
     pub train: Option<TrainId>,
     /// Why.
     pub cause: Cause,
-    /// Whether it closed; `false` for a contact that missed its train.
+    /// Whether it closed; `false` for a missed train.
     pub closed: bool,
     /// What the train's odometer showed, in mm.
     pub odometer_mm: f64,
@@ -137,25 +137,25 @@ impl<'w, 'l> Truth<'w, 'l> {
         &self.world.rails.track
     }
 
-    /// How far the leading end of a train's shoe is past where it closes a contact, or the first part that detectors sense past
-    /// where it enters a block, in true lengths, short of it if negative: the way since it came by or, if that is nearer, the
-    /// way to it as the turnouts lie. Nothing if neither is less than 20 m.
+    /// How far the leading end of a train's shoe is past the place where it closes a sensor, or the first part that detectors
+    /// sense past the entry of a block, in true lengths; negative if it is before it. This is the distance since the train
+    /// passed it or, if that is shorter, the distance to it as the turnouts lie. `None` if neither is below 20 m.
     #[must_use]
     pub fn past(&self, train: TrainId, sensor: SensorId) -> Option<Length> {
         let found = self.found(train)?;
         let by = |pass: &&PassTruth| pass.train == Some(train) && pass.sensor == sensor;
         let passed = self.world.s88.passes.iter().rev().find(by);
         let place = found.body.as_ref()?.place()?;
-        // What it passed before a hand took it elsewhere is no way from here.
+        // What it passed before it was lifted is no distance from here.
         let passed = passed.filter(|pass| pass.odometer_mm >= found.put_down_at);
         let since = passed.map(|pass| found.odometer - pass.odometer_mm).filter(|mm| *mm < FAR_MM);
         // Past its usual place, and it has not closed yet this time.
-        let just_past = self.contact(sensor).and_then(|usual| self.path_length(0.0, usual, place));
+        let just_past = self.closes_at(sensor).and_then(|usual| self.distance_between(usual, place));
         let is_due = |mm: &f64| *mm < CLOSES_WITHIN_MM && since.is_none_or(|since| since > CLOSES_WITHIN_MM);
         let since = just_past.filter(is_due).or(since);
         let is_entry = self.world.layout().block_of_entry(sensor).is_some();
         let ahead = if is_entry { found.sensed()[0] } else { 0.0 };
-        let before = self.way_to((place.0, place.1 + ahead), sensor);
+        let before = self.distance_to((place.0, place.1 + ahead), sensor);
         let nearer = |since: f64, before: f64| if since <= before { since } else { -before };
         let mm = match (since, before) {
             (Some(since), Some(before)) => nearer(since, before),
@@ -165,66 +165,59 @@ impl<'w, 'l> Truth<'w, 'l> {
         Some(Length::from_mm(mm))
     }
 
-    /// How long the way from one contact to another feels to a train: the length that it would run on level straight
-    /// rails in the same time. `edges` lead from the one to the other.
+    /// The path length from one sensor to another for a train: the distance that it would run on level straight rails in
+    /// the same time. `edges` lead from the one to the other.
     #[must_use]
-    pub fn felt(&self, train: TrainId, edges: &[EdgeId], from: SensorId, to: SensorId) -> Option<Length> {
-        let feel = self.engine(train)?.curve_sensitivity;
+    pub fn path_length(
+        &self,
+        train: TrainId,
+        edges: &[EdgeId],
+        from: SensorId,
+        to: SensorId,
+    ) -> Option<Length> {
+        let sensitivity = self.engine(train)?.curve_sensitivity;
         let track = self.track();
-        let slower = |edge: &EdgeId| 1.0 + feel * (track.speed_factor(*edge).as_parts() - 1.0);
-        let way: Length = edges.iter().map(|edge| track.length(*edge) / slower(edge)).sum();
-        // Contacts are a few millimetres from their nodes: which rails those lie on makes no difference.
+        let slower = |edge: &EdgeId| 1.0 + sensitivity * (track.speed_factor(*edge).as_parts() - 1.0);
+        let length: Length = edges.iter().map(|edge| track.length(*edge) / slower(edge)).sum();
+        // Sensors are a few millimetres from their nodes: it makes no difference on which rails.
         let offset = |sensor, edge: Option<&EdgeId>| track.sensor_offset(sensor) / edge.map_or(1.0, slower);
-        Some(way - offset(from, edges.first()) + offset(to, edges.last()))
+        Some(length - offset(from, edges.first()) + offset(to, edges.last()))
     }
 
-    /// The same as [`past`](Self::past), as long as it feels to the train; only up to 5 m.
-    #[must_use]
-    pub fn felt_past(&self, train: TrainId, sensor: SensorId) -> Option<Length> {
-        let found = self.found(train)?;
-        let place = found.body.as_ref()?.place()?;
-        let contact = self.contact(sensor)?;
-        let feel = found.train.curve_sensitivity;
-        let past = self.path_length(feel, contact, place);
-        let short = || self.path_length(feel, place, contact).map(|mm| -mm);
-        past.or_else(short).map(Length::from_mm)
-    }
-
-    /// Where a contact closes.
-    fn contact(&self, sensor: SensorId) -> Option<(EdgeId, f64)> {
+    /// Where a sensor closes on average.
+    fn closes_at(&self, sensor: SensorId) -> Option<(EdgeId, f64)> {
         let layout = self.world.layout();
         layout.edges().find_map(|(id, _)| {
-            let contacts = &self.world.rails.rail(id)?.contacts;
-            contacts.iter().find(|(_, found)| *found == sensor).map(|(at, _)| (id, *at))
+            let sensors = &self.world.rails.rail(id)?.sensors;
+            sensors.iter().find(|(_, found)| *found == sensor).map(|(at, _)| (id, *at))
         })
     }
 
-    /// The way ahead from one place to another as the turnouts lie and as long as it feels, in mm.
-    fn path_length(&self, feel: f64, from: (EdgeId, f64), to: (EdgeId, f64)) -> Option<f64> {
+    /// The true distance from one place to another ahead as the turnouts lie, in mm.
+    fn distance_between(&self, from: (EdgeId, f64), to: (EdgeId, f64)) -> Option<f64> {
         let rails = &self.world.rails;
         let lies = |turnout| self.world.points.lies(turnout);
-        let (mut edge, mut begins, mut felt) = (from.0, from.1, 0.0);
-        while felt < NEAR_MM {
+        let (mut edge, mut begins, mut length) = (from.0, from.1, 0.0);
+        while length < NEAR_MM {
             let rail = rails.rail(edge)?;
-            let slower = 1.0 + feel * (rail.factor - 1.0);
             if edge == to.0 && begins <= to.1 {
-                return Some(felt + (to.1 - begins) / slower);
+                return Some(length + (to.1 - begins));
             }
-            felt += ((rail.length_mm - begins) / slower).max(f64::MIN_POSITIVE);
+            length += (rail.length_mm - begins).max(f64::MIN_POSITIVE);
             (edge, begins) = (after(rails, &lies, edge)?, 0.0);
         }
         None
     }
 
-    /// The true way from a place to where a contact ahead closes, as the turnouts lie, in mm.
-    fn way_to(&self, (edge, offset): (EdgeId, f64), sensor: SensorId) -> Option<f64> {
+    /// The true distance from a place to a sensor ahead as the turnouts lie, in mm.
+    fn distance_to(&self, (edge, offset): (EdgeId, f64), sensor: SensorId) -> Option<f64> {
         let rails = &self.world.rails;
         let lies = |turnout| self.world.points.lies(turnout);
         let (mut edge, mut begins) = (edge, -offset);
         while begins < FAR_MM {
             let rail = rails.rail(edge)?;
             let due = |(at, found): &&(f64, SensorId)| *found == sensor && begins + at > 0.0;
-            if let Some((at, _)) = rail.contacts.iter().find(due) {
+            if let Some((at, _)) = rail.sensors.iter().find(due) {
                 return Some(begins + at);
             }
             begins += rail.length_mm.max(f64::MIN_POSITIVE);
@@ -239,8 +232,7 @@ impl<'w, 'l> Truth<'w, 'l> {
         &self.world.rests
     }
 
-    /// Every contact that a train came to so far; those that closed by themselves are among them once the
-    /// station has looked.
+    /// Every passage of a sensor by a train so far; and every spurious detection, as soon as the station has read it.
     #[must_use]
     pub fn passes(&self) -> &'w [PassTruth] {
         &self.world.s88.passes

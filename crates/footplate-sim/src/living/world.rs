@@ -5,8 +5,8 @@ use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use crate::circuit::Circuit;
 use crate::draws::{Draws, Purpose};
+use crate::living::incident::{Incident, IncidentKind};
 use crate::living::live_train::{Around, LiveTrain, Order, STEP, Stepped};
-use crate::living::mishap::{Mishap, MishapKind};
 use crate::living::points::Points;
 use crate::living::rails::Rails;
 use crate::living::s88::S88;
@@ -16,25 +16,25 @@ use crate::physics_range::PhysicsRange;
 use crate::track::TrueTrack;
 use crate::train::Train;
 
-/// Trains on a layout, and everything that they do to each other. Its time moves only when it is told to.
+/// Trains on a layout, with their collisions, and what sensors see of them. Its time is an argument.
 #[derive(Debug, Clone)]
 pub struct LivingLayout<'l> {
     pub(crate) rails: Rails<'l>,
     pub(crate) points: Points,
     pub(crate) s88: S88,
     pub(crate) trains: Vec<LiveTrain>,
-    /// For each train the step that the station goes on telling it.
-    told: Vec<SpeedStep>,
+    /// For each train the step that the station repeats.
+    commanded: Vec<SpeedStep>,
     /// Trains that may touch each other, by their places in the list.
     near: Vec<(usize, usize)>,
     is_powered: bool,
     /// Everything has happened up to here; a whole number of steps.
     now: Timestamp,
     draws: Draws,
-    mishaps: Vec<Mishap>,
+    incidents: Vec<Incident>,
     pub(crate) rests: Vec<RestTruth>,
     pub(crate) homes: Vec<(TrainId, Circuit)>,
-    /// Whether contacts close where they will from pass to pass.
+    /// Whether sensors scatter from passage to passage.
     pub(crate) scatters: bool,
 }
 
@@ -50,14 +50,14 @@ impl<'l> LivingLayout<'l> {
         Self {
             rails: Rails::new(layout, track, switches.physics, seed),
             points,
-            s88: S88::new(layout, &switches.faults, switches.stale_contacts, faults),
+            s88: S88::new(layout, &switches.faults, switches.stale_detections, faults),
             trains: Vec::new(),
-            told: Vec::new(),
+            commanded: Vec::new(),
             near: Vec::new(),
             is_powered: true,
             now: Timestamp::ZERO,
             draws,
-            mishaps: Vec::new(),
+            incidents: Vec::new(),
             rests: Vec::new(),
             homes: Vec::new(),
             scatters: switches.physics.includes(PhysicsRange::AsymmetricSensors),
@@ -72,28 +72,28 @@ impl<'l> LivingLayout<'l> {
             Some(place) => self.trains[place] = added,
             None => {
                 self.trains.push(added);
-                self.told.push(SpeedStep::STAND);
+                self.commanded.push(SpeedStep::STAND);
             }
         }
         self.find_near();
     }
 
-    /// The layout as people know it.
+    /// The layout as its owner knows it.
     #[must_use]
     pub const fn layout(&self) -> &'l Layout {
         self.rails.layout
     }
 
-    /// Up to when everything has happened: the next whole millisecond after the time it was commanded to go on to.
+    /// The time up to which the world has advanced: the next whole millisecond after the time asked for.
     #[must_use]
     pub const fn now(&self) -> Timestamp {
         self.now
     }
 
-    /// What went wrong so far, in order.
+    /// All incidents so far, in order.
     #[must_use]
-    pub fn mishaps(&self) -> &[Mishap] {
-        &self.mishaps
+    pub fn incidents(&self) -> &[Incident] {
+        &self.incidents
     }
 
     /// Whether the rails are under power.
@@ -102,13 +102,13 @@ impl<'l> LivingLayout<'l> {
         self.is_powered
     }
 
-    /// How a turnout really lies.
+    /// The true position of a turnout.
     #[must_use]
     pub fn lies(&self, turnout: TurnoutId) -> Option<Leg> {
         self.points.lies(turnout)
     }
 
-    /// Another session begins after a pause: trains that stood have cooled down, and voltage, cleanness and load are
+    /// Begins another session after a pause: trains at rest have cooled down, and voltage, cleanness and load are
     /// drawn anew for each train from what its [`Traits`](crate::Traits) say.
     pub fn begin_session(&mut self, pause: TimeSpan) {
         self.trains.iter_mut().for_each(|train| train.begin_session(pause));
@@ -122,13 +122,13 @@ impl<'l> LivingLayout<'l> {
         }
     }
 
-    /// What really happens: for scorers only.
+    /// The truth: for scorers only.
     #[must_use]
     pub const fn truth(&self) -> Truth<'_, 'l> {
         Truth { world: self }
     }
 
-    /// Lets everything happen until a time. In between nothing can be told.
+    /// Advances to a time.
     pub fn advance(&mut self, until: Timestamp) {
         while self.now < until {
             if self.points.next().is_none() && self.trains.iter().all(|train| train.sleeps) {
@@ -142,23 +142,23 @@ impl<'l> LivingLayout<'l> {
         }
     }
 
-    /// The station tells a train a step.
-    pub(crate) fn tell(&mut self, train: TrainId, step: SpeedStep, sent: Timestamp) {
+    /// The station commands a train to run at a step.
+    pub(crate) fn command(&mut self, train: TrainId, step: SpeedStep, sent: Timestamp) {
         if let Some(place) = self.trains.iter().position(|found| found.id == train) {
-            self.told[place] = step;
+            self.commanded[place] = step;
             self.send(place, Order::Step(step), sent);
         }
     }
 
-    /// The station tells a train to turn around, which sets its step to 0.
-    pub(crate) fn turn(&mut self, train: TrainId, sent: Timestamp) {
+    /// The station commands a train to reverse, which sets its step to 0.
+    pub(crate) fn reverse(&mut self, train: TrainId, sent: Timestamp) {
         if let Some(place) = self.trains.iter().position(|found| found.id == train) {
-            self.told[place] = SpeedStep::STAND;
+            self.commanded[place] = SpeedStep::STAND;
             self.send(place, Order::Turn, sent);
         }
     }
 
-    /// Whether a train will run with its front end leading, once it has heard everything that was sent.
+    /// Whether the front end of a train will lead once it has received all commands that were sent.
     pub(crate) fn runs_forward(&self, train: TrainId) -> Option<bool> {
         self.trains.iter().find(|found| found.id == train).map(LiveTrain::runs_forward)
     }
@@ -171,21 +171,21 @@ impl<'l> LivingLayout<'l> {
     fn send(&mut self, place: usize, order: Order, sent: Timestamp) {
         let train = &mut self.trains[place];
         if self.is_powered && train.body.is_some() && !train.is_wrecked {
-            train.tell(order, sent);
+            train.send(order, sent);
         }
     }
 
-    /// The station goes on telling a train what it told it last, which a decoder that forgot it hears anew.
-    pub(crate) fn remind(&mut self, place: usize, now: Timestamp) {
-        let step = self.told[place];
+    /// The station repeats its last command to a train, for a decoder that forgot it.
+    pub(crate) fn repeat_command(&mut self, place: usize, now: Timestamp) {
+        let step = self.commanded[place];
         if step != SpeedStep::STAND {
             self.send(place, Order::Step(step), now);
         }
     }
 
-    /// The station forgets what it told trains.
-    pub(crate) fn forget_all_told(&mut self) {
-        self.told.fill(SpeedStep::STAND);
+    /// The station forgets its commands to trains.
+    pub(crate) fn forget_commands(&mut self) {
+        self.commanded.fill(SpeedStep::STAND);
     }
 
     /// The station gives power to the rails, or takes it.
@@ -196,7 +196,7 @@ impl<'l> LivingLayout<'l> {
         self.is_powered = on;
         for place in 0..self.trains.len() {
             if on {
-                self.remind(place, now);
+                self.repeat_command(place, now);
             } else {
                 self.trains[place].lose_power();
             }
@@ -206,7 +206,7 @@ impl<'l> LivingLayout<'l> {
     /// A solenoid burns.
     pub(crate) fn burn(&mut self, turnout: TurnoutId, at: Timestamp) {
         self.points.burn(turnout);
-        self.mishaps.push(Mishap { at, train: None, kind: MishapKind::CoilBurnt { turnout } });
+        self.incidents.push(Incident { at, train: None, kind: IncidentKind::CoilBurnt { turnout } });
     }
 
     fn step(&mut self) {
@@ -218,10 +218,10 @@ impl<'l> LivingLayout<'l> {
             if train.sleeps {
                 continue;
             }
-            let Stepped { other_edges: others, mishap } =
+            let Stepped { other_edges: others, incident } =
                 train.advance(now, &mut Around { rails, lies: &lies, s88, rests });
             other_edges |= others;
-            if let Some(kind) = mishap {
+            if let Some(kind) = incident {
                 wrecked = wrecked.or(Some((place, kind)));
             }
         }
@@ -240,14 +240,14 @@ impl<'l> LivingLayout<'l> {
         }
     }
 
-    /// Points that have moved derail what stands on them.
+    /// Throws turnouts whose time has come; trains on their blades derail.
     fn throw(&mut self) {
         while let Some(turnout) = self.points.moved(self.now) {
             for place in 0..self.trains.len() {
                 let train = &self.trains[place];
                 let derails = train.body.as_ref().is_some_and(|body| body.is_on_blades(&self.rails, turnout));
                 if derails && !train.is_wrecked {
-                    self.wreck(place, MishapKind::Derailment { turnout });
+                    self.wreck(place, IncidentKind::Derailment { turnout });
                 }
             }
         }
@@ -263,19 +263,19 @@ impl<'l> LivingLayout<'l> {
                 continue;
             }
             let ids = (first.id, second.id);
-            self.wreck(one, MishapKind::Collision { with: ids.1 });
-            self.wreck(other, MishapKind::Collision { with: ids.0 });
+            self.wreck(one, IncidentKind::Collision { with: ids.1 });
+            self.wreck(other, IncidentKind::Collision { with: ids.0 });
         }
     }
 
-    fn wreck(&mut self, place: usize, kind: MishapKind) {
+    fn wreck(&mut self, place: usize, kind: IncidentKind) {
         let train = &mut self.trains[place];
         train.stand(self.now, &mut self.rests);
         train.is_wrecked = true;
-        self.mishaps.push(Mishap { at: self.now, train: Some(train.id), kind });
+        self.incidents.push(Incident { at: self.now, train: Some(train.id), kind });
     }
 
-    /// Finds the trains that may touch each other; to be called whenever one is on other edges.
+    /// Finds the trains that may touch each other; needed whenever one is on other edges.
     pub(crate) fn find_near(&mut self) {
         self.near.clear();
         for (one, first) in self.trains.iter().enumerate() {

@@ -1,49 +1,48 @@
 //! The virtual Z21: a living layout behind the datagrams that such a station exchanges with up to twenty clients.
 //!
-//! What comes in is read with the codec that the program writes with; when things come and go is decided here. Nothing is known of a
-//! real station's times but that its bus of feedback modules is asked in a cycle: that cycle is simulated. Whoever spoke to it
-//! is forgotten after a minute and otherwise not watched: trains run on when they are gone.
+//! The codec is that of the program; the times are the simulation's own. Of a
+//! real station's times, only the cycle of its feedback bus is known and simulated. It forgets
+//! silent clients after a minute and does not watch them otherwise: trains run on when they are gone.
 
 mod obeying;
 
 use std::collections::VecDeque;
 
-use footplate_core::track::{Layout, Leg};
+use footplate_core::track::Leg;
 use footplate_core::{DecoderSteps, SensorId, TimeSpan, Timestamp, TrainId};
 use footplate_wire::z21::{
     Broadcasts, CanDetection, CentralState, Feedback, GROUP_INPUTS, GROUP_MODULES, LocoNetDetection, RailCom,
     Reply, Throttle, TurnoutPosition,
 };
 
-use crate::circuit::CircuitError;
 use crate::draws::{Draws, Purpose};
+use crate::living::due_queue::DueQueue;
 use crate::living::network::{Disturbances, Network};
 use crate::living::s88::Edge;
-use crate::living::switches::LivingSwitches;
 use crate::living::world::LivingLayout;
 use crate::living::z21_switches::Z21Switches;
 
 /// All modules of the feedback bus are asked once in this time (the RS-bus: 130 pulses of 0.2 ms and a pause of 7 ms).
 const BUS_CYCLE: TimeSpan = TimeSpan::from_ms(33);
-/// What the station needs from there until its datagram leaves (s; chosen).
+/// The time from there until the datagram leaves (s; chosen).
 const HANDS_ON_S: std::ops::Range<f64> = 0.000_5..0.003;
-/// Detectors that report by themselves filter what they see for so long (s; chosen).
+/// The filter time of detectors that report by themselves (s; chosen).
 const DETECTOR_S: std::ops::Range<f64> = 0.003..0.025;
-/// What the station needs for an answer (s; chosen).
+/// The answer time (s; chosen).
 const ANSWER_S: std::ops::Range<f64> = 0.000_5..0.004;
-/// The world goes on in such steps, so that no sensor is seen later than its message is due.
+/// The longest step of the world, so that no report is late.
 const LOOK_EVERY: TimeSpan = TimeSpan::from_ms(2);
 /// Inputs of a feedback module.
 const MODULE_INPUTS: u16 = 8;
-/// Clients that it knows at a time.
+/// The most clients at a time.
 const MOST_CLIENTS: usize = 20;
-/// A client that says nothing for so long is forgotten.
+/// The time after which a silent client is forgotten.
 const FORGOTTEN_AFTER: TimeSpan = TimeSpan::from_ms(60_000);
-/// Locomotives of which a client is told.
+/// Locomotives that a client may subscribe to.
 const MOST_SUBSCRIBED: usize = 16;
-/// From power on until it answers.
+/// The time from power on to the first answer.
 const BOOT: TimeSpan = TimeSpan::from_ms(4_000);
-/// How often a decoder's RailCom data are passed on.
+/// The interval of RailCom reports.
 const RAIL_COM_EVERY: TimeSpan = TimeSpan::from_ms(500);
 /// From mm/s of a model in 1:87 to km/h.
 const SCALE_KM_H: f64 = 87.0 * 3.6e-3;
@@ -52,7 +51,7 @@ const SCALE_KM_H: f64 = 87.0 * 3.6e-3;
 #[derive(Debug, Clone)]
 struct Connected {
     id: usize,
-    told: Broadcasts,
+    broadcasts: Broadcasts,
     subscribed: VecDeque<u16>,
     heard: Timestamp,
 }
@@ -79,19 +78,19 @@ pub struct VirtualZ21<'l> {
     clients: Vec<Connected>,
     slots: Vec<Slot>,
     turnouts: Vec<(u16, TurnoutPosition)>,
-    /// What the station knows of its sensors, and what it will know when.
+    /// Occupied sensors as the station knows them, and changes that it will know later.
     occupied: Vec<SensorId>,
-    changes: Vec<(Timestamp, SensorId, bool)>,
+    changes: DueQueue<(SensorId, bool)>,
     /// When each module is asked within the cycle of the bus.
     phases: Vec<TimeSpan>,
     central: CentralState,
     rail_com_due: Timestamp,
     loses_next_subscription: bool,
-    /// Until when it is starting.
+    /// The end of its start.
     dark_until: Option<Timestamp>,
 }
 
-/// What happens next.
+/// An occurrence in the station or on its line.
 #[derive(Debug, Clone, Copy)]
 enum Next {
     Incoming,
@@ -134,27 +133,13 @@ impl<'l> VirtualZ21<'l> {
             clients: Vec::new(),
             slots,
             turnouts: Vec::new(),
-            changes: Vec::new(),
+            changes: DueQueue::new(),
             phases,
             central: CentralState(CentralState::POWER_OFF),
             rail_com_due: now + RAIL_COM_EVERY,
             loses_next_subscription: switches.loses_first_subscription,
             dark_until: None,
         }
-    }
-
-    /// A station and a layout on which trains have been put: see [`LivingLayout::draw`].
-    ///
-    /// # Errors
-    /// [`CircuitError`] when no train can run round on the layout.
-    pub fn draw(
-        layout: &'l Layout,
-        seed: u64,
-        trains: &[TrainId],
-        switches: &LivingSwitches,
-        z21: Z21Switches,
-    ) -> Result<Self, CircuitError> {
-        Ok(Self::new(LivingLayout::draw(layout, seed, trains, switches)?, seed, z21))
     }
 
     /// The time.
@@ -169,7 +154,7 @@ impl<'l> VirtualZ21<'l> {
         &self.world
     }
 
-    /// The layout, for a person's hands.
+    /// The layout, for operator intervention.
     pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
         &mut self.world
     }
@@ -178,7 +163,7 @@ impl<'l> VirtualZ21<'l> {
     pub fn restart(&mut self) {
         let now = self.now;
         self.world.power(false, now);
-        self.world.forget_all_told();
+        self.world.forget_commands();
         self.clients.clear();
         self.slots.clear();
         self.turnouts.clear();
@@ -192,7 +177,7 @@ impl<'l> VirtualZ21<'l> {
         self.network.send_to_station(self.now, client, datagram);
     }
 
-    /// Goes on until a time, or until a datagram reaches a client before it.
+    /// Advances to a time, or until a datagram reaches a client before it.
     pub fn advance(&mut self, until: Timestamp) -> Option<(usize, Vec<u8>)> {
         loop {
             let next = self.next().filter(|(at, _)| *at <= until);
@@ -212,12 +197,12 @@ impl<'l> VirtualZ21<'l> {
         }
     }
 
-    /// What happens next, and when; of things at one time the first in the order of this list.
+    /// The next occurrence and its time; of simultaneous ones, the first of this list.
     fn next(&self) -> Option<(Timestamp, Next)> {
         let rail_com = self.switches.rail_com.then_some(self.rail_com_due);
         let coming = [
             (self.network.next_to_station(), Next::Incoming),
-            (self.changes.iter().map(|(at, ..)| *at).min(), Next::Change),
+            (self.changes.due(), Next::Change),
             (self.network.next_to_client(), Next::Outgoing),
             (rail_com, Next::RailCom),
             (self.dark_until, Next::Light),
@@ -235,9 +220,7 @@ impl<'l> VirtualZ21<'l> {
                 }
             }
             Next::Change => {
-                let first = self.changes.iter().enumerate().min_by_key(|(_, (at, ..))| *at);
-                if let Some(at) = first.map(|(at, _)| at) {
-                    let (_, sensor, is_occupied) = self.changes.remove(at);
+                if let Some((sensor, is_occupied)) = self.changes.take() {
                     self.change(sensor, is_occupied);
                 }
             }
@@ -253,7 +236,7 @@ impl<'l> VirtualZ21<'l> {
         }
     }
 
-    /// Sees which sensors have changed, and when the station will know.
+    /// Finds the sensors that have changed, and when the station will know it.
     fn look(&mut self, by: Timestamp) {
         for Edge { at, sensor, is_occupied } in self.world.s88.take_edges(by) {
             let due = match self.switches.feedback {
@@ -265,10 +248,8 @@ impl<'l> VirtualZ21<'l> {
                 }
                 Feedback::Can | Feedback::LocoNet => at + TimeSpan::from_s(self.draws.uniform(DETECTOR_S)),
             };
-            // What is known of one sensor stays in order.
-            let last = self.changes.iter().filter(|(_, other, _)| *other == sensor).map(|(at, ..)| *at).max();
-            let due = last.map_or(due, |last| due.max(last + TimeSpan::from_us(100))).max(self.now);
-            self.changes.push((due, sensor, is_occupied));
+            let change = (sensor, is_occupied);
+            self.changes.add_report(due.max(self.now), change, |(other, _)| *other == sensor);
         }
     }
 
@@ -304,7 +285,7 @@ impl<'l> VirtualZ21<'l> {
         CanDetection { network: 0xd000 | address, address, port, kind: 1, value, more: 0 }
     }
 
-    /// Decoders report how fast they run.
+    /// Decoders report the speed of their locomotives.
     fn pass_on_rail_com(&mut self) {
         if !self.central.is_powered() {
             return;
@@ -314,8 +295,9 @@ impl<'l> VirtualZ21<'l> {
             let slot = self.slots[at];
             let rail_com = Reply::RailCom(self.rail_com(&slot));
             let wants = |client: &Connected| {
-                client.told.has(Broadcasts::ALL_RAIL_COM)
-                    || client.told.has(Broadcasts::RAIL_COM) && client.subscribed.contains(&slot.address)
+                client.broadcasts.has(Broadcasts::ALL_RAIL_COM)
+                    || client.broadcasts.has(Broadcasts::RAIL_COM)
+                        && client.subscribed.contains(&slot.address)
             };
             let ids: Vec<usize> =
                 self.clients.iter().filter(|client| wants(client)).map(|client| client.id).collect();

@@ -78,9 +78,9 @@ fn diameters_lie_within_their_tolerance_and_use_it() {
         let mut widest = 0.0_f64;
         for seed in 0..8 {
             let run = scenario.run(seed, LineConditions::default());
-            for (true_one, believed) in run.diameters.iter().zip(&run.vehicle.wheelsets) {
-                let off = (true_one.as_m() / believed.diameter.as_m() - 1.0).abs();
-                assert_eq!(believed.diameter_tolerance, tolerance);
+            for (true_one, assumed) in run.diameters.iter().zip(&run.vehicle.wheelsets) {
+                let off = (true_one.as_m() / assumed.diameter.as_m() - 1.0).abs();
+                assert_eq!(assumed.diameter_tolerance, tolerance);
                 assert!(off <= tolerance);
                 widest = widest.max(off);
             }
@@ -118,11 +118,11 @@ fn acceleration_speed_and_distance_are_one_motion() {
     each_run(|name, seed, run| {
         for (at, pair) in run.truth.windows(2).enumerate() {
             let span = (run.samples[at + 1].time - run.samples[at].time).as_s();
-            let way = (pair[1].distance - pair[0].distance).as_m();
+            let distance = (pair[1].distance - pair[0].distance).as_m();
             let mean = 0.5 * (pair[0].speed + pair[1].speed).as_m_per_s();
             // Acceleration changes by at most 1 m/s² within a period; late rows last longer than they say.
             let slack = if name == "F9" { 0.06 * mean.abs() + 1e-2 } else { 0.25 * 0.05 * 0.05 };
-            assert!((way - mean * span).abs() <= slack, "{name} {seed} row {at}: {way} m");
+            assert!((distance - mean * span).abs() <= slack, "{name} {seed} row {at}: {distance} m");
         }
         assert_eq!(run.truth[0].distance.as_m(), 0.0);
         assert_eq!(run.samples[0].time.as_ns(), 0);

@@ -84,9 +84,9 @@ fn how_a_run_is_recorded_does_not_change_what_happens() {
         assert_eq!(plain.truth, scenario.run(3, other).truth, "{name}");
         // Another period divides time into the same steps, but begins that much earlier or later.
         let slower = LineConditions { period: TimeSpan::from_ms(100), ..LineConditions::default() };
-        let way = |run: &LineRun| run.truth.last().unwrap().distance.as_m();
+        let distance = |run: &LineRun| run.truth.last().unwrap().distance.as_m();
         let slower = scenario.run(3, slower);
-        assert!((way(&plain) - way(&slower)).abs() < 0.02 * way(&plain), "{name}");
+        assert!((distance(&plain) - distance(&slower)).abs() < 0.02 * distance(&plain), "{name}");
     }
 }
 

@@ -13,7 +13,7 @@ fn run(name: &str, seed: u64) -> LineRun {
     run_with(name, seed, LineConditions::default())
 }
 
-/// The way that a tachometer counted while the train moved, with the true diameter (m): a standing wheel can chatter.
+/// The distance that a tachometer counted while the train moved, with the true diameter (m): a standing wheel can chatter.
 fn counted(run: &LineRun, wheel: usize) -> f64 {
     let moving =
         run.samples.iter().zip(&run.truth).skip(1).filter(|(_, truth)| truth.speed.as_m_per_s() != 0.0);
@@ -21,12 +21,12 @@ fn counted(run: &LineRun, wheel: usize) -> f64 {
     pulses as f64 * PI * run.diameters[wheel].as_m() / f64::from(run.vehicle.wheelsets[wheel].teeth)
 }
 
-fn way(run: &LineRun) -> f64 {
+fn distance(run: &LineRun) -> f64 {
     run.truth.last().unwrap().distance.as_m()
 }
 
 #[test]
-fn pulses_add_up_to_the_way_with_every_wheel_and_period() {
+fn pulses_add_up_to_the_distance_with_every_wheel_and_period() {
     for (teeth, ms) in [(80, 50), (100, 20), (200, 100), (200, 20)] {
         let conditions = LineConditions { teeth, period: TimeSpan::from_ms(ms), ..LineConditions::default() };
         for (name, seed) in [("N1", 1), ("N2", 2), ("F8", 3)] {
@@ -35,10 +35,13 @@ fn pulses_add_up_to_the_way_with_every_wheel_and_period() {
                 continue;
             }
             for wheel in [0, 1] {
-                let (counted, way) = (counted(&run, wheel), way(&run));
+                let (counted, distance) = (counted(&run, wheel), distance(&run));
                 // Creepage on dry rail: a few hundredths of a percent, and a pulse at either end.
-                let slack = 6e-4 * way + 0.1;
-                assert!((counted - way).abs() < slack, "{name} {teeth} {ms}: {counted} m of {way} m");
+                let slack = 6e-4 * distance + 0.1;
+                assert!(
+                    (counted - distance).abs() < slack,
+                    "{name} {teeth} {ms}: {counted} m of {distance} m"
+                );
             }
         }
     }
@@ -48,7 +51,7 @@ fn pulses_add_up_to_the_way_with_every_wheel_and_period() {
 fn a_driven_wheel_runs_ahead_and_a_braked_one_lags_by_hundredths_of_a_percent() {
     // Accelerating for six minutes and braking for three: the driven wheel gains, the other only loses.
     let run = run("N1", 4);
-    let [driven, trailing] = [0, 1].map(|wheel| counted(&run, wheel) / way(&run) - 1.0);
+    let [driven, trailing] = [0, 1].map(|wheel| counted(&run, wheel) / distance(&run) - 1.0);
     assert!((0.0..5e-4).contains(&driven), "{driven}");
     assert!((-4e-4..0.0).contains(&trailing), "{trailing}");
 }
@@ -66,7 +69,7 @@ fn counters_and_pulses_tell_the_same_story() {
                     (now.counter.unwrap() - pair[0].wheels[wheel].counter.unwrap()).rem_euclid(modulus);
                 let moved = if moved > modulus / 2 { moved - modulus } else { moved };
                 let pulses = now.pulses.unwrap();
-                // Both ways within a period add up in pulses and cancel in the counter.
+                // Both directions within a period add up in pulses and cancel in the counter.
                 assert!(moved.abs() <= pulses && (pulses - moved) % 2 == 0, "{name}: {moved} {pulses}");
                 backward += i64::from(moved < 0);
                 if moved.abs() > 1 {
@@ -108,9 +111,9 @@ fn time_stamps_measure_speed_to_a_centimetre_a_second() {
 fn a_missing_tooth_costs_one_pulse_a_turn() {
     for seed in 0..3 {
         let faulty = run("F1", seed);
-        let lost = 1.0 - counted(&faulty, 0) / way(&faulty);
+        let lost = 1.0 - counted(&faulty, 0) / distance(&faulty);
         assert!((lost - 0.01).abs() < 8e-4, "seed {seed}: {lost}");
-        let sound = 1.0 - counted(&faulty, 1) / way(&faulty);
+        let sound = 1.0 - counted(&faulty, 1) / distance(&faulty);
         assert!(sound.abs() < 8e-4, "seed {seed}: {sound}");
     }
 }
@@ -139,7 +142,7 @@ fn a_bad_clock_loses_rows_and_stretches_time() {
     assert!(run.samples.windows(2).all(|pair| pair[1].time > pair[0].time));
     // The counter has seen what the lost rows have not.
     let pulses = counted(&run, 0);
-    assert!(pulses < way(&run));
+    assert!(pulses < distance(&run));
 }
 
 #[test]
@@ -147,7 +150,7 @@ fn balises_are_where_the_map_has_them() {
     let (mut read, mut kilometres) = (0, 0.0);
     for seed in 0..6 {
         let run = run("N6", seed);
-        kilometres += way(&run) / 1000.0;
+        kilometres += distance(&run) / 1000.0;
         for (sample, pair) in run.samples[1..].iter().zip(run.truth.windows(2)) {
             if let Some(place) = sample.balise {
                 read += 1;

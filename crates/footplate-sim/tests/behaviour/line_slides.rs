@@ -47,8 +47,8 @@ fn a_long_slide_is_what_slide_protection_makes_of_it() {
 
 /// When a wheelset began to do something (s), in order.
 fn begins(run: &LineRun, wheelset: usize, what: WheelTruth) -> Vec<f64> {
-    let told = run.events.iter().filter(|event| event.what == LineEventKind::Wheel { wheelset, does: what });
-    told.map(|event| event.time.as_s()).collect()
+    let times = run.events.iter().filter(|event| event.what == LineEventKind::Wheel { wheelset, does: what });
+    times.map(|event| event.time.as_s()).collect()
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The virtual 6051 keeps the times and the habits of the real one.
 
 use footplate_core::{Ratio, TimeSpan, Timestamp, TurnoutId};
-use footplate_sim::{CtsSwitch, FromStation, LivingSwitches, MishapKind, StationSwitches, VirtualStation};
+use footplate_sim::{CtsSwitch, FromStation, IncidentKind, LivingSwitches, StationSwitches, VirtualStation};
 
 use crate::yard::{OTHER, TRAIN, ask, empty, put, say, two_loops, wait};
 
@@ -109,7 +109,7 @@ fn without_the_wire_bytes_may_follow_each_other() {
 }
 
 #[test]
-fn contacts_are_remembered_until_they_are_read_module_by_module() {
+fn detections_are_remembered_until_they_are_read_module_by_module() {
     let layout = two_loops();
     let mut station = empty(&layout, StationSwitches::default());
     put(&mut station, TRAIN, "S1", "S2", 800.0);
@@ -130,7 +130,7 @@ fn contacts_are_remembered_until_they_are_read_module_by_module() {
 }
 
 #[test]
-fn a_held_contact_is_seen_again_and_again() {
+fn a_sensor_that_stays_closed_is_seen_again_and_again() {
     let layout = two_loops();
     let mut station = empty(&layout, StationSwitches::default());
     put(&mut station, TRAIN, "S1", "S2", 890.0);
@@ -158,8 +158,8 @@ fn a_solenoid_left_on_raises_an_alarm_and_burns() {
     wait(&mut station, 0.2);
     assert_eq!(station.alarms().iter().map(|alarm| alarm.turnout).collect::<Vec<_>>(), [TurnoutId(3)]);
     wait(&mut station, 6.0);
-    let kinds: Vec<MishapKind> = station.world().mishaps().iter().map(|mishap| mishap.kind).collect();
-    assert_eq!(kinds, [MishapKind::CoilBurnt { turnout: TurnoutId(3) }]);
+    let kinds: Vec<IncidentKind> = station.world().incidents().iter().map(|incident| incident.kind).collect();
+    assert_eq!(kinds, [IncidentKind::CoilBurnt { turnout: TurnoutId(3) }]);
 }
 
 #[test]
@@ -192,7 +192,7 @@ fn seen(seed: u64) -> (Vec<(Timestamp, FromStation)>, String) {
         }
     }
     let truth = station.world().truth();
-    (seen, format!("{:?} {:?} {:?}", truth.passes(), truth.rests(), station.world().mishaps()))
+    (seen, format!("{:?} {:?} {:?}", truth.passes(), truth.rests(), station.world().incidents()))
 }
 
 #[test]

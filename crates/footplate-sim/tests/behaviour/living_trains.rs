@@ -3,7 +3,7 @@
 use footplate_core::track::{Leg, Position};
 use footplate_core::{Length, SensorId, TurnoutId};
 use footplate_sim::living::End;
-use footplate_sim::{CtsSwitch, LivingSwitches, MishapKind, StationSwitches, VirtualStation};
+use footplate_sim::{CtsSwitch, IncidentKind, LivingSwitches, StationSwitches, VirtualStation};
 
 use crate::yard::{OTHER, TRAIN, empty, put, say, two_loops, wait};
 
@@ -12,7 +12,7 @@ fn sensors_passed(station: &footplate_sim::VirtualStation<'_>) -> Vec<u16> {
 }
 
 #[test]
-fn a_train_goes_round_and_closes_only_the_contacts_of_its_direction() {
+fn a_train_goes_round_and_closes_only_the_sensors_of_its_direction() {
     let layout = two_loops();
     let mut station = empty(&layout, StationSwitches::default());
     put(&mut station, TRAIN, "S1", "S2", 300.0);
@@ -22,7 +22,7 @@ fn a_train_goes_round_and_closes_only_the_contacts_of_its_direction() {
     assert!(passed.len() >= 4, "{passed:?}");
     let round = [4, 6, 0, 2];
     assert!(passed.iter().zip(round.iter().cycle()).all(|(found, due)| found == due), "{passed:?}");
-    assert!(station.world().mishaps().is_empty());
+    assert!(station.world().incidents().is_empty());
 }
 
 #[test]
@@ -38,12 +38,12 @@ fn it_goes_where_the_turnout_lies_when_it_comes_to_it() {
     wait(&mut station, 20.0);
     let passed = sensors_passed(&station);
     assert_eq!(passed.get(..4), Some([0, 10, 12, 14].as_slice()), "over S0 into the inner loop: {passed:?}");
-    // Märklin's points give way to a train that comes from the wrong leg.
-    assert!(station.world().mishaps().is_empty(), "{:?}", station.world().mishaps());
+    // Märklin's points are moved by a train that comes from the wrong leg.
+    assert!(station.world().incidents().is_empty(), "{:?}", station.world().incidents());
 }
 
 #[test]
-fn a_train_told_to_turn_stops_dead_and_comes_back() {
+fn a_reversed_train_stops_dead_and_comes_back() {
     let layout = two_loops();
     let mut station = empty(&layout, StationSwitches::default());
     put(&mut station, TRAIN, "S1", "S2", 300.0);
@@ -64,7 +64,7 @@ fn a_train_told_to_turn_stops_dead_and_comes_back() {
     wait(&mut station, 8.0);
     let passes = station.world().truth().passes();
     let next = passes.iter().find(|pass| pass.at > last.at).unwrap();
-    assert_eq!(next.sensor, SensorId(last.sensor.0 ^ 1), "the same place, the other way");
+    assert_eq!(next.sensor, SensorId(last.sensor.0 ^ 1), "the same place, in the other direction");
     assert!(layout.edge(edge_before).is_some());
 }
 
@@ -89,12 +89,12 @@ fn trains_that_meet_collide_and_stay_where_they_are() {
     say(&mut station, &[8, 24]);
     say(&mut station, &[12, 58]);
     wait(&mut station, 20.0);
-    let mishaps = station.world().mishaps();
-    let kinds: Vec<MishapKind> = mishaps.iter().map(|mishap| mishap.kind).collect();
-    assert_eq!(kinds, [MishapKind::Collision { with: OTHER }, MishapKind::Collision { with: TRAIN }]);
+    let incidents = station.world().incidents();
+    let kinds: Vec<IncidentKind> = incidents.iter().map(|incident| incident.kind).collect();
+    assert_eq!(kinds, [IncidentKind::Collision { with: OTHER }, IncidentKind::Collision { with: TRAIN }]);
     let truth = station.world().truth();
     for train in [TRAIN, OTHER] {
-        assert_eq!(truth.train(train).unwrap().at_rest_since, Some(mishaps[0].at));
+        assert_eq!(truth.train(train).unwrap().at_rest_since, Some(incidents[0].at));
         assert!(truth.train(train).unwrap().is_wrecked);
     }
 }
@@ -107,8 +107,8 @@ fn points_thrown_under_a_train_derail_it() {
     put(&mut station, TRAIN, "B1", "S1", 60.0);
     say(&mut station, &[34, 1]);
     wait(&mut station, 0.4);
-    let kinds: Vec<MishapKind> = station.world().mishaps().iter().map(|mishap| mishap.kind).collect();
-    assert_eq!(kinds, [MishapKind::Derailment { turnout: TurnoutId(1) }]);
+    let kinds: Vec<IncidentKind> = station.world().incidents().iter().map(|incident| incident.kind).collect();
+    assert_eq!(kinds, [IncidentKind::Derailment { turnout: TurnoutId(1) }]);
 }
 
 #[test]
@@ -119,11 +119,11 @@ fn a_train_that_backs_over_points_it_has_forced_derails() {
     put(&mut station, TRAIN, "M1", "R0", 60.0);
     station.world_mut().lay(TurnoutId(1), Leg::Curved);
     say(&mut station, &[15, 24]);
-    assert!(station.world().mishaps().is_empty());
+    assert!(station.world().incidents().is_empty());
     say(&mut station, &[10, 24]);
     wait(&mut station, 3.0);
-    let kinds: Vec<MishapKind> = station.world().mishaps().iter().map(|mishap| mishap.kind).collect();
-    assert_eq!(kinds, [MishapKind::Derailment { turnout: TurnoutId(1) }]);
+    let kinds: Vec<IncidentKind> = station.world().incidents().iter().map(|incident| incident.kind).collect();
+    assert_eq!(kinds, [IncidentKind::Derailment { turnout: TurnoutId(1) }]);
 }
 
 #[test]
@@ -133,8 +133,8 @@ fn a_train_runs_off_the_end_of_a_siding() {
     put(&mut station, TRAIN, "S8", "X", 300.0);
     say(&mut station, &[10, 24]);
     wait(&mut station, 20.0);
-    let mishaps = station.world().mishaps();
-    assert_eq!(mishaps.iter().map(|mishap| mishap.kind).collect::<Vec<_>>(), [MishapKind::Overrun]);
+    let incidents = station.world().incidents();
+    assert_eq!(incidents.iter().map(|incident| incident.kind).collect::<Vec<_>>(), [IncidentKind::Overrun]);
 }
 
 #[test]
@@ -184,7 +184,7 @@ fn hands_lift_push_dirty_and_swap() {
 }
 
 #[test]
-fn what_a_train_passed_before_a_hand_took_it_elsewhere_is_no_way_from_there() {
+fn what_a_train_passed_before_it_was_lifted_is_no_distance_from_there() {
     let layout = two_loops();
     let mut station = empty(&layout, StationSwitches::default());
     put(&mut station, TRAIN, "S1", "S2", 300.0);
@@ -223,8 +223,8 @@ fn every_train_drawn_can_run_round_its_circuit_while_the_others_stand() {
             }
             say(&mut station, &[11, train.0 as u8]);
             wait(&mut station, 30.0);
-            assert!(station.world().mishaps().is_empty(), "seed {seed}: {:?}", station.world().mishaps());
-            // One way round or the other.
+            assert!(station.world().incidents().is_empty(), "seed {seed}: {:?}", station.world().incidents());
+            // In one direction of the circuit or the other.
             let met = |sensor: SensorId| {
                 let passes = station.world().truth().passes();
                 passes.iter().any(|pass| pass.sensor == sensor || pass.sensor.0 == sensor.0 ^ 1)

@@ -46,7 +46,7 @@ fn a_sensor_is_reported_while_the_shoe_is_on_it_at_its_true_place() {
         assert!(off < 1e-3, "{} closed {off} mm from its place", report.sensor);
         // Still under the shoe at the previous reading, or closed since then.
         let held_until = motion.distance(report.reading_before).as_mm() - closed_at;
-        assert!(held_until <= yard.train.shoe.as_mm() + 1e-3, "{held_until} mm past the contact");
+        assert!(held_until <= yard.train.shoe.as_mm() + 1e-3, "{held_until} mm past the sensor");
         let EventKind::Sensor(written) = run.events[report.event].kind else { panic!("no report") };
         assert_eq!(written.sensor, report.sensor);
         let late = run.events[report.event].time - report.reading;

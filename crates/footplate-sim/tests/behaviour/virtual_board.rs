@@ -10,7 +10,7 @@ use crate::yard::{TRAIN, two_loops};
 
 /// A board in front of the two loops, with one train 100 mm behind S0 that leads with an end.
 fn board(layout: &footplate_core::track::Layout, leads: End, switches: BoardSwitches) -> VirtualBoard<'_> {
-    let calm = LivingSwitches { true_rails: false, stale_contacts: false, ..LivingSwitches::faultless() };
+    let calm = LivingSwitches { true_rails: false, stale_detections: false, ..LivingSwitches::faultless() };
     let mut world = LivingLayout::without_trains(layout, 7, &calm);
     (1..=3).for_each(|number| world.lay(TurnoutId(number), Leg::Straight));
     world.add(TRAIN, Train::draw(24, LawFamily::Constant), 1.0);
@@ -140,7 +140,7 @@ fn directions_are_absolute() {
 }
 
 #[test]
-fn trains_run_on_when_nobody_writes_and_stop_when_the_board_is_reset() {
+fn trains_run_on_without_commands_and_stop_when_the_board_is_reset() {
     let layout = two_loops();
     let mut board = board(&layout, End::Nose, BoardSwitches::default());
     answer(&mut board, "<1>");

@@ -13,7 +13,7 @@ use crate::yard::{TRAIN, two_loops};
 
 /// A station in front of the two loops, with one train 100 mm behind S0 that leads with its nose.
 fn station(layout: &Layout, switches: CanSwitches) -> VirtualCentralStation<'_> {
-    let calm = LivingSwitches { true_rails: false, stale_contacts: false, ..LivingSwitches::faultless() };
+    let calm = LivingSwitches { true_rails: false, stale_detections: false, ..LivingSwitches::faultless() };
     let mut world = LivingLayout::without_trains(layout, 7, &calm);
     (1..=3).for_each(|number| world.lay(TurnoutId(number), footplate_core::track::Leg::Straight));
     world.add(TRAIN, Train::draw(24, LawFamily::Constant), 1.0);
@@ -126,7 +126,7 @@ fn the_list_of_locomotives_names_the_trains() {
 }
 
 #[test]
-fn contacts_are_reported_within_a_cycle_with_the_time_since_the_change_before() {
+fn sensors_are_reported_within_a_cycle_with_the_time_since_the_change_before() {
     let layout = two_loops();
     let mut station =
         station(&layout, CanSwitches { transport: CanTransport::Stream, ..CanSwitches::default() });
@@ -134,24 +134,24 @@ fn contacts_are_reported_within_a_cycle_with_the_time_since_the_change_before() 
     let heard = ask(&mut station, Message::Speed { uid: UID, speed: Some(800) }, 60_000);
     let changes = |is: bool| {
         heard.iter().filter_map(move |(at, frame)| match Message::of(frame) {
-            Message::Contact { contact, change: Some(change), .. } if change.is_occupied == is => {
-                Some((*at, contact, change))
+            Message::Contact { contact: input, change: Some(change), .. } if change.is_occupied == is => {
+                Some((*at, input, change))
             }
             _ => None,
         })
     };
     let mut passes = station.world().truth().passes().iter();
     let mut count = 0;
-    for (at, contact, change) in changes(true) {
+    for (at, input, change) in changes(true) {
         let pass = passes.next().expect("a pass for each report");
-        assert_eq!(pass.sensor.0 + 1, contact);
+        assert_eq!(pass.sensor.0 + 1, input);
         let delay = (at - pass.at).as_ms();
         // Up to a cycle of 100 ms, 18 bits of 0.167 ms, some milliseconds.
-        assert!((0.9..112.0).contains(&delay), "contact {contact}: {delay} ms");
+        assert!((0.9..112.0).contains(&delay), "input {input}: {delay} ms");
         assert!(!change.was_occupied);
         // The report of its becoming free follows, with how long it was occupied.
         let (free_at, _, freed) =
-            changes(false).find(|(free, other, _)| *other == contact && *free > at).unwrap();
+            changes(false).find(|(free, other, _)| *other == input && *free > at).unwrap();
         let lasted = f64::from(freed.lasted.unwrap()) * 10.0;
         assert!(((free_at - at).as_ms() - lasted).abs() < 15.0, "{lasted} ms");
         count += 1;
@@ -163,7 +163,7 @@ fn contacts_are_reported_within_a_cycle_with_the_time_since_the_change_before() 
 }
 
 #[test]
-fn trains_run_on_when_nobody_writes_and_stop_when_it_is_switched_off() {
+fn trains_run_on_without_commands_and_stop_when_it_is_switched_off() {
     let layout = two_loops();
     let mut station = station(&layout, CanSwitches::default());
     answers(&mut station, Message::Go(Uid::ALL));
@@ -200,8 +200,8 @@ fn the_quirks_that_were_reported_can_be_switched_on() {
     assert!((35..=65).contains(&answered), "{answered} of 100, half on average");
     let mut twice = station(&layout, CanSwitches { duplicated: Ratio::from_percent(100.0), ..default() });
     assert_eq!(answers(&mut twice, speed).len(), 4);
-    let contact = |change| Message::Contact { device: 0, contact: 2, change };
-    let state = answers(&mut bare, contact(None));
+    let of_input = |change| Message::Contact { device: 0, contact: 2, change };
+    let state = answers(&mut bare, of_input(None));
     assert!(
         matches!(
             state[..],

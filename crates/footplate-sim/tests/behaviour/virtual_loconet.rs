@@ -10,7 +10,7 @@ use crate::yard::{TRAIN, two_loops};
 
 /// A station in front of the two loops, with one train 100 mm behind S0 that leads with its nose.
 fn station(layout: &Layout, switches: LocoNetSwitches) -> VirtualLocoNet<'_> {
-    let calm = LivingSwitches { true_rails: false, stale_contacts: false, ..LivingSwitches::faultless() };
+    let calm = LivingSwitches { true_rails: false, stale_detections: false, ..LivingSwitches::faultless() };
     let mut world = LivingLayout::without_trains(layout, 7, &calm);
     (1..=3).for_each(|number| world.lay(TurnoutId(number), Leg::Straight));
     world.add(TRAIN, Train::draw(24, LawFamily::Constant), 1.0);
@@ -51,7 +51,7 @@ fn requests_are_answered_as_the_protocols_say() {
             &["RECEIVE BB 00 00 44", "SENT OK", "RECEIVE E7 0E 00 03 00 00 00 02 00 00 00 00 00 17"],
         ),
         ("SEND 83 7C", &["RECEIVE 83 7C", "SENT OK"]),
-        // Train 24 is in slot 1, used by nobody; then by this throttle.
+        // Train 24 is in slot 1, which is not in use; then by this throttle.
         (
             "SEND BF 00 18 58",
             &["RECEIVE BF 00 18 58", "SENT OK", "RECEIVE E7 0E 01 13 18 00 00 03 00 00 00 00 00 1F"],

@@ -11,7 +11,7 @@ use crate::yard::{TRAIN, two_loops};
 
 /// A station in front of the two loops, with one train 100 mm behind S0 that leads with an end.
 fn station(layout: &Layout, leads: End, switches: Z21Switches) -> VirtualZ21<'_> {
-    let calm = LivingSwitches { true_rails: false, stale_contacts: false, ..LivingSwitches::faultless() };
+    let calm = LivingSwitches { true_rails: false, stale_detections: false, ..LivingSwitches::faultless() };
     let mut world = LivingLayout::without_trains(layout, 7, &calm);
     (1..=3).for_each(|number| world.lay(TurnoutId(number), Leg::Straight));
     world.add(TRAIN, Train::draw(24, LawFamily::Constant), 1.0);
@@ -78,23 +78,23 @@ fn requests_are_answered_one_dataset_after_the_other() {
 }
 
 #[test]
-fn clients_are_told_what_they_asked_for_and_forgotten_after_a_minute() {
+fn clients_receive_what_they_subscribed_to_and_are_forgotten_after_a_minute() {
     let layout = two_loops();
     let mut station = station(&layout, End::Nose, Z21Switches { rail_com: false, ..Z21Switches::default() });
     for client in [1, 2, 3] {
-        let told = if client == 3 { Broadcasts::NONE } else { Broadcasts::STATES };
-        write(&mut station, client, &[Request::SetBroadcasts(told)]);
+        let broadcasts = if client == 3 { Broadcasts::NONE } else { Broadcasts::STATES };
+        write(&mut station, client, &[Request::SetBroadcasts(broadcasts)]);
     }
     write(&mut station, 2, &[Request::Locomotive { address: 24 }]);
     wait(&mut station, 40);
     write(&mut station, 1, &[drive(9, true)]);
     let heard = wait(&mut station, 40);
     assert_eq!(heard.iter().map(|(client, _)| *client).collect::<Vec<_>>(), [2], "{heard:?}");
-    // The third is told of the power only if it has switched it itself.
+    // The third hears of the power only if it has switched it itself.
     write(&mut station, 3, &[Request::Power { on: true }]);
-    let mut told: Vec<usize> = wait(&mut station, 40).into_iter().map(|(client, _)| client).collect();
-    told.sort_unstable();
-    assert_eq!(told, [1, 2, 3]);
+    let mut informed: Vec<usize> = wait(&mut station, 40).into_iter().map(|(client, _)| client).collect();
+    informed.sort_unstable();
+    assert_eq!(informed, [1, 2, 3]);
     // Seventeen locomotives are one too many.
     for address in 100..116 {
         write(&mut station, 2, &[Request::Locomotive { address }]);
@@ -104,8 +104,8 @@ fn clients_are_told_what_they_asked_for_and_forgotten_after_a_minute() {
     assert_eq!(wait(&mut station, 40), []);
     wait(&mut station, 61_000);
     write(&mut station, 3, &[Request::Power { on: false }]);
-    let told: Vec<usize> = wait(&mut station, 40).into_iter().map(|(client, _)| client).collect();
-    assert_eq!(told, [3]);
+    let informed: Vec<usize> = wait(&mut station, 40).into_iter().map(|(client, _)| client).collect();
+    assert_eq!(informed, [3]);
     // Twenty are known at a time, and the next is not answered.
     for client in 10..40 {
         write(&mut station, client, &[Request::SerialNumber]);
@@ -147,7 +147,7 @@ fn sensors_are_reported_within_a_cycle_of_their_bus_or_by_their_detectors() {
 }
 
 #[test]
-fn turnouts_obey_however_often_they_are_told_and_trains_stop_at_once_when_all_do() {
+fn turnouts_obey_repeated_commands_and_trains_stop_at_once_when_all_do() {
     let layout = two_loops();
     let mut station = station(&layout, End::Nose, Z21Switches::default());
     ask(&mut station, &[Request::Power { on: true }]);
@@ -212,11 +212,11 @@ fn a_train_with_a_long_address_is_driven() {
 }
 
 #[test]
-fn trains_run_on_when_nobody_writes_and_stop_when_the_station_is_restarted() {
+fn trains_run_on_without_commands_and_stop_when_the_station_is_restarted() {
     let layout = two_loops();
     let mut station = station(&layout, End::Nose, Z21Switches::default());
-    let told = Request::SetBroadcasts(Broadcasts::STATES);
-    ask(&mut station, &[told, Request::Power { on: true }, drive(72, true)]);
+    let subscribe = Request::SetBroadcasts(Broadcasts::STATES);
+    ask(&mut station, &[subscribe, Request::Power { on: true }, drive(72, true)]);
     wait(&mut station, 10_000);
     let before = odometer(&station);
     wait(&mut station, 5_000);

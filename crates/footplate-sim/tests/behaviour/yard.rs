@@ -11,7 +11,7 @@ pub(crate) const TRAIN: TrainId = TrainId(24);
 pub(crate) const OTHER: TrainId = TrainId(58);
 
 /// Outer loop S0 B1 S1 S2 S3 B3 S0, inner loop S4 M2 S5 S6 S7 S4; the curved leg of turnout 1 leads from the outer to
-/// the inner loop, that of turnout 3 to a siding with contact S8 that ends at X.
+/// the inner loop, that of turnout 3 to a siding with sensor S8 that ends at X.
 pub(crate) fn two_loops() -> Layout {
     let sensor = |number: u16| Place::Sensor {
         names: [format!("S{number}"), format!("R{number}")],
@@ -63,7 +63,7 @@ pub(crate) fn two_loops() -> Layout {
 
 /// A station before a faultless layout with surveyed rails, all turnouts straight, without trains.
 pub(crate) fn empty(layout: &Layout, switches: StationSwitches) -> VirtualStation<'_> {
-    let calm = LivingSwitches { true_rails: false, stale_contacts: false, ..LivingSwitches::faultless() };
+    let calm = LivingSwitches { true_rails: false, stale_detections: false, ..LivingSwitches::faultless() };
     let mut world = LivingLayout::without_trains(layout, 7, &calm);
     for number in 1..=3 {
         world.lay(TurnoutId(number), Leg::Straight);

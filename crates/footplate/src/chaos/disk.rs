@@ -160,14 +160,14 @@ impl FaultyDisk {
     /// The computer loses its power, perhaps in the middle of a commit.
     pub(super) fn lose_power(mut self, choice: &mut Choice) -> anyhow::Result<()> {
         let acknowledged = self.acknowledged;
-        let under_way = self.commit.as_ref().map_or(0, |commit| commit.entries);
+        let uncommitted = self.commit.as_ref().map_or(0, |commit| commit.entries);
         let before = Image::of(&self.path)?;
-        self.append(under_way)?;
+        self.append(uncommitted)?;
         let after = Image::of(&self.path)?;
         let (path, recorded) = (self.path.clone(), self.recorded.clone());
         drop(self);
         before.torn(&after, choice).write(&path)?;
-        kept(&path, &recorded, acknowledged, acknowledged + under_way)
+        kept(&path, &recorded, acknowledged, acknowledged + uncommitted)
     }
 }
 
@@ -230,7 +230,7 @@ fn beside(path: &Path, ending: &str) -> PathBuf {
 }
 
 /// Checks that the last session of a store holds the recorded entries in order: at least the acknowledged ones, and none
-/// beyond those of the commit under way.
+/// beyond those of the unfinished commit.
 fn kept(path: &Path, recorded: &[Event], least: usize, most: usize) -> anyhow::Result<()> {
     let store = Store::open(path).context("the store cannot be opened after its program died")?;
     store.check()?;
@@ -242,7 +242,7 @@ fn kept(path: &Path, recorded: &[Event], least: usize, most: usize) -> anyhow::R
     let events: Vec<Event> = runs.iter().flat_map(|run| &run.events).map(|stored| stored.raw.event).collect();
     ensure!(
         (least..=most).contains(&events.len()),
-        "{} events are in the store, {least} were acknowledged and {} under way",
+        "{} events are in the store, {least} were acknowledged and {} not committed yet",
         events.len(),
         most - least
     );

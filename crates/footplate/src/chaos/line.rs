@@ -28,7 +28,7 @@ pub(super) type SharedStation<'l> = Rc<RefCell<SimulatedStation<'l>>>;
 enum Holder {
     Guardian,
     /// The guardian is dead, and the program has not noticed.
-    Nobody,
+    None,
     /// The program itself.
     Program,
 }
@@ -55,7 +55,7 @@ pub(super) struct FaultyLine<'l> {
     /// When all trains had received their stop, or had no power.
     pub(super) stopped_at: Option<Timestamp>,
     /// What happened, for people.
-    pub(super) told: Vec<(Timestamp, String)>,
+    pub(super) notes: Vec<(Timestamp, String)>,
 }
 
 impl<'l> FaultyLine<'l> {
@@ -85,13 +85,13 @@ impl<'l> FaultyLine<'l> {
             will: None,
             runs: false,
             stopped_at: None,
-            told: Vec::new(),
+            notes: Vec::new(),
         }
     }
 
     fn tell(&mut self, words: impl Into<String>) {
         let now = self.time();
-        self.told.push((now, words.into()));
+        self.notes.push((now, words.into()));
     }
 
     fn time(&self) -> Timestamp {
@@ -146,7 +146,7 @@ impl<'l> FaultyLine<'l> {
             }
         }
         if self.life.death() == Some(Death::GuardianKilled) && self.holder == Holder::Guardian {
-            self.holder = Holder::Nobody;
+            self.holder = Holder::None;
             self.tell("the guardian is killed");
         }
     }
@@ -293,7 +293,7 @@ impl Link for FaultyLine<'_> {
         self.happen();
         match self.holder {
             _ if self.life.is_over() => Err(Self::dead()),
-            Holder::Nobody => Err(Lost("the guardian has died".to_owned())),
+            Holder::None => Err(Lost("the guardian has died".to_owned())),
             Holder::Guardian | Holder::Program => self.put(bytes),
         }
     }
@@ -307,7 +307,7 @@ impl Link for FaultyLine<'_> {
             if self.life.is_over() {
                 return Heard::Lost(Self::dead());
             }
-            if self.holder == Holder::Nobody {
+            if self.holder == Holder::None {
                 return Heard::Lost(Lost("the guardian has died".to_owned()));
             }
             let now = self.time();
@@ -345,7 +345,7 @@ impl Link for FaultyLine<'_> {
         if self.life.is_over() {
             return Err(Self::dead());
         }
-        if self.holder == Holder::Nobody {
+        if self.holder == Holder::None {
             self.holder = Holder::Program;
             self.life.orphan();
         }

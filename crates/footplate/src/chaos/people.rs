@@ -35,7 +35,7 @@ pub(super) struct Seen {
     pub(super) grants: u32,
     /// When the program was stuck without an alarm.
     pub(super) stuck: Option<Timestamp>,
-    pub(super) told: Vec<(Timestamp, String)>,
+    pub(super) notes: Vec<(Timestamp, String)>,
 }
 
 /// The operator of the railway in one life of the program.
@@ -57,7 +57,7 @@ pub(super) struct People<'p, 'l> {
     moved: Timestamp,
     looked: Timestamp,
     has_sent: bool,
-    mishaps: usize,
+    incidents: usize,
     news: Vec<LinkNews>,
     pub(super) trouble: Option<String>,
 }
@@ -73,7 +73,7 @@ impl<'p, 'l> People<'p, 'l> {
         lasts: TimeSpan,
     ) -> Self {
         let now = station.borrow().now();
-        let mishaps = station.borrow().world().mishaps().len();
+        let incidents = station.borrow().world().incidents().len();
         Self {
             layout,
             station,
@@ -91,14 +91,14 @@ impl<'p, 'l> People<'p, 'l> {
             moved: now,
             looked: now,
             has_sent: false,
-            mishaps,
+            incidents,
             news: Vec::new(),
             trouble: None,
         }
     }
 
     fn tell(&mut self, now: Timestamp, words: String) {
-        self.seen.told.push((now, words));
+        self.seen.notes.push((now, words));
     }
 
     fn alarm(&mut self, now: Timestamp, train: TrainId) {
@@ -238,8 +238,8 @@ impl Attendant<Dispatcher> for People<'_, '_> {
         if now - self.looked >= LOOK {
             self.look(now, dispatcher);
         }
-        let has_mishap = self.station.borrow().world().mishaps().len() > self.mishaps;
-        if now >= self.ends || has_mishap { Wish::Finish } else { Wish::GoOn }
+        let has_incident = self.station.borrow().world().incidents().len() > self.incidents;
+        if now >= self.ends || has_incident { Wish::Finish } else { Wish::GoOn }
     }
 }
 

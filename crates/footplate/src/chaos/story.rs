@@ -13,10 +13,7 @@ use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_eval::seeds::Choice;
 use footplate_eval::testbed::PreparedTrains;
 use footplate_eval::traffic::{HAND, LENGTHS, place_by_hand};
-use footplate_sim::{
-    BoardSwitches, CanSwitches, LivingLayout, LivingSwitches, LocoNetSwitches, StationSwitches, VirtualBoard,
-    VirtualCentralStation, VirtualLocoNet, VirtualStation, VirtualZ21, Z21Switches,
-};
+use footplate_sim::{LivingLayout, LivingSwitches, StationSwitches};
 use footplate_store::Store;
 
 use super::disk::FaultyDisk;
@@ -25,7 +22,7 @@ use super::line::{FaultyLine, LATE, SharedStation};
 use super::people::{People, Seen, SharedDisk};
 use super::plan::{Plan, PlannedLife};
 use crate::commands::stop_all;
-use crate::link::{Address, Link, SimulatedStation, StationKind, StationSession, open_session};
+use crate::link::{Address, Link, Quirks, SimulatedStation, StationSession, open_session};
 use crate::runtime::{Ended, Runtime, carry_out};
 
 /// Trains of every story.
@@ -84,14 +81,14 @@ pub(crate) struct Fate {
     pub(crate) alarms: u32,
     pub(crate) grants: u32,
     pub(crate) intrusions: u32,
-    /// Mishaps while no command could reach the station.
+    /// Incidents while no command could reach the station.
     pub(crate) out_of_reach: u32,
     /// From each death until all trains were stopped, in ms.
     pub(crate) stopped_ms: Vec<f64>,
     /// Violated invariants.
     pub(crate) failures: Vec<String>,
     /// The events of the story.
-    pub(crate) told: Vec<(Timestamp, String)>,
+    pub(crate) notes: Vec<(Timestamp, String)>,
 }
 
 /// Runs the story of a seed. `store` is the path of its store, which does not exist yet.
@@ -105,16 +102,20 @@ pub(crate) fn story(stage: &Stage<'_>, seed: u64, store: &Path) -> anyhow::Resul
     put_trains(stage, &mut world, &mut choice)?;
     let mut teller = Teller {
         stage,
-        address: format!("sim:track-a?station={}", name_of(plan.station))
-            .parse()
-            .map_err(anyhow::Error::msg)?,
-        station: Rc::new(RefCell::new(station_of(plan.station, world, stage.number))),
+        address: format!("sim:track-a?station={}", plan.station.key()).parse().map_err(anyhow::Error::msg)?,
+        station: Rc::new(RefCell::new(SimulatedStation::new(
+            plan.station,
+            world,
+            stage.number,
+            StationSwitches::default(),
+            Quirks::default(),
+        ))),
         store,
         choice,
         fate: Fate { seed, ..Fate::default() },
     };
     let began = teller.now();
-    teller.note(format!("a {}", name_of(plan.station)));
+    teller.note(format!("a {}", plan.station.key()));
     for life in &plan.lives {
         teller.live(life)?;
         if !teller.fate.failures.is_empty() {
@@ -122,28 +123,8 @@ pub(crate) fn story(stage: &Stage<'_>, seed: u64, store: &Path) -> anyhow::Resul
         }
     }
     teller.fate.seconds = (teller.now() - began).as_s();
-    teller.fate.told.sort_by_key(|(at, _)| *at);
+    teller.fate.notes.sort_by_key(|(at, _)| *at);
     Ok(teller.fate)
-}
-
-const fn name_of(kind: StationKind) -> &'static str {
-    match kind {
-        StationKind::Marklin => "marklin",
-        StationKind::DccEx => "dcc-ex",
-        StationKind::Z21 => "z21",
-        StationKind::MarklinCan => "marklin-can",
-        StationKind::LocoNet => "loconet",
-    }
-}
-
-fn station_of(kind: StationKind, world: LivingLayout<'_>, seed: u64) -> SimulatedStation<'_> {
-    match kind {
-        StationKind::Marklin => VirtualStation::new(world, seed, StationSwitches::default()).into(),
-        StationKind::DccEx => VirtualBoard::new(world, seed, BoardSwitches::default()).into(),
-        StationKind::Z21 => VirtualZ21::new(world, seed, Z21Switches::default()).into(),
-        StationKind::MarklinCan => VirtualCentralStation::new(world, seed, CanSwitches::default()).into(),
-        StationKind::LocoNet => VirtualLocoNet::new(world, seed, LocoNetSwitches::default()).into(),
-    }
 }
 
 /// Places trains on reservations that do not overlap, clear of turnouts.
@@ -214,7 +195,7 @@ impl<'l> Teller<'_, 'l> {
 
     fn note(&mut self, words: String) {
         let now = self.now();
-        self.fate.told.push((now, words));
+        self.fate.notes.push((now, words));
     }
 
     /// Notes the steps that decoders received last, and the leading ends of trains.
@@ -271,7 +252,7 @@ impl<'l> Teller<'_, 'l> {
     fn live(&mut self, planned: &PlannedLife) -> anyhow::Result<()> {
         self.stop_left_running()?;
         self.await_rest();
-        let mishaps = self.station.borrow().world().mishaps().len();
+        let incidents = self.station.borrow().world().incidents().len();
         self.fate.lives += 1;
         let life = Rc::new(Life::new(planned.ends));
         self.note(format!(
@@ -315,7 +296,7 @@ impl<'l> Teller<'_, 'l> {
         drop(people);
         drop(recorder);
         let disk = Rc::into_inner(disk).context("a disk that is still in use")?.into_inner();
-        self.fate.told.append(&mut line.told);
+        self.fate.notes.append(&mut line.notes);
         self.count(seen);
         let ended = match ended {
             Ok(Ended::Finished) => "finished".to_owned(),
@@ -328,12 +309,12 @@ impl<'l> Teller<'_, 'l> {
             self.fail(format!("the journal failed: {trouble}"));
         }
         let unreachable = line.unreachable();
-        self.check_mishaps(mishaps, &unreachable);
+        self.check_incidents(incidents, &unreachable);
         self.bury(death, began, closing.is_complete(), &mut line, disk)
     }
 
     fn count(&mut self, mut seen: Seen) {
-        self.fate.told.append(&mut seen.told);
+        self.fate.notes.append(&mut seen.notes);
         self.fate.arrivals += seen.arrivals;
         self.fate.alarms += seen.alarms;
         self.fate.grants += seen.grants;
@@ -343,19 +324,20 @@ impl<'l> Teller<'_, 'l> {
         }
     }
 
-    /// Checks the mishaps of a life. Those while no command reaches the station, and until trains have stopped after that, are
+    /// Checks the incidents of a life. Those while no command reaches the station, and until trains have stopped after that, are
     /// counted apart: no program could have prevented them.
-    fn check_mishaps(&mut self, before: usize, unreachable: &[Spell]) {
-        let mishaps: Vec<_> = self.station.borrow().world().mishaps().iter().skip(before).copied().collect();
-        for mishap in mishaps {
+    fn check_incidents(&mut self, before: usize, unreachable: &[Spell]) {
+        let incidents: Vec<_> =
+            self.station.borrow().world().incidents().iter().skip(before).copied().collect();
+        for incident in incidents {
             let is_helpless =
-                |spell: &Spell| Spell { until: spell.until + BRAKES_WITHIN, ..*spell }.covers(mishap.at);
+                |spell: &Spell| Spell { until: spell.until + BRAKES_WITHIN, ..*spell }.covers(incident.at);
             if unreachable.iter().any(is_helpless) {
-                self.note(format!("out of reach: {:?} of {:?}", mishap.kind, mishap.train));
+                self.note(format!("out of reach: {:?} of {:?}", incident.kind, incident.train));
                 self.fate.out_of_reach += 1;
                 continue;
             }
-            self.fail(format!("{:?} of {:?} at {:.2} s", mishap.kind, mishap.train, mishap.at.as_s()));
+            self.fail(format!("{:?} of {:?} at {:.2} s", incident.kind, incident.train, incident.at.as_s()));
         }
     }
 
@@ -411,7 +393,7 @@ impl<'l> Teller<'_, 'l> {
             since = self.now();
         }
         let is_said = carry_out(line, &will);
-        self.fate.told.append(&mut line.told);
+        self.fate.notes.append(&mut line.notes);
         match line.stopped_at {
             Some(at) => {
                 let took = (at - since).max(TimeSpan::ZERO);

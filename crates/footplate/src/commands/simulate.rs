@@ -2,25 +2,24 @@
 
 mod again;
 mod chaos;
-mod disasters;
 mod driving;
 mod layout;
 mod line;
-mod pacing;
 mod recording;
 mod score_form;
+mod seed_scores;
 mod series;
 mod station;
 mod survey;
 mod traffic;
 mod truth;
 mod worlds;
-mod zones;
 
 use std::io::Write;
 
 use clap::{Args, Subcommand};
 
+use self::seed_scores::SeedScores;
 use super::Outcome;
 
 /// Write recordings of simulated trains, with the truth beside them.
@@ -41,30 +40,43 @@ pub(crate) struct Arguments {
 #[derive(Subcommand)]
 enum World {
     Chaos(chaos::Arguments),
-    Disasters(disasters::Arguments),
+    /// Exchange engines, dirty wheels, restart the station, lift trains, and score how a supervised driver copes.
+    ///
+    /// Each seed is a layout with its trains. Each disturbance happens as if no other had happened before, and one run has none.
+    #[command(after_help = "Example: footplate simulate disasters --seeds 1..5 --markdown")]
+    Disasters(SeedScores<240>),
     Driving(driving::Arguments),
     Layout(layout::Arguments),
     Line(line::Arguments),
-    Pacing(pacing::Arguments),
+    /// Let calibrated trains hold speeds between those of steps, arrive in time and follow each other, and score them by the truth.
+    ///
+    /// Each seed is a layout with three trains. Simpler drivers carry out the same orders in the same world.
+    #[command(after_help = "Example: footplate simulate pacing --seeds 1..4 --markdown")]
+    Pacing(SeedScores),
     Survey(survey::Arguments),
     Traffic(traffic::Arguments),
     Worlds(worlds::Arguments),
-    Zones(zones::Arguments),
+    /// Let calibrated trains run, stop, hold speeds, arrive in time and follow each other over speed restrictions, and score
+    /// their true speeds there.
+    ///
+    /// Each seed is a layout with three trains and other restrictions for each of them; zones of its own are not used.
+    #[command(after_help = "Example: footplate simulate zones --seeds 1..4 --markdown")]
+    Zones(SeedScores),
 }
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         match self.world {
             Some(World::Chaos(arguments)) => arguments.run(output),
-            Some(World::Disasters(arguments)) => arguments.run(output),
+            Some(World::Disasters(scores)) => scores.disasters(output),
             Some(World::Driving(arguments)) => arguments.run(output),
             Some(World::Layout(arguments)) => arguments.run(output),
             Some(World::Line(arguments)) => arguments.run(output),
-            Some(World::Pacing(arguments)) => arguments.run(output),
+            Some(World::Pacing(scores)) => scores.pacing(output),
             Some(World::Survey(arguments)) => arguments.run(output),
             Some(World::Traffic(arguments)) => arguments.run(output),
             Some(World::Worlds(arguments)) => arguments.run(output),
-            Some(World::Zones(arguments)) => arguments.run(output),
+            Some(World::Zones(scores)) => scores.zones(output),
             None => {
                 if self.list {
                     layout::list(output)?;

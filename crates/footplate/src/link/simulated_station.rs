@@ -4,9 +4,11 @@ use std::collections::VecDeque;
 
 use footplate_core::Timestamp;
 use footplate_sim::living::{
-    CanTransport, CoilAlarm, FromStation, LivingLayout, VirtualBoard, VirtualCentralStation, VirtualLocoNet,
-    VirtualStation, VirtualZ21,
+    CanTransport, CoilAlarm, FromStation, LivingLayout, StationSwitches, VirtualBoard, VirtualCentralStation,
+    VirtualLocoNet, VirtualStation, VirtualZ21,
 };
+
+use super::{Quirks, StationKind};
 
 /// A simulated station and the world behind it.
 #[derive(Debug, Clone)]
@@ -29,30 +31,6 @@ impl<'l> From<VirtualStation<'l>> for SimulatedStation<'l> {
     }
 }
 
-impl<'l> From<VirtualBoard<'l>> for SimulatedStation<'l> {
-    fn from(board: VirtualBoard<'l>) -> Self {
-        Self::DccEx(Box::new(board))
-    }
-}
-
-impl<'l> From<VirtualZ21<'l>> for SimulatedStation<'l> {
-    fn from(station: VirtualZ21<'l>) -> Self {
-        Self::Z21(Box::new(station))
-    }
-}
-
-impl<'l> From<VirtualCentralStation<'l>> for SimulatedStation<'l> {
-    fn from(station: VirtualCentralStation<'l>) -> Self {
-        Self::Can(Box::new(station))
-    }
-}
-
-impl<'l> From<VirtualLocoNet<'l>> for SimulatedStation<'l> {
-    fn from(station: VirtualLocoNet<'l>) -> Self {
-        Self::LocoNet(Box::new(station))
-    }
-}
-
 /// What reaches the host from any.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum FromSimulated {
@@ -65,6 +43,24 @@ pub(crate) enum FromSimulated {
 }
 
 impl<'l> SimulatedStation<'l> {
+    /// A station of a kind in front of a world; `marklin` is how a 6051 behaves, `quirks` how the others do.
+    pub(crate) fn new(
+        kind: StationKind,
+        world: LivingLayout<'l>,
+        seed: u64,
+        marklin: StationSwitches,
+        quirks: Quirks,
+    ) -> Self {
+        let Quirks { board, z21, can, loconet } = quirks;
+        match kind {
+            StationKind::Marklin => VirtualStation::new(world, seed, marklin).into(),
+            StationKind::DccEx => Self::DccEx(Box::new(VirtualBoard::new(world, seed, board))),
+            StationKind::Z21 => Self::Z21(Box::new(VirtualZ21::new(world, seed, z21))),
+            StationKind::MarklinCan => Self::Can(Box::new(VirtualCentralStation::new(world, seed, can))),
+            StationKind::LocoNet => Self::LocoNet(Box::new(VirtualLocoNet::new(world, seed, loconet))),
+        }
+    }
+
     /// The station's time.
     pub(crate) const fn now(&self) -> Timestamp {
         match self {

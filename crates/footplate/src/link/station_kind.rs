@@ -65,15 +65,22 @@ impl StationKind {
     /// # Errors
     /// The names that exist, if there is no such name.
     pub(crate) fn named(value: &str) -> Result<Self, String> {
-        match value {
-            "marklin" => Ok(Self::Marklin),
-            "dcc-ex" => Ok(Self::DccEx),
-            "z21" => Ok(Self::Z21),
-            "marklin-can" => Ok(Self::MarklinCan),
-            "loconet" => Ok(Self::LocoNet),
-            _ => Err(format!(
+        let all = [Self::Marklin, Self::DccEx, Self::Z21, Self::MarklinCan, Self::LocoNet];
+        all.into_iter().find(|kind| kind.key() == value).ok_or_else(|| {
+            format!(
                 "there is no simulated station `{value}`; there are marklin, dcc-ex, z21, marklin-can and loconet"
-            )),
+            )
+        })
+    }
+
+    /// Its name in the address of a simulated layout.
+    pub(crate) const fn key(self) -> &'static str {
+        match self {
+            Self::Marklin => "marklin",
+            Self::DccEx => "dcc-ex",
+            Self::Z21 => "z21",
+            Self::MarklinCan => "marklin-can",
+            Self::LocoNet => "loconet",
         }
     }
 }

@@ -4,7 +4,7 @@ use footplate_wire::marklin_can::{Frame, LONGEST_LINE};
 
 /// The rate of Märklin's bus, 250 kbit/s, among the adapter's ten.
 const RATE: &str = "S5";
-/// What it answers: done, a frame is on its way, refused.
+/// Its answers: done, a frame was sent, refused.
 const DONE: &str = "\r";
 const SENT: &str = "Z\r";
 const REFUSED: &str = "\x07";
@@ -52,7 +52,7 @@ impl Adapter {
                 DONE
             }
             frame => match Frame::of_text(frame).filter(|_| self.is_open) {
-                // At a wrong rate nobody on the bus understands it.
+                // At a wrong rate no device on the bus understands it.
                 frame @ Some(_) => return (Some(SENT), frame.filter(|_| self.has_rate)),
                 None => REFUSED,
             },

@@ -40,7 +40,7 @@ impl VirtualCentralStation<'_> {
                 self.slots[slot].speed = 0;
                 if let Some(train) = self.train(uid) {
                     // What is turned around twice while it runs stops at once and leads with the same end.
-                    (0..2).for_each(|_| self.world.turn(train, self.now));
+                    (0..2).for_each(|_| self.world.reverse(train, self.now));
                 }
                 self.say(message);
             }
@@ -74,14 +74,14 @@ impl VirtualCentralStation<'_> {
             }
             Message::ModulePoll { modules, .. } if self.switches.answers_polls => {
                 for module in 1..=modules {
-                    let contacts = self.scanning.module(module);
-                    self.say(Message::ModuleState { uid: Uid::ALL, module, contacts });
+                    let state = self.scanning.module(module);
+                    self.say(Message::ModuleState { uid: Uid::ALL, module, contacts: state });
                 }
             }
-            Message::Contact { device: 0, contact, change: None } => {
-                let change = self.scanning.contact(contact, self.now);
+            Message::Contact { device: 0, contact: input, change: None } => {
+                let change = self.scanning.input(input, self.now);
                 if change.is_some() {
-                    self.say(Message::Contact { device: 0, contact, change });
+                    self.say(Message::Contact { device: 0, contact: input, change });
                 }
             }
             Message::Ping => match self.switches.transport {
@@ -116,7 +116,7 @@ impl VirtualCentralStation<'_> {
         }
     }
 
-    /// The place of a locomotive; one that nobody spoke of yet leads with its front end.
+    /// The index of a locomotive; a new one leads with its front end.
     fn slot(&mut self, uid: Uid) -> usize {
         if let Some(found) = self.slots.iter().position(|slot| slot.uid == uid) {
             return found;
@@ -158,10 +158,10 @@ impl VirtualCentralStation<'_> {
     fn command(&mut self, slot: Slot) {
         let Some(train) = self.train(slot.uid) else { return };
         if self.world.runs_forward(train) == Some(!slot.forward) {
-            self.world.turn(train, self.now);
+            self.world.reverse(train, self.now);
         }
         let step = step_of(slot.speed, self.world.decoder(train));
-        self.world.tell(train, step, self.now);
+        self.world.command(train, step, self.now);
     }
 
     /// Sends the list of the locomotives on the layout.

@@ -50,8 +50,8 @@ impl VirtualZ21<'_> {
         if self.clients.len() >= MOST_CLIENTS {
             return false;
         }
-        let (told, subscribed) = (Broadcasts::NONE, std::collections::VecDeque::new());
-        self.clients.push(Connected { id, told, subscribed, heard: now });
+        let (broadcasts, subscribed) = (Broadcasts::NONE, std::collections::VecDeque::new());
+        self.clients.push(Connected { id, broadcasts, subscribed, heard: now });
         true
     }
 
@@ -72,16 +72,16 @@ impl VirtualZ21<'_> {
                 self.say(id, &Reply::LockCode(lock));
             }
             Request::LogOff => self.clients.retain(|client| client.id != id),
-            Request::SetBroadcasts(told) => {
+            Request::SetBroadcasts(broadcasts) => {
                 if !std::mem::take(&mut self.loses_next_subscription)
                     && let Some(client) = self.client(id)
                 {
-                    client.told = told;
+                    client.broadcasts = broadcasts;
                 }
             }
             Request::Broadcasts => {
-                let told = self.client(id).map_or(Broadcasts::NONE, |client| client.told);
-                self.say(id, &Reply::Broadcasts(told));
+                let broadcasts = self.client(id).map_or(Broadcasts::NONE, |client| client.broadcasts);
+                self.say(id, &Reply::Broadcasts(broadcasts));
             }
             Request::SystemState => self.say(id, &Reply::SystemState(self.system_state())),
             Request::XBusVersion => {
@@ -114,7 +114,7 @@ impl VirtualZ21<'_> {
                 (driven.steps, driven.throttle, driven.forward) = (steps, throttle, forward);
                 let slot = *driven;
                 self.command(at, slot);
-                self.tell_of_locomotive(address);
+                self.report_locomotive(address);
             }
             Request::Function { address, function, switch } => {
                 let slot = self.slot(address);
@@ -125,7 +125,7 @@ impl VirtualZ21<'_> {
                     FunctionSwitch::On => *functions |= bit,
                     FunctionSwitch::Toggle => *functions ^= bit,
                 }
-                self.tell_of_locomotive(address);
+                self.report_locomotive(address);
             }
             Request::Turnout { address } => {
                 self.say(id, &Reply::Turnout { address, position: self.position(address) });
@@ -238,7 +238,7 @@ impl VirtualZ21<'_> {
         LocomotiveState { address, busy: false, steps, throttle, forward, functions }
     }
 
-    /// A client is told of a locomotive from now on, and of the oldest no more when it is one too many.
+    /// Subscribes a client to a locomotive; beyond the limit, the oldest subscription ends.
     fn subscribe(&mut self, id: usize, address: u16) {
         if let Some(client) = self.client(id) {
             client.subscribed.retain(|known| *known != address);
@@ -249,21 +249,21 @@ impl VirtualZ21<'_> {
         }
     }
 
-    fn tell_of_locomotive(&mut self, address: u16) {
+    fn report_locomotive(&mut self, address: u16) {
         let state = Reply::Locomotive(self.state_of(address));
         let wants = |client: &Connected| {
-            client.told.has(Broadcasts::ALL_LOCOMOTIVES)
-                || client.told.has(Broadcasts::STATES) && client.subscribed.contains(&address)
+            client.broadcasts.has(Broadcasts::ALL_LOCOMOTIVES)
+                || client.broadcasts.has(Broadcasts::STATES) && client.subscribed.contains(&address)
         };
         let ids: Vec<usize> =
             self.clients.iter().filter(|client| wants(client)).map(|client| client.id).collect();
         ids.into_iter().for_each(|id| self.say(id, &state));
     }
 
-    /// Tells whoever has asked for states, and whoever has caused it in any case.
+    /// Answers the client that caused a change, and informs those that have subscribed to states.
     fn answer_all(&mut self, id: usize, reply: &Reply) {
-        let is_told = self.client(id).is_some_and(|client| client.told.has(Broadcasts::STATES));
-        if !is_told {
+        let is_subscribed = self.client(id).is_some_and(|client| client.broadcasts.has(Broadcasts::STATES));
+        if !is_subscribed {
             self.say(id, reply);
         }
         self.broadcast(Broadcasts::STATES, reply);
@@ -272,12 +272,12 @@ impl VirtualZ21<'_> {
     pub(super) fn broadcast(&mut self, kind: Broadcasts, reply: &Reply) {
         let now = self.now;
         self.clients.retain(|client| now - client.heard < FORGOTTEN_AFTER);
-        let told = self.clients.iter().filter(|client| client.told.has(kind));
-        let ids: Vec<usize> = told.map(|client| client.id).collect();
+        let subscribed = self.clients.iter().filter(|client| client.broadcasts.has(kind));
+        let ids: Vec<usize> = subscribed.map(|client| client.id).collect();
         ids.into_iter().for_each(|id| self.say(id, reply));
     }
 
-    /// Puts a message on its way, in a datagram of its own.
+    /// Sends a message in a datagram of its own.
     pub(super) fn say(&mut self, id: usize, reply: &Reply) {
         if self.dark_until.is_some() {
             return;

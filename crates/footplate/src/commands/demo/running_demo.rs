@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use footplate_core::control::Machine;
 use footplate_core::{SpeedStep, Timestamp, TrainId};
-use footplate_sim::living::MishapKind;
+use footplate_sim::living::IncidentKind;
 use footplate_store::{Journal, MotionFile, TrainAtStart};
 use serde::Serialize;
 
@@ -195,15 +195,16 @@ impl<'r, 'l, 'o> Demo<'r, 'l, 'o> {
     }
 
     fn report_faults(&mut self) -> io::Result<()> {
-        let new: Vec<_> = self.railway.world().mishaps().iter().skip(self.faults_reported).copied().collect();
+        let new: Vec<_> =
+            self.railway.world().incidents().iter().skip(self.faults_reported).copied().collect();
         for fault in new {
             self.faults_reported += 1;
             self.broken = true;
             let what = match fault.kind {
-                MishapKind::Collision { with } => format!("ran into train {with}"),
-                MishapKind::Derailment { turnout } => format!("derailed on turnout {turnout}"),
-                MishapKind::Overrun => "ran past the end of its track".to_owned(),
-                MishapKind::CoilBurnt { turnout } => format!("the coil of turnout {turnout} burnt"),
+                IncidentKind::Collision { with } => format!("ran into train {with}"),
+                IncidentKind::Derailment { turnout } => format!("derailed on turnout {turnout}"),
+                IncidentKind::Overrun => "ran past the end of its track".to_owned(),
+                IncidentKind::CoilBurnt { turnout } => format!("the coil of turnout {turnout} burnt"),
             };
             match fault.train {
                 Some(train) => self.screen.fault(train, &what)?,

@@ -41,12 +41,12 @@ mod tests {
     #[test]
     fn a_failed_run_says_how_to_have_it_again() {
         let failed = FailedRun {
-            what: "seed 7, law lag: 1 mishap".to_owned(),
+            what: "seed 7, law lag: 1 incident".to_owned(),
             again: "simulate driving --seed 7 --law lag".to_owned(),
         };
         assert_eq!(
             failed.to_string(),
-            "seed 7, law lag: 1 mishap; only this again: footplate simulate driving --seed 7 --law lag"
+            "seed 7, law lag: 1 incident; only this again: footplate simulate driving --seed 7 --law lag"
         );
         assert!(matches!(name_failed(&[failed]), Outcome::FallsShort));
         assert!(matches!(name_failed(&[]), Outcome::Done));

@@ -17,7 +17,7 @@ use crate::spread::each;
 /// Run the whole program under seeds that draw a station, a line that fails, a disk that fails, and deaths at any step.
 ///
 /// Three trains are sent to random places. A seed fails if trains touch, derail or run off the track, if an acknowledged
-/// measurement is lost, if trains are not stopped within a second after a death, or if nothing moves and nobody was told.
+/// measurement is lost, if trains are not stopped within a second after a death, or if nothing moves without an alarm.
 #[derive(Args)]
 #[command(after_help = "Example: footplate simulate chaos --seeds 1..100")]
 pub(super) struct Arguments {
@@ -46,7 +46,7 @@ impl Arguments {
         let fates = each("chaos", &stages, self.threads, |(number, seeds)| fates(&layout, *number, seeds))?;
         let fates: Vec<Fate> = fates.into_iter().flatten().collect();
         if self.talk {
-            for (at, words) in fates.iter().flat_map(|fate| &fate.told) {
+            for (at, words) in fates.iter().flat_map(|fate| &fate.notes) {
                 writeln!(output, "{:9.3} {words}", at.as_s())?;
             }
         }
@@ -59,13 +59,13 @@ impl Arguments {
 fn fates(layout: &Layout, number: u64, seeds: &[u64]) -> anyhow::Result<Vec<Fate>> {
     let stage = Stage::set(layout, number)?;
     let folder = std::env::temp_dir().join(format!("footplate-chaos-{}-{number}", std::process::id()));
-    let told = |seed: &u64| {
+    let fate = |seed: &u64| {
         // Nothing of the story before is left.
         let _ = std::fs::remove_dir_all(&folder);
         std::fs::create_dir_all(&folder)?;
         story(&stage, *seed, &folder.join("railway.db"))
     };
-    let fates = seeds.iter().map(told).collect();
+    let fates = seeds.iter().map(fate).collect();
     let _ = std::fs::remove_dir_all(&folder);
     fates
 }
@@ -86,7 +86,7 @@ fn write(fates: &[Fate], output: &mut dyn Write) -> std::io::Result<()> {
         )?;
     }
     writeln!(output, "{} arrivals, {} alarms", sum(|fate| fate.arrivals), sum(|fate| fate.alarms))?;
-    writeln!(output, "{} mishaps while no command could reach the station", sum(|fate| fate.out_of_reach))?;
+    writeln!(output, "{} incidents while no command could reach the station", sum(|fate| fate.out_of_reach))?;
     let (entered, set) = (sum(|fate| fate.intrusions) as usize, sum(|fate| fate.grants) as usize);
     let [low, high] = binomial_interval(entered, set).map(|part| 100.0 * part);
     writeln!(

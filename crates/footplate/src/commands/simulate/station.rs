@@ -160,9 +160,9 @@ fn open(place: &Place) -> anyhow::Result<(String, Receiver<Incoming>)> {
 }
 
 fn say_what_happened(server: &Server<'_>) {
-    for mishap in server.station().world().mishaps() {
-        let train = mishap.train.map_or_else(String::new, |train| format!("train {train}: "));
-        eprintln!("at {:.1} s {train}{:?}", mishap.at.as_s(), mishap.kind);
+    for incident in server.station().world().incidents() {
+        let train = incident.train.map_or_else(String::new, |train| format!("train {train}: "));
+        eprintln!("at {:.1} s {train}{:?}", incident.at.as_s(), incident.kind);
     }
     for alarm in server.station().alarms() {
         let since = alarm.since.as_s();

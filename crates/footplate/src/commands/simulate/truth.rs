@@ -147,7 +147,7 @@ pub(super) fn parameters(railway: &Railway<'_>, simulated: &SimulatedRecording, 
     })
 }
 
-/// The speed of every step from both sides: on the level, over a lap of the circuit, and the way to rest.
+/// The speed of every step from both sides: on the level, over a lap of the circuit, and the stopping distance.
 fn speeds(railway: &Railway<'_>, train: &Train) -> Vec<Value> {
     let steps = (1..=train.speeds.highest().get()).filter_map(SpeedStep::new);
     let rows = steps.flat_map(|step| [(step, Approach::Below, "below"), (step, Approach::Above, "above")]);

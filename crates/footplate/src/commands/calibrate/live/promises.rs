@@ -80,7 +80,7 @@ impl<'l> Railway<'l> {
         let station = self.runtime.link_mut().station_mut();
         let truth = station.world().truth().train(TRAIN).expect("it is there");
         assert!(truth.at_rest_since.is_some(), "{what}: it still runs");
-        assert_eq!(station.world().mishaps(), [], "{what}");
+        assert_eq!(station.world().incidents(), [], "{what}");
         assert_eq!(station.alarms(), [], "{what}");
         let _ = self.layout;
         let accuracy = self.calibrator.accuracy();

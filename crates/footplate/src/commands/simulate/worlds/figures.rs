@@ -25,7 +25,7 @@ pub(super) struct Figures {
     /// The median width of a promise, in mm, of those kept and of those broken.
     pub(super) widths: [Option<f64>; 2],
     pub(super) failed: usize,
-    pub(super) mishaps: usize,
+    pub(super) incidents: usize,
 }
 
 impl Figures {
@@ -44,7 +44,7 @@ impl Figures {
             bias: quantile(stops().map(|stop| stop.error), 0.5),
             widths: [widths(true), widths(false)],
             failed: worlds.iter().map(|world| world.failures.len()).sum(),
-            mishaps: worlds.iter().map(|world| world.mishaps).sum(),
+            incidents: worlds.iter().map(|world| world.incidents).sum(),
         }
     }
 
@@ -64,7 +64,7 @@ impl Figures {
             "sessions": self.sessions, "sessions_below_85_pct": self.below, "worst_session": worst,
             "error_median_mm": self.errors[0], "error_p95_mm": self.errors[1], "bias_mm": self.bias,
             "width_kept_mm": self.widths[0], "width_broken_mm": self.widths[1],
-            "failed": self.failed, "mishaps": self.mishaps,
+            "failed": self.failed, "incidents": self.incidents,
         })
     }
 }

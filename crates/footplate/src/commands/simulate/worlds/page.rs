@@ -69,7 +69,7 @@ impl WrittenScores for Page<'_> {
                 shown(figures.widths[0], 0),
                 shown(figures.widths[1], 0),
                 figures.failed,
-                figures.mishaps,
+                figures.incidents,
             )?;
         }
         let stops: usize = self.worlds.iter().map(|world| world.stops.len()).sum();
@@ -99,7 +99,7 @@ impl WrittenScores for Page<'_> {
         for name in self.names {
             let worlds = self.of(*name);
             let figures = Figures::of(&worlds);
-            let wrecked = worlds.iter().filter(|world| world.mishaps > 0).count();
+            let wrecked = worlds.iter().filter(|world| world.incidents > 0).count();
             let broken = figures.stops - figures.kept;
             rates.push(Rate::grief(wrecked, worlds.len()));
             rates.push(Rate::new(format!("{name}: 95 % promises broken"), broken, figures.stops));
@@ -123,7 +123,7 @@ fn world_json(world: &ScoredWorld) -> Value {
     let per_stop = 1e3 * world.taken.as_secs_f64() / world.stops.len().max(1) as f64;
     json!({
         "world": world.name.to_string(), "seed": world.seed, "calibration_s": world.calibration_s,
-        "ending": world.ending, "mishaps": world.mishaps, "sessions_warned": world.sessions_warned, "failures": world.failures,
+        "ending": world.ending, "incidents": world.incidents, "sessions_warned": world.sessions_warned, "failures": world.failures,
         "computing_ms_per_stop": per_stop, "computing_ms_longest": 1e3 * world.longest.as_secs_f64(), "stops": stops,
     })
 }

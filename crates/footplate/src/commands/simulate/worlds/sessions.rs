@@ -67,7 +67,7 @@ pub(super) struct ScoredWorld {
     pub(super) stops: Vec<ScoredStop>,
     /// Stops asked for that were refused, or did not end.
     pub(super) failures: Vec<String>,
-    pub(super) mishaps: usize,
+    pub(super) incidents: usize,
     /// Sessions in which it was said that the train breaks its promises.
     pub(super) sessions_warned: usize,
     /// Track time of the calibration, in s, and why it ended.
@@ -95,7 +95,7 @@ pub(super) fn score(
         seed,
         stops: Vec::new(),
         failures: Vec::new(),
-        mishaps: 0,
+        incidents: 0,
         sessions_warned: 0,
         calibration_s: calibrated.seconds,
         ending: calibrated.ending,
@@ -112,8 +112,8 @@ pub(super) fn score(
             break;
         }
     }
-    let mishaps = driven.line.station.world().mishaps().len();
-    scored.mishaps = mishaps;
+    let incidents = driven.line.station.world().incidents().len();
+    scored.incidents = incidents;
     Ok(scored)
 }
 
@@ -215,7 +215,7 @@ impl Driven<'_, '_> {
         }
     }
 
-    /// A person does what is said to one: lets the train stand, and then run over a contact.
+    /// Does what the program asks an operator to do: stops the train, and then runs it over a sensor.
     fn seek(&mut self, machine: &mut Timed) {
         self.say(machine, &format!("speed {TRAIN} 0"));
         self.until_at_rest(machine);
