@@ -4,7 +4,7 @@ use footplate_core::{
     Command, DecoderSteps, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, TrainId, TurnoutId,
 };
 use footplate_wire::dcc_ex::{Client, Settings, TurnoutRequests};
-use footplate_wire::{CommandError, LinkNotice, Session};
+use footplate_wire::{CommandError, LinkNotice, ReportedFunctions, Session};
 
 use crate::desk::{Station, T24, T58, function, ms, speed};
 
@@ -398,6 +398,13 @@ fn a_function_is_switched_and_confirmed_and_is_no_event() {
     desk.run_for(400);
     assert_eq!(desk.texts()[2..].iter().filter(|text| **text != "<#>").count(), 1, "{:?}", desk.texts());
     assert_eq!((&desk.events[..], &desk.notices[..]), (&[][..], &[][..]));
+    assert_eq!(desk.functions[&T24], ReportedFunctions::all(1));
+    // Another throttle switches F0 off and F3 on: the board tells everybody.
+    desk.client.handle_bytes(desk.now, b"<l 24 0 0 8>\n");
+    desk.run_for(10);
+    let functions = ReportedFunctions::all(8);
+    assert_eq!(desk.functions[&T24], functions);
+    assert_eq!(desk.notices, [LinkNotice::OtherFunctions { train: T24, functions }]);
 }
 
 #[test]

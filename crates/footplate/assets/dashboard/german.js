@@ -46,7 +46,7 @@ export const GERMAN = {
   "no-such-train": "Zug {0} gehört nicht zu dieser Sitzung.", "sent": "gesendet: {0}", "refused": "abgelehnt: {0}",
   "picked-for": "{0}: Zug {1} dort anhalten oder zu einer bestimmten Zeit ankommen lassen", "drive": "Fahren",
   "if-stopped": "bei Halt jetzt", "rest-way": "hält {0} ± {1} mm weiter, bei {2}, in {3} s", "at-rest": "steht",
-  "due": "nächster Rückmelder", "due-in": "{0} in {1} s ± {2} ms", "found": "lokalisiert", "reverse": "Wenden", "light": "Licht", "functions": "Funktionen",
+  "due": "nächster Rückmelder", "due-in": "{0} in {1} s ± {2} ms", "found": "lokalisiert", "reverse": "Wenden", "light": "Licht", "functions": "Funktionen", "functions-unreported": "wie hier geschaltet; von der Zentrale nicht bestätigt",
   "slower": "Eine Stufe langsamer", "faster": "Eine Stufe schneller", "hold": "Tempo halten", "hold-speed": "Zu haltendes Tempo (mm/s)",
   "follow": "Folgen", "leader": "Vorausfahrender Zug", "gap-behind": "Zeitabstand (s)", "arrive": "Ankommen",
   "arrive-at": "Ankunftsstelle", "arrive-in": "Ankunft in (s)", "move": "Vorrücken", "move-way": "Strecke (mm)",

@@ -10,7 +10,7 @@ const FUNCTIONS = [0, 1, 2, 3, 4];
 export class Throttle {
   /** Whether the slider is being moved. */
   isDragged = false;
-  #slider; #shown; #train; #lock; #give; #functions; #step = 0;
+  #slider; #shown; #train; #lock; #give; #functions; #note; #step = 0;
 
   /** `give` sends a command and shows its result beside the throttle. */
   constructor(root, train, give) {
@@ -34,7 +34,8 @@ export class Throttle {
       });
       return button;
     });
-    $("#functions").append(...this.#functions);
+    this.#note = document.createElement("small");
+    $("#functions").append(...this.#functions, this.#note);
     this.#lock.addEventListener("click", () => this.#lockTo(!this.isLocked));
     document.addEventListener("visibilitychange", this.#left);
     put(this.#lock, say("lock"));
@@ -62,9 +63,11 @@ export class Throttle {
     if (document.hidden && this.isLocked && this.#step > 0) orderAtOnce(`stop ${this.#train}`);
   };
 
-  show({ step, functions }, highest) {
+  show({ step, functions, functions_reported: reported }, highest) {
     this.#step = step;
     FUNCTIONS.forEach((number) => this.#functions[number].setAttribute("aria-pressed", String(functions.includes(number))));
+    const isUnreported = functions.some((number) => !reported.includes(number));
+    put(this.#note, isUnreported ? say("functions-unreported") : "");
     if (highest) this.#slider.max = String(highest);
     if (this.isDragged) return;
     if (document.activeElement !== this.#slider) this.#slider.value = String(step);
