@@ -269,6 +269,10 @@ fn a_board_that_restarted_behind_a_network_is_recognised_by_what_it_forgot() {
     desk.run_for(1_000);
     assert!(desk.notices.contains(&LinkNotice::Restarted), "{:?}", desk.notices);
     assert_eq!(desk.texts()[..6], ["<s>", "<Q>", "<1 MAIN>", "<#>", "<t 24>", "<t 24 0 0>"]);
+    // It lost everything else, too: it is asked again before it is said to answer.
+    assert_eq!(desk.texts()[6..9], ["<Q>", "<1 MAIN>", "<#>"]);
+    let restarted = desk.notices.iter().position(|notice| *notice == LinkNotice::Restarted);
+    assert_eq!(desk.notices.get(restarted.unwrap() + 1), Some(&LinkNotice::Answers));
 }
 
 #[test]
