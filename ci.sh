@@ -223,6 +223,8 @@ step_stations() {
   FOOTPLATE="$TARGET/debug/footplate" STATIONS_AT="$at" node crates/footplate/tests/stations/dcc_ex_commands.mjs
   FOOTPLATE="$TARGET/debug/footplate" "$at/venv/bin/python" crates/footplate/tests/stations/z21_client.py
   FOOTPLATE="$TARGET/debug/footplate" "$at/venv/bin/python" crates/footplate/tests/stations/z21_server.py
+  FOOTPLATE="$TARGET/debug/footplate" CARGO_TARGET_DIR="$at/z21_driver" \
+    cargo run --quiet --locked --manifest-path crates/footplate/tests/stations/z21_driver/Cargo.toml
   FOOTPLATE="$TARGET/debug/footplate" "$at/venv/bin/python" crates/footplate/tests/stations/can_client.py
 }
 

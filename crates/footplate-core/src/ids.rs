@@ -144,6 +144,17 @@ impl FunctionNumber {
         self.0
     }
 
+    /// All functions, F0 first.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..=Self::HIGHEST).map(Self)
+    }
+
+    /// Whether this function is in a set with F0 in the lowest bit.
+    #[must_use]
+    pub const fn is_in(self, functions: u32) -> bool {
+        functions & self.bit() != 0
+    }
+
     /// The bit of this function in a set with F0 in the lowest bit.
     #[must_use]
     pub const fn bit(self) -> u32 {

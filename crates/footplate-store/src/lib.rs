@@ -45,9 +45,9 @@ pub use findings::{
     ComparedLawForm, Findings, LawForm, PollingForm, SuspicionForm, TapedStopForm, TrainFindings,
 };
 pub use layout_file::{
-    BUILT_IN, Drawing, ImportContext, ImportError, LARGEST_LAYOUT, LayoutFile, LayoutFileError,
-    LayoutProblem, LayoutTables, NothingToDraw, RowProblem, TextPlace, built_in, draw_layout, import_layout,
-    layout_named, parse_layout, read_layout, write_layout,
+    BUILT_IN, Drawing, ImportContext, ImportError, ImportedPanel, LARGEST_LAYOUT, LayoutFile,
+    LayoutFileError, LayoutProblem, LayoutTables, NothingToDraw, PanelError, RowProblem, TextPlace, built_in,
+    draw_layout, import_layout, import_panel, layout_named, parse_layout, read_layout, write_layout,
 };
 pub use line_file::{LineFile, LineFileForm, parse_line, read_line, write_line};
 pub use motion_file::{

@@ -13,7 +13,7 @@ use footplate_core::{
 };
 
 use crate::farewell::Farewell;
-use crate::locomotives::{Locomotive, Locomotives};
+use crate::locomotives::{Locomotive, Locomotives, ReportedFunctions};
 use crate::outstanding::{AllOutstanding, Awaited, Outgoing, Outstanding};
 use crate::pacing::Pacing;
 use crate::queue::{Queue, entry_of, train_of};
@@ -323,6 +323,29 @@ impl<A: Awaited> Dialogue<A> {
     pub(crate) fn directed(&self) -> Vec<TrainId> {
         let known = self.locomotives.iter().filter(|locomotive| locomotive.forward.is_some());
         known.map(|locomotive| locomotive.train).collect()
+    }
+
+    /// Notes what the station reports of a train's functions. They are this program's own if the report answered its switch, or while
+    /// it awaits the answer to one.
+    pub(crate) fn hear_of_functions(
+        &mut self,
+        train: TrainId,
+        newer: ReportedFunctions,
+        answered: Option<&A>,
+    ) {
+        let switches = |awaited: &A| awaited.switched() == Some(train);
+        let is_own = answered.is_some_and(switches) || self.outstanding.any(switches);
+        let Some(locomotive) = self.locomotive(train) else { return };
+        let before = locomotive.functions;
+        let functions = before.with(newer);
+        if functions == before {
+            return;
+        }
+        locomotive.functions = functions;
+        self.output.push_back(Transmit::Functions(train, functions));
+        if (functions.on ^ before.on) & before.known != 0 && !is_own {
+            self.notify(LinkNotice::OtherFunctions { train, functions });
+        }
     }
 
     /// Notes a turnout's position from the station; returns the position before.

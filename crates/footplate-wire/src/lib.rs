@@ -25,4 +25,5 @@ pub mod withrottle;
 pub mod z21;
 
 pub use blocks::BlockReports;
+pub use locomotives::ReportedFunctions;
 pub use session::{Closing, CommandError, Confirmation, LinkNotice, Session, Transmit};

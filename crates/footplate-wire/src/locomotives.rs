@@ -2,9 +2,38 @@
 
 use alloc::vec::Vec;
 
-use footplate_core::{Command, SpeedStep, TrainId};
+use footplate_core::{Command, FunctionNumber, SpeedStep, TrainId};
 
 use crate::queue::Queue;
+
+/// What the station has reported of a locomotive's functions. Sets have F0 in the lowest bit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ReportedFunctions {
+    /// The functions that it reported.
+    pub known: u32,
+    /// Those of them that are on.
+    pub on: u32,
+}
+
+impl ReportedFunctions {
+    /// All functions that a station can switch, these of them on.
+    #[must_use]
+    pub const fn all(on: u32) -> Self {
+        Self { known: (1 << (FunctionNumber::HIGHEST + 1)) - 1, on }
+    }
+
+    /// The state of a function; `None` if the station never reported it.
+    #[must_use]
+    pub const fn is_on(self, function: FunctionNumber) -> Option<bool> {
+        if function.is_in(self.known) { Some(function.is_in(self.on)) } else { None }
+    }
+
+    /// These, with what a newer report says.
+    #[must_use]
+    pub const fn with(self, newer: Self) -> Self {
+        Self { known: self.known | newer.known, on: self.on & !newer.known | newer.on & newer.known }
+    }
+}
 
 /// One locomotive.
 #[derive(Debug, Clone, Copy)]
@@ -14,8 +43,8 @@ pub(crate) struct Locomotive {
     pub(crate) forward: Option<bool>,
     /// The step of the last command.
     pub(crate) step: SpeedStep,
-    /// Functions that are on, F0 in the lowest bit, as the station reported last; `None` where it has not, or never does.
-    pub(crate) functions: Option<u32>,
+    /// What the station has reported of its functions.
+    pub(crate) functions: ReportedFunctions,
     /// Whether a speed was ever written for it, so that the end must stop it.
     pub(crate) is_driven: bool,
     /// Whether the station has confirmed step 0 since the last other step.
@@ -43,7 +72,7 @@ impl Locomotives {
                 train,
                 forward: None,
                 step,
-                functions: None,
+                functions: ReportedFunctions::default(),
                 is_driven: false,
                 is_stopped: false,
             });

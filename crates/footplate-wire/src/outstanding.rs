@@ -39,6 +39,9 @@ pub(crate) trait Awaited: Copy + Debug {
     /// The turnout that is not thrown again before this answer.
     fn turnout(&self) -> Option<TurnoutId>;
 
+    /// The train of which it awaits a function.
+    fn switched(&self) -> Option<TrainId>;
+
     /// Whether trains can be driven without the answer, so that the request is given up in the end.
     fn may_be_given_up(&self, is_command: bool) -> bool;
 

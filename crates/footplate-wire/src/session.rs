@@ -1,5 +1,6 @@
 //! A session with a command station, without a socket: bytes and commands in, bytes and entries of the recording out.
 
+use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt::{Display, Formatter, Result as FmtResult};
@@ -10,6 +11,7 @@ use footplate_core::{
     TurnoutId,
 };
 
+use crate::locomotives::ReportedFunctions;
 use crate::marklin_serial::ModuleReads;
 
 /// A session, driven by the loop around a station's line.
@@ -84,6 +86,8 @@ pub enum Transmit {
     Event(Event),
     /// Something a person should know.
     Notice(LinkNotice),
+    /// What the station has reported of a train's functions, when that changes. A link without such reports has no such output.
+    Functions(TrainId, ReportedFunctions),
 }
 
 /// What a person should know about the line.
@@ -155,6 +159,13 @@ pub enum LinkNotice {
         train: TrainId,
         /// Whether it was reversed.
         reversed: bool,
+    },
+    /// Another throttle switched functions of a train of this program.
+    OtherFunctions {
+        /// The train.
+        train: TrainId,
+        /// What the station has reported of its functions.
+        functions: ReportedFunctions,
     },
     /// The power went off the track without a command of this program.
     PowerLost,
@@ -372,6 +383,12 @@ impl Display for LinkNotice {
                 "the station has no free slot for train {train}: release a locomotive at a throttle that drives none, or \
                  restart the station"
             ),
+            Self::OtherFunctions { train, functions } => {
+                let on = FunctionNumber::all().filter(|function| functions.is_on(*function) == Some(true));
+                let on: Vec<String> = on.map(|function| format!("{function}")).collect();
+                let on = if on.is_empty() { "none".into() } else { on.join(", ") };
+                write!(f, "another throttle switched functions of train {train}; on now: {on}")
+            }
             Self::OtherThrottle { train, reversed } => write!(
                 f,
                 "another throttle {} train {train}; drive it from one place only",

@@ -273,8 +273,9 @@ impl Station {
         let request = match order {
             PhoneOrder::Speed { train, step } => Request::Line(format!("speed {train} {step}")),
             PhoneOrder::Reverse { train } => Request::Line(format!("reverse {train}")),
-            PhoneOrder::Function { train, number, on } => {
-                Request::Line(format!("function {train} {number} {}", if on { "on" } else { "off" }))
+            PhoneOrder::Function { train, function, on } => {
+                let (number, state) = (function.get(), if on { "on" } else { "off" });
+                Request::Line(format!("function {train} {number} {state}"))
             }
             PhoneOrder::Turnout { turnout, leg } => {
                 let leg = if leg == Leg::Curved { "curved" } else { "straight" };

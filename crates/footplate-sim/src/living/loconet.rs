@@ -60,6 +60,8 @@ impl Default for LocoNetSwitches {
 #[derive(Debug, Clone, Copy)]
 struct Slot {
     data: SlotData,
+    /// The functions beyond those in its data that packets switched on in its decoder.
+    higher_functions: u32,
     commanded: Timestamp,
 }
 
@@ -122,7 +124,7 @@ impl<'l> VirtualLocoNet<'l> {
         let slot = |(number, train): (u8, TrainId)| {
             let forward = world.runs_forward(train).unwrap_or(true);
             let data = SlotData { address: train.0, forward, ..free_slot(number) };
-            Slot { data: data.used_as(SlotUse::Common), commanded: now }
+            Slot { data: data.used_as(SlotUse::Common), higher_functions: 0, commanded: now }
         };
         let slots = (1..=switches.slots).zip(world.train_ids()).map(slot).collect();
         world.power(false, now);
@@ -159,6 +161,13 @@ impl<'l> VirtualLocoNet<'l> {
     #[must_use]
     pub const fn world(&self) -> &LivingLayout<'l> {
         &self.world
+    }
+
+    /// The functions of a locomotive that are on, F0 in the lowest bit; none of one that is in no slot.
+    #[must_use]
+    pub fn functions(&self, train: TrainId) -> u32 {
+        let slot = self.slots.iter().find(|slot| slot.data.address == train.0);
+        slot.map_or(0, |slot| slot.data.functions | slot.higher_functions)
     }
 
     /// The layout, for operator intervention.
@@ -315,5 +324,5 @@ const fn number_of(sensor: SensorId) -> u16 {
 
 /// A slot that is not in use, with a decoder of 128 steps.
 const fn free_slot(slot: u8) -> SlotData {
-    SlotData { slot, status: 3, address: 0, speed: 0, forward: true, functions: 0, track: 0, rest: [0; 4] }
+    SlotData { slot, status: 3, address: 0, speed: 0, forward: true, functions: 0, track: 0, rest: [0; 3] }
 }

@@ -20,6 +20,7 @@ mod mapped_recordings;
 mod metro_trips;
 mod models_of_logs;
 mod no_look_ahead;
+mod panels;
 mod real_logs;
 mod recordings;
 mod replays_go_on;

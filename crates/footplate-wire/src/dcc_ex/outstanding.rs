@@ -47,7 +47,7 @@ impl AwaitedAnswer for Awaited {
                 Reply::Locomotive { cab, throttle: at, forward: to, .. },
             ) => train.0 == *cab && throttle == *at && forward == *to,
             (Self::Function(train, function, on), Reply::Locomotive { cab, functions, .. }) => {
-                train.0 == *cab && (functions & function.bit() != 0) == on
+                train.0 == *cab && function.is_in(*functions) == on
             }
             (Self::Power(on), reply) => reply.main_power() == Some(on),
             (Self::Turnout(turnout, curved), Reply::Turnout { id, thrown }) => {
@@ -71,6 +71,13 @@ impl AwaitedAnswer for Awaited {
     fn train(&self) -> Option<TrainId> {
         match self {
             Self::Driven(train, ..) | Self::Locomotive(train) => Some(*train),
+            _ => None,
+        }
+    }
+
+    fn switched(&self) -> Option<TrainId> {
+        match self {
+            Self::Function(train, ..) => Some(*train),
             _ => None,
         }
     }

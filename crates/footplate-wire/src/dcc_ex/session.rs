@@ -181,8 +181,8 @@ impl Client {
 
     /// The board answers only when the state changes.
     fn switch(&self, train: TrainId, function: FunctionNumber, on: bool) -> (Request, Option<Awaited>) {
-        let known = self.dialogue.locomotives.get(train).and_then(|known| known.functions);
-        let changes = known.is_none_or(|functions| (functions & function.bit() != 0) != on);
+        let known = self.dialogue.locomotives.get(train).and_then(|known| known.functions.is_on(function));
+        let changes = known != Some(on);
         let request = Request::Function { cab: train.0, function: function.get(), on };
         (request, changes.then_some(Awaited::Function(train, function, on)))
     }

@@ -10,6 +10,7 @@
 
 use alloc::vec::Vec;
 
+use super::functions::{FunctionPacket, beside_direction, direction_bits, sound, sound_bits};
 use super::slot::SlotData;
 
 const BUSY: u8 = 0x81;
@@ -18,6 +19,7 @@ const POWER_ON: u8 = 0x83;
 const IDLE: u8 = 0x85;
 const SPEED: u8 = 0xA0;
 const DIRECTION: u8 = 0xA1;
+const SOUND: u8 = 0xA2;
 const SWITCH: u8 = 0xB0;
 const INPUT: u8 = 0xB2;
 const LONG_ACK: u8 = 0xB4;
@@ -25,13 +27,12 @@ const MOVE_SLOTS: u8 = 0xBA;
 const READ_SLOT: u8 = 0xBB;
 const LOCOMOTIVE: u8 = 0xBF;
 const SLOT: u8 = 0xE7;
+const PACKET: u8 = 0xED;
 
 /// Operands have seven bits.
 pub(super) const OPERAND: u8 = 0x7F;
 /// The direction bit of a locomotive: backward.
 const BACKWARD: u8 = 0x20;
-/// Bits F0 to F4 beside the direction.
-const FUNCTIONS: u8 = 0x1F;
 /// Bits of a switch's second operand: the direction (closed) and whether the output is on.
 const CLOSED: u8 = 0x20;
 const ON: u8 = 0x10;
@@ -68,9 +69,18 @@ pub enum Message {
         slot: u8,
         /// Whether it runs forward.
         forward: bool,
-        /// Bit 4 is F0, bits 0 to 3 are F1 to F4.
-        functions: u8,
+        /// Those of F0 to F4 that are on, F0 in the lowest bit.
+        functions: u32,
     },
+    /// Functions F5 to F8 of the locomotive of a slot.
+    Sound {
+        /// The slot.
+        slot: u8,
+        /// Those that are on, F0 in the lowest bit.
+        functions: u32,
+    },
+    /// A packet for the rails that switches higher functions of a decoder.
+    Functions(FunctionPacket),
     /// An output of a turnout is to be switched.
     Switch {
         /// Its address, from 1.
@@ -154,6 +164,7 @@ impl Message {
                 let (forward, functions) = direction_of(dirf);
                 Self::Direction { slot, forward, functions }
             }
+            (SOUND, &[slot, byte]) => Self::Sound { slot, functions: sound(byte) },
             (SWITCH, &[low, high]) => Self::Switch {
                 address: (u16::from(high & UPPER) << 7 | u16::from(low)) + 1,
                 closed: high & CLOSED != 0,
@@ -168,6 +179,9 @@ impl Message {
             (MOVE_SLOTS, &[from, to]) => Self::MoveSlots { from, to },
             (READ_SLOT, &[slot, _]) => Self::ReadSlot { slot },
             (LOCOMOTIVE, &[high, low]) => Self::Locomotive { address: u16::from(high) << 7 | u16::from(low) },
+            (PACKET, operands) => {
+                FunctionPacket::read(operands).map_or(Self::Other { opcode: PACKET }, Self::Functions)
+            }
             (SLOT, [SLOT_LENGTH, slot @ ..]) => Self::Slot(SlotData::read(slot).ok_or(Malformed)?),
             (opcode, _) => Self::Other { opcode },
         })
@@ -185,6 +199,11 @@ impl Message {
             Self::Speed { slot, speed } => bytes.extend([SPEED, slot, speed]),
             Self::Direction { slot, forward, functions } => {
                 bytes.extend([DIRECTION, slot, direction_byte(forward, functions)]);
+            }
+            Self::Sound { slot, functions } => bytes.extend([SOUND, slot, sound_bits(functions)]),
+            Self::Functions(packet) => {
+                bytes.push(PACKET);
+                bytes.extend(packet.operands());
             }
             Self::Switch { address, closed, on } => {
                 let (high, low) = address_bytes(address.saturating_sub(1));
@@ -218,13 +237,13 @@ impl Message {
 }
 
 /// Direction and functions F0 to F4 from their byte.
-pub(super) const fn direction_of(byte: u8) -> (bool, u8) {
-    (byte & BACKWARD == 0, byte & FUNCTIONS)
+pub(super) const fn direction_of(byte: u8) -> (bool, u32) {
+    (byte & BACKWARD == 0, beside_direction(byte))
 }
 
 /// The byte of a direction and functions F0 to F4.
-pub(super) const fn direction_byte(forward: bool, functions: u8) -> u8 {
-    functions & FUNCTIONS | if forward { 0 } else { BACKWARD }
+pub(super) const fn direction_byte(forward: bool, functions: u32) -> u8 {
+    direction_bits(functions) | if forward { 0 } else { BACKWARD }
 }
 
 /// The upper and the lower seven bits of an address.

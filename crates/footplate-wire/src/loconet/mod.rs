@@ -6,6 +6,7 @@
 //! - [`Line`] is a line of the server, [`Lines`] cuts a stream into them; [`Message`] is a message of the bus.
 //! - [`Client`] is the session: it takes slots, keeps them, and reads them back to see what the station has understood.
 
+mod functions;
 mod line;
 mod message;
 mod outbox;
@@ -16,6 +17,7 @@ mod settings;
 mod slot;
 mod time_model;
 
+pub use functions::{FunctionGroup, FunctionPacket};
 pub use line::{LONGEST_LINE, Line, Lines, SentReport};
 pub use message::{Malformed, Message};
 pub use request::{LAST_WILL, LOCOMOTIVES, TURNOUTS, speed_of};

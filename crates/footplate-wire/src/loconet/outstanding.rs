@@ -2,6 +2,7 @@
 
 use footplate_core::{TimeSpan, TrainId, TurnoutId};
 
+use super::functions::FunctionGroup;
 use super::message::Message;
 use super::request::Request;
 use super::slot::SlotData;
@@ -18,6 +19,8 @@ pub(super) enum Answer {
     Slot(SlotData),
     /// A message of this client was put on the bus.
     Sent(Message),
+    /// A packet for the rails was accepted.
+    Packet,
 }
 
 /// What an answer to a request looks like.
@@ -32,8 +35,8 @@ pub(super) enum Awaited {
     Locomotive(TrainId),
     /// That it is driven so.
     Driven(TrainId, u8, bool),
-    /// That these of its functions F0 to F4 are on.
-    Functions(TrainId, u8),
+    /// That these of a group of its functions are on, or that the packet which switches them was accepted.
+    Functions(TrainId, FunctionGroup, u32),
     /// That a turnout's output was commanded on the bus: nothing else confirms it.
     Turnout(TurnoutId, Message),
 }
@@ -65,9 +68,11 @@ impl AwaitedAnswer for Awaited {
             (Self::Driven(train, speed, forward), Answer::Slot(data)) => {
                 (train.0, speed, forward) == (data.address, data.speed, data.forward) && data.slot > 0
             }
-            (Self::Functions(train, functions), Answer::Slot(data)) => {
-                (train.0, functions) == (data.address, data.functions) && data.slot > 0
+            (Self::Functions(train, group, functions), Answer::Slot(data)) => {
+                let is_so = (functions ^ data.functions) & group.mask() == 0;
+                group.is_in_slot() && is_so && train.0 == data.address && data.slot > 0
             }
+            (Self::Functions(_, group, _), Answer::Packet) => !group.is_in_slot(),
             (Self::Interrogation(nth), Answer::Sent(message)) => {
                 Request::Interrogate(nth).messages().contains(message)
             }
@@ -80,7 +85,9 @@ impl AwaitedAnswer for Awaited {
         match (self, other) {
             (Self::Power(_), Self::Power(_)) => true,
             (Self::Turnout(one, _), Self::Turnout(other, _)) => one == other,
-            (Self::Functions(one, _), Self::Functions(other, _)) => one == other,
+            (Self::Functions(one, group, _), Self::Functions(other, of_other, _)) => {
+                (one, group) == (other, of_other)
+            }
             _ => self.train().map_or(self == other, |train| other.train() == Some(train)),
         }
     }
@@ -88,6 +95,13 @@ impl AwaitedAnswer for Awaited {
     fn train(&self) -> Option<TrainId> {
         match self {
             Self::Driven(train, ..) | Self::Locomotive(train) => Some(*train),
+            _ => None,
+        }
+    }
+
+    fn switched(&self) -> Option<TrainId> {
+        match self {
+            Self::Functions(train, ..) => Some(*train),
             _ => None,
         }
     }

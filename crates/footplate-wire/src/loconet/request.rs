@@ -3,8 +3,9 @@
 use alloc::vec::Vec;
 use core::ops::RangeInclusive;
 
-use footplate_core::{DecoderSteps, FunctionNumber, SpeedStep};
+use footplate_core::{DecoderSteps, SpeedStep};
 
+use super::functions::{FunctionGroup, FunctionPacket};
 use super::message::Message;
 
 /// What stops everything: all locomotives stop, and the track loses its power.
@@ -15,17 +16,6 @@ pub const LOCOMOTIVES: RangeInclusive<u16> = 1..=9_983;
 
 /// The addresses of turnouts.
 pub const TURNOUTS: RangeInclusive<u16> = 1..=2_048;
-
-/// The highest function of a slot that this client switches: F0 to F4 are beside the direction.
-pub(super) const HIGHEST_FUNCTION: u8 = 4;
-
-/// The bit of a function beside the direction: F0 is above F1 to F4.
-pub(super) const fn function_bit(function: FunctionNumber) -> u8 {
-    match function.get() {
-        0 => 0x10,
-        number => 1 << (number - 1),
-    }
-}
 
 /// The speed of an emergency stop; the decoder's steps lie above it.
 const EMERGENCY_STOP: u8 = 1;
@@ -64,13 +54,15 @@ pub(super) enum Request {
     Drive {
         slot: u8,
         speed: u8,
-        direction: Option<(bool, u8)>,
+        direction: Option<(bool, u32)>,
     },
-    /// Direction and functions F0 to F4 of a slot's locomotive.
+    /// A group of functions of a slot's locomotive.
     Functions {
         slot: u8,
+        address: u16,
         forward: bool,
-        functions: u8,
+        group: FunctionGroup,
+        functions: u32,
     },
     Switch {
         address: u16,
@@ -106,9 +98,13 @@ impl Request {
                 messages.extend(after);
                 messages.push(Message::ReadSlot { slot });
             }
-            Self::Functions { slot, forward, functions } => {
-                messages.push(Message::Direction { slot, forward, functions });
-                messages.push(Message::ReadSlot { slot });
+            Self::Functions { slot, address, forward, group, functions } => {
+                messages.push(match group {
+                    FunctionGroup::Direction => Message::Direction { slot, forward, functions },
+                    FunctionGroup::Sound => Message::Sound { slot, functions },
+                    _ => Message::Functions(FunctionPacket { address, group, functions }),
+                });
+                messages.extend(group.is_in_slot().then_some(Message::ReadSlot { slot }));
             }
             Self::Switch { address, closed, on } => {
                 messages.push(Message::Switch { address, closed, on });

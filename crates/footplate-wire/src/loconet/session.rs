@@ -10,11 +10,12 @@ use footplate_core::{
     TurnoutId,
 };
 
+use super::functions::FunctionGroup;
 use super::line::{Line, Lines};
 use super::message::Message;
 use super::outbox::{Outbox, SENT_WITHIN, SENT_WITHIN_AT_END};
 use super::outstanding::Awaited;
-use super::request::{HIGHEST_FUNCTION, INTERROGATIONS, LOCOMOTIVES, Request, function_bit, speed_of};
+use super::request::{INTERROGATIONS, LOCOMOTIVES, Request, speed_of};
 use super::settings::Settings;
 use super::slot::DrivenSlots;
 use crate::dialogue::{Dialogue, Opening, Repeat};
@@ -276,17 +277,17 @@ impl Client {
         }
     }
 
-    /// One message sets all of F0 to F4: a newer request includes what an earlier one switched.
+    /// One message sets all functions of a group: a newer request includes what an earlier one switched.
     fn switch(&mut self, train: TrainId, function: FunctionNumber, on: bool) -> (Request, Option<Awaited>) {
         let Some(slot) = self.slots.of_mut(train) else { return (Request::Locomotive(train.0), None) };
-        let bit = function_bit(function);
+        let bit = function.bit();
         slot.functions = if on { slot.functions | bit } else { slot.functions & !bit };
-        let (forward, functions) = (slot.forward, slot.functions);
+        let (forward, functions, group) = (slot.forward, slot.functions, FunctionGroup::of(function));
         let request = match slot.number {
-            Some(slot) => Request::Functions { slot, forward, functions },
+            Some(slot) => Request::Functions { slot, address: train.0, forward, group, functions },
             None => Request::Locomotive(train.0),
         };
-        (request, Some(Awaited::Functions(train, functions)))
+        (request, Some(Awaited::Functions(train, group, functions)))
     }
 
     fn throw(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) -> (Request, Option<Awaited>) {
@@ -360,9 +361,6 @@ impl Session for Client {
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
         self.dialogue.check_step(&command)?;
         match command {
-            Command::Function { function, .. } if function.get() > HIGHEST_FUNCTION => {
-                return Err(CommandError::Function { function, highest: HIGHEST_FUNCTION });
-            }
             Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. } => {
                 CommandError::check_train(train, &LOCOMOTIVES)?;
             }

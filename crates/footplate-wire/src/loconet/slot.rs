@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 
 use footplate_core::TrainId;
 
+use super::functions::{FunctionGroup, sound, sound_bits};
 use super::message::{OPERAND, address_bytes, direction_byte, direction_of};
 
 /// Bits of a slot's status: who uses it.
@@ -38,15 +39,18 @@ pub struct SlotData {
     pub speed: u8,
     /// Whether it runs forward.
     pub forward: bool,
-    /// Bit 4 is F0, bits 0 to 3 are F1 to F4.
-    pub functions: u8,
+    /// Those of F0 to F8 that are on, F0 in the lowest bit.
+    pub functions: u32,
     /// The state of the track, in bits.
     pub track: u8,
-    /// More of its status, functions F5 to F8, and the throttle's number.
-    pub rest: [u8; 4],
+    /// More of its status, and the throttle's number.
+    pub rest: [u8; 3],
 }
 
 impl SlotData {
+    /// The functions that slots hold: F0 to F8.
+    pub const FUNCTIONS: u32 = FunctionGroup::Direction.mask() | FunctionGroup::Sound.mask();
+
     /// What it says of its use.
     #[must_use]
     pub const fn slot_use(&self) -> SlotUse {
@@ -85,7 +89,7 @@ impl SlotData {
 
     /// Reads what follows the length.
     pub(super) fn read(bytes: &[u8]) -> Option<Self> {
-        let [slot, status, low, speed, dirf, track, more, high, sound, first, second] = *bytes else {
+        let [slot, status, low, speed, dirf, track, more, high, snd, first, second] = *bytes else {
             return None;
         };
         let (forward, functions) = direction_of(dirf);
@@ -96,9 +100,9 @@ impl SlotData {
             address,
             speed,
             forward,
-            functions,
+            functions: functions | sound(snd),
             track,
-            rest: [more, sound, first, second],
+            rest: [more, first, second],
         })
     }
 
@@ -106,8 +110,9 @@ impl SlotData {
     pub(super) fn bytes(&self) -> [u8; 11] {
         let (high, low) = address_bytes(self.address);
         let dirf = direction_byte(self.forward, self.functions);
-        let [more, sound, first, second] = self.rest;
-        [self.slot, self.status, low, self.speed, dirf, self.track, more, high, sound, first, second]
+        let snd = sound_bits(self.functions);
+        let [more, first, second] = self.rest;
+        [self.slot, self.status, low, self.speed, dirf, self.track, more, high, snd, first, second]
             .map(|byte| byte & OPERAND)
     }
 }
@@ -118,9 +123,9 @@ pub(super) struct DrivenSlot {
     pub(super) train: TrainId,
     /// The slot's number, while the station is known to have one for it.
     pub(super) number: Option<u8>,
-    /// Direction and functions, by the station's own message.
+    /// Direction and functions, by the station's own message; functions beyond those of slots as they were commanded.
     pub(super) forward: bool,
-    pub(super) functions: u8,
+    pub(super) functions: u32,
     /// The direction that was commanded before the station lost the slot.
     pub(super) commanded: Option<bool>,
     /// When its speed was written last.
@@ -149,7 +154,10 @@ impl DrivenSlots {
     pub(super) fn found(&mut self, train: TrainId, data: &SlotData, now: footplate_core::Timestamp) {
         let (number, SlotData { forward, functions, .. }) = (Some(data.slot), *data);
         match self.of_mut(train) {
-            Some(slot) => (slot.number, slot.forward, slot.functions) = (number, forward, functions),
+            Some(slot) => {
+                let beyond = slot.functions & !SlotData::FUNCTIONS;
+                (slot.number, slot.forward, slot.functions) = (number, forward, functions | beyond);
+            }
             None => {
                 self.0.push(DrivenSlot {
                     train,

@@ -109,6 +109,13 @@ impl AwaitedAnswer for Awaited {
         }
     }
 
+    fn switched(&self) -> Option<TrainId> {
+        match self {
+            Self::Function(train, ..) => Some(*train),
+            _ => None,
+        }
+    }
+
     fn turnout(&self) -> Option<TurnoutId> {
         match self {
             Self::Accessory(turnout, ..) => Some(*turnout),

@@ -6,7 +6,7 @@
 use alloc::string::String;
 use core::fmt;
 
-use footplate_core::{TrainId, TurnoutId};
+use footplate_core::{FunctionNumber, TrainId, TurnoutId};
 
 use super::server_line::FULL_SPEED;
 
@@ -56,15 +56,15 @@ pub enum Action {
     },
     /// A function key was pressed, or released.
     Function {
-        /// Its number.
-        number: u8,
+        /// The function.
+        function: FunctionNumber,
         /// Pressed.
         pressed: bool,
     },
     /// A function must be on, or off.
     SetFunction {
-        /// Its number.
-        number: u8,
+        /// The function.
+        function: FunctionNumber,
         /// On.
         on: bool,
     },
@@ -179,12 +179,12 @@ fn action(text: &str) -> Option<Action> {
         ('R', "0") => Some(Action::Direction { forward: false }),
         ('R', "1") => Some(Action::Direction { forward: true }),
         ('F', _) => {
-            let (number, pressed) = function(rest)?;
-            Some(Action::Function { number, pressed })
+            let (function, pressed) = function(rest)?;
+            Some(Action::Function { function, pressed })
         }
         ('f', _) => {
-            let (number, on) = function(rest)?;
-            Some(Action::SetFunction { number, on })
+            let (function, on) = function(rest)?;
+            Some(Action::SetFunction { function, on })
         }
         ('q', "V") => Some(Action::QuerySpeed),
         ('q', "R") => Some(Action::QueryDirection),
@@ -193,13 +193,13 @@ fn action(text: &str) -> Option<Action> {
 }
 
 /// `15`: state 1 of function 5.
-fn function(text: &str) -> Option<(u8, bool)> {
+fn function(text: &str) -> Option<(FunctionNumber, bool)> {
     let on = match text.chars().next()? {
         '0' => false,
         '1' => true,
         _ => return None,
     };
-    Some((text.get(1..)?.parse().ok()?, on))
+    Some((FunctionNumber::new(text.get(1..)?.parse().ok()?)?, on))
 }
 
 /// `PA1`, `TA2LT11`.

@@ -121,8 +121,8 @@ pub enum PhoneOrder {
     Function {
         /// The train.
         train: TrainId,
-        /// The number of the function.
-        number: u8,
+        /// The function.
+        function: FunctionNumber,
         /// On or off.
         on: bool,
     },
@@ -394,15 +394,15 @@ impl Phone {
                     self.order(PhoneOrder::Reverse { train });
                 }
             }
-            Action::Function { number, pressed } => {
-                let is_on = state.is_some_and(|state| is_on(state.functions, number));
-                if number == HORN {
-                    self.order(PhoneOrder::Function { train, number, on: pressed });
+            Action::Function { function, pressed } => {
+                let is_on = state.is_some_and(|state| function.is_in(state.functions));
+                if function.get() == HORN {
+                    self.order(PhoneOrder::Function { train, function, on: pressed });
                 } else if pressed {
-                    self.order(PhoneOrder::Function { train, number, on: !is_on });
+                    self.order(PhoneOrder::Function { train, function, on: !is_on });
                 }
             }
-            Action::SetFunction { number, on } => self.order(PhoneOrder::Function { train, number, on }),
+            Action::SetFunction { function, on } => self.order(PhoneOrder::Function { train, function, on }),
             Action::QuerySpeed => {
                 let part = shown.part;
                 self.say(ServerLine::Speed(throttle, key, Some(part)));
@@ -429,10 +429,6 @@ fn heartbeat() -> ServerLine {
     ServerLine::Heartbeat(HEARTBEAT.as_s() as u16)
 }
 
-fn is_on(functions: u32, number: u8) -> bool {
-    functions.checked_shr(u32::from(number)).is_some_and(|rest| rest & 1 == 1)
-}
-
 /// The lines for functions that differ between two states.
 fn changed_functions(
     throttle: char,
@@ -440,7 +436,7 @@ fn changed_functions(
     before: u32,
     after: u32,
 ) -> impl Iterator<Item = ServerLine> {
-    (0..=FunctionNumber::HIGHEST)
-        .filter(move |number| is_on(before, *number) != is_on(after, *number))
-        .map(move |number| ServerLine::Function(throttle, key, number, is_on(after, number)))
+    FunctionNumber::all()
+        .filter(move |function| function.is_in(before ^ after))
+        .map(move |function| ServerLine::Function(throttle, key, function, function.is_in(after)))
 }

@@ -4,8 +4,8 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
 
-use footplate_core::TurnoutId;
 use footplate_core::track::Leg;
+use footplate_core::{FunctionNumber, TurnoutId};
 
 use super::client_line::ThrottleKey;
 
@@ -47,7 +47,7 @@ pub enum ServerLine {
     /// The direction to display.
     Direction(char, ThrottleKey, bool),
     /// The state of a function.
-    Function(char, ThrottleKey, u8, bool),
+    Function(char, ThrottleKey, FunctionNumber, bool),
     /// Speed steps of the throttle: 1 is 128.
     StepMode(char, ThrottleKey),
     /// A message that the phone shows until it is confirmed.
@@ -88,8 +88,8 @@ impl fmt::Display for ServerLine {
             Self::Direction(throttle, key, forward) => {
                 write!(f, "M{throttle}A{key}<;>R{}", u8::from(*forward))
             }
-            Self::Function(throttle, key, number, on) => {
-                write!(f, "M{throttle}A{key}<;>F{}{number}", u8::from(*on))
+            Self::Function(throttle, key, function, on) => {
+                write!(f, "M{throttle}A{key}<;>F{}{}", u8::from(*on), function.get())
             }
             Self::StepMode(throttle, key) => write!(f, "M{throttle}A{key}<;>s1"),
             Self::Alert(text) => write!(f, "HM{}", Text(text)),

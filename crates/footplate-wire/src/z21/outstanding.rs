@@ -68,7 +68,7 @@ impl AwaitedAnswer for Awaited {
                 train.0 == state.address && as_fast && forward == state.forward
             }
             (Self::Function(train, function, on), Reply::Locomotive(state)) => {
-                train.0 == state.address && (state.functions & function.bit() != 0) == on
+                train.0 == state.address && function.is_in(state.functions) == on
             }
             (Self::Power(on), reply) => reply.power() == Some(on),
             (Self::Turnout(_, address, second), Reply::Turnout { address: of, position }) => {
@@ -92,6 +92,13 @@ impl AwaitedAnswer for Awaited {
     fn train(&self) -> Option<TrainId> {
         match self {
             Self::Driven(train, ..) | Self::Locomotive(train) => Some(*train),
+            _ => None,
+        }
+    }
+
+    fn switched(&self) -> Option<TrainId> {
+        match self {
+            Self::Function(train, ..) => Some(*train),
             _ => None,
         }
     }

@@ -4,7 +4,7 @@ use footplate_core::{
     Command, DecoderSteps, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, TrainId, TurnoutId,
 };
 use footplate_wire::dcc_ex::{Client, Settings, TurnoutRequests};
-use footplate_wire::{CommandError, LinkNotice, Session};
+use footplate_wire::{CommandError, LinkNotice, ReportedFunctions, Session};
 
 use crate::desk::{Station, T24, T58, function, ms, speed};
 
@@ -269,6 +269,10 @@ fn a_board_that_restarted_behind_a_network_is_recognised_by_what_it_forgot() {
     desk.run_for(1_000);
     assert!(desk.notices.contains(&LinkNotice::Restarted), "{:?}", desk.notices);
     assert_eq!(desk.texts()[..6], ["<s>", "<Q>", "<1 MAIN>", "<#>", "<t 24>", "<t 24 0 0>"]);
+    // It lost everything else, too: it is asked again before it is said to answer.
+    assert_eq!(desk.texts()[6..9], ["<Q>", "<1 MAIN>", "<#>"]);
+    let restarted = desk.notices.iter().position(|notice| *notice == LinkNotice::Restarted);
+    assert_eq!(desk.notices.get(restarted.unwrap() + 1), Some(&LinkNotice::Answers));
 }
 
 #[test]
@@ -398,6 +402,13 @@ fn a_function_is_switched_and_confirmed_and_is_no_event() {
     desk.run_for(400);
     assert_eq!(desk.texts()[2..].iter().filter(|text| **text != "<#>").count(), 1, "{:?}", desk.texts());
     assert_eq!((&desk.events[..], &desk.notices[..]), (&[][..], &[][..]));
+    assert_eq!(desk.functions[&T24], ReportedFunctions::all(1));
+    // Another throttle switches F0 off and F3 on: the board tells everybody.
+    desk.client.handle_bytes(desk.now, b"<l 24 0 0 8>\n");
+    desk.run_for(10);
+    let functions = ReportedFunctions::all(8);
+    assert_eq!(desk.functions[&T24], functions);
+    assert_eq!(desk.notices, [LinkNotice::OtherFunctions { train: T24, functions }]);
 }
 
 #[test]

@@ -1,9 +1,11 @@
 //! A session, the station it speaks with, and the line between them.
 
+use std::collections::BTreeMap;
+
 use footplate_core::{
     Command, Event, EventKind, FunctionNumber, Report, SpeedStep, TimeSpan, Timestamp, TrainId,
 };
-use footplate_wire::{LinkNotice, Session, Transmit};
+use footplate_wire::{LinkNotice, ReportedFunctions, Session, Transmit};
 
 pub(crate) const T24: TrainId = TrainId(24);
 pub(crate) const T58: TrainId = TrainId(58);
@@ -42,12 +44,15 @@ pub(crate) struct Desk<C, S: Station> {
     pub(crate) written: Vec<(i64, S::Written)>,
     pub(crate) events: Vec<Event>,
     pub(crate) notices: Vec<LinkNotice>,
+    /// What the station has reported of each train's functions.
+    pub(crate) functions: BTreeMap<TrainId, ReportedFunctions>,
 }
 
 impl<C: Session, S: Station> Desk<C, S> {
     pub(crate) fn with(client: C, station: S) -> Self {
         let (coming, written, events, notices) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { client, now: ms(0), station, coming, written, events, notices }
+        let functions = BTreeMap::new();
+        Self { client, now: ms(0), station, coming, written, events, notices, functions }
     }
 
     pub(crate) fn run_until(&mut self, end: Timestamp) {
@@ -63,6 +68,9 @@ impl<C: Session, S: Station> Desk<C, S> {
                     }
                     Transmit::Event(event) => self.events.push(event),
                     Transmit::Notice(notice) => self.notices.push(notice),
+                    Transmit::Functions(train, reported) => {
+                        self.functions.insert(train, reported);
+                    }
                     Transmit::Byte(byte) => unreachable!("a lone byte {byte}"),
                 }
             }

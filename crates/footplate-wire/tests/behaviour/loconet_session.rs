@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 
 use footplate_core::{Command, EventKind, SensorId, TimeSpan, TrainId, TurnoutId};
-use footplate_wire::loconet::{Client, LAST_WILL, Line, Lines, Message, Settings, SlotData, SlotUse};
-use footplate_wire::{CommandError, LinkNotice, Session};
+use footplate_wire::loconet::{
+    Client, FunctionGroup, FunctionPacket, LAST_WILL, Line, Lines, Message, Settings, SlotData, SlotUse,
+};
+use footplate_wire::{CommandError, LinkNotice, ReportedFunctions, Session};
 
 use crate::desk::{Station, T24, T58, function, ms, speed};
 
@@ -35,7 +37,7 @@ impl Server {
             forward: true,
             functions: 0,
             track,
-            rest: [0; 4],
+            rest: [0; 3],
         };
         SlotData { track, ..self.slots.get(&slot).copied().unwrap_or(free) }
     }
@@ -49,8 +51,16 @@ impl Server {
                 self.slots.entry(slot).and_modify(|of| of.speed = speed);
             }
             Message::Direction { slot, forward, functions } => {
-                self.slots.entry(slot).and_modify(|of| (of.forward, of.functions) = (forward, functions));
+                let sound = FunctionGroup::Sound.mask();
+                self.slots.entry(slot).and_modify(|of| {
+                    (of.forward, of.functions) = (forward, functions | of.functions & sound);
+                });
             }
+            Message::Sound { slot, functions } => {
+                let others = FunctionGroup::Direction.mask();
+                self.slots.entry(slot).and_modify(|of| of.functions = functions | of.functions & others);
+            }
+            Message::Functions(_) => return vec![Message::LongAck { opcode: 0x6D, code: 0x7F }],
             Message::Locomotive { address } => {
                 let known = self.slots.values().find(|slot| slot.address == address).map(|slot| slot.slot);
                 let Some(slot) =
@@ -197,7 +207,9 @@ fn reversing_stops_first_and_keeps_the_functions() {
     desk.run_for(400);
     let reversed = Message::Direction { slot: 1, forward: false, functions: 0x11 };
     assert_eq!(desk.commands(), [drives(1, 0), reversed, drives(1, 37)]);
-    assert!(desk.notices.is_empty(), "{:?}", desk.notices);
+    // They were switched elsewhere.
+    let functions = ReportedFunctions { known: SlotData::FUNCTIONS, on: 0x11 };
+    assert_eq!(desk.notices, [LinkNotice::OtherFunctions { train: T24, functions }]);
 }
 
 #[test]
@@ -421,11 +433,44 @@ fn functions_keep_the_direction_and_one_another() {
     }
     desk.run_for(1_000);
     let slot = desk.station.slots[&1];
-    assert_eq!((slot.forward, slot.functions), (false, 0x18), "F0 is above F1 to F4");
+    assert_eq!((slot.forward, slot.functions), (false, 0x11), "F0 and F4");
     desk.command(Command::Reverse { train: T24 });
     desk.run_for(600);
     let slot = desk.station.slots[&1];
-    assert_eq!((slot.forward, slot.functions), (true, 0x18));
-    let refused = desk.client.handle_command(desk.now, function(T24, 5, true)).unwrap_err();
-    assert_eq!(refused.to_string(), "F5 cannot be switched over this link; functions are F0 to F4");
+    assert_eq!((slot.forward, slot.functions), (true, 0x11));
+}
+
+#[test]
+fn functions_from_f5_are_in_the_slot_and_from_f9_in_packets_that_keep_one_another() {
+    let mut desk = Desk::opened();
+    for (number, on) in [(0, true), (5, true), (8, true), (5, false), (6, true)] {
+        desk.command(function(T24, number, on));
+    }
+    desk.run_for(1_000);
+    assert_eq!(desk.station.slots[&1].functions, 1 | 1 << 6 | 1 << 8);
+    desk.written.clear();
+    desk.command(function(T24, 9, true));
+    desk.run_for(200);
+    desk.command(function(T24, 12, true));
+    desk.command(function(T24, 28, true));
+    desk.run_for(500);
+    let packet = |group, functions| Message::Functions(FunctionPacket { address: 24, group, functions });
+    let expected = [
+        packet(FunctionGroup::F9To12, 1 << 9),
+        packet(FunctionGroup::F9To12, 1 << 9 | 1 << 12),
+        packet(FunctionGroup::F21To28, 1 << 28),
+    ];
+    assert_eq!(desk.commands(), expected, "each once: the station accepts them");
+    assert!(desk.notices.is_empty(), "{:?}", desk.notices);
+    // The slot confirms F0 to F8, an accepted packet its own group; nothing is known of F13 to F20.
+    let known = 0x1FFF | 0xFF << 21;
+    let on = 1 | 1 << 6 | 1 << 8 | 1 << 9 | 1 << 12 | 1 << 28;
+    assert_eq!(desk.functions[&T24], ReportedFunctions { known, on });
+    // Another throttle switches F5: its slot is read again.
+    let sound = Message::Sound { slot: 1, functions: 0xF << 5 };
+    desk.station.obey(sound);
+    desk.hear(sound);
+    desk.run_for(300);
+    let functions = ReportedFunctions { known, on: on | 0xF << 5 };
+    assert_eq!(desk.notices, [LinkNotice::OtherFunctions { train: T24, functions }]);
 }

@@ -4,7 +4,7 @@ use footplate_core::{Command, Event, EventKind, Report, SensorId, SpeedStep, Tim
 use footplate_wire::marklin_can::{
     Client, Direction, Frame, Framing, LocomotiveProtocol, Message, Settings, Transport, Uid,
 };
-use footplate_wire::{CommandError, LinkNotice, Session};
+use footplate_wire::{CommandError, LinkNotice, ReportedFunctions, Session};
 
 use crate::desk::{Station, T24, T58, function, ms, speed};
 
@@ -438,4 +438,15 @@ fn functions_are_switched_one_by_one() {
         desk.messages().into_iter().filter(|message| matches!(message, Message::Function { .. })).collect();
     assert_eq!(functions, [switched(0, 1), switched(28, 0)], "both are confirmed");
     assert_eq!(desk.events, []);
+    assert_eq!(desk.functions[&T24], ReportedFunctions { known: 1 | 1 << 28, on: 1 });
+    // The station confirms what another throttle asked for; of F3 nothing was known, so that it is no change.
+    for (function, value) in [(3, 0), (0, 0)] {
+        let message = Message::Function { uid: Uid(24), function, value: Some(value) };
+        let heard = desk.station.encoded(message, true);
+        desk.client.handle_bytes(desk.now, &heard);
+        desk.run_for(10);
+    }
+    let functions = ReportedFunctions { known: 1 | 1 << 3 | 1 << 28, on: 0 };
+    assert_eq!(desk.functions[&T24], functions);
+    assert_eq!(desk.notices.last(), Some(&LinkNotice::OtherFunctions { train: T24, functions }));
 }

@@ -219,7 +219,7 @@ impl Bench {
     fn take(&mut self) {
         while let Some(output) = self.session.poll_output() {
             match output {
-                Transmit::Message(bytes) => unreachable!("this line is written byte by byte, not {bytes:?}"),
+                Transmit::Message(_) | Transmit::Functions(..) => unreachable!("a 6051: {output:?}"),
                 Transmit::Byte(byte) => {
                     self.written.push((self.now, byte));
                     self.station.write(self.now, byte);

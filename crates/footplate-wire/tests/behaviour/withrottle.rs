@@ -1,7 +1,7 @@
 //! A conversation with a phone. Lines are those of the WiThrottle protocol as JMRI documents it, and as Engine Driver sends them.
 
 use footplate_core::track::Leg;
-use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 use footplate_wire::withrottle::{
     ClientLine, FULL_SPEED, Phone, PhoneOrder, PhoneOutput, Railway, RosterTrain, ThrottleKey, TrainState,
 };
@@ -171,7 +171,10 @@ fn power_turnouts_functions_and_the_emergency_stop_are_orders() {
         phone.handle_line(at(1.0), line);
     }
     let turnout = |number, leg| format!("> {:?}", PhoneOrder::Turnout { turnout: TurnoutId(number), leg });
-    let function = |number, on| format!("> {:?}", PhoneOrder::Function { train: TRAIN, number, on });
+    let function = |number, on| {
+        let function = FunctionNumber::new(number).unwrap();
+        format!("> {:?}", PhoneOrder::Function { train: TRAIN, function, on })
+    };
     assert_eq!(
         outputs(&mut phone),
         [

@@ -2,10 +2,10 @@
 
 use footplate_core::{Command, DecoderSteps, EventKind, SensorId, TrainId, TurnoutId};
 use footplate_wire::z21::{
-    Broadcasts, CanDetection, Feedback, FunctionSwitch, Lock, LocoNetDetection, Reply, Request, Settings,
-    Throttle, TurnoutPosition,
+    Broadcasts, CanDetection, Feedback, FunctionSwitch, Lock, LocoNetDetection, LocomotiveState, Reply,
+    Request, Settings, Throttle, TurnoutPosition,
 };
-use footplate_wire::{CommandError, LinkNotice, Session};
+use footplate_wire::{CommandError, LinkNotice, ReportedFunctions, Session};
 
 use crate::desk::{T24, T58, function, ms, speed};
 use crate::z21_desk::{Desk, state};
@@ -452,4 +452,12 @@ fn functions_are_switched_one_by_one_and_confirmed_by_the_state() {
     let switched = Request::Function { address: 24, function: 3, switch: FunctionSwitch::On };
     assert_eq!(desk.written.iter().filter(|(_, request)| *request == switched).count(), 2);
     assert_eq!(desk.events, []);
+    // Another throttle switches one: the station says so by itself.
+    let functions = 1 << 28 | 1 << 2;
+    desk.hear(Reply::Locomotive(LocomotiveState { functions, ..desk.station.locomotive(24) }));
+    desk.run_for(20);
+    assert_eq!(desk.functions[&T24], ReportedFunctions::all(functions));
+    let said = desk.notices.iter().filter(|notice| matches!(notice, LinkNotice::OtherFunctions { .. }));
+    let said: Vec<String> = said.map(ToString::to_string).collect();
+    assert_eq!(said, ["another throttle switched functions of train 24; on now: F2, F28"]);
 }

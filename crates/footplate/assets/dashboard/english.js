@@ -49,7 +49,7 @@ export const ENGLISH = {
   "no-such-train": "Train {0} is not part of this session.", "sent": "sent: {0}", "refused": "refused: {0}",
   "picked-for": "{0}: stop train {1} there, or arrive there at a set time", "drive": "Drive",
   "if-stopped": "if stopped now", "rest-way": "stops {0} ± {1} mm ahead, at {2}, in {3} s", "at-rest": "at rest",
-  "due": "next sensor", "due-in": "{0} in {1} s ± {2} ms", "found": "located", "reverse": "Reverse", "light": "Light", "functions": "Functions",
+  "due": "next sensor", "due-in": "{0} in {1} s ± {2} ms", "found": "located", "reverse": "Reverse", "light": "Light", "functions": "Functions", "functions-unreported": "as switched here; not confirmed by the station",
   "slower": "One step slower", "faster": "One step faster", "hold": "Hold speed", "hold-speed": "Speed to hold (mm/s)",
   "follow": "Follow", "leader": "Train to follow", "gap-behind": "Gap to it", "gap-unit": "in", "go-here": "Send to {0}", "not-beyond": "at most 1 of 1000 beyond it", "more-functions": "F5 to F28",
   "portrait": "Picture", "portrait-choose": "Choose a picture; it stays in this browser", "portrait-other": "Choose another picture", "portrait-remove": "Remove it", "portrait-unread": "This file is no picture that the browser can read.",

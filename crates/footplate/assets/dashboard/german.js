@@ -50,7 +50,7 @@ export const GERMAN = {
   "no-such-train": "Zug {0} gehört nicht zu dieser Sitzung.", "sent": "gesendet: {0}", "refused": "abgelehnt: {0}",
   "picked-for": "{0}: Zug {1} dort anhalten oder zu einer bestimmten Zeit ankommen lassen", "drive": "Fahren",
   "if-stopped": "bei Halt jetzt", "rest-way": "hält {0} ± {1} mm weiter, bei {2}, in {3} s", "at-rest": "steht",
-  "due": "nächster Rückmelder", "due-in": "{0} in {1} s ± {2} ms", "found": "lokalisiert", "reverse": "Wenden", "light": "Licht", "functions": "Funktionen",
+  "due": "nächster Rückmelder", "due-in": "{0} in {1} s ± {2} ms", "found": "lokalisiert", "reverse": "Wenden", "light": "Licht", "functions": "Funktionen", "functions-unreported": "wie hier geschaltet; von der Zentrale nicht bestätigt",
   "slower": "Eine Stufe langsamer", "faster": "Eine Stufe schneller", "hold": "Tempo halten", "hold-speed": "Zu haltendes Tempo (mm/s)",
   "follow": "Folgen", "leader": "Vorausfahrender Zug", "gap-behind": "Abstand zu ihm", "gap-unit": "in", "go-here": "Fahren nach {0}", "not-beyond": "höchstens 1 von 1000 darüber hinaus", "more-functions": "F5 bis F28",
   "portrait": "Bild", "portrait-choose": "Ein Bild wählen; es bleibt in diesem Browser", "portrait-other": "Ein anderes Bild wählen", "portrait-remove": "Entfernen", "portrait-unread": "Diese Datei ist kein Bild, das der Browser lesen kann.",

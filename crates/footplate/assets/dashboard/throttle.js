@@ -14,7 +14,7 @@ const LAST_OF_ALL = 4;
 export class Throttle {
   /** Whether the slider is being moved. */
   isDragged = false;
-  #slider; #shown; #train; #lock; #give; #functions; #step = 0; #asked; #askedAt = 0;
+  #slider; #shown; #train; #lock; #give; #functions; #note; #step = 0; #asked; #askedAt = 0;
 
   /** `give` sends a command and shows its result beside the throttle. */
   constructor(root, train, give) {
@@ -38,7 +38,8 @@ export class Throttle {
       });
       return button;
     });
-    $("#functions").append(...this.#functions.slice(0, LAST_OF_ALL + 1));
+    this.#note = document.createElement("small");
+    $("#functions").append(...this.#functions.slice(0, LAST_OF_ALL + 1), this.#note);
     $("#more-functions .functions").append(...this.#functions.slice(LAST_OF_ALL + 1));
     this.#lock.addEventListener("click", () => this.#lockTo(!this.isLocked));
     document.addEventListener("visibilitychange", this.#left);
@@ -69,9 +70,11 @@ export class Throttle {
     if (document.hidden && this.isLocked && this.#step > 0) orderAtOnce(`stop ${this.#train}`);
   };
 
-  show({ step, functions }, highest) {
+  show({ step, functions, functions_reported: reported }, highest) {
     this.#step = step;
     FUNCTIONS.forEach((number) => this.#functions[number].setAttribute("aria-pressed", String(functions.includes(number))));
+    const isUnreported = functions.some((number) => !reported.includes(number));
+    put(this.#note, isUnreported ? say("functions-unreported") : "");
     if (highest) this.#slider.max = String(highest);
     if (step === this.#asked || performance.now() - this.#askedAt > ASKED_FOR_MS) this.#asked = undefined;
     if (this.isDragged || this.#asked !== undefined) return;

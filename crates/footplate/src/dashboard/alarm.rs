@@ -238,7 +238,9 @@ impl Alarm {
     /// alarms.
     pub(crate) fn of_line(notice: &LinkNotice) -> Option<Self> {
         let (grade, what, train, blanks) = match notice {
-            LinkNotice::Closed(_) | LinkNotice::Identified { .. } => return None,
+            LinkNotice::Closed(_) | LinkNotice::Identified { .. } | LinkNotice::OtherFunctions { .. } => {
+                return None;
+            }
             LinkNotice::Answers => (Grade::Over, "line-answers", None, Vec::new()),
             LinkNotice::Silent { since, .. } => {
                 (Grade::Danger, "line-silent", None, vec![format!("{:.1}", since.as_s())])

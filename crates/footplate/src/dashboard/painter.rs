@@ -10,6 +10,7 @@ use footplate_core::track::Layout;
 use footplate_core::tracking::DriftTest;
 use footplate_core::tracking::{DueContact, PassedContact, PathPoint};
 use footplate_core::{FunctionNumber, HALF_95, Length, SensorId, TimeSpan, Timestamp, TrainId};
+use footplate_wire::ReportedFunctions;
 use serde::Serialize;
 
 use super::alarm::{Alarm, Grade};
@@ -49,6 +50,8 @@ pub(crate) struct Painter {
     /// Detections that are not published yet.
     unpublished: Vec<TrainPassed>,
     distances: BTreeMap<TrainId, TravelledDistance>,
+    /// What the station has reported of each train's functions.
+    functions: BTreeMap<TrainId, ReportedFunctions>,
     samples: Vec<(TrainId, Sample)>,
     sampled: Option<Timestamp>,
     drifts: BTreeMap<TrainId, DriftTest>,
@@ -107,9 +110,9 @@ struct DuePicture<'l> {
     half_ms: f64,
 }
 
-/// The numbers of the bits that are set.
+/// The numbers of the functions in a set.
 fn numbers(functions: u32) -> Vec<u8> {
-    (0..=FunctionNumber::HIGHEST).filter(|number| functions >> number & 1 == 1).collect()
+    FunctionNumber::all().filter(|function| function.is_in(functions)).map(FunctionNumber::get).collect()
 }
 
 impl Painter {
@@ -119,6 +122,7 @@ impl Painter {
             flashes: BTreeMap::new(),
             unpublished: Vec::new(),
             distances: BTreeMap::new(),
+            functions: BTreeMap::new(),
             samples: Vec::new(),
             sampled: None,
             drifts: BTreeMap::new(),
@@ -150,6 +154,11 @@ impl Painter {
             self.alarm(now, &Alarm::of_fault(layout, train, fault).said(said));
         }
         self.calibration.get_or_insert_default().hear(notice);
+    }
+
+    /// Takes in what the station has reported of a train's functions.
+    pub(crate) fn hear_of_functions(&mut self, train: TrainId, reported: ReportedFunctions) {
+        self.functions.insert(train, reported);
     }
 
     /// Ends the display of a calibration.
@@ -260,7 +269,10 @@ impl Painter {
                 located.filter(|_| self.display_only).map_or_else(|| driver.commanded(train), |at| at.step);
             let task = session.tasks.get(&train);
             let mut picture = paint_train(driver, train, task, now, commanded, travelled, reserved(train));
-            picture.functions = session.functions.get(&train).copied().map_or_else(Vec::new, numbers);
+            let reported = self.functions.get(&train).copied().unwrap_or_default();
+            let switched = session.functions.get(&train).copied().unwrap_or_default();
+            picture.functions = numbers(switched & !reported.known | reported.on);
+            picture.functions_reported = numbers(reported.known);
             trains.push(picture);
             if is_sampled {
                 let sample = Sample::of((now - began).as_s(), commanded, located.as_ref(), travelled);

@@ -122,8 +122,10 @@ pub(super) struct TrainPicture {
     at_rest: bool,
     /// Whether its direction is the opposite of that at the begin of the session.
     reversed: bool,
-    /// The functions that were switched on.
+    /// The functions that are on: as the station reports them, the others as they were switched here.
     pub(super) functions: Vec<u8>,
+    /// The functions whose state the station reports.
+    pub(super) functions_reported: Vec<u8>,
     /// Distance travelled since it was located.
     way_mm: Option<f64>,
     body: Vec<Span>,
@@ -189,6 +191,7 @@ pub(super) fn paint_train(
         at_rest: located.is_some_and(|located| located.at_rest),
         reversed: driver.is_reversed(train),
         functions: Vec::new(),
+        functions_reported: Vec::new(),
         way_mm: travelled.map(|length| tenths(length.as_mm())),
         body: around(TAIL, NOSE),
         haze: half.map_or_else(Vec::new, |half| around(TAIL + half, NOSE + half)),

@@ -1,8 +1,8 @@
 //! Interfaces of the runtime: the recorder, and the attendant that passes notices to people and their requests back.
 
 use footplate_core::control::Machine;
-use footplate_core::{Command, Event, Timestamp};
-use footplate_wire::{BlockReports, CommandError, LinkNotice};
+use footplate_core::{Command, Event, Timestamp, TrainId};
+use footplate_wire::{BlockReports, CommandError, LinkNotice, ReportedFunctions};
 
 /// Records the entries of a run before the machine receives them.
 pub(crate) trait Recorder {
@@ -32,6 +32,9 @@ pub(crate) trait Attendant<M: Machine> {
 
     /// What the detectors of blocks report now; called before [`attend`](Self::attend) on a layout with blocks.
     fn see_blocks(&mut self, _blocks: &BlockReports) {}
+
+    /// What the station has reported of a train's functions.
+    fn hear_of_functions(&mut self, _train: TrainId, _reported: ReportedFunctions) {}
 
     /// A message about the line for people to read.
     fn read(&mut self, words: &str) {

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use footplate_core::control::{Machine, Output};
-use footplate_core::{Event, TimeSpan, Timestamp};
-use footplate_wire::{Closing, LinkNotice, Session, Transmit};
+use footplate_core::{Event, TimeSpan, Timestamp, TrainId};
+use footplate_wire::{Closing, LinkNotice, ReportedFunctions, Session, Transmit};
 
 use super::attendant::{Attendant, Recorder, Wish};
 use super::ending::{Ended, REOPEN_WITHIN, SECOND_CHANCE, WITHIN};
@@ -34,6 +34,8 @@ pub(crate) struct Runtime<'r, L: Link> {
     /// Entries that are not recorded yet; reused, so that no byte costs an allocation.
     fresh: Vec<Event>,
     notices: Vec<LinkNotice>,
+    /// What the station reported of functions and the attendant has not taken yet.
+    functions: Vec<(TrainId, ReportedFunctions)>,
     will: LastWill,
     /// How often the line was opened again since the station answered last.
     reopened: u32,
@@ -58,7 +60,7 @@ impl<'r, L: Link> Runtime<'r, L> {
         if let Some(up) = link.cts() {
             session.handle_cts(link.now(), up);
         }
-        let (fresh, notices) = (Vec::new(), Vec::new());
+        let (fresh, notices, functions) = (Vec::new(), Vec::new(), Vec::new());
         Self {
             link,
             session,
@@ -66,6 +68,7 @@ impl<'r, L: Link> Runtime<'r, L> {
             stop,
             fresh,
             notices,
+            functions,
             will: LastWill::new(),
             reopened: 0,
             is_closed: false,
@@ -114,6 +117,9 @@ impl<'r, L: Link> Runtime<'r, L> {
             for notice in self.notices.drain(..) {
                 judge(&mut doubt, now, &notice);
                 attendant.hear_of_line(now, &notice);
+            }
+            for (train, reported) in self.functions.drain(..) {
+                attendant.hear_of_functions(train, reported);
             }
             if doubt.as_ref().is_some_and(|(until, _)| now >= *until)
                 && let Some((_, why)) = doubt.take()
@@ -220,6 +226,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                     }
                     self.notices.push(notice);
                 }
+                Transmit::Functions(train, reported) => self.functions.push((train, reported)),
             }
         }
         self.will.keep(&self.session, &mut self.link)
@@ -305,6 +312,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                 self.fresh.clear();
             }
             self.notices.clear();
+            self.functions.clear();
             let now = self.link.now();
             let waited = self.link.real_time() - since;
             let late = now - began >= WITHIN || waited.as_secs_f64() >= WITHIN.as_s();

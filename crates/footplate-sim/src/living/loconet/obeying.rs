@@ -2,7 +2,7 @@
 
 use footplate_core::track::Leg;
 use footplate_core::{SensorId, TrainId, TurnoutId};
-use footplate_wire::loconet::{Message, SlotData, SlotUse};
+use footplate_wire::loconet::{FunctionGroup, FunctionPacket, Message, SlotData, SlotUse};
 
 use super::{Sender, Slot, VirtualLocoNet, free_slot, number_of};
 use crate::living::decoder::DecoderSpeed;
@@ -31,7 +31,19 @@ impl VirtualLocoNet<'_> {
             }
             Message::Speed { slot, speed } => self.command(slot, |data| data.speed = speed),
             Message::Direction { slot, forward, functions } => {
-                self.command(slot, |data| (data.forward, data.functions) = (forward, functions));
+                self.command(slot, |data| {
+                    let others = data.functions & !FunctionGroup::Direction.mask();
+                    (data.forward, data.functions) = (forward, functions | others);
+                });
+            }
+            Message::Sound { slot, functions } => self.command(slot, |data| {
+                data.functions = data.functions & !FunctionGroup::Sound.mask() | functions;
+            }),
+            Message::Functions(FunctionPacket { address, group, functions }) => {
+                if let Some(slot) = self.slots.iter_mut().find(|slot| slot.data.address == address) {
+                    slot.higher_functions = slot.higher_functions & !group.mask() | functions;
+                }
+                self.answer(Message::LongAck { opcode: 0x6D, code: 0x7F });
             }
             Message::Switch { address: INTERROGATION, closed: true, on: false } => self.report_all(),
             // The decoder of a turnout powers its coil for long enough and lets go by itself.
@@ -78,7 +90,7 @@ impl VirtualLocoNet<'_> {
         let number = fresh.or_else(given)?;
         self.slots.retain(|slot| slot.data.slot != number);
         let data = SlotData { address, ..free_slot(number) }.used_as(SlotUse::Common);
-        self.slots.push(Slot { data, commanded: self.now });
+        self.slots.push(Slot { data, higher_functions: 0, commanded: self.now });
         Some(self.slots.len() - 1)
     }
 

@@ -11,6 +11,7 @@ use super::super::request::Throttle;
 use super::super::settings::TurnoutRequests;
 use super::super::time_model::occupied;
 use super::Client;
+use crate::locomotives::ReportedFunctions;
 use crate::outstanding::Awaited as _;
 use crate::sensors::Change;
 use crate::session::LinkNotice;
@@ -44,9 +45,9 @@ impl Client {
         match reply {
             Reply::Identity(identity) => self.identified(now, identity.trim(), answered.is_some()),
             Reply::Locomotive { cab, register, throttle, forward, functions } => {
-                if let Some(locomotive) = self.dialogue.locomotive(TrainId(cab)) {
-                    locomotive.functions = Some(functions);
-                }
+                let reported = ReportedFunctions::all(functions);
+                let answer = answered.as_ref().map(|answered| &answered.awaited);
+                self.dialogue.hear_of_functions(TrainId(cab), reported, answer);
                 let driven =
                     matches!(answered, Some(answered) if matches!(answered.awaited, Awaited::Driven(..)));
                 self.hear_of_locomotive(TrainId(cab), Driven { register, throttle, forward }, driven);
@@ -132,7 +133,7 @@ impl Client {
         if driven.register < 0 {
             // The board does not drive it: it was restarted while the line was silent.
             self.restarted();
-            return;
+            return self.verify();
         }
         let reversed = driven.forward != forward;
         locomotive.forward = Some(driven.forward);

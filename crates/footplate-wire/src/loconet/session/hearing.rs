@@ -11,11 +11,16 @@ use super::super::request::speed_of;
 use super::super::slot::{SlotData, SlotUse};
 use super::super::time_model::occupied;
 use super::Client;
+use crate::locomotives::ReportedFunctions;
+use crate::outstanding::Awaited as _;
 use crate::sensors::Change;
 use crate::session::LinkNotice;
 
 /// The opcode of a request for a slot, as the station's refusal of it names it.
 const NO_SLOT: Message = Message::LongAck { opcode: 0x3F, code: 0 };
+/// The opcode of a packet for the rails in the station's answer, and as the LocoNet Personal Use Edition writes it.
+const PACKET: u8 = 0x6D;
+const PACKET_AS_WRITTEN: u8 = 0x7D;
 
 impl Client {
     pub(super) fn hear(&mut self, now: Timestamp, byte: u8) {
@@ -68,7 +73,17 @@ impl Client {
             Message::Switch { address, closed, on: true } => {
                 self.hear_of_turnout(now, address, closed, is_own);
             }
-            Message::Speed { slot, .. } | Message::Direction { slot, .. } if !is_own => {
+            Message::LongAck { opcode: PACKET | PACKET_AS_WRITTEN, code: 1.. } => {
+                let answered =
+                    self.dialogue.outstanding.answered(&Answer::Packet).map(|answered| answered.awaited);
+                if let Some(Awaited::Functions(train, group, on)) = answered {
+                    let reported = ReportedFunctions { known: group.mask(), on };
+                    self.dialogue.hear_of_functions(train, reported, answered.as_ref());
+                }
+            }
+            Message::Speed { slot, .. } | Message::Direction { slot, .. } | Message::Sound { slot, .. }
+                if !is_own =>
+            {
                 // Another throttle drives it: the slot says how.
                 if let Some(train) =
                     self.slots.train_in(slot).filter(|train| !self.unverified.contains(train))
@@ -112,15 +127,14 @@ impl Client {
         if self.dialogue.locomotive(train).is_none() {
             return;
         }
+        let reported = ReportedFunctions { known: SlotData::FUNCTIONS, on: data.functions };
+        self.dialogue.hear_of_functions(train, reported, answered.as_ref().map(|answered| &answered.awaited));
         let commanded = self.slots.of(train).and_then(|slot| slot.commanded);
         // The answer to an older request does not undo what a newer one switched.
-        let is_switching =
-            |awaited: &Awaited| matches!(awaited, Awaited::Functions(switched, _) if *switched == train);
+        let is_switching = self.dialogue.outstanding.any(|awaited| awaited.switched() == Some(train));
         let switched = self.slots.of(train).map(|slot| slot.functions);
         self.slots.found(train, data, now);
-        if let (true, Some(functions), Some(slot)) =
-            (self.dialogue.outstanding.any(is_switching), switched, self.slots.of_mut(train))
-        {
+        if let (true, Some(functions), Some(slot)) = (is_switching, switched, self.slots.of_mut(train)) {
             slot.functions = functions;
         }
         self.without_slot.retain(|other| *other != train);

@@ -2,7 +2,7 @@
 
 use alloc::format;
 
-use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
+use footplate_core::{EventKind, FunctionNumber, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
 
 use super::super::contacts::News;
 use super::super::frame::Frame;
@@ -14,6 +14,7 @@ use super::super::time_model::{CONTACTS_PER_MODULE, Order};
 use super::super::uid::Uid;
 use super::{Client, Query};
 use crate::dialogue::Opening;
+use crate::locomotives::ReportedFunctions;
 use crate::queue::train_of;
 use crate::session::LinkNotice;
 
@@ -92,6 +93,13 @@ impl Client {
                 if let (Some(train), Direction::Forward | Direction::Backward) = (self.train(uid), direction)
                 {
                     self.hear_of_direction(train, direction == Direction::Forward, answered);
+                }
+            }
+            Message::Function { uid, function, value: Some(value) } => {
+                if let (Some(train), Some(function)) = (self.train(uid), FunctionNumber::new(function)) {
+                    let known = function.bit();
+                    let reported = ReportedFunctions { known, on: if value == 0 { 0 } else { known } };
+                    self.dialogue.hear_of_functions(train, reported, answered.as_ref());
                 }
             }
             Message::Accessory { uid, position, current, .. } => {

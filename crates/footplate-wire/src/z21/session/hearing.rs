@@ -15,6 +15,7 @@ use super::super::states::{Firmware, Lock, LocomotiveState, TurnoutPosition};
 use super::super::time_model::occupied;
 use super::{Client, DETECTORS_WITHIN};
 use crate::dialogue::Opening;
+use crate::locomotives::ReportedFunctions;
 use crate::outstanding::{Awaited as _, Outstanding};
 use crate::session::LinkNotice;
 
@@ -51,6 +52,9 @@ impl Client {
             Reply::Broadcasts(reported) => self.hear_of_broadcasts(reported),
             Reply::Locomotive(state) => {
                 let driven = |answered: Outstanding<Awaited>| matches!(answered.awaited, Awaited::Driven(..));
+                let answer = answered.as_ref().map(|answered| &answered.awaited);
+                let reported = ReportedFunctions::all(state.functions);
+                self.dialogue.hear_of_functions(TrainId(state.address), reported, answer);
                 self.hear_of_locomotive(&state, answered.is_some_and(driven));
             }
             Reply::Turnout { address, position: TurnoutPosition::Output { second } } => {

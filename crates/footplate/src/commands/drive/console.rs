@@ -8,8 +8,8 @@ use std::thread;
 use std::time::Duration;
 
 use footplate_core::control::{LinkNews, Machine as _};
-use footplate_core::{Command, Timestamp};
-use footplate_wire::{BlockReports, CommandError, LinkNotice};
+use footplate_core::{Command, Timestamp, TrainId};
+use footplate_wire::{BlockReports, CommandError, LinkNotice, ReportedFunctions};
 
 use super::script_runner::ScriptRunner;
 use super::session_message::{Ended, SessionMessage};
@@ -231,6 +231,12 @@ impl Attendant<Recorded<ScriptRunner>> for Console {
     fn see_blocks(&mut self, blocks: &BlockReports) {
         if let Some(live_view) = &mut self.live_view {
             live_view.painter.see_blocks(blocks.occupied());
+        }
+    }
+
+    fn hear_of_functions(&mut self, train: TrainId, reported: ReportedFunctions) {
+        if let Some(live_view) = &mut self.live_view {
+            live_view.painter.hear_of_functions(train, reported);
         }
     }
 
