@@ -132,7 +132,7 @@ impl Client {
         if driven.register < 0 {
             // The board does not drive it: it was restarted while the line was silent.
             self.restarted();
-            return;
+            return self.verify();
         }
         let reversed = driven.forward != forward;
         locomotive.forward = Some(driven.forward);
