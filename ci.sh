@@ -240,7 +240,7 @@ step_chaos() {
   "$TARGET/debug/footplate" simulate chaos --seeds "$CHAOS_SEEDS"
 }
 
-# Orders and HTTP bodies are read inside the program and have no target yet.
+# Orders are read inside the program: a property test beside their parser draws them. An HTTP body holds such a line as JSON.
 step_fuzz() {
   need_nextest
   cargo build --quiet --workspace --bins --profile test

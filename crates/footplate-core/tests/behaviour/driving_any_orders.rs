@@ -138,6 +138,8 @@ proptest! {
                             }
                             None => break,
                         }
+                        // Otherwise a loop that wakes it when it asks would never wait.
+                        prop_assert!(driver.next_timeout().is_none_or(|at| at > now));
                         while let Some(output) = driver.poll_output() {
                             if let Output::Command(command) = output { waiting.push(command) }
                         }

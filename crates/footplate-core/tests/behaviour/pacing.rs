@@ -71,6 +71,19 @@ fn a_speed_outside_the_steps_is_rejected_with_the_possible_range() {
 }
 
 #[test]
+fn a_lost_train_that_is_to_hold_a_speed_asks_for_no_time_that_has_passed() {
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = driver_of(&world, "D1", 300.0);
+    driver.lose(world.now, TRAIN);
+    driver.order(world.now, hold(240.0)).expect("a speed");
+    world.run(&mut driver, 0.2);
+    driver.handle_timeout(world.now);
+    assert!(driver.next_timeout().is_none_or(|at| at > world.now), "{:?}", driver.next_timeout());
+    // It is paced once two sensors have shown where it is.
+    begin(&mut world, &mut driver);
+}
+
+#[test]
 fn another_order_ends_pacing() {
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let mut driver = driver_of(&world, "D1", 300.0);

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use anyhow::{Context, bail, ensure};
-use footplate_core::{Event, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Event, EventKind, TimeSpan, Timestamp, TrainId};
 use footplate_eval::seeds::Choice;
 use footplate_store::{Journal, JournalEntry, NewMachine, Side, Store, Traced};
 
@@ -148,6 +148,13 @@ impl FaultyDisk {
         let (path, recorded, acknowledged) = (self.path.clone(), self.recorded.clone(), self.acknowledged);
         drop(self);
         kept(&path, &recorded, acknowledged, acknowledged)
+    }
+
+    /// The commands that were sent, with their times.
+    pub(super) fn sent(&self) -> Vec<(Timestamp, String)> {
+        let is_command = |event: &&Event| !matches!(event.kind, EventKind::Sensor(_) | EventKind::Freed(_));
+        let commands = self.recorded.iter().filter(is_command);
+        commands.map(|event| (event.time, format!("sent: {:?}", event.kind))).collect()
     }
 
     /// The program dies. The store must hold all acknowledged entries, and no others than recorded ones.

@@ -168,8 +168,12 @@ impl<'p, 'l> People<'p, 'l> {
 
 impl Attendant<Dispatcher> for People<'_, '_> {
     fn hear(&mut self, now: Timestamp, notice: Notice) {
-        if !matches!(notice, Notice::Planned(_) | Notice::Passed { .. } | Notice::Waits { .. }) {
-            self.tell(now, format!("{notice:?}"));
+        match &notice {
+            Notice::Passed { train, passed, .. } => {
+                self.tell(now, format!("train {train} passed sensor {}", passed.sensor));
+            }
+            Notice::Planned(_) | Notice::Waits { .. } => {}
+            _ => self.tell(now, format!("{notice:?}")),
         }
         match notice {
             Notice::Arrived { .. } => {

@@ -68,21 +68,23 @@ impl Watchdog {
 
     /// Whether a lost train may creep ahead. From its last detection, over the leg to which each turnout is set or over both if
     /// that is unknown, and from wherever it may be, [`SENSORS_AHEAD`] sensors come before the end of the track and before any track that is
-    /// closed to it.
+    /// closed to it; in both directions if it may face in either.
     pub(super) fn is_clear_ahead(&self, now: Timestamp, train: TrainId) -> bool {
         let Some(seen) = self.seen.get(&train) else { return false };
         let closed = self.closed_to(now, train);
         let ahead = Ahead { run: self.unheard_run(now, train), sensors: SENSORS_AHEAD };
-        let set = self.driver.turnouts();
-        reports_before(self.driver.layout(), set, alloc::vec![(seen.edge, seen.offset)], ahead, &closed)
+        let layout = self.driver.layout();
+        let back = layout.reversed(*seen).filter(|_| self.undirected.contains(&train));
+        let begins = core::iter::once(*seen).chain(back).map(|place| (place.edge, place.offset)).collect();
+        reports_before(layout, self.driver.turnouts(), begins, ahead, &closed)
     }
 
     /// The sensor to which a lost train may creep back, in its new direction: the one that reported it last. `None` if
     /// it could reach the end of the track, or track that is closed to it, before a sensor reports it, wherever it
-    /// may be and however turnouts are set.
+    /// may be and however turnouts are set, and if its direction is unknown.
     pub(super) fn sensor_behind(&self, now: Timestamp, train: TrainId) -> Option<NodeId> {
         let layout = self.driver.layout();
-        let behind = *self.behind.get(&train)?;
+        let behind = *self.behind.get(&train).filter(|_| !self.undirected.contains(&train))?;
         let reach = edges_within(layout, behind, self.unheard_run(now, train) + BODY);
         let length = |edge| layout.edge(edge).map_or(Length::ZERO, |edge| edge.length);
         let from = |(edge, left): (EdgeId, Length)| (edge.twin(), (length(edge) - left).max(Length::ZERO));

@@ -76,6 +76,17 @@ impl Watchdog {
         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 
+    /// Commands the stops of trains in danger and of held ones again.
+    pub(super) fn repeat_stops(&mut self, now: Timestamp) {
+        let (dangers, held) = (&self.dangers, &self.held);
+        let is_alarmed = |train: TrainId| dangers.contains_key(&train) || held.contains_key(&train);
+        let stops = &mut self.stops;
+        let due: Vec<TrainId> = core::iter::from_fn(|| stops.take_repeat(now, is_alarmed)).collect();
+        for train in due {
+            self.command(Command::Speed { train, step: SpeedStep::STAND });
+        }
+    }
+
     /// Whether a train could meet one in danger, whose position may be uncertain.
     pub(super) fn could_meet(&self, now: Timestamp, train: TrainId) -> bool {
         let Some(own) = self.own_reach(now, train) else { return self.has_danger() };

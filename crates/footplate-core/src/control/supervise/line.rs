@@ -28,7 +28,10 @@ impl Watchdog {
     /// Takes news of the link.
     pub fn handle_link(&mut self, now: Timestamp, news: LinkNews) {
         match news {
-            LinkNews::ReverseInDoubt { train } => self.lose(now, train),
+            LinkNews::ReverseInDoubt { train } => {
+                self.undirected.insert(train);
+                self.lose(now, train);
+            }
             _ if !self.is_watching() => {}
             LinkNews::Silent if self.silent.is_none() => {
                 self.silent = Some(now);

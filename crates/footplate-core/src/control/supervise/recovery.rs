@@ -288,6 +288,7 @@ impl Watchdog {
                 recovery.fit.note_use(step, StepUse::Moves);
                 // Two consecutive sensors show its direction, and so does one sensor passed in both directions.
                 if node == seen || self.driver.hop_length(train, seen, node).is_some() {
+                    self.undirected.remove(&train);
                     self.notify(Notice::Located { train });
                     self.measure(now, train);
                 } else {

@@ -1,6 +1,6 @@
 //! The watchdog: monitors the trains of a driver, and recovers those that do not run as modelled.
 
-use alloc::collections::{BTreeMap, VecDeque};
+use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
 use alloc::vec::Vec;
 
 use crate::control::dispatch::Reservation;
@@ -55,6 +55,8 @@ pub struct Watchdog {
     pub(super) seen: BTreeMap<TrainId, Position>,
     /// The sensor that reported each train last since it reversed or was placed: it is behind the train.
     pub(super) behind: BTreeMap<TrainId, NodeId>,
+    /// Trains that may face in either direction, until they are located.
+    pub(super) undirected: BTreeSet<TrainId>,
     /// How far each train may have run since its last detection.
     pub(super) unheard: BTreeMap<TrainId, Unheard>,
     /// The orders of recoveries.
@@ -88,6 +90,7 @@ impl Watchdog {
             unfinished: BTreeMap::new(),
             seen: BTreeMap::new(),
             behind: BTreeMap::new(),
+            undirected: BTreeSet::new(),
             unheard: BTreeMap::new(),
             own: BTreeMap::new(),
             permits_all: true,
@@ -161,6 +164,7 @@ impl Watchdog {
         self.note_place(now, train);
         self.note_detection(train, now);
         self.behind.remove(&train);
+        self.undirected.remove(&train);
         self.clear_intruder();
         self.release_held();
         self.drain(now);
@@ -302,11 +306,13 @@ impl Watchdog {
         self.monitors.remove(&train);
         self.seen.remove(&train);
         self.behind.remove(&train);
+        self.undirected.remove(&train);
     }
 
     /// Acts on the outputs and timeouts that are due.
     pub(super) fn act(&mut self, now: Timestamp) {
         self.drain(now);
+        self.repeat_stops(now);
         if let Some(train) = self.stops.overdue(now).filter(|_| self.is_watching && self.is_powered()) {
             self.raise(now, train, Alarm::StopUnconfirmed);
             self.power_off(now, train);
@@ -456,7 +462,7 @@ impl Machine for Watchdog {
             self.note_command(train, event.time, step);
             if step == SpeedStep::STAND {
                 let at_rest = self.at_rest_by(train, event.time);
-                self.stops.sent(train, at_rest);
+                self.stops.sent(train, event.time, at_rest);
                 self.monitors.entry(train).or_default().stop();
             } else {
                 self.stops.forget(train);
@@ -486,7 +492,8 @@ impl Machine for Watchdog {
     fn next_timeout(&self) -> Option<Timestamp> {
         let waits = self.dangers.keys().filter_map(|train| self.stops.at_rest(*train));
         let recovering = self.dangers.values().filter_map(Recovery::next_timeout);
-        let own = recovering.chain(waits).chain(self.stops.next()).chain(self.power_due());
+        let repeats = self.stops.next_repeat(|train| self.is_held(train));
+        let own = recovering.chain(waits).chain(self.stops.next()).chain(repeats).chain(self.power_due());
         own.filter(|at| *at > self.acted).chain(self.driver.next_timeout()).min()
     }
 }

@@ -207,6 +207,9 @@ impl Words<'_, '_, '_> {
 mod tests {
     use footplate_core::{Length, Ratio, Speed, TimeSpan, TrainId, TurnoutId};
     use footplate_store::{Schedule, layout_named};
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+    use proptest::sample::select;
 
     use super::*;
 
@@ -357,18 +360,29 @@ mod tests {
         assert!(mistake.contains("is off the track"), "{mistake}");
     }
 
-    #[test]
-    fn no_line_panics() {
-        for line in [
-            "\u{0}",
-            "speed 99999999999 1",
-            "wait -1s",
-            "wait 1e999s",
-            "move 24 nanmm",
-            "stop 24 at +",
-            "wait ms",
-        ] {
-            assert!(read(line).is_err(), "{line:?}");
+    /// Words that lines are made of, and some that end in what a reader could stumble over.
+    const SOME: &str = "24 58 at to in by step rest C13 C13+120mm C13+ + -1mm mm 1e999s 99999999999 0 2s 0.1% not-beyond \
+        facing next round pickup overhang on off all straight curved behind # \u{0}";
+
+    fn any_word() -> impl Strategy<Value = String> {
+        prop_oneof![
+            4 => select(VERBS.to_vec()).prop_map(str::to_owned),
+            8 => select(SOME.split(' ').collect::<Vec<_>>()).prop_map(str::to_owned),
+            1 => any::<f64>().prop_map(|number| format!("{number}mm")),
+            1 => ".{0,8}",
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn a_mistake_in_any_line_names_a_column_of_it(words in vec(any_word(), 0..12)) {
+            let line = words.join(" ");
+            if let Err(mistake) = read(&line) {
+                let column = mistake.strip_prefix("column ").and_then(|rest| rest.split(':').next());
+                let column: Option<usize> = column.and_then(|column| column.parse().ok());
+                let is_of_it = |column: usize| (1..=line.chars().count() + 2).contains(&column);
+                prop_assert!(column.is_some_and(is_of_it), "{line:?}: {mistake}");
+            }
         }
     }
 }

@@ -205,7 +205,13 @@ impl DrivenTrain {
         if !self.follows_plan(context, now, out) || !self.may_follow(context, now, others, out) {
             return;
         }
-        let Some(rollout) = self.locator.rollout() else { return };
+        let Some(rollout) = self.locator.rollout() else {
+            // A lost train is paced again from the next sensor on.
+            self.pacing.iter_mut().for_each(|pacing| {
+                pacing.next_update.take_if(|at| *at <= now);
+            });
+            return;
+        };
         let (node, model) = (rollout.node(), &self.model);
         let followed = match self.pacing.as_ref().map(|pacing| &pacing.pace) {
             Some(Pace::Follow(following)) => self.follow_reference(context, now, *following, node, others),
