@@ -163,7 +163,7 @@ export function recordingsPage(root, live, number) {
     } catch (error) {
       put($("#answer"), error.message);
     }
-    slider.max = String(Math.max(0, ...[...shownSessions.values()].map((walked) => walked.lasts)).toFixed(1));
+    slider.max = String(Number(Math.max(0, ...[...shownSessions.values()].map((walked) => walked.lasts)).toFixed(1)));
     slider.value = "0";
     draw();
     show();
