@@ -184,6 +184,13 @@ impl Locator {
         }
     }
 
+    /// Whether it is at rest at a time not before the last entry, located or not.
+    #[must_use]
+    pub fn is_at_rest(&self, model: &MotionModel, at: Timestamp) -> bool {
+        let time = self.seconds(at);
+        self.filter.at(model, time).rests_at(time)
+    }
+
     /// The node from which its distance counts, the distance (m) and the speed (m/s); `None` while it is lost.
     pub(super) fn motion_at(&self, model: &MotionModel, at: Timestamp) -> Option<(NodeId, Gaussian, f64)> {
         let time = self.seconds(at);

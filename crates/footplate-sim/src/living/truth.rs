@@ -149,12 +149,16 @@ impl<'w, 'l> Truth<'w, 'l> {
         // What it passed before it was lifted is no distance from here.
         let passed = passed.filter(|pass| pass.odometer_mm >= found.put_down_at);
         let since = passed.map(|pass| found.odometer - pass.odometer_mm).filter(|mm| *mm < FAR_MM);
-        // Past its usual place, and it has not closed yet this time.
-        let just_past = self.closes_at(sensor).and_then(|usual| self.distance_between(usual, place));
-        let is_due = |mm: &f64| *mm < CLOSES_WITHIN_MM && since.is_none_or(|since| since > CLOSES_WITHIN_MM);
-        let since = just_past.filter(is_due).or(since);
         let is_entry = self.world.layout().block_of_entry(sensor).is_some();
         let ahead = if is_entry { found.sensed()[0] } else { 0.0 };
+        // Past its usual place, and it has not closed yet this time.
+        let just_past = self.closes_at(sensor).and_then(|usual| {
+            let shoe_past = self.distance_between(usual, place).map(|mm| ahead + mm);
+            let shoe_short = self.distance_between(place, usual).map(|mm| ahead - mm);
+            shoe_past.into_iter().chain(shoe_short).filter(|mm| *mm >= 0.0).min_by(f64::total_cmp)
+        });
+        let is_due = |mm: &f64| *mm < CLOSES_WITHIN_MM && since.is_none_or(|since| since > CLOSES_WITHIN_MM);
+        let since = just_past.filter(is_due).or(since);
         let before = self.distance_to((place.0, place.1 + ahead), sensor);
         let nearer = |since: f64, before: f64| if since <= before { since } else { -before };
         let mm = match (since, before) {

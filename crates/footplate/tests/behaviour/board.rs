@@ -38,10 +38,15 @@ pub(crate) fn calibrated(name: &str, seed: u64) -> PathBuf {
 
 /// The same behind any simulated station; the link ends where the seed is written.
 pub(crate) fn calibrated_over(link: &str, name: &str, seed: u64) -> PathBuf {
+    calibrated_on("track-a", "5m", &format!("{link}{seed}"), name)
+}
+
+/// The same on any layout and within any time.
+pub(crate) fn calibrated_on(layout: &str, budget: &str, link: &str, name: &str) -> PathBuf {
     let folder = folder(name);
-    let (link, store) = (format!("{link}{seed}"), folder.join("railway.db").display().to_string());
-    let over = ["--link", &link, "--layout", "track-a", "--store", &store];
-    let calibrated = footplate(&[&["calibrate", "--train", "24", "--budget", "5m"], &over[..]].concat());
+    let store = folder.join("railway.db").display().to_string();
+    let over = ["--link", link, "--layout", layout, "--store", &store];
+    let calibrated = footplate(&[&["calibrate", "--train", "24", "--budget", budget], &over[..]].concat());
     assert_eq!(calibrated.status, 0, "{}{}", calibrated.output, calibrated.errors);
     folder
 }
@@ -55,9 +60,14 @@ pub(crate) fn driven(folder: &Path, link: &str, script: &str) -> (Run, Vec<Value
 
 /// The same where an order may end otherwise, such as at rest with a sensor unseen.
 pub(crate) fn tried(folder: &Path, link: &str, script: &str) -> (Run, Vec<Value>) {
+    tried_on("track-a", folder, link, script)
+}
+
+/// The same on any layout.
+pub(crate) fn tried_on(layout: &str, folder: &Path, link: &str, script: &str) -> (Run, Vec<Value>) {
     let [store, file] = ["railway.db", "script.txt"].map(|file| folder.join(file).display().to_string());
     std::fs::write(&file, script).expect("a test file");
-    let over = ["--link", link, "--layout", "track-a", "--store", &store];
+    let over = ["--link", link, "--layout", layout, "--store", &store];
     let run = footplate(&[&["drive", "--script", &file, "--json"], &over[..]].concat());
     assert!(run.status <= 1, "{}{}", run.output, run.errors);
     let lines = run.output.lines().map(|line| serde_json::from_str(line).expect(line));

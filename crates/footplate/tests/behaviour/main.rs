@@ -25,6 +25,7 @@ mod odometer_on_scenarios;
 mod odometry;
 mod odometry_report;
 mod other_layouts;
+mod other_stations;
 mod phones;
 mod placed_rides;
 mod plot;

@@ -13,6 +13,20 @@ use super::hypotheses::{Detection, Explanation, hypotheses};
 const SESSION_IS_RIGHT: f64 = 10.0;
 
 impl Driver {
+    /// Whether a block is found occupied while the trains, none of them located yet, are at rest: detectors report that when the
+    /// track gets power, or when a train is put down. No train has come to a boundary.
+    pub(super) fn is_found_occupied(&mut self, detection: &Detection) -> bool {
+        let Some(block) = self.track.context().layout.block_of_entry(detection.sensor) else { return false };
+        let stands = |train: &DrivenTrain| {
+            !train.locator.is_located() && train.locator.is_at_rest(&train.model, detection.window.until)
+        };
+        let is_found = self.trains.values().all(stands);
+        if is_found {
+            self.occupied.insert(block.detector);
+        }
+        is_found
+    }
+
     /// The sensor of a report. A detector does not say at which end of its block a train came in, and the session only knows
     /// which blocks were occupied; where trains are decides.
     pub(super) fn likeliest_entry(&mut self, now: Timestamp, detection: Detection) -> Detection {
@@ -72,5 +86,38 @@ impl DrivenTrain {
         if left >= self.steady_at {
             self.model.take_release(release);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::Machine as _;
+    use crate::event::{Event, EventKind};
+    use crate::ids::{SpeedStep, TrainId};
+    use crate::model::MotionModel;
+    use crate::time::TimeSpan;
+    use crate::track::TurnoutStates;
+    use crate::track::example::oval_of_blocks;
+    use crate::tracking::Locator;
+
+    #[test]
+    fn a_block_that_is_found_occupied_does_not_locate_a_train_at_rest() {
+        let layout = oval_of_blocks();
+        let sensor = layout.blocks()[0].entries[0];
+        let train = TrainId(24);
+        let step = |number| SpeedStep::new(number).unwrap();
+        let mut driver = Driver::new(layout, TurnoutStates::unknown());
+        driver.add_located(MotionModel::unknown(train, step(14)), Locator::new(train));
+        let mut hear = |seconds, kind| {
+            let time = Timestamp::from_s(seconds);
+            driver.handle_event(time, &Event { time, kind });
+            driver.locate(train, time).is_some()
+        };
+        let report = EventKind::Sensor(Report { sensor, poll_interval: Some(TimeSpan::from_ms(20)) });
+        assert!(!hear(1.0, report));
+        // Once the train runs, the same report shows where it is.
+        hear(10.0, EventKind::Speed { train, step: step(9) });
+        assert!(hear(20.0, report));
     }
 }

@@ -320,6 +320,9 @@ impl Driver {
         while let Some(sensor) = self.association.next_restored(now) {
             self.outputs.notify(Notice::SensorRestored { sensor });
         }
+        if self.is_found_occupied(&detection) {
+            return;
+        }
         let detection = self.likeliest_entry(now, detection);
         let sensor = detection.sensor;
         match self.association.resolve(&self.trains, self.track.context(), now, detection) {
