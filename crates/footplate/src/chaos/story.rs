@@ -315,8 +315,7 @@ impl<'l> Teller<'_, 'l> {
         drop(people);
         drop(recorder);
         let disk = Rc::into_inner(disk).context("a disk that is still in use")?.into_inner();
-        self.fate.told.append(&mut line.told);
-        self.fate.told.append(&mut disk.sent());
+        self.fate.told.extend(line.told.drain(..).chain(disk.sent()));
         self.count(seen);
         let ended = match ended {
             Ok(Ended::Finished) => "finished".to_owned(),
