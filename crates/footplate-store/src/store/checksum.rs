@@ -2,10 +2,10 @@
 
 use crc32fast::Hasher;
 use rusqlite::types::{ToSqlOutput, Value, ValueRef};
-use rusqlite::{Statement, ToSql, params_from_iter};
+use rusqlite::{Connection, Statement, ToSql, params_from_iter};
 
 /// The tables whose rows have a checksum. It is the last column of each; rows of older programs have none there.
-pub(super) const TABLES: [&str; 3] = ["events", "inputs", "decisions"];
+pub(super) const TABLES: [&str; 4] = ["events", "inputs", "decisions", "archives"];
 /// The column of the checksum.
 pub(super) const COLUMN: &str = "crc32";
 
@@ -34,6 +34,21 @@ pub(super) fn of<'v>(table: &str, values: impl IntoIterator<Item = ValueRef<'v>>
         }
     }
     hasher.finalize()
+}
+
+/// The number of the first row of one of [`TABLES`] whose checksum differs.
+pub(super) fn changed_row(connection: &Connection, table: &str) -> rusqlite::Result<Option<i64>> {
+    let rows = format!("SELECT * FROM {table} WHERE {COLUMN} IS NOT NULL");
+    let mut statement = connection.prepare(&rows)?;
+    let last = statement.column_count() - 1;
+    let mut rows = statement.query([])?;
+    while let Some(row) = rows.next()? {
+        let values = (1..last).map(|at| row.get_ref(at)).collect::<rusqlite::Result<Vec<_>>>()?;
+        if i64::from(of(table, values)) != row.get::<_, i64>(last)? {
+            return row.get(0).map(Some);
+        }
+    }
+    Ok(None)
 }
 
 /// Inserts a row whose checksum is the last parameter of the statement. `values` are those before it, in the order of the table's

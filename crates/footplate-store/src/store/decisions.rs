@@ -1,13 +1,14 @@
 //! The decisions of a machine in a live session, and their inputs.
 //!
 //! The store keeps the initial state of a machine, and after it, numbered together, its inputs and decisions. Every row
-//! is one [`Traced`]; the program that wrote the text defines its meaning.
+//! is one [`Traced`]; the program that wrote the text defines its meaning. Older ones move into [archives](super::archives).
 
 use std::borrow::Cow;
 
 use footplate_core::Timestamp;
-use rusqlite::{Row, ToSql, Transaction};
+use rusqlite::{Connection, Row, ToSql, Transaction};
 
+use super::archives::archived;
 use super::checksum;
 use super::error::StoreError;
 use super::file::Store;
@@ -101,8 +102,11 @@ impl Store {
     /// The store cannot be read.
     pub fn machines(&self) -> Result<Vec<StoredMachine>, StoreError> {
         let sql = "SELECT id, recording, stored_at_ns, kind, program, body, body_sha256, \
-                   (SELECT count(*) FROM inputs WHERE machine = machines.id), \
-                   (SELECT count(*) FROM decisions WHERE machine = machines.id) FROM machines ORDER BY id";
+                   (SELECT count(*) FROM inputs WHERE machine = machines.id) + \
+                   (SELECT ifnull(sum(inputs), 0) FROM archives WHERE machine = machines.id), \
+                   (SELECT count(*) FROM decisions WHERE machine = machines.id) + \
+                   (SELECT ifnull(sum(decisions), 0) FROM archives WHERE machine = machines.id) \
+                   FROM machines ORDER BY id";
         let read = || {
             let mut statement = self.connection.prepare(sql)?;
             statement.query_map([], machine)?.collect::<rusqlite::Result<Vec<StoredMachine>>>()
@@ -115,14 +119,20 @@ impl Store {
     /// # Errors
     /// The store cannot be read.
     pub fn trace(&self, machine: MachineKey) -> Result<Vec<Traced>, StoreError> {
-        let sql = "SELECT number, time_ns, 0, kind, text FROM inputs WHERE machine = ?1 UNION ALL \
-                   SELECT number, time_ns, 1, kind, text FROM decisions WHERE machine = ?1 ORDER BY number";
         let read = || {
-            let mut statement = self.connection.prepare(sql)?;
-            statement.query_map([machine.0], traced)?.collect::<rusqlite::Result<Vec<Traced>>>()
+            let mut trace = archived(&self.connection, machine)?;
+            trace.extend(loose(&self.connection, machine)?);
+            Ok(trace)
         };
         read().map_err(|error| self.error(error))
     }
+}
+
+/// The inputs and decisions of a machine that are rows of their own, in order.
+pub(super) fn loose(connection: &Connection, machine: MachineKey) -> rusqlite::Result<Vec<Traced>> {
+    let sql = "SELECT number, time_ns, 0, kind, text FROM inputs WHERE machine = ?1 UNION ALL \
+               SELECT number, time_ns, 1, kind, text FROM decisions WHERE machine = ?1 ORDER BY number";
+    connection.prepare(sql)?.query_map([machine.0], traced)?.collect()
 }
 
 fn machine(row: &Row<'_>) -> rusqlite::Result<StoredMachine> {

@@ -21,6 +21,7 @@ const MIGRATIONS: &[&str] = &[
     include_str!("migrations/5_checksums.sql"),
     include_str!("migrations/6_profiles.sql"),
     include_str!("migrations/7_schedules.sql"),
+    include_str!("migrations/8_archives.sql"),
 ];
 
 /// The longest wait for another process to finish writing (chosen: an import of a million events takes less).
@@ -95,31 +96,18 @@ impl Store {
         let what = match orphan {
             _ if found != "ok" => found.replace('\n', ", "),
             Some(table) => format!("rows of {table} belong to nothing"),
-            None => match self.changed_row().map_err(|error| self.error(error))? {
-                Some((table, row)) => {
-                    format!("row {row} of {table} is not as it was written: its checksum differs")
-                }
-                None => return Ok(()),
-            },
+            None => {
+                let changed = checksum::TABLES.iter().find_map(|table| {
+                    let row = checksum::changed_row(&self.connection, table).transpose()?;
+                    Some(row.map(|row| (table, row)))
+                });
+                let Some((table, row)) = changed.transpose().map_err(|error| self.error(error))? else {
+                    return Ok(());
+                };
+                format!("row {row} of {table} is not as it was written: its checksum differs")
+            }
         };
         Err(StoreError::Damaged { file: self.path.clone(), what })
-    }
-
-    /// The first row whose checksum differs, with its table.
-    fn changed_row(&self) -> rusqlite::Result<Option<(&'static str, i64)>> {
-        for table in checksum::TABLES {
-            let rows = format!("SELECT * FROM {table} WHERE {} IS NOT NULL", checksum::COLUMN);
-            let mut statement = self.connection.prepare(&rows)?;
-            let last = statement.column_count() - 1;
-            let mut rows = statement.query([])?;
-            while let Some(row) = rows.next()? {
-                let values = (1..last).map(|at| row.get_ref(at)).collect::<rusqlite::Result<Vec<_>>>()?;
-                if i64::from(checksum::of(table, values)) != row.get::<_, i64>(last)? {
-                    return Ok(Some((table, row.get(0)?)));
-                }
-            }
-        }
-        Ok(None)
     }
 
     fn open_with(path: &Path, flags: OpenFlags, migrations: &[&str]) -> Result<Self, StoreError> {
@@ -141,6 +129,8 @@ impl Store {
         // A commit is on disk before it is acknowledged.
         self.connection.pragma_update(None, "synchronous", "FULL")?;
         self.connection.pragma_update(None, "foreign_keys", true)?;
+        // Zeros over what has moved into an archive, so that a salvage does not find it a second time.
+        self.connection.pragma_update(None, "secure_delete", true)?;
         // No code in a foreign file runs with our rights, and damaged pages are detected early.
         self.connection.pragma_update(None, "trusted_schema", false)?;
         self.connection.pragma_update(None, "cell_size_check", true)

@@ -7,6 +7,7 @@
 
 use footplate_core::{Event, RunId, Timestamp};
 
+use super::archives;
 use super::decisions::{self, MachineKey, NewMachine, Traced};
 use super::error::StoreError;
 use super::file::Store;
@@ -46,6 +47,8 @@ pub struct Journal {
     number: u32,
     machine: Option<MachineKey>,
     acknowledged: u64,
+    /// Inputs and decisions that are not in an archive yet.
+    loose: u64,
 }
 
 impl Journal {
@@ -64,7 +67,26 @@ impl Journal {
     ) -> Result<Self, StoreError> {
         let recording = store.begin_recording(name, layout, now)?;
         let run = store.begin_run(recording, RunId(1), began_at, trains)?;
-        Ok(Self { store, recording, run, number: 1, machine: None, acknowledged: 0 })
+        let mut journal = Self { store, recording, run, number: 1, machine: None, acknowledged: 0, loose: 0 };
+        journal.archive_loose()?;
+        Ok(journal)
+    }
+
+    /// Moves what earlier sessions, or an older Footplate, left outside archives, if it is much.
+    fn archive_loose(&mut self) -> Result<(), StoreError> {
+        let path = self.store.path().to_owned();
+        let transaction = self.store.write()?;
+        let archive = || {
+            let loose = archives::loose_count(&transaction)?;
+            if loose < archives::MOST_LOOSE {
+                return Ok(loose);
+            }
+            archives::archive(&transaction)?;
+            Ok(0)
+        };
+        let loose = archive().and_then(|loose| transaction.commit().map(|()| loose));
+        self.loose = loose.map_err(|error| StoreError::of(&path, error))?;
+        Ok(())
     }
 
     /// Begins the next run: the clock has jumped, a train was lifted, or other trains take part. `began_at` as above;
@@ -113,16 +135,20 @@ impl Journal {
         let path = self.store.path().to_owned();
         let (run, machine) = (self.run, self.machine.unwrap_or(NO_MACHINE));
         let transaction = self.store.write()?;
+        let events = entries.iter().filter_map(JournalEntry::event).count() as u64;
+        let loose = self.loose + (entries.len() as u64 - events);
+        let is_much = loose >= archives::MOST_LOOSE;
         let append = || {
             let mut statement = transaction.prepare_cached(row::INSERT)?;
             entries.iter().try_for_each(|entry| match entry {
                 JournalEntry::Event(event) => row::insert(&mut statement, run, None, now, *event),
                 JournalEntry::Traced(traced) => decisions::insert(&transaction, machine, traced),
-            })
+            })?;
+            if is_much { archives::archive(&transaction) } else { Ok(()) }
         };
         append().and_then(|()| transaction.commit()).map_err(|error| StoreError::of(&path, error))?;
-        let events = entries.iter().filter_map(JournalEntry::event).count();
-        self.acknowledged += events as u64;
+        self.acknowledged += events;
+        self.loose = if is_much { 0 } else { loose };
         Ok(self.acknowledged)
     }
 

@@ -9,6 +9,7 @@
 //! recordings    imports recordings, appends the events of a live session
 //! journal       a live session from its beginning to its end
 //! decisions     inputs and decisions of a machine, for a replay
+//! archives      the same, many in a row and compressed
 //! history       the state at a date, and the changes between two dates
 //! marks         excludes and restores events
 //! calibrations  models of trains by date
@@ -20,6 +21,7 @@
 //! salvage       copies the readable rows of a damaged file into a new one
 //! ```
 
+mod archives;
 mod calibrations;
 mod checksum;
 mod decisions;

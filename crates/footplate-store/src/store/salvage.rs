@@ -55,7 +55,7 @@ pub struct SalvagedTable {
 }
 
 /// The tables with their parents, parents first. States of replays are not copied: they follow from the rest.
-const TABLES: [(&str, Option<Parent>); 12] = [
+const TABLES: [(&str, Option<Parent>); 13] = [
     ("recordings", None),
     ("runs", Some(Parent { column: "recording", table: "recordings", stand_in: STAND_IN_RECORDING })),
     ("starts", Some(Parent { column: "run", table: "runs", stand_in: STAND_IN_RUN })),
@@ -70,6 +70,7 @@ const TABLES: [(&str, Option<Parent>); 12] = [
     // Without the initial state no decision can be replayed.
     ("inputs", None),
     ("decisions", None),
+    ("archives", None),
 ];
 
 /// The parent of a row.

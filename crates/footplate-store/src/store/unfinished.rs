@@ -25,7 +25,8 @@ impl Store {
         let newest = "SELECT recordings.name FROM machines \
                       JOIN recordings ON recordings.id = machines.recording \
                       WHERE machines.id = (SELECT max(id) FROM machines) AND NOT EXISTS \
-                      (SELECT 1 FROM inputs WHERE machine = machines.id AND kind = 'end')";
+                      (SELECT 1 FROM inputs WHERE machine = machines.id AND kind = 'end') AND NOT EXISTS \
+                      (SELECT 1 FROM archives WHERE machine = machines.id AND has_end)";
         let known = "SELECT train FROM events WHERE train IS NOT NULL UNION SELECT train FROM calibrations \
                      UNION SELECT part.value FROM machines, json_tree(machines.body) AS part \
                      WHERE machines.id = (SELECT max(id) FROM machines) AND part.key = 'train' \

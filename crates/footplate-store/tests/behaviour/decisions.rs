@@ -100,3 +100,85 @@ fn a_session_without_an_end_is_unfinished_with_all_trains_that_may_run() {
     journal.append_all(&[JournalEntry::Traced(end)], minute(1)).unwrap();
     assert_eq!(journal.end().unfinished_session().unwrap(), None);
 }
+
+/// Entries that fill a store until they move into archives.
+const FILLS: u64 = 1_024;
+
+fn entries(numbers: std::ops::Range<u64>) -> Vec<JournalEntry> {
+    numbers.map(traced).map(JournalEntry::Traced).collect()
+}
+
+#[test]
+fn entries_of_long_sessions_are_archived_and_come_back() {
+    let shelf = Shelf::new();
+    let mut journal = journal(&shelf);
+    journal.begin_machine(DRIVE, minute(0)).unwrap();
+    for first in (0..10_000).step_by(500) {
+        journal.append_all(&entries(first..first + 500), minute(1)).unwrap();
+    }
+    // A later session continues where the first left off.
+    let mut journal = Journal::begin(journal.end(), "night", "track-a", None, &[], minute(2)).unwrap();
+    journal.begin_machine(NewMachine { kind: "tour", ..DRIVE }, minute(2)).unwrap();
+    journal.append_all(&entries(0..4_000), minute(2)).unwrap();
+    let store = journal.end();
+    store.check().unwrap();
+
+    let file = rusqlite::Connection::open(shelf.path()).unwrap();
+    let count = |sql: &str| file.query_row(sql, [], |row| row.get::<_, u64>(0)).unwrap();
+    let loose = count("SELECT (SELECT count(*) FROM inputs) + (SELECT count(*) FROM decisions)");
+    assert!(loose < FILLS, "{loose} entries are outside archives");
+    assert_eq!(count("SELECT sum(inputs + decisions) FROM archives") + loose, 14_000);
+    let machines = store.machines().unwrap();
+    // Every third entry is an input, the first one included.
+    let counts: Vec<_> = machines.iter().map(|one| (one.inputs, one.decisions)).collect();
+    assert_eq!(counts, [(3_334, 6_666), (1_334, 2_666)]);
+    assert_eq!(store.trace(machines[0].key).unwrap(), (0..10_000).map(traced).collect::<Vec<_>>());
+    assert_eq!(store.trace(machines[1].key).unwrap(), (0..4_000).map(traced).collect::<Vec<_>>());
+    // What is in no archive stays.
+    if loose > 0 {
+        assert!(file.execute_batch("DELETE FROM inputs; DELETE FROM decisions").is_err());
+    }
+
+    let into = shelf.file("new.db");
+    let salvaged = salvage(&shelf.path(), &into).unwrap();
+    assert!(salvaged.is_all(), "{salvaged:?}");
+    let salvaged = Store::open(&into).unwrap();
+    assert_eq!(salvaged.machines().unwrap(), machines);
+    assert_eq!(salvaged.trace(machines[0].key).unwrap(), (0..10_000).map(traced).collect::<Vec<_>>());
+    // A changed archive is noticed.
+    file.execute_batch(
+        "DROP TRIGGER archives_are_not_changed; UPDATE archives SET last = last + 1 WHERE id = 1",
+    )
+    .unwrap();
+    let damage = store.check().unwrap_err().to_string();
+    assert!(damage.contains("row 1 of archives is not as it was written"), "{damage}");
+}
+
+#[test]
+fn a_session_whose_end_is_in_an_archive_has_ended() {
+    let shelf = Shelf::new();
+    let mut journal = journal(&shelf);
+    journal.begin_machine(DRIVE, minute(0)).unwrap();
+    journal.append_all(&entries(0..FILLS - 1), minute(1)).unwrap();
+    assert!(shelf.store().unfinished_session().unwrap().is_some());
+    let end = Traced { side: Side::Input, kind: Cow::Borrowed("end"), ..traced(FILLS - 1) };
+    journal.append_all(&[JournalEntry::Traced(end)], minute(1)).unwrap();
+    let store = journal.end();
+    let file = rusqlite::Connection::open(shelf.path()).unwrap();
+    let inputs: u64 = file.query_row("SELECT count(*) FROM inputs", [], |row| row.get(0)).unwrap();
+    assert_eq!((inputs, store.unfinished_session().unwrap()), (0, None));
+}
+
+#[test]
+fn a_changed_entry_is_not_hidden_in_an_archive() {
+    let shelf = Shelf::new();
+    let mut journal = journal(&shelf);
+    journal.begin_machine(DRIVE, minute(0)).unwrap();
+    journal.append_all(&entries(0..FILLS - 1), minute(1)).unwrap();
+    let file = rusqlite::Connection::open(shelf.path()).unwrap();
+    file.execute_batch("DROP TRIGGER inputs_are_not_changed; UPDATE inputs SET text = 'other' WHERE id = 7")
+        .unwrap();
+    journal.append_all(&entries(FILLS - 1..FILLS + 1), minute(1)).unwrap();
+    let damage = journal.end().check().unwrap_err().to_string();
+    assert!(damage.contains("row 7 of inputs is not as it was written"), "{damage}");
+}

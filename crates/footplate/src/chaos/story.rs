@@ -296,8 +296,7 @@ impl<'l> Teller<'_, 'l> {
         drop(people);
         drop(recorder);
         let disk = Rc::into_inner(disk).context("a disk that is still in use")?.into_inner();
-        self.fate.notes.append(&mut line.notes);
-        self.fate.notes.append(&mut disk.sent());
+        self.fate.notes.extend(line.notes.drain(..).chain(disk.sent()));
         self.count(seen);
         let ended = match ended {
             Ok(Ended::Finished) => "finished".to_owned(),
