@@ -13,6 +13,7 @@ use footplate_core::{TimeSpan, TrainId};
 use footplate_sim::LivingSwitches;
 
 use self::arrive::{Arrived, arrive};
+use self::counted::By;
 use self::follow::{Followed, Kept, follow};
 use self::hold::{Held, hold};
 pub use self::page::Page;
@@ -25,29 +26,6 @@ const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(63)];
 /// Gaps between them (s or mm), and for how long each is kept (s).
 const GAPS: [(Kept, f64); 3] = [(Kept::Time, 1.5), (Kept::Time, 3.0), (Kept::Length, 150.0)];
 const FOLLOWED_FOR: f64 = 600.0;
-
-/// The driver of a train.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum By {
-    Footplate,
-    /// Footplate with a motion model made from the truth: what is left is what no calibration could remove.
-    Oracle,
-    /// A driver that only knows the speeds of steps.
-    Step,
-}
-
-impl By {
-    const ALL: [Self; 3] = [Self::Footplate, Self::Oracle, Self::Step];
-
-    /// Its name in tables; `step` is what the one does that only knows the speeds of steps.
-    const fn key(self, step: &'static str) -> &'static str {
-        match self {
-            Self::Footplate => "footplate",
-            Self::Oracle => "oracle",
-            Self::Step => step,
-        }
-    }
-}
 
 /// The results of one seed.
 pub struct Scored {

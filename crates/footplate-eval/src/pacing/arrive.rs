@@ -5,8 +5,7 @@ use footplate_core::control::{Notice, Order, OrderId, Refusal, StopOrder};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Length, TimeSpan, Timestamp, TrainId};
 
-use super::By;
-use super::counted::{Counted, cut_short};
+use super::counted::{By, Counted, cut_short};
 use super::hold::oracle_model;
 use super::tracked::LOOK;
 use crate::seeds::Choice;

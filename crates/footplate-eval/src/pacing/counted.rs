@@ -10,6 +10,29 @@ use footplate_wire::LinkNotice;
 
 use crate::testbed::VirtualLine;
 
+/// The driver of a train.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum By {
+    Footplate,
+    /// Footplate with a motion model made from the truth: what is left is what no calibration could remove.
+    Oracle,
+    /// A driver that only knows the speeds of steps.
+    Step,
+}
+
+impl By {
+    pub(super) const ALL: [Self; 3] = [Self::Footplate, Self::Oracle, Self::Step];
+
+    /// Its name in tables; `step` is what the one does that only knows the speeds of steps.
+    pub(super) const fn key(self, step: &'static str) -> &'static str {
+        match self {
+            Self::Footplate => "footplate",
+            Self::Oracle => "oracle",
+            Self::Step => step,
+        }
+    }
+}
+
 /// What is above the driver.
 enum Control {
     /// The dispatcher with its watchdog, as in operation.

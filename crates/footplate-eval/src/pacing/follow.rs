@@ -7,8 +7,7 @@ use footplate_core::control::{Gap, Notice, Order, Refusal, TrainLengths};
 use footplate_core::{Length, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::living::Truth;
 
-use super::By;
-use super::counted::{Counted, cut_short};
+use super::counted::{By, Counted, cut_short};
 use super::tracked::{LOOK, Odometer};
 use crate::seeds::Choice;
 use crate::testbed::{LongestCircuit, PreparedTrains, speed};

@@ -8,8 +8,7 @@ use footplate_core::track::Layout;
 use footplate_core::tracking::TrackContext;
 use footplate_core::{Length, NodeId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use super::By;
-use super::counted::{Counted, cut_short};
+use super::counted::{By, Counted, cut_short};
 use super::tracked::{LOOK, Odometer, TruePath};
 use crate::driving::known;
 use crate::seeds::Choice;

@@ -5,10 +5,11 @@ use std::ops::Range;
 
 use serde_json::{Value, json};
 
+use super::Scored;
 use super::arrive::{self, Arrived};
+use super::counted::By;
 use super::follow::{self, Followed, Kept};
 use super::hold::{Held, HoldRecord};
-use super::{By, Scored};
 use crate::figures::{quantile, root_mean_square, shown, within_pct};
 use crate::written_scores::{Rate, WrittenScores};
 
