@@ -2,7 +2,7 @@
 //! commands.
 #![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
 
-use footplate_core::control::{Driver, Notice, Order, PacedLine, Refusal};
+use footplate_core::control::{Driver, Machine as _, Notice, Order, PacedLine, Refusal};
 use footplate_core::{Command, Speed, TimeSpan, Timestamp, TrainId};
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 
