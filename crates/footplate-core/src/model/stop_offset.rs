@@ -18,8 +18,9 @@ const LEAST_DEVIATION: f64 = 0.0005;
 /// On a layout of which nothing is known (m): the effect of a gradient of 0.2 % on a train that rolls to rest (chosen: tables of
 /// clubs are level to a few millimetres a metre), ...
 const USUAL_DEVIATION: f64 = 0.005;
-/// ... which weighs as much as this many edges that are well known.
-const WORTH: f64 = 4.0;
+/// ... which weighs as much as this many edges that are well known. With four, a layout of steep gradients is taken for a level one for
+/// whole sessions: while the deviation is small, no edge counts as well known.
+const WORTH: f64 = 1.0;
 /// Halvings of the speed at which a part of a stop is left: to a thousandth.
 const HALVINGS: usize = 10;
 

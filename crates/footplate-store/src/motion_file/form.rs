@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 use crate::quantity::Quantity;
 
 /// The version of the formulas behind the numbers. Raise it when the same events lead to other numbers: with every
-/// change of the fit in `calibration::motion` of core, or of the events that [`MotionReplay`](crate::MotionReplay)
+/// change of the fit in `model::fit` of core, or of the events that [`MotionReplay`](crate::MotionReplay)
 /// feeds it. Stored models and replays are then computed again from the events. A test pins the numbers of every
 /// version.
-pub const MOTION_MODEL_VERSION: &str = "7";
+pub const MOTION_MODEL_VERSION: &str = "8";
 
 /// The motion model of one train on one layout.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
