@@ -70,8 +70,7 @@ impl Client {
             match self.dialogue.next_repeat(now, only_urgent)? {
                 Repeat::Again(outgoing) => return Some(outgoing),
                 Repeat::GivenUp(given_up) => {
-                    let has_answered = self.dialogue.heard >= given_up.sent;
-                    if let Some(instead) = self.instead_of(given_up.awaited, has_answered) {
+                    if let Some(instead) = self.instead_of(given_up.awaited) {
                         return Some(instead);
                     }
                 }
@@ -79,15 +78,10 @@ impl Client {
         }
     }
 
-    /// Handles a request that the station does not answer, though it may have answered others since; returns a request to send
-    /// instead.
-    fn instead_of(&mut self, awaited: Awaited, has_answered: bool) -> Option<Outgoing<Awaited>> {
+    /// Handles a request that the station does not answer; returns a request to send instead.
+    fn instead_of(&mut self, awaited: Awaited) -> Option<Outgoing<Awaited>> {
         match awaited {
             Awaited::Modules => self.has_modules = false,
-            // A station that is off has not said that it cannot: commanding a direction might reverse the train.
-            Awaited::AnyDirection(train, _) if !has_answered => {
-                return Some(self.query(train, Query::Direction));
-            }
             Awaited::AnyDirection(train, uid) => {
                 // The direction cannot be read: it is commanded, so that it is known.
                 self.dialogue.locomotives.know(train);
