@@ -146,14 +146,14 @@ each_table() {
   "$1" cross-check compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv --markdown
   "$1" running-times example running_times
   "$1" driving simulate driving --seeds 1..5 --markdown
-  "$1" worlds simulate worlds --seeds fresh:5@fa2ca933d86df1e8306612a4804d20d6a9d337c7 --markdown
+  "$1" worlds simulate worlds --seeds fresh:5@00329b43e7a9bc25d25083fbddee93bd220ae241 --markdown
   "$1" disasters simulate disasters --seeds 1..8 --markdown
   "$1" pacing simulate pacing --seeds 1..3 --markdown
   "$1" zones simulate zones --seeds 21..26 --markdown
   "$1" pacing-unseen simulate pacing --seeds 101..112 --markdown
   "$1" traffic simulate traffic --seeds 541..550 --hours 1 --baseline --markdown
   "$1" odometry simulate line --score --seeds 1..10 --teeth 80,100,200 --markdown
-  "$1" odometry-worlds simulate line --score --worlds fresh:200@ed55016fa23bf57e97b60a5bfd967cc0e765060c --markdown
+  "$1" odometry-worlds simulate line --score --worlds fresh:200@00329b43e7a9bc25d25083fbddee93bd220ae241 --markdown
   # Recordings that may not be copied: the table is made where they are.
   if [[ -n ${FOOTPLATE_DATA:-} ]]; then
     "$1" standstill odometry --imu "$FOOTPLATE_DATA"/paris-metro-accel/*_accel.csv --score --markdown

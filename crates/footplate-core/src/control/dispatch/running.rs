@@ -320,7 +320,9 @@ impl Dispatcher {
     pub(super) fn withdraw(&mut self, now: Timestamp, id: TrainId, why: Option<Refusal>) {
         // The next path begins with the present positions of the turnouts under the train.
         let blocks_itself = why.as_ref().and_then(Refusal::occupier) == Some(id);
+        let mut makes_room_for = None;
         if let Some(train) = self.trains.get_mut(&id) {
+            makes_room_for = train.makes_room_for();
             train.authorities.clear();
             train.state = State::Resting;
             train.purpose = Purpose::Journey;
@@ -332,6 +334,9 @@ impl Dispatcher {
         self.notify(Notice::Withdrawn { train: id, why });
         if self.trains.get_mut(&id).is_some_and(|train| train.withdrawn >= MAX_WITHDRAWN) {
             self.give_up_journey(id, self.unreachable(id));
+            if let Some(train) = makes_room_for {
+                self.notify(Notice::Deadlocked { train });
+            }
         }
     }
 
