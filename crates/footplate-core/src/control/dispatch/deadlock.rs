@@ -77,7 +77,7 @@ impl Dispatcher {
         let another_makes_room = self
             .trains
             .values()
-            .any(|train| matches!(train.purpose, Purpose::Aside(_)) && !train.authorities.is_empty());
+            .any(|train| train.makes_room_for().is_some() && !train.authorities.is_empty());
         if !all_rest || another_makes_room {
             return;
         }

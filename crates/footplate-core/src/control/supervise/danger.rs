@@ -78,11 +78,9 @@ impl Watchdog {
 
     /// Commands the stops of trains in danger and of held ones again.
     pub(super) fn repeat_stops(&mut self, now: Timestamp) {
-        let (dangers, held) = (&self.dangers, &self.held);
-        let is_alarmed = |train: TrainId| dangers.contains_key(&train) || held.contains_key(&train);
-        let stops = &mut self.stops;
-        let due: Vec<TrainId> = core::iter::from_fn(|| stops.take_repeat(now, is_alarmed)).collect();
+        let due: Vec<TrainId> = self.stops.repeats_due(now).filter(|train| self.is_held(*train)).collect();
         for train in due {
+            self.stops.repeat(train);
             self.command(Command::Speed { train, step: SpeedStep::STAND });
         }
     }

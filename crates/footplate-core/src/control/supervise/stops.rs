@@ -54,18 +54,17 @@ impl Stops {
         }
     }
 
-    /// A train of an alarm whose stop is to be commanded again now.
-    pub(super) fn take_repeat(
-        &mut self,
-        now: Timestamp,
-        is_alarmed: impl Fn(TrainId) -> bool,
-    ) -> Option<TrainId> {
-        let is_due = |train: &TrainId, stop: &Stop| {
-            stop.repeat_due().is_some_and(|due| due <= now) && is_alarmed(*train)
-        };
-        let (train, stop) = self.stops.iter_mut().find(|(train, stop)| is_due(train, stop))?;
-        (stop.sent, stop.repeats) = (None, stop.repeats - 1);
-        Some(*train)
+    /// The trains whose stops may be commanded again now.
+    pub(super) fn repeats_due(&self, now: Timestamp) -> impl Iterator<Item = TrainId> {
+        let due = self.stops.iter().filter(move |(_, stop)| stop.repeat_due().is_some_and(|due| due <= now));
+        due.map(|(train, _)| *train)
+    }
+
+    /// A stop is commanded again.
+    pub(super) fn repeat(&mut self, train: TrainId) {
+        if let Some(stop) = self.stops.get_mut(&train) {
+            (stop.sent, stop.repeats) = (None, stop.repeats.saturating_sub(1));
+        }
     }
 
     /// When the next stop of an alarm is commanded again.

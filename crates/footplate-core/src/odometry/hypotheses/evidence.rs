@@ -149,6 +149,11 @@ struct Shown<'a> {
 }
 
 impl Shown<'_> {
+    /// Its count is stuck, or its sensor was found dead and has not counted since.
+    fn is_faulty(&self) -> bool {
+        self.wheel.stuck || self.compared.dead
+    }
+
     /// It rolls.
     fn rolls(&self, train: &State) -> f64 {
         let Self { scene, wheel, compared, .. } = self;
@@ -160,13 +165,13 @@ impl Shown<'_> {
         let creep = (ROLLING_CREEPAGE * effort + RESTLESS) * train.v;
         let y = compared.speed - train.v;
         let speed = unusual(y * y / (train.pvv + compared.variance + creep * creep));
-        let stuck = if wheel.stuck || compared.dead { STUCK } else { 0.0 };
-        -0.5 * self.followed * (speed + self.unsteady(train)) - stuck * self.t
+        let faulty = if self.is_faulty() { STUCK } else { 0.0 };
+        -0.5 * self.followed * (speed + self.unsteady(train)) - faulty * self.t
     }
 
     /// It rests with the train.
     fn rests(&self, train: &State) -> f64 {
-        if self.wheel.stuck || self.compared.dead { 0.0 } else { self.rolls(train) }
+        if self.is_faulty() { 0.0 } else { self.rolls(train) }
     }
 
     /// By how much its acceleration is unlike that of the train.
@@ -229,7 +234,7 @@ fn beside_dead(one: &Shown, other: &Shown, [first_dead, second_dead]: [&State; 2
     let [spins, slides] = BESIDE_DEAD;
     let cost = one.t * if one.side < 0.0 { spins } else { slides };
     let of = |dead: &Shown, slips: &Shown, train: &State| {
-        if dead.compared.dead || dead.wheel.stuck { slips.slips(train) - cost } else { f64::NEG_INFINITY }
+        if dead.is_faulty() { slips.slips(train) - cost } else { f64::NEG_INFINITY }
     };
     let mut least = Lanes::all(f64::NEG_INFINITY);
     let [.., of_first, of_second] = &mut least.0;
