@@ -1,6 +1,6 @@
 //! The tasks of one train: stops and short moves, compared with the truth.
 
-use footplate_core::control::{Aim, Driver, Notice, Order, OrderId, StopOrder};
+use footplate_core::control::{Aim, Driver, Notice, Order, OrderId, Refusal, StopOrder};
 use footplate_core::track::{Landmark, Layout, TurnoutStates};
 use footplate_core::{Approach, Length, NodeId, Ratio, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LawFamily, LivingSwitches, TrainTruth, VirtualStation};
@@ -14,8 +14,10 @@ pub const TRAIN: TrainId = TrainId(24);
 const HIGHEST: u8 = 14;
 /// The longest time for an order, in s.
 const ORDER_TIMEOUT_S: f64 = 60.0;
-/// The time within which a train comes to rest, in s.
-const BRAKING_TIMEOUT_S: f64 = 8.0;
+/// How long an operator waits for a lost train to come to a sensor (chosen: longer than between any two of a circuit).
+const FIND_WITHIN: TimeSpan = TimeSpan::from_s(30.0);
+/// How long he waits for its stop to end (chosen: longer than the driver gives a train of unknown position).
+const STOPPED_WITHIN: TimeSpan = TimeSpan::from_s(20.0);
 /// The interval of position checks.
 const CHECK_INTERVAL: TimeSpan = TimeSpan::from_ms(200);
 /// The true speeds of mid steps; top steps are faster than `TOP_FROM_MM_PER_S`. Published scatter of stops is 4 mm near
@@ -207,6 +209,9 @@ impl<'a, 'l> Trial<'a, 'l> {
             Err(refusal) => {
                 self.results.failed += 1;
                 self.results.failures.push(format!("{refusal:?}"));
+                if matches!(refusal, Refusal::Lost { .. }) {
+                    self.halt();
+                }
                 return None;
             }
         };
@@ -260,20 +265,32 @@ impl<'a, 'l> Trial<'a, 'l> {
         self.results.position_checks[1] += u32::from(off.abs() <= 1.96 * located.uncertainty.as_mm());
     }
 
-    /// Relocates a lost train as an operator would: runs it to a sensor and stops it.
+    /// Whether the driver knows where the train is, and no sensor that should have reported it is silent.
+    fn is_found(&self) -> bool {
+        let now = self.line.now();
+        self.driver.locate(TRAIN, now).is_some() && self.driver.missed_sensor(TRAIN, now).is_none()
+    }
+
+    /// Relocates a lost train as an operator would: runs it to a sensor, faster each time that it does not come to one,
+    /// as a train that stalled on a dirty spot needs a higher step; then stops it.
     fn halt(&mut self) {
-        let found_by = self.line.now() + TimeSpan::from_s(ORDER_TIMEOUT_S);
-        if let Some(step) = self.plan.mid.first().copied() {
+        for step in self.plan.mid.clone() {
             let _ = self.driver.order(self.line.now(), Order::Speed { train: TRAIN, step });
-        }
-        while self.line.now() < found_by && self.driver.locate(TRAIN, self.line.now()).is_none() {
-            let until = found_by.min(self.line.now() + CHECK_INTERVAL);
-            let _ = self.line.drive(&mut self.driver, until);
+            let found_by = self.line.now() + FIND_WITHIN;
+            while self.line.now() < found_by && !self.is_found() {
+                let until = found_by.min(self.line.now() + CHECK_INTERVAL);
+                let _ = self.line.drive(&mut self.driver, until);
+            }
+            if self.is_found() {
+                break;
+            }
         }
         let stop = Order::Speed { train: TRAIN, step: SpeedStep::STAND };
         let _ = self.driver.order(self.line.now(), stop);
-        let until = self.line.now() + TimeSpan::from_s(BRAKING_TIMEOUT_S);
-        while self.line.drive(&mut self.driver, until).is_some() {}
+        let deadline = self.line.now() + STOPPED_WITHIN;
+        while self.line.now() < deadline && self.driver.busy(TRAIN).is_some() {
+            let _ = self.line.drive(&mut self.driver, deadline.min(self.line.now() + CHECK_INTERVAL));
+        }
     }
 }
 
