@@ -6,7 +6,7 @@
 //! change.
 
 use super::locator::{LEAST_SPEED_M_PER_S, Locator, log_density};
-use super::path_length::{LOG_CHANCE_OF_SILENCE, path_reaches};
+use super::path_length::path_reaches;
 use super::track_context::TrackContext;
 use crate::ids::SensorId;
 use crate::linalg::Gaussian;
@@ -22,7 +22,8 @@ const CHANGED_PART: f64 = 0.3;
 
 impl Locator {
     /// The logarithm of the density (1/s) with which this train closed a sensor within a window; `None` while it is lost, and
-    /// where no path as the turnouts lie leads there with at most two missed detections.
+    /// where no path as the turnouts lie leads there with few missed detections ([`MAX_MISSED`](crate::track::MAX_MISSED)), of
+    /// which sensors miss a share.
     #[must_use]
     pub fn claim(
         &self,
@@ -30,6 +31,7 @@ impl Locator {
         model: &MotionModel,
         sensor: SensorId,
         window: ContactWindow,
+        missed_share: f64,
     ) -> Option<f64> {
         let (node, place, speed) = self.motion_at(model, window.middle())?;
         let speed = speed.max(LEAST_SPEED_M_PER_S);
@@ -39,7 +41,7 @@ impl Locator {
             let variance = place.variance + reach.length.variance + noise;
             let short = Gaussian { mean: reach.length.mean - place.mean, variance };
             let changed = Gaussian { variance: variance + off * off, ..short };
-            let silent = LOG_CHANCE_OF_SILENCE * reach.missed as f64;
+            let silent = libm::log(missed_share) * reach.missed as f64;
             libm::exp(log_density(short) + silent) + libm::exp(log_density(changed) + LOG_CHANGED + silent)
         });
         let density = speed * density.sum::<f64>();

@@ -5,16 +5,12 @@ use super::track_context::TrackContext;
 use crate::ids::{NodeId, SensorId};
 use crate::linalg::Gaussian;
 use crate::model::{FELT, MotionModel};
-use crate::track::{Hop, Landmark, Layout, Position, Reach};
+use crate::track::{Hop, Landmark, Layout, MAX_MISSED, Position, Reach};
 use crate::units::Length;
 
-/// With more missed detections in a row than this, a path is not considered.
-const MOST_MISSED: usize = 2;
-/// Chance of a missed detection, as ln: dirty track, a light pickup (chosen; the trains of the course miss fewer).
+/// Chance of a missed detection, as ln: dirty track, a light pickup (chosen; the trains of the course miss fewer). Where trains
+/// are distinguished, it is what was learnt of each.
 const LOG_MISSED: f64 = -3.9;
-/// The same where trains are distinguished, as ln: 0.3 % on a well-kept layout (chosen from the complaints of course reports).
-/// For a single train it may be higher, because there is no other explanation of a report.
-pub(super) const LOG_CHANCE_OF_SILENCE: f64 = -5.809;
 /// Most hops of a path to a place: more than a lap of any layout in use.
 const MOST_HOPS: usize = 200;
 /// One standard deviation of where a sensor closes against the survey (m): half a pickup's springiness and the length of a
@@ -61,7 +57,7 @@ pub(super) fn path_reaches<'g>(
 ) -> impl Iterator<Item = PathReach> + 'g {
     context
         .layout
-        .reaches(from, context.turnouts, MOST_MISSED)
+        .reaches(from, context.turnouts, MAX_MISSED)
         .filter(move |reach| reach.sensor == Some(sensor))
         .map(move |reach| reach_length(context, model, context.layout, &reach))
 }

@@ -19,6 +19,7 @@ mod odometer;
 mod pacing;
 mod paths_on_tracks;
 mod profiles;
+mod recovering;
 mod short_moves;
 mod speed_change_laws;
 mod speed_zones;

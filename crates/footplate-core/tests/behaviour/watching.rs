@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use footplate_core::control::{
-    Alarm, LinkNews, Machine, Notice, Order, Outcome, Output, Refusal, Reservation, StopOrder, Watchdog,
+    Alarm, LinkNews, Machine, Notice, Order, Outcome, Output, Refusal, StopOrder, Watchdog,
 };
 use footplate_core::track::Landmark;
 use footplate_core::{
@@ -26,18 +26,18 @@ pub(crate) struct Watched {
     pub(crate) world: ToyRailway,
     pub(crate) dog: Watchdog,
     pub(crate) notices: Vec<Notice>,
-    commanded: Vec<(Timestamp, Command)>,
+    pub(crate) commanded: Vec<(Timestamp, Command)>,
 }
 
 impl Watched {
-    fn one() -> Self {
+    pub(crate) fn one() -> Self {
         let world = ToyRailway::new(24, "D1", 300.0);
         let driver = driver_of(&world, "D1", 300.0);
         let dog = Watchdog::new(driver, world.now);
         Self { world, dog, notices: Vec::new(), commanded: Vec::new() }
     }
 
-    fn asking() -> Self {
+    pub(crate) fn asking() -> Self {
         let mut watched = Self::one();
         watched.dog.ask_before_creeping();
         watched.go(FIRST, 8);
@@ -112,7 +112,7 @@ impl Watched {
         })
     }
 
-    fn recovered(&self) -> Option<Outcome> {
+    pub(crate) fn recovered(&self) -> Option<Outcome> {
         self.notices.iter().find_map(|notice| match notice {
             Notice::Recovered { outcome, .. } => Some(*outcome),
             _ => None,
@@ -319,37 +319,6 @@ fn orders_waiting_for_a_placed_train_are_reported_as_cancelled() {
         watched.notices
     );
     watched.go(SECOND, 8);
-}
-
-#[test]
-fn the_first_train_asked_waits_for_the_answer() {
-    let mut watched = Watched::asking();
-    let asked = |notice: &Notice| matches!(notice, Notice::AsksToCreep { train: FIRST });
-    assert_eq!(watched.notices.iter().filter(|notice| asked(notice)).count(), 1);
-    assert!(watched.world.trains[0].speed_mm_per_s < 1.0);
-    watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
-    assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
-}
-
-#[test]
-fn a_train_lost_again_on_reserved_track_does_not_creep_on() {
-    // Given a train under a dispatcher that is located and measured again,
-    let mut watched = Watched::asking();
-    watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
-    let is_located =
-        |watched: &Watched| watched.notices.iter().any(|notice| matches!(notice, Notice::Located { .. }));
-    assert!(watched.run_until(60.0, is_located), "{:#?}", watched.notices);
-    watched.run(1.0);
-    let from = watched.commanded.len();
-    // when its position is lost,
-    watched.dog.lose(watched.world.now, FIRST);
-    watched.run(0.5);
-    // then it reverses towards the sensor that it ran over, instead of creeping on into track that may end.
-    let first = watched.commanded.get(from).map(|(_, command)| *command);
-    assert_eq!(first, Some(Command::Speed { train: FIRST, step: SpeedStep::STAND }));
-    assert!(watched.run_until(10.0, |watched| {
-        watched.commanded.iter().skip(from).any(|(_, command)| matches!(command, Command::Reverse { .. }))
-    }));
 }
 
 /// One input of a watchdog.

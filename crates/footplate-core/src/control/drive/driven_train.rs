@@ -6,14 +6,15 @@ use crate::link::TimeModel;
 use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{Located, Locator, PassedContact, PathPoint, TrackContext, landmark_of};
-use crate::units::Length;
+use crate::units::{Length, Speed};
 
+use super::detections::Detections;
 use super::order::OrderId;
 use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
 use super::path::{reversed_location, sensors_within};
 use super::refusal::Refusal;
-use super::task::{Destination, DetectionCount, Expectation, Goal, SpeedSupervision, Task, TaskPhase};
+use super::task::{Destination, Expectation, Goal, SpeedSupervision, Task, TaskPhase};
 use crate::control::{Achieved, Finished, Notice, Promise};
 
 /// Time allowed beyond the predicted time to rest, fixed and as a part of it: decoders creep at the end, and nothing
@@ -54,7 +55,7 @@ pub(super) struct DrivenTrain {
     /// What should be reported next.
     pub(super) expected: Expectation,
     /// How often it was reported, and how often not.
-    pub(super) detections: DetectionCount,
+    pub(super) detections: Detections,
     /// Where its movement authority ends; `None` without a limit.
     pub(super) end_of_authority: Option<PathPoint>,
     /// Its lengths ahead of and behind the leading end of the pickup.
@@ -81,7 +82,7 @@ impl DrivenTrain {
             unsent: None,
             steady_at: Timestamp::ZERO,
             expected: Expectation::default(),
-            detections: DetectionCount::default(),
+            detections: Detections::default(),
             end_of_authority: None,
             reach: [TRAIN_REACH; 2],
             speed_supervision: SpeedSupervision::default(),
@@ -104,6 +105,11 @@ impl DrivenTrain {
 
     pub(super) fn located(&self, context: TrackContext<'_>, now: Timestamp) -> Option<Located> {
         self.locator.locate(context, &self.model, now)
+    }
+
+    /// Its estimated speed; 0 where its position is unknown.
+    pub(super) fn speed(&self, context: TrackContext<'_>, now: Timestamp) -> Speed {
+        self.located(context, now).map_or(Speed::ZERO, |located| located.speed)
     }
 
     /// Whether it is estimated to be at rest. A train of unknown position counts as at rest once its stop command has
@@ -321,7 +327,8 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) {
         self.clear_missed();
-        self.detections.take(passed.missed);
+        let speed = self.speed(context, passed.at);
+        self.detections.take(passed.missed, speed, passed.window.width());
         self.note_passage(context, node, passed.at);
         self.recount_end_of_authority(context, node);
         self.expect_next(context, now);

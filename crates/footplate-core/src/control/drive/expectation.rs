@@ -154,7 +154,7 @@ impl DrivenTrain {
                 self.expected.lost_by.get_or_insert(now + LOST.max(travel + travel));
                 self.expected.missed_sensor.get_or_insert(due.sensor);
                 self.expected.missed_in_a_row = self.expected.missed_in_a_row.saturating_add(1);
-                if self.expected.missed_in_a_row >= self.detections.lost_after() {
+                if self.expected.missed_in_a_row >= self.detections.lost_after(self.speed(context, now)) {
                     return self.lose(now, out);
                 }
                 let next = self.locator.next_contact(context, &self.model, now);

@@ -15,18 +15,16 @@ use super::driven_train::DrivenTrain;
 
 /// How many hops ahead of a train a turnout failure is considered: the present hop and the next.
 const HOPS_AHEAD: usize = 2;
-/// ln of the probability that a turnout does not move when commanded, 0.3 % (chosen as [`LOG_CHANCE_OF_SILENCE`] is).
-///
-/// [`LOG_CHANCE_OF_SILENCE`]: crate::tracking::Locator::claim
+/// ln of the probability that a turnout does not move when commanded, 0.3 % (chosen as that of a missed detection is).
 const LOG_TURNOUT_FAILS: f64 = -5.809;
 /// Turnout failures are considered only if the density (ln 1/s) with the known positions is below this: an
 /// uncertainty of about half a second.
 const LIKELY: f64 = 0.0;
-/// A train that a sensor should have reported was missed by the sensor (0.3 %), has changed (0.1 %, as in its claim),
-/// or is not there (0.01 %, chosen: lifted, derailed, stalled). ln of the sum, and of the share of the last.
-const LOG_MISSED: f64 = -5.5;
-/// See [`LOG_MISSED`].
-const LOG_STRAYED: f64 = -3.7;
+/// A train that a sensor should have reported was missed by the sensor (the learnt share, usually 0.3 %), has changed (0.1 %,
+/// as in its claim), ...
+const CHANGED: f64 = 0.001;
+/// ... or is not there (0.01 %, chosen: lifted, derailed, stalled).
+const STRAYED: f64 = 0.0001;
 /// ln of the probability that a train without any missed sensor is elsewhere (chosen).
 const LOG_LIFTED: f64 = -9.2;
 /// Largest error of a predicted time of rest: until then a train may still cause a detection.
@@ -88,10 +86,13 @@ pub(super) fn hypotheses(
             continue;
         }
         let is_missed = train.missed_sensor().is_some();
+        let missed_share = train.detections.missed_share(train.speed(context, detection.window.middle()));
         // The missed sensor has already happened under every hypothesis: condition on it.
-        let conditioned = if is_missed { -LOG_MISSED } else { 0.0 };
+        let happened = missed_share + CHANGED + STRAYED;
+        let conditioned = if is_missed { -libm::log(happened) } else { 0.0 };
         let claim = |context: TrackContext<'_>| {
-            let claim = train.locator.claim(context, &train.model, detection.sensor, detection.window)?;
+            let Detection { sensor, window } = detection;
+            let claim = train.locator.claim(context, &train.model, sensor, window, missed_share)?;
             Some(claim + conditioned)
         };
         let current = claim(context);
@@ -108,7 +109,7 @@ pub(super) fn hypotheses(
                 }
             }
         }
-        let strayed = if is_missed { LOG_STRAYED } else { LOG_LIFTED };
+        let strayed = if is_missed { libm::log(STRAYED / happened) } else { LOG_LIFTED };
         add(Explanation::Strayed(id), anywhere + strayed);
     }
     found

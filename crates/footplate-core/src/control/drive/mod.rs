@@ -9,6 +9,7 @@ mod approach;
 mod blocks;
 mod command_time;
 mod data_association;
+mod detections;
 mod driven_train;
 mod driver;
 mod expectation;

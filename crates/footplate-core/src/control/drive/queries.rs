@@ -5,10 +5,13 @@ use alloc::collections::BTreeSet;
 use crate::ids::{NodeId, SensorId, TrainId, TurnoutId};
 use crate::model::MotionFit;
 use crate::time::Timestamp;
-use crate::track::Position;
-use crate::tracking::{PassedContact, PathPoint, Rest, TrackContext, distance_to, place_of};
+use crate::track::{Landmark, Position};
+use crate::tracking::{
+    PassedContact, PathPoint, Rest, TrackContext, distance_to, distance_to_landmark, place_of,
+};
 use crate::units::Length;
 
+use super::driven_train::DrivenTrain;
 use super::driver::Driver;
 use super::order::OrderId;
 use super::path::{circuit_length, reversed_on_current_path, reversed_position, trailing_position};
@@ -62,6 +65,13 @@ impl Driver {
     pub fn missed_sensor(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
         let (train, context) = (self.trains.get(&train)?, self.track.context());
         train.missed_sensor().or_else(|| train.sensor_missed_before(context, &train.located(context, now)?))
+    }
+
+    /// The share of detections that sensors miss of a train at its speed, as learnt in this session.
+    #[must_use]
+    pub fn missed_share(&self, train: TrainId, now: Timestamp) -> f64 {
+        let speed = |train: &DrivenTrain| train.speed(self.track.context(), now);
+        self.trains.get(&train).map_or(0.0, |train| train.detections.missed_share(speed(train)))
     }
 
     /// Whether the position of a train depends on an ambiguous detection.
@@ -136,6 +146,16 @@ impl Driver {
     pub fn path_point(&self, train: TrainId, from: NodeId, to: Position) -> Option<PathPoint> {
         let distance = distance_to(self.track.context(), &self.trains.get(&train)?.model, from, to)?;
         Some(PathPoint { node: from, distance })
+    }
+
+    /// Whether a path leads a train from a position to a place, with the turnouts as they are.
+    #[must_use]
+    pub fn leads_to(&self, train: TrainId, from: Position, to: Landmark) -> bool {
+        let context = self.track.context();
+        let ahead = self.track.layout.edge(from.edge).map(|edge| edge.to);
+        ahead
+            .zip(self.trains.get(&train))
+            .is_some_and(|(ahead, train)| distance_to_landmark(context, &train.model, ahead, to).is_some())
     }
 
     /// Gives up the position of a train that was found to be wrong.

@@ -10,17 +10,6 @@ use crate::tracking::{DueContact, PathPoint};
 use super::order::{Aim, OrderId};
 use crate::control::Promise;
 
-/// The share of missed detections of a well-kept layout, 0.3 %, counts as much as a hundred detections.
-const USUAL_MISSED: f64 = 0.3;
-const USUAL_DETECTIONS: f64 = 100.0;
-const MANY_MISSED: f64 = 0.01;
-/// The number of missed detections in a row after which a train is lost: sensors of a well-kept layout miss two in a row once in
-/// 100 000 times; trains stall, derail or are lifted ten times as often.
-const LOST_AFTER_MISSED: u8 = 2;
-/// The same where more than one detection in a hundred is missed, so that two in a row are as frequent as trains that stall: at an
-/// interface that does not latch, a fast train closes a sensor for less than a poll. Data association looks no further.
-const LOST_WHERE_MANY_ARE_MISSED: u8 = 3;
-
 /// An order that is being carried out.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Task {
@@ -115,45 +104,4 @@ pub(super) struct SpeedSupervision {
     pub(super) next_check: Option<Timestamp>,
     /// The zone that was reported to slow the train down.
     pub(super) reported_zone: Option<String>,
-}
-
-/// Detections of a train in this session, and how many were missed between them.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct DetectionCount {
-    passed: u32,
-    missed: u32,
-}
-
-impl DetectionCount {
-    /// A sensor reported the train, after so many that did not.
-    pub(super) fn take(&mut self, missed: usize) {
-        self.passed = self.passed.saturating_add(1);
-        self.missed = self.missed.saturating_add(u32::try_from(missed).unwrap_or(u32::MAX));
-    }
-
-    /// The number of missed detections in a row after which the train is lost.
-    pub(super) fn lost_after(self) -> u8 {
-        let (passed, missed) = (f64::from(self.passed), f64::from(self.missed));
-        let share = (USUAL_MISSED + missed) / (USUAL_DETECTIONS + passed + missed);
-        if share > MANY_MISSED { LOST_WHERE_MANY_ARE_MISSED } else { LOST_AFTER_MISSED }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_train_is_lost_later_where_sensors_miss_it_often() {
-        let mut detections = DetectionCount::default();
-        assert_eq!(detections.lost_after(), 2);
-        for nth in 0..200 {
-            detections.take(usize::from(nth == 90));
-        }
-        assert_eq!(detections.lost_after(), 2, "one of 200");
-        for nth in 0..40 {
-            detections.take(usize::from(nth % 4 == 0));
-        }
-        assert_eq!(detections.lost_after(), 3, "a quarter of the last 40");
-    }
 }

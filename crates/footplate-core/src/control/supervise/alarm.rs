@@ -21,8 +21,10 @@ const UNTIMELY: f64 = 8.0;
 /// ... if it is also this fraction of its time, even if later ones fit: another locomotive with the same address may
 /// be as fast, and a lifted train may reach the same sensor.
 const UNTIMELY_PART: f64 = 0.2;
-/// Missed detections, minus those that came in between, that raise the alarm.
-const MAX_MISSES: usize = 4;
+/// Missed detections, minus those that came in between, that raise the alarm: the fourth, where nearly none are usual.
+const MAX_MISSES: f64 = 3.5;
+/// Twice as many as are usual at a speed do not count.
+const USUAL_TWICE: f64 = 2.0;
 
 /// Why a train is no longer trusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,7 +74,8 @@ pub(super) struct ConsistencyMonitor {
     starts: bool,
     drift: DriftTest,
     outliers: u8,
-    misses: usize,
+    /// Missed detections beyond what is usual.
+    misses: f64,
     last: Option<Timestamp>,
     is_located: bool,
 }
@@ -93,8 +96,8 @@ impl ConsistencyMonitor {
         *self = Self::default();
     }
 
-    /// Tests a passage. Returns the alarm that it raises, if any.
-    pub(super) fn pass(&mut self, passed: &PassedContact) -> Option<Alarm> {
+    /// Tests a passage at a speed at which sensors miss a share of detections. Returns the alarm that it raises, if any.
+    pub(super) fn pass(&mut self, passed: &PassedContact, missed_share: f64) -> Option<Alarm> {
         let before = self.last.replace(passed.window.until);
         let started = core::mem::take(&mut self.starts);
         let was_located = core::mem::replace(&mut self.is_located, true);
@@ -102,9 +105,12 @@ impl ConsistencyMonitor {
             self.outliers = 0;
             return was_located.then_some(Alarm::Elsewhere(passed.sensor));
         };
-        self.misses = (self.misses + passed.missed).saturating_sub(usize::from(passed.missed == 0));
+        // Missed before each detection, where each sensor misses a share of all.
+        let usual = missed_share / (1.0 - missed_share);
+        let counts = if passed.missed == 0 { -1.0 } else { passed.missed as f64 };
+        self.misses = (self.misses + counts - USUAL_TWICE * usual).max(0.0);
         if self.misses >= MAX_MISSES {
-            self.misses = 0;
+            self.misses = 0.0;
             return Some(Alarm::Misses);
         }
         // A start deviates by more than predicted; that is no drift.

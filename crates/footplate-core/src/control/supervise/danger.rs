@@ -194,6 +194,9 @@ impl Watchdog {
             return;
         }
         let Some(from) = before.filter(|_| self.dangers.is_empty()) else { return };
+        if let Some(train) = self.only_train_overdue(now) {
+            return self.raise(now, train, Alarm::Elsewhere(sensor));
+        }
         self.intruder.near = Some(sensor);
         let stopped = self.hold_endangered(now);
         self.notify(Notice::UnauthorisedMovement { from, to: sensor, stopped });
@@ -203,6 +206,15 @@ impl Watchdog {
         for train in resting {
             self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
         }
+    }
+
+    /// The train that runs, if it is the only one and a sensor that should have reported it did not: what moves elsewhere
+    /// is this train.
+    fn only_train_overdue(&self, now: Timestamp) -> Option<TrainId> {
+        let mut trains = self.driver.trains();
+        let train = trains.next().filter(|_| trains.next().is_none())?;
+        let runs = self.driver.commanded(train) > SpeedStep::STAND;
+        (runs && self.driver.missed_sensor(train, now).is_some()).then_some(train)
     }
 
     /// The rails that whatever moves may be on; `None` if nothing does.

@@ -412,7 +412,8 @@ impl Watchdog {
     }
 
     fn passed(&mut self, now: Timestamp, train: TrainId, passed: &crate::tracking::PassedContact) {
-        let alarm = self.monitors.entry(train).or_default().pass(passed);
+        let missed = self.driver.missed_share(train, passed.at);
+        let alarm = self.monitors.entry(train).or_default().pass(passed, missed);
         self.note_place(now, train);
         self.note_detection(train, passed.window.until);
         if let Some(node) = self.driver.node_passed(passed) {
@@ -445,8 +446,7 @@ impl Watchdog {
     fn at_rest_by(&self, train: TrainId, left: Timestamp) -> Timestamp {
         let located = self.driver.locate(train, left);
         let model = self.driver.model(train);
-        let is_in_danger = self.dangers.contains_key(&train);
-        let (Some(located), Some(model), false) = (located, model, is_in_danger) else {
+        let (Some(located), Some(model), false) = (located, model, self.is_in_danger(train)) else {
             return left + REST_UNKNOWN;
         };
         let stop = model.stop(located.step, crate::event::Approach::Above);
@@ -464,7 +464,8 @@ impl Machine for Watchdog {
                 let at_rest = self.at_rest_by(train, event.time);
                 self.stops.sent(train, event.time, at_rest);
                 self.monitors.entry(train).or_default().stop();
-            } else {
+            } else if !self.stops.is_pending(train) {
+                // A stop that waits was commanded after it.
                 self.stops.forget(train);
             }
         }
