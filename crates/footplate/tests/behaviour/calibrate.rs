@@ -138,6 +138,13 @@ fn bad_input_is_answered_with_its_place_and_what_would_be_right() {
         assert_eq!(refused.status, 2, "{name}: {}", refused.errors);
         assert!(refused.errors.contains(says), "{name}: {}", refused.errors);
     }
+    let nothing = footplate(&["calibrate"]);
+    assert_eq!(nothing.status, 2);
+    for way in ["--link", "--from", "--store"] {
+        assert!(nothing.errors.contains(way), "{way}: {}", nothing.errors);
+    }
+    let absent = footplate(&["calibrate", "--from", "absent.csv", "--layout", "track-a"]);
+    assert_eq!(absent.errors.matches("(os error 2)").count(), 1, "said once: {}", absent.errors);
     let [run, _] = train_24();
     let missing = footplate(&["calibrate", "--from", &run, "--layout", "track-z"]);
     assert_eq!(missing.status, 2);
