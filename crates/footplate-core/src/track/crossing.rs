@@ -1,7 +1,7 @@
 //! Level crossings: two tracks that cross in one plane and are not connected.
 //!
-//! A train has no choice there, so the graph has no node. But only one train at a time can use a crossing: whoever keeps trains
-//! apart asks [`Layout::crossed_near`] which other track an interval of rail obstructs.
+//! A train has no choice there, so the graph has no node. But only one train at a time can use a crossing: the dispatcher asks
+//! [`Layout::crossed_near`] which other track an interval of rail obstructs.
 
 use alloc::vec::Vec;
 

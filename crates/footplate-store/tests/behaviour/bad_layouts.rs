@@ -130,7 +130,7 @@ fn keys_are_those_of_a_layout() {
         complaint("edges = [", "edge = ["),
         "oval.toml, line 18, column 1: unknown field `edge`, expected one of `format`, `name`, `about`, \
          `length_uncertainty_mm`, `length_origin`, `length_scale_uncertainty_percent`, `sensors`, `turnouts`, \
-         `never_both_curved`, `ends`, `zones`, `blocks`, `boundaries`, `edges`, `distances`"
+         `never_both_curved`, `ends`, `zones`, `blocks`, `boundaries`, `edges`, `crossings`, `distances`"
     );
     assert_eq!(
         complaint("length_origin = \"tape measure\"\n", ""),
