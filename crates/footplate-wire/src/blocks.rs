@@ -39,9 +39,9 @@ impl BlockReports {
         }
     }
 
-    /// The detectors that report their blocks as occupied, those in which a train stood from the start among them.
-    pub fn occupied(&self) -> impl Iterator<Item = SensorId> {
-        self.occupancy.occupied_blocks(&self.layout).map(|block| block.detector)
+    /// Every block by its detector, and whether it is occupied, as those are in which a train stood from the start.
+    pub fn states(&self) -> impl Iterator<Item = (SensorId, bool)> {
+        self.occupancy.states(&self.layout)
     }
 
     /// The number by which the station knows a sensor.

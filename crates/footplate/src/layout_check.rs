@@ -3,7 +3,7 @@
 use anyhow::bail;
 use footplate_core::model::survey::{LayoutTest, SectionIndex, SurveyTest};
 use footplate_core::track::{HopId, Layout, SequenceVerdict, StrayReport};
-use footplate_core::{Event, Length, SensorId};
+use footplate_core::{Event, EventKind, Length, SensorId};
 use footplate_store::{BUILT_IN, Run, built_in};
 
 use crate::runtime::Recorder;
@@ -14,13 +14,19 @@ const EXPLAINED: Length = Length::from_mm(40.0);
 /// Two lengths that are those of the other layout, and not of the one that was said, are no chance.
 const FEWEST_EXPLAINED: usize = 2;
 
+/// Trains of every scale run at 20 to 1500 mm/s. Speeds that are all outside of this (mm/s) are of another unit.
+const PLAUSIBLE_MM_PER_S: std::ops::Range<f64> = 2.0..10_000.0;
+
+/// Fewer speeds than these may be of a train that stood.
+const FEWEST_SPEEDS: usize = 4;
+
 /// More contradictions than these tell a person nothing new.
 const MOST_SAID: usize = 4;
 
 /// Checks runs against a layout, and returns how its lengths compare with them.
 ///
 /// # Errors
-/// The runs are of another layout: sensors follow each other that no rails join, or the lengths are those of another
+/// The times are not in seconds. Or the runs are of another layout: sensors follow each other that no rails join, or the lengths are those of another
 /// built-in layout. The message names the sensors, and what to do.
 pub(crate) fn check_runs<'r>(
     layout: &Layout,
@@ -28,13 +34,18 @@ pub(crate) fn check_runs<'r>(
 ) -> anyhow::Result<SurveyTest> {
     let sections = SectionIndex::of(layout);
     let mut test = LayoutTest::default();
+    let mut speeds = Vec::new();
     for run in runs {
+        speeds.extend(mean_speeds(layout, run));
         test.begin_run(run.moving().len());
         for raw in &run.events {
             test.take(layout, &sections, &raw.event);
         }
     }
     if let Some(contradiction) = order_contradicts(layout, &test.sequence()) {
+        bail!(contradiction);
+    }
+    if let Some(contradiction) = speeds_contradict(layout, speeds) {
         bail!(contradiction);
     }
     let lengths = test.lengths(&sections);
@@ -50,6 +61,35 @@ pub(crate) fn check_runs<'r>(
         eprintln!("{said}");
     }
     Ok(lengths)
+}
+
+/// The mean speeds of a run between neighbouring sensors, in mm/s; none on a layout with unknown lengths.
+fn mean_speeds(layout: &Layout, run: &Run) -> impl Iterator<Item = f64> {
+    let mut before = None;
+    run.events.iter().filter(|_| layout.is_measured()).filter_map(move |raw| {
+        let EventKind::Sensor(report) = raw.event.kind else { return None };
+        let (from, left) = before.replace((report.sensor, raw.event.time))?;
+        let mut hops = layout.hops_from(layout.sensor_node(from)?);
+        let hop = hops.find(|hop| hop.sensor == Some(report.sensor))?;
+        let took = (raw.event.time - left).as_s();
+        (took > 0.0 && hop.length > Length::ZERO).then(|| hop.length.as_mm() / took)
+    })
+}
+
+/// The message where times and lengths make no speed of a model train, not even the fastest or the slowest tenth.
+fn speeds_contradict(layout: &Layout, mut speeds: Vec<f64>) -> Option<String> {
+    speeds.sort_by(f64::total_cmp);
+    let tenth = speeds.len() / 10;
+    let slow = *speeds.get(tenth).filter(|_| speeds.len() >= FEWEST_SPEEDS)?;
+    // Trains that rest between sensors are slower than any step; others of the same recording are not.
+    let fast = *speeds.iter().rev().nth(tenth)?;
+    (fast < PLAUSIBLE_MM_PER_S.start || slow > PLAUSIBLE_MM_PER_S.end).then(|| {
+        format!(
+            "the recordings are not in seconds, or layout `{}` is not in millimetres: trains would run at {slow:.3} to \
+             {fast:.3} mm/s from sensor to sensor; correct the unit",
+            layout.name()
+        )
+    })
 }
 
 /// Watches a session: ends it if the reports are not of the layout on which trains are driven.

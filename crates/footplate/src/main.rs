@@ -5,6 +5,7 @@ mod clock;
 mod commands;
 mod counted;
 mod dashboard;
+mod error_text;
 #[cfg(unix)]
 mod guardian;
 mod layout_check;
@@ -25,6 +26,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use commands::{Command, Outcome};
+use error_text::error_text;
 
 /// Exit status when the usage or the input is wrong; the command line parser ends with it, too.
 const BAD_INPUT: u8 = 2;
@@ -61,7 +63,7 @@ fn main() -> ExitCode {
 }
 
 fn failed(error: &anyhow::Error) -> ExitCode {
-    eprintln!("error: {error:#}");
+    eprintln!("error: {}", error_text(error));
     ExitCode::from(BAD_INPUT)
 }
 

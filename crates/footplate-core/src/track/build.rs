@@ -57,6 +57,7 @@ impl Layout {
             restricted: BTreeMap::new(),
             blocks: Vec::new(),
             entered: BTreeMap::new(),
+            crossings: Vec::new(),
         };
         let layout = layout.with_blocks(&plan.blocks, &plan.places)?.with_hops()?;
         let zones = plan.zones.iter();

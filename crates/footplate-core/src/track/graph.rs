@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 
 use crate::ids::{EdgeId, NodeId, SensorId, StretchId, TurnoutId};
 use crate::track::hop::Hops;
-use crate::track::{Block, HopId, Leg, StretchLength, Survey, TurnoutStates, Zone};
+use crate::track::{Block, Crossing, HopId, Leg, StretchLength, Survey, TurnoutStates, Zone};
 use crate::units::Length;
 
 impl NodeId {
@@ -141,6 +141,7 @@ pub struct Layout {
     pub(crate) blocks: Vec<Block>,
     /// The block of each entry, as an index into `blocks`.
     pub(crate) entered: BTreeMap<SensorId, usize>,
+    pub(crate) crossings: Vec<Crossing>,
 }
 
 impl Layout {

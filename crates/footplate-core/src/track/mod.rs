@@ -8,12 +8,14 @@
 //! - [`Layout::route`]: the shortest path between two nodes; [`Layout::circuit_from`]: a path that leads back;
 //! - [`Layout::blocks`]: sections with an occupancy detector, and where trains enter them;
 //! - [`Occupancy`]: from reports of their detectors to these entries;
+//! - [`Layout::crossings`]: where two tracks cross without a connection;
 //! - [`Layout::zone`]: the speed restriction of an edge;
 //! - [`Position`] and [`Landmark`]: points on the rails, and their names.
 
 mod block;
 mod build;
 mod circuit;
+mod crossing;
 mod error;
 #[cfg(test)]
 pub(crate) mod example;
@@ -32,6 +34,7 @@ mod zone;
 
 pub use block::Block;
 pub use circuit::Circuit;
+pub use crossing::Crossing;
 pub use error::{LayoutError, PlanEntry};
 pub use graph::{Edge, Layout, Node, NodeKind, OutgoingEdges};
 pub use hop::{Hop, HopId};

@@ -41,10 +41,9 @@ impl Occupancy {
         Self { blocks, turnouts: TurnoutStates::unknown() }
     }
 
-    /// The blocks that are occupied.
-    pub fn occupied_blocks<'l>(&self, layout: &'l Layout) -> impl Iterator<Item = &'l Block> {
-        let states = layout.blocks().iter().zip(&self.blocks);
-        states.filter(|(_, state)| state.is_occupied).map(|(block, _)| block)
+    /// Every block by its detector, and whether it is occupied.
+    pub fn states(&self, layout: &Layout) -> impl Iterator<Item = (SensorId, bool)> {
+        layout.blocks().iter().zip(&self.blocks).map(|(block, state)| (block.detector, state.is_occupied))
     }
 
     /// A detector was occupied when it was first read. Returns whether there is such a detector.
@@ -172,7 +171,12 @@ mod tests {
         let station = scene.layout.block_of_detector(SensorId(1)).unwrap().detector;
         assert!(scene.occupancy.occupied_from_start(&scene.layout, station));
         let occupied = |scene: &Scene| -> Vec<_> {
-            scene.occupancy.occupied_blocks(&scene.layout).map(|block| block.detector).collect()
+            scene
+                .occupancy
+                .states(&scene.layout)
+                .filter(|(_, is_occupied)| *is_occupied)
+                .map(|(detector, _)| detector)
+                .collect()
         };
         assert_eq!(occupied(&scene), [station], "its detector reports it before any train is known");
         assert_eq!(scene.occupied(5.0, "main"), Some("S3"));

@@ -6,7 +6,7 @@
 
 use std::collections::VecDeque;
 
-use footplate_core::track::Leg;
+use footplate_core::track::{Crossing, Leg, Position};
 use footplate_core::{EdgeId, SensorId, TurnoutId};
 
 use crate::circuit::FOULING_MM;
@@ -274,34 +274,51 @@ impl Body {
         (from < to).then_some(along)
     }
 
-    /// Whether two trains could touch: they share rails or the legs of a turnout.
+    /// Whether two trains could touch: they share rails, the legs of a turnout or a crossing.
     pub(crate) fn is_near(&self, rails: &Rails<'_>, other: &Self) -> bool {
-        self.path.iter().any(|mine| {
-            other.path.iter().any(|others| {
-                mine.edge.stretch() == others.edge.stretch()
-                    || legs(rails, mine.edge)
-                        .any(|leg| legs(rails, others.edge).any(|theirs| theirs.0 == leg.0))
+        let runs_over = |body: &Self, at: Position| {
+            body.path.iter().any(|under| under.edge.stretch() == at.edge.stretch())
+        };
+        self.crosses(rails, other, runs_over)
+            || self.path.iter().any(|mine| {
+                other.path.iter().any(|others| {
+                    mine.edge.stretch() == others.edge.stretch()
+                        || legs(rails, mine.edge)
+                            .any(|leg| legs(rails, others.edge).any(|theirs| theirs.0 == leg.0))
+                })
             })
+    }
+
+    /// Whether two trains satisfy a condition on the two tracks of a level crossing.
+    fn crosses(&self, rails: &Rails<'_>, other: &Self, is_so: impl Fn(&Self, Position) -> bool) -> bool {
+        rails.layout.crossings().iter().any(|Crossing { tracks: [one, two] }| {
+            is_so(self, *one) && is_so(other, *two) || is_so(self, *two) && is_so(other, *one)
         })
     }
 
     /// Whether two trains touch.
     pub(crate) fn touches(&self, rails: &Rails<'_>, other: &Self) -> bool {
-        self.path.iter().any(|mine| {
-            let Some([from, to]) = self.reach_on(mine.edge) else { return false };
-            let shares = other.reach_on(mine.edge).is_some_and(|[begins, ends]| begins < to && from < ends);
-            shares
-                || legs(rails, mine.edge).any(|(turnout, leg)| {
-                    let fouls = |path: &Self, under: &Under| {
-                        path.distance_from_toe(rails, under, turnout) < FOULING_MM
-                    };
-                    let stands_beside = |theirs: &Under| {
-                        legs(rails, theirs.edge).any(|(number, by)| number == turnout && by != leg)
-                            && fouls(other, theirs)
-                    };
-                    fouls(self, mine) && other.path.iter().any(stands_beside)
-                })
-        })
+        let fouls_crossing = |body: &Self, at: Position| {
+            let spot = at.offset.as_mm();
+            body.reach_on(at.edge).is_some_and(|[from, to]| (from - spot).max(spot - to) < FOULING_MM)
+        };
+        self.crosses(rails, other, fouls_crossing)
+            || self.path.iter().any(|mine| {
+                let Some([from, to]) = self.reach_on(mine.edge) else { return false };
+                let shares =
+                    other.reach_on(mine.edge).is_some_and(|[begins, ends]| begins < to && from < ends);
+                shares
+                    || legs(rails, mine.edge).any(|(turnout, leg)| {
+                        let fouls = |path: &Self, under: &Under| {
+                            path.distance_from_toe(rails, under, turnout) < FOULING_MM
+                        };
+                        let stands_beside = |theirs: &Under| {
+                            legs(rails, theirs.edge).any(|(number, by)| number == turnout && by != leg)
+                                && fouls(other, theirs)
+                        };
+                        fouls(self, mine) && other.path.iter().any(stands_beside)
+                    })
+            })
     }
 
     /// Whether points that have just moved moved under the train.

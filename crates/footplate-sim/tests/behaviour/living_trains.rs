@@ -100,6 +100,25 @@ fn trains_that_meet_collide_and_stay_where_they_are() {
 }
 
 #[test]
+fn trains_that_meet_on_a_crossing_collide() {
+    let plain = two_loops();
+    let at = |from: &str, to: &str, mm| {
+        let node = |name| plain.node_named(name).unwrap();
+        Position { edge: plain.edge_between(node(from), node(to)).unwrap(), offset: Length::from_mm(mm) }
+    };
+    let crossed = plain.clone().with_crossing([at("S1", "S2", 600.0), at("S5", "S6", 600.0)]).unwrap();
+    for (layout, expected) in [(&plain, 0), (&crossed, 2)] {
+        let mut station = empty(layout, StationSwitches::default());
+        put(&mut station, TRAIN, "S1", "S2", 100.0);
+        put(&mut station, OTHER, "S5", "S6", 100.0);
+        say(&mut station, &[8, 24]);
+        say(&mut station, &[8, 58]);
+        wait(&mut station, 5.0);
+        assert_eq!(station.world().incidents().len(), expected);
+    }
+}
+
+#[test]
 fn points_thrown_under_a_train_derail_it() {
     let layout = two_loops();
     let mut station = empty(&layout, StationSwitches::default());

@@ -122,6 +122,19 @@ pub enum LayoutProblem {
         /// The name in the file.
         found: String,
     },
+    /// A crossing on an edge that is not in the file.
+    #[error("no edge leads from `{from}` to `{to}`: name it as it is written in `edges`")]
+    UnknownEdge {
+        /// Where the edge should begin.
+        from: String,
+        /// Where it should end.
+        to: String,
+    },
+    /// A crossing before the start or beyond the end of an edge.
+    #[error(
+        "`mm` of a crossing is not on its edge: write the distance from the start of the edge to the crossing"
+    )]
+    CrossingOffEdge,
     /// Coordinates out of range.
     #[error("[{x}, {y}] is out of range: coordinates are between -{limit} and {limit}")]
     Point {

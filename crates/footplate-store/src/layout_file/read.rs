@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use footplate_core::track::{
-    Layout, LayoutError, LayoutPlan, Leg, Place, PlanEntry, PlannedBlock, PlannedZone, RailEnd, Stretch,
-    StretchLength, Survey, SurveyedDistance, Zone,
+    Layout, LayoutError, LayoutPlan, Leg, Place, PlanEntry, PlannedBlock, PlannedZone, Position, RailEnd,
+    Stretch, StretchLength, Survey, SurveyedDistance, Zone,
 };
-use footplate_core::{Length, SensorId, Speed, StretchId, TurnoutId};
+use footplate_core::{EdgeId, Length, SensorId, Speed, StretchId, TurnoutId};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -72,6 +72,7 @@ fn read_text(text: &str) -> Result<LayoutFile, Fault> {
     }
     let plan = written.plan()?;
     let layout = Layout::build(&plan).map_err(|error| (written.place_of(&error), error.into()))?;
+    let layout = written.cross(layout)?;
     let mut drawing = Drawing::default();
     for (place, at) in plan.places.iter().zip(written.points()) {
         let Some(at) = at else { continue };
@@ -121,6 +122,8 @@ struct Written {
     #[serde(default)]
     boundaries: Vec<Spanned<WrittenBoundary>>,
     edges: Vec<Spanned<WrittenEdge>>,
+    #[serde(default)]
+    crossings: Vec<Spanned<WrittenCrossing>>,
     #[serde(default)]
     distances: Vec<Spanned<WrittenDistance>>,
 }
@@ -172,6 +175,21 @@ struct WrittenEdge {
     mm: Option<Spanned<f64>>,
     uncertainty_mm: Option<Spanned<f64>>,
     zone: Option<Spanned<String>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenCrossing {
+    tracks: [WrittenSpot; 2],
+}
+
+/// A place on an edge, which is named as in `edges`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenSpot {
+    from: String,
+    to: String,
+    mm: f64,
 }
 
 #[derive(Deserialize)]
@@ -255,6 +273,26 @@ impl Written {
             }
         });
         Ok(zones.collect())
+    }
+
+    /// Adds the level crossings to a layout.
+    fn cross(&self, mut layout: Layout) -> Result<Layout, Fault> {
+        for crossing in &self.crossings {
+            let fault = |problem| (crossing.span().start, problem);
+            let position = |WrittenSpot { from, to, mm }: &WrittenSpot| {
+                let is_named = |edge: &Spanned<WrittenEdge>| {
+                    edge.get_ref().from.get_ref() == from && edge.get_ref().to.get_ref() == to
+                };
+                let unknown = || fault(LayoutProblem::UnknownEdge { from: from.clone(), to: to.clone() });
+                let number = self.edges.iter().position(is_named).ok_or_else(unknown)?;
+                // Layouts number their edges by `u16`, two to a written one.
+                Ok(Position { edge: EdgeId(2 * number as u16), offset: Length::from_mm(*mm) })
+            };
+            let [one, other] = &crossing.get_ref().tracks;
+            let tracks = [position(one)?, position(other)?];
+            layout = layout.with_crossing(tracks).ok_or_else(|| fault(LayoutProblem::CrossingOffEdge))?;
+        }
+        Ok(layout)
     }
 
     /// The points of all places, in the order of the plan.

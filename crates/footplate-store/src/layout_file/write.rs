@@ -1,9 +1,9 @@
 //! Writes a layout as readable TOML that reads back as the same layout.
 
 use footplate_core::track::{
-    Block, Edge, Layout, Leg, Node, NodeKind, StretchLength, SurveyedDistance, Zone,
+    Block, Crossing, Edge, Layout, Leg, Node, NodeKind, StretchLength, SurveyedDistance, Zone,
 };
-use footplate_core::{Length, NodeId};
+use footplate_core::{EdgeId, Length, NodeId};
 
 use super::drawing::{Drawing, LayoutFile};
 use super::read::FORMAT;
@@ -63,6 +63,11 @@ pub fn write_layout(file: &LayoutFile) -> String {
         text += "# Edges without mm were not measured.\n";
     }
     text += &list("edges", stretches(layout));
+    if !layout.crossings().is_empty() {
+        text += "\n# Level crossings: two edges, and how far from their starts they cross.\n";
+        text +=
+            &list("crossings", layout.crossings().iter().map(|crossing| self::crossing(layout, crossing)));
+    }
     if !survey.distances.is_empty() {
         text += "\n# Distances between sensors, known better than the sum of their edges.\n";
         text += &list("distances", survey.distances.iter().map(distance));
@@ -122,16 +127,26 @@ impl<'f> Places<'f> {
     }
 }
 
-/// Each stretch once: its first edge names the end, its twin the leg that it leaves by.
+/// Each stretch once.
 fn stretches(layout: &Layout) -> impl Iterator<Item = String> {
-    let twins = layout.edges().skip(1).step_by(2);
-    layout.edges().step_by(2).zip(twins).map(|((id, there), (_, back))| {
-        let from = rail_end(layout, there.from, there);
-        let to = rail_end(layout, there.to, back);
+    layout.edges().step_by(2).map(|(id, edge)| {
         let zone =
             layout.zone(id).map_or_else(String::new, |zone| format!(", zone = {}", quoted(&zone.name)));
-        format!("from = {from}, to = {to}{}{zone}", length(there.known))
+        format!("{}{}{zone}", ends(layout, id), length(edge.known))
     })
+}
+
+/// The ends of an edge: it names its start, and its twin the leg by which that leaves the end.
+fn ends(layout: &Layout, id: EdgeId) -> String {
+    let edges = [layout.edge(id), layout.edge(id.twin())];
+    let [Some(there), Some(back)] = edges else { return String::new() };
+    format!("from = {}, to = {}", rail_end(layout, there.from, there), rail_end(layout, there.to, back))
+}
+
+fn crossing(layout: &Layout, crossing: &Crossing) -> String {
+    let spots =
+        crossing.tracks.map(|at| format!("{{ {}, mm = {} }}", ends(layout, at.edge), millimetres(at.offset)));
+    format!("tracks = [{}]", spots.join(", "))
 }
 
 /// The keys of an edge's length.

@@ -1,6 +1,6 @@
 //! Whatever is wrong with a layout file, the message names file, line, column and value, and what would be right.
 
-use footplate_store::{LARGEST_LAYOUT, parse_layout, read_layout};
+use footplate_store::{LARGEST_LAYOUT, parse_layout, read_layout, write_layout};
 
 /// A loop with one siding, as a person would write it.
 const OVAL: &str = r#"format = 1
@@ -49,6 +49,26 @@ fn the_oval_is_right() {
     assert_eq!(file.about, "");
     // Windows line ends and a file of the newest TOML are fine, too.
     assert_eq!(parse_layout("oval.toml", OVAL.replace('\n', "\r\n").as_bytes()).unwrap(), file);
+}
+
+#[test]
+fn tracks_cross_where_the_file_says() {
+    let crossing = "crossings = [\n  { tracks = [{ from = \"MR2\", to = \"A1\", mm = 450 }, { from = \"BR1 curved\", to = \"EX1\", mm = 120.5 }] },\n]\n";
+    let file = parse_layout("oval.toml", format!("{OVAL}{crossing}").as_bytes()).unwrap();
+    let places = file.layout.crossings()[0].tracks.map(|at| (at.edge.0, at.offset.as_mm()));
+    assert_eq!(places, [(6, 450.0), (8, 120.5)]);
+    assert_eq!(parse_layout("again", write_layout(&file).as_bytes()).unwrap(), file);
+    let complaint = |right: &str, wrong: &str| {
+        let text = format!("{OVAL}{}", crossing.replacen(right, wrong, 1));
+        parse_layout("oval.toml", text.as_bytes()).unwrap_err().to_string()
+    };
+    let place = "oval.toml, line 30, column 3: ";
+    let unknown = "no edge leads from `A1` to `MR2`: name it as it is written in `edges`";
+    assert_eq!(complaint(r#""MR2", to = "A1""#, r#""A1", to = "MR2""#), format!("{place}{unknown}"));
+    let beyond = "`mm` of a crossing is not on its edge: write the distance from the start of the edge to the crossing";
+    for wrong in ["901", "-1", "nan"] {
+        assert_eq!(complaint("450", wrong), format!("{place}{beyond}"));
+    }
 }
 
 #[test]
@@ -110,7 +130,7 @@ fn keys_are_those_of_a_layout() {
         complaint("edges = [", "edge = ["),
         "oval.toml, line 18, column 1: unknown field `edge`, expected one of `format`, `name`, `about`, \
          `length_uncertainty_mm`, `length_origin`, `length_scale_uncertainty_percent`, `sensors`, `turnouts`, \
-         `never_both_curved`, `ends`, `zones`, `blocks`, `boundaries`, `edges`, `distances`"
+         `never_both_curved`, `ends`, `zones`, `blocks`, `boundaries`, `edges`, `crossings`, `distances`"
     );
     assert_eq!(
         complaint("length_origin = \"tape measure\"\n", ""),

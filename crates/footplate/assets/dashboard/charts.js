@@ -40,7 +40,7 @@ export class LiveChart {
       made.addEventListener("click", does);
       return made;
     };
-    (figure.querySelector("figcaption") ?? figure).append(saves("chart-csv", "CSV", () => this.#save()), saves("chart-png", "PNG", () => this.#draws()));
+    (figure.querySelector("figcaption") ?? figure).append(make("span", { class: "saves" }, saves("chart-csv", "CSV", () => this.#save()), saves("chart-png", "PNG", () => this.#draws())));
     let width = figure.clientWidth;
     this.#watch = new ResizeObserver(() => {
       if (figure.clientWidth === width) return;
@@ -122,7 +122,7 @@ export class LiveChart {
   close() {
     this.#watch.disconnect();
     dark.removeEventListener("change", this.#again);
-    this.#figure.querySelectorAll(".csv").forEach((button) => button.remove());
+    this.#figure.querySelector(".saves").remove();
     this.#u.destroy();
   }
 }

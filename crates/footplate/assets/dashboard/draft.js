@@ -26,6 +26,11 @@ function endsOf({ kind, mm, radius, angle, side = 1 }) {
   const straight = { x: mm, y: 0, heading: 0 };
   const curved = { x: radius * Math.sin(bend), y: side * radius * (1 - Math.cos(bend)), heading: side * bend };
   if (kind === "straight") return [first, straight];
+  if (kind === "crossing") {
+    // The other track crosses the middle.
+    const [dx, dy] = [mm / 2 * Math.cos(bend), side * mm / 2 * Math.sin(bend)];
+    return [first, straight, { x: mm / 2 - dx, y: -dy, heading: Math.PI + side * bend }, { x: mm / 2 + dx, y: dy, heading: side * bend }];
+  }
   return kind === "curve" ? [first, curved] : [first, straight, curved];
 }
 
@@ -150,7 +155,8 @@ export class Draft {
       const part = bend * nth / 12;
       return [piece.radius * Math.sin(part), (piece.side ?? 1) * piece.radius * (1 - Math.cos(part))];
     });
-    const curves = { straight: [line], curve: [arc], turnout: [line, arc] }[piece.kind];
+    const across = endsOf(piece).slice(2).map(({ x, y }) => [x, y]);
+    const curves = { straight: [line], curve: [arc], turnout: [line, arc], crossing: [line, across] }[piece.kind];
     return curves.map((curve) => curve.map(([x, y]) => { const point = at(piece.pose, { x, y, heading: 0 }); return [point.x, point.y]; }));
   }
 

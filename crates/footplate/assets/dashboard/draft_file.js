@@ -1,5 +1,5 @@
 // The text of a layout file from a drawing: sensors, boundaries, turnouts and open ends are its nodes; the pieces between them form its
-// edges.
+// edges. Where two edges run over one crossing, the file says so.
 
 import { arcOf } from "./pieces.js";
 
@@ -36,23 +36,28 @@ export class DraftFile {
     }
   }
 
-  /** Leaves a piece through an end, after `mm` so far: the node that is reached, the distance, and its name from this side. */
-  #reach(piece, port, mm) {
+  /**
+   * Leaves a piece through an end, after `mm` so far, over the middle of the crossings `crossed`: the node that is reached, with its name
+   * from this side, and the distance.
+   */
+  #reach(piece, port, mm, crossed = []) {
     const joint = this.#jointOf.get(`${piece} ${port}`);
-    if (joint.end) return { name: `EX${joint.end}`, mm };
+    if (joint.end) return { name: `EX${joint.end}`, mm, crossed };
     const isFirst = joint.ends[0].piece === piece && joint.ends[0].port === port;
-    if (joint.names) return { name: joint.names[isFirst ? 0 : 1], mm };
+    if (joint.names) return { name: joint.names[isFirst ? 0 : 1], mm, crossed };
     const next = joint.ends[isFirst ? 1 : 0];
-    return this.#through(next.piece, next.port, mm);
+    return this.#through(next.piece, next.port, mm, crossed);
   }
 
   /** Enters a piece through an end. */
-  #through(piece, port, mm) {
+  #through(piece, port, mm, crossed = []) {
     const laid = this.#draft.pieces[piece];
-    if (laid.kind !== "turnout") return this.#reach(piece, 1 - port, mm + (laid.kind === "straight" ? laid.mm : arcOf(laid)));
+    // Opposite ends of a crossing are neighbours in the list.
+    if (laid.kind === "crossing") return this.#reach(piece, port ^ 1, mm + laid.mm, [...crossed, { piece, mm: mm + laid.mm / 2 }]);
+    if (laid.kind !== "turnout") return this.#reach(piece, 1 - port, mm + (laid.kind === "straight" ? laid.mm : arcOf(laid)), crossed);
     const { number } = this.#turnouts.find((one) => one.piece === piece);
-    if (port === 0) return { name: `BR${number}`, mm };
-    return port === 1 ? { name: `MR${number} straight`, mm: mm + laid.mm } : { name: `MR${number} curved`, mm: mm + arcOf(laid) };
+    if (port === 0) return { name: `BR${number}`, mm, crossed };
+    return port === 1 ? { name: `MR${number} straight`, mm: mm + laid.mm, crossed } : { name: `MR${number} curved`, mm: mm + arcOf(laid), crossed };
   }
 
   /** Every path out of a node, by the name of the node in this direction, and its name in the other direction. */
@@ -83,14 +88,15 @@ export class DraftFile {
 
   text() {
     const written = new Set();
-    const edges = [];
-    for (const { from, back, name, mm } of this.#paths()) {
+    const edges = [], crossed = new Map();
+    for (const { from, back, name, mm, crossed: over } of this.#paths()) {
       // Each edge is found from both of its ends.
       if (written.has(`${from} ${name}`)) continue;
       written.add(`${from} ${name}`);
       const other = this.#paths().find((path) => path.back === name && path.name === back);
       if (other) written.add(`${other.from} ${other.name}`);
       edges.push(`  { from = "${from}", to = "${name}", mm = ${mm.toFixed(1)} },`);
+      for (const at of over) crossed.set(at.piece, [...(crossed.get(at.piece) ?? []), `{ from = "${from}", to = "${name}", mm = ${at.mm.toFixed(1)} }`]);
     }
     const list = (key, rows) => (rows.length > 0 ? [`${key} = [`, ...rows, "]"] : []);
     return [
@@ -101,7 +107,8 @@ export class DraftFile {
       ...list("boundaries", this.#boundaries.map((joint) => `  { names = ["${joint.names.join('", "')}"], enters = [${this.#block(joint.ends[1])}, ${this.#block(joint.ends[0])}], at = ${point(joint)} },`)),
       ...list("turnouts", this.#turnouts.map(({ number, toe }) => `  { number = ${number}, names = ["BR${number}", "MR${number}"], at = ${point(toe)} },`)),
       ...list("ends", this.#ends.map((joint) => `  { names = ["EN${joint.end}", "EX${joint.end}"], at = ${point(joint)} },`)),
-      ...list("edges", edges), "",
+      ...list("edges", edges),
+      ...list("crossings", [...crossed.values()].filter(({ length }) => length === 2).map((tracks) => `  { tracks = [${tracks.join(", ")}] },`)), "",
     ].join("\n");
   }
 }

@@ -161,13 +161,14 @@ export function editorPage(root, live) {
   }
 
   function list() {
-    const size = (piece) => (piece.kind === "straight" ? `${piece.mm} mm` : `${piece.radius} mm, ${piece.angle}°${piece.kind === "turnout" ? `, ${piece.mm} mm` : ""}`);
+    const size = ({ mm, radius, angle }) => [radius && `${radius} mm`, angle && `${angle}°`, mm && `${mm} mm`].filter(Boolean).join(", ");
     const button = (piece) => {
-      const made = make("button", { type: "button", title: piece.kind === "straight" ? "" : say("draft-arc", arcOf(piece).toFixed(1)) }, make("b", {}, piece.name), make("small", {}, size(piece)));
+      const made = make("button", { type: "button", title: piece.radius ? say("draft-arc", arcOf(piece).toFixed(1)) : "" }, make("b", {}, piece.name), make("small", {}, size(piece)));
       made.addEventListener("click", () => lay(piece));
       return made;
     };
-    const groups = ["straight", "curve", "turnout"].map((kind) => make("div", { role: "group", "aria-label": say(`draft-${kind}s`) },
+    const has = (kind) => LIBRARIES[$("#library").value].some((piece) => piece.kind === kind);
+    const groups = ["straight", "curve", "turnout", "crossing"].filter(has).map((kind) => make("div", { role: "group", "aria-label": say(`draft-${kind}s`) },
       make("h3", {}, say(`draft-${kind}s`)), make("div", { class: "does" }, ...LIBRARIES[$("#library").value].filter((piece) => piece.kind === kind).map(button))));
     $("#pieces").replaceChildren(...groups);
   }

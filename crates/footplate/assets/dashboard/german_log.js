@@ -1,18 +1,54 @@
 // The lines of the log, and the reasons of refused commands, in German. A line that is not known stays English as a whole.
 
+import { ERRORS } from "./german_errors.js";
+
 const LEGS = { straight: "gerade", curved: "auf Abzweig" };
-const trains = (list) => list.replace(/train (\d+)/g, "Zug $1");
+const trains = (list) => list.replace("no train that can move", "kein Zug, der fahren kann").replace(/train (\d+)/g, "Zug $1");
+const WHILE = { "while it was being stopped": "beim Anhalten", "while it crept to a sensor": "beim Schleichen zum Rückmelder", "while it was measured again": "beim erneuten Messen" };
 
 /** What may follow a detection or a stop. */
 const TAILS = [
   [/, found/, ", lokalisiert"], [/, (\d+) ms late/, ", $1 ms später"], [/, (\d+) ms early/, ", $1 ms früher"], [/, predicted ([\d.]+ s)/, ", vorhergesagt $1"],
   [/, (\d+) missed before/, ", $1 davor ausgelassen"], [/; next (\S+) at/, "; als Nächstes $1 um"], [/, ([+−-]?[\d.]+) mm from the target/, ", $1 mm neben dem Ziel"],
-  [/\(predicted (\S+) mm to (\S+) mm\)/, "(vorhergesagt $1 mm bis $2 mm)"], [/, ([\d.]+) s after (\S+?);/, ", $1 s nach $2;"], [/; rests at (\S+) mm to (\S+) mm/, "; hält bei $1 mm bis $2 mm"],
+  [/\(predicted (\S+) mm to (\S+) mm\)/, "(vorhergesagt $1 mm bis $2 mm)"], [/; starts at step (\S+) at (\S+ s)/, "; fährt um $2 mit Stufe $1 an"],
+  [/, with minimum jerk/, ", mit kleinstem Ruck"], [/, through a steady speed/, ", über ein gleichmäßiges Tempo"], [/ from (\S+) to (\S+) mm\/s, and stops from step (\S+)/, " von $1 auf $2 mm/s, und hält aus Stufe $3"],
+  [/, reversing once/, ", einmal wenden"], [/, reversing (\d+) times/, ", $1-mal wenden"], [/, ([\d.]+) s after (\S+?);/, ", $1 s nach $2;"], [/; rests at (\S+) mm to (\S+) mm/, "; hält bei $1 mm bis $2 mm"],
 ];
 
 const LINES = [
   [/^( *[\d.]+ s {2})train (\d+) at (\S+?)(,? .*)?$/, (_, at, train, place, more = "") => `${at}Zug ${train} bei ${place}${tailed(more)}`],
   [/^( *[\d.]+ s {2})train (\d+) will be commanded to stop(.*)$/, (_, at, train, more) => `${at}Zug ${train} erhält den Haltbefehl${tailed(more)}`],
+  [/^( *[\d.]+ s {2})train (\d+) will be at rest there(.*)$/, (_, at, train, more) => `${at}Zug ${train} wird dort stehen${tailed(more)}`],
+  [/^( *[\d.]+ s {2})train (\d+) holds (\S+) mm\/s from here on$/, "$1Zug $2 hält von hier an $3 mm/s"],
+  [/^( *[\d.]+ s {2})(\S+) was reported by train (\d+) or by (.*): the next reports decide$/, (_, at, sensor, train, or) => `${at}${sensor} kam von Zug ${train} oder ${or === "no train at all" ? "von keinem Zug" : `von ${trains(or)}`}: die nächsten Meldungen entscheiden`],
+  [/^train (\d+) comes to rest about (\S+) mm beyond the target: .*$/, "Zug $1 hält etwa $2 mm hinter dem Ziel: es war näher als geschätzt"],
+  [/^train (\d+) is held back: it would come too close to train (\d+), .*$/, "Zug $1 wird zurückgehalten: er käme Zug $2 zu nah, oder dessen Position ist unbekannt"],
+  [/^something moves from (\S+) to (\S+) that Footplate does not drive; stopped: (.*); check the track.*$/, (_, from, to, list) => `von ${from} nach ${to} bewegt sich etwas, das Footplate nicht fährt; angehalten: ${trains(list)}; das Gleis prüfen, dann \`power on\` eingeben oder den Zug, der es ist, mit \`place\` setzen`],
+  [/^not confirmed as sent: (.*)$/, "Senden nicht bestätigt: $1"],
+  [/^train (\d+) is in a deadlock: no train can make room for another; .*$/, "Zug $1 ist blockiert: kein Zug kann einem anderen Platz machen; einen von Hand umsetzen und mit `place` sagen, wo er ist"],
+  [/^train (\d+) is in a deadlock that no train can resolve from its place: .*$/, "Zug $1 ist blockiert, und kein Zug kann das von seiner Stelle aus lösen: einer wird anderswohin geschickt"],
+  [/^train (\d+) does not start yet(?:: (.*))?; Footplate tries again$/, (_, train, why) => `Zug ${train} fährt noch nicht an${why ? `: ${logInGerman(why)}` : ""}; Footplate versucht es wieder`],
+  [/^train (\d+) left its reserved route: stopped$/, "Zug $1 hat seine reservierte Fahrstraße verlassen: angehalten"],
+  [/^train (\d+) left its reserved route: stopped, with the trains it could meet: (.*)$/, (_, train, list) => `Zug ${train} hat seine reservierte Fahrstraße verlassen: angehalten, mit den Zügen, denen er begegnen könnte: ${trains(list)}`],
+  [/^train (\d+) is waiting for clearance to creep$/, "Zug $1 wartet, bis er schleichen darf"],
+  [/^train (\d+) runs at (\S+) % \(± (\S+) %\) of its calibrated speed at step (\S+)$/, "Zug $1 fährt mit Stufe $4 $2 % (± $3 %) des kalibrierten Tempos"],
+  [/^train (\d+) came to rest (\S+) mm beyond the prediction \(± (\S+) mm\)$/, "Zug $1 hielt $2 mm hinter der Vorhersage (± $3 mm)"],
+  [/^recovery took (\S+) s; train (\d+) is back in service: (.*)$/, (_, took, train, found) => `nach ${took} s ist Zug ${train} wieder im Dienst: ${logInGerman(found)}`],
+  [/^it runs at (\S+) % of its calibrated speeds$/, "er fährt mit $1 % seiner kalibrierten Tempi"], [/^it is another engine, and was calibrated anew$/, "es ist eine andere Lok, sie wurde neu kalibriert"], [/^its model is unchanged$/, "sein Modell ist unverändert"],
+  [/^position of train (\d+) lost: recovery failed (.*); check the train, then enter .*$/, (_, train, during) => `Position von Zug ${train} verloren: die Wiederherstellung ist ${WHILE[during] ?? during} gescheitert; den Zug prüfen, dann \`place ${train} at ...\` eingeben oder ihn über einen Rückmelder fahren, wenn kein anderer Zug in der Nähe ist`],
+  [/^stops of train (\d+) miss their intervals: the intervals are ±(\S+) mm wider from now on; .*$/, "Zug $1 hält außerhalb seiner Intervalle: sie sind ab jetzt ±$2 mm breiter; wenn Last, Zug oder Gleis sich geändert haben, ihn neu kalibrieren"],
+  [/^train (\d+) extends (\S+) mm ahead of the leading end of its pickup, and (\S+) mm behind it$/, "Zug $1 reicht $2 mm vor das vordere Ende seines Schleifers und $3 mm dahinter"],
+  [/^train (\d+) has no command that would bring it to rest; .*$/, "Zug $1 hat keinen Befehl, der ihn anhält; das Skript geht weiter"], [/^nothing happened within (\S+) s; .*$/, "in $1 s ist nichts geschehen; das Skript geht weiter"],
+  [/^`(.*)` waits: (.*)$/, (_, line, why) => `\`${line}\` wartet: ${logInGerman(why)}`],
+  [/^schedule `(.*)` has ended; (\S+) lines? of its last round (?:was|were) refused$/, (_, name, count) => `Fahrplan \`${name}\` ist zu Ende; abgelehnte Zeilen der letzten Runde: ${count === "one" ? 1 : count}`],
+  [/^no schedule is saved: .*$/, "kein Fahrplan ist gespeichert: auf der Seite „Fahrpläne“ schreibt man sie"], [/^no schedule `(.*)` runs$/, "kein Fahrplan `$1` läuft"],
+  // Why a train was stopped.
+  [/^train (\d+) stopped: the track ahead is reserved for (.*)$/, (_, train, list) => `Zug ${train} angehalten: das Gleis voraus ist für ${trains(list)} reserviert`],
+  [/^train (\d+) stopped: (.*); also stopped, because they could meet it: (.*)$/, (_, train, why, list) => `Zug ${train} angehalten: ${logInGerman(why)}; auch angehalten, weil sie ihm begegnen könnten: ${trains(list)}`],
+  [/^it runs slower than calibrated$/, "er fährt langsamer als kalibriert"], [/^it runs faster than calibrated$/, "er fährt schneller als kalibriert"], [/^its position is lost$/, "seine Position ist verloren"],
+  [/^a sensor reported it where it cannot have run to$/, "ein Rückmelder hat ihn gemeldet, wohin er nicht gefahren sein kann"], [/^a sensor reported it at a time when .*$/, "ein Rückmelder hat ihn zu einer Zeit gemeldet, zu der er nicht dort gewesen sein kann"],
+  [/^several sensors in a row did not report it$/, "mehrere Rückmelder nacheinander haben ihn nicht gemeldet"], [/^the stop command could not be sent$/, "der Haltbefehl konnte nicht gesendet werden"],
+  [/^it was commanded to stop and sensors still report it$/, "er hat den Haltbefehl, und Rückmelder melden ihn weiter"], [/^its model no longer fits$/, "sein Modell stimmt nicht mehr"],
   [/^train (\d+): position unknown; run it over a sensor first$/, "Zug $1: Position unbekannt; erst über einen Rückmelder fahren"],
   [/^train (\d+): (.*), at rest$/, "Zug $1: $2, steht"], [/^train (\d+): (.*) mm\/s at step (\d+)$/, "Zug $1: $2 mm/s, Stufe $3"],
   [/^turnout (\d+) set (\w+)$/, (_, turnout, leg) => `Weiche ${turnout} ${LEGS[leg] ?? leg} gestellt`],
@@ -25,7 +61,7 @@ const LINES = [
   [/^(\S+) reports repeatedly where no train can be: .*$/, "$1 meldet wiederholt, wo kein Zug sein kann: wird ignoriert, bis er wieder stimmt"],
   [/^(\S+) has behaved for a while and is used again$/, "$1 stimmt seit einer Weile und wird wieder verwendet"],
   [/^( *[\d.]+ s {2})(\S+) reported, but no train can have been there$/, "$1$2 hat gemeldet, aber dort kann kein Zug gewesen sein"],
-  [/^route set for train (\d+): about (\d+) s(.*)$/, (_, train, time, more) => `Fahrstraße für Zug ${train} gestellt: etwa ${time} s${more.replace(", reversing once", ", einmal wenden").replace(/, reversing (\d+) times/, ", $1-mal wenden")}`],
+  [/^route set for train (\d+): about (\d+) s(.*)$/, (_, train, time, more) => `Fahrstraße für Zug ${train} gestellt: etwa ${time} s${tailed(more)}`],
   [/^train (\d+) waits for track that is reserved for (.*)$/, (_, train, on) => `Zug ${train} wartet auf Gleis, das für ${trains(on)} reserviert ist`],
   [/^train (\d+) is in a deadlock: (.*) makes room$/, (_, train, others) => `Zug ${train} ist blockiert: ${trains(others)} macht Platz`],
   [/^train (\d+) moves to (\S+) to make room for train (\d+)$/, "Zug $1 fährt nach $2, um Zug $3 Platz zu machen"],
@@ -65,12 +101,23 @@ const LINES = [
   [/^turnout (\d+) can be curved only while turnout (\d+) is straight, and train (\d+) is on that one: .*$/, "Weiche $1 kann nur auf Abzweig liegen, solange Weiche $2 gerade liegt, und auf der ist Zug $3: warten oder ihn erst anhalten"],
   [/^`(.*)` cannot be reached that soon: allow at least (\S+) s$/, "`$1` ist so schnell nicht zu erreichen: mindestens $2 s geben"],
   [/^a moving train cannot take that long to `(.*)`: allow at most (\S+) s, or stop it first$/, "ein fahrender Zug braucht nicht so lange bis `$1`: höchstens $2 s geben oder ihn erst anhalten"],
+  [/^train (\d+) is not part of this session$/, "Zug $1 gehört nicht zu dieser Sitzung"], [/^the layout has no turnout (\d+)$/, "die Anlage hat keine Weiche $1"],
+  [/^step (\d+) is too high: the highest step of this train is (\d+)$/, "Stufe $1 ist zu hoch: die höchste Stufe dieses Zuges ist $2"],
+  [/^probability (\S+) % is out of range: .*$/, "Wahrscheinlichkeit $1 % ist außerhalb des Bereichs: 0.0001 % bis 50 %"], [/^distance (\S+) mm is out of range: .*$/, "Strecke $1 mm ist außerhalb des Bereichs: 1 mm bis 100000 mm"],
+  [/^train (\d+) did not arrive within (\S+) s: .*$/, "Zug $1 ist in $2 s nicht angekommen: wegräumen, was seinen Weg versperrt, und Züge mit unsicherer Position über einen Rückmelder fahren"],
+  [/^train (\d+) already follows train (\d+): .*$/, "Zug $1 folgt schon Zug $2: Zug $1 erst einen anderen Befehl geben"], [/^gap to train (\d+) too short to stop safely: use at least (.*)$/, "Abstand zu Zug $1 ist zu kurz, um sicher zu halten: mindestens $2"],
+  [/^(\S+) mm\/s cannot be held: use (\S+) to (\S+) mm\/s$/, "$1 mm/s lassen sich nicht halten: $2 bis $3 mm/s"], [/^no sensor reported train (\d+) within (\S+) s: .*$/, "kein Rückmelder hat Zug $1 in $2 s gemeldet: prüfen, ob er fährt und auf dieser Anlage ist"],
+  [/^the position is not on this layout$/, "die Stelle ist nicht auf dieser Anlage"], [/^a distance should be a finite number$/, "eine Strecke sollte eine endliche Zahl sein"],
+  [/^the position of turnout (\d+), (\S+) mm before the end of the path, is unknown: .*$/, "die Stellung von Weiche $1, $2 mm vor dem Ende des Weges, ist unbekannt: erst stellen"], [/^the track ends at `(.*)`, (\S+) mm before the end of the path$/, "das Gleis endet bei `$1`, $2 mm vor dem Ende des Weges"],
+  ...ERRORS,
 ];
 
 const tailed = (text) => TAILS.reduce((line, [english, german]) => line.replace(english, german), text);
 
-/** A line of the log in German. */
-export function logInGerman(line) {
-  const known = LINES.find(([is]) => is.test(line));
-  return known ? line.replace(...known) : line;
+/** A line of the log, or an error of the server, in German; several lines one by one. */
+export function logInGerman(text) {
+  return text.split("\n").map((line) => {
+    const known = LINES.find(([is]) => is.test(line));
+    return known ? line.replace(...known) : line;
+  }).join("\n");
 }

@@ -162,6 +162,8 @@ export function layoutPage(root, live, about) {
     if (field.value.trim() && (await give(field.value, $("#answer")))) field.value = "";
   });
 
+  $("#commands").addEventListener("click", () => give("help", $("#answer")));
+
   function card(train, nth) {
     const id = `step-${train.train}`;
     const [at, speed, busy] = [make("dd"), make("dd"), make("dd")];
@@ -174,8 +176,8 @@ export function layoutPage(root, live, about) {
       make("dl", {}, make("dt", {}, say("at")), at, make("dt", {}, say("speed")), speed, make("dt", {}, say("busy")), busy),
       make("div", { class: "does" },
         button("stop", () => give(`stop ${train.train}`, answer)), stopHere,
-        make("label", { htmlFor: id }, say("step")), step,
-        button("set", () => give(`speed ${train.train} ${step.value}`, answer, `speed ${train.train} ${ofTrain(train.train).step}`)), takes),
+        make("span", { class: "together" }, make("label", { htmlFor: id }, say("step")), step,
+          button("set", () => give(`speed ${train.train} ${step.value}`, answer, `speed ${train.train} ${ofTrain(train.train).step}`))), takes),
       answer);
     made.style.borderLeftColor = colourOf(nth);
     if (cards.size === 0) $("#trains").replaceChildren();

@@ -3,18 +3,19 @@
 const straight = (name, mm) => ({ name, kind: "straight", mm });
 const curve = (name, radius, angle) => ({ name, kind: "curve", radius, angle });
 const turnout = (name, mm, radius, angle) => ({ name, kind: "turnout", mm, radius, angle });
+const crossing = (name, mm, angle) => ({ name, kind: "crossing", mm, angle });
 
-/** Lengths and radii in mm, angles in degrees. Curves and turnouts exist for both hands. */
+/** Lengths and radii in mm, angles in degrees. Curves, turnouts and crossings exist for both hands. */
 export const LIBRARIES = {
   "Märklin C (H0)": [
     straight("24188", 188.3), straight("24172", 171.7), straight("24229", 229.3), straight("24094", 94.2), straight("24077", 77.5),
     curve("24130 R1", 360, 30), curve("24115 R1", 360, 15), curve("24230 R2", 437.5, 30), curve("24224 R2", 437.5, 24.3), curve("24330 R3", 515, 30),
-    turnout("24611/24612", 188.3, 437.5, 24.3),
+    turnout("24611/24612", 188.3, 437.5, 24.3), crossing("24640", 188.3, 24.3), crossing("24649", 236.1, 12.1),
   ],
   "Märklin K (H0)": [
     straight("2200", 180), straight("2206", 168.9), straight("2207", 156), straight("2201", 90), straight("2202", 45),
     curve("2221 R1", 360, 30), curve("2223 R1", 360, 15), curve("2231 R2", 424.6, 30), curve("2234 R2", 424.6, 22.5),
-    turnout("22715/22716", 168.9, 424.6, 22.5),
+    turnout("22715/22716", 168.9, 424.6, 22.5), crossing("2259", 168.9, 22.5),
   ],
   "Roco geoLine (H0)": [
     straight("61110 G200", 200), straight("61111 G185", 185), straight("61113 G76.5", 76.5),
@@ -24,12 +25,12 @@ export const LIBRARIES = {
   "Peco Setrack (00/H0)": [
     straight("ST-200", 168), straight("ST-201", 335), straight("ST-202", 79), straight("ST-203", 41),
     curve("ST-221 R1", 371, 45), curve("ST-226 R2", 438, 45), curve("ST-225 R2", 438, 22.5), curve("ST-231 R3", 505, 45),
-    turnout("ST-240/ST-241", 168, 438, 22.5),
+    turnout("ST-240/ST-241", 168, 438, 22.5), crossing("ST-250/ST-251", 168, 22.5),
   ],
   "Kato Unitrack (N)": [
     straight("20-000", 248), straight("20-010", 186), straight("20-020", 124), straight("20-040", 62),
     curve("20-100", 249, 45), curve("20-110", 282, 45), curve("20-120", 315, 45), curve("20-150", 718, 15),
-    turnout("20-202/20-203", 186, 718, 15),
+    turnout("20-202/20-203", 186, 718, 15), crossing("20-320/20-321", 186, 15), crossing("20-340", 124, 90),
   ],
 };
 

@@ -7,7 +7,7 @@ import { make, put, shown, signed } from "./dom.js";
 import { get } from "./server.js";
 import { COLOURS, Track } from "./track.js";
 import { View } from "./view.js";
-import { say } from "./words.js";
+import { logged, say } from "./words.js";
 
 /** Lines shown around the selected time. */
 const LINES = 8;
@@ -56,7 +56,7 @@ class Walked {
     const where = picture.trains.map((train) => `${say("train", train.train)}: ${train.at ? `${train.at} ± ${shown(train.half_mm)} mm, ${shown(train.speed_mm_per_s)} mm/s` : say("nowhere")}${train.doing ? ` (${train.doing})` : ""}`);
     if (picture.calibration) where.push(aboutCalibration(picture.calibration));
     put(this.#root.querySelector(".where"), where.join("; "));
-    const said = this.#lines.filter(({ t_s }) => t_s <= at).slice(-LINES).map(({ text }) => make("li", {}, text));
+    const said = this.#lines.filter(({ t_s }) => t_s <= at).slice(-LINES).map(({ text }) => make("li", {}, logged(text)));
     this.#root.querySelector(".said").replaceChildren(...said);
   }
 
@@ -65,10 +65,12 @@ class Walked {
     const begins = this.#pictures[0].t_s;
     const trains = [...new Set(this.#pictures.flatMap((picture) => picture.trains.map(({ train }) => train)))];
     const times = this.#pictures.map(({ t_s }) => t_s - begins);
-    return trains.map((train) => [train, times, this.#pictures.map((picture) => {
+    const speeds = trains.map((train) => [train, times, this.#pictures.map((picture) => {
       const own = picture.trains.find((one) => one.train === train);
       return own?.at ? own.speed_mm_per_s : null;
     })]);
+    // A train that was never located has none.
+    return speeds.filter(([, , values]) => values.some((value) => value != null));
   }
 
   /** Detections by time since the first picture, with their prediction errors. */
@@ -123,7 +125,7 @@ export function recordingsPage(root, live, number) {
     // A calibration predicts no detections.
     const predicts = all.some(([, own]) => own.length > 0);
     $('[data-chart="recorded"]').hidden = $("#compared").hidden = !predicts;
-    const speeds = [...shownSessions.entries()].flatMap(([name, walked]) => walked.speeds().map(([train, times, values]) => [`${say("train", train)}, ${name}`, times, values]));
+    const speeds = [...shownSessions.entries()].flatMap(([name, walked]) => walked.speeds().map(([train, times, values]) => [`${say("train", train)}, ${name}`, times, values, name]));
     if (speeds.length > 0) {
       charts.push(new LiveChart($('[data-chart="recorded-speed"]'), () => ({
         name: say("chart-recorded-speed"), x, y: say("axis-speed"), sync: SYNC, below: [mark],
@@ -133,7 +135,8 @@ export function recordingsPage(root, live, number) {
     if (!predicts) return;
     charts.push(new LiveChart($('[data-chart="recorded"]'), () => ({
       name: say("chart-recorded"), x, y: say("axis-sure"), zero: true, sync: SYNC, below: [mark],
-      series: all.map(([name], place) => dots(name, `t${place}`, "mm", 1)),
+      // Each session in the colour of its first train.
+      series: all.map(([name]) => dots(name, `t${Math.max(speeds.findIndex(([, , , of]) => of === name), 0) % COLOURS}`, "mm", 1)),
     }), spread(all.map(([, own]) => [own.map(({ at }) => at), own.map(({ mm }) => mm)])), pick));
     $("#figures").replaceChildren(...all.map(([name, own]) => {
       const rms = Math.sqrt(own.reduce((sum, { mm }) => sum + mm * mm, 0) / Math.max(own.length, 1));

@@ -1,5 +1,7 @@
 // Requests to the server.
 
+import { logged } from "./words.js";
+
 // A pasted `+` is a plus sign: tokens have no spaces.
 const token = new URLSearchParams(location.search).get("token")?.replaceAll(" ", "+");
 const headers = token ? { Authorization: `Bearer ${token}` } : {};
@@ -9,7 +11,7 @@ export const withToken = (path) => (token ? `${path}${path.includes("?") ? "&" :
 
 async function answer(response) {
   const said = await response.json().catch(() => ({}));
-  if (!response.ok) throw new Error(said.error ?? response.statusText);
+  if (!response.ok) throw new Error(said.error ? logged(said.error) : response.statusText);
   return said;
 }
 

@@ -54,9 +54,11 @@ export function trainPage(root, live, number) {
   $("#say-where").href = `#/layout/${train}`;
   $("#find").addEventListener("click", () => give(`find ${train}`));
   const aim = () => ($("#not-beyond").checked ? " not-beyond 0.1%" : "");
+  const stopping = () => `${$("#from-step").value ? ` at step ${$("#from-step").value}` : ""}${aim()}${$("#next-round").checked ? " next round" : ""}`;
+  const arriving = () => `${$("#facing").checked ? " facing" : ""}${aim()}`;
   const throttle = new Throttle(root, train, give);
-  $("#stop-at").addEventListener("click", () => track.place && give(`stop ${train} at ${track.place}${aim()}`, $("#stop-answer")));
-  $("#go-to").addEventListener("click", () => track.place && give(`go ${train} to ${track.place}${aim()}`, $("#stop-answer")));
+  $("#stop-at").addEventListener("click", () => track.place && give(`stop ${train} at ${track.place}${stopping()}`, $("#stop-answer")));
+  $("#go-to").addEventListener("click", () => track.place && give(`go ${train} to ${track.place}${arriving()}`, $("#stop-answer")));
   const asks = (form, line) => $(form).addEventListener("submit", (event) => {
     event.preventDefault();
     give(line(new FormData(event.target)), event.target.querySelector(".answer"));
@@ -66,6 +68,7 @@ export function trainPage(root, live, number) {
   asks("#length", (said) => `length ${train} pickup ${said.get("pickup")}mm overhang ${said.get("overhang")}mm`);
   asks("#arrive", (said) => `arrive ${train} at ${said.get("at")} in ${said.get("in")}s`);
   asks("#move", (said) => `move ${train} ${said.get("way")}mm`);
+  asks("#reverse-then", (said) => `reverse ${train} at step ${said.get("step")}`);
 
   function leaders(picture) {
     const others = picture.trains.map((other) => String(other.train)).filter((other) => other !== String(train));

@@ -64,7 +64,7 @@ Examples:
 pub(crate) struct Arguments {
     /// Sensor logs (CSV), in any of the forms of docs/formats/sensor-log.md; or, without a layout, series of positions of
     /// one start or stop each (docs/formats/position-series.md) or measured short moves (docs/formats/short-moves.md).
-    #[arg(long, value_name = "LOG", num_args = 1.., required_unless_present_any = ["store", "link"])]
+    #[arg(long, value_name = "LOG", num_args = 1..)]
     from: Vec<PathBuf>,
     /// Drive the train over this link: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0,
     /// z21:192.168.0.111, marklin-can:192.168.0.5, loconet:192.168.0.20, or tcp://host:port in place of a device.
@@ -124,6 +124,12 @@ impl Arguments {
     }
 
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        if self.from.is_empty() && self.store.is_none() && self.link.is_none() {
+            bail!(
+                "nothing to calibrate: drive a train with `--link URL --train N --layout LAYOUT`, read recordings with `--from \
+                 LOG --layout LAYOUT`, or what a store keeps with `--store FILE --layout LAYOUT`"
+            );
+        }
         if let Some(series) = measured_by_hand(&self.from, "series of positions", PositionSeries::read)? {
             self.check_measured_by_hand("a series of positions", None)?;
             series::write(&series, self.json, output)?;

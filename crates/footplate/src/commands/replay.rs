@@ -2,6 +2,7 @@
 
 mod page;
 mod pictures;
+mod recorded_blocks;
 mod session;
 
 use std::io::Write;

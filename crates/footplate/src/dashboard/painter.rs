@@ -1,6 +1,6 @@
 //! Composes the picture of the current state, the histories and the detections from the state of a driver.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use footplate_core::control::learn::CalibrationNotice;
@@ -56,8 +56,8 @@ pub(crate) struct Painter {
     sampled: Option<Timestamp>,
     drifts: BTreeMap<TrainId, DriftTest>,
     alarms: AlarmList,
-    /// The detectors of blocks that are occupied; `None` before the first look at them.
-    occupied: Option<BTreeSet<SensorId>>,
+    /// Whether the blocks are occupied whose state is known, by their detectors.
+    blocks: BTreeMap<SensorId, bool>,
     /// When the session began, by the clock of the link.
     began: Option<Timestamp>,
     models: BTreeMap<TrainId, MotionModel>,
@@ -127,7 +127,7 @@ impl Painter {
             sampled: None,
             drifts: BTreeMap::new(),
             alarms: AlarmList::default(),
-            occupied: None,
+            blocks: BTreeMap::new(),
             began: None,
             models: BTreeMap::new(),
             models_published: None,
@@ -173,9 +173,9 @@ impl Painter {
         self.unpublished.push(passed);
     }
 
-    /// Takes in which blocks are occupied, by their detectors.
-    pub(crate) fn see_blocks(&mut self, occupied: impl Iterator<Item = SensorId>) {
-        self.occupied = Some(occupied.collect());
+    /// Takes in whether blocks are occupied, by their detectors.
+    pub(crate) fn see_blocks(&mut self, states: impl Iterator<Item = (SensorId, bool)>) {
+        self.blocks.extend(states);
     }
 
     /// Raises an alarm, or resolves those that a message of the kind `over` is about.
@@ -301,10 +301,7 @@ impl Painter {
                     (turnout.0, leg.map(|leg| if leg.is_curved() { "curved" } else { "straight" }))
                 })
                 .collect(),
-            blocks: self
-                .occupied
-                .as_ref()
-                .map_or_else(BTreeMap::new, |occupied| block_states(driver, occupied)),
+            blocks: block_states(driver, &self.blocks),
             ignored: ignored_sensors(driver),
             calibration: self.calibration.clone(),
             alarms: self.alarms.ranked(),

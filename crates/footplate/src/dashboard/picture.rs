@@ -1,6 +1,6 @@
 //! The current state, as sent to browsers.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use footplate_core::control::Driver;
 use footplate_core::track::{Block, Landmark, NodeKind};
@@ -68,7 +68,7 @@ pub(super) struct Picture {
     pub(super) passed: BTreeMap<u16, f64>,
     /// The sensors whose reports are ignored.
     pub(super) ignored: Vec<u16>,
-    /// The state of each block, by the number of its detector; nothing until detectors were read.
+    /// The state of each block, by the number of its detector; without those that are not known yet.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub(super) blocks: BTreeMap<u16, BlockState>,
     /// The active alarms, the most severe first.
@@ -90,18 +90,23 @@ pub(super) enum BlockState {
     Ignored,
 }
 
-/// The state of every block, from the detectors that report an occupied one.
-pub(super) fn block_states(driver: &Driver, occupied: &BTreeSet<SensorId>) -> BTreeMap<u16, BlockState> {
+/// The state of every block that is known, by its detector; `occupied` says which have a train in them.
+pub(super) fn block_states(
+    driver: &Driver,
+    occupied: &BTreeMap<SensorId, bool>,
+) -> BTreeMap<u16, BlockState> {
     let state = |block: &Block| {
-        if block.entries.iter().any(|entry| driver.ignores(*entry)) {
+        let is_occupied = *occupied.get(&block.detector)?;
+        let state = if block.entries.iter().any(|entry| driver.ignores(*entry)) {
             BlockState::Ignored
-        } else if occupied.contains(&block.detector) {
+        } else if is_occupied {
             BlockState::Occupied
         } else {
             BlockState::Free
-        }
+        };
+        Some((block.detector.0, state))
     };
-    driver.layout().blocks().iter().map(|block| (block.detector.0, state(block))).collect()
+    driver.layout().blocks().iter().filter_map(state).collect()
 }
 
 /// The sensors whose reports are ignored.

@@ -81,7 +81,7 @@ impl ReadOnlyDashboard {
 
     /// Displays which blocks are occupied.
     pub(crate) fn see_blocks(&mut self, blocks: &BlockReports) {
-        self.painter.see_blocks(blocks.occupied());
+        self.painter.see_blocks(blocks.states());
     }
 
     /// Takes in a notice of a calibration; `said` is the line that was printed for it.

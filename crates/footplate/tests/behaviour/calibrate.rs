@@ -124,12 +124,16 @@ fn bad_input_is_answered_with_its_place_and_what_would_be_right() {
         path.display().to_string()
     };
     let backwards = "t_s,kind,name,train,step\n1.0,speed,,24,8\n2.0,sensor,C13,,\n1.5,sensor,E7,,\n";
+    // 437 to 875 mm in 1400 to 3100 s.
+    let in_ms = "t_s,kind,name,train,step\n0,speed,,24,8\n2000,sensor,C13,,\n5100,sensor,E7,,\n6500,sensor,D7,,\n\
+                 8100,sensor,D9,,\n9300,sensor,E12,,\n";
     let cases = [
         ("empty.csv", "", "empty"),
         ("columns.csv", "when,what\n1,2\n", "missing columns"),
         ("backwards.csv", backwards, "line 4"),
         ("sensor.csv", "t_s,kind,name,train,step\n1.0,speed,,24,8\n2.0,sensor,Z99,,\n", "Z99"),
         ("nan.csv", "t_s,kind,name,train,step\n1.0,speed,,24,8\nNaN,sensor,C13,,\n", "NaN"),
+        ("milliseconds.csv", in_ms, "not in seconds"),
         ("standing.csv", "t_s,kind,name,train,step\n1.0,speed,,24,8\n", "nothing to calibrate"),
     ];
     for (name, text, says) in cases {
@@ -138,6 +142,13 @@ fn bad_input_is_answered_with_its_place_and_what_would_be_right() {
         assert_eq!(refused.status, 2, "{name}: {}", refused.errors);
         assert!(refused.errors.contains(says), "{name}: {}", refused.errors);
     }
+    let nothing = footplate(&["calibrate"]);
+    assert_eq!(nothing.status, 2);
+    for way in ["--link", "--from", "--store"] {
+        assert!(nothing.errors.contains(way), "{way}: {}", nothing.errors);
+    }
+    let absent = footplate(&["calibrate", "--from", "absent.csv", "--layout", "track-a"]);
+    assert_eq!(absent.errors.matches("(os error 2)").count(), 1, "said once: {}", absent.errors);
     let [run, _] = train_24();
     let missing = footplate(&["calibrate", "--from", &run, "--layout", "track-z"]);
     assert_eq!(missing.status, 2);

@@ -68,7 +68,26 @@ fn speed_restrictions_are_shown() {
     let end = serde_json::json!([{ "name": "end", "max_mm_s": 90.0, "length_mm": 80.0 }]);
     assert_eq!(summary["zones"], end);
     let checked = footplate(&["layout", "check", text(&file)]).output;
-    assert!(checked.ends_with("6 nodes and 4 edges, with one speed restriction\n"), "{checked}");
+    assert!(checked.ends_with("6 nodes and 4 edges, with 1 speed restriction\n"), "{checked}");
+}
+
+#[test]
+fn blocks_are_shown_with_their_boundaries() {
+    let shown = footplate(&["layout", "show", "oval-blocks"]).output;
+    // From the layout file; the curve is half a circle with a radius of 437.5 mm.
+    for fact in [
+        "nodes   12: 0 sensors, 0 turnouts, 0 track ends, 6 boundaries\n",
+        "block   right curve: detector 2, entered at B5, B8, 1374 mm of rails\n",
+    ] {
+        assert!(shown.contains(fact), "{fact}: {shown}");
+    }
+    let checked = footplate(&["layout", "check", "oval-blocks"]).output;
+    let whole = "oval-blocks: a sound layout of 12 nodes and 12 edges, with 6 blocks between 6 boundaries\n";
+    assert_eq!(checked, whole);
+    let json = footplate(&["layout", "show", "oval-blocks", "--json"]).output;
+    let summary: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let curve = serde_json::json!({ "name": "right curve", "detector": 2, "entries": ["B5", "B8"], "length_mm": 1374.4 });
+    assert_eq!((&summary["blocks"][2], &summary["sensors"]), (&curve, &serde_json::json!(0)));
 }
 
 #[test]

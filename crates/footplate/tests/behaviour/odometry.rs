@@ -180,6 +180,16 @@ fn a_live_input_is_answered_line_by_line() {
 }
 
 #[test]
+fn times_in_milliseconds_are_doubted() {
+    let recording = folder("odometry-milliseconds").join("in-ms.csv");
+    let rows: String = (1..200).map(|period| format!("{},3,3\n", 50 * period)).collect();
+    std::fs::write(&recording, format!("t_s,pulses_1,pulses_2\n{rows}")).unwrap();
+    let run = odometry(&[&recording.display().to_string()]);
+    assert!(run.status == 1 && run.output.starts_with("WARNING: "), "{}", run.output);
+    assert!(run.output.contains("198 of 199 periods follow a gap"), "{}", run.output);
+}
+
+#[test]
 fn wrong_input_is_named_and_ends_with_status_2() {
     let folder = folder("odometry-wrong");
     let file = |name: &str, text: &str| {

@@ -10,6 +10,7 @@ import { after, before, test } from "node:test";
 
 import { findings } from "./axe.mjs";
 import { AT, launch, openQuietly, width } from "./browser.mjs";
+import { pressJoint } from "./oval.mjs";
 import { PATIENCE, begin, end, picture, say } from "./railway.mjs";
 
 /** The detectors of the curves of `oval-blocks`, each 1374 mm long: a train that stands is in one or two of the six blocks. */
@@ -44,7 +45,7 @@ test("a block is occupied from the start and while the train is in it, and bound
   assert.equal(await page.locator("#track .name.of-block").count(), 6);
   await say(running, "speed 24 8");
   const began = occupied(seen);
-  const later = await picture(running, (state) => state.trains[0].at && occupied(state).some((detector) => !began.includes(detector)));
+  const later = await picture(running, (state) => state.trains[0].at && began.every((detector) => state.blocks[detector] === "free"));
   assert.ok(occupied(later).length <= 2, "one train of less than 600 mm is in two blocks at most");
   await say(running, "stop 24");
   const { trains: [train], blocks } = await picture(running, ({ trains: [own] }) => own.at_rest);
@@ -58,6 +59,26 @@ test("a block is occupied from the start and while the train is in it, and bound
   const name = await page.locator("#track text", { hasText: "B5 B6" }).boundingBox();
   await page.mouse.click(name.x + name.width / 2, name.y + name.height + 4);
   await until(page, () => /^Selected: B[3456]\S*, in block (front right|right curve)$/.test(document.querySelector("#picked").textContent));
+  assert.deepEqual(complaints, []);
+  await page.close();
+});
+
+test("a recording shows the blocks as they were", async () => {
+  const { page, complaints } = await openQuietly(browser, `${running.url}#/recordings`);
+  const box = page.locator("#recordings tr", { hasText: "driving" }).locator("input").first();
+  await box.check();
+  await until(page, () => document.querySelectorAll(".session .track-view .rail").length > 0);
+  const { pictures } = await (await fetch(`${running.url}api/recordings/${await box.inputValue()}/pictures`)).json();
+  // The train stands: what was occupied at the end of the recording is occupied now. Blocks that never reported are not known.
+  const { blocks: now } = await picture(running);
+  const then = pictures.at(-1).blocks;
+  assert.ok(Object.keys(then).length >= 2, JSON.stringify(then));
+  for (const [detector, state] of Object.entries(then)) assert.equal(state, now[detector], `block ${detector}`);
+  assert.ok(occupied(pictures[0]).length > 0, "the block in which the train began was occupied from the start");
+  await page.locator("#time").focus();
+  await page.keyboard.press("End");
+  await until(page, () => document.querySelectorAll(".session .track-view .rail.occupied").length > 0);
+  await page.screenshot({ path: join(AT, "blocks-recorded.png"), fullPage: true });
   assert.deepEqual(complaints, []);
   await page.close();
 });
@@ -82,17 +103,8 @@ test("blocks are drawn between boundaries, named and numbered, and the program c
   await page.click("#hand-right");
   for (const [name, times] of [["24188", 4], ["24130", 6], ["24188", 4], ["24130", 6]]) await lay(name, times);
   assert.equal(await page.locator("#draft .joint.open").count(), 0);
-  /** Clicks the joint that is nearest to a point of the drawing (mm). */
-  const press = async (x, y) => {
-    const nth = await page.$$eval("#draft .joint.joined", (all, [x, y]) => {
-      const away = (joint) => Math.hypot(joint.cx.baseVal.value - x, joint.cy.baseVal.value - y);
-      return all.indexOf([...all].sort((one, other) => away(one) - away(other))[0]);
-    }, [x, y]);
-    const box = await page.locator("#draft .joint.joined").nth(nth).boundingBox();
-    await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
-  };
   for (const [x, y] of [[0, 0], [753, 0], [753, 720], [0, 720]]) {
-    await press(x, y);
+    await pressJoint(page, "joined", x, y);
     await page.click("#draft-boundary");
   }
   assert.match(await page.locator("#draft-says").textContent(), /Blocks: 4\./);

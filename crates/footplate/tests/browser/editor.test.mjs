@@ -10,7 +10,7 @@ import { after, before, test } from "node:test";
 
 import { findings } from "./axe.mjs";
 import { AT, launch, openQuietly, width } from "./browser.mjs";
-import { drawOval } from "./oval.mjs";
+import { drawOval, pressJoint } from "./oval.mjs";
 import { PATIENCE, begin, end } from "./railway.mjs";
 
 let browser;
@@ -85,6 +85,37 @@ test("an oval with a siding is drawn from nothing, its file is valid, and a trai
   await seen.page.close();
   await end(drives);
   running.delete(drives);
+});
+
+test("a level crossing is placed and joined, and the file says where its tracks cross", async () => {
+  const program = await started("sim:track-a?seed=7", "crossing.db");
+  const { page, complaints } = await openQuietly(browser, `${program.url}#/editor`);
+  await page.waitForSelector("#pieces button");
+  const lay = (name) => page.locator("#pieces button", { hasText: name }).first().click();
+  await page.click("#hand-right");
+  await lay("24640");
+  await lay("24188");
+  assert.equal(await page.locator("#draft .joint.open").count(), 4);
+  // The ends of the other track, by the angle of 24.3° about the middle of the first one.
+  await pressJoint(page, "open", 180, 39);
+  await lay("24172");
+  assert.equal(await page.locator("#draft .joint.open").count(), 4);
+  for (const [x, y] of [[188, 0], [180, 39]]) {
+    await pressJoint(page, "joined", x, y);
+    await page.click("#draft-sensor");
+  }
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "editor-crossing.png") });
+  const [download] = await Promise.all([page.waitForEvent("download", { timeout: PATIENCE }), page.click("#draft-save")]);
+  const file = join(folder, "crossing.toml");
+  await download.saveAs(file);
+  assert.match(footplate("layout", "check", file), /a sound layout of 12 nodes and 8 edges, with 1 crossing$/m);
+  // Half of 188.3 mm from the sensor at either end of the piece.
+  assert.match(footplate("layout", "show", file), /^cross   A2 to EX1 after 94 mm crosses A4 to EX2 after 94 mm$/m);
+  assert.deepEqual(complaints, []);
+  await page.close();
+  await end(program);
+  running.delete(program);
 });
 
 test("the editor fits a phone, in the dark and in German", async () => {

@@ -2,6 +2,18 @@
 
 import assert from "node:assert/strict";
 
+/** Clicks the joint of a kind that is nearest to a point of the drawing (mm). */
+export async function pressJoint(page, kind, x, y) {
+  const joints = page.locator(`#draft .joint.${kind}`);
+  const nth = await page.$$eval(`#draft .joint.${kind}`, (all, [x, y]) => {
+    const away = (joint) => Math.hypot(joint.cx.baseVal.value - x, joint.cy.baseVal.value - y);
+    return all.indexOf([...all].sort((one, other) => away(one) - away(other))[0]);
+  }, [x, y]);
+  await joints.nth(nth).scrollIntoViewIfNeeded();
+  const box = await joints.nth(nth).boundingBox();
+  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+}
+
 /** Draws it on an editor page that is empty. */
 export async function drawOval(page) {
   const lay = async (...names) => {
@@ -9,16 +21,6 @@ export async function drawOval(page) {
   };
   const joints = (kind) => page.locator(`#draft .joint.${kind}`);
   const says = () => page.locator("#draft-says").textContent();
-  /** Clicks the joint of a kind that is nearest to a point of the drawing (mm). */
-  const press = async (kind, x, y) => {
-    const nth = await page.$$eval(`#draft .joint.${kind}`, (all, [x, y]) => {
-      const away = (joint) => Math.hypot(joint.cx.baseVal.value - x, joint.cy.baseVal.value - y);
-      return all.indexOf([...all].sort((one, other) => away(one) - away(other))[0]);
-    }, [x, y]);
-    await joints(kind).nth(nth).scrollIntoViewIfNeeded();
-    const box = await joints(kind).nth(nth).boundingBox();
-    await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
-  };
   await page.click("#hand-right");
   await lay("24611/24612", "24172", "24188", "24188", "24172");
   // The track joins the other turnout at its straight leg; both curved legs are on the same side.
@@ -34,7 +36,7 @@ export async function drawOval(page) {
   await page.click("#draft-undo");
   await lay(...half);
   assert.equal(await joints("open").count(), 2, "the oval has snapped shut");
-  await press("open", 180, 39);
+  await pressJoint(page, "open", 180, 39);
   await page.click("#hand-left");
   await lay("24224");
   await lay("24188", "24188", "24224");
@@ -42,7 +44,7 @@ export async function drawOval(page) {
   assert.match(await says(), /No sensor yet/);
   assert.ok(await page.locator("#draft-save").isDisabled());
   for (const [x, y] of [[548, 0], [1097, 720], [548, 78], [188, 720]]) {
-    await press("joined", x, y);
+    await pressJoint(page, "joined", x, y);
     await page.click("#draft-sensor");
   }
 }

@@ -116,7 +116,20 @@ test("a train is stopped at a clicked place, and an impossible command is refuse
   await until(page, () => /Z99/.test(document.querySelector("#arrive .answer").textContent));
   assert.equal(await text(page, "#hold .answer"), "", "what comes of an order is said beside it, and nowhere else");
   assert.deepEqual(await page.$$eval(".orders label span", (all) => all.map((one) => one.textContent)),
-    ["at most 1 of 1000 beyond it", "Place of arrival", "Arrive in (s)", "Speed to hold (mm/s)", "Distance to move (mm)", "Train to follow", "Gap to it", "in", "Choose a picture; it stays in this browser", "Pickup (mm)", "From there to the far end (mm)"]);
+    ["at most 1 of 1000 beyond it", "Stop from step (empty: the best)", "stop there only after passing it once", "send it so that it arrives in the direction of that sensor", "Place of arrival", "Arrive in (s)", "Speed to hold (mm/s)", "Distance to move (mm)", "Reverse, then run at step", "Train to follow", "Gap to it", "in", "Choose a picture; it stays in this browser", "Pickup (mm)", "From there to the far end (mm)"]);
+  // What the prompt can say of a stop and a journey, the page can.
+  const ordered = async (button) => {
+    const [request] = await Promise.all([page.waitForRequest("**/api/orders"), page.click(button)]);
+    return JSON.parse(request.postData()).line;
+  };
+  await page.locator(".orders summary", { hasText: "More about stopping" }).click();
+  await page.fill("#from-step", "9");
+  await page.check("#next-round");
+  assert.match(await ordered("#stop-at"), /^stop 24 at (C13|C14|E7)\S* at step 9 next round$/);
+  await page.check("#facing");
+  assert.match(await ordered("#go-to"), /^go 24 to (C13|C14|E7)\S* facing$/);
+  assert.equal(await ordered("#reverse-then button"), "reverse 24 at step 8");
+  await ordered("#stop");
   // The browser logs the refusal of the last command as an error of the page.
   assert.deepEqual(complaints.filter((complaint) => !/422/.test(complaint)), []);
   await page.close();

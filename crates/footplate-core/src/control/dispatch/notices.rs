@@ -255,7 +255,7 @@ impl Dispatcher {
         let others = || self.trains.values().filter(|other| other.id != id);
         let mut free = Reservation::empty();
         for (edge, known) in layout.edges().filter(|(edge, _)| *edge < edge.twin()) {
-            let taken = others().flat_map(|other| other.reservation.spans());
+            let taken = others().flat_map(|other| other.reservation.obstructed());
             let mut taken: Vec<Span> =
                 taken.filter(|(stretch, _)| *stretch == edge.stretch()).map(|(_, span)| span).collect();
             taken.sort_by(|one, other| one.from.as_m().total_cmp(&other.from.as_m()));

@@ -9,7 +9,7 @@ use crate::units::Length;
 
 /// The distance of the fouling point of a turnout from its toe: nearer, a train on one leg obstructs the other. On
 /// Märklin's K track it is 180 mm for a 22.5 degree turnout; one or two centimetres are added for the ends of long
-/// vehicles, which overhang in curves.
+/// vehicles, which overhang in curves. The tracks of a crossing diverge at the angle of a turnout or more.
 pub const CLEARANCE: Length = Length::from_mm(200.0);
 
 /// An interval of a stretch, counted from the start of the first of its two edges.
@@ -36,6 +36,8 @@ impl Span {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Reservation {
     spans: BTreeMap<StretchId, Vec<Span>>,
+    /// Track of others that crosses these rails: no other train may be there, but its rails are not the train's own.
+    crossed: BTreeMap<StretchId, Vec<Span>>,
     turnouts: BTreeSet<TurnoutId>,
 }
 
@@ -43,7 +45,7 @@ impl Reservation {
     /// An empty reservation.
     #[must_use]
     pub const fn empty() -> Self {
-        Self { spans: BTreeMap::new(), turnouts: BTreeSet::new() }
+        Self { spans: BTreeMap::new(), crossed: BTreeMap::new(), turnouts: BTreeSet::new() }
     }
 
     /// Whether it has no track.
@@ -55,6 +57,12 @@ impl Reservation {
     /// The reserved rails, stretch by stretch.
     pub fn spans(&self) -> impl Iterator<Item = (StretchId, Span)> {
         self.spans.iter().flat_map(|(stretch, spans)| spans.iter().map(|span| (*stretch, *span)))
+    }
+
+    /// The rails that no other train may reserve: the reserved ones, and those that cross them.
+    pub(super) fn obstructed(&self) -> impl Iterator<Item = (StretchId, Span)> {
+        let crossed = self.crossed.iter();
+        self.spans().chain(crossed.flat_map(|(stretch, spans)| spans.iter().map(|span| (*stretch, *span))))
     }
 
     /// The reserved turnouts, with those that share their place.
@@ -88,7 +96,8 @@ impl Reservation {
         }
     }
 
-    /// Adds part of an edge, counted from its start, and the turnouts of which it is a leg if it fouls them.
+    /// Adds part of an edge, counted from its start, and what it fouls: the turnouts of which it is a leg, and the tracks that
+    /// cross it.
     pub fn take(&mut self, layout: &Layout, id: EdgeId, from: Length, to: Length) {
         let Some(span) = Span::on(layout, id, from, to) else { return };
         let spans = self.spans.entry(id.stretch()).or_default();
@@ -103,6 +112,11 @@ impl Reservation {
         });
         spans.push(merged);
         self.turnouts.extend(turnouts_near(layout, id, from, to));
+        for other in layout.crossed_near(id, from, to, CLEARANCE) {
+            let crossed = Span::on(layout, other.edge, other.offset - CLEARANCE, other.offset + CLEARANCE);
+            let known = self.crossed.entry(other.edge.stretch()).or_default();
+            known.extend(crossed.filter(|crossed| !known.contains(crossed)));
+        }
     }
 
     /// Adds another reservation.
@@ -113,18 +127,20 @@ impl Reservation {
         self.turnouts.extend(&other.turnouts);
     }
 
-    /// Whether two reservations share any track.
+    /// Whether two reservations share any track, or cross.
     #[must_use]
     pub fn meets(&self, other: &Self) -> bool {
-        let shares = |(stretch, span): (StretchId, Span)| other.overlaps(stretch, span);
-        !self.turnouts.is_disjoint(&other.turnouts) || self.spans().any(shares)
+        let shares = |(stretch, span): (StretchId, Span)| other.obstructs(stretch, span);
+        // Two trains that cross the same track one behind the other do not meet.
+        let is_crossed = |(stretch, span): (StretchId, Span)| overlaps(&self.crossed, stretch, span);
+        !self.turnouts.is_disjoint(&other.turnouts)
+            || self.spans().any(shares)
+            || other.spans().any(is_crossed)
     }
 
-    /// Whether any part of an interval is reserved.
-    #[must_use]
-    pub fn overlaps(&self, stretch: StretchId, span: Span) -> bool {
-        let spans = self.spans.get(&stretch);
-        spans.is_some_and(|spans| spans.iter().any(|own| own.from <= span.to && span.from <= own.to))
+    /// Whether another train on any part of an interval would meet this one.
+    fn obstructs(&self, stretch: StretchId, span: Span) -> bool {
+        overlaps(&self.spans, stretch, span) || overlaps(&self.crossed, stretch, span)
     }
 
     /// Where reserved track begins on an edge, from an offset on in its direction: reserved rails, or the fouling point
@@ -133,7 +149,8 @@ impl Reservation {
     pub fn begins_on(&self, layout: &Layout, id: EdgeId, from: Length) -> Option<Length> {
         let rest = Span::on(layout, id, from, layout.edge(id)?.length)?;
         let length = layout.edge(id)?.length;
-        let met = self.spans.get(&id.stretch()).into_iter().flatten();
+        let met =
+            [&self.spans, &self.crossed].into_iter().filter_map(|spans| spans.get(&id.stretch())).flatten();
         let met = met.filter(|span| span.from <= rest.to && rest.from <= span.to);
         let rails = met.map(|span| if id < id.twin() { span.from } else { length - span.to });
         let is_taken = |turnout: &TurnoutId| self.turnouts.contains(turnout);
@@ -154,6 +171,12 @@ impl Reservation {
             spans.iter().any(|own| own.from <= span.from + tolerance && span.to - tolerance <= own.to)
         })
     }
+}
+
+/// Whether any part of an interval is among others.
+fn overlaps(spans: &BTreeMap<StretchId, Vec<Span>>, stretch: StretchId, span: Span) -> bool {
+    let spans = spans.get(&stretch);
+    spans.is_some_and(|spans| spans.iter().any(|own| own.from <= span.to && span.from <= own.to))
 }
 
 /// The turnouts that part of an edge fouls as one of their legs, with those in the same places.
@@ -246,7 +269,7 @@ pub(super) struct Obstacles {
 impl Obstacles {
     /// Adds a reservation, with a cost in seconds for each stretch and turnout.
     pub(super) fn add(&mut self, reservation: &Reservation, seconds: f64) {
-        for (stretch, span) in reservation.spans() {
+        for (stretch, span) in reservation.obstructed() {
             self.spans.entry(stretch).or_default().push((span, seconds));
         }
         for turnout in reservation.turnouts() {
@@ -269,5 +292,38 @@ impl Obstacles {
             cost += self.turnouts.get(&turnout).copied().unwrap_or_default();
         }
         cost.is_finite().then_some(cost)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::Position;
+    use crate::track::example::oval;
+
+    #[test]
+    fn only_one_train_at_a_time_is_near_a_crossing() {
+        let plain = oval();
+        let node = |name: &str| plain.node_named(name).unwrap();
+        let edge = |from, to| plain.edge_between(node(from), node(to)).unwrap();
+        let [main, siding] = [edge("D1", "A1"), edge("BR1", "C1")];
+        let at = |edge, mm| Position { edge, offset: Length::from_mm(mm) };
+        let layout = plain.clone().with_crossing([at(main, 250.0), at(siding, 210.0)]).unwrap();
+        let taken = |layout: &Layout, edge, from, to| {
+            let mut reservation = Reservation::empty();
+            reservation.take(layout, edge, Length::from_mm(from), Length::from_mm(to));
+            reservation
+        };
+        // 200 mm on either side of the crossing, on both tracks.
+        let beside = taken(&layout, siding, 100.0, 120.0);
+        assert!(beside.meets(&taken(&layout, main, 0.0, 60.0)));
+        assert!(!beside.meets(&taken(&layout, main, 0.0, 40.0)));
+        assert!(!taken(&layout, siding, 0.0, 5.0).meets(&taken(&layout, main, 0.0, 500.0)));
+        assert!(!taken(&plain, siding, 100.0, 120.0).meets(&taken(&plain, main, 0.0, 500.0)));
+        // Two trains on one track, on either side of the crossing.
+        assert!(!taken(&layout, main, 0.0, 100.0).meets(&taken(&layout, main, 400.0, 500.0)));
+        // A train that runs towards the crossing stops short of it.
+        let begins = beside.begins_on(&layout, main, Length::ZERO).map(Length::as_mm);
+        assert!(begins.is_some_and(|mm| (mm - 50.0).abs() < 1e-9), "{begins:?}");
     }
 }

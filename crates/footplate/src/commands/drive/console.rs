@@ -230,7 +230,7 @@ impl Attendant<Recorded<ScriptRunner>> for Console {
 
     fn see_blocks(&mut self, blocks: &BlockReports) {
         if let Some(live_view) = &mut self.live_view {
-            live_view.painter.see_blocks(blocks.occupied());
+            live_view.painter.see_blocks(blocks.states());
         }
     }
 

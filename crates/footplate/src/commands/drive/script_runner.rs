@@ -121,7 +121,7 @@ impl ScriptRunner {
         self.trains.keys().copied()
     }
 
-    fn driver(&self) -> &Driver {
+    pub(crate) fn driver(&self) -> &Driver {
         self.dispatcher.driver()
     }
 

@@ -5,7 +5,9 @@ use std::io::Write;
 use clap::Args;
 use footplate_store::layout_named;
 
+use super::show::boundaries;
 use crate::commands::Outcome;
+use crate::counted::counted;
 
 /// Check a layout.
 ///
@@ -23,11 +25,18 @@ impl Arguments {
         let layout = &file.layout;
         let (nodes, edges) = (layout.nodes().len(), layout.edges().len());
         write!(output, "{}: a sound layout of {nodes} nodes and {edges} edges", self.layout)?;
-        match layout.zones().len() {
-            0 => writeln!(output)?,
-            1 => writeln!(output, ", with one speed restriction")?,
-            zones => writeln!(output, ", with {zones} speed restrictions")?,
+        let [blocks, zones] = [layout.blocks().len(), layout.zones().len()];
+        if blocks > 0 {
+            let boundaries = boundaries(layout).count();
+            write!(output, ", with {} between {boundaries} boundaries", counted(blocks, "block"))?;
         }
+        if !layout.crossings().is_empty() {
+            write!(output, ", with {}", counted(layout.crossings().len(), "crossing"))?;
+        }
+        if zones > 0 {
+            write!(output, ", with {}", counted(zones, "speed restriction"))?;
+        }
+        writeln!(output)?;
         Ok(Outcome::Done)
     }
 }

@@ -5,7 +5,10 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use footplate_core::track::{Hop, Layout, NodeKind, StretchLength, TurnoutNeed, Zone};
+use footplate_core::track::{
+    Block, Crossing, Hop, Layout, NodeKind, Position, StretchLength, TurnoutNeed, Zone,
+};
+use footplate_core::{EdgeId, NodeId};
 use footplate_store::{LayoutFile, draw_layout, layout_named, write_whole};
 use serde_json::{Value, json};
 
@@ -56,7 +59,11 @@ fn write_words(file: &LayoutFile, output: &mut dyn Write) -> anyhow::Result<()> 
     }
     let [sensors, turnouts, ends] = counts(layout);
     let nodes = layout.nodes().len();
-    writeln!(output, "nodes   {nodes}: {sensors} sensors, {turnouts} turnouts, {ends} track ends")?;
+    write!(output, "nodes   {nodes}: {sensors} sensors, {turnouts} turnouts, {ends} track ends")?;
+    match boundaries(layout).count() {
+        0 => writeln!(output)?,
+        boundaries => writeln!(output, ", {boundaries} boundaries")?,
+    }
     let known = || layout.edges().filter(|(_, edge)| edge.known != StretchLength::Unknown);
     let (shortest, longest) = range_mm(known().map(|(_, edge)| edge.length.as_mm()));
     let unknown = layout.edges().len() - known().count();
@@ -89,6 +96,19 @@ fn write_words(file: &LayoutFile, output: &mut dyn Write) -> anyhow::Result<()> 
     for [one, other] in layout.never_both_curved() {
         writeln!(output, "pair    turnouts {one} and {other} are never both curved")?;
     }
+    for block in layout.blocks() {
+        let Block { name, detector, entries, .. } = block;
+        let entries: Vec<&str> = entries.iter().map(|entry| layout.sensor_name(*entry)).collect();
+        let rails = block_mm(layout, block);
+        writeln!(
+            output,
+            "block   {name}: detector {detector}, entered at {}, {rails:.0} mm of rails",
+            entries.join(", ")
+        )?;
+    }
+    for Crossing { tracks: [one, other] } in layout.crossings() {
+        writeln!(output, "cross   {} crosses {}", spot(layout, *one), spot(layout, *other))?;
+    }
     for zone in layout.zones() {
         let (limit, rails) = (zone.limit.as_mm_per_s(), restricted_mm(layout, zone));
         writeln!(output, "zone    {}: at most {limit} mm/s on {rails:.0} mm of rails", zone.name)?;
@@ -100,6 +120,24 @@ fn write_words(file: &LayoutFile, output: &mut dyn Write) -> anyhow::Result<()> 
 fn restricted_mm(layout: &Layout, zone: &Zone) -> f64 {
     let stretches = layout.edges().step_by(2).filter(|(edge, _)| layout.zone(*edge) == Some(zone));
     stretches.map(|(_, edge)| edge.length.as_mm()).sum()
+}
+
+/// The places of the boundaries of blocks, each by its first node.
+pub(super) fn boundaries(layout: &Layout) -> impl Iterator<Item = NodeId> {
+    layout.nodes().step_by(2).map(|(node, _)| node).filter(|node| layout.is_boundary(*node))
+}
+
+/// The length of rail in a block, in mm.
+fn block_mm(layout: &Layout, block: &Block) -> f64 {
+    let edges = block.stretches.iter().filter_map(|stretch| layout.edge(EdgeId(2 * stretch.0)));
+    edges.map(|edge| edge.length.as_mm()).sum()
+}
+
+/// A place on an edge: `A1 to B3 after 120 mm`.
+fn spot(layout: &Layout, at: Position) -> String {
+    let name = |node| layout.node_name(node);
+    let ends = layout.edge(at.edge).map_or(["?", "?"], |edge| [name(edge.from), name(edge.to)]);
+    format!("{} after {:.0} mm", ends.join(" to "), at.offset.as_mm())
 }
 
 /// Writes each hop from a sensor to the next, one a line.
@@ -134,6 +172,14 @@ fn summary(layout: &Layout) -> Value {
             "length_mm": rounded_mm(restricted_mm(layout, zone)),
         })
     });
+    let blocks = layout.blocks().iter().map(|block| {
+        json!({
+            "name": block.name,
+            "detector": block.detector,
+            "entries": block.entries.iter().map(|entry| layout.sensor_name(*entry)).collect::<Value>(),
+            "length_mm": rounded_mm(block_mm(layout, block)),
+        })
+    });
     json!({
         "name": layout.name(),
         "nodes": layout.nodes().len(),
@@ -145,6 +191,9 @@ fn summary(layout: &Layout) -> Value {
         "length_uncertainty_mm": rounded_mm(layout.survey().uncertainty.as_mm()),
         "length_origin": layout.survey().origin,
         "never_both_curved": layout.never_both_curved(),
+        "boundaries": boundaries(layout).count(),
+        "blocks": blocks.collect::<Value>(),
+        "crossings": layout.crossings().len(),
         "zones": zones.collect::<Value>(),
         "hops": hops.collect::<Value>(),
     })
@@ -155,7 +204,10 @@ fn counts(layout: &Layout) -> [usize; 3] {
     let count =
         |is_counted: fn(&NodeKind) -> bool| layout.nodes().filter(|(_, node)| is_counted(&node.kind)).count();
     [
-        count(|kind| matches!(kind, NodeKind::Sensor(_))),
+        layout
+            .nodes()
+            .filter(|(node, _)| layout.sensor_at(*node).is_some() && !layout.is_boundary(*node))
+            .count(),
         count(|kind| matches!(kind, NodeKind::Branch(_))),
         count(|kind| matches!(kind, NodeKind::Exit)),
     ]

@@ -13,6 +13,7 @@ use super::recording::OpenRecording;
 use super::report;
 use super::walked::Walked;
 use crate::commands::web_page::Language;
+use crate::error_text::error_text;
 
 /// Recordings that were sent to this process, so that two of one name are two files.
 static SENT: AtomicU32 = AtomicU32::new(0);
@@ -70,7 +71,7 @@ pub(crate) fn uploaded_page(
     std::io::copy(bytes, &mut fs::File::create_new(&file)?)?;
     walked_page(&file, vehicle, has_vehicle, language).map_err(|error| {
         // Where it passed through is nobody's concern.
-        let said = format!("{error:#}").replace(&file.display().to_string(), name);
+        let said = error_text(&error).replace(&file.display().to_string(), name);
         anyhow::Error::msg(said)
     })
 }

@@ -12,6 +12,8 @@ const SPEED_INSIDE_PCT: f64 = 99.99;
 
 /// Share of periods in which claims may be contradicted before they do not hold: rows that were read late.
 const CONTRADICTED: f64 = 1e-3;
+/// Share of periods after a gap beyond which a recording is not what it says: losses are rarer, another unit of time is not.
+const GAPS: f64 = 0.5;
 /// What is said without a vehicle file.
 const fn no_vehicle(language: Language) -> &'static str {
     match language {
@@ -72,6 +74,21 @@ impl Walked {
             warnings.push(no_vehicle(language).to_owned());
         }
         for recording in &self.recordings {
+            let periods: u64 = recording.runs.iter().map(|run| run.odometry.summary().periods).sum();
+            let gaps = recording.time_faults.gaps;
+            if gaps as f64 > GAPS * periods as f64 {
+                let file = &recording.file;
+                warnings.push(match language {
+                    Language::English => format!(
+                        "{file}: {gaps} of {periods} periods follow a gap, so hardly any speed is estimated; is t_s in \
+                         seconds, and is every period in the file?"
+                    ),
+                    Language::German => format!(
+                        "{file}: {gaps} von {periods} Perioden folgen auf eine Lücke, daher wird kaum ein Tempo geschätzt; \
+                         ist t_s in Sekunden, und sind alle Perioden in der Datei?"
+                    ),
+                });
+            }
             for run in &recording.runs {
                 let claims = run.odometry.doubtful_claims();
                 let periods = run.odometry.summary().periods;

@@ -9,6 +9,7 @@ use footplate_core::track::Layout;
 use footplate_core::{TimeSpan, Timestamp, TrainId};
 use footplate_store::{RecordingKey, Side, Store, StoredMachine, Traced, parse_layout};
 
+use super::recorded_blocks::RecordedBlocks;
 use super::session::read;
 use crate::commands::calibrate::{CalibrationBeginning, calibration_line};
 use crate::commands::demo::TourBeginning;
@@ -84,7 +85,9 @@ impl Walked {
                 let beginning: DriveBeginning = read(stored)?;
                 self.draws(beginning.layout())?;
                 let look = |machine: &ScriptRunner, painter: &mut Painter, now| machine.show(painter, now);
-                self.tell(&mut beginning.script_runner()?, trace, Painter::new, look, of_session);
+                let mut machine = beginning.script_runner()?;
+                let blocks = RecordedBlocks::of(machine.driver().layout(), trace);
+                self.tell(&mut machine, trace, blocks, Painter::new, look, of_session);
             }
             TourBeginning::KIND => {
                 let beginning: TourBeginning = read(stored)?;
@@ -93,7 +96,8 @@ impl Walked {
                 let look = |machine: &Driver, painter: &mut Painter, now| {
                     painter.paint_undispatched(machine, BTreeMap::new(), now, Timestamp::ZERO);
                 };
-                self.tell(&mut beginning.driver(&layout), trace, Painter::new, look, |notice| {
+                let blocks = RecordedBlocks::of(&layout, trace);
+                self.tell(&mut beginning.driver(&layout), trace, blocks, Painter::new, look, |notice| {
                     of_driver(&notice)
                 });
             }
@@ -108,7 +112,14 @@ impl Walked {
                 let mut calibrator = beginning.calibrator(&layout);
                 let heard = |notice| Some(Shown::Calibration(notice));
                 self.calibrated = Some((layout.clone(), calibrator.locator().train()));
-                self.tell(&mut calibrator, trace, Painter::following, look, heard);
+                self.tell(
+                    &mut calibrator,
+                    trace,
+                    RecordedBlocks::of(&layout, trace),
+                    Painter::following,
+                    look,
+                    heard,
+                );
             }
             _ => {}
         }
@@ -136,6 +147,7 @@ impl Walked {
         &mut self,
         machine: &mut M,
         trace: &[Traced],
+        mut blocks: RecordedBlocks,
         paints: impl Fn(&Arc<Board>) -> Painter,
         mut look: impl FnMut(&M, &mut Painter, Timestamp),
         shown: impl Fn(M::Notice) -> Option<Shown>,
@@ -146,6 +158,10 @@ impl Walked {
         let between = BETWEEN.max(even);
         let board = Board::new(0);
         let mut painter = paints(&board);
+        let mut look = |machine: &M, painter: &mut Painter, now| {
+            painter.see_blocks(blocks.at(now));
+            look(machine, painter, now);
+        };
         let mut next = first.time;
         for row in told() {
             // A row that this program cannot read ends what can be looked at.

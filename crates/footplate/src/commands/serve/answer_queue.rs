@@ -20,6 +20,7 @@ use tokio::time::timeout;
 use crate::commands::clerk::{CLERK, LONGEST_ANSWER, Question, limit_that_ended};
 use crate::commands::odometry::PassingFolder;
 use crate::commands::web_page::Language;
+use crate::error_text::error_text;
 
 /// Computes one answer at a time: on a machine with two cores the control loop needs the other one.
 #[derive(Debug, Clone)]
@@ -72,7 +73,7 @@ impl AnswerQueue {
     /// The request is invalid.
     pub(super) async fn ask(&self, question: Question, body: Body, most: usize) -> Result<String, Rejection> {
         let internal =
-            |error: anyhow::Error| Rejection(StatusCode::INTERNAL_SERVER_ERROR, format!("{error:#}"));
+            |error: anyhow::Error| Rejection(StatusCode::INTERNAL_SERVER_ERROR, error_text(&error));
         let too_many = || {
             let why = "too many requests are being computed: try again in a moment".to_owned();
             Rejection(StatusCode::TOO_MANY_REQUESTS, why)

@@ -16,6 +16,7 @@ use serde_json::json;
 use super::answer_queue::Rejection;
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::Routes;
+use crate::error_text::error_text;
 
 /// The largest layout that is taken, in bytes: thousands of nodes.
 pub(super) const LARGEST_LAYOUT: usize = 1 << 20;
@@ -50,6 +51,6 @@ async fn check(body: Result<Json<DrawnLayout>, JsonRejection>) -> Response {
     let checked = tokio::task::spawn_blocking(move || drawn.written().map(|_| ())).await;
     match checked.map_err(anyhow::Error::from).and_then(|checked| checked) {
         Ok(()) => Json(json!({ "taken": true })).into_response(),
-        Err(error) => Rejection(StatusCode::UNPROCESSABLE_ENTITY, format!("{error:#}")).into_response(),
+        Err(error) => Rejection(StatusCode::UNPROCESSABLE_ENTITY, error_text(&error)).into_response(),
     }
 }

@@ -33,6 +33,7 @@ use super::set_up_file::{SetUp, SetUpTrain};
 use super::{Next, check_link};
 use crate::clock::now;
 use crate::dashboard::Routes;
+use crate::error_text::error_text;
 use crate::link::find_stations;
 
 /// What the program that answers does.
@@ -139,7 +140,7 @@ impl Kept {
     fn of(set_up: SetUp, store: &Path) -> Self {
         let (calibrated, problem) = match set_up.calibrated(store) {
             Ok(calibrated) => (calibrated, None),
-            Err(error) => (BTreeSet::new(), Some(format!("{error:#}"))),
+            Err(error) => (BTreeSet::new(), Some(error_text(&error))),
         };
         Self { set_up, calibrated, problem }
     }
@@ -319,7 +320,7 @@ fn answer(result: anyhow::Result<Value>) -> Response {
     match result {
         Ok(json) => (no_store, Json(json)).into_response(),
         Err(error) => {
-            (no_store, Rejection(StatusCode::UNPROCESSABLE_ENTITY, format!("{error:#}"))).into_response()
+            (no_store, Rejection(StatusCode::UNPROCESSABLE_ENTITY, error_text(&error))).into_response()
         }
     }
 }

@@ -1,0 +1,74 @@
+// Every message that the server can send is German on German pages: the texts are taken from the sources that write them.
+
+import assert from "node:assert/strict";
+import { readFileSync, readdirSync } from "node:fs";
+import { join } from "node:path";
+import { test } from "node:test";
+import { fileURLToPath } from "node:url";
+import { ENGLISH } from "../../assets/dashboard/english.js";
+import { GERMAN } from "../../assets/dashboard/german.js";
+import { logInGerman } from "../../assets/dashboard/german_log.js";
+
+const CRATES = fileURLToPath(new URL("../../../", import.meta.url));
+const DRIVE = "footplate/src/commands/drive";
+const SERVE = "footplate/src/commands/serve";
+/** The sources of lines of the log, of refusals, and of errors of a command. */
+const SOURCES = [
+  `${DRIVE}/formatter.rs`, `${DRIVE}/script_runner.rs`, ...readdirSync(join(CRATES, DRIVE, "script_runner")).map((name) => `${DRIVE}/script_runner/${name}`),
+  `${DRIVE}/parse.rs`, `${DRIVE}/reader.rs`, "footplate-core/src/control/drive/refusal.rs", "footplate-core/src/control/supervise/alarm.rs",
+  "footplate-core/src/track/position.rs", "footplate-core/src/track/landmark.rs",
+];
+/** The sources of errors of a request, among texts for the terminal. */
+const REQUESTS = [`${SERVE}/set_up/routes.rs`, `${SERVE}/set_up/set_up_file.rs`, `${SERVE}/schedules.rs`, `${SERVE}/answer_queue.rs`, `${SERVE}/odometry_pages.rs`];
+const ERROR = /(?:bail!|with_context|context|refused|let why =)\(?\s*(?:\|\| )?\{?\s*(?:format!\()?\s*$/;
+/** No page shows these: they are for programs, for developers, or for the line below the terminal's prompt. */
+const FOR_OTHERS = [
+  "{train} {place} ±{half:.0} mm {speed:.0} mm/s", "cannot start a process to compute the answer", "making room for an answer", "the request failed without a reason",
+];
+/** Values for a blank whose kind is not known from its name. */
+const GUESSES = ["24", "C13", "train 24", "`stop 24 at C13`", "curved"];
+const NAMED = { zone: "yard", end: "EX1", from: "C13", target: "C13", nearest: "C14", or: "by train 58", why: "the station does not answer", found: "its model is unchanged", name: "Evening", near: "", by: "early", error: "the track ends at `EX1`, 30 mm before the end of the path", moves: "at rest" };
+/** The most combinations of guesses for one text. */
+const MOST_TRIED = 3000;
+/** The sentences of which a text may be a part, as `…`. */
+const WHOLE = [
+  "…", "column 4: `sped`…", "column 4: `sped` …", "column 4: `sped` should be …", "column 4: …", "column 4: `sped` is not a command…", "schedule `Evening` …", "schedule `Evening` runs: round 1…",
+  "    1.000 s  train 24 at C13…", "    1.000 s  train 24 will be at rest there…", "    1.000 s  train 24 will be at rest there, … from 3 to 9 mm/s, and stops from step 8",
+  "    1.000 s  train 24 will be commanded to stop…; rests at -3 mm to +3 mm (95 %)",
+  "    1.000 s  C13 was reported by train 24 or …: the next reports decide", "train 24 is in a deadlock: … makes room", "route set for train 24: about 9 s…", "train 24: C13 ± 3 mm (95 %), …",
+  "`C13` is too close to stop at: the nearest possible place is `C14`, 20 mm beyond it…",
+];
+
+/** The texts of a source that are sentences: literals with several words, outside its tests and comments. */
+function sentences(path, isWanted = () => true) {
+  const source = readFileSync(join(CRATES, path), "utf8").split("#[cfg(test)]")[0].replace(/^\s*\/\/.*$/gm, "");
+  const literals = [...source.matchAll(/"((?:[^"\\]|\\[^])*)"/g)].filter(({ index }) => isWanted(source.slice(0, index)));
+  const texts = literals.map(([, text]) => text.replace(/\\\n\s*/g, "").replaceAll("\\u{b1}", "±"));
+  return texts.filter((text) => / \w+ /.test(text) && !text.includes("\n") && !FOR_OTHERS.includes(text));
+}
+
+/** Whether some values for the blanks of a text make a sentence whose German has none of its English. */
+function isKnown(text) {
+  const named = text.replace(/^\{\} {2}/, "    1.000 s  ").replace("yet{why}", "yet: {why}").replace(/\{(\w+)(?::[^}]*)?\}/g, (_, name) => NAMED[name] ?? "24");
+  const parts = named.split(/\{[^}]*\}/);
+  // The longest English of the text, which must not stay.
+  const [own] = named.replace(/\(95 %\)/, "").split(/\{[^}]*\}|`[^`]*`|\d\S*/).sort((one, other) => other.length - one.length);
+  for (let nth = 0; nth < Math.min(GUESSES.length ** (parts.length - 1), MOST_TRIED); nth++) {
+    const filled = parts.reduce((made, part, place) => made + GUESSES[Math.floor(nth / GUESSES.length ** (place - 1)) % GUESSES.length] + part);
+    if (WHOLE.some((whole) => !logInGerman(whole.replace("…", () => filled)).includes(own.trim()))) return true;
+  }
+  return false;
+}
+
+test("every message of the server is known in German", () => {
+  const all = [...SOURCES.map((path) => [path, sentences(path)]), ...REQUESTS.map((path) => [path, sentences(path, (before) => ERROR.test(before))])];
+  assert.ok(all.flatMap(([, texts]) => texts).length > 150, "the texts were found");
+  const unknown = all.flatMap(([path, texts]) => texts.filter((text) => !isKnown(text)).map((text) => `${path}: ${text}`));
+  assert.deepEqual(unknown, []);
+});
+
+test("every word of the pages is in both languages, with the same blanks", () => {
+  const blanks = (text) => [...text.matchAll(/\{\d\}/g)].map(String).sort();
+  assert.deepEqual(Object.keys(GERMAN).sort(), Object.keys(ENGLISH).sort());
+  for (const [word, text] of Object.entries(ENGLISH)) assert.deepEqual(blanks(GERMAN[word]), blanks(text), word);
+});
