@@ -320,7 +320,8 @@ print_summary() {
     printf '  %-12s %4d s  failed\n' "$current" "$((SECONDS - step_started))"
   fi
   echo "  recordings   ${FOOTPLATE_DATA:-none; tests on real recordings were left out}"
-  if [[ $status -eq 0 ]]; then
+  # A signal ends the shell without a status of its own.
+  if [[ $status -eq 0 && -z $current ]]; then
     echo "ci.sh: all passed in $SECONDS s"
   else
     echo "ci.sh: stopped at $current after $SECONDS s"
