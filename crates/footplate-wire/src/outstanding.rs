@@ -20,8 +20,23 @@ pub(crate) struct Repeats {
     pub(crate) usual: u8,
 }
 
+/// What a question is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Subject {
+    /// The power of the track.
+    Power,
+    /// How a train is driven.
+    Train(TrainId),
+    /// A function of a train, or a group of them.
+    Function(TrainId, u8),
+    /// A turnout.
+    Turnout(TurnoutId),
+    /// Anything else: the question itself.
+    Other,
+}
+
 /// What an answer to a request looks like.
-pub(crate) trait Awaited: Copy + Debug {
+pub(crate) trait Awaited: Copy + Debug + PartialEq {
     /// What is written to the station.
     type Request: Copy + Debug;
     /// What the station says.
@@ -30,17 +45,39 @@ pub(crate) trait Awaited: Copy + Debug {
 
     fn is_answered_by(&self, reply: &Self::Reply) -> bool;
 
+    fn subject(&self) -> Subject;
+
     /// Whether both await the answer to the same question, so that only the newer one counts.
-    fn is_same(&self, other: &Self) -> bool;
+    fn is_same(&self, other: &Self) -> bool {
+        match self.subject() {
+            Subject::Other => self == other,
+            subject => subject == other.subject(),
+        }
+    }
 
     /// The train whose next command must wait for this answer.
-    fn train(&self) -> Option<TrainId>;
+    fn train(&self) -> Option<TrainId> {
+        match self.subject() {
+            Subject::Train(train) => Some(train),
+            _ => None,
+        }
+    }
 
     /// The turnout that is not thrown again before this answer.
-    fn turnout(&self) -> Option<TurnoutId>;
+    fn turnout(&self) -> Option<TurnoutId> {
+        match self.subject() {
+            Subject::Turnout(turnout) => Some(turnout),
+            _ => None,
+        }
+    }
 
     /// The train of which it awaits a function.
-    fn switched(&self) -> Option<TrainId>;
+    fn switched(&self) -> Option<TrainId> {
+        match self.subject() {
+            Subject::Function(train, _) => Some(train),
+            _ => None,
+        }
+    }
 
     /// Whether trains can be driven without the answer, so that the request is given up in the end.
     fn may_be_given_up(&self, is_command: bool) -> bool;

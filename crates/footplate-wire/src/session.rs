@@ -124,6 +124,8 @@ pub enum LinkNotice {
         /// What a person should check on this kind of link.
         check: &'static str,
     },
+    /// The line was lost and is open again: what was sent and reported meanwhile is unknown.
+    Reopened,
     /// The station has identified itself.
     Identified {
         /// Its own words.
@@ -358,6 +360,7 @@ impl Display for LinkNotice {
             Self::Unreadable { bytes, check } => {
                 write!(f, "{bytes} bytes came that could not be read; {check}")
             }
+            Self::Reopened => f.write_str("the line is open again; trains are stopped, and the station is asked for all states"),
             Self::Identified { identity } => write!(f, "the station is {identity}"),
             Self::Restarted => f.write_str(
                 "the station was reset; trains stopped when the power went and stay so until they are commanded anew",

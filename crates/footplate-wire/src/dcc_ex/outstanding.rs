@@ -5,7 +5,7 @@ use footplate_core::{FunctionNumber, TimeSpan, TrainId, TurnoutId};
 use super::reply::Reply;
 use super::request::{Request, Throttle};
 use super::time_model::ANSWER_LONGEST;
-use crate::outstanding::{Awaited as AwaitedAnswer, Repeats};
+use crate::outstanding::{Awaited as AwaitedAnswer, Repeats, Subject};
 
 /// A request without an answer is repeated after this time: many times the longest answer (9.1 ms), as the project's own
 /// client library asks of clients.
@@ -57,35 +57,13 @@ impl AwaitedAnswer for Awaited {
         }
     }
 
-    fn is_same(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Power(_), Self::Power(_)) => true,
-            (Self::Turnout(one, _), Self::Turnout(other, _)) => one == other,
-            (Self::Function(one, function, _), Self::Function(other, of_other, _)) => {
-                (one, function) == (other, of_other)
-            }
-            _ => self.train().map_or(self == other, |train| other.train() == Some(train)),
-        }
-    }
-
-    fn train(&self) -> Option<TrainId> {
-        match self {
-            Self::Driven(train, ..) | Self::Locomotive(train) => Some(*train),
-            _ => None,
-        }
-    }
-
-    fn switched(&self) -> Option<TrainId> {
-        match self {
-            Self::Function(train, ..) => Some(*train),
-            _ => None,
-        }
-    }
-
-    fn turnout(&self) -> Option<TurnoutId> {
-        match self {
-            Self::Turnout(turnout, ..) => Some(*turnout),
-            _ => None,
+    fn subject(&self) -> Subject {
+        match *self {
+            Self::Identity | Self::Slots => Subject::Other,
+            Self::Locomotive(train) | Self::Driven(train, ..) => Subject::Train(train),
+            Self::Function(train, function, _) => Subject::Function(train, function.get()),
+            Self::Power(_) => Subject::Power,
+            Self::Turnout(turnout, _) => Subject::Turnout(turnout),
         }
     }
 

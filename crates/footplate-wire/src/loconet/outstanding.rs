@@ -6,7 +6,7 @@ use super::functions::FunctionGroup;
 use super::message::Message;
 use super::request::Request;
 use super::slot::SlotData;
-use crate::outstanding::{Awaited as AwaitedAnswer, Repeats};
+use crate::outstanding::{Awaited as AwaitedAnswer, Repeats, Subject};
 
 /// A request without an answer is repeated after this time: three messages with their reports take some 30 ms on an idle bus; a busy
 /// bus and a wireless network are given ten times that.
@@ -81,35 +81,13 @@ impl AwaitedAnswer for Awaited {
         }
     }
 
-    fn is_same(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Power(_), Self::Power(_)) => true,
-            (Self::Turnout(one, _), Self::Turnout(other, _)) => one == other,
-            (Self::Functions(one, group, _), Self::Functions(other, of_other, _)) => {
-                (one, group) == (other, of_other)
-            }
-            _ => self.train().map_or(self == other, |train| other.train() == Some(train)),
-        }
-    }
-
-    fn train(&self) -> Option<TrainId> {
-        match self {
-            Self::Driven(train, ..) | Self::Locomotive(train) => Some(*train),
-            _ => None,
-        }
-    }
-
-    fn switched(&self) -> Option<TrainId> {
-        match self {
-            Self::Functions(train, ..) => Some(*train),
-            _ => None,
-        }
-    }
-
-    fn turnout(&self) -> Option<TurnoutId> {
-        match self {
-            Self::Turnout(turnout, _) => Some(*turnout),
-            _ => None,
+    fn subject(&self) -> Subject {
+        match *self {
+            Self::Status | Self::Interrogation(_) => Subject::Other,
+            Self::Locomotive(train) | Self::Driven(train, ..) => Subject::Train(train),
+            Self::Functions(train, group, _) => Subject::Function(train, group as u8),
+            Self::Power(_) => Subject::Power,
+            Self::Turnout(turnout, _) => Subject::Turnout(turnout),
         }
     }
 

@@ -16,11 +16,11 @@ const RUNS: u8 = 0x02;
 /// Who uses a slot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SlotUse {
-    /// Nobody; it holds no locomotive.
+    /// No throttle, and no locomotive is in it.
     Free,
-    /// Nobody; its locomotive is refreshed.
+    /// No throttle; its locomotive is refreshed.
     Common,
-    /// Nobody; its locomotive is not refreshed.
+    /// No throttle; its locomotive is not refreshed.
     Idle,
     /// A throttle.
     InUse,

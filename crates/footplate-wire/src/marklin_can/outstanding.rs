@@ -1,11 +1,13 @@
 //! The answers to requests to the station, and when to repeat them.
 
+use core::mem::discriminant;
+
 use footplate_core::{DecoderSteps, FunctionNumber, SpeedStep, TimeSpan, TrainId, TurnoutId};
 
 use super::message::{Direction, Message};
 use super::speed::step_of;
 use super::uid::Uid;
-use crate::outstanding::{Awaited as AwaitedAnswer, Repeats};
+use crate::outstanding::{Awaited as AwaitedAnswer, Repeats, Subject};
 
 /// Stations answer within some milliseconds; 250 to 500 ms are advised.
 pub(super) const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(250);
@@ -87,39 +89,22 @@ impl AwaitedAnswer for Awaited {
         }
     }
 
+    fn subject(&self) -> Subject {
+        match *self {
+            Self::Speed(train, ..) | Self::Direction(train, ..) => Subject::Train(train),
+            Self::Function(train, _, function, _) => Subject::Function(train, function.get()),
+            Self::Power(_) => Subject::Power,
+            Self::Accessory(turnout, ..) => Subject::Turnout(turnout),
+            _ => Subject::Other,
+        }
+    }
+
+    /// Speed and direction are questions of their own, and a number on the bus names the same train as any other.
     fn is_same(&self, other: &Self) -> bool {
         match (self, other) {
-            (Self::Power(_), Self::Power(_)) | (Self::Roster { .. }, Self::Roster { .. }) => true,
             (Self::AnySpeed(one, _), Self::AnySpeed(other, _))
-            | (Self::Speed(one, ..), Self::Speed(other, ..))
-            | (Self::AnyDirection(one, _), Self::AnyDirection(other, _))
-            | (Self::Direction(one, ..), Self::Direction(other, ..)) => one == other,
-            (Self::Function(one, _, function, _), Self::Function(other, _, of_other, _)) => {
-                (one, function) == (other, of_other)
-            }
-            (Self::Accessory(one, ..), Self::Accessory(other, ..)) => one == other,
-            _ => self == other,
-        }
-    }
-
-    fn train(&self) -> Option<TrainId> {
-        match self {
-            Self::Speed(train, ..) | Self::Direction(train, ..) => Some(*train),
-            _ => None,
-        }
-    }
-
-    fn switched(&self) -> Option<TrainId> {
-        match self {
-            Self::Function(train, ..) => Some(*train),
-            _ => None,
-        }
-    }
-
-    fn turnout(&self) -> Option<TurnoutId> {
-        match self {
-            Self::Accessory(turnout, ..) => Some(*turnout),
-            _ => None,
+            | (Self::AnyDirection(one, _), Self::AnyDirection(other, _)) => one == other,
+            _ => discriminant(self) == discriminant(other) && self.subject() == other.subject(),
         }
     }
 

@@ -7,7 +7,7 @@ use super::reply::Reply;
 use super::request::Request;
 use super::speed::Throttle;
 use super::states::TurnoutPosition;
-use crate::outstanding::{Awaited as AwaitedAnswer, Repeats};
+use crate::outstanding::{Awaited as AwaitedAnswer, Repeats, Subject};
 
 /// A request without an answer is repeated after this time: a datagram may be lost, and stations answer within some
 /// milliseconds. Over a busy wireless network answers take longer now and then; a repetition then does no harm.
@@ -78,35 +78,13 @@ impl AwaitedAnswer for Awaited {
         }
     }
 
-    fn is_same(&self, other: &Self) -> bool {
-        match (self, other) {
-            (Self::Power(_), Self::Power(_)) | (Self::Broadcasts(_), Self::Broadcasts(_)) => true,
-            (Self::Turnout(one, ..), Self::Turnout(other, ..)) => one == other,
-            (Self::Function(one, function, _), Self::Function(other, of_other, _)) => {
-                (one, function) == (other, of_other)
-            }
-            _ => self.train().map_or(self == other, |train| other.train() == Some(train)),
-        }
-    }
-
-    fn train(&self) -> Option<TrainId> {
-        match self {
-            Self::Driven(train, ..) | Self::Locomotive(train) => Some(*train),
-            _ => None,
-        }
-    }
-
-    fn switched(&self) -> Option<TrainId> {
-        match self {
-            Self::Function(train, ..) => Some(*train),
-            _ => None,
-        }
-    }
-
-    fn turnout(&self) -> Option<TurnoutId> {
-        match self {
-            Self::Turnout(turnout, ..) => Some(*turnout),
-            _ => None,
+    fn subject(&self) -> Subject {
+        match *self {
+            Self::Locomotive(train) | Self::Driven(train, ..) => Subject::Train(train),
+            Self::Function(train, function, _) => Subject::Function(train, function.get()),
+            Self::Power(_) => Subject::Power,
+            Self::Turnout(turnout, ..) => Subject::Turnout(turnout),
+            _ => Subject::Other,
         }
     }
 

@@ -203,7 +203,7 @@ impl Arguments {
 
     /// Prints how the line changes the time model.
     fn advise(&self, line: Option<&RoundTrips>, output: &mut dyn Write) -> anyhow::Result<()> {
-        let Some((line, usual)) = line.zip(self.link.station_kind().usual_line()) else { return Ok(()) };
+        let Some((line, usual)) = line.zip(self.link.kind().usual_line()) else { return Ok(()) };
         let (excess, repeats) = (line.excess(usual), line.repeats());
         let within = usual.answers_within.as_ms();
         if excess == TimeSpan::ZERO && repeats == 0 {

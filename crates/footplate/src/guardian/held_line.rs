@@ -131,7 +131,7 @@ impl WillLine for LastLine<'_> {
         std::thread::sleep(span);
     }
     fn has_answered(&self) -> bool {
-        !self.line.cable.has_datagrams() || self.line.has_heard.load(Ordering::Acquire)
+        !self.line.cable.has_answers() || self.line.has_heard.load(Ordering::Acquire)
     }
     fn expect_answer(&mut self) {
         self.line.has_heard.store(false, Ordering::Release);

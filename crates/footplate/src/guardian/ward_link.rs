@@ -187,6 +187,10 @@ impl Link for WardLink {
         Ok(())
     }
 
+    fn may_be_half_open(&self) -> bool {
+        self.cable.is_connection()
+    }
+
     fn guardian(&mut self) -> Option<&mut dyn Guardian> {
         if self.is_orphan { None } else { Some(self) }
     }

@@ -36,6 +36,8 @@ pub(crate) struct Cable {
     place: Place,
     /// How many times faster than real time the station's clock runs.
     speed: f64,
+    /// Whether the station answers each command: all but a 6050 or 6051 do.
+    has_answers: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -48,7 +50,7 @@ impl From<&SerialAddress> for Cable {
     fn from(address: &SerialAddress) -> Self {
         let SerialAddress { port, cts, speed, .. } = address.clone();
         let format = SerialFormat { baud: MARKLIN_BAUD, stop_bits: StopBits::Two, cts };
-        Self { place: Place::Stream(port, format), speed }
+        Self { place: Place::Stream(port, format), speed, has_answers: false }
     }
 }
 
@@ -56,14 +58,15 @@ impl From<&BoardAddress> for Cable {
     fn from(address: &BoardAddress) -> Self {
         let BoardAddress { port, speed, .. } = address.clone();
         let format = SerialFormat { baud: DCC_EX_BAUD, stop_bits: StopBits::One, cts: Some(false) };
-        Self { place: Place::Stream(port, format), speed }
+        Self { place: Place::Stream(port, format), speed, has_answers: true }
     }
 }
 
 impl From<&Z21Address> for Cable {
     fn from(address: &Z21Address) -> Self {
         let Z21Address { host, port, speed, .. } = address.clone();
-        Self { place: Place::Datagrams(Correspondent { host, port, receive_at: None }), speed }
+        let place = Place::Datagrams(Correspondent { host, port, receive_at: None });
+        Self { place, speed, has_answers: true }
     }
 }
 
@@ -79,7 +82,7 @@ impl From<&CanAddress> for Cable {
                 Place::Datagrams(Correspondent { host, port, receive_at: Some(receive_at) })
             }
         };
-        Self { place, speed: address.speed }
+        Self { place, speed: address.speed, has_answers: true }
     }
 }
 
@@ -88,7 +91,7 @@ impl From<&LocoNetAddress> for Cable {
         let LocoNetAddress { port, speed, .. } = address.clone();
         // Servers are reached over TCP, where no format matters.
         let format = SerialFormat { baud: ADAPTER_BAUD, stop_bits: StopBits::One, cts: Some(false) };
-        Self { place: Place::Stream(port, format), speed }
+        Self { place: Place::Stream(port, format), speed, has_answers: true }
     }
 }
 
@@ -120,6 +123,16 @@ impl Cable {
     /// Whether bytes are exchanged in datagrams, which may be lost without notice.
     pub(crate) const fn has_datagrams(&self) -> bool {
         matches!(self.place, Place::Datagrams(_))
+    }
+
+    /// Whether bytes go over a connection, whose other end may be gone without notice.
+    pub(crate) const fn is_connection(&self) -> bool {
+        matches!(self.place, Place::Stream(Port::Tcp { .. }, _))
+    }
+
+    /// Whether the station answers each command.
+    pub(crate) const fn has_answers(&self) -> bool {
+        self.has_answers
     }
 
     /// Opens it. What arrives is given to `deliver` on a thread of its own, until that answers `false`.
@@ -238,5 +251,9 @@ impl Link for CableLink {
         self.line = None;
         self.line = Some(open(&self.cable)?);
         Ok(())
+    }
+
+    fn may_be_half_open(&self) -> bool {
+        self.cable.is_connection()
     }
 }

@@ -28,6 +28,12 @@ pub(crate) trait Link {
     /// Tries to open a lost line again.
     fn reopen(&mut self) -> Result<(), Lost>;
 
+    /// Whether the other end may be gone without notice, as that of a connection whose cable was pulled. A station that falls silent
+    /// on such a line is looked for over a new one.
+    fn may_be_half_open(&self) -> bool {
+        false
+    }
+
     /// Real time, since some moment before: how long a person has waited. In a world that is simulated with the program itself,
     /// the time of that world.
     fn real_time(&self) -> Duration;
@@ -110,6 +116,9 @@ impl<L: Link + ?Sized> Link for Box<L> {
     fn reopen(&mut self) -> Result<(), Lost> {
         (**self).reopen()
     }
+    fn may_be_half_open(&self) -> bool {
+        (**self).may_be_half_open()
+    }
     fn real_time(&self) -> Duration {
         (**self).real_time()
     }
@@ -139,6 +148,9 @@ impl<L: Link + ?Sized> Link for &mut L {
     }
     fn reopen(&mut self) -> Result<(), Lost> {
         (**self).reopen()
+    }
+    fn may_be_half_open(&self) -> bool {
+        (**self).may_be_half_open()
     }
     fn real_time(&self) -> Duration {
         (**self).real_time()

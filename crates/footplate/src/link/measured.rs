@@ -71,7 +71,7 @@ impl MeasuredLine {
 impl Address {
     /// Returns the time model of the link over the measured line.
     pub(crate) fn time_model(&self, line: Option<&MeasuredLine>) -> TimeModel {
-        let kind = self.station_kind();
+        let kind = self.kind();
         match (line, kind.usual_line()) {
             (Some(line), Some(usual)) => kind.time_model().over(&line.round_trips, usual),
             _ => kind.time_model(),
@@ -80,7 +80,7 @@ impl Address {
 
     /// Returns how much longer than usual the measured line delays reports.
     pub(crate) fn excess(&self, line: Option<&MeasuredLine>) -> TimeSpan {
-        let usual = self.station_kind().usual_line();
+        let usual = self.kind().usual_line();
         line.zip(usual).map_or(TimeSpan::ZERO, |(line, usual)| line.round_trips.excess(usual))
     }
 

@@ -139,6 +139,10 @@ impl<L: Link> Link for ObservedLink<L> {
         self.link.reopen()
     }
 
+    fn may_be_half_open(&self) -> bool {
+        self.link.may_be_half_open()
+    }
+
     fn real_time(&self) -> Duration {
         self.link.real_time()
     }

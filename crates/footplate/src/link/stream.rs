@@ -31,7 +31,7 @@ pub(super) fn connect(
     let mut addresses = (host, port).to_socket_addrs().map_err(|error| failed(&error))?;
     let address = addresses.next().ok_or_else(|| failed(&"the name has no address"))?;
     let stream = TcpStream::connect_timeout(&address, CONNECT_WITHIN).map_err(|error| failed(&error))?;
-    // A byte waits for nobody.
+    // Each byte leaves at once.
     stream.set_nodelay(true).map_err(|error| failed(&error))?;
     stream.set_write_timeout(Some(WRITE_WITHIN)).map_err(|error| failed(&error))?;
     let mut reader = stream.try_clone().map_err(|error| failed(&error))?;

@@ -76,6 +76,10 @@ impl<L: Link> Link for TappedLink<L> {
         self.link.reopen()
     }
 
+    fn may_be_half_open(&self) -> bool {
+        self.link.may_be_half_open()
+    }
+
     fn real_time(&self) -> Duration {
         self.link.real_time()
     }

@@ -3,22 +3,7 @@
 use footplate_core::link::{TimeModel, UsualLine};
 use footplate_wire::{dcc_ex, loconet, marklin_can, marklin_serial, z21};
 
-use super::address::Address;
 use super::station_kind::StationKind;
-
-impl Address {
-    /// The station behind it.
-    pub(crate) const fn station_kind(&self) -> StationKind {
-        match self {
-            Self::Simulated(simulated) => simulated.station,
-            Self::Serial(_) => StationKind::Marklin,
-            Self::Board(_) => StationKind::DccEx,
-            Self::Z21(_) => StationKind::Z21,
-            Self::Can(_) => StationKind::MarklinCan,
-            Self::LocoNet(_) => StationKind::LocoNet,
-        }
-    }
-}
 
 impl StationKind {
     /// Returns the station's time model, which holds over a usual line.

@@ -124,8 +124,8 @@ pub(crate) trait WillLine {
 
     fn pause(&mut self, span: Duration);
 
-    /// Whether the station has answered anything since [`expect_answer`](Self::expect_answer); `true` on a line that says
-    /// itself when it is gone.
+    /// Whether the station has answered anything since [`expect_answer`](Self::expect_answer); `true` for one that does not answer
+    /// commands.
     fn has_answered(&self) -> bool;
 
     fn expect_answer(&mut self);
@@ -173,7 +173,7 @@ fn try_to_carry_out(line: &mut impl WillLine, will: &[u8]) -> Result<(), Lost> {
     if !line.is_open() {
         return Err(Lost("the line is gone".to_owned()));
     }
-    // Datagrams vanish without notice. A station that exchanges them answers each command.
+    // Datagrams vanish without notice, and so do bytes on a connection whose other end is gone.
     if line.has_answered() { Ok(()) } else { Err(Lost("the station does not answer".to_owned())) }
 }
 

@@ -17,6 +17,8 @@ mod stop_flag;
 #[cfg(test)]
 mod over_a_board;
 #[cfg(test)]
+mod over_a_half_open_line;
+#[cfg(test)]
 mod over_a_network;
 #[cfg(test)]
 mod over_a_simulation;

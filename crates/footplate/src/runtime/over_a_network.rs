@@ -1,4 +1,4 @@
-//! The loop over a real connection: a station that is there, one that goes, one that says nothing, and noise on the way.
+//! The loop over a real connection: a station that is there, one that goes, one that says nothing, and noise in between.
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -52,11 +52,11 @@ impl Standing {
             let mut server = Server::new(station, TIMES, incoming);
             server.serve(|| stopped.load(Ordering::Relaxed));
             let world = server.station().world();
-            let way = |train| world.truth().train(train).map_or(0.0, |truth| truth.odometer.as_m());
+            let distance = |train| world.truth().train(train).map_or(0.0, |truth| truth.odometer.as_m());
             Seen {
                 powered: world.is_powered(),
                 coils_overdue: server.station().alarms().len(),
-                travelled_m: address.trains.iter().map(|train| way(*train)).collect(),
+                travelled_m: address.trains.iter().map(|train| distance(*train)).collect(),
             }
         });
         Self { place, stop, thread: Some(thread) }
@@ -94,7 +94,7 @@ fn trains_run_over_a_network_as_they_do_in_process() {
     std::thread::sleep(std::time::Duration::from_millis(50));
     let seen = standing.end();
     assert!(reports(&machine) > 5, "{} reports, {:?}", reports(&machine), until.1);
-    assert!(seen.travelled_m.iter().all(|way| *way > 1.0), "{:?}", seen.travelled_m);
+    assert!(seen.travelled_m.iter().all(|distance| *distance > 1.0), "{:?}", seen.travelled_m);
     assert!(!seen.powered);
     assert_eq!(seen.coils_overdue, 0);
 }
@@ -125,9 +125,9 @@ fn a_program_that_vanishes_leaves_trains_running_and_the_next_one_can_stop_them(
     std::thread::sleep(std::time::Duration::from_millis(200));
     // when the next one connects,
     let mut runtime = connected(&standing.place);
-    let mut nobody = Runs::none();
+    let mut idle = Runs::none();
     let mut until = Until(Timestamp::from_s(10.0), Vec::new());
-    let ended = runtime.run(&mut nobody, &mut until).expect("nothing is written down");
+    let ended = runtime.run(&mut idle, &mut until).expect("nothing is written down");
     assert!(matches!(ended, Ended::Finished), "{ended}");
     runtime.close();
     std::thread::sleep(std::time::Duration::from_millis(50));
@@ -151,7 +151,7 @@ fn a_station_that_vanishes_is_said_to_be_gone() {
     let stopwatch = Stopwatch::start();
     let mut until = Until(Timestamp::from_s(1e6), Vec::new());
     let ended = runtime.run(&mut Runs::two(), &mut until).expect("nothing is written down");
-    // then it is tried again for a few seconds, and a person is told what to do.
+    // then it is tried again for a few seconds, and the message says what to do.
     let Ended::LineLost(_) = &ended else { panic!("{ended}") };
     assert!(ended.to_string().contains("switch the track power off by hand"), "{ended}");
     assert!(stopwatch.elapsed().as_secs_f64() < 10.0);

@@ -39,6 +39,8 @@ pub(crate) struct Runtime<'r, L: Link> {
     will: LastWill,
     /// How often the line was opened again since the station answered last.
     reopened: u32,
+    /// Whether the station has answered since the line was opened last.
+    has_answered: bool,
     is_closed: bool,
 }
 
@@ -71,6 +73,7 @@ impl<'r, L: Link> Runtime<'r, L> {
             functions,
             will: LastWill::new(),
             reopened: 0,
+            has_answered: false,
             is_closed: false,
         }
     }
@@ -222,9 +225,17 @@ impl<'r, L: Link> Runtime<'r, L> {
                 }
                 Transmit::Notice(notice) => {
                     if notice == LinkNotice::Answers {
-                        self.reopened = 0;
+                        (self.reopened, self.has_answered) = (0, true);
                     }
+                    // A station that fell silent may still be there, and only this connection to it gone.
+                    let is_half_open = matches!(notice, LinkNotice::Silent { .. })
+                        && self.link.may_be_half_open()
+                        && std::mem::take(&mut self.has_answered);
+                    let lost = is_half_open.then(|| Lost(notice.to_string()));
                     self.notices.push(notice);
+                    if let Some(lost) = lost {
+                        return Err(lost);
+                    }
                 }
                 Transmit::Functions(train, reported) => self.functions.push((train, reported)),
             }
@@ -258,6 +269,9 @@ impl<'r, L: Link> Runtime<'r, L> {
             )));
         }
         self.reopened += 1;
+        self.has_answered = false;
+        let now = self.link.now();
+        self.notices.drain(..).for_each(|notice| attendant.hear_of_line(now, &notice));
         attendant.read(&format!("{lost}; trying to open it again for {} s", REOPEN_WITHIN.as_secs()));
         let began = self.link.real_time();
         while self.link.real_time() - began < REOPEN_WITHIN && !self.stop.is_some_and(StopFlag::is_up) {
@@ -268,7 +282,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                 if let Some(up) = self.link.cts() {
                     self.session.handle_cts(now, up);
                 }
-                attendant.read("the line is open again");
+                attendant.hear_of_line(now, &LinkNotice::Reopened);
                 return Ok(());
             }
         }

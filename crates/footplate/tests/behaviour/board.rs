@@ -70,9 +70,14 @@ pub(crate) fn tried_on(layout: &str, folder: &Path, link: &str, script: &str) ->
     let over = ["--link", link, "--layout", layout, "--store", &store];
     let run = footplate(&[&["drive", "--script", &file, "--json"], &over[..]].concat());
     assert!(run.status <= 1, "{}{}", run.output, run.errors);
-    let lines = run.output.lines().map(|line| serde_json::from_str(line).expect(line));
-    let stops = lines.filter(|line: &Value| !line["target"].is_null()).collect();
+    let stops = stops_of(&run);
     (run, stops)
+}
+
+/// The stops among what `drive --json` prints.
+pub(crate) fn stops_of(run: &Run) -> Vec<Value> {
+    let lines = run.output.lines().map(|line| serde_json::from_str(line).expect(line));
+    lines.filter(|line: &Value| !line["target"].is_null()).collect()
 }
 
 #[test]

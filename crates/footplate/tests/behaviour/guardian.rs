@@ -28,6 +28,8 @@ struct Heard {
     /// Connections that were made.
     connections: usize,
     open: Option<TcpStream>,
+    /// The other half of that connection, to the board.
+    board: Option<TcpStream>,
     refuses: bool,
 }
 
@@ -100,6 +102,12 @@ impl Line {
         Instant::now()
     }
 
+    /// The board behind this connection is gone without notice: the connection stays, and nothing comes back.
+    fn is_half_open(&self) {
+        let board = locked(&self.heard).board.take().expect("a connection");
+        board.shutdown(Shutdown::Both).expect("it was open");
+    }
+
     /// Pulls the plug, or puts it back.
     fn is_pulled(&self, pulled: bool) {
         let mut heard = locked(&self.heard);
@@ -123,15 +131,15 @@ fn serve(mut program: TcpStream, board: Option<&str>, heard: &Arc<Mutex<Heard>>)
             (station.try_clone().expect("a handle"), program.try_clone().expect("a handle"));
         thread::spawn(move || std::io::copy(&mut answers, &mut back));
     }
+    locked(heard).board = station.as_ref().and_then(|station| station.try_clone().ok());
     let heard = Arc::clone(heard);
     thread::spawn(move || {
         let mut bytes = [0; 4096];
         while let Ok(count @ 1..) = program.read(&mut bytes) {
             let now = Instant::now();
             locked(&heard).bytes.extend(bytes[..count].iter().map(|byte| (now, *byte)));
-            if station.as_mut().is_some_and(|station| station.write_all(&bytes[..count]).is_err()) {
-                break;
-            }
+            // Once the board is gone, bytes are taken all the same, as by a connection that is half open.
+            station = station.filter(|mut station| station.write_all(&bytes[..count]).is_ok());
         }
         let _ = station.map(|station| station.shutdown(Shutdown::Both));
     });
@@ -353,6 +361,21 @@ fn a_line_that_was_gone_carries_the_stops_once_it_is_back() {
     line.is_pulled(false);
     stopped(&line, since, "killed, and the plug was put back");
     assert_eq!(driven.status(), Some(128 + 9), "{}", driven.errors());
+}
+
+#[test]
+fn a_connection_that_is_half_open_is_noticed_and_the_train_stopped_over_a_new_one() {
+    let (_board, line, driven, _) = running("guardian-half-open");
+    let since = Instant::now();
+    line.is_half_open();
+    driven.await_errors("the station has answered nothing");
+    let silent = Instant::now();
+    let stop = line.await_words(b"<t 24 0", silent);
+    println!("noticed after {:.1?}, stopped after {:.1?}", silent - since, stop - since);
+    // A question after 500 ms, 1.5 s without the answer, and half a second for a busy machine.
+    assert!(silent - since < Duration::from_millis(2_500), "{:?}", silent - since);
+    assert!(stop - silent < WITHIN, "{:?}", stop - silent);
+    assert_eq!(locked(&line.heard).connections, 2);
 }
 
 #[test]

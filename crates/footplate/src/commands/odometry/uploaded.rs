@@ -21,7 +21,7 @@ static SENT: AtomicU32 = AtomicU32::new(0);
 /// Charts of as many runs as there are in one page.
 const MOST_RUNS: usize = report::MOST_RUNS;
 
-/// A folder that is gone when nobody holds it any more.
+/// A folder that is removed when it is dropped.
 pub(crate) struct PassingFolder(PathBuf);
 
 impl PassingFolder {
@@ -41,7 +41,7 @@ impl PassingFolder {
 
 impl Drop for PassingFolder {
     fn drop(&mut self) {
-        // Whoever cleans the folder of passing files will find what is left.
+        // What cannot be removed is left to the system, which cleans its folder of temporary files.
         let _ = fs::remove_dir_all(&self.0);
     }
 }
@@ -70,7 +70,7 @@ pub(crate) fn uploaded_page(
     let file = folder.path().join(name);
     std::io::copy(bytes, &mut fs::File::create_new(&file)?)?;
     walked_page(&file, vehicle, has_vehicle, language).map_err(|error| {
-        // Where it passed through is nobody's concern.
+        // The folder has a name that no user knows.
         let said = error_text(&error).replace(&file.display().to_string(), name);
         anyhow::Error::msg(said)
     })
