@@ -347,6 +347,8 @@ impl Session for Interface {
     fn handle_reopened(&mut self, now: Timestamp) {
         self.polls.forget_reads();
         self.reply_time.forget();
+        // Its next answer is news: trains wait for it.
+        self.silence = Silence::default();
         self.put_in_doubt(now, now);
         self.recovery.begin_anew(self.power_word());
         self.pacing = Pacing::new(now, self.settings.pace);

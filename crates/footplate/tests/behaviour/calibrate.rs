@@ -144,8 +144,8 @@ fn bad_input_is_answered_with_its_place_and_what_would_be_right() {
     }
     let nothing = footplate(&["calibrate"]);
     assert_eq!(nothing.status, 2);
-    for way in ["--link", "--from", "--store"] {
-        assert!(nothing.errors.contains(way), "{way}: {}", nothing.errors);
+    for option in ["--link", "--from", "--store"] {
+        assert!(nothing.errors.contains(option), "{option}: {}", nothing.errors);
     }
     let absent = footplate(&["calibrate", "--from", "absent.csv", "--layout", "track-a"]);
     assert_eq!(absent.errors.matches("(os error 2)").count(), 1, "said once: {}", absent.errors);
