@@ -5,10 +5,8 @@ use alloc::collections::BTreeSet;
 use crate::ids::{NodeId, SensorId, TrainId, TurnoutId};
 use crate::model::MotionFit;
 use crate::time::Timestamp;
-use crate::track::{Landmark, Position};
-use crate::tracking::{
-    PassedContact, PathPoint, Rest, TrackContext, distance_to, distance_to_landmark, place_of,
-};
+use crate::track::Position;
+use crate::tracking::{PassedContact, PathPoint, Rest, TrackContext, distance_to, place_of};
 use crate::units::Length;
 
 use super::driven_train::DrivenTrain;
@@ -146,16 +144,6 @@ impl Driver {
     pub fn path_point(&self, train: TrainId, from: NodeId, to: Position) -> Option<PathPoint> {
         let distance = distance_to(self.track.context(), &self.trains.get(&train)?.model, from, to)?;
         Some(PathPoint { node: from, distance })
-    }
-
-    /// Whether a path leads a train from a position to a place, with the turnouts as they are.
-    #[must_use]
-    pub fn leads_to(&self, train: TrainId, from: Position, to: Landmark) -> bool {
-        let context = self.track.context();
-        let ahead = self.track.layout.edge(from.edge).map(|edge| edge.to);
-        ahead
-            .zip(self.trains.get(&train))
-            .is_some_and(|(ahead, train)| distance_to_landmark(context, &train.model, ahead, to).is_some())
     }
 
     /// Gives up the position of a train that was found to be wrong.

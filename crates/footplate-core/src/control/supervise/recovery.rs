@@ -9,7 +9,6 @@ use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::model::MotionFit;
 use crate::model::{MeasuredRatio, MotionModel, Rescaling, StepUse};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::Position;
 use crate::tracking::PassedContact;
 use crate::units::Length;
 
@@ -86,8 +85,6 @@ pub(super) enum Phase {
     LearningRest,
     /// The recovery is complete, and it comes to rest.
     Ending { outcome: Outcome },
-    /// It reverses once more: its order goes on in the direction that it was meant for.
-    TurningBack { outcome: Outcome },
     /// An operator is needed.
     GivenUp,
 }
@@ -172,12 +169,7 @@ impl Watchdog {
                 Phase::Ending { outcome }
                     if self.stops.at_rest(train).is_some_and(|at_rest| at_rest <= now) =>
                 {
-                    if self.goes_on_backwards(now, train) {
-                        self.set_phase(train, Phase::TurningBack { outcome }, now + STOPPED_WITHIN);
-                        self.issue(now, Order::Reverse { train, then: SpeedStep::STAND });
-                    } else {
-                        self.recovered(now, train, outcome);
-                    }
+                    self.recovered(now, train, outcome);
                 }
                 Phase::Measuring { trial, .. } if recovery.by <= now => self.skip(now, train, trial.step),
                 Phase::GivenUp => {}
@@ -268,10 +260,6 @@ impl Watchdog {
             recovery.phase = Phase::Locating { step, pushed: now, seen };
             recovery.by = now + LOCATED_WITHIN;
             self.keep_clear(now, train);
-        } else if let (EventKind::Reverse { .. }, Phase::TurningBack { outcome }) =
-            (event.kind, recovery.phase)
-        {
-            self.recovered(now, train, outcome);
         } else if let EventKind::Speed { step, .. } = event.kind
             && let Phase::Measuring { trial, from } | Phase::LearningSpeed { trial, from } =
                 &mut recovery.phase
@@ -433,19 +421,6 @@ impl Watchdog {
     }
 
     /// The train is at rest and its recovery complete.
-    /// Whether a train that reversed for its recovery reaches the place of its interrupted order only if it reverses again.
-    fn goes_on_backwards(&self, now: Timestamp, train: TrainId) -> bool {
-        let turned = self.dangers.get(&train).filter(|recovery| recovery.reversals % 2 == 1);
-        let target = match turned.and_then(|recovery| recovery.interrupted) {
-            Some((_, Order::Stop(stop))) => stop.target,
-            Some((_, Order::Arrive { target, .. })) => target,
-            _ => return false,
-        };
-        let reaches =
-            |from: Option<Position>| from.is_some_and(|from| self.driver.leads_to(train, from, target));
-        !reaches(self.driver.position(train, now)) && reaches(self.driver.reversed_position(train, now))
-    }
-
     fn recovered(&mut self, now: Timestamp, train: TrainId, outcome: Outcome) {
         let Some(recovery) = self.dangers.remove(&train) else { return };
         self.driver.set_end_of_authority(now, train, None);
@@ -481,9 +456,7 @@ impl Watchdog {
     pub(super) fn need_operator(&mut self, now: Timestamp, train: TrainId) {
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let while_it = match recovery.phase {
-            Phase::Stopping | Phase::Waiting { .. } | Phase::Ending { .. } | Phase::TurningBack { .. } => {
-                "while it was being stopped"
-            }
+            Phase::Stopping | Phase::Waiting { .. } | Phase::Ending { .. } => "while it was being stopped",
             Phase::Locating { .. } | Phase::Reversing { .. } => "while it crept to a sensor",
             Phase::GivenUp => return,
             _ => "while it was measured again",
