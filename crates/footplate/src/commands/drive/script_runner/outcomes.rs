@@ -21,6 +21,20 @@ const UNRELIABLE_FROM: Length = Length::from_mm(15.0);
 /// No refit is computed if something is due within this time: one part takes less.
 const DUE_SOON: TimeSpan = TimeSpan::from_ms(50);
 
+/// Speeds of one train differ by no more than this between two sessions (2 % is one deviation over the pairs of sessions of the
+/// published logs); more is dirt or another engine.
+const SAME_TRAIN: f64 = 0.05;
+
+/// Whether what was learnt of a train before its recovery still holds, so that it goes on being learnt. A train that no longer
+/// learns keeps no promise once its stops have changed.
+fn goes_on_learning(outcome: Outcome) -> bool {
+    match outcome {
+        Outcome::AsBefore => true,
+        Outcome::Rescaled { ratio } => (ratio - 1.0).abs() <= SAME_TRAIN,
+        _ => false,
+    }
+}
+
 impl ScriptRunner {
     pub(super) fn refuse(&mut self, now: Timestamp, step: &Step, why: &Refusal) {
         self.fell_short = true;
@@ -120,8 +134,8 @@ impl ScriptRunner {
                     self.cancelled(now, step, &Refusal::InDanger { train: *train });
                 }
             }
-            // The fit restarts from what the recovery measured: earlier events belong to the train as it was before.
-            Notice::Recovered { train, outcome, .. } if *outcome != Outcome::AsBefore => {
+            // Earlier events belong to the train as it was before.
+            Notice::Recovered { train, outcome, .. } if !goes_on_learning(*outcome) => {
                 self.learning.forget(*train);
                 self.refitted.remove(train);
                 self.changed.insert(*train);
