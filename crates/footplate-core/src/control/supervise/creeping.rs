@@ -128,6 +128,7 @@ impl Watchdog {
 
     /// A train was detected or placed.
     pub(super) fn note_detection(&mut self, train: TrainId, now: Timestamp) {
+        self.intruder.in_a_row = 0;
         let step = self.unheard.get(&train).map_or(SpeedStep::STAND, |known| known.step);
         self.unheard.insert(train, Unheard { step, since: now, before: step, ..Unheard::default() });
     }

@@ -194,7 +194,7 @@ impl Watchdog {
             return;
         }
         let Some(from) = before.filter(|_| self.dangers.is_empty()) else { return };
-        if let Some(train) = self.only_train_overdue(now) {
+        if let Some(train) = self.only_train_elsewhere(now) {
             return self.raise(now, train, Alarm::Elsewhere(sensor));
         }
         self.intruder.near = Some(sensor);
@@ -208,13 +208,14 @@ impl Watchdog {
         }
     }
 
-    /// The train that runs, if it is the only one and a sensor that should have reported it did not: what moves elsewhere
-    /// is this train.
-    fn only_train_overdue(&self, now: Timestamp) -> Option<TrainId> {
+    /// The train that runs, if it is the only one and a sensor that should have reported it did not, or none has since others
+    /// reported what no train explains: what moves elsewhere is this train.
+    fn only_train_elsewhere(&self, now: Timestamp) -> Option<TrainId> {
         let mut trains = self.driver.trains();
         let train = trains.next().filter(|_| trains.next().is_none())?;
         let runs = self.driver.commanded(train) > SpeedStep::STAND;
-        (runs && self.driver.missed_sensor(train, now).is_some()).then_some(train)
+        let is_silent = self.intruder.in_a_row > 1 || self.driver.missed_sensor(train, now).is_some();
+        (runs && is_silent).then_some(train)
     }
 
     /// The rails that whatever moves may be on; `None` if nothing does.

@@ -18,11 +18,14 @@ pub(super) struct Intruder {
     pub(super) last: Option<(SensorId, Timestamp)>,
     /// The sensor that reported it last, until an operator says that the track is clear.
     pub(super) near: Option<SensorId>,
+    /// Detections in a row that no train explains.
+    pub(super) in_a_row: usize,
 }
 
 impl Intruder {
     /// Takes a detection that no train explains. Returns the adjacent sensor that reported just before, if any did.
     pub(super) fn take(&mut self, layout: &Layout, sensor: SensorId, time: Timestamp) -> Option<SensorId> {
+        self.in_a_row = self.in_a_row.saturating_add(1);
         let (from, at) = self.last.replace((sensor, time))?;
         ((time - at).abs() <= NEXT_WITHIN && are_adjacent(layout, from, sensor)).then_some(from)
     }
