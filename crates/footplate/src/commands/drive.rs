@@ -196,13 +196,12 @@ impl Arguments {
         let schedules = store.as_ref().map_or_else(|| Ok(Vec::new()), saved)?;
         drop(store);
         let beginning = self.beginning(&written, known, schedules)?;
-        let dashboard = self.dashboard(&written)?;
         match address {
             Address::Simulated(simulated) => {
                 // The simulator uses the built-in layout; `--layout` may differ from it to study a wrong survey.
                 let real = layout_named(&simulated.layout)?.layout;
                 let link = open_simulated(simulated, &real, pace)?;
-                self.drive(layout, link, beginning, dashboard.as_ref(), output)
+                self.drive(&written, link, beginning, output)
             }
             Address::Serial(_)
             | Address::Board(_)
@@ -210,7 +209,7 @@ impl Arguments {
             | Address::Can(_)
             | Address::LocoNet(_) => {
                 let link = opened.map_or_else(|| open(address, layout, pace), Ok)?;
-                self.drive(layout, link, beginning, dashboard.as_ref(), output)
+                self.drive(&written, link, beginning, output)
             }
         }
     }
@@ -317,13 +316,16 @@ impl Arguments {
 
     fn drive<L: Link + GroundTruth>(
         &self,
-        layout: &Layout,
+        written: &WrittenLayout,
         link: L,
         beginning: DriveBeginning,
-        dashboard: Option<&Dashboard>,
         output: &mut dyn Write,
     ) -> anyhow::Result<Outcome> {
+        let layout = &written.layout;
         let address = self.railway.station()?;
+        // Only now that there is a link: a page of a session that cannot begin would be gone before it has loaded.
+        let dashboard = self.dashboard(written)?;
+        let dashboard = dashboard.as_ref();
         let line = dashboard.map(|dashboard| Arc::clone(&dashboard.line));
         let line = line.or_else(|| self.railway.phones.map(|_| SharedTallies::default()));
         let link = ObservedLink::new(link, line.clone());

@@ -3,8 +3,10 @@
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 
-/// The content security policy of the pages: they load from this server only.
-const POLICY: &str = "default-src 'none'; connect-src 'self'; manifest-src 'self'; img-src 'self' data:; script-src 'self'; style-src 'self'; frame-src 'self'; \
+/// The content security policy of the pages: they load from this server only. The hash is that of the script within `index.html`,
+/// which has to be there when no other file is.
+const POLICY: &str = "default-src 'none'; connect-src 'self'; manifest-src 'self'; img-src 'self' data:; \
+     script-src 'self' 'sha256-34PApFKKNDpqbgJSU5hbFIyQNuDVdCwySJDmuO282nA='; style-src 'self'; frame-src 'self'; \
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 /// A file of the pages.
@@ -38,7 +40,7 @@ pub(super) fn asset(path: &str) -> Option<Asset> {
             "\nexport { chart, colour, dots, line, rounded };\n"
         ),
         _ => files! { path:
-            "index.html" "boot.js" "dashboard.css" "dashboard.js" "alarms.js" "guide.js" "schedules_page.js" "route_buttons.js" "server.js" "live.js" "halt.js" "dom.js" "words.js" "english.js"
+            "index.html" "dashboard.css" "dashboard.js" "alarms.js" "guide.js" "schedules_page.js" "route_buttons.js" "server.js" "live.js" "halt.js" "dom.js" "words.js" "english.js"
             "german.js" "german_report.js" "german_log.js" "german_errors.js" "charts.js" "time_window.js" "portrait.js" "signals.js" "layout_page.js" "pick_track.js" "track.js" "view.js" "train_page.js"
             "train_charts.js" "places.js" "plan.js" "plan_curve.js" "plan_without_points.js" "scale.js" "throttle.js" "doing_now.js" "pieces.js" "draft.js" "draft_file.js" "editor_page.js" "setup_page.js" "worker.js" "icon.svg" "manifest.webmanifest" "calibration_page.js" "health_page.js" "recordings_page.js" "odometry_page.js" "slide_view.js"
         },

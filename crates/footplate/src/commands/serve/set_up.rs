@@ -152,7 +152,10 @@ impl Session {
         if let Ok(outcome) = outcome_of(result.status) {
             return Ok(Some(outcome));
         }
-        self.problem = Some(result.report);
+        let report = result.report;
+        // What was printed before the error is not the reason.
+        let reason = report.rfind("error: ").and_then(|from| report.get(from..));
+        self.problem = Some(reason.unwrap_or(&report).trim_start_matches("error: ").to_owned());
         Ok(None)
     }
 
