@@ -136,10 +136,15 @@ impl<A: Awaited> Dialogue<A> {
     /// Counts bytes that form no message.
     pub(crate) fn hear_noise(&mut self, bytes: usize) {
         if bytes > 0
-            && let Some(notice) = self.silence.heard_noise(bytes)
+            && let Some(notice) = self.silence.heard_noise(self.now, bytes)
         {
             self.notify(notice);
         }
+    }
+
+    /// Whether the line may garble what is sent now.
+    pub(crate) fn is_noisy(&self) -> bool {
+        self.silence.is_noisy(self.now)
     }
 
     // What is written next.

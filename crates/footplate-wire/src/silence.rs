@@ -10,6 +10,8 @@ const SILENT_AFTER: TimeSpan = TimeSpan::from_ms(1_500);
 
 /// Unreadable bytes that are not reported yet: a message or two that were cut off when the line was opened.
 const NOISE: usize = 64;
+/// A line counts as noisy this long after bytes that could not be read: several messages of a quiet line.
+const NOISY_FOR: TimeSpan = TimeSpan::from_s(5.0);
 
 /// What a person should check on a kind of link.
 #[derive(Debug, Clone, Copy)]
@@ -33,12 +35,14 @@ pub(crate) struct Silence {
     unread_in_all: usize,
     is_silent: bool,
     is_noise_known: bool,
+    /// When bytes last came that could not be read.
+    noise: Option<Timestamp>,
 }
 
 impl Silence {
     pub(crate) const fn new(checks: Checks) -> Self {
         let (since, unread, unread_in_all, is_silent, is_noise_known) = (None, 0, 0, false, false);
-        Self { checks, since, unread, unread_in_all, is_silent, is_noise_known }
+        Self { checks, since, unread, unread_in_all, is_silent, is_noise_known, noise: None }
     }
 
     /// Notes a request that expects an answer.
@@ -53,7 +57,8 @@ impl Silence {
     }
 
     /// Counts bytes that form no message; reports them once.
-    pub(crate) fn heard_noise(&mut self, bytes: usize) -> Option<LinkNotice> {
+    pub(crate) fn heard_noise(&mut self, now: Timestamp, bytes: usize) -> Option<LinkNotice> {
+        self.noise = Some(now);
         self.unread = self.unread.saturating_add(bytes);
         self.unread_in_all = self.unread_in_all.saturating_add(bytes);
         if self.unread_in_all < NOISE || self.is_noise_known {
@@ -61,6 +66,11 @@ impl Silence {
         }
         self.is_noise_known = true;
         Some(LinkNotice::Unreadable { bytes: self.unread_in_all, check: self.checks.noise })
+    }
+
+    /// Whether the line may garble what is sent now.
+    pub(crate) fn is_noisy(&self, now: Timestamp) -> bool {
+        self.noise.is_some_and(|noise| now - noise < NOISY_FOR)
     }
 
     /// Reports once that the station has become silent.

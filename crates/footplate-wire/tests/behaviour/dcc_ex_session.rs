@@ -90,7 +90,7 @@ fn nothing_is_written_before_the_banner_of_a_board_that_is_reset() {
     assert_eq!(desk.texts(), [""; 0]);
     desk.hear("boot\r\n<* License GPLv3 *>\n<iDCC-EX V-5.6.0 / MEGA / X G-x>\n");
     desk.run_for(300);
-    assert_eq!(desk.texts(), ["<Q>", "<1 MAIN>", "<#>", "<t 24>", "<t 24 72 0>"]);
+    assert_eq!(desk.texts(), ["<Q>", "<1 MAIN>", "<#>", "<t 24>", "<t 24>", "<t 24 72 0>"]);
     // A board that does not reset is asked after 6 s.
     let mut desk = Desk::new(Settings { resets_on_open: true, ..Settings::default() });
     desk.run_until(ms(7_000));
@@ -104,7 +104,7 @@ fn the_direction_is_read_back_and_then_absolute() {
         desk.command(command);
     }
     desk.run_for(300);
-    assert_eq!(desk.texts(), ["<t 24>", "<t 58>", "<t 24 72 0>", "<t 58 81 1>"]);
+    assert_eq!(desk.texts(), ["<t 24>", "<t 58>", "<t 24>", "<t 58>", "<t 24 72 0>", "<t 58 81 1>"]);
     desk.written.clear();
     for command in [speed(T24, 0), Command::Reverse { train: T24 }, speed(T24, 8)] {
         desk.command(command);
@@ -114,6 +114,38 @@ fn the_direction_is_read_back_and_then_absolute() {
     let kinds: Vec<EventKind> = desk.events.iter().skip(2).map(|event| event.kind).collect();
     let step = |step| EventKind::Speed { train: T24, step: SpeedStep::new(step).unwrap() };
     assert_eq!(kinds, [step(0), EventKind::Reverse { train: T24 }, step(8)]);
+}
+
+#[test]
+fn a_direction_counts_once_two_reports_agree() {
+    let mut desk = Desk::opened();
+    desk.station.answers.retain(|(request, _)| *request != "<t 24>");
+    desk.command(speed(T24, 8));
+    // `128`, forward at rest, without its first digit; then twice whole.
+    for (answer, drives) in [("<l 24 0 28 0>\n", false), ("<l 24 0 128 0>\n", false), ("<l 24 0 128 0>\n", true)] {
+        desk.run_for(100);
+        desk.hear(answer);
+        desk.run_for(100);
+        assert_eq!(desk.texts().contains(&"<t 24 72 1>"), drives, "{:?}", desk.texts());
+    }
+    assert!(!desk.texts().contains(&"<t 24 72 0>"));
+}
+
+#[test]
+fn a_turnout_is_commanded_three_times_at_once_while_the_line_is_noisy() {
+    let mut desk = Desk::opened();
+    let curve = Command::Turnout { turnout: TurnoutId(9), curved: true };
+    desk.command(curve);
+    desk.run_for(100);
+    desk.hear("<l 24 x 0>\n");
+    desk.command(curve);
+    desk.run_for(6_000);
+    desk.command(curve);
+    desk.run_for(100);
+    let thrown: Vec<&str> = desk.texts().into_iter().filter(|text| text.starts_with("<a")).collect();
+    assert_eq!(thrown, ["<a 9 1>", "<a 9 1><a 9 1><a 9 1>", "<a 9 1>"]);
+    let entries = desk.events.iter().filter(|event| matches!(event.kind, EventKind::Turnout { .. }));
+    assert_eq!(entries.count(), 3);
 }
 
 #[test]
@@ -315,7 +347,7 @@ fn a_train_that_was_never_driven_here_is_stopped_at_the_end_if_that_was_commande
     desk.run_for(500);
     let texts = desk.texts();
     let end = texts.iter().position(|text| *text == "<!>").expect("all locomotives are stopped");
-    assert_eq!(texts[end..], ["<!>", "<t 24>", "<t 24 0 0>", "<0>"]);
+    assert_eq!(texts[end..], ["<!>", "<t 24>", "<t 24>", "<t 24 0 0>", "<0>"]);
     let closing = desk.client.closing();
     assert_eq!((closing.is_complete(), closing.commanded_to_stop), (true, vec![T24]));
 }
@@ -378,8 +410,8 @@ fn a_decoder_of_126_steps_and_a_long_address_is_commanded_in_its_own_steps() {
     desk.command(speed(long, 63));
     desk.command(speed(T58, 9));
     desk.run_for(1_000);
-    let expected = ["<t 3850>", "<t 58>", "<t 3850 63 1>", "<t 58 81 1>"];
-    assert_eq!(desk.texts()[..4], expected);
+    let expected = ["<t 3850>", "<t 58>", "<t 3850>", "<t 58>", "<t 3850 63 1>", "<t 58 81 1>"];
+    assert_eq!(desk.texts()[..6], expected);
     assert_eq!(desk.notices, [], "the board confirms its own speed");
     desk.client.set_decoder(T58, DecoderSteps::TwentyEight).unwrap();
     let refused = desk.client.handle_command(desk.now, speed(T58, 29)).unwrap_err();
@@ -395,12 +427,12 @@ fn a_function_is_switched_and_confirmed_and_is_no_event() {
     desk.station.answers.push(("<F 24 0 1>", "<l 24 0 0 1>\n"));
     desk.command(function(T24, 0, true));
     desk.run_for(400);
-    assert_eq!(desk.texts(), ["<t 24>", "<F 24 0 1>"], "confirmed at once");
+    assert_eq!(desk.texts(), ["<t 24>", "<t 24>", "<F 24 0 1>"], "confirmed at once");
     // The board does not answer a request that changes nothing: none is awaited.
     desk.station.answers.pop();
     desk.command(function(T24, 0, true));
     desk.run_for(400);
-    assert_eq!(desk.texts()[2..].iter().filter(|text| **text != "<#>").count(), 1, "{:?}", desk.texts());
+    assert_eq!(desk.texts()[3..].iter().filter(|text| **text != "<#>").count(), 1, "{:?}", desk.texts());
     assert_eq!((&desk.events[..], &desk.notices[..]), (&[][..], &[][..]));
     assert_eq!(desk.functions[&T24], ReportedFunctions::all(1));
     // Another throttle switches F0 off and F3 on: the board tells everybody.

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
-use footplate_core::control::{Dispatcher, Journey, LinkNews, Notice};
+use footplate_core::control::{Dispatcher, Journey, LinkNews, Notice, Reservation};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Command, Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_eval::seeds::Choice;
@@ -128,7 +128,14 @@ impl<'p, 'l> People<'p, 'l> {
             let is_inside = is_on_reserved_track(self.layout, world, dispatcher, *train);
             if self.is_inside.insert(*train, is_inside) == Some(true) && !is_inside {
                 self.seen.intrusions.push((now, *train));
-                self.tell(now, format!("train {train} is on track that is not reserved for it"));
+                let held = dispatcher.reservation(*train);
+                let turnouts = held.into_iter().flat_map(Reservation::turnouts);
+                let legs: Vec<_> = turnouts.map(|turnout| (turnout, world.lies(turnout))).collect();
+                let at = place_by_hand(self.layout, world, *train);
+                self.tell(
+                    now,
+                    format!("train {train} is on track that is not reserved for it: {at:?}; its turnouts lie {legs:?}"),
+                );
             }
             let moves = world.truth().train(*train).is_some_and(|truth| truth.at_rest_since.is_none());
             if moves {
@@ -137,7 +144,12 @@ impl<'p, 'l> People<'p, 'l> {
             if self.moves.insert(*train, moves) != Some(moves) {
                 self.tell(
                     now,
-                    format!("really: train {train} {}", if moves { "moves" } else { "is at rest" }),
+                    format!(
+                        "really: train {train} {} at {:?}; believed at {:?}",
+                        if moves { "moves" } else { "is at rest" },
+                        place_by_hand(self.layout, world, *train),
+                        dispatcher.driver().locate(*train, now).map(|located| located.at),
+                    ),
                 );
             }
             // The operator enters the true position.

@@ -124,6 +124,20 @@ impl Recovery {
         !matches!(self.phase, Phase::Stopping | Phase::Waiting { .. } | Phase::GivenUp)
     }
 
+    /// Whether its position was about right when the alarm came: its speed was not.
+    const fn is_roughly_located(&self) -> bool {
+        matches!(self.why, Alarm::Drift(_) | Alarm::Misses | Alarm::Distrusted)
+    }
+
+    /// Whether it is searched, or will be once it is at rest.
+    const fn is_searched(&self) -> bool {
+        match self.phase {
+            Phase::Locating { .. } | Phase::Reversing { .. } => true,
+            Phase::Stopping | Phase::Waiting { .. } => !self.is_roughly_located(),
+            _ => false,
+        }
+    }
+
     /// When its phase has to be checked.
     pub(super) fn next_timeout(&self) -> Option<Timestamp> {
         match self.phase {
@@ -203,7 +217,7 @@ impl Watchdog {
         }
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         recovery.closed = closed;
-        let is_roughly_located = matches!(recovery.why, Alarm::Drift(_) | Alarm::Misses | Alarm::Distrusted);
+        let is_roughly_located = recovery.is_roughly_located();
         match self.driver.locate(train, now).filter(|_| is_roughly_located) {
             Some(located) => self.driver.place(now, train, located.at, ABOUT.max(located.uncertainty)),
             None => {
@@ -450,6 +464,18 @@ impl Watchdog {
             Some(order) => self.notify(Notice::Resumed { train, interrupted: Some(id), order }),
             None => self.notify(Notice::Cancelled { train, order }),
         }
+    }
+
+    /// An operator says where a train is: it is not searched any more, and trusted again if that was all that was wrong.
+    pub(super) fn end_search(&mut self, now: Timestamp, train: TrainId) {
+        if let Some(recovery) = self.dangers.get_mut(&train).filter(|recovery| recovery.is_searched()) {
+            recovery.phase = Phase::GivenUp;
+            if let Some((_, order)) = recovery.interrupted.take() {
+                self.notify(Notice::Cancelled { train, order });
+            }
+            self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
+        }
+        self.trust_again(train);
     }
 
     /// The recovery has failed: an operator is needed.

@@ -154,11 +154,11 @@ impl Watchdog {
         }
     }
 
-    /// Sets the position of a train, as an operator entered it. A train that could not be recovered is trusted again,
-    /// with its earlier model. If no train is in danger any more, held trains are released and their orders
+    /// Sets the position of a train, as an operator entered it. A train that creeps to be located is stopped, and like one that
+    /// could not be recovered it is trusted again, with its earlier model. If no train is in danger any more, held trains are released and their orders
     /// cancelled.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: PathPoint, uncertainty: Length) {
-        self.trust_again(train);
+        self.end_search(now, train);
         self.driver.place(now, train, at, uncertainty);
         self.monitors.entry(train).or_default().place();
         self.note_place(now, train);
@@ -273,7 +273,7 @@ impl Watchdog {
     }
 
     /// Restores the earlier model of a train that could not be recovered, after an operator has checked it.
-    fn trust_again(&mut self, train: TrainId) {
+    pub(super) fn trust_again(&mut self, train: TrainId) {
         let given_up = self.dangers.get(&train).filter(|danger| danger.phase == Phase::GivenUp);
         if let Some(base) = given_up.map(|danger| danger.base().clone()) {
             self.driver.set_model(base);

@@ -119,7 +119,9 @@ impl Client {
             return;
         }
         let Some(forward) = locomotive.forward else {
-            locomotive.forward = Some(driven.forward);
+            // Messages have no checksum, and `128`, forward, without its first digit is a speed backward: two have to agree.
+            let before = self.directions.insert(train, driven.forward);
+            locomotive.forward = before.filter(|forward| *forward == driven.forward);
             return;
         };
         let is_as_commanded = driven.throttle == wanted && driven.forward == forward;
@@ -127,7 +129,9 @@ impl Client {
             return;
         }
         if !locomotive.is_driven {
-            locomotive.forward = Some(driven.forward);
+            // It is asked for again before it is used.
+            locomotive.forward = None;
+            self.directions.insert(train, driven.forward);
             return;
         }
         if driven.register < 0 {
