@@ -10,7 +10,7 @@ use crate::event::Command;
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Landmark;
-use crate::tracking::{DueContact, PassedContact};
+use crate::tracking::{DueSensor, PassedSensor};
 use crate::units::{Length, Speed};
 
 /// What has happened, or will.
@@ -21,9 +21,9 @@ pub enum Notice {
         /// The train.
         train: TrainId,
         /// The detection, beside the one that was expected.
-        passed: PassedContact,
+        passed: PassedSensor,
         /// The detection that is due next.
-        next: Option<DueContact>,
+        next: Option<DueSensor>,
     },
     /// The driver planned a stop, or planned it again from a new detection.
     Planned(PlannedStop),

@@ -1,7 +1,8 @@
 //! Trains in danger come back into service, or wait where creeping is not permitted.
 
-use footplate_core::control::{Notice, Reservation};
-use footplate_core::{Command, SpeedStep};
+use footplate_core::control::{Alarm, Notice, Reservation};
+use footplate_core::tracking::PathPoint;
+use footplate_core::{Command, Length, SpeedStep, TimeSpan};
 
 use crate::watching::{FIRST, Watched};
 
@@ -43,4 +44,41 @@ fn a_train_lost_again_on_reserved_track_does_not_creep_on() {
     assert!(watched.run_until(10.0, |watched| {
         watched.commanded.iter().skip(from).any(|(_, command)| matches!(command, Command::Reverse { .. }))
     }));
+}
+
+#[test]
+fn a_train_that_sets_out_backward_is_stopped_by_the_sensor_behind_it() {
+    // Given a train whose decoder lost its direction, and another that runs,
+    let mut watched = Watched::two();
+    watched.world.turn_around(FIRST);
+    watched.go(FIRST, 8);
+    // when the sensor behind it reports it,
+    let passed = |watched: &Watched| !watched.world.passes.is_empty();
+    assert!(watched.run_until(20.0, passed));
+    let (at, sensor, _) = watched.world.passes[0];
+    // then the train is known to run there, and stops: no second report is needed, and no other train is suspected.
+    assert!(watched.run_until(2.0, |watched| watched.alarm().is_some()), "{:#?}", watched.notices);
+    assert_eq!(watched.alarm(), Some(Alarm::Elsewhere(sensor)));
+    assert!(watched.world.now - at < TimeSpan::from_ms(300));
+    watched.run(5.0);
+    assert!(watched.world.trains[0].speed_mm_per_s < 1.0);
+    assert!(watched.dog.is_in_danger(FIRST));
+}
+
+#[test]
+fn a_train_that_a_person_places_is_searched_no_more() {
+    // Given a train that creeps to be located,
+    let mut watched = Watched::asking();
+    watched.dog.lose(watched.world.now, FIRST);
+    watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
+    let creeps = |watched: &Watched| watched.world.trains[0].speed_mm_per_s > 20.0;
+    assert!(watched.run_until(60.0, creeps), "{:#?}", watched.notices);
+    // when a person says where it is,
+    let node = watched.world.layout.node_named("D1").expect("a node");
+    let at = PathPoint { node, distance: Length::from_mm(100.0) };
+    watched.dog.place(watched.world.now, FIRST, at, Length::from_mm(3.0));
+    // then it stops, and is at the operator's disposal.
+    watched.run(8.0);
+    assert!(watched.world.trains[0].speed_mm_per_s < 1.0, "{:#?}", watched.notices);
+    assert!(!watched.dog.is_held(FIRST));
 }

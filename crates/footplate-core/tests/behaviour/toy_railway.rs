@@ -234,12 +234,7 @@ impl ToyRailway {
                 EventKind::Speed { train, step }
             }
             Command::Reverse { train } => {
-                for toy in self.trains.iter_mut().filter(|toy| toy.id == train) {
-                    // A shoe of 30 mm: the other end leads.
-                    let back = self.layout.reversed(toy.at).expect("on the layout");
-                    let shoe = Length::from_mm(30.0);
-                    toy.at = self.layout.advance(back, shoe, &self.turnouts).unwrap_or(back);
-                }
+                self.turn_around(train);
                 EventKind::Reverse { train }
             }
             Command::Turnout { turnout, curved } => {
@@ -249,6 +244,16 @@ impl ToyRailway {
                 EventKind::Turnout { turnout, curved }
             }
             _ => EventKind::Reverse { train: TrainId(0) },
+        }
+    }
+
+    /// The other end of a train leads from now on.
+    pub(crate) fn turn_around(&mut self, train: TrainId) {
+        for toy in self.trains.iter_mut().filter(|toy| toy.id == train) {
+            let back = self.layout.reversed(toy.at).expect("on the layout");
+            // A shoe of 30 mm.
+            let shoe = Length::from_mm(30.0);
+            toy.at = self.layout.advance(back, shoe, &self.turnouts).unwrap_or(back);
         }
     }
 

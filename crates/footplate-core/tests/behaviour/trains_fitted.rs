@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use footplate_core::link::ContactWindow;
+use footplate_core::link::DetectionWindow;
 use footplate_core::model::MotionModel;
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::tracking::{Locator, PathPoint, TrackContext};
@@ -77,7 +77,7 @@ fn the_rest_predicted_at_the_command_contains_the_true_one() {
                 match event.kind {
                     EventKind::Sensor(report) => {
                         let after = event.time - report.poll_interval.unwrap();
-                        let window = ContactWindow { after, until: event.time };
+                        let window = DetectionWindow { after, until: event.time };
                         assert!(locator.likelihood(context, model(), report.sensor, window).is_some());
                         locator.pass(context, model(), report.sensor, window);
                     }
@@ -140,9 +140,9 @@ fn a_report_behind_a_lost_reply_counts_by_its_real_width() {
                 };
                 reports += 1;
                 let usual =
-                    ContactWindow { after: event.time - report.poll_interval.unwrap(), until: event.time };
+                    DetectionWindow { after: event.time - report.poll_interval.unwrap(), until: event.time };
                 // when the last report follows lost replies, late in its window, or with a usual window,
-                let wide = ContactWindow { after: event.time - TimeSpan::from_ms(730), until: event.time };
+                let wide = DetectionWindow { after: event.time - TimeSpan::from_ms(730), until: event.time };
                 let windows = if reports == last { [usual, wide] } else { [usual, usual] };
                 for (locator, window) in locators.iter_mut().zip(windows) {
                     locator.pass(context, model(), report.sensor, window);

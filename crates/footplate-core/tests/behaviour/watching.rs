@@ -105,7 +105,7 @@ impl Watched {
         self.dog.place(self.world.now, FIRST, at, Length::from_mm(3.0));
     }
 
-    fn alarm(&self) -> Option<Alarm> {
+    pub(crate) fn alarm(&self) -> Option<Alarm> {
         self.notices.iter().find_map(|notice| match notice {
             Notice::Danger { why, .. } => Some(*why),
             _ => None,

@@ -145,7 +145,7 @@ impl<'p, 'l> People<'p, 'l> {
                 self.tell(
                     now,
                     format!(
-                        "really: train {train} {} at {:?}; believed at {:?}",
+                        "really: train {train} {} at {:?}; estimated at {:?}",
                         if moves { "moves" } else { "is at rest" },
                         place_by_hand(self.layout, world, *train),
                         dispatcher.driver().locate(*train, now).map(|located| located.at),

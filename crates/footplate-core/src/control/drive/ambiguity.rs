@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use crate::ids::{SensorId, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Leg, TurnoutStates};
-use crate::tracking::{Locator, PassedContact, TrackContext};
+use crate::tracking::{Locator, PassedSensor, TrackContext};
 
 use super::driven_train::DrivenTrain;
 use super::hypotheses::{Detection, Explanation, Hypothesis, hypotheses};
@@ -22,7 +22,7 @@ pub(super) struct Pass {
     pub(super) detection: Detection,
     pub(super) explanation: Explanation,
     /// The detection beside its prediction.
-    pub(super) passed: PassedContact,
+    pub(super) passed: PassedSensor,
 }
 
 /// The state of one train if the assignment is wrong.

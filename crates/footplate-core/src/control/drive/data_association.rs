@@ -67,6 +67,11 @@ impl DataAssociation {
         self.faults.is_stuck(sensor)
     }
 
+    /// ln of the rate (1/s) of spurious reports of a sensor before its last one.
+    pub(super) fn log_rate_before(&self, sensor: SensorId, now: Timestamp) -> f64 {
+        self.faults.log_rate_before(sensor, now)
+    }
+
     /// A stuck sensor whose reports are used again; call until `None`.
     pub(super) fn next_restored(&mut self, now: Timestamp) -> Option<SensorId> {
         self.faults.next_restored(now)

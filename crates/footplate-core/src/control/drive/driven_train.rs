@@ -5,14 +5,14 @@ use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::link::TimeModel;
 use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::{Located, Locator, PassedContact, PathPoint, TrackContext, landmark_of};
+use crate::tracking::{Located, Locator, PassedSensor, PathPoint, TrackContext, landmark_of};
 use crate::units::{Length, Speed};
 
 use super::detections::Detections;
 use super::order::OrderId;
 use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
-use super::path::{reversed_location, sensors_within};
+use super::path::sensors_within;
 use super::refusal::Refusal;
 use super::task::{Destination, Expectation, Goal, SpeedSupervision, Task, TaskPhase};
 use crate::control::{Achieved, Finished, Notice, Promise};
@@ -40,6 +40,8 @@ pub(super) const TRAIN_REACH: Length = Length::from_mm(250.0);
 #[derive(Debug, Clone)]
 pub(super) struct DrivenTrain {
     pub(super) locator: Locator,
+    /// Where it is if it runs backward.
+    pub(super) backward: Option<Locator>,
     pub(super) model: MotionModel,
     /// One standard deviation of the least precise stop from a step that moves it.
     pub(super) widest_stop: Option<Length>,
@@ -74,6 +76,7 @@ impl DrivenTrain {
     pub(super) fn new(model: MotionModel, locator: Locator, link: TimeModel) -> Self {
         Self {
             locator,
+            backward: None,
             widest_stop: widest_stop(&model),
             model,
             task: None,
@@ -137,6 +140,7 @@ impl DrivenTrain {
         uncertainty: Length,
     ) {
         self.locator.place(now, at, uncertainty);
+        self.backward = None;
         self.passages.forget();
         self.clear_missed();
         self.end_authority_here(context, now);
@@ -236,6 +240,7 @@ impl DrivenTrain {
                 if before != step {
                     self.steady_at = event.time + self.model.settles_within(before, step);
                 }
+                self.command_backward(context, event, step);
                 self.locator.handle_command(context, &self.model, event);
                 let train = self.id();
                 let waits_for = self.unsent.map(|(command, _)| command);
@@ -250,12 +255,13 @@ impl DrivenTrain {
             }
             EventKind::Reverse { .. } => {
                 self.is_reversed = !self.is_reversed;
-                let rest = self.located_at_rest(context, event.time);
+                let rest = self.back_at_rest(context, event.time);
                 self.locator.handle_command(context, &self.model, event);
                 if matches!(self.unsent, Some((Command::Reverse { .. }, _))) {
                     self.unsent = None;
                 }
-                match rest.and_then(|located| reversed_location(context, &self.model, located)) {
+                self.backward = None;
+                match rest {
                     Some((at, uncertainty)) => self.locator.place(now, at, uncertainty),
                     None => self.locator.lose(),
                 }
@@ -279,10 +285,6 @@ impl DrivenTrain {
             }
             _ => {}
         }
-    }
-
-    fn located_at_rest(&self, context: TrackContext<'_>, time: Timestamp) -> Option<Located> {
-        self.located(context, time).filter(|located| located.at_rest)
     }
 
     fn step_sent(&mut self, context: TrackContext<'_>, now: Timestamp, step: SpeedStep, out: &mut Outputs) {
@@ -323,10 +325,11 @@ impl DrivenTrain {
         context: TrackContext<'_>,
         now: Timestamp,
         node: NodeId,
-        passed: PassedContact,
+        passed: PassedSensor,
         out: &mut Outputs,
     ) {
         self.clear_missed();
+        self.backward = None;
         let speed = self.speed(context, passed.at);
         self.detections.take(passed.missed, speed, passed.window.width());
         self.note_passage(context, node, passed.at);

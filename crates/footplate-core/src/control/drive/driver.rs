@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use crate::control::{Machine, Notice, Output};
 use crate::event::{Command, Event, EventKind, Report};
 use crate::ids::{SensorId, SpeedStep, TrainId, TurnoutId};
-use crate::link::{ContactWindow, TimeModel};
+use crate::link::{DetectionWindow, TimeModel};
 use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Layout, Leg, TurnoutStates};
@@ -47,6 +47,8 @@ pub struct Driver {
     pub(super) occupied: BTreeSet<SensorId>,
     /// Turnout commands that have not been sent yet, with their orders.
     pending_turnouts: Vec<(TurnoutId, OrderId)>,
+    /// When each turnout was last commanded to another leg than it had.
+    turnouts_changed: BTreeMap<TurnoutId, Timestamp>,
     pub(super) association: DataAssociation,
     pub(super) orders: u32,
     /// When the sensor to be polled more often changes.
@@ -65,6 +67,7 @@ impl Driver {
             last_detections: BTreeMap::new(),
             occupied: BTreeSet::new(),
             pending_turnouts: Vec::new(),
+            turnouts_changed: BTreeMap::new(),
             association: DataAssociation::default(),
             orders: 0,
             watch_changes: None,
@@ -278,7 +281,11 @@ impl Driver {
     }
 
     fn turnout_sent(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) {
-        self.track.turnouts.set(turnout, Leg::from_curved(curved));
+        let leg = Leg::from_curved(curved);
+        if self.track.turnouts.get(turnout) != Some(leg) {
+            self.turnouts_changed.insert(turnout, now);
+        }
+        self.track.turnouts.set(turnout, leg);
         self.association.turnout_thrown(turnout);
         let out = &mut self.outputs;
         let mut is_ordered = false;
@@ -296,6 +303,13 @@ impl Driver {
         self.all_turnouts_changed(now);
     }
 
+    /// The station may not have received commands since a time: turnouts that were to move lie one way or the other.
+    pub(in crate::control) fn forget_turnouts_changed(&mut self, now: Timestamp, since: Timestamp) {
+        let turnouts = &mut self.track.turnouts;
+        self.turnouts_changed.iter().filter(|(_, at)| **at >= since).for_each(|(id, _)| turnouts.forget(*id));
+        self.all_turnouts_changed(now);
+    }
+
     fn all_turnouts_changed(&mut self, now: Timestamp) {
         let context = self.track.context();
         for train in self.trains.values_mut() {
@@ -306,7 +320,7 @@ impl Driver {
     /// A report, and the window of its time.
     pub(super) fn detection(&self, time: Timestamp, report: Report) -> Detection {
         let interval = report.poll_interval.unwrap_or(self.link.report_window).abs();
-        Detection { sensor: report.sensor, window: ContactWindow { after: time - interval, until: time } }
+        Detection { sensor: report.sensor, window: DetectionWindow { after: time - interval, until: time } }
     }
 
     fn report(&mut self, now: Timestamp, time: Timestamp, report: Report) {

@@ -77,7 +77,7 @@ impl DrivenTrain {
 
     /// Predicts the next detection and the latest stops before the end of the track and the end of authority.
     pub(super) fn expect_next(&mut self, context: TrackContext<'_>, now: Timestamp) {
-        let due = self.locator.next_contact(context, &self.model, now);
+        let due = self.locator.next_sensor(context, &self.model, now);
         let track_end_stop = self.track_end_stop(context, now);
         let authority_stop = self.end_of_authority.and_then(|end| self.last_stop_before(context, now, end));
         self.schedule_zone_check(context, now);
@@ -157,7 +157,7 @@ impl DrivenTrain {
                 if self.expected.missed_in_a_row >= self.detections.lost_after(self.speed(context, now)) {
                     return self.lose(now, out);
                 }
-                let next = self.locator.next_contact(context, &self.model, now);
+                let next = self.locator.next_sensor(context, &self.model, now);
                 // From now on the sensor behind the missed one is due; if none is known, only the time limit applies.
                 let next = next.filter(|next| next.sensor != due.sensor);
                 self.expected.overdue_reported = next.is_none();
@@ -172,7 +172,7 @@ impl DrivenTrain {
     /// it. The one behind it is due.
     pub(super) fn expect_beyond(&mut self, context: TrackContext<'_>, now: Timestamp) {
         let Some(due) = self.expected.due else { return };
-        let next = self.locator.next_contact(context, &self.model, now);
+        let next = self.locator.next_sensor(context, &self.model, now);
         let next = next.filter(|next| next.sensor != due.sensor);
         self.expected.since = now;
         self.expected.overdue_reported = next.is_none();

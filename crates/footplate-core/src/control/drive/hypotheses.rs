@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 
 use crate::event::Approach;
 use crate::ids::{SensorId, TrainId, TurnoutId};
-use crate::link::ContactWindow;
+use crate::link::DetectionWindow;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Leg, TurnoutStates};
 use crate::tracking::TrackContext;
@@ -36,7 +36,7 @@ const UNKNOWN_TRACK_M: f64 = 20.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Detection {
     pub(super) sensor: SensorId,
-    pub(super) window: ContactWindow,
+    pub(super) window: DetectionWindow,
 }
 
 /// What explains a detection.
@@ -120,7 +120,7 @@ fn may_have_moved(
     train: &DrivenTrain,
     context: TrackContext<'_>,
     now: Timestamp,
-    window: ContactWindow,
+    window: DetectionWindow,
 ) -> bool {
     if train.may_move(context, now) {
         return true;

@@ -6,6 +6,7 @@
 
 mod ambiguity;
 mod approach;
+mod backward;
 mod blocks;
 mod command_time;
 mod data_association;

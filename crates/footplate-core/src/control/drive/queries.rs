@@ -6,7 +6,7 @@ use crate::ids::{NodeId, SensorId, TrainId, TurnoutId};
 use crate::model::MotionFit;
 use crate::time::Timestamp;
 use crate::track::Position;
-use crate::tracking::{PassedContact, PathPoint, Rest, TrackContext, distance_to, place_of};
+use crate::tracking::{PassedSensor, PathPoint, Rest, TrackContext, distance_to, place_of};
 use crate::units::Length;
 
 use super::driven_train::DrivenTrain;
@@ -191,7 +191,7 @@ impl Driver {
 
     /// The node of the sensor that a train passed.
     #[must_use]
-    pub fn node_passed(&self, passed: &PassedContact) -> Option<NodeId> {
+    pub fn node_passed(&self, passed: &PassedSensor) -> Option<NodeId> {
         self.track.layout.sensor_node(passed.sensor)
     }
 

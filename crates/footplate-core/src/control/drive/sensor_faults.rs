@@ -47,6 +47,12 @@ impl SensorFaults {
         libm::log(SPURIOUS_RATE + strange / FORGETTING_TIME.as_s())
     }
 
+    /// The same without the last one.
+    pub(super) fn log_rate_before(&self, sensor: SensorId, now: Timestamp) -> f64 {
+        let strange = self.records.get(&sensor).map_or(0.0, |record| record.unexplained_at(now) - 1.0);
+        libm::log(SPURIOUS_RATE + strange.max(0.0) / FORGETTING_TIME.as_s())
+    }
+
     /// Whether its reports are ignored.
     pub(super) fn is_stuck(&self, sensor: SensorId) -> bool {
         self.records.get(&sensor).is_some_and(|record| record.is_stuck)

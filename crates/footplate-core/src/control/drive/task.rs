@@ -5,7 +5,7 @@ use alloc::string::String;
 use crate::ids::{NodeId, SensorId, SpeedStep};
 use crate::time::Timestamp;
 use crate::track::Landmark;
-use crate::tracking::{DueContact, PathPoint};
+use crate::tracking::{DueSensor, PathPoint};
 
 use super::order::{Aim, OrderId};
 use crate::control::Promise;
@@ -80,7 +80,7 @@ pub(super) struct StopPlan {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Expectation {
     /// The next detection.
-    pub(super) due: Option<DueContact>,
+    pub(super) due: Option<DueSensor>,
     pub(super) since: Timestamp,
     pub(super) overdue_reported: bool,
     /// How many sensors in a row should have reported the train and did not.

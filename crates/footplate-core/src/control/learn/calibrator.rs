@@ -13,7 +13,7 @@ use super::tracker::{ReportClass, Tracker};
 use crate::control::{Machine, Output};
 use crate::event::{Approach, Command, Event, EventKind, Report};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId, TurnoutId};
-use crate::link::{ContactWindow, PollTiming};
+use crate::link::{DetectionWindow, PollTiming};
 use crate::model::MotionFit;
 use crate::model::survey::{SectionIndex, SurveyTest};
 use crate::model::{MotionModel, StepUse};
@@ -254,7 +254,7 @@ impl<'l> Calibrator<'l> {
 
     fn handle_report(&mut self, now: Timestamp, event: &Event, report: Report) {
         let interval = report.poll_interval.unwrap_or(PollTiming::ASSUMED.period).abs();
-        let window = ContactWindow { after: event.time - interval, until: event.time };
+        let window = DetectionWindow { after: event.time - interval, until: event.time };
         let context =
             TrackContext { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts };
         let model = self.fit.model();
@@ -295,7 +295,7 @@ impl<'l> Calibrator<'l> {
     /// A block is free that the train has left: its length shows if its speed was steady since.
     fn handle_release(&mut self, event: &Event, report: Report) {
         let interval = report.poll_interval.unwrap_or(PollTiming::ASSUMED.period).abs();
-        let window = ContactWindow { after: event.time - interval, until: event.time };
+        let window = DetectionWindow { after: event.time - interval, until: event.time };
         let release = self.locator.release_of(self.context(), self.model(), report.sensor, window);
         let left = window.after - self.model().train_length().longest_delay();
         if let Some(release) = release.filter(|_| left >= self.steady_at) {
@@ -312,7 +312,7 @@ impl<'l> Calibrator<'l> {
     }
 
     /// The train passed a sensor.
-    fn accept(&mut self, now: Timestamp, event: &Event, sensor: SensorId, window: ContactWindow) {
+    fn accept(&mut self, now: Timestamp, event: &Event, sensor: SensorId, window: DetectionWindow) {
         let context =
             TrackContext { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts };
         let passed = self.locator.pass(context, self.fit.model(), sensor, window);

@@ -11,7 +11,7 @@ use crate::model::StepUse;
 use crate::model::survey::{OddSection, SurveyTest};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Hop, HopId, Leg};
-use crate::tracking::PassedContact;
+use crate::tracking::PassedSensor;
 use crate::units::{Length, Speed};
 
 /// A detection is overdue this long after its predicted time ...
@@ -55,7 +55,7 @@ impl Calibrator<'_> {
             return;
         }
         let since = self.tracker.last_time().map_or(self.commanded_at, |last| last.max(self.commanded_at));
-        let due = self.locator.next_contact(self.context(), self.model(), now);
+        let due = self.locator.next_sensor(self.context(), self.model(), now);
         let due_by = match due {
             Some(due) => {
                 let margin = TimeSpan::from_s(2.0 * due.uncertainty.as_s()).min(MAX_UNCERTAINTY);
@@ -117,7 +117,7 @@ impl Calibrator<'_> {
 
     /// A detection after the train was pushed up: of the sensor that was due, it shows that the train had stalled; of
     /// a later one, that the detection was missed.
-    pub(super) fn note_pushes(&mut self, passed: &PassedContact) {
+    pub(super) fn note_pushes(&mut self, passed: &PassedSensor) {
         let Some(step) = self.pushed_from.take() else { return };
         self.pushes = 0;
         if passed.missed == 0 {
@@ -174,7 +174,7 @@ impl Calibrator<'_> {
     /// A hop over a section whose length contradicts the layout, the layout's length, and the path length.
     fn odd_hop(&self, odd: &OddSection) -> Option<(HopId, Length, Length)> {
         let mut hops = self.layout.hops().filter(|hop| self.sections.section(hop.id) == Some(odd.section));
-        Some((hops.next()?.id, Length::from_m(odd.surveyed), Length::from_m(odd.felt)))
+        Some((hops.next()?.id, Length::from_m(odd.surveyed), Length::from_m(odd.path_length)))
     }
 
     /// Ends the calibration: the train stops.

@@ -5,7 +5,7 @@ use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
 use crate::ids::{NodeId, SensorId, TurnoutId};
-use crate::link::ContactWindow;
+use crate::link::DetectionWindow;
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Layout, Leg, Reach, TurnoutStates};
@@ -86,7 +86,7 @@ impl Tracker {
         locator: &Locator,
         model: &MotionModel,
         sensor: SensorId,
-        window: ContactWindow,
+        window: DetectionWindow,
     ) -> ReportClass {
         let time = window.until;
         let before = self.reported.insert(sensor, time);
@@ -217,7 +217,7 @@ mod tests {
                 TrackContext { layout: &self.layout, sections: &self.sections, turnouts: &self.turnouts };
             let train = TrainId(24);
             let until = Timestamp::from_s(seconds);
-            let window = ContactWindow { after: until - TimeSpan::from_ms(70), until };
+            let window = DetectionWindow { after: until - TimeSpan::from_ms(70), until };
             let sensor = self.layout.sensor_named(name).unwrap();
             let model = MotionModel::unknown(train, SpeedStep::new(14).unwrap());
             self.tracker.classify(context, &Locator::new(train), &model, sensor, window)

@@ -4,7 +4,7 @@ use core::fmt;
 
 use crate::ids::SensorId;
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::{Drift, DriftTest, PassedContact};
+use crate::tracking::{Drift, DriftTest, PassedSensor};
 
 /// The innovation is normalised by its predicted standard deviation and by this fraction of the time since the last
 /// sensor: trains warm up, and runs differ.
@@ -97,7 +97,7 @@ impl ConsistencyMonitor {
     }
 
     /// Tests a passage at a speed at which sensors miss a share of detections. Returns the alarm that it raises, if any.
-    pub(super) fn pass(&mut self, passed: &PassedContact, missed_share: f64) -> Option<Alarm> {
+    pub(super) fn pass(&mut self, passed: &PassedSensor, missed_share: f64) -> Option<Alarm> {
         let before = self.last.replace(passed.window.until);
         let started = core::mem::take(&mut self.starts);
         let was_located = core::mem::replace(&mut self.is_located, true);

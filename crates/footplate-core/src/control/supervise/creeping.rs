@@ -22,6 +22,12 @@ const SENSORS_AHEAD: usize = 2;
 const FASTER: f64 = 1.2;
 /// Commands that were sent this long before the station was found silent may be lost: it is silent for 1.5 s by then.
 const SILENT_FOR: TimeSpan = TimeSpan::from_ms(2_000);
+/// A train should be at rest after its predicted time multiplied by this, ...
+const REST_PART: f64 = 1.3;
+/// ... plus this.
+const REST_MORE: TimeSpan = TimeSpan::from_ms(700);
+/// The time to rest of a train without a valid model (the longest published stop).
+const REST_UNKNOWN: TimeSpan = TimeSpan::from_s(5.0);
 
 impl Watchdog {
     /// The track that a train in recovery must not enter. Without a dispatcher, the track under the other trains.
@@ -119,11 +125,23 @@ impl Watchdog {
         self.unheard.insert(train, Unheard { run, step, since: sent, before: known.step });
     }
 
-    /// The station has been silent for a while: it may not have received the last command of any train.
+    /// The station has been silent for a while: it may not have received the last command of any train or turnout.
     pub(super) fn distrust_last_commands(&mut self, now: Timestamp) {
+        self.driver.forget_turnouts_changed(now, now - SILENT_FOR);
         for known in self.unheard.values_mut().filter(|known| now - known.since <= SILENT_FOR) {
             known.step = known.step.max(known.before);
         }
+    }
+
+    /// When a train should be at rest whose stop command left the line at a time.
+    pub(super) fn at_rest_by(&self, train: TrainId, left: Timestamp) -> Timestamp {
+        let located = self.driver.locate(train, left);
+        let model = self.driver.model(train);
+        let (Some(located), Some(model), false) = (located, model, self.is_in_danger(train)) else {
+            return left + REST_UNKNOWN;
+        };
+        let stop = model.stop(located.step, Approach::Above);
+        left + TimeSpan::from_s(stop.time.as_s() * REST_PART) + REST_MORE
     }
 
     /// A train was detected or placed.

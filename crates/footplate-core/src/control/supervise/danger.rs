@@ -185,8 +185,19 @@ impl Watchdog {
 }
 
 impl Watchdog {
+    /// Raises the alarm if a report that is not explained shows that a train runs backward.
+    pub(super) fn note_backward(&mut self, now: Timestamp, sensor: SensorId, time: Timestamp) -> bool {
+        let Some(train) = self.driver.runs_backward(now, sensor, time) else { return false };
+        self.undirected.insert(train);
+        self.raise(now, train, Alarm::Elsewhere(sensor));
+        true
+    }
+
     /// A detection that no train explains: the second one at adjacent sensors raises the alarm.
     pub(super) fn note_unexplained(&mut self, now: Timestamp, sensor: SensorId, time: Timestamp) {
+        if self.note_backward(now, sensor, time) {
+            return;
+        }
         let before = self.intruder.take(self.driver.layout(), sensor, time);
         if self.intruder.near.is_some() {
             self.intruder.near = Some(sensor);

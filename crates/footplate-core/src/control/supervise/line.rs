@@ -46,7 +46,8 @@ impl Watchdog {
             }
             LinkNews::Silent => {}
             LinkNews::Answers => {
-                if self.silent.take().is_some() {
+                if let Some(since) = self.silent.take() {
+                    self.driver.forget_turnouts_changed(now, since);
                     // Stop commands may have been lost: stop each train again.
                     let trains: Vec<TrainId> = self.driver.trains().collect();
                     for train in trains {

@@ -9,7 +9,7 @@ use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::model::MotionFit;
 use crate::model::{MeasuredRatio, MotionModel, Rescaling, StepUse};
 use crate::time::{TimeSpan, Timestamp};
-use crate::tracking::PassedContact;
+use crate::tracking::PassedSensor;
 use crate::units::Length;
 
 use super::alarm::Alarm;
@@ -284,7 +284,7 @@ impl Watchdog {
     }
 
     /// A train in recovery has passed a sensor.
-    pub(super) fn recovery_passed(&mut self, now: Timestamp, train: TrainId, passed: &PassedContact) {
+    pub(super) fn recovery_passed(&mut self, now: Timestamp, train: TrainId, passed: &PassedSensor) {
         let Some(node) = self.driver.node_passed(passed) else { return };
         if !self.dangers.get(&train).is_some_and(|danger| matches!(danger.phase, Phase::Reversing { .. })) {
             self.keep_clear(now, train);

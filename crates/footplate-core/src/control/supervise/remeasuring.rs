@@ -8,7 +8,7 @@ use crate::ids::{SpeedStep, TrainId};
 use crate::model::{MeasuredRatio, Rescaling};
 use crate::time::Timestamp;
 use crate::track::Landmark;
-use crate::tracking::PassedContact;
+use crate::tracking::PassedSensor;
 use crate::units::Length;
 
 use super::alarm::Alarm;
@@ -118,7 +118,7 @@ impl Watchdog {
         now: Timestamp,
         train: TrainId,
         distance: Length,
-        passed: &PassedContact,
+        passed: &PassedSensor,
     ) {
         let speed = self.driver.locate(train, now).map(|located| located.speed);
         let seen = passed.short.zip(passed.late).zip(speed).filter(|_| passed.missed == 0);

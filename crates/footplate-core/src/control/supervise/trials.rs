@@ -4,7 +4,7 @@ use alloc::vec::Vec;
 
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep};
-use crate::link::ContactWindow;
+use crate::link::DetectionWindow;
 use crate::model::{MeasuredRatio, MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Length, Speed};
@@ -70,8 +70,8 @@ pub(super) struct SpeedTrial {
     pub(super) step: SpeedStep,
     approach: Approach,
     settled: Option<Timestamp>,
-    first: Option<ContactWindow>,
-    last: Option<(NodeId, ContactWindow)>,
+    first: Option<DetectionWindow>,
+    last: Option<(NodeId, DetectionWindow)>,
     distance: Length,
     hops: u8,
 }
@@ -89,7 +89,7 @@ impl SpeedTrial {
     }
 
     /// A passage of a sensor, with the distance from the one before.
-    pub(super) fn pass(&mut self, node: NodeId, window: ContactWindow, hop: Option<Length>) {
+    pub(super) fn pass(&mut self, node: NodeId, window: DetectionWindow, hop: Option<Length>) {
         if self.settled.is_none_or(|settled| window.after < settled) {
             return;
         }

@@ -9,7 +9,7 @@ use crate::control::{Machine, Output};
 use crate::event::{Command, Event, EventKind};
 use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::model::MotionModel;
-use crate::time::{TimeSpan, Timestamp};
+use crate::time::Timestamp;
 use crate::track::Position;
 use crate::tracking::{Locator, PathPoint};
 use crate::units::Length;
@@ -20,13 +20,6 @@ use super::recovery::{Phase, Recovery};
 use super::stops::Stops;
 use super::unheard::Unheard;
 use crate::control::Notice;
-
-/// A train should be at rest after its predicted time multiplied by this, ...
-const REST_PART: f64 = 1.3;
-/// ... plus this.
-const REST_MORE: TimeSpan = TimeSpan::from_ms(700);
-/// The time to rest of a train without a valid model (the longest published stop).
-const REST_UNKNOWN: TimeSpan = TimeSpan::from_s(5.0);
 
 /// The track power, as commanded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -370,6 +363,9 @@ impl Watchdog {
                     return self.note_unexplained(now, sensor, time);
                 }
             }
+            Notice::Ambiguous { sensor, time, .. } => {
+                self.note_backward(now, *sensor, *time);
+            }
             Notice::Done(finished) => {
                 if self.own.remove(&finished.order).is_some() {
                     return self.recovery_order_ended(now, finished.train, finished.order, None);
@@ -411,7 +407,7 @@ impl Watchdog {
         self.notify(notice);
     }
 
-    fn passed(&mut self, now: Timestamp, train: TrainId, passed: &crate::tracking::PassedContact) {
+    fn passed(&mut self, now: Timestamp, train: TrainId, passed: &crate::tracking::PassedSensor) {
         let missed = self.driver.missed_share(train, passed.at);
         let alarm = self.monitors.entry(train).or_default().pass(passed, missed);
         self.note_place(now, train);
@@ -441,16 +437,6 @@ impl Watchdog {
     /// Whether it monitors and recovers trains.
     pub(in crate::control) const fn is_watching(&self) -> bool {
         self.is_watching
-    }
-
-    fn at_rest_by(&self, train: TrainId, left: Timestamp) -> Timestamp {
-        let located = self.driver.locate(train, left);
-        let model = self.driver.model(train);
-        let (Some(located), Some(model), false) = (located, model, self.is_in_danger(train)) else {
-            return left + REST_UNKNOWN;
-        };
-        let stop = model.stop(located.step, crate::event::Approach::Above);
-        left + TimeSpan::from_s(stop.time.as_s() * REST_PART) + REST_MORE
     }
 }
 

@@ -9,7 +9,7 @@ use crate::control::drive::order::Gap;
 use crate::control::drive::outputs::Outputs;
 use crate::control::drive::task::{Destination, Goal};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
-use crate::link::ContactWindow;
+use crate::link::DetectionWindow;
 use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{PathPoint, TrackContext};
 use crate::units::{Length, Speed};
@@ -159,7 +159,7 @@ impl DrivenTrain {
         &mut self,
         context: TrackContext<'_>,
         sensor: SensorId,
-        window: ContactWindow,
+        window: DetectionWindow,
     ) {
         let comes_in_time = matches!(self.goal(), Some(Goal::RestAt(Destination { in_time: Some(_), .. })));
         if self.paced().is_none() && !comes_in_time {
