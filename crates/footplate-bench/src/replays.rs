@@ -95,7 +95,7 @@ impl Score {
         for (count, stated) in self.inside.iter_mut().zip(LEVELS) {
             *count += u64::from(level <= stated);
         }
-        self.off_mm += forecast.way_error(reported).as_mm().abs();
+        self.off_mm += forecast.place_error(reported).as_mm().abs();
     }
 }
 

@@ -200,7 +200,7 @@ impl Batch {
                 rhythms.push(rhythm.clone());
             }
         }
-        if passages.iter().flat_map(|run| &run.passages).all(|passage| passage.way.is_none()) {
+        if passages.iter().flat_map(|run| &run.passages).all(|passage| passage.path.is_none()) {
             return Err(BatchError::NothingSettled {
                 runs: runs.len(),
                 passages: passages.iter().map(|run| run.passages.len()).sum(),

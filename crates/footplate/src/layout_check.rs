@@ -8,7 +8,7 @@ use footplate_store::{BUILT_IN, Run, built_in};
 
 use crate::runtime::Recorder;
 
-/// A length of another layout explains what is felt if it is so near: curves and surveys account for it.
+/// A length of another layout explains a path length if it is so near: curves and surveys account for it.
 const EXPLAINED: Length = Length::from_mm(40.0);
 
 /// Two lengths that are those of the other layout, and not of the one that was said, are no chance.
@@ -167,12 +167,12 @@ fn followers(layout: &Layout, sensor: SensorId) -> Vec<&str> {
     names
 }
 
-/// Hops that are not as long as the layout says: the length there, and the one that is felt.
+/// Hops that are not as long as the layout says: the length there, and the path length.
 fn odd_hops(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTest) -> Vec<(HopId, Length, Length)> {
     let hop_of = |section| layout.hops().find(|hop| sections.section(hop.id) == Some(section));
     let odd = lengths.odd.iter();
     odd.filter_map(|odd| {
-        Some((hop_of(odd.section)?.id, Length::from_m(odd.surveyed), Length::from_m(odd.felt)))
+        Some((hop_of(odd.section)?.id, Length::from_m(odd.surveyed), Length::from_m(odd.path_length)))
     })
     .collect()
 }
@@ -197,27 +197,30 @@ fn lengths_doubted(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTes
 }
 
 fn lengths_said(layout: &Layout, odd: &[(HopId, Length, Length)]) -> String {
-    let said = odd.iter().take(MOST_SAID).filter_map(|(hop, surveyed, felt)| {
+    let said = odd.iter().take(MOST_SAID).filter_map(|(hop, surveyed, path_length)| {
         let hop = layout.hop(*hop)?;
         let (from, to) = (layout.node_name(hop.from), layout.node_name(hop.to));
-        let (surveyed, felt) = (surveyed.as_mm(), felt.as_mm());
-        Some(format!("{from} to {to} takes as long as {felt:.0} mm, not {surveyed:.0}"))
+        let (surveyed, path_length) = (surveyed.as_mm(), path_length.as_mm());
+        Some(format!("{from} to {to} takes as long as {path_length:.0} mm, not {surveyed:.0}"))
     });
     said.collect::<Vec<_>>().join(", ")
 }
 
-/// Another built-in layout with the lengths that are felt.
+/// Another built-in layout with the path lengths.
 pub(crate) fn layout_with(layout: &Layout, hops: &[(HopId, Length, Length)]) -> Option<&'static str> {
     BUILT_IN.iter().copied().filter(|name| *name != layout.name()).find(|name| {
         let Ok(other) = built_in(name) else { return false };
         // Early in a session one or the other length is still wrong.
-        let explained = hops.iter().filter(|(hop, surveyed, felt)| {
+        let explained = hops.iter().filter(|(hop, surveyed, path_length)| {
             let Some(hop) = layout.hop(*hop) else { return false };
             let ends = [hop.from, hop.to].map(|node| other.layout.node_named(layout.node_name(node)));
             let [Some(from), Some(to)] = ends else { return false };
             let there = other.layout.hops_from(from).find(|other| other.to == to);
-            let is_nearer = |there: Length| (there - *felt).abs() < 0.5 * (*surveyed - *felt).abs();
-            there.is_some_and(|there| (there.length - *felt).abs() <= EXPLAINED && is_nearer(there.length))
+            let is_nearer =
+                |there: Length| (there - *path_length).abs() < 0.5 * (*surveyed - *path_length).abs();
+            there.is_some_and(|there| {
+                (there.length - *path_length).abs() <= EXPLAINED && is_nearer(there.length)
+            })
         });
         explained.count() >= FEWEST_EXPLAINED
     })

@@ -1,6 +1,6 @@
 //! What kind of decoder a train most likely has, by how its stops go.
 //!
-//! One set of numbers tells the ways of all decoders; each kind knows something beforehand that the [model](MotionModel) of
+//! One set of numbers describes the stopping distances of all decoders; each kind knows something beforehand that the [model](MotionModel) of
 //! all does not:
 //!
 //! | kind | its set speed | knows |
@@ -23,7 +23,7 @@ use super::motion_model::MotionModel;
 use super::parameters::{DOWN, PRIOR, SPEEDS, STOP_NODES};
 use super::priors::{SHAPE_ERROR, independent_nodes};
 
-/// Places of lag, `κ` and `ρ` on the way down.
+/// Places of lag, `κ` and `ρ` while the speed falls.
 const LAG: usize = DOWN + 1;
 const KAPPA: usize = DOWN + 2;
 const RHO: usize = DOWN + 3;

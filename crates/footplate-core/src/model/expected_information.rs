@@ -7,7 +7,7 @@ use super::motion_model::MotionModel;
 use super::parameters::Answers;
 use super::priors::{LATE_START, TRIP_DEVIATION};
 use super::segment::{Pace, Segment, SpeedCommand};
-use super::short_moves::move_way;
+use super::short_moves::move_distance;
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 use crate::time::TimeSpan;
@@ -107,15 +107,15 @@ impl MotionModel {
         let mut seen = Vec::new();
         if let Some(past) = past {
             let until = (whole - past.as_m()).max(0.0);
-            let way = |answers: &Answers<'_>, time: f64| {
+            let distance = |answers: &Answers<'_>, time: f64| {
                 let speed = answers.speed(usize::from(step), above);
                 let segment = stop_from(answers, step, speed);
                 speed * segment.begins + segment.distance(time)
             };
-            let time = time_of(until, |time| way(&answers, time));
+            let time = time_of(until, |time| distance(&answers, time));
             let slow = stop_from(&answers, step, speed).speed(time);
             let variance = begin + sum_of_squares(&[slow * TIMING, SHAPE * whole, scatter]);
-            seen.push(Seen { slopes: self.slopes(|answers| way(answers, time)), variance });
+            seen.push(Seen { slopes: self.slopes(|answers| distance(answers, time)), variance });
         }
         let rest = if past.is_some() { TO_NEXT } else { CREEP };
         let (time, creep_speed) = self.creep(creep, rest);
@@ -135,7 +135,7 @@ impl MotionModel {
         let (time, creep_speed) = self.creep(creep, CREEP);
         let slopes = self.slopes(|answers| {
             stop_distance(answers, creep.get(), false)
-                + move_way(answers, step.get(), run.as_s())
+                + move_distance(answers, step.get(), run.as_s())
                 + start_to(answers, creep.get()).distance(time)
         });
         let answers = self.answers();
@@ -147,10 +147,10 @@ impl MotionModel {
     }
 
     /// The time (s) of creeping over a distance (m) from rest, and the speed (m/s) then.
-    fn creep(&self, step: SpeedStep, way: f64) -> (f64, f64) {
+    fn creep(&self, step: SpeedStep, distance: f64) -> (f64, f64) {
         let answers = self.answers();
         let start = start_to(&answers, step.get());
-        let time = time_of(way, |time| if time <= start.begins { 0.0 } else { start.distance(time) });
+        let time = time_of(distance, |time| if time <= start.begins { 0.0 } else { start.distance(time) });
         (time, start.speed(time))
     }
 }

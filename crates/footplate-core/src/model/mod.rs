@@ -47,7 +47,9 @@ pub use motion_model::{MotionModel, StepUse, StopForecast};
 pub use numbers::{MotionNumbers, NumbersError};
 pub use objective::Objective;
 pub use passage::{Drive, Passage, PassageTracker, STALE_WITHIN, Sighting};
-pub(crate) use priors::{FELT, TRIP_DEVIATION, WANDER, change_error, run_variance, section_variance};
+pub(crate) use priors::{
+    PATH_LENGTH_SPREAD, TRIP_DEVIATION, WANDER, change_error, run_variance, section_variance,
+};
 pub use rescaled::{MeasuredRatio, Rescaling};
 pub(crate) use segment::{Pace, Segment, SpeedCommand};
 pub(crate) use sensor_scatter::SensorScatter;

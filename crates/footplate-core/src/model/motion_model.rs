@@ -266,7 +266,7 @@ impl MotionModel {
         Estimate {
             value: TimeSpan::from_s(late(&self.answers()).max(0.0)),
             uncertainty: TimeSpan::from_s(self.deviation_with_scale(late)),
-            count: self.contacts_passed(),
+            count: self.sensors_passed(),
             date: self.date,
         }
     }
@@ -289,7 +289,7 @@ impl MotionModel {
         is_a_ramp.then(|| Estimate {
             value: Acceleration::from_m_per_s2(1.0 / value),
             uncertainty: Acceleration::from_m_per_s2(deviation / (value * value)),
-            count: self.contacts_passed(),
+            count: self.sensors_passed(),
             date: self.date,
         })
     }

@@ -1,7 +1,7 @@
 //! What a calibration is to make small, as one number.
 //!
 //! The sum over steps and both approaches of `(u_stop² + u_run²) / s²`, with `u_stop` the doubt of a stop made there,
-//! `u_run` the doubt of the way in half a second of running (a stop is commanded about so long after the last contact),
+//! `u_run` the uncertainty of the distance in half a second of running (a stop is commanded about so long after the last contact),
 //! and `s` the scatter that no knowledge would narrow; and over some short moves the same with their own doubt.
 //!
 //! A measurement sees a sum `hᵀx + noise` of the model's numbers `x`, whose covariance is `P`. It takes
@@ -12,7 +12,7 @@ use alloc::vec::Vec;
 
 use super::expected_information::{ExpectedInformation, Seen, stop_distance};
 use super::motion_model::MotionModel;
-use super::short_moves::move_way;
+use super::short_moves::move_distance;
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 
@@ -27,7 +27,7 @@ const MOVES: [f64; 2] = [0.9, 1.6];
 const MOVES_EVERY: usize = 2;
 /// ... that is no faster than this (m/s): nobody makes short moves at full speed.
 const FASTEST_MOVE: f64 = 0.3;
-/// Part of its way by which a short move may be off.
+/// Part of its distance by which a short move may be off.
 const MOVE_PART: f64 = 0.02;
 
 /// What is wanted of a model, with its slopes and how much it counts.
@@ -56,9 +56,9 @@ impl Objective {
         let slow = |step: &u8| model.answers().speed(usize::from(*step), false) <= FASTEST_MOVE;
         for step in steps.iter().map(|step| step.get()).filter(slow).step_by(MOVES_EVERY) {
             for run in MOVES {
-                let may_be_off = (MOVE_PART * move_way(&model.answers(), step, run)).max(LEAST_SCATTER);
+                let may_be_off = (MOVE_PART * move_distance(&model.answers(), step, run)).max(LEAST_SCATTER);
                 let weight = 1.0 / (may_be_off * may_be_off);
-                targets.push((model.slopes(|answers| move_way(answers, step, run)), weight));
+                targets.push((model.slopes(|answers| move_distance(answers, step, run)), weight));
             }
         }
         Self { targets }

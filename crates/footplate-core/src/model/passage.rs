@@ -6,7 +6,7 @@
 
 use crate::event::{Approach, Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
-use crate::link::{ContactWindow, PollTimingEstimator};
+use crate::link::{DetectionWindow, PollTimingEstimator};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Layout, Leg, Reach, TurnoutStates};
 
@@ -14,7 +14,7 @@ use crate::track::{Layout, Leg, Reach, TurnoutStates};
 /// remembered: command delay (0.1 to 0.6 s measured) and the first 0.5 s of any start move a train by less
 /// than its shoe is long.
 pub const STALE_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
-/// Contacts that may stay silent in a row before the way is no longer believed.
+/// Contacts that may stay silent in a row before the path is no longer believed.
 const BELIEVED_MISSED: usize = 2;
 
 /// Commands that follow one another this fast keep the line busy: a solenoid is switched off 150 to 200 ms after it is switched
@@ -52,9 +52,9 @@ pub struct Passage {
     /// Its node, which tells the direction of travel.
     pub node: NodeId,
     /// When it closed.
-    pub window: ContactWindow,
-    /// The way from the passage before; `None` for the first of a run and where no way leads from there.
-    pub way: Option<Reach>,
+    pub window: DetectionWindow,
+    /// The path from the passage before; `None` for the first of a run and where no path leads from there.
+    pub path: Option<Reach>,
     /// What the train was told at the time.
     pub drive: Drive,
     /// The entry of the run that reported it, counted from 0.
@@ -125,7 +125,7 @@ impl PassageTracker {
         self.entries += 1;
         match event.kind {
             EventKind::Sensor(report) => {
-                let mut window = ContactWindow::of_report(
+                let mut window = DetectionWindow::of_report(
                     event.time,
                     report.poll_interval,
                     self.last_report,
@@ -192,16 +192,22 @@ impl PassageTracker {
         self.entries += 1;
     }
 
-    fn sight(&mut self, layout: &Layout, sensor: SensorId, window: ContactWindow, entry: usize) -> Sighting {
+    fn sight(
+        &mut self,
+        layout: &Layout,
+        sensor: SensorId,
+        window: DetectionWindow,
+        entry: usize,
+    ) -> Sighting {
         let Some(node) = layout.sensor_node(sensor) else { return Sighting::UnknownSensor };
         self.last_sensor = Some(sensor);
         if self.stands_until().is_some_and(|until| window.until < until) {
-            // It moves off from somewhere behind or on the contact: no way can be measured from here.
+            // It moves off from somewhere behind or on the contact: no path can be measured from here.
             self.at = None;
             return Sighting::Standing;
         }
-        let way = self.at.and_then(|from| {
-            // The way past the fewest silent contacts, and of these the shortest.
+        let path = self.at.and_then(|from| {
+            // The path past the fewest silent contacts, and of these the shortest.
             (0..=BELIEVED_MISSED).find_map(|missed| {
                 layout
                     .reaches(from, &self.turnouts, missed)
@@ -210,7 +216,7 @@ impl PassageTracker {
             })
         });
         self.at = Some(node);
-        Sighting::Passage(Passage { sensor, node, window, way, drive: self.drive, entry })
+        Sighting::Passage(Passage { sensor, node, window, path, drive: self.drive, entry })
     }
 
     /// Until when reports say nothing of the motion of a train that starts from rest.

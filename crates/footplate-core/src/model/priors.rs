@@ -20,7 +20,7 @@ const END_OF_STOP_SPEED: f64 = 0.1;
 pub(super) const SHAPE_ERROR: f64 = 0.04;
 /// Path lengths differ from surveyed lengths by some per cent because of curves and slopes (published section means: 1 to
 /// 3 %).
-pub(crate) const FELT: f64 = 0.02;
+pub(crate) const PATH_LENGTH_SPREAD: f64 = 0.02;
 /// Starts are late or early by a tenth of their delay (observed on trains that need 0.5 to 1 s to start), in s.
 pub(crate) const LATE_START: f64 = 0.06;
 /// Repeats of a run differ by 0.3 to 0.8 %, ...
@@ -37,8 +37,8 @@ const USUAL_DELAY: f64 = 0.8;
 
 /// Prior variance of a section's path length over its surveyed length (m²).
 pub(crate) fn section_variance(sections: &SectionIndex, section: usize) -> f64 {
-    let felt = FELT * sections.surveyed_length(section);
-    sections.survey_variance(section) + felt * felt
+    let spread = PATH_LENGTH_SPREAD * sections.surveyed_length(section);
+    sections.survey_variance(section) + spread * spread
 }
 
 /// Standard deviation of the distance that a change adds to its law (m), by its change of speed (m/s).

@@ -47,7 +47,7 @@ pub struct Rescaling {
     pub ratio: f64,
     /// One standard deviation of its logarithm: how far the measured ones are from each other.
     pub deviation: f64,
-    /// Ways to rest over what the ratio of speeds makes of them.
+    /// Stopping distances over what the ratio of speeds makes of them.
     pub stops: f64,
     /// One standard deviation of that.
     pub stops_deviation: f64,
@@ -92,7 +92,7 @@ impl Rescaling {
         if least > 0.0 && most > 0.0 { most / least } else { 1.0 }
     }
 
-    /// Takes in that a stop went on for so much longer than was forecast, as a part of its way, with one standard deviation
+    /// Takes in that a stop went on for so much longer than was forecast, as a part of its distance, with one standard deviation
     /// of what was measured.
     pub fn take_stop(&mut self, longer: f64, deviation: f64) {
         if !longer.is_finite() || !deviation.is_finite() {

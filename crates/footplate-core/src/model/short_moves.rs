@@ -35,7 +35,7 @@ impl ShortMoveForecast {
 }
 
 /// The distance of a short move (m): a start, and a stop commanded some seconds later.
-pub(super) fn move_way(answers: &Answers<'_>, step: u8, run: f64) -> f64 {
+pub(super) fn move_distance(answers: &Answers<'_>, step: u8, run: f64) -> f64 {
     let start = start_to(answers, step);
     let mut commanded = SpeedCommand { sent: run, from: step, to: 0, at_rest: false };
     let effect = commanded.effect(answers);
@@ -58,12 +58,12 @@ impl MotionModel {
         let answers = self.answers();
         let start = start_to(&answers, step.get());
         let reached = start.speed(run);
-        let unknown = self.deviation_with_scale(|answers| move_way(answers, step.get(), run));
-        let distance = move_way(&answers, step.get(), run).max(0.0);
+        let unknown = self.deviation_with_scale(|answers| move_distance(answers, step.get(), run));
+        let distance = move_distance(&answers, step.get(), run).max(0.0);
         let commanded = SpeedCommand { sent: run, from: step.get(), to: 0, at_rest: false };
         let effect = commanded.effect(&answers);
         // The stop begins in the middle of the start, where its law is least known; it goes on for as long as the speed there
-        // says, so that both errors go the same way.
+        // says, so that both errors have the same sign.
         let stop = Segment::of(&commanded, &answers, start.pace(effect));
         let stop_lasts = stop.distance_to_rest() / start.speed(effect).max(LEAST_SPEED);
         let shape = OTHER_SHAPES * (start.shape_error(effect) + stop_lasts * start.shape_speed_error(effect));
@@ -80,8 +80,8 @@ impl MotionModel {
     pub fn short_move_time(&self, step: SpeedStep, distance: Length) -> Option<TimeSpan> {
         let answers = self.answers();
         let wanted = distance.as_m();
-        let way = |run| move_way(&answers, step.get(), run);
-        let is_reached = wanted > 0.0 && wanted <= way(LONGEST_S);
-        is_reached.then(|| TimeSpan::from_s(time_of(wanted, way)))
+        let distance = |run| move_distance(&answers, step.get(), run);
+        let is_reached = wanted > 0.0 && wanted <= distance(LONGEST_S);
+        is_reached.then(|| TimeSpan::from_s(time_of(wanted, distance)))
     }
 }

@@ -53,7 +53,7 @@ impl Spread {
     /// each number is off by for one standard deviation of that total.
     ///
     /// Speeds and lengths could all be larger by the same part and no timing would tell. Where a train is and where it comes to
-    /// rest is the same either way, so the scale of the survey is kept apart from what is not known of the train.
+    /// rest is the same in both cases, so the scale of the survey is kept apart from what is not known of the train.
     pub(super) fn of(solution: &Solution, highest: usize, sections: &[usize]) -> (Self, Vec<f64>) {
         let side = count(highest);
         let with_total = |i: usize| solution.covariance_with_sum(i, sections);

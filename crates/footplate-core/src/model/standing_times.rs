@@ -1,6 +1,6 @@
 //! When a train that was commanded to stop stands, by the [kind of decoder](DecoderKind) that it most likely has.
 //!
-//! One set of numbers tells the ways of all decoders, and says little of their times: a stop that dies away and one that ends
+//! One set of numbers describes the stopping distances of all decoders, and says little of their times: a stop that dies away and one that ends
 //! may be as long and half a second, or two, apart. No sensor sees a train come to rest, so the kind shows in how distances
 //! grow with speed.
 //!
@@ -10,7 +10,7 @@
 //! | even | `q + 2D`: it is as late at the end as in the middle |
 //! | counted | `q + D/m`, `m` the mean of the speeds passed over the first |
 //!
-//! with `q` the delay until it takes effect and `D` the way from there over the speed `v`. The numbers are those that the kind
+//! with `q` the delay until it takes effect and `D` the distance from there over the speed `v`. The numbers are those that the kind
 //! makes of the model's.
 
 use alloc::vec::Vec;
@@ -63,7 +63,7 @@ impl StandingTimes<'_> {
         Segment::of(&commanded, answers, Pace::steady(speed))
     }
 
-    /// The mean of the speeds that a counter passes on its way down, as part of the first.
+    /// The mean of the speeds that a counter passes as it falls, as part of the first.
     fn mean_part(&self, answers: &Answers<'_>, speed: f64) -> f64 {
         let at = answers.step_at(usize::from(self.model.step_near(speed)), speed);
         let whole = at as usize;
@@ -84,9 +84,9 @@ mod tests {
     use crate::ids::{SpeedStep, TrainId};
     use crate::model::parameters::{FRICTION, SPEEDS, speed_at};
 
-    /// A train of which ways are known well that stop from 0.1 to 0.5 m/s, whatever the numbers are by which they are told:
-    /// each way is a measurement of a sum of numbers, give or take 1 mm.
-    fn known(way: impl Fn(f64) -> f64, table: impl Fn(f64) -> f64) -> MotionModel {
+    /// A train of which stopping distances are known well from 0.1 to 0.5 m/s, whatever the numbers are by which they are told:
+    /// each distance is a measurement of a sum of numbers, give or take 1 mm.
+    fn known(distance: impl Fn(f64) -> f64, table: impl Fn(f64) -> f64) -> MotionModel {
         let mut model = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));
         for step in 1..=14 {
             model.values[speed_at(step)] = libm::log(table(step as f64));
@@ -118,7 +118,7 @@ mod tests {
                     .collect();
                 let variance: f64 = (0..SPEEDS).map(|i| slopes[i] * with[i]).sum::<f64>() + 1e-6;
                 let linear: f64 = (0..SPEEDS).map(|i| slopes[i] * (at[i] - model.values[i])).sum();
-                let off = way(speed) - here - linear;
+                let off = distance(speed) - here - linear;
                 for i in 0..SPEEDS {
                     at[i] += with[i] * off / variance;
                     for j in 0..SPEEDS {
@@ -167,11 +167,11 @@ mod tests {
     #[test]
     fn a_train_whose_decoder_counts_down_stands_when_its_counter_does() {
         // 0.25 s a step, 0.2 s before, on a steep train: half of its speed is gone after three tenths of that.
-        let way = |speed: f64| {
+        let distance = |speed: f64| {
             let steps = libm::sqrt(speed / 0.0032);
             0.2 * speed + 0.25 * 0.0032 * steps * steps * steps / 3.0
         };
-        let model = known(way, steep);
+        let model = known(distance, steep);
         let times = model.standing_times();
         assert_eq!(times.kind, DecoderKind::Counted);
         for speed in [0.2, 0.3, 0.4] {

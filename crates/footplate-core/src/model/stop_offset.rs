@@ -125,13 +125,13 @@ mod tests {
         // Given a train of 1.5 s lag and 20 mm/s² of friction that runs the end of its stop over a gradient,
         let (lag, friction, step) = (1.5, 0.02, 1e-4);
         let stop = |gradient_from: f64| {
-            let (mut speed, mut way) = (0.3_f64, 0.0);
+            let (mut speed, mut distance) = (0.3_f64, 0.0);
             while speed > 0.0 {
-                let gradient = if way >= gradient_from { 1e-4 } else { 0.0 };
+                let gradient = if distance >= gradient_from { 1e-4 } else { 0.0 };
                 speed -= step * (speed / lag + friction + gradient);
-                way += step * speed.max(0.0);
+                distance += step * speed.max(0.0);
             }
-            way
+            distance
         };
         let level = stop(10.0);
         let whole = level - stop(0.0);

@@ -11,7 +11,7 @@
 //! measurement at a time. Letters as in the tracking filters: `p` covariance, `h` row, `r` variance, `s` innovation variance.
 
 use crate::estimate::Estimate;
-use crate::link::ContactWindow;
+use crate::link::DetectionWindow;
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Length, Speed};
 
@@ -38,7 +38,7 @@ pub struct BlockRelease {
     /// The speed of the train.
     pub speed: Speed,
     /// When the detector reported.
-    pub window: ContactWindow,
+    pub window: DetectionWindow,
 }
 
 /// The length of a train and the release delay of the detectors.
@@ -166,7 +166,7 @@ mod tests {
         BlockRelease {
             beyond: [mm, 3.0].map(Length::from_mm),
             speed: Speed::from_mm_per_s(mm_per_s),
-            window: ContactWindow { after: until - TimeSpan::from_ms(60), until },
+            window: DetectionWindow { after: until - TimeSpan::from_ms(60), until },
         }
     }
 

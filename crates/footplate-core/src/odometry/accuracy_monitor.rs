@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn a_third_of_the_way_is_a_failure_that_stays() {
+    fn a_third_of_the_distance_is_a_failure_that_stays() {
         let (mut monitor, mut sums) = fresh();
         run(&mut monitor, &mut sums, 4_990.0, 0.0, 0.301);
         assert_eq!(monitor.accuracy(), OdometerAccuracy::Failed);

@@ -140,9 +140,9 @@ impl BaliseLink {
 }
 
 /// Whether the train can have run the distance between two balises.
-fn agree(way: Length, bound: Length, then: &DistanceInterval, now: &DistanceInterval) -> bool {
+fn agree(distance: Length, bound: Length, then: &DistanceInterval, now: &DistanceInterval) -> bool {
     let [least, most] = [now.low - then.low, now.high - then.high];
-    way >= least - 2.0 * bound && way <= most + 2.0 * bound
+    distance >= least - 2.0 * bound && distance <= most + 2.0 * bound
 }
 
 #[cfg(test)]
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn two_impossible_balises_that_agree_are_believed() {
+    fn two_impossible_balises_that_agree_are_accepted() {
         let mut link = link();
         let then = interval(1500.0, 1485.0, 1515.0);
         let now = interval(2500.0, 2475.0, 2525.0);
@@ -240,11 +240,11 @@ mod tests {
             let mut link = link();
             let mut now = interval(0.0, 0.0, 0.0);
             let mut truth = 0.0;
-            for (way, below, above, place, error, ran, part) in passages {
-                now.low += Length::from_m(way * (1.0 - below));
-                now.high += Length::from_m(way * (1.0 + above));
-                now.estimate += Length::from_m(way);
-                truth += way * (1.0 - below + (below + above) * place);
+            for (distance, below, above, place, error, ran, part) in passages {
+                now.low += Length::from_m(distance * (1.0 - below));
+                now.high += Length::from_m(distance * (1.0 + above));
+                now.estimate += Length::from_m(distance);
+                truth += distance * (1.0 - below + (below + above) * place);
                 let said = Length::from_m(truth - ran * part + error);
                 let verdict = link.pass(said, Length::from_m(ran), &now);
                 let BaliseVerdict::Accepted(after) = verdict else {

@@ -55,7 +55,7 @@ pub(super) struct Counted {
     /// Signed pulses in the direction of travel.
     pub(super) pulses: f64,
     /// How many of them may be wrong.
-    pub(super) doubt: f64,
+    pub(super) uncertainty: f64,
     /// It may loosen the lower bound but not set it: traction may turn it faster.
     pub(super) loosens_low: bool,
     /// The same of the upper bound: the brake may turn it slower.
@@ -111,15 +111,15 @@ impl DistanceBounds {
                 (wheel.pitch.low, wheel.pitch.high)
             };
             let off = PULSES_OFF * wheel.pitch.high;
-            let doubt = wheel.doubt * wheel.pitch.high;
+            let uncertainty = wheel.uncertainty * wheel.pitch.high;
             if let Some(bound) =
-                low_anchor.bound(wheel.at_least, wheel.loosens_low, wheel.pulses * short - doubt, -off)
+                low_anchor.bound(wheel.at_least, wheel.loosens_low, wheel.pulses * short - uncertainty, -off)
             {
                 by_low = by_low.also(bound, low_anchor.only_loosens, smaller);
                 own[0] = Some(bound);
             }
             if let Some(bound) =
-                high_anchor.bound(wheel.at_most, wheel.loosens_high, wheel.pulses * long + doubt, off)
+                high_anchor.bound(wheel.at_most, wheel.loosens_high, wheel.pulses * long + uncertainty, off)
             {
                 by_high = by_high.also(bound, high_anchor.only_loosens, larger);
                 own[1] = Some(bound);
@@ -172,7 +172,7 @@ mod tests {
     fn counted(pulses: f64) -> Counted {
         Counted {
             pulses,
-            doubt: 0.0,
+            uncertainty: 0.0,
             loosens_low: false,
             loosens_high: false,
             pitch: Range::around(0.027, 0.001),
@@ -191,12 +191,12 @@ mod tests {
     }
 
     #[test]
-    fn counts_bound_a_long_way_by_their_pitch_and_a_pulse() {
+    fn counts_bound_a_long_distance_by_their_pitch_and_a_pulse() {
         // 37 pulses of 27 mm in 50 ms: 19.98 m/s.
         let distance = after([counted(37.0), counted(37.0)], 2000);
-        let way = 2000.0 * 37.0 * 0.027;
-        assert!(distance.low < way && way < distance.high);
-        assert!(distance.width() < way * 0.002 + 0.3, "{distance:?}: the speeds alone leave 200 m");
+        let truth = 2000.0 * 37.0 * 0.027;
+        assert!(distance.low < truth && truth < distance.high);
+        assert!(distance.width() < truth * 0.002 + 0.3, "{distance:?}: the speeds alone leave 200 m");
     }
 
     #[test]
@@ -206,14 +206,14 @@ mod tests {
     }
 
     #[test]
-    fn a_wheel_in_doubt_loosens_and_does_not_set() {
-        let doubted = Counted { loosens_low: true, loosens_high: true, ..counted(37.0) };
-        let alone = after([doubted, Counted { at_least: false, at_most: false, ..counted(0.0) }], 2000);
+    fn an_uncertain_wheel_loosens_and_does_not_set() {
+        let uncertain = Counted { loosens_low: true, loosens_high: true, ..counted(37.0) };
+        let alone = after([uncertain, Counted { at_least: false, at_most: false, ..counted(0.0) }], 2000);
         assert!(alone.width() > 190.0, "the speeds alone: {alone:?}");
     }
 
     #[test]
-    fn a_sensor_that_counts_at_rest_does_not_have_its_way_once_the_other_is_not_asked() {
+    fn a_sensor_that_counts_at_rest_does_not_decide_once_the_other_is_not_asked() {
         let mut bounds = DistanceBounds::new(Range::exactly(0.0));
         let (speed, limits) = (Range { low: -0.3, high: 30.0 }, Range { low: -1.0, high: 1.0 });
         let high = |pulses| Counted { at_most: false, ..counted(pulses) };

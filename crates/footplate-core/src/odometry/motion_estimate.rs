@@ -10,7 +10,7 @@ pub struct MotionEstimate {
     pub time: Timestamp,
     /// The best estimate of the speed, negative backwards.
     pub speed: Speed,
-    /// Its standard deviation as the filter believes it.
+    /// Its standard deviation as the filter states it.
     pub speed_deviation: Speed,
     /// The best estimate of the acceleration.
     pub acceleration: Acceleration,
@@ -78,7 +78,7 @@ pub enum Mode {
     OneSlip,
     /// Both slip or slide; the virtual sensor carries the estimate.
     Correction,
-    /// Nothing has carried it for too long: the bounds hold, the estimate is a guess.
+    /// Nothing has carried it for too long: the bounds hold, nothing supports the estimate.
     Ambiguous,
     /// A tachometer is missing or excluded.
     Degraded,

@@ -87,7 +87,7 @@ impl Odometer {
             traction: if allowed.slip { allowed.traction } else { 0.0 },
             slide: allowed.slide,
             slip: allowed.slip,
-            felt: self.inertia.as_ref().map(Inertia::acceleration),
+            inertial: self.inertia.as_ref().map(Inertia::acceleration),
             independent: self.vehicle.independent,
             top_speed: self.vehicle.max_speed.as_m_per_s(),
         }
@@ -118,11 +118,11 @@ impl Odometer {
         let [first, second] = &self.wheels;
         let [first_wrong, second_wrong] = self.bounds.wrong();
         let of = |wheel: &WheelChannel, wrong: bool| {
-            let good = wheel.doubt.is_finite() && !wrong && !wheel.stuck;
+            let good = wheel.uncertainty.is_finite() && !wrong && !wheel.stuck;
             let (slides, slips) = wheel.may_differ(allowed);
             Counted {
                 pulses: wheel.pulses,
-                doubt: if good { wheel.doubt } else { 0.0 },
+                uncertainty: if good { wheel.uncertainty } else { 0.0 },
                 loosens_low: slips,
                 loosens_high: slides,
                 pitch: wheel.pitch_range,

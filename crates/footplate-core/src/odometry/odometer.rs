@@ -263,7 +263,8 @@ impl Odometer {
             scene.wheels.iter().all(|wheel| wheel.read && wheel.speed > TOO_FAST * scene.top_speed);
         self.above_top += u64::from(too_fast);
         let ran = self.bank.step(&scene, t);
-        let [probable_speed, probable_way] = self.bank.interval(&scene, 1.0 - self.settings.confidence, t);
+        let [probable_speed, probable_distance] =
+            self.bank.interval(&scene, 1.0 - self.settings.confidence, t);
         let (lost, dead) = self.probable();
         let (ran, shares, lost, dead) = if let Some(published) = &mut self.published {
             let fused = published.next(&self.wheels, counted, &allowed, &self.vehicle, t);
@@ -286,7 +287,7 @@ impl Odometer {
         }
         self.distance += self.direction * ran;
         self.distance_bounds.moved(speed_before, bounded, allowed.acceleration, &self.counted(&allowed), t);
-        self.enclose(probable_speed, probable_way, bounded);
+        self.enclose(probable_speed, probable_distance, bounded);
         self.place(period, effort, lost, ran);
         let states = self.states(lost, dead);
         let estimate = MotionEstimate {
@@ -318,7 +319,7 @@ impl Odometer {
         let [first_lost, second_lost] = lost;
         let rolled = |wheel: &WheelChannel, lost: Option<Loss>| Rolled {
             nominal: self.direction * wheel.pulses * wheel.wheelset_pitch,
-            rolls: lost.is_none() && wheel.is_read() && wheel.doubt == 0.0,
+            rolls: lost.is_none() && wheel.is_read() && wheel.uncertainty == 0.0,
         };
         places.roll(period.time, [rolled(first, first_lost), rolled(second, second_lost)], effort);
         let bounds_nothing = period.balise_deviation.is_some();

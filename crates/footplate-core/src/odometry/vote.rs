@@ -11,12 +11,12 @@ pub(super) struct Vote {
 impl Vote {
     pub(super) const NONE: Self = Self { bound: None, counts: false };
 
-    pub(super) fn also(self, bound: f64, doubted: bool, looser: fn(f64, f64) -> f64) -> Self {
+    pub(super) fn also(self, bound: f64, disputed: bool, looser: fn(f64, f64) -> f64) -> Self {
         if bound.is_infinite() {
             return self;
         }
         let bound = self.bound.map_or(bound, |so_far| looser(so_far, bound));
-        Self { bound: Some(bound), counts: self.counts || !doubted }
+        Self { bound: Some(bound), counts: self.counts || !disputed }
     }
 
     pub(super) fn outcome(self) -> Option<f64> {

@@ -60,8 +60,8 @@ pub(super) struct WheelChannel {
     /// That count is no wheel's.
     pub(super) stuck: bool,
     /// How many pulses its last count may be wrong by.
-    pub(super) doubt: f64,
-    doubt_before: f64,
+    pub(super) uncertainty: f64,
+    uncertainty_before: f64,
     /// The direction that its sensor reported lately.
     pub(super) reported: ReportedDirection,
     tachometer: Tachometer,
@@ -91,8 +91,8 @@ impl WheelChannel {
             other_further: 0.0,
             turned_lately: [0.0; 2],
             stuck: false,
-            doubt: 0.0,
-            doubt_before: 0.0,
+            uncertainty: 0.0,
+            uncertainty_before: 0.0,
             reported: ReportedDirection::default(),
             tachometer: Tachometer::new(),
             windows: CountWindows::new(period),
@@ -135,13 +135,13 @@ impl WheelChannel {
         self.pulses = pulses;
         self.late = turn.late * heading.direction;
         let counted = self.pulses * self.pitch;
-        self.doubt = turn.doubt;
-        if turn.doubt.is_finite() {
+        self.uncertainty = turn.uncertainty;
+        if turn.uncertainty.is_finite() {
             // A row that was read late is short of nothing, but the next window may begin with it.
-            self.windows.counted(t, self.pulses, turn.doubt + self.doubt_before);
-            self.doubt_before = turn.doubt;
+            self.windows.counted(t, self.pulses, turn.uncertainty + self.uncertainty_before);
+            self.uncertainty_before = turn.uncertainty;
         } else {
-            self.doubt_before = 0.0;
+            self.uncertainty_before = 0.0;
             self.windows.counted(t, self.pulses, 0.0);
             self.windows.interrupt();
         }
@@ -161,8 +161,8 @@ impl WheelChannel {
     }
 
     /// Takes in the direction that the sensor reports.
-    pub(super) fn read_direction(&mut self, reading: &WheelReading, way: f64, t: f64) {
-        self.reported.read(reading, self.tachometer.wiring(), way * self.pulses, t);
+    pub(super) fn read_direction(&mut self, reading: &WheelReading, sign: f64, t: f64) {
+        self.reported.read(reading, self.tachometer.wiring(), sign * self.pulses, t);
     }
 
     /// The first reading of a run, which tells only a speed.
@@ -182,7 +182,7 @@ impl WheelChannel {
 
     /// The speeds that the train can have if this wheel rolls; any while its count is uncertain.
     pub(super) fn turns(&self, acceleration: Range) -> Range {
-        if self.doubt.is_infinite() {
+        if self.uncertainty.is_infinite() {
             return Range::ANY;
         }
         self.windows.speed(self.pitch_range, acceleration)
@@ -223,7 +223,7 @@ impl WheelChannel {
         for (wheel, beside) in [(self, other_moves), (other, moves)] {
             let was = wheel.stuck;
             wheel.stuck = wheel.stands_still() && (was || beside);
-            if was && !wheel.stuck && wheel.doubt > 0.0 {
+            if was && !wheel.stuck && wheel.uncertainty > 0.0 {
                 // What was followed while it was stuck says nothing.
                 wheel.tracker.restart(wheel.pulses * wheel.pitch / t);
             }

@@ -28,7 +28,7 @@ const FARTHEST_DEVIATION: f64 = 1.5;
 /// What there is no letter for.
 const NONE: (usize, f64) = (0, 0.0);
 
-/// The change under way, as it would be from or to a speed that differs a little.
+/// The present change, as it would be from or to a speed that differs a little.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Apart {
@@ -100,16 +100,16 @@ impl Apart {
 
     /// Adds how the place of a train changes with the letters of its steps.
     pub(super) fn add_slopes(&self, course: &FilterState, time: f64, slope: &mut [f64; N]) {
-        let way = |segment: &Segment| {
+        let distance = |segment: &Segment| {
             if time.is_infinite() { segment.distance_to_rest() } else { segment.distance(time - course.x[H]) }
         };
         let grown = libm::exp(course.x[E]) / STEP;
-        let here = way(&course.segment);
+        let here = distance(&course.segment);
         if let Some(letter) = course.speed {
-            slope[letter] += grown * (way(&self.toward) - here);
+            slope[letter] += grown * (distance(&self.toward) - here);
         }
         for (letter, by) in self.before {
-            slope[letter] += grown * by * (way(&self.away) - here);
+            slope[letter] += grown * by * (distance(&self.away) - here);
         }
     }
 }
@@ -129,7 +129,7 @@ impl FilterState {
         self.speed
     }
 
-    /// Makes the segment under way anew with what is known of the speeds of steps by now.
+    /// Makes the present segment anew with what is known of the speeds of steps by now.
     pub(super) fn linearise(&mut self, model: &MotionModel) {
         let Some(mut apart) = self.apart else { return };
         let letter = self.speed.filter(|_| self.step != 0);
@@ -198,10 +198,10 @@ impl FilterState {
         if learnt == [0.0; 3] {
             return 0.0;
         }
-        let way = |segment: &Segment| segment.distance(time - self.x[H]);
-        let here = way(&self.segment);
+        let distance = |segment: &Segment| segment.distance(time - self.x[H]);
+        let here = distance(&self.segment);
         let before = apart.before[0].1 * learnt[1] + apart.before[1].1 * learnt[2];
-        ((way(&apart.toward) - here) * learnt[0] + (way(&apart.away) - here) * before) / STEP
+        ((distance(&apart.toward) - here) * learnt[0] + (distance(&apart.away) - here) * before) / STEP
     }
 }
 

@@ -38,7 +38,7 @@ impl<const L: usize> MotionFilter<L> {
         slope
     }
 
-    /// All ways are counted from elsewhere from now on: from a place that is so far (m) as the companions are now, and
+    /// All distances are counted from elsewhere from now on: from a place that is so far (m) as the companions are now, and
     /// moves with them.
     pub(crate) fn shift_beside(&mut self, by: f64, slopes: &[(usize, f64)]) {
         let mut slope = [0.0; L];

@@ -1,4 +1,4 @@
-//! Where a train is in the run under way, how fast it runs and how long the hops are that it runs over, known together.
+//! Where a train is in the present run, how fast it runs and how long the hops are that it runs over, known together.
 //!
 //! A Kalman filter over the letters of [`MotionFilter`] and, beside them, `δ`: by how much each section run over is longer than
 //! surveyed. A train that passes a sensor at `t` measures all of them at once:
@@ -29,7 +29,7 @@ const MOST_HOPS: usize = crate::track::MAX_MISSED + 1;
 /// The shortest distance between two sensors that is believed (m); closer ones cannot be distinguished.
 const SHORTEST_M: f64 = 0.01;
 
-/// The run under way.
+/// The present run.
 #[derive(Debug, Clone)]
 pub(super) struct ArrivalFilter {
     following: MotionFilter<LETTERS>,
@@ -96,7 +96,7 @@ impl ArrivalFilter {
         self.is_placed
     }
 
-    /// The speed (m/s) at which it runs, or to which the change under way leads.
+    /// The speed (m/s) at which it runs, or to which the present change leads.
     pub(super) fn settled_speed(&self) -> Gaussian {
         self.following.settled_speed()
     }
@@ -110,11 +110,11 @@ impl ArrivalFilter {
     pub(super) fn ahead(
         &mut self,
         sections: &SectionIndex,
-        way: &Reach,
+        path: &Reach,
         prior: impl Fn(usize) -> Gaussian,
     ) -> Ahead {
-        let mut ahead = Ahead { length: way.length.as_m(), slopes: [(0, 0.0); MOST_HOPS], count: 0 };
-        for section in way.hops().iter().filter_map(|hop| sections.section(*hop)) {
+        let mut ahead = Ahead { length: path.length.as_m(), slopes: [(0, 0.0); MOST_HOPS], count: 0 };
+        for section in path.hops().iter().filter_map(|hop| sections.section(*hop)) {
             let companion = self.companion(section, &prior);
             ahead.length += self.longer.get(companion).copied().unwrap_or(0.0);
             if let Some(slot) = ahead.slopes.get_mut(ahead.count) {
@@ -186,7 +186,7 @@ impl ArrivalFilter {
         self.following.widen_speed(variance);
     }
 
-    /// It is off by more (m) than any interval allows. Whether a change of speed is under way that may be why: its uncertainty
+    /// It is off by more (m) than any interval allows. Whether a change of speed is not complete that may be why: its uncertainty
     /// is widened then.
     pub(super) fn widen_change(&mut self, time: f64, off: f64) -> bool {
         self.following.widen_change(&self.model, time, off)

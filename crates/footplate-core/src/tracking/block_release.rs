@@ -3,7 +3,7 @@
 use super::locator::{Locator, PathPoint};
 use super::track_context::TrackContext;
 use crate::ids::SensorId;
-use crate::link::ContactWindow;
+use crate::link::DetectionWindow;
 use crate::model::{BlockRelease, MotionModel};
 use crate::track::Block;
 use crate::units::Length;
@@ -20,7 +20,7 @@ impl Locator {
         context: TrackContext<'_>,
         model: &MotionModel,
         detector: SensorId,
-        window: ContactWindow,
+        window: DetectionWindow,
     ) -> Option<BlockRelease> {
         let block = context.layout.block_of_detector(detector)?;
         let located = self.locate(context, model, window.middle()).filter(|located| !located.at_rest)?;

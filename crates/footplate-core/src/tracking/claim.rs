@@ -10,7 +10,7 @@ use super::path_length::path_reaches;
 use super::track_context::TrackContext;
 use crate::ids::SensorId;
 use crate::linalg::Gaussian;
-use crate::link::ContactWindow;
+use crate::link::DetectionWindow;
 use crate::model::MotionModel;
 
 /// Chance that a train no longer runs by its model when it reaches a sensor, one in a thousand, as ln (chosen: engines are
@@ -30,7 +30,7 @@ impl Locator {
         context: TrackContext<'_>,
         model: &MotionModel,
         sensor: SensorId,
-        window: ContactWindow,
+        window: DetectionWindow,
         missed_share: f64,
     ) -> Option<f64> {
         let (node, place, speed) = self.motion_at(model, window.middle())?;

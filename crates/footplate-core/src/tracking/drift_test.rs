@@ -52,7 +52,7 @@ impl DriftTest {
         drift
     }
 
-    /// How far the larger sum is on its way to an alarm, 0 to 1.
+    /// How far the larger sum is towards an alarm, 0 to 1.
     #[must_use]
     pub fn level(&self) -> f64 {
         self.late.max(self.early) / ALARM_AT

@@ -1,7 +1,7 @@
 //! The most likely course of a train: where its laws take it from one command to the next.
 //!
-//! Letters: `b` place at which the segment under way began (m), `ε` deviation of ln speed of this run, `η` by how much
-//! (s) the start was late, `ζ` distance (m) by which the change under way differs from its law, `S(t)` distance of the segment by
+//! Letters: `b` place at which the present segment began (m), `ε` deviation of ln speed of this run, `η` by how much
+//! (s) the start was late, `ζ` distance (m) by which the present change differs from its law, `S(t)` distance of the segment by
 //! the laws, `r(t)` share of its change that is done. What is the same whenever the train does it again has letters
 //! that last, for a train that does the same again and again: by how much (s) changes of speed are later than their law,
 //! `τ` upwards and downwards, and what ln speed is off by at each of the steps met of late, `s`. With `Δ` the speed before
@@ -53,7 +53,7 @@ pub(crate) struct FilterState {
     oldest: usize,
     is_repeating: bool,
     pub(super) speed: Option<usize>,
-    /// The letter of the change under way, and its `Δ` (m/s); none of a start or a stop.
+    /// The letter of the present change, and its `Δ` (m/s); none of a start or a stop.
     later: usize,
     slower: f64,
     pending: [Option<SpeedCommand>; MOST_PENDING],
@@ -208,7 +208,7 @@ impl FilterState {
         met.map(|(at, (step, above))| (STEPS + at, step, above))
     }
 
-    /// Its speed relative to that of the segment under way.
+    /// Its speed relative to that of the present segment.
     pub(super) fn grown(&self) -> f64 {
         // Where steps are apart the segment has the speed of its step already.
         let by_step = self.speed.filter(|_| self.apart.is_none()).map_or(0.0, |letter| self.x[letter]);
@@ -225,7 +225,7 @@ impl FilterState {
         }
     }
 
-    /// By how much (m) the change under way differs from its law once it is done.
+    /// By how much (m) the present change differs from its law once it is done.
     fn displaced(&self) -> f64 {
         self.x[Z] + self.slower * self.x[self.later]
     }
@@ -279,7 +279,7 @@ impl FilterState {
         self.x[B] + grown * distance + change
     }
 
-    /// The speed (m/s) that the change under way has still to make at a time.
+    /// The speed (m/s) that the present change has still to make at a time.
     pub(crate) fn unsettled(&self, time: f64) -> f64 {
         (self.segment.to - self.segment.speed(time - self.x[H])).abs()
     }

@@ -5,7 +5,7 @@ use crate::link::UniformNormal;
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Length, Speed};
 
-/// What the train is doing on the way to the contact.
+/// What the train is doing before the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Phase {
@@ -13,7 +13,7 @@ pub enum Phase {
     Steady,
     /// Runs at a settled speed over a hop that it passes for the first time, or at a step it has not run at.
     FirstLap,
-    /// Starts from rest or changes speed on the way.
+    /// Starts from rest or changes speed before it.
     Change,
 }
 
@@ -26,13 +26,13 @@ pub struct Forecast {
     /// Intervals lie about it.
     pub time: Timestamp,
     /// The poll that will report it if it closes when it is due, where the rhythm of polls is known; otherwise
-    /// the mean time again. The best single guess of the stamp: a report comes at a poll, not between two.
+    /// the mean time again. The best single estimate of the stamp: a report comes at a poll, not between two.
     pub report: Timestamp,
-    /// How the report scatters about the mean time, in seconds: the doubt of the motion and the uniform poll.
+    /// How the report scatters about the mean time, in seconds: the uncertainty of the motion and the uniform poll.
     pub spread: UniformNormal,
     /// The speed at which the train will pass it.
     pub speed: Speed,
-    /// What the train does on the way there.
+    /// What the train does before it.
     pub phase: Phase,
 }
 
@@ -54,15 +54,15 @@ impl Forecast {
     /// How much later than the mean time a report came: the error of the motion, with that of the poll in it.
     #[inline]
     #[must_use]
-    pub fn contact_error(&self, report: Timestamp) -> TimeSpan {
+    pub fn detection_error(&self, report: Timestamp) -> TimeSpan {
         report - self.time
     }
 
-    /// The same in millimetres of way: how far beyond the forecast place the train was, negative when it
+    /// The same in millimetres: how far beyond the forecast place the train was, negative when it
     /// was short of it.
     #[inline]
     #[must_use]
-    pub fn way_error(&self, report: Timestamp) -> Length {
+    pub fn place_error(&self, report: Timestamp) -> Length {
         self.speed * self.error(report)
     }
 
@@ -71,7 +71,7 @@ impl Forecast {
     #[inline]
     #[must_use]
     pub fn probability_by(&self, report: Timestamp) -> f64 {
-        self.spread.cdf(self.contact_error(report).as_s())
+        self.spread.cdf(self.detection_error(report).as_s())
     }
 }
 
@@ -94,6 +94,6 @@ mod tests {
         assert!((held - 0.9).abs() < 1e-6);
         let late = Timestamp::from_s(10.05);
         assert_eq!(forecast.error(late), TimeSpan::from_ms(50));
-        assert!((forecast.way_error(late).as_mm() - 20.0).abs() < 1e-9);
+        assert!((forecast.place_error(late).as_mm() - 20.0).abs() < 1e-9);
     }
 }

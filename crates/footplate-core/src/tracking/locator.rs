@@ -12,7 +12,7 @@ use super::track_context::TrackContext;
 use crate::event::{Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::linalg::Gaussian;
-use crate::link::{ContactWindow, TruncatedNormal};
+use crate::link::{DetectionWindow, TruncatedNormal};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Length, Speed};
@@ -77,7 +77,7 @@ impl Rest {
 
 /// The next sensor and when its detection is due.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DueContact {
+pub struct DueSensor {
     /// The sensor.
     pub sensor: SensorId,
     /// When it should close.
@@ -90,11 +90,11 @@ pub struct DueContact {
 
 /// A sensor that the train passed, compared with its prediction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PassedContact {
+pub struct PassedSensor {
     /// The sensor.
     pub sensor: SensorId,
     /// When it closed, by the report.
-    pub window: ContactWindow,
+    pub window: DetectionWindow,
     /// When it closed most likely, by report and prediction together.
     pub at: Timestamp,
     /// By how much the middle of the window was later than predicted, and one standard deviation of that (prediction and
@@ -203,7 +203,7 @@ impl Locator {
         context: TrackContext<'_>,
         model: &MotionModel,
         sensor: SensorId,
-        window: ContactWindow,
+        window: DetectionWindow,
     ) -> Option<(PathReach, Gaussian, f64)> {
         let time = self.seconds(window.middle());
         let place = self.filter.place(model, time);
@@ -229,7 +229,7 @@ impl Locator {
         context: TrackContext<'_>,
         model: &MotionModel,
         sensor: SensorId,
-        window: ContactWindow,
+        window: DetectionWindow,
     ) -> Option<f64> {
         if self.node.is_none() {
             return Some(0.0);
@@ -244,10 +244,10 @@ impl Locator {
         context: TrackContext<'_>,
         model: &MotionModel,
         sensor: SensorId,
-        window: ContactWindow,
-    ) -> PassedContact {
+        window: DetectionWindow,
+    ) -> PassedSensor {
         let time = self.seconds(window.middle());
-        let known = PassedContact { sensor, window, at: window.middle(), late: None, short: None, missed: 0 };
+        let known = PassedSensor { sensor, window, at: window.middle(), late: None, short: None, missed: 0 };
         let Some(node) = context.node_of(sensor) else { return known };
         let scatter = model.sensor_variance(Some(sensor));
         let Some((reach, short, _)) = self.best_reach(context, model, sensor, window) else {
@@ -266,7 +266,7 @@ impl Locator {
         if !contradicts {
             at = self.fuse(model, [reach.length, here], window, time + short.mean / speed);
         } else if self.filter.widen_change(model, time, short.mean) {
-            // The innovation exceeds its predicted variance, and a change of speed under way will continue to deviate. The
+            // The innovation exceeds its predicted variance, and a change of speed that is not complete will continue to deviate. The
             // sensor gives the position, however uncertain the path to it is.
             self.filter.shift(-reach.length.mean, reach.length.variance);
             self.filter.pass(model, time, window.variance_s2(), here);
@@ -282,7 +282,7 @@ impl Locator {
         }
         self.node = Some(node);
         let late = [-short.mean / speed, libm::sqrt(short.variance) / speed].map(TimeSpan::from_s);
-        PassedContact {
+        PassedSensor {
             at,
             late: Some(late),
             short: Some(Length::from_m(short.mean)),
@@ -298,7 +298,7 @@ impl Locator {
         &mut self,
         model: &MotionModel,
         [length, sensor]: [Gaussian; 2],
-        window: ContactWindow,
+        window: DetectionWindow,
         due: f64,
     ) -> Timestamp {
         let [after, until] = [window.after, window.until].map(|end| self.seconds(end));
@@ -340,12 +340,12 @@ impl Locator {
 
     /// The sensor it reaches next without another command; `None` while it is at rest, stops short of it or is lost.
     #[must_use]
-    pub fn next_contact(
+    pub fn next_sensor(
         &self,
         context: TrackContext<'_>,
         model: &MotionModel,
         now: Timestamp,
-    ) -> Option<DueContact> {
+    ) -> Option<DueSensor> {
         let node = self.node?;
         let time = self.seconds(now);
         let here = self.filter.place(model, time);
@@ -361,7 +361,7 @@ impl Locator {
             let sensor = hop.sensor?;
             let (due, uncertain_s) = self.filter.reaches(model, at, time)?;
             let speed = self.filter.speed(model, due).mean;
-            return Some(DueContact {
+            return Some(DueSensor {
                 sensor,
                 time: self.timestamp(due),
                 uncertainty: TimeSpan::from_s(uncertain_s),

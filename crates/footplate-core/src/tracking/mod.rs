@@ -33,7 +33,7 @@ mod train_forecaster;
 
 pub use drift_test::{Drift, DriftTest};
 pub use forecast::{Forecast, Phase};
-pub use locator::{DueContact, Located, Locator, PassedContact, PathPoint, Rest};
+pub use locator::{DueSensor, Located, Locator, PassedSensor, PathPoint, Rest};
 pub(crate) use motion_filter::INTERRUPTED;
 pub use path_length::{distance_to, distance_to_landmark, landmark_of, place_of};
 pub use predictor::{Hit, Predictor, Verdict};

@@ -272,7 +272,7 @@ impl<const L: usize> MotionFilter<L> {
         Gaussian { variance: speed.variance + shape * shape + start * start, ..speed }
     }
 
-    /// The speed (m/s) to which the change under way leads.
+    /// The speed (m/s) to which the present change leads.
     pub(crate) fn settled_speed(&self) -> Gaussian {
         let mean = self.course.grown() * self.course.segment.to;
         Gaussian { mean, variance: mean * mean * self.ln_speed_variance() }
@@ -422,7 +422,7 @@ impl<const L: usize> MotionFilter<L> {
     }
 
     /// Its innovation (m) is larger than its uncertainty allows. During a change of speed the rest of the change is uncertain, too: a
-    /// start that is late, or a change of another shape. Whether a change is under way.
+    /// start that is late, or a change of another shape. Whether a change is not complete.
     pub(crate) fn widen_change(&mut self, model: &MotionModel, time: f64, off: f64) -> bool {
         self.settle(model, time);
         let share = self.course.segment.share(time);

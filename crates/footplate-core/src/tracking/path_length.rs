@@ -4,7 +4,7 @@ use super::locator::PathPoint;
 use super::track_context::TrackContext;
 use crate::ids::{NodeId, SensorId};
 use crate::linalg::Gaussian;
-use crate::model::{FELT, MotionModel};
+use crate::model::{MotionModel, PATH_LENGTH_SPREAD};
 use crate::track::{Hop, Landmark, Layout, MAX_MISSED, Position, Reach};
 use crate::units::Length;
 
@@ -15,7 +15,7 @@ const LOG_MISSED: f64 = -3.9;
 const MOST_HOPS: usize = 200;
 /// One standard deviation of where a sensor closes against the survey (m): half a pickup's springiness and the length of a
 /// contact track (chosen; tapes laid from sensors agree with it).
-const CONTACT_PLACE_M: f64 = 0.005;
+const SENSOR_PLACE_M: f64 = 0.005;
 
 /// A path to a sensor, past missed detections, in path lengths.
 #[derive(Debug, Clone, Copy)]
@@ -71,7 +71,7 @@ pub fn distance_to(
     from: NodeId,
     to: Position,
 ) -> Option<Length> {
-    let mut way = Length::ZERO;
+    let mut distance = Length::ZERO;
     for (count, hop) in context.hops_ahead(from).take(MOST_HOPS).enumerate() {
         if count > 0 && hop.from == from {
             return None;
@@ -80,11 +80,11 @@ pub fn distance_to(
         let mut along = Length::ZERO;
         for id in hop.edges {
             if *id == to.edge {
-                return Some(way + path_length * part(along + to.offset, hop.length));
+                return Some(distance + path_length * part(along + to.offset, hop.length));
             }
             along += context.layout.edge(*id)?.length;
         }
-        way += path_length;
+        distance += path_length;
     }
     None
 }
@@ -97,8 +97,8 @@ pub(super) fn taped_length(context: TrackContext<'_>, model: &MotionModel, hop: 
     let surveyed = hop.length.as_m();
     let survey =
         context.sections.section(hop.id).map_or(0.0, |section| context.sections.survey_variance(section))
-            + 2.0 * CONTACT_PLACE_M * CONTACT_PLACE_M;
-    let feels = FELT * surveyed;
+            + 2.0 * SENSOR_PLACE_M * SENSOR_PLACE_M;
+    let feels = PATH_LENGTH_SPREAD * surveyed;
     let train = path_length.variance + feels * feels;
     if train <= 0.0 {
         return Gaussian { mean: surveyed, variance: survey };
@@ -119,27 +119,27 @@ pub fn distance_to_landmark(
     from: NodeId,
     to: Landmark,
 ) -> Option<Length> {
-    let Some((base, before)) = way_to_node(context, model, from, to.node) else {
+    let Some((base, before)) = path_to_node(context, model, from, to.node) else {
         let position = context.layout.locate(to, context.turnouts).ok()?;
         return distance_to(context, model, from, position);
     };
     if to.offset < Length::ZERO {
         return Some(base + to.offset * before);
     }
-    let (mut way, mut left) = (base, to.offset);
+    let (mut distance, mut left) = (base, to.offset);
     for hop in context.hops_ahead(to.node).take(MOST_HOPS) {
         let path_length = hop_length(context, model, &hop).mean;
         let taped = taped_length(context, model, &hop).mean;
         if left.as_m() <= taped {
-            return Some(way + left * if taped > 0.0 { path_length / taped } else { 1.0 });
+            return Some(distance + left * if taped > 0.0 { path_length / taped } else { 1.0 });
         }
-        (way, left) = (way + Length::from_m(path_length), left - Length::from_m(taped));
+        (distance, left) = (distance + Length::from_m(path_length), left - Length::from_m(taped));
     }
-    (left == Length::ZERO).then_some(way)
+    (left == Length::ZERO).then_some(distance)
 }
 
 /// The path to a node at which hops begin or end, and the ratio of path length to taped length on the hop before it.
-fn way_to_node(
+fn path_to_node(
     context: TrackContext<'_>,
     model: &MotionModel,
     from: NodeId,
@@ -148,16 +148,16 @@ fn way_to_node(
     if from == to {
         return Some((Length::ZERO, 1.0));
     }
-    let mut way = 0.0;
+    let mut distance = 0.0;
     for (count, hop) in context.hops_ahead(from).take(MOST_HOPS).enumerate() {
         if count > 0 && hop.from == from {
             return None;
         }
         let path_length = hop_length(context, model, &hop).mean;
-        way += path_length;
+        distance += path_length;
         if hop.to == to {
             let taped = taped_length(context, model, &hop).mean;
-            return Some((Length::from_m(way), if taped > 0.0 { path_length / taped } else { 1.0 }));
+            return Some((Length::from_m(distance), if taped > 0.0 { path_length / taped } else { 1.0 }));
         }
     }
     None

@@ -35,7 +35,7 @@ pub struct Hit {
     pub passage: Passage,
     /// What had been forecast for this contact before it reported; `None` when nothing could be.
     pub forecast: Option<Forecast>,
-    /// The contact that had been named as the next; it differs after a missed contact or another way.
+    /// The contact that had been named as the next; it differs after a missed contact or another path.
     pub named: Option<SensorId>,
     /// What became of it.
     pub verdict: Verdict,
@@ -43,13 +43,13 @@ pub struct Hit {
     pub drift: Option<Drift>,
 }
 
-/// Everything learnt so far, and the train under way.
+/// Everything learnt so far, and the present train.
 #[derive(Debug, Clone)]
 pub struct Predictor {
     sections: SectionIndex,
     trains: Vec<TrainForecaster>,
     /// Which of `trains` the run is of, and its tracker.
-    under_way: Option<(usize, PassageTracker)>,
+    present: Option<(usize, PassageTracker)>,
     timing: PollTimingEstimator,
 }
 
@@ -60,7 +60,7 @@ impl Predictor {
         Self {
             sections: SectionIndex::of(layout),
             trains: Vec::new(),
-            under_way: None,
+            present: None,
             timing: PollTimingEstimator::default(),
         }
     }
@@ -74,12 +74,12 @@ impl Predictor {
             model.begin_run(step);
         }
         self.timing.restart();
-        self.under_way = Some((place, PassageTracker::new(train, step, self.timing.clone())));
+        self.present = Some((place, PassageTracker::new(train, step, self.timing.clone())));
     }
 
     /// The run is over: what it showed of the train goes into its motion model.
     pub fn end_run(&mut self) {
-        if let Some((place, tracker)) = self.under_way.take() {
+        if let Some((place, tracker)) = self.present.take() {
             self.timing = tracker.timing().clone();
             if let Some(train) = self.trains.get_mut(place) {
                 train.end_run(&self.sections);
@@ -90,7 +90,7 @@ impl Predictor {
     /// The next entry of the run. A hit where it is a report of a passage; `None` for all else and outside
     /// a run.
     pub fn take(&mut self, layout: &Layout, event: &Event) -> Option<Hit> {
-        let (place, tracker) = self.under_way.as_mut()?;
+        let (place, tracker) = self.present.as_mut()?;
         let before = tracker.drive();
         let polls = Polls::of(tracker.timing());
         let sighting = tracker.take(layout, event);
@@ -119,7 +119,7 @@ impl Predictor {
     /// The forecast for the contact named next, as things stand: before any further report.
     #[must_use]
     pub fn forecast(&self, layout: &Layout) -> Option<Forecast> {
-        let (place, tracker) = self.under_way.as_ref()?;
+        let (place, tracker) = self.present.as_ref()?;
         let train = self.trains.get(*place)?;
         let others = || self.trains.iter().filter(|other| other.train() != train.train());
         let prior = |model: &MotionModel, section| expected_length(model, others(), &self.sections, section);
@@ -155,7 +155,7 @@ impl Predictor {
     /// The rhythm of the link as learnt so far.
     #[must_use]
     pub fn timing(&self) -> &PollTimingEstimator {
-        self.under_way.as_ref().map_or(&self.timing, |(_, tracker)| tracker.timing())
+        self.present.as_ref().map_or(&self.timing, |(_, tracker)| tracker.timing())
     }
 
     fn place_of(&mut self, train: TrainId) -> usize {

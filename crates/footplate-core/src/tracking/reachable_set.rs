@@ -6,7 +6,7 @@
 use super::motion_filter::MotionFilter;
 use crate::ids::{NodeId, SpeedStep};
 use crate::linalg::Gaussian;
-use crate::model::{FELT, MotionModel};
+use crate::model::{MotionModel, PATH_LENGTH_SPREAD};
 use crate::time::{TimeSpan, Timestamp};
 
 /// A train that takes longer to a place (s) does not count as reaching it: as long as a session waits for the longest hop at
@@ -93,7 +93,7 @@ impl ReachableSet {
         if settled > 0.0 { now / settled - 1.0 } else { now }
     }
 
-    /// The highest speed (m/s) at a time and from then on, whether or not the change under way is complete.
+    /// The highest speed (m/s) at a time and from then on, whether or not the present change is complete.
     pub(crate) fn fastest_from(&self, model: &MotionModel, at: Timestamp, k: f64) -> f64 {
         let now = local(self.following.changing_speed(model, (at - self.epoch).as_s()), k);
         now.max(self.fastest_settled(k))
@@ -108,8 +108,8 @@ impl ReachableSet {
 /// The bound of a speed on a single stretch: a model knows speeds as means over whole hops, and the ratio of path length to
 /// surveyed length varies within a hop.
 fn local(of: Gaussian, k: f64) -> f64 {
-    let felt = FELT * of.mean;
-    bound(Gaussian { variance: of.variance + felt * felt, ..of }, k)
+    let spread = PATH_LENGTH_SPREAD * of.mean;
+    bound(Gaussian { variance: of.variance + spread * spread, ..of }, k)
 }
 
 fn bound(of: Gaussian, k: f64) -> f64 {

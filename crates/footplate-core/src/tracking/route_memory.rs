@@ -16,15 +16,15 @@ pub(super) struct RouteMemory {
 
 impl RouteMemory {
     /// Whether the train has run over every hop of a path at this step before.
-    pub(super) fn has_passed(&self, way: &Reach, step: SpeedStep) -> bool {
-        way.hops()
+    pub(super) fn has_passed(&self, path: &Reach, step: SpeedStep) -> bool {
+        path.hops()
             .iter()
             .all(|hop| self.passed.get(hop.index()).is_some_and(|steps| steps >> step.get() & 1 == 1))
     }
 
     /// The train took a path at this step.
-    pub(super) fn remember(&mut self, layout: &Layout, way: &Reach, step: SpeedStep) {
-        for hop in way.hops() {
+    pub(super) fn remember(&mut self, layout: &Layout, path: &Reach, step: SpeedStep) {
+        for hop in path.hops() {
             if self.passed.len() <= hop.index() {
                 self.passed.resize(hop.index() + 1, 0);
             }
@@ -42,7 +42,7 @@ impl RouteMemory {
     }
 
     /// The next sensor as the turnouts are known to lie, or else by the train's last route.
-    pub(super) fn likely_way(
+    pub(super) fn likely_path(
         &self,
         layout: &Layout,
         from: NodeId,
@@ -54,14 +54,14 @@ impl RouteMemory {
         Some(
             core::iter::once(first)
                 .chain(open)
-                .find(|way| way.hops().first().copied() == habit)
+                .find(|path| path.hops().first().copied() == habit)
                 .unwrap_or(first),
         )
     }
 
     /// Which sensor had been named as the next before the train took this path.
-    pub(super) fn named(&self, layout: &Layout, way: &Reach) -> Option<SensorId> {
-        let first = way.hops().first().and_then(|hop| layout.hop(*hop))?;
+    pub(super) fn named(&self, layout: &Layout, path: &Reach) -> Option<SensorId> {
+        let first = path.hops().first().and_then(|hop| layout.hop(*hop))?;
         self.habit(first.from)
             .and_then(|hop| layout.hop(hop))
             .or_else(|| layout.hops_from(first.from).next())?

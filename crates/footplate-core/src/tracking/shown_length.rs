@@ -16,7 +16,7 @@ use super::locator::{GATE, Locator};
 use super::track_context::TrackContext;
 use crate::ids::SensorId;
 use crate::linalg::Gaussian;
-use crate::link::ContactWindow;
+use crate::link::DetectionWindow;
 use crate::model::MotionModel;
 
 /// Least standard deviation of a hop (m): a report then moves the length by a third of its innovation (chosen by what repeats
@@ -31,7 +31,7 @@ impl Locator {
         context: TrackContext<'_>,
         model: &MotionModel,
         sensor: SensorId,
-        window: ContactWindow,
+        window: DetectionWindow,
     ) -> Option<(usize, Gaussian)> {
         let hop = context.hop_from(self.node()?).filter(|hop| hop.sensor == Some(sensor))?;
         let section = context.sections.section(hop.id)?;

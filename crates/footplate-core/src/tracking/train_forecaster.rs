@@ -1,4 +1,4 @@
-//! One train as it is known: its motion model, the run under way, how its sensors scatter and which paths it takes.
+//! One train as it is known: its motion model, the present run, how its sensors scatter and which paths it takes.
 
 use super::DriftTest;
 use super::arrival::Arrival;
@@ -14,8 +14,8 @@ use crate::linalg::Gaussian;
 use crate::link::UniformNormal;
 use crate::model::survey::SectionIndex;
 use crate::model::{Drive, Passage, PassageTracker};
-use crate::model::{FELT, MotionModel};
 use crate::model::{MotionFit, SensorScatter};
+use crate::model::{MotionModel, PATH_LENGTH_SPREAD};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Layout, Reach, TurnoutStates};
 use crate::units::Speed;
@@ -96,7 +96,7 @@ impl TrainForecaster {
         self.model = model;
     }
 
-    /// The steady speed of the step as the run under way has shown it up to the last contact. `None` before the first hop
+    /// The steady speed of the step as the present run has shown it up to the last contact. `None` before the first hop
     /// at a settled speed. The count is of such hops.
     #[must_use]
     pub fn running_speed(&self) -> Option<Estimate<Speed>> {
@@ -128,7 +128,7 @@ impl TrainForecaster {
 
     /// What the runs so far have shown of the train goes into its model, unless that was made of more.
     fn refit(&mut self, sections: &SectionIndex) {
-        if self.passages < self.model.contacts_passed() {
+        if self.passages < self.model.sensors_passed() {
             return;
         }
         self.fit.refit(sections);
@@ -194,11 +194,11 @@ impl TrainForecaster {
             turnouts,
             &Event { time: passage.window.until, kind: EventKind::Sensor(report) },
         );
-        let named = passage.way.as_ref().and_then(|way| self.routes.named(layout, way));
+        let named = passage.path.as_ref().and_then(|path| self.routes.named(layout, path));
         let hit = |forecast, verdict, drift| Hit { passage, forecast, named, verdict, drift };
         let (time, variance) = (self.seconds(passage.window.middle()), passage.window.variance_s2());
         let scatter = self.scatter.variance(passage.sensor, self.drive.step);
-        let Some(way) = passage.way.filter(|_| self.filter.is_placed()) else {
+        let Some(path) = passage.path.filter(|_| self.filter.is_placed()) else {
             // The first poll after a pause reports what is long past: no place to count from.
             if self.filter.is_placed() || passage.window.width().as_s() < LONGEST_WINDOW * polls.period.as_s()
             {
@@ -206,20 +206,20 @@ impl TrainForecaster {
             }
             return hit(None, Verdict::First, None);
         };
-        let ahead = self.filter.ahead(sections, &way, |section| prior(&self.model, section));
+        let ahead = self.filter.ahead(sections, &path, |section| prior(&self.model, section));
         let Some(due) = self.filter.arrival(&ahead, scatter) else {
             // By all that is known the train stops short of it, so there was no forecast.
             self.filter.appear(time, variance, scatter);
             return hit(None, Verdict::First, None);
         };
         let is_changing = !self.filter.is_settled();
-        let forecast = self.forecast_of(passage.sensor, &way, &due, is_changing, polls);
+        let forecast = self.forecast_of(passage.sensor, &path, &due, is_changing, polls);
         // Judged by what was known before the hit.
         let stated = self.foreseeable(forecast);
         let late = time - due.time;
         let probability = forecast.probability_by(passage.window.until);
         let too_wild = probability.min(1.0 - probability) < GATE;
-        self.routes.remember(layout, &way, self.drive.step);
+        self.routes.remember(layout, &path, self.drive.step);
         if too_wild {
             let reopened = self.was_rejected;
             self.was_rejected = !reopened;
@@ -258,21 +258,21 @@ impl TrainForecaster {
 
     /// A forecast of a steady train counts as one when it was ever seen to run.
     fn foreseeable(&self, forecast: Forecast) -> Option<Forecast> {
-        let is_known = self.settled_hops > 0 || self.model.contacts_passed() > 0;
+        let is_known = self.settled_hops > 0 || self.model.sensors_passed() > 0;
         (is_known || forecast.phase == Phase::Change).then_some(forecast)
     }
 
     fn forecast_of(
         &self,
         sensor: SensorId,
-        way: &Reach,
+        path: &Reach,
         due: &Arrival,
         is_changing: bool,
         polls: Polls,
     ) -> Forecast {
         let phase = if is_changing {
             Phase::Change
-        } else if self.routes.has_passed(way, self.drive.step) {
+        } else if self.routes.has_passed(path, self.drive.step) {
             Phase::Steady
         } else {
             Phase::FirstLap
@@ -298,14 +298,14 @@ impl TrainForecaster {
         prior: impl Fn(&MotionModel, usize) -> Gaussian,
     ) -> Option<Forecast> {
         let from = tracker.at().filter(|_| self.filter.is_placed())?;
-        let way = self.routes.likely_way(layout, from, tracker.turnouts())?;
+        let path = self.routes.likely_path(layout, from, tracker.turnouts())?;
         let mut filter = self.filter.clone();
-        let ahead = filter.ahead(sections, &way, |section| prior(&self.model, section));
-        let sensor = way.sensor?;
+        let ahead = filter.ahead(sections, &path, |section| prior(&self.model, section));
+        let sensor = path.sensor?;
         let scatter = self.scatter.variance(sensor, self.drive.step);
         let due = filter.arrival(&ahead, scatter)?;
         let is_changing = !filter.is_settled();
-        self.foreseeable(self.forecast_of(sensor, &way, &due, is_changing, Polls::of(tracker.timing())))
+        self.foreseeable(self.forecast_of(sensor, &path, &due, is_changing, Polls::of(tracker.timing())))
     }
 }
 
@@ -320,8 +320,8 @@ pub(super) fn expected_length<'t>(
     if let Some((mean, variance)) = model.section(section) {
         return Gaussian { mean, variance };
     }
-    let felt = FELT * sections.surveyed_length(section);
-    let survey = sections.survey_variance(section) + felt * felt;
+    let spread = PATH_LENGTH_SPREAD * sections.surveyed_length(section);
+    let survey = sections.survey_variance(section) + spread * spread;
     let own = OWN_LENGTH_M * OWN_LENGTH_M;
     let (mut weight, mut sum, mut alike) = (1.0 / survey.max(f64::MIN_POSITIVE), 0.0, 0.0);
     for (by, variance) in others.filter_map(|other| other.model.section(section)) {

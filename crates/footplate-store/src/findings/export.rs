@@ -61,7 +61,7 @@ impl TrainFindings {
             contacts: own().map(|run| run.passages.len() as u32).sum(),
             steps,
             run_deviation_percent: 100.0 * review.running.run_deviation,
-            contact_scatter_mm: review.running.contact_scatter.as_mm(),
+            contact_scatter_mm: review.running.sensor_scatter.as_mm(),
             sections,
             laws: laws.filter_map(|(direction, comparison)| law_form(*direction, comparison)).collect(),
             stops: review.stops.iter().filter_map(|stop| taped_stop(batch, stop)).collect(),

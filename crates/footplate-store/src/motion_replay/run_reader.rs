@@ -1,7 +1,7 @@
 //! From the raw events of a run to what a fit is given of one train: its commands, and the contacts it passed with the
 //! interval in which each closed.
 
-use footplate_core::link::{ContactWindow, PollTiming};
+use footplate_core::link::{DetectionWindow, PollTiming};
 use footplate_core::model::STALE_WITHIN;
 use footplate_core::{Event, EventKind, Report, SpeedStep, TimeSpan, Timestamp, TrainId};
 
@@ -58,7 +58,7 @@ impl RunReader {
             }
             EventKind::Sensor(report) => {
                 let last = self.last_report.replace(time);
-                let window = ContactWindow::of_report(time, report.poll_interval, last, timing);
+                let window = DetectionWindow::of_report(time, report.poll_interval, last, timing);
                 if self.is_stale(time) {
                     return None;
                 }

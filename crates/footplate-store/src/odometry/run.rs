@@ -3,7 +3,7 @@
 use footplate_core::Estimate;
 use footplate_core::odometry::diameter::WheelScale;
 use footplate_core::odometry::wheels::{Period, Vehicle, VehicleError};
-use footplate_core::odometry::{DoubtfulClaims, MotionEstimate, Odometer, OdometrySettings, PlacedValue};
+use footplate_core::odometry::{ImplausibleClaims, MotionEstimate, Odometer, OdometrySettings, PlacedValue};
 
 use super::counted_way::WayCounter;
 use super::detection::{FlagWatch, SlipWatch};
@@ -174,8 +174,8 @@ impl OdometryRun {
 
     /// Claims of the vehicle file that the run contradicts.
     #[must_use]
-    pub fn doubtful_claims(&self) -> DoubtfulClaims {
-        self.odometer.doubtful_claims()
+    pub fn implausible_claims(&self) -> ImplausibleClaims {
+        self.odometer.implausible_claims()
     }
 
     /// How good its estimates were, if that was asked for.

@@ -61,7 +61,7 @@ impl Baselines {
         let passage = &hit.passage;
         let now = passage.window.until;
         let last = self.last_report.replace(now);
-        let (Some(last), Some(path)) = (last, passage.way) else { return [None; BASELINES.len()] };
+        let (Some(last), Some(path)) = (last, passage.path) else { return [None; BASELINES.len()] };
         let Some(hop) = path.hops().first().map(|first| (*first, path.to)) else {
             return [None; BASELINES.len()];
         };

@@ -134,7 +134,7 @@ impl Coverage {
 
 #[cfg(test)]
 mod tests {
-    use footplate_core::link::{ContactWindow, UniformNormal};
+    use footplate_core::link::{DetectionWindow, UniformNormal};
     use footplate_core::model::{Drive, Passage};
     use footplate_core::tracking::{Forecast, Hit, Phase, Verdict};
     use footplate_core::{NodeId, RunId, SensorId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
@@ -157,8 +157,8 @@ mod tests {
         let passage = Passage {
             sensor,
             node: NodeId(0),
-            window: ContactWindow { after: until - TimeSpan::from_ms(70), until },
-            way: None,
+            window: DetectionWindow { after: until - TimeSpan::from_ms(70), until },
+            path: None,
             drive: Drive { step: SpeedStep::STAND, from: SpeedStep::STAND, commanded: None },
             entry: 0,
         };

@@ -96,7 +96,7 @@ fn stretches(hits: &[Hit]) -> impl Iterator<Item = &[Hit]> {
 /// Whether the train ran at a steady speed from the sensor before.
 fn is_steady(hit: &Hit) -> bool {
     let is_steady = hit.forecast.is_none_or(|forecast| forecast.phase != Phase::Change);
-    is_steady && hit.passage.way.is_some()
+    is_steady && hit.passage.path.is_some()
 }
 
 /// Distance over time from the first to the last passage of a group.
@@ -112,7 +112,7 @@ fn mean_speed(stretch: &[Hit], length: impl Fn(&Hit) -> Length) -> Option<(Drive
 
 /// The path length before a passage, as learnt from the whole recording.
 fn length(layout: &Layout, hit: &Hit, sections: &SectionIndex, model: &MotionModel) -> Length {
-    let Some(path) = hit.passage.way else { return Length::ZERO };
+    let Some(path) = hit.passage.path else { return Length::ZERO };
     let hops = path.hops().iter().filter_map(|hop| layout.hop(*hop));
     hops.map(|hop| model.length(sections, &hop)[0]).sum()
 }

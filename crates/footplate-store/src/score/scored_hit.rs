@@ -45,7 +45,7 @@ impl ScoredHit {
     /// The delay against our forecast.
     #[must_use]
     pub fn late(&self) -> Option<TimeSpan> {
-        self.hit.forecast.map(|forecast| forecast.contact_error(self.reported()))
+        self.hit.forecast.map(|forecast| forecast.detection_error(self.reported()))
     }
 
     /// The delay against the forecast of a reference.

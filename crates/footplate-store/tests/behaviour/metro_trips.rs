@@ -250,14 +250,14 @@ fn the_same_hop_is_as_long_on_another_day() {
     for (day, hops) in DAYS.iter().zip(&days) {
         for hop in hops {
             let before = hop.trace.last().unwrap().1.as_m_per_s();
-            let fastest = hop.trace.iter().map(|(since, speed)| hop.trip.closure.speed(*since, *speed));
+            let fastest = hop.trace.iter().map(|(since, speed)| hop.trip.ends.speed(*since, *speed));
             let fastest = fastest.fold(Speed::ZERO, Speed::max).as_m_per_s();
             let (length, deviation) = (hop.trip.length.as_m(), hop.trip.length_deviation.as_m());
             eprintln!(
                 "{day}: {length:4.0} m ± {deviation:2.0} m, up to {:2.0} km/h; speed left at the stop {before:5.1} m/s as \
                  added up, {:4.1} with both ends, 0 after closure",
                 3.6 * fastest,
-                hop.trip.closure.rest().as_m_per_s(),
+                hop.trip.ends.rest().as_m_per_s(),
             );
             // Stations of line 4 lie some 400 to 700 m apart; 400 m is the least that was surveyed, 10 % is ours.
             assert!((320.0..800.0).contains(&length), "{day}: {length} m");
@@ -314,7 +314,7 @@ fn what_is_read_at_both_stops_takes_most_of_the_drift_out() {
     let (mut added_up, mut with_ends) = (Vec::new(), Vec::new());
     for hop in recordings.iter().flat_map(hops) {
         added_up.push(hop.trace.last().unwrap().1.as_m_per_s().abs());
-        with_ends.push(hop.trip.closure.rest().as_m_per_s().abs());
+        with_ends.push(hop.trip.ends.rest().as_m_per_s().abs());
     }
     let (added_up, with_ends) = (median(added_up), median(with_ends));
     eprintln!(
@@ -328,11 +328,8 @@ fn accelerations_are_those_of_a_metro() {
     let Some(recordings) = recordings() else { return };
     let mut accelerations = Vec::new();
     for hop in recordings.iter().flat_map(hops) {
-        let speeds: Vec<f64> = hop
-            .trace
-            .iter()
-            .map(|(since, speed)| hop.trip.closure.speed(*since, *speed).as_m_per_s())
-            .collect();
+        let speeds: Vec<f64> =
+            hop.trace.iter().map(|(since, speed)| hop.trip.ends.speed(*since, *speed).as_m_per_s()).collect();
         // Means over 2 s, as the README of the recordings gives them for readings with the high pass.
         accelerations.extend(speeds.windows(21).map(|window| (window[20] - window[0]) / 2.0));
     }

@@ -122,7 +122,9 @@ fn a_direction_counts_once_two_reports_agree() {
     desk.station.answers.retain(|(request, _)| *request != "<t 24>");
     desk.command(speed(T24, 8));
     // `128`, forward at rest, without its first digit; then twice whole.
-    for (answer, drives) in [("<l 24 0 28 0>\n", false), ("<l 24 0 128 0>\n", false), ("<l 24 0 128 0>\n", true)] {
+    for (answer, drives) in
+        [("<l 24 0 28 0>\n", false), ("<l 24 0 128 0>\n", false), ("<l 24 0 128 0>\n", true)]
+    {
         desk.run_for(100);
         desk.hear(answer);
         desk.run_for(100);

@@ -8,7 +8,7 @@ use footplate_core::control::{Dispatcher, Driver};
 use footplate_core::model::MotionModel;
 use footplate_core::track::Layout;
 use footplate_core::tracking::DriftTest;
-use footplate_core::tracking::{DueContact, PassedContact, PathPoint};
+use footplate_core::tracking::{DueSensor, PassedSensor, PathPoint};
 use footplate_core::{FunctionNumber, HALF_95, Length, SensorId, TimeSpan, Timestamp, TrainId};
 use footplate_wire::ReportedFunctions;
 use serde::Serialize;
@@ -36,9 +36,9 @@ const MODEL_INTERVAL: TimeSpan = TimeSpan::from_ms(1_000);
 pub(crate) struct TrainPassed {
     pub(crate) train: TrainId,
     /// The detection, beside its prediction.
-    pub(crate) passed: PassedContact,
+    pub(crate) passed: PassedSensor,
     /// The detection that is due next.
-    pub(crate) next: Option<DueContact>,
+    pub(crate) next: Option<DueSensor>,
 }
 
 /// Publishes the state of a driver on a board.

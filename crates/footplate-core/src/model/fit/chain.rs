@@ -128,11 +128,11 @@ impl Chain {
         if self.step == 0 && (self.at_rest || self.trips.is_empty()) {
             return false;
         }
-        let way = self
+        let path = self
             .at
             .filter(|_| self.unbroken)
             .and_then(|from| reach_of(layout, turnouts, from, report.sensor));
-        let begins_anew = !self.unbroken || (self.at.is_some() && way.is_none());
+        let begins_anew = !self.unbroken || (self.at.is_some() && path.is_none());
         if begins_anew {
             // The earlier path is unknown: distances count from here. A train that has moved as commanded since it was at rest
             // may still be accelerating; any other counts as running steadily.
@@ -143,7 +143,7 @@ impl Chain {
             self.trips.push(trip);
             self.unbroken = true;
         }
-        let ahead: Vec<(usize, f64)> = way.as_ref().map_or_else(Vec::new, |way| edges(layout, way));
+        let ahead: Vec<(usize, f64)> = path.as_ref().map_or_else(Vec::new, |path| edges(layout, path));
         if let [.., stopped, trip] = self.trips.as_mut_slice()
             && trip.continues
             && trip.detections.is_empty()
@@ -162,8 +162,8 @@ impl Chain {
             self.behind.drain(..far.unwrap_or(0));
         }
         let Some(trip) = self.trips.last_mut() else { return false };
-        let (length, sections) = way.filter(|_| !begins_anew).map_or((0.0, Vec::new()), |way| {
-            (way.length.as_m(), way.hops().iter().filter_map(|hop| sections.section(*hop)).collect())
+        let (length, sections) = path.filter(|_| !begins_anew).map_or((0.0, Vec::new()), |path| {
+            (path.length.as_m(), path.hops().iter().filter_map(|hop| sections.section(*hop)).collect())
         });
         let (sensor, variance) = (Some(report.sensor), interval * interval / 12.0);
         trip.pass(TripDetection { node, sensor, time, variance, length, sections });
@@ -211,8 +211,8 @@ impl Chain {
 }
 
 /// The edges of a path, with their lengths (m).
-fn edges(layout: &Layout, way: &Reach) -> Vec<(usize, f64)> {
-    let hops = way.hops().iter().filter_map(|hop| layout.hop(*hop));
+fn edges(layout: &Layout, path: &Reach) -> Vec<(usize, f64)> {
+    let hops = path.hops().iter().filter_map(|hop| layout.hop(*hop));
     let edges = hops.flat_map(|hop| hop.edges.iter().copied());
     edges.filter_map(|edge| Some((usize::from(edge.0), layout.edge(edge)?.length.as_m()))).collect()
 }

@@ -51,7 +51,7 @@ impl MotionModel {
 
     /// Sensors passed, over all steps.
     #[must_use]
-    pub fn contacts_passed(&self) -> u32 {
+    pub fn sensors_passed(&self) -> u32 {
         self.counts.iter().flatten().map(|counts| counts.contacts).sum()
     }
 }

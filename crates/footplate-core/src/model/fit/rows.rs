@@ -12,7 +12,7 @@ use crate::model::parameters::{
     shape_at, speed_at,
 };
 use crate::model::priors::SHAPE_ERROR;
-use crate::model::priors::{FELT, TRIP_DEVIATION, WANDER, change_error};
+use crate::model::priors::{PATH_LENGTH_SPREAD, TRIP_DEVIATION, WANDER, change_error};
 use crate::model::scatter::Scatter;
 use crate::model::segment::Segment;
 use crate::model::sensor_scatter::SensorVariances;
@@ -231,7 +231,7 @@ impl Point<'_> {
             let taped = counted().map(|detection| detection.length).sum::<f64>() + rest.beyond;
             let passed = counted().flat_map(|detection| &detection.sections).chain(&rest.sections);
             let (taped_longer, taped_sections) = self.longer(passed);
-            let tape = TAPE * TAPE + FELT * FELT * rest.beyond * rest.beyond;
+            let tape = TAPE * TAPE + PATH_LENGTH_SPREAD * PATH_LENGTH_SPREAD * rest.beyond * rest.beyond;
             // With a next trip the tape measures its beginning; otherwise the scatter of the stop is included.
             let (mut terms, at_rest, variance) = match next_place {
                 Some(place) => {

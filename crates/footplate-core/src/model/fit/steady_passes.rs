@@ -46,7 +46,7 @@ struct Usual {
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct SteadyPasses {
-    /// The last two passes of a steady run under way.
+    /// The last two passes of a steady run in progress.
     recent: Vec<Pass>,
     usual: BTreeMap<SensorId, Vec<Usual>>,
     scatter: SensorScatter,

@@ -309,12 +309,12 @@ impl<'t> Walk<'t> {
         self.segment
     }
 
-    /// Whether the change under way ends at rest.
+    /// Whether the present change ends at rest.
     pub(super) fn is_stopping(&self) -> bool {
         self.segments.get(self.segment).is_some_and(Segment::is_stop)
     }
 
-    /// How much of the change under way is neither begun nor done (0 to 1, most at its middle), and its displacement (m).
+    /// How much of the present change is neither begun nor done (0 to 1, most at its middle), and its displacement (m).
     pub(super) fn in_change(&self, time: f64) -> (f64, f64) {
         self.segments.get(self.segment).map_or((0.0, 0.0), |segment| {
             let share = segment.share(time);

@@ -32,17 +32,17 @@ impl Review {
         let law = self.laws.get(&change.direction())?.laws.first()?;
         let table = step_table(model);
         let state = |since: f64| law_state(law, change, table.as_ref(), since);
-        let ways: Vec<(f64, f64)> = change
+        let distances: Vec<(f64, f64)> = change
             .points
             .iter()
             .map(|point| {
                 state(point.since_command).map(|state| (state.distance.as_m(), state.speed.as_m_per_s()))
             })
             .collect::<Option<_>>()?;
-        let off = residuals(&ways, change);
+        let off = residuals(&distances, change);
         // All detections have the same x₀: take it from the first.
-        let (first, (way, _)) = (change.points.first()?, ways.first()?);
-        let x0 = Length::from_m(first.way - way - off.first()?.1);
+        let (first, (distance, _)) = (change.points.first()?, distances.first()?);
+        let x0 = Length::from_m(first.distance - distance - off.first()?.1);
         let placed = |state: MotionState| MotionState { distance: state.distance + x0, ..state };
         Some(FittedChange {
             states: times.iter().map(|time| state(time.as_s()).map(placed)).collect::<Option<_>>()?,
@@ -62,11 +62,11 @@ fn law_state(
     let [delay, _] = law.delay;
     let motion = motion(law.kind, pace, change, table)?;
     let since_effect = since_command - delay;
-    let (way, speed) = at(&motion, change.speeds[0].as_m_per_s(), since_effect);
+    let (distance, speed) = at(&motion, change.speeds[0].as_m_per_s(), since_effect);
     let acceleration = if since_effect <= 0.0 {
         Acceleration::ZERO
     } else {
         motion.state_at(TimeSpan::from_s(since_effect)).acceleration
     };
-    Some(MotionState { distance: Length::from_m(way), speed: Speed::from_m_per_s(speed), acceleration })
+    Some(MotionState { distance: Length::from_m(distance), speed: Speed::from_m_per_s(speed), acceleration })
 }

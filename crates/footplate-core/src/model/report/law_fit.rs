@@ -118,7 +118,7 @@ pub(super) fn motion<'t>(
     }
 }
 
-/// Way and speed at a time since the command.
+/// Distance and speed at a time since the command.
 pub(super) fn at(motion: &impl Motion, from: f64, since_effect: f64) -> (f64, f64) {
     if since_effect <= 0.0 {
         return (from * since_effect, from);
@@ -142,23 +142,24 @@ fn total_cost(all: &[(f64, f64)]) -> f64 {
 }
 
 /// Residuals of one change over their standard deviations, and in m, `x0` eliminated.
-pub(super) fn residuals(ways: &[(f64, f64)], change: &Transient) -> Vec<(f64, f64)> {
+pub(super) fn residuals(distances: &[(f64, f64)], change: &Transient) -> Vec<(f64, f64)> {
     let weights: Vec<f64> = change
         .points
         .iter()
-        .zip(ways)
+        .zip(distances)
         .map(|(point, (_, speed))| {
-            1.0 / (speed * speed * point.variance + change.way_doubt * change.way_doubt)
+            1.0 / (speed * speed * point.variance + change.distance_deviation * change.distance_deviation)
         })
         .collect();
-    let off = |(point, (way, _)): (&super::transient::TransientPoint, &(f64, f64))| point.way - way;
+    let off =
+        |(point, (distance, _)): (&super::transient::TransientPoint, &(f64, f64))| point.distance - distance;
     let sum: f64 =
-        change.points.iter().zip(ways).map(off).zip(&weights).map(|(off, weight)| off * weight).sum();
+        change.points.iter().zip(distances).map(off).zip(&weights).map(|(off, weight)| off * weight).sum();
     let x0 = sum / weights.iter().sum::<f64>();
     change
         .points
         .iter()
-        .zip(ways)
+        .zip(distances)
         .map(off)
         .zip(&weights)
         .map(|(off, weight)| ((off - x0) * libm::sqrt(*weight), off - x0))
@@ -175,12 +176,12 @@ fn all_residuals(
     for change in changes {
         let motion = motion(kind, libm::exp(x[0]), change, table)?;
         let [from, _] = change.speeds;
-        let ways: Vec<(f64, f64)> = change
+        let distances: Vec<(f64, f64)> = change
             .points
             .iter()
             .map(|point| at(&motion, from.as_m_per_s(), point.since_command - x[1].max(0.0)))
             .collect();
-        all.extend(residuals(&ways, change));
+        all.extend(residuals(&distances, change));
     }
     Some(all)
 }

@@ -47,7 +47,7 @@ const EVEN_LN_LAG: f64 = -7.0;
 /// An even change needs no friction to end (m/s²).
 const NO_FRICTION: f64 = 1e-4;
 
-/// How far the law's shape is off within a change, as part of its way: for most trains (docs/theory/motion_model.md). No number
+/// How far the law's shape is off within a change, as part of its distance: for most trains (docs/theory/motion_model.md). No number
 /// of positions narrows it, so that it is added to where a stop begins and how long it is.
 const SHAPE: f64 = 0.04;
 
@@ -269,10 +269,10 @@ impl Series {
 
     /// Where the search begins: the delay and ramp that a stop or start of this length has at an even rate.
     fn first(&self, is_even: bool) -> [f64; N] {
-        let (duration, way) =
+        let (duration, distance) =
             (self.times.last().copied().unwrap_or(0.0), self.positions.last().copied().unwrap_or(0.0));
         // A change at once at the time `at` would get as far; a real one begins before it, and takes about a second.
-        let running = way / self.speed;
+        let running = distance / self.speed;
         let at = if self.change == SeriesChange::Stop { running } else { duration - running };
         let effect = (at - 0.5).max(0.0);
         let position = if self.change == SeriesChange::Stop { self.speed * effect } else { 0.0 };
@@ -328,7 +328,7 @@ impl Series {
         };
         let (lag, is_stop) = (libm::exp(x[LAG]), self.change == SeriesChange::Stop);
         let (ramp, friction) = (libm::exp(x[RAMP]), libm::exp(x[FRICTION]));
-        let (way, way_deviation) = derived(Segment::distance_to_rest);
+        let (distance, distance_deviation) = derived(Segment::distance_to_rest);
         let (time, time_deviation) = derived(|law| law.settled() - law.begins);
         let shape = SHAPE * self.law(x).delay() * x[SPEED];
         let shape_time = SHAPE * self.law(x).delay();
@@ -350,8 +350,8 @@ impl Series {
                 date: Timestamp::ZERO,
             }),
             stopping_distance: is_stop.then(|| Estimate {
-                value: Length::from_m(way),
-                uncertainty: Length::from_m(libm::hypot(way_deviation, shape)),
+                value: Length::from_m(distance),
+                uncertainty: Length::from_m(libm::hypot(distance_deviation, shape)),
                 count,
                 date: Timestamp::ZERO,
             }),

@@ -86,7 +86,7 @@ impl RunPassages {
         read
     }
 
-    /// The stretches in which the train ran settled: each a chain of passages linked by known ways, at one
+    /// The stretches in which the train ran settled: each a chain of passages linked by known paths, at one
     /// step, after the change to it was over.
     pub fn settled_stretches<'r>(
         &'r self,
@@ -101,7 +101,7 @@ impl RunPassages {
         };
         self.passages
             .chunk_by(move |one, next| {
-                settled(one) && settled(next) && one.drive == next.drive && next.way.is_some()
+                settled(one) && settled(next) && one.drive == next.drive && next.path.is_some()
             })
             .filter(|chain| chain.len() > 1)
     }

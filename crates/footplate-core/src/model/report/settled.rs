@@ -52,7 +52,7 @@ pub struct SettledRunning {
     /// Stretches of a run at one step whose contacts are linked by known paths, in order.
     pub stretches: Vec<Vec<SettledPassage>>,
     /// One standard deviation of contacts about the place where they usually close.
-    pub contact_scatter: Length,
+    pub sensor_scatter: Length,
     /// One standard deviation of the speed of a run about that of its step, as a part of it.
     pub run_deviation: f64,
 }
@@ -82,7 +82,7 @@ impl SettledRunning {
                         .iter()
                         .enumerate()
                         .map(|(place, passage)| {
-                            let reach = passage.way.as_ref().filter(|_| place > 0);
+                            let reach = passage.path.as_ref().filter(|_| place > 0);
                             SettledPassage {
                                 run: run.run,
                                 passage: *passage,
@@ -107,7 +107,7 @@ impl SettledRunning {
             scatter = scatter_of(&stretches);
         }
         let run_deviation = run_deviation(model, &stretches, scatter);
-        Self { stretches, contact_scatter: Length::from_m(scatter), run_deviation }
+        Self { stretches, sensor_scatter: Length::from_m(scatter), run_deviation }
     }
 
     /// Reports that chance hardly makes.
@@ -127,7 +127,7 @@ impl SettledRunning {
         };
         let longest = self.stretches.iter().filter(is_of_drive).max_by_key(|stretch| stretch.len());
         let Some((shown, variance)) =
-            longest.and_then(|stretch| speed_of(stretch, self.contact_scatter.as_m()))
+            longest.and_then(|stretch| speed_of(stretch, self.sensor_scatter.as_m()))
         else {
             return [usual, usual * libm::sqrt(usual_variance)];
         };

@@ -60,7 +60,7 @@ impl TapedStop {
             if reached {
                 break;
             }
-            path += path_length(layout, sections, model, passage.way.as_ref()?).as_m();
+            path += path_length(layout, sections, model, passage.path.as_ref()?).as_m();
             reached = passage.node == landmark;
         }
         if !reached {

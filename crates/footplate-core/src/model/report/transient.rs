@@ -42,7 +42,7 @@ pub struct TransientPoint {
     /// Variance of that, from the poll (s²).
     pub variance: f64,
     /// Path since the first contact of the change (m), with the lengths of the motion model.
-    pub way: f64,
+    pub distance: f64,
     /// The entry of the run that reported it.
     pub entry: usize,
 }
@@ -60,8 +60,8 @@ pub struct Transient {
     pub speeds: [Speed; 2],
     /// Its contacts in order.
     pub points: Vec<TransientPoint>,
-    /// Scatter of the train's contacts and doubt of the way between them (m).
-    pub way_doubt: f64,
+    /// Scatter of the train's contacts and uncertainty of the path between them (m).
+    pub distance_deviation: f64,
 }
 
 impl Transient {
@@ -89,7 +89,7 @@ pub(super) struct ChangeReader<'r> {
 impl ChangeReader<'_> {
     /// All changes of speed in a run of which enough was seen.
     pub(super) fn changes(&self, run: &RunPassages) -> Vec<Transient> {
-        let chains = run.passages.chunk_by(|one, next| one.drive == next.drive && next.way.is_some());
+        let chains = run.passages.chunk_by(|one, next| one.drive == next.drive && next.path.is_some());
         let mut before: Option<Drive> = None;
         chains
             .filter_map(|chain| {
@@ -115,12 +115,12 @@ impl ChangeReader<'_> {
         } else {
             self.running.speed_in_run(self.model, run.run, drive)[0]
         };
-        let mut way = 0.0;
+        let mut distance = 0.0;
         let mut settled = 0;
         let mut points = Vec::new();
         for (place, passage) in chain.iter().enumerate() {
-            if let (true, Some(reach)) = (place > 0, &passage.way) {
-                way += path_length(self.layout, self.sections, self.model, reach).as_m();
+            if let (true, Some(reach)) = (place > 0, &passage.path) {
+                distance += path_length(self.layout, self.sections, self.model, reach).as_m();
             }
             let since = passage.window.middle() - commanded;
             settled += usize::from(since > ends);
@@ -130,7 +130,7 @@ impl ChangeReader<'_> {
             points.push(TransientPoint {
                 since_command: since.as_s(),
                 variance: passage.window.variance_s2(),
-                way,
+                distance,
                 entry: passage.entry,
             });
         }
@@ -144,7 +144,7 @@ impl ChangeReader<'_> {
             steps: [drive.from, drive.step],
             speeds: [from, to],
             points,
-            way_doubt: libm::hypot(self.running.contact_scatter.as_m(), PATH_UNCERTAINTY_M),
+            distance_deviation: libm::hypot(self.running.sensor_scatter.as_m(), PATH_UNCERTAINTY_M),
         })
     }
 }

@@ -172,7 +172,7 @@ impl Finder<'_> {
         from_first: &[Passage],
     ) -> Option<Vec<TwoSensorChange>> {
         let (before, after) = (last.drive, first.drive);
-        let commanded = after.commanded.filter(|_| before != after && first.way.is_some())?;
+        let commanded = after.commanded.filter(|_| before != after && first.path.is_some())?;
         let is_steady = before.step != SpeedStep::STAND
             && before.step == after.from
             && before
@@ -186,12 +186,13 @@ impl Finder<'_> {
         let command_delay = if after.step > before.step { self.faster } else { self.slower };
         let before_command =
             self.estimate(commanded - last.window.middle(), deviation(last.window.variance_s2()));
-        let scatter = self.running.contact_scatter.as_m();
+        let scatter = self.running.sensor_scatter.as_m();
         let (mut distance, mut variance) = (0.0, 2.0 * scatter * scatter);
-        let seconds = from_first.iter().take_while(|passage| passage.drive == after && passage.way.is_some());
+        let seconds =
+            from_first.iter().take_while(|passage| passage.drive == after && passage.path.is_some());
         let mut changes = Vec::new();
         for second in seconds.take(SECOND_SENSORS) {
-            let (length, of_length) = self.length(second.way.as_ref()?);
+            let (length, of_length) = self.length(second.path.as_ref()?);
             distance += length;
             variance += of_length;
             // It may have closed before the command, and says nothing of the change.

@@ -24,7 +24,7 @@ const FEWEST_HOPS: usize = 5;
 /// A section that was passed less often says nothing: one poll too late, or one spurious report, is no length.
 const FEWEST_PASSES: usize = 3;
 
-/// Times between two polled reports scatter by about so much of a way (m), one standard deviation: one poll of 70 ms at mid
+/// Times between two polled reports scatter by about so much of a distance (m), one standard deviation: one poll of 70 ms at mid
 /// speed.
 const SCATTER: f64 = 0.013;
 
@@ -37,7 +37,7 @@ pub struct LayoutTest {
     is_sole: bool,
     last: Option<(NodeId, Timestamp)>,
     steady_from: Timestamp,
-    /// Sections of the stretch of running under way, with `ln(t/m)`.
+    /// Sections of the present stretch of running, with `ln(t/m)`.
     running: Vec<(usize, f64)>,
     /// By section, by how much `ln(t/m)` was above the median of its stretch.
     longer: BTreeMap<usize, Vec<f64>>,
@@ -119,13 +119,13 @@ impl LayoutTest {
         let mut test = self.clone();
         test.end_stretch();
         let passed = test.longer.iter().filter(|(_, longer)| longer.len() >= FEWEST_PASSES);
-        let felt = passed.filter_map(|(section, longer)| {
+        let path_length = passed.filter_map(|(section, longer)| {
             let length = sections.surveyed_length(*section);
             let by = length * libm::expm1(median(longer.iter().copied())?);
             // The median of n values is by a quarter worse than their mean.
             Some((*section, by, 1.57 * SCATTER * SCATTER / longer.len() as f64))
         });
-        SurveyTest::of(sections, felt)
+        SurveyTest::of(sections, path_length)
     }
 }
 
@@ -168,6 +168,6 @@ mod tests {
         assert!(laps(&[]).is_passed());
         let test = laps(&[(4, 0.2)]);
         assert_eq!(test.odd.len(), 1, "{test:?}");
-        assert!((test.odd[0].felt - test.odd[0].surveyed - 0.2).abs() < 0.01, "{test:?}");
+        assert!((test.odd[0].path_length - test.odd[0].surveyed - 0.2).abs() < 0.01, "{test:?}");
     }
 }

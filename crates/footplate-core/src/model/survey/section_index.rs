@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use crate::track::{Hop, HopId, Layout, StretchLength};
 use crate::units::Length;
 
-/// Which section each hop of a layout lies on; a hop and its way back are one.
+/// Which section each hop of a layout lies on; a hop and its reverse are one.
 #[derive(Debug, Clone)]
 pub struct SectionIndex {
     of_hop: Vec<u32>,
@@ -102,7 +102,7 @@ impl SectionIndex {
         self.scale
     }
 
-    /// How well the survey knows the way over some sections as a whole: variance of its logarithm. No timing
+    /// How well the survey knows the path over some sections as a whole: variance of its logarithm. No timing
     /// of trains can narrow it, so every speed found on these sections shares it.
     #[must_use]
     pub fn scale_variance(&self, sections: impl Iterator<Item = usize>) -> f64 {

@@ -9,7 +9,7 @@
 use alloc::vec::Vec;
 
 use super::section_index::SectionIndex;
-use crate::model::FELT;
+use crate::model::PATH_LENGTH_SPREAD;
 
 /// Fewer sections cannot tell which of them is wrong.
 const FEWEST: usize = 4;
@@ -32,7 +32,7 @@ pub struct OddSection {
     /// Its length by the survey (m).
     pub surveyed: f64,
     /// Its length by the train, as a tape would have it if the survey is right about half of the sections (m).
-    pub felt: f64,
+    pub path_length: f64,
 }
 
 /// How a survey compares with what a train ran over.
@@ -50,14 +50,14 @@ pub struct SurveyTest {
 impl SurveyTest {
     /// Compares the lengths of a survey with a train's: by section, by how much it feels it longer (m), with the variance.
     #[must_use]
-    pub fn of(sections: &SectionIndex, felt: impl Iterator<Item = (usize, f64, f64)>) -> Self {
+    pub fn of(sections: &SectionIndex, path_length: impl Iterator<Item = (usize, f64, f64)>) -> Self {
         let fits = Self { odd: Vec::new(), factor: 1.0, scale: 0.0 };
-        let known: Vec<Compared> = compared(sections, felt);
-        let Some(ratio) = median(known.iter().map(|one| one.felt / one.surveyed)) else { return fits };
+        let known: Vec<Compared> = compared(sections, path_length);
+        let Some(ratio) = median(known.iter().map(|one| one.path_length / one.surveyed)) else { return fits };
         if known.len() < FEWEST || ratio <= 0.0 {
             return fits;
         }
-        let off = |one: &Compared| one.felt / ratio - one.surveyed;
+        let off = |one: &Compared| one.path_length / ratio - one.surveyed;
         let z = |one: &Compared| off(one).abs() / libm::sqrt(one.variance);
         let factor = PER_MEDIAN * median(known.iter().map(z)).unwrap_or(0.0);
         let factor = if factor > DOUBTED { factor } else { 1.0 };
@@ -67,7 +67,7 @@ impl SurveyTest {
         let odd = odd.into_iter().map(|one| OddSection {
             section: one.section,
             surveyed: one.surveyed,
-            felt: one.felt / ratio,
+            path_length: one.path_length / ratio,
         });
         Self { odd: odd.collect(), factor, scale: if factor > 1.0 { part } else { 0.0 } }
     }
@@ -83,7 +83,7 @@ impl SurveyTest {
     pub fn applied_to(&self, sections: &SectionIndex) -> SectionIndex {
         sections.doubted(self.factor * self.factor, self.scale, |section| {
             let odd = self.odd.iter().find(|odd| odd.section == section);
-            odd.map_or(0.0, |odd| (odd.felt - odd.surveyed) * (odd.felt - odd.surveyed))
+            odd.map_or(0.0, |odd| (odd.path_length - odd.surveyed) * (odd.path_length - odd.surveyed))
         })
     }
 }
@@ -92,13 +92,13 @@ impl SurveyTest {
 struct Compared {
     section: usize,
     surveyed: f64,
-    felt: f64,
+    path_length: f64,
     variance: f64,
 }
 
-fn compared(sections: &SectionIndex, felt: impl Iterator<Item = (usize, f64, f64)>) -> Vec<Compared> {
+fn compared(sections: &SectionIndex, path_length: impl Iterator<Item = (usize, f64, f64)>) -> Vec<Compared> {
     let run_over: Vec<(usize, f64, f64)> =
-        felt.filter(|(section, ..)| sections.surveyed_length(*section) > 0.0).collect();
+        path_length.filter(|(section, ..)| sections.surveyed_length(*section) > 0.0).collect();
     // What a train does not know of the scale all its lengths share: it is no part of how they differ.
     let part = |section: usize, variance: f64| {
         let length = sections.surveyed_length(section);
@@ -110,12 +110,12 @@ fn compared(sections: &SectionIndex, felt: impl Iterator<Item = (usize, f64, f64
         .into_iter()
         .map(|(section, longer, variance)| {
             let surveyed = sections.surveyed_length(section);
-            let feels = FELT * surveyed;
+            let feels = PATH_LENGTH_SPREAD * surveyed;
             let own = (part(section, variance) - shared) * surveyed * surveyed;
             Compared {
                 section,
                 surveyed,
-                felt: surveyed + longer,
+                path_length: surveyed + longer,
                 variance: sections.survey_variance(section) + feels * feels + own,
             }
         })

@@ -13,13 +13,13 @@ use alloc::vec::Vec;
 
 use super::section_index::SectionIndex;
 use crate::linalg::{NormalEquations, Solution};
-use crate::model::{FELT, MotionModel, section_variance};
+use crate::model::{MotionModel, PATH_LENGTH_SPREAD, section_variance};
 use crate::track::{Hop, Layout, LayoutError, StretchLength, Survey, SurveyedDistance};
 use crate::units::Length;
 
 /// Contacts close within this of where a tape would be laid, one standard deviation (m): half a pickup's springiness and a
 /// contact track's own length.
-const CONTACT_PLACE: f64 = 0.005;
+const SENSOR_PLACE: f64 = 0.005;
 /// The part of its variance that what trains feel of a section, and where its contacts close, have in common: curves and contacts
 /// are the same, bogies and pickups are not.
 const IN_COMMON: f64 = 0.5;
@@ -52,7 +52,7 @@ pub struct TrackSurvey {
 struct Row {
     section: usize,
     train: usize,
-    felt: f64,
+    path_length: f64,
     variance: f64,
 }
 
@@ -71,15 +71,16 @@ impl TrackSurvey {
             (layout.stretch_count(), |section: usize| hops.get(section).and_then(Option::as_ref));
         let terms = |row: &Row| {
             let mut terms = edges(row.section).map(terms_of).unwrap_or_default();
-            terms.push((count + row.train, -row.felt));
+            terms.push((count + row.train, -row.path_length));
             terms.push((count + models.len() + row.section, 1.0));
             terms
         };
         let mut known = prior(layout, models.len());
         known.extend((0..sections.len()).map(|section| {
             let length = sections.surveyed_length(section);
-            let felt = rows.iter().find(|row| row.section == section).map_or(length, |row| row.felt);
-            (0.0, IN_COMMON * felt_variance(felt))
+            let path_length =
+                rows.iter().find(|row| row.section == section).map_or(length, |row| row.path_length);
+            (0.0, IN_COMMON * path_length_variance(path_length))
         }));
         let mut weights = vec![1.0; rows.len()];
         let mut solution: Option<Solution> = None;
@@ -92,14 +93,14 @@ impl TrackSurvey {
                 equations.add(&terms, 0.0, variance);
             }
             for (row, weight) in rows.iter().zip(&weights) {
-                let longer = row.felt - sections.surveyed_length(row.section);
+                let longer = row.path_length - sections.surveyed_length(row.section);
                 equations.add(&terms(row), longer, row.variance / weight);
             }
             let found = equations.solve()?;
             for (row, weight) in rows.iter().zip(&mut weights) {
                 let sum: f64 =
                     terms(row).iter().map(|(unknown, slope)| slope * value(&found, *unknown)).sum();
-                let off = row.felt - sections.surveyed_length(row.section) - sum;
+                let off = row.path_length - sections.surveyed_length(row.section) - sum;
                 *weight = (HUBER * libm::sqrt(row.variance) / off.abs().max(f64::MIN_POSITIVE)).min(1.0);
             }
             // Where only sums are known, their parts may come out below nothing.
@@ -171,12 +172,12 @@ impl TrackSurvey {
         let distances = hops.iter().flatten().filter_map(|hop| {
             let section = sections.section(hop.id)?;
             let [_, uncertainty] = self.distance(section)?.map(Length::as_m);
-            let ways = layout.hops_from(hop.from).filter(|other| other.to == hop.to).count();
+            let paths = layout.hops_from(hop.from).filter(|other| other.to == hop.to).count();
             let edges = hop.edges.iter().filter_map(|edge| lengths.get(usize::from(edge.stretch().0)));
             let sum: Length = edges.map(|edge| edge.estimate(layout.survey()).0).sum();
             let shared = self.scale * sum.as_m();
             let own = libm::sqrt((uncertainty * uncertainty - shared * shared).max(LEAST * LEAST));
-            (ways == 1).then(|| SurveyedDistance {
+            (paths == 1).then(|| SurveyedDistance {
                 from: layout.node_name(hop.from).to_string(),
                 to: layout.node_name(hop.to).to_string(),
                 length: sum,
@@ -231,17 +232,17 @@ fn rows_of(sections: &SectionIndex, train: usize, model: &MotionModel) -> Vec<Ro
         if information <= 0.0 {
             return None;
         }
-        let felt = length + longer / (own * information);
-        let variance = 1.0 / information + (1.0 - IN_COMMON) * felt_variance(felt);
-        Some(Row { section: *section, train, felt, variance })
+        let path_length = length + longer / (own * information);
+        let variance = 1.0 / information + (1.0 - IN_COMMON) * path_length_variance(path_length);
+        Some(Row { section: *section, train, path_length, variance })
     });
     rows.collect()
 }
 
 /// Variance (m²) of what a train makes of a section of this length (m), however often it runs over it.
-fn felt_variance(felt: f64) -> f64 {
-    let feels = FELT * felt;
-    feels * feels + 2.0 * CONTACT_PLACE * CONTACT_PLACE
+fn path_length_variance(path_length: f64) -> f64 {
+    let feels = PATH_LENGTH_SPREAD * path_length;
+    feels * feels + 2.0 * SENSOR_PLACE * SENSOR_PLACE
 }
 
 /// What is known beforehand of each unknown, edges and then factors, with the variance.
@@ -276,8 +277,8 @@ fn common_scale<'h, 'l: 'h>(
     let mut all: Vec<(usize, f64)> = Vec::new();
     let mut length = 0.0;
     for (section, found) in found.iter().enumerate() {
-        let (Some((felt, _)), Some(hop)) = (found, edges(section)) else { continue };
-        length += felt;
+        let (Some((path_length, _)), Some(hop)) = (found, edges(section)) else { continue };
+        length += path_length;
         for (edge, times) in terms_of(hop) {
             match all.iter_mut().find(|(known, _)| *known == edge) {
                 Some((_, part)) => *part += times,

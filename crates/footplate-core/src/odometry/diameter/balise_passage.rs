@@ -22,7 +22,7 @@ pub(super) struct Passage {
 
 /// The distance from one balise to another by one wheelset.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct PairedWay {
+pub(super) struct PairedDistance {
     /// By the balises, negative if the wheels turned backwards.
     pub(super) said: Length,
     /// By the wheelset.
@@ -35,8 +35,8 @@ pub(super) struct PairedWay {
 
 impl Passage {
     /// The distances to a later passage by both wheelsets.
-    pub(super) fn ways_to(&self, later: &Self) -> [PairedWay; 2] {
-        let [first, second] = ways(self.counted, later.counted);
+    pub(super) fn distances_to(&self, later: &Self) -> [PairedDistance; 2] {
+        let [first, second] = distances(self.counted, later.counted);
         let [first_from, second_from] = self.counted;
         let [first_to, second_to] = later.counted;
         let backward = first_to + second_to < first_from + second_from;
@@ -45,17 +45,22 @@ impl Passage {
         let [first_open, second_open] = later.within;
         let [first_rolled, second_rolled] = self.rolled;
         [
-            PairedWay { said, counted: first, within: first_within + first_open, rolled: first_rolled },
-            PairedWay { said, counted: second, within: second_within + second_open, rolled: second_rolled },
+            PairedDistance { said, counted: first, within: first_within + first_open, rolled: first_rolled },
+            PairedDistance {
+                said,
+                counted: second,
+                within: second_within + second_open,
+                rolled: second_rolled,
+            },
         ]
     }
 }
 
-impl PairedWay {
+impl PairedDistance {
     /// The scales that are possible when the wheelset rolled, for balises that are off by this together and a pulse.
     pub(super) fn allows(&self, off: Length, pulse: Length) -> Option<ScaleInterval> {
         let open = pulse + self.within;
-        ScaleInterval::of_way(
+        ScaleInterval::of_distances(
             [(self.said - off) * (1.0 - CREEPAGE_BOUND), (self.said + off) * (1.0 + CREEPAGE_BOUND)],
             [self.counted - open, self.counted + open],
         )
@@ -71,6 +76,6 @@ impl PairedWay {
 }
 
 /// How far both wheelsets turned from one reading to another.
-pub(super) fn ways([first_from, second_from]: [Length; 2], [first, second]: [Length; 2]) -> [Length; 2] {
+pub(super) fn distances([first_from, second_from]: [Length; 2], [first, second]: [Length; 2]) -> [Length; 2] {
     [(first - first_from).abs(), (second - second_from).abs()]
 }

@@ -26,7 +26,7 @@ impl ScaleInterval {
     /// The scales that a true distance and a counted one within these bounds allow; `None` when nothing was
     /// counted for certain.
     #[must_use]
-    pub fn of_way(
+    pub fn of_distances(
         [true_low, true_high]: [Length; 2],
         [counted_low, counted_high]: [Length; 2],
     ) -> Option<Self> {
@@ -60,10 +60,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_longer_way_allows_a_smaller_range() {
+    fn a_longer_distance_allows_a_smaller_range() {
         // A kilometre ±2 m counted as 990 m ±34 mm.
         let lengths = |middle, half| [middle - half, middle + half].map(Length::from_m);
-        let interval = ScaleInterval::of_way(lengths(1000.0, 2.0), lengths(990.0, 0.034)).unwrap();
+        let interval = ScaleInterval::of_distances(lengths(1000.0, 2.0), lengths(990.0, 0.034)).unwrap();
         assert!((interval.low - 998.0 / 990.034).abs() < 1e-12);
         assert!((interval.high - 1002.0 / 989.966).abs() < 1e-12);
     }
@@ -76,6 +76,6 @@ mod tests {
             tolerance.meet(ScaleInterval { low: 1.005, high: 1.03 }),
             Some(ScaleInterval { low: 1.005, high: 1.01 })
         );
-        assert_eq!(ScaleInterval::of_way([Length::ZERO; 2], [Length::ZERO; 2]), None);
+        assert_eq!(ScaleInterval::of_distances([Length::ZERO; 2], [Length::ZERO; 2]), None);
     }
 }

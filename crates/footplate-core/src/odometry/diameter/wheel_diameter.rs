@@ -10,7 +10,7 @@ use core::fmt;
 use libm::{log, sqrt};
 
 use super::balise_accuracy::BaliseAccuracy;
-use super::balise_passage::{PairedWay, Passage, ways};
+use super::balise_passage::{PairedDistance, Passage, distances};
 use super::scale_filter::ScaleFilter;
 use super::scale_interval::ScaleInterval;
 use crate::estimate::Estimate;
@@ -79,7 +79,7 @@ pub struct WheelDiameters {
     /// The latest balise that agreed with the one before it.
     trusted: Option<Passage>,
     /// A later one that did not. It is right if the next agrees with it.
-    doubted: Option<Passage>,
+    disputed: Option<Passage>,
     /// For each wheelset the first balise of those that agreed since which it has rolled.
     origins: [Option<Passage>; 2],
     /// Where both began to roll with little effort.
@@ -105,7 +105,7 @@ impl WheelDiameters {
             counts: [0; 2],
             dates: [Timestamp::ZERO; 2],
             trusted: None,
-            doubted: None,
+            disputed: None,
             origins: [None; 2],
             comparing_from: None,
             compared: false,
@@ -150,8 +150,8 @@ impl WheelDiameters {
     pub fn roll(&mut self, time: Timestamp, counted: [Length; 2], rolling: [bool; 2], little_effort: bool) {
         self.grow(counted);
         if rolling != [true; 2] {
-            let Self { trusted, doubted, origins: [first, second], .. } = self;
-            for passage in [trusted, doubted, first, second].into_iter().flatten() {
+            let Self { trusted, disputed, origins: [first, second], .. } = self;
+            for passage in [trusted, disputed, first, second].into_iter().flatten() {
                 for (rolled, rolling) in passage.rolled.iter_mut().zip(rolling) {
                     *rolled &= rolling;
                 }
@@ -165,7 +165,7 @@ impl WheelDiameters {
             self.comparing_from = Some(counted);
             return;
         };
-        let [first, second] = ways(from, counted);
+        let [first, second] = distances(from, counted);
         if first.min(second).as_m() >= COMPARED_WAY_M {
             self.comparing_from = Some(counted);
             self.compare(time, [first, second]);
@@ -177,7 +177,7 @@ impl WheelDiameters {
         if !place.is_finite() {
             return PairVerdict::Refused { said: place, low: Length::ZERO, high: Length::ZERO };
         }
-        let [first, second] = ways(self.counted_before, self.counted).map(|way| way * 0.5);
+        let [first, second] = distances(self.counted_before, self.counted).map(|distance| distance * 0.5);
         let [first_before, second_before] = self.counted_before;
         let [first_now, second_now] = self.counted;
         let here = Passage {
@@ -187,7 +187,7 @@ impl WheelDiameters {
             rolled: [true; 2],
         };
         let mut refusal = None;
-        for before in [self.trusted, self.doubted].into_iter().flatten() {
+        for before in [self.trusted, self.disputed].into_iter().flatten() {
             match self.pair(time, &before, &here) {
                 verdict @ PairVerdict::Refused { .. } => refusal = refusal.or(Some(verdict)),
                 PairVerdict::Accepted => return self.trust(here, PairVerdict::Accepted),
@@ -197,7 +197,7 @@ impl WheelDiameters {
         }
         match refusal {
             Some(verdict) => {
-                self.doubted = Some(here);
+                self.disputed = Some(here);
                 verdict
             }
             None => self.trust(here, PairVerdict::First),
@@ -206,7 +206,7 @@ impl WheelDiameters {
 
     fn trust(&mut self, here: Passage, verdict: PairVerdict) -> PairVerdict {
         self.trusted = Some(here);
-        self.doubted = None;
+        self.disputed = None;
         verdict
     }
 
@@ -248,18 +248,18 @@ impl WheelDiameters {
     fn grow(&mut self, counted: [Length; 2]) {
         self.counted_before = self.counted;
         self.counted = counted;
-        let [first, second] = ways(self.grown_at, counted);
-        let way = first.max(second).as_m();
-        if way >= GROWS_EVERY_M {
+        let [first, second] = distances(self.grown_at, counted);
+        let distance = first.max(second).as_m();
+        if distance >= GROWS_EVERY_M {
             self.grown_at = counted;
-            self.filter.wander(way / 1000.0);
-            self.widen(way);
+            self.filter.wander(distance / 1000.0);
+            self.widen(distance);
         }
     }
 
-    fn widen(&mut self, way_m: f64) {
+    fn widen(&mut self, distance_m: f64) {
         for (interval, wheelset) in self.intervals.iter_mut().zip(&self.wheelsets) {
-            let widened = interval.widened(CHANGES_PER_KM * way_m / 1000.0);
+            let widened = interval.widened(CHANGES_PER_KM * distance_m / 1000.0);
             let possible = ScaleInterval::of_tolerance(wheelset.diameter_tolerance);
             *interval = widened.meet(possible).unwrap_or(possible);
         }
@@ -279,21 +279,22 @@ impl WheelDiameters {
         if from.rolled == [false; 2] {
             return PairVerdict::Disturbed;
         }
-        let ways = from.ways_to(to);
-        let near = |way: &PairedWay| way.counted.max(way.said.abs()).as_m() < NEAREST_PAIR_M;
-        if ways.iter().filter(|way| way.rolled).all(near) {
+        let distances = from.distances_to(to);
+        let near =
+            |distance: &PairedDistance| distance.counted.max(distance.said.abs()).as_m() < NEAREST_PAIR_M;
+        if distances.iter().filter(|distance| distance.rolled).all(near) {
             return PairVerdict::TooNear;
         }
         let off = 2.0 * self.balise.bound;
         let mut met = self.intervals;
-        for ((interval, wheelset), way) in met.iter_mut().zip(&self.wheelsets).zip(&ways) {
+        for ((interval, wheelset), distance) in met.iter_mut().zip(&self.wheelsets).zip(&distances) {
             let pulse = wheelset.pulse_pitch();
-            match way.allows(off, pulse).and_then(|pair| interval.meet(pair)) {
-                _ if !way.rolled => {}
+            match distance.allows(off, pulse).and_then(|pair| interval.meet(pair)) {
+                _ if !distance.rolled => {}
                 Some(both) => *interval = both,
                 None => {
-                    let [low, high] = way.possible(*interval, off, pulse);
-                    return PairVerdict::Refused { said: way.said, low, high };
+                    let [low, high] = distance.possible(*interval, off, pulse);
+                    return PairVerdict::Refused { said: distance.said, low, high };
                 }
             }
         }
@@ -301,12 +302,12 @@ impl WheelDiameters {
         self.lengthen(from, to);
         // In advance, for the distance until the next step.
         self.widen(GROWS_EVERY_M);
-        self.learn(&ways);
+        self.learn(&distances);
         self.settle(time, from.rolled);
         PairVerdict::Accepted
     }
 
-    /// Pairs a balise with the first since which each wheelset has rolled: the longer the way, the less the balises leave open.
+    /// Pairs a balise with the first since which each wheelset has rolled: the longer the distance, the less the balises leave open.
     fn lengthen(&mut self, from: &Passage, to: &Passage) {
         let off = 2.0 * self.balise.bound;
         let each = self.origins.iter_mut().zip(&mut self.intervals).zip(&self.wheelsets);
@@ -315,26 +316,28 @@ impl WheelDiameters {
             if !origin.as_ref().is_some_and(has_rolled) {
                 *origin = Some(*from).filter(has_rolled);
             }
-            let Some(way) = origin.and_then(|origin| origin.ways_to(to).into_iter().nth(wheel)) else {
+            let Some(distance) = origin.and_then(|origin| origin.distances_to(to).into_iter().nth(wheel))
+            else {
                 continue;
             };
             // The scale has changed between the two.
-            let changed = CHANGES_PER_KM * way.counted.as_m() / 1000.0;
-            let allowed = way.allows(off, wheelset.pulse_pitch()).map(|allowed| allowed.widened(changed));
+            let changed = CHANGES_PER_KM * distance.counted.as_m() / 1000.0;
+            let allowed =
+                distance.allows(off, wheelset.pulse_pitch()).map(|allowed| allowed.widened(changed));
             // Where nothing is left, the balises agree in pairs and not over all: one bound was broken by little. Pairs win.
             *interval = allowed.and_then(|allowed| interval.meet(allowed)).unwrap_or(*interval);
         }
     }
 
     /// Gives a pair to the filter. The error of the balises is the same for both wheelsets and is not counted twice.
-    fn learn(&mut self, [one, other]: &[PairedWay; 2]) {
+    fn learn(&mut self, [one, other]: &[PairedDistance; 2]) {
         let [first_pulse, second_pulse] = self.wheelsets.map(|wheelset| wheelset.pulse_pitch());
         let (said, first, second) = (one.said, one.counted, other.counted);
-        // Each end of the pair has its own error, and is at any time of its period: even over the way of the period.
+        // Each end of the pair has its own error, and is at any time of its period: even over the distance of the period.
         let (balise, periods) = (self.balise.deviation / said, one.within / said);
         let balises = 2.0 * balise * balise + periods * periods / 3.0;
-        let own = |pulse: Length, way: Length| {
-            CREEPAGE_DEVIATION * CREEPAGE_DEVIATION + pulse_variance(pulse / way)
+        let own = |pulse: Length, distance: Length| {
+            CREEPAGE_DEVIATION * CREEPAGE_DEVIATION + pulse_variance(pulse / distance)
         };
         let (of_first, of_second) = (own(first_pulse, first), own(second_pulse, second));
         match [one.rolled, other.rolled] {
@@ -364,8 +367,8 @@ impl WheelDiameters {
 }
 
 /// Uncertainty of the logarithm of a distance by the pulses at both ends.
-fn pulse_variance(pulse_over_way: f64) -> f64 {
-    2.0 * PULSE_VARIANCE * pulse_over_way * pulse_over_way
+fn pulse_variance(pulse_over_distance: f64) -> f64 {
+    2.0 * PULSE_VARIANCE * pulse_over_distance * pulse_over_distance
 }
 
 /// A scale that belongs to another wheelset.

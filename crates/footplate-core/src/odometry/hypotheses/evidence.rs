@@ -122,7 +122,7 @@ pub(super) fn evidence(
         GRIPS * of(&scene.rolling) + (Lanes::all(1.0) - GRIPS) * of(&scene.acceleration)
     };
     let (low, high) = (range(|range| range.low), range(|range| range.high));
-    // A train on whose rail one wheelset slides brakes no harder than half way between what is commanded and the most.
+    // A train on whose rail one wheelset slides brakes no harder than the middle between what is commanded and the most.
     let halfway = match scene.commanded {
         Some(commanded) if commanded < 0.0 => 0.5 * (commanded - scene.acceleration.low),
         _ => 0.0,

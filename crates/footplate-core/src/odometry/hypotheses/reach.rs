@@ -14,7 +14,7 @@ use crate::odometry::wheels::{Range, larger, smaller};
 /// takes 0.05 for full traction.
 const UNSEEN: [f64; 2] = [0.2, 0.08];
 /// The same where no command is recorded: most of the time that the wheels' acceleration is taken for, nothing acts.
-const UNSEEN_UNTOLD: [f64; 2] = [0.14, 0.07];
+const UNSEEN_WITHOUT_COMMAND: [f64; 2] = [0.14, 0.07];
 /// Wheels that begin to creep faster than this are seen to (m/s²).
 const UNSEEN_RATE: f64 = 0.8;
 /// Wheels that turn alike so soon after one was turned up to the train (s), and slip with no more than this probability,
@@ -150,7 +150,7 @@ impl Reach {
                 )
             }
         };
-        let unseen = if scene.commanded.is_some() { UNSEEN } else { UNSEEN_UNTOLD };
+        let unseen = if scene.commanded.is_some() { UNSEEN } else { UNSEEN_WITHOUT_COMMAND };
         let [of_brake, of_traction] = unseen.map(creeps);
         let [towards_low, towards_high] = match (returns, self.side > 0.0) {
             (true, true) => [traction, 1.0],
@@ -236,7 +236,7 @@ mod tests {
             traction: 0.0,
             slide: true,
             slip: true,
-            felt: None,
+            inertial: None,
             independent: false,
             top_speed: 40.0,
         };

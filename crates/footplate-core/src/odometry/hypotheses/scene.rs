@@ -44,7 +44,7 @@ pub(in super::super) struct Scene {
     pub(in super::super) slide: bool,
     pub(in super::super) slip: bool,
     /// Acceleration from an inertial sensor (m/s²).
-    pub(in super::super) felt: Option<f64>,
+    pub(in super::super) inertial: Option<f64>,
     /// Both wheelsets sliding alike can be ruled out.
     pub(in super::super) independent: bool,
     /// The highest speed of the train (m/s).

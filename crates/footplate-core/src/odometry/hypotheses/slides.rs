@@ -26,7 +26,7 @@ const SLIDES_FOR_S: f64 = 2.0;
 const CREEPS_WITHIN: f64 = 0.5;
 const CREEPS_FOR_S: f64 = 3.0;
 /// Standard deviation of the acceleration of an inertial sensor (m/s²), with the same correlation time.
-const FELT_WITHIN: f64 = 0.06;
+const INERTIAL_WITHIN: f64 = 0.06;
 /// Softness of the limits of steady creep (part of the speed).
 const CREEP_EDGE: f64 = 0.03;
 /// Standard deviation of the bound that a wheel sets which is faster than a sliding train (m/s).
@@ -60,10 +60,10 @@ impl Bank {
             state.a = larger(smaller(state.a, high), low);
             self.filters.set(lane, state);
         }
-        if let Some(felt) = scene.felt {
+        if let Some(inertial) = scene.inertial {
             for lane in MOVES {
                 let mut state = self.filters.state(lane);
-                state.acceleration(felt - state.a, lasting(FELT_WITHIN, SLIDES_FOR_S, t));
+                state.acceleration(inertial - state.a, lasting(INERTIAL_WITHIN, SLIDES_FOR_S, t));
                 self.filters.set(lane, state);
             }
         }

@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_high_pass_took_away_comes_back() {
+    fn what_a_high_pass_removed_comes_back() {
         // Pulls, coasts, brakes, stands.
         let acceleration = |t: f64| match t {
             t if t < 2.0 => 0.0,

@@ -50,10 +50,10 @@ impl Default for InertialNoise {
     }
 }
 
-/// How far a measured speed is from what the accelerometer foretold.
+/// How far a measured speed is from what the accelerometer predicted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpeedInnovation {
-    /// Measured less foretold.
+    /// Measured less predicted.
     pub value: Speed,
     /// Its standard deviation, if both are right.
     pub deviation: Speed,

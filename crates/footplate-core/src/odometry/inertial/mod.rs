@@ -13,7 +13,7 @@ mod inertial_bounds;
 mod inertial_filter;
 mod standstill;
 mod trip;
-mod trip_closure;
+mod trip_ends;
 
 pub use acceleration_block::{AccelerationBlock, BlockAverage};
 pub use axis_alignment::{AxisAlignment, ForwardAxis};
@@ -22,4 +22,4 @@ pub use inertial_bounds::{InertialBounds, InertialLimits};
 pub use inertial_filter::{InertialFilter, InertialNoise, SpeedInnovation};
 pub use standstill::{DriftLimits, Standing, StandstillDetector, StandstillThresholds};
 pub use trip::{RunningTrip, Trip, TripRecorder};
-pub use trip_closure::{BiasWalk, TripClosure};
+pub use trip_ends::{BiasWalk, TripEnds};

@@ -6,7 +6,7 @@ use super::acceleration_block::AccelerationBlock;
 use super::standstill::{
     DEPARTING, DriftLimits, Standing, StandstillDetector, StandstillThresholds, WATCHED,
 };
-use super::trip_closure::{BiasWalk, TripClosure};
+use super::trip_ends::{BiasWalk, TripEnds};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Acceleration, Length, Speed};
 
@@ -22,7 +22,7 @@ pub struct Trip {
     /// One standard deviation of that, by how much the speeds of all trips so far were off at their ends.
     pub length_deviation: Length,
     /// Takes the drift out of what the readings of this trip added up to.
-    pub closure: TripClosure,
+    pub ends: TripEnds,
 }
 
 /// What the readings of a trip add up to so far, less what was read while standing before it; drift included.
@@ -143,14 +143,14 @@ impl TripRecorder {
     fn close(&mut self, running: &RunningTrip, arrival: Timestamp, stands_with: f64) -> Trip {
         // What was read before the departure is already taken out.
         let standing = [Acceleration::ZERO, Acceleration::from_m_per_s2(stands_with) - running.standing];
-        let closure = TripClosure::new(running.since, standing, running.speed);
-        self.walk.take(&closure);
+        let ends = TripEnds::new(running.since, standing, running.speed);
+        self.walk.take(&ends);
         Trip {
             departure: running.departure,
             arrival,
-            length: closure.distance(running.since, running.distance),
+            length: ends.distance(running.since, running.distance),
             length_deviation: self.walk.length_deviation(running.since),
-            closure,
+            ends,
         }
     }
 }

@@ -262,8 +262,8 @@ mod tests {
         for fusion in [Fusion::Reset, Fusion::CovarianceIntersection] {
             let (_, bias) = slide(fusion, [0.998, 1e-3, 1e-3]);
             assert!(bias.abs() < 0.05, "{fusion:?}: {bias}");
-            let (_, believed) = slide(fusion, [0.4995, 0.4995, 1e-3]);
-            assert!((believed + 1.0).abs() < 0.05, "{fusion:?}: believed, it pulls half way: {believed}");
+            let (_, trusted) = slide(fusion, [0.4995, 0.4995, 1e-3]);
+            assert!((trusted + 1.0).abs() < 0.05, "{fusion:?}: trusted, it pulls by a half: {trusted}");
         }
     }
 

@@ -8,7 +8,7 @@ use crate::odometry::sound::sound_period;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MotionStep {
     /// What the mean acceleration adds to the speed if the state's own has nothing beyond it.
-    way_of_mean: f64,
+    distance_of_mean: f64,
     mean: f64,
     /// What acceleration beyond the mean does to speed and acceleration.
     of_excess: [f64; 2],
@@ -24,7 +24,7 @@ impl MotionStep {
         let period = sound_period(period);
         let errors = [period, 1.0];
         Self {
-            way_of_mean: 0.0,
+            distance_of_mean: 0.0,
             mean: 0.0,
             of_excess: errors,
             of_error: errors,
@@ -45,7 +45,7 @@ impl MotionStep {
         let noise = model.process_noise_up_to(most);
         let missing = (least - noise.acceleration).max(0.0);
         Self {
-            way_of_mean: period,
+            distance_of_mean: period,
             mean,
             of_excess: model.of_acceleration(),
             of_error,
@@ -58,7 +58,7 @@ impl MotionStep {
     pub fn state(&self, [speed, acceleration]: [f64; 2]) -> [f64; 2] {
         let excess = acceleration - self.mean;
         let [to_speed, to_acceleration] = self.of_excess;
-        [speed + self.way_of_mean * self.mean + to_speed * excess, self.mean + to_acceleration * excess]
+        [speed + self.distance_of_mean * self.mean + to_speed * excess, self.mean + to_acceleration * excess]
     }
 
     /// What becomes of the covariance: F P Fᵀ + Q.

@@ -123,9 +123,9 @@ impl Published {
         let filter = self.filter.get_or_insert_with(|| FederatedFilter::starting_at(self.fusion, before));
         let [first_lost, second_lost] = lost;
         let rolls = [first_lost.is_none(), second_lost.is_none()];
-        let believed = [rolls[0] && first_speed.is_some(), rolls[1] && second_speed.is_some()];
+        let trusted = [rolls[0] && first_speed.is_some(), rolls[1] && second_speed.is_some()];
         let speeds = [first_speed, second_speed, stood_in].map(|speed| speed.unwrap_or(0.0));
-        let shares = Sharing::PAPER.shares(speeds, believed);
+        let shares = Sharing::PAPER.shares(speeds, trusted);
         let step = self.manoeuvre.next_step(t);
         let measured = [
             measured(first_speed, quantum(first)),

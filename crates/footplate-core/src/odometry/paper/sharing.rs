@@ -53,8 +53,8 @@ impl Sharing {
     /// The shares of the two wheelsets and the virtual sensor, from the speeds (m/s) they claim and from whether
     /// each wheelset is trusted. They add up to 1, and none is much below the floor.
     #[must_use]
-    pub fn shares(&self, speeds: [f64; 3], believed: [bool; 2]) -> [f64; 3] {
-        let [first, second] = believed;
+    pub fn shares(&self, speeds: [f64; 3], trusted: [bool; 2]) -> [f64; 3] {
+        let [first, second] = trusted;
         let [v1, v2, v3] = speeds.map(|speed| self.weight(speed));
         let claims = [
             if first { v1 } else { 0.0 },
@@ -130,12 +130,12 @@ mod tests {
         #[test]
         fn all_of_it_is_shared_out(
             speeds in proptest::array::uniform3(proptest::num::f64::ANY),
-            believed in proptest::array::uniform2(proptest::bool::ANY),
+            trusted in proptest::array::uniform2(proptest::bool::ANY),
             floor in proptest::num::f64::ANY,
             exponent in 0..100_u32,
         ) {
             let sharing = Sharing::new(floor, exponent);
-            let shares = sharing.shares(speeds, believed);
+            let shares = sharing.shares(speeds, trusted);
             prop_assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-15 * 4.0);
             // The floors of the others come off.
             let least = sharing.floor / (1.0 + 2.0 * sharing.floor);

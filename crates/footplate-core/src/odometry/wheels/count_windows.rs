@@ -75,11 +75,14 @@ impl CountWindows {
 
     /// So many pulses in the last `period` seconds, of which so many may be wrong.
     #[inline]
-    pub fn counted(&mut self, period: f64, pulses: f64, doubt: f64) {
+    pub fn counted(&mut self, period: f64, pulses: f64, uncertainty: f64) {
         let Reading { time, back, forth } = self.readings[self.newest];
         self.newest = (self.newest + 1) % RING;
-        self.readings[self.newest] =
-            Reading { time: time + period, back: back + (doubt - pulses), forth: forth + (doubt + pulses) };
+        self.readings[self.newest] = Reading {
+            time: time + period,
+            back: back + (uncertainty - pulses),
+            forth: forth + (uncertainty + pulses),
+        };
         self.good = (self.good + 1).min(RING);
         self.regular = if period == self.period { self.regular + 1 } else { 0 };
         self.period = period;
@@ -142,7 +145,7 @@ impl CountWindows {
             if lag >= self.good {
                 break;
             }
-            let [back, forth] = self.turned(lag).ways(pitch);
+            let [back, forth] = self.turned(lag).distances(pitch);
             let [fastest_back, fastest_forth] = fastest;
             fastest = [
                 smaller(back * per_second - half * acceleration.low, fastest_back),
@@ -165,7 +168,7 @@ struct Turned {
 impl Turned {
     /// How far the wheel rolled at most, backwards and forwards (m).
     #[inline]
-    fn ways(self, pitch: Range) -> [f64; 2] {
+    fn distances(self, pitch: Range) -> [f64; 2] {
         // A wheel that certainly turns forward.
         if self.back <= -SHAKEN {
             return [self.back * pitch.low, self.forth * pitch.high];
@@ -273,8 +276,8 @@ mod tests {
             // From full speed through a trembling standstill to running backwards, with some uncertain counts.
             let tremor = (seed >> 60) as f64 - 7.5;
             let pulses = libm::round(40.0 - f64::from(reading) / 60.0 + 0.2 * tremor);
-            let doubt = if seed >> 58 == 0 { 3.0 } else { 0.0 };
-            windows.counted(0.05, pulses, doubt);
+            let uncertainty = if seed >> 58 == 0 { 3.0 } else { 0.0 };
+            windows.counted(0.05, pulses, uncertainty);
             if reading % 500 == 499 {
                 windows.interrupt();
             }

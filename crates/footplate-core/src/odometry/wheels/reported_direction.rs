@@ -52,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_shaken_tooth_says_a_way_and_does_not_convince() {
+    fn a_shaken_tooth_reports_a_direction_that_is_not_accepted() {
         let mut reported = ReportedDirection::default();
         let reading = |direction| WheelReading { direction, ..WheelReading::pulses(1) };
         for direction in [Direction::Forward, Direction::Backward, Direction::Forward] {

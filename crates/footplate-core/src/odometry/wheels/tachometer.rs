@@ -33,7 +33,7 @@ pub struct Turn {
     /// Its quality.
     pub quality: Quality,
     /// How many pulses it may be wrong by, beyond the one of every count.
-    pub doubt: f64,
+    pub uncertainty: f64,
     /// Those of its pulses that were not read in the period: they belong to the one before, or are only expected.
     pub late: f64,
 }
@@ -82,7 +82,7 @@ pub struct Tachometer {
     wiring: f64,
     contradictions: u32,
     /// The direction at the last pulse, and whether it changed in this period, which may then hold pulses of both.
-    last_way: f64,
+    last_sign: f64,
     turned_round: bool,
 }
 
@@ -98,7 +98,7 @@ impl Tachometer {
             passes: false,
             wiring: 1.0,
             contradictions: 0,
-            last_way: 0.0,
+            last_sign: 0.0,
             turned_round: false,
         }
     }
@@ -123,7 +123,7 @@ impl Tachometer {
                 return Turn {
                     pulses: expected.pulses,
                     quality: Quality::Missing,
-                    doubt: f64::INFINITY,
+                    uncertainty: f64::INFINITY,
                     late: 0.0,
                 };
             }
@@ -134,7 +134,7 @@ impl Tachometer {
                 return Turn {
                     pulses: expected.pulses,
                     quality: Quality::Missing,
-                    doubt: f64::INFINITY,
+                    uncertainty: f64::INFINITY,
                     late: 0.0,
                 };
             }
@@ -148,23 +148,23 @@ impl Tachometer {
             let quality = if whole { Quality::Ok } else { Quality::Substituted };
             let unusual =
                 if whole && surprise.abs() <= expected.rolling { 0.0 } else { surprise.abs() + 1.0 };
-            let either_way = self.turned_round || heading.disputed;
-            let doubt = unusual + if either_way { 2.0 * pulses.abs() } else { 0.0 };
-            return Turn { pulses, quality, doubt, late: 0.0 };
+            let is_ambiguous = self.turned_round || heading.disputed;
+            let uncertainty = unusual + if is_ambiguous { 2.0 * pulses.abs() } else { 0.0 };
+            return Turn { pulses, quality, uncertainty, late: 0.0 };
         }
         if self.passes || self.withheld * surprise > 0.0 {
             let late = self.withheld;
             self.withheld = 0.0;
             self.passes = true;
-            let doubt = surprise.abs() + 1.0;
-            return Turn { pulses: pulses + late, quality: Quality::Ok, doubt, late };
+            let uncertainty = surprise.abs() + 1.0;
+            return Turn { pulses: pulses + late, quality: Quality::Ok, uncertainty, late };
         }
         let stand_in = libm::round(expected.pulses);
         self.withheld = pulses - stand_in;
-        let doubt = expected.more.max(expected.fewer);
+        let uncertainty = expected.more.max(expected.fewer);
         // The expectation may have run ahead of the wheel.
         let late = if self.withheld * heading.direction < 0.0 { -self.withheld } else { 0.0 };
-        Turn { pulses: stand_in, quality: Quality::Substituted, doubt, late }
+        Turn { pulses: stand_in, quality: Quality::Substituted, uncertainty, late }
     }
 
     /// Signed pulses since the last reading, if they can be a count.
@@ -184,11 +184,11 @@ impl Tachometer {
                 let moved = self.counter.replace(value).and_then(|before| unwrapped(before, value, most));
                 match moved {
                     Some(turned) => {
-                        let told = if turned < 0.0 { -self.wiring } else { self.wiring };
+                        let reported = if turned < 0.0 { -self.wiring } else { self.wiring };
                         // A running counter counts backwards itself.
                         let heading = Heading { disputed: false, ..heading };
                         let turned =
-                            turned.abs() * if turned == 0.0 { 1.0 } else { self.believed(told, heading) };
+                            turned.abs() * if turned == 0.0 { 1.0 } else { self.accepted(reported, heading) };
                         Increment::Turned { pulses: turned - self.assumed, whole: true }
                     }
                     None => Increment::Restarted,
@@ -199,12 +199,12 @@ impl Tachometer {
                 if !(0.0..=most).contains(&counted) {
                     return Increment::Nothing;
                 }
-                let way = self.sign(reading.direction, heading, pulses != 0);
-                self.turned_round = pulses != 0 && way * self.last_way < 0.0;
+                let sign = self.sign(reading.direction, heading, pulses != 0);
+                self.turned_round = pulses != 0 && sign * self.last_sign < 0.0;
                 if pulses != 0 {
-                    self.last_way = way;
+                    self.last_sign = sign;
                 }
-                let counted = counted * way;
+                let counted = counted * sign;
                 let expected_in_all = expected.pulses + self.assumed;
                 let expected_in_one = expected_in_all / larger(span, 1.0);
                 // A count after lost rows covers them, or its own period only: whichever is nearer to the expectation.
@@ -227,19 +227,19 @@ impl Tachometer {
 
     /// The sign of the pulses, with swapped wires taken into account.
     fn sign(&mut self, direction: Direction, heading: Heading, turned: bool) -> f64 {
-        let told = match direction {
+        let reported = match direction {
             Direction::Unknown => return heading.direction,
             Direction::Forward => self.wiring,
             Direction::Backward => -self.wiring,
         };
-        if turned { self.believed(told, heading) } else { heading.direction }
+        if turned { self.accepted(reported, heading) } else { heading.direction }
     }
 
-    /// The direction of a wheel whose sensor reports `told`.
-    fn believed(&mut self, told: f64, heading: Heading) -> f64 {
-        if told == heading.direction {
+    /// The direction of a wheel whose sensor reports `reported`.
+    fn accepted(&mut self, reported: f64, heading: Heading) -> f64 {
+        if reported == heading.direction {
             self.contradictions = 0;
-            return told;
+            return reported;
         }
         if heading.certain {
             self.contradictions += 1;
@@ -248,7 +248,7 @@ impl Tachometer {
                 self.contradictions = 0;
             }
         }
-        if heading.certain || heading.disputed { heading.direction } else { told }
+        if heading.certain || heading.disputed { heading.direction } else { reported }
     }
 }
 
@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn two_surprises_in_a_row_are_believed_with_all_their_pulses() {
+    fn two_surprises_in_a_row_are_accepted_with_all_their_pulses() {
         let turns = turns(&[Count::Pulses(20), Count::Pulses(12), Count::Pulses(8)]);
         assert_eq!(turns[2].quality, Quality::Ok);
         assert_eq!(total(&turns), 40.0, "no pulse is lost");
@@ -358,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sensor_wired_the_wrong_way_round_is_found_out() {
+    fn a_sensor_wired_backward_is_found_out() {
         let mut tachometer = Tachometer::new();
         let reading = WheelReading { direction: Direction::Backward, ..WheelReading::pulses(20) };
         for _ in 0..CONTRADICTIONS {

@@ -144,12 +144,12 @@ fn hop_rows<'p>(
         let [from, to] = pair else { return None };
         let took = (to.passage.window.middle() - from.passage.window.middle()).as_s();
         let poll = from.passage.window.variance_s2() + to.passage.window.variance_s2();
-        let surveyed = to.passage.way.map_or(0.0, |way| way.length.as_mm());
+        let surveyed = to.passage.path.map_or(0.0, |path| path.length.as_mm());
         Some(vec![
             json!(batch.runs.get(to.run).map_or(0, |run| run.id.0)),
             json!(layout.sensor_name(from.passage.sensor)),
             json!(layout.sensor_name(to.passage.sensor)),
-            json!(to.passage.way.map_or(0, |way| way.missed())),
+            json!(to.passage.path.map_or(0, |path| path.missed())),
             rounded(took, 4),
             rounded(poll.sqrt(), 4),
             rounded(surveyed, 0),
@@ -254,7 +254,7 @@ fn changes(batch: &Batch, direction: Direction) -> Vec<Listing> {
                     json!(to.get()),
                     rounded(point.since_command, 3),
                     rounded(point.variance.sqrt(), 3),
-                    rounded(1e3 * point.way, 1),
+                    rounded(1e3 * point.distance, 1),
                     place(batch, change.run, point.entry),
                 ]
             })
@@ -293,8 +293,8 @@ fn lengths(layout: &Layout, batch: &Batch, from: &str, to: &str) -> anyhow::Resu
     };
     let Some(section) = batch.sections.section(hop.id) else { return Ok(Vec::new()) };
     let is_over = |pair: &&[SettledPassage]| {
-        let way = pair.last().and_then(|passage| passage.passage.way);
-        way.is_some_and(|way| way.hops().iter().any(|hop| batch.sections.section(*hop) == Some(section)))
+        let path = pair.last().and_then(|passage| passage.passage.path);
+        path.is_some_and(|path| path.hops().iter().any(|hop| batch.sections.section(*hop) == Some(section)))
     };
     let listing = |train: &BatchTrain| {
         let pairs = stretches(train).flat_map(|stretch| stretch.windows(2)).filter(is_over);

@@ -6,7 +6,7 @@ use footplate_core::control::{Driver, Finished, Notice, Order, OrderId, PlannedS
 use footplate_core::model::MotionModel;
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::track::{Landmark, Layout, Leg};
-use footplate_core::tracking::{DueContact, Locator, PassedContact, TrackContext};
+use footplate_core::tracking::{DueSensor, Locator, PassedSensor, TrackContext};
 use footplate_core::{Approach, Length, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 use serde::{Deserialize, Serialize};
 
@@ -34,7 +34,7 @@ pub(super) struct Tour<'l> {
     driver: Recorded<Driver>,
     /// The last detection, for display.
     passed: String,
-    next: Option<DueContact>,
+    next: Option<DueSensor>,
     planned: Option<PlannedStop>,
 }
 
@@ -201,7 +201,7 @@ impl<'l> Tour<'l> {
         }
     }
 
-    fn pass(&mut self, passed: PassedContact, next: Option<DueContact>) {
+    fn pass(&mut self, passed: PassedSensor, next: Option<DueSensor>) {
         let sensor = self.layout.sensor_name(passed.sensor);
         self.passed = match (passed.late, passed.short) {
             (Some([late, _]), Some(short)) => {

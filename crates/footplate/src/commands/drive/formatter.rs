@@ -4,7 +4,7 @@ use footplate_core::control::{
     Driver, Finished, Notice, Order, Outcome, PlannedArrival, PlannedStop, Refusal,
 };
 use footplate_core::track::Landmark;
-use footplate_core::tracking::{DueContact, PassedContact};
+use footplate_core::tracking::{DueSensor, PassedSensor};
 use footplate_core::{HALF_95, Length, SensorId, Timestamp, TrainId};
 
 use super::instruction::Instruction;
@@ -221,7 +221,7 @@ impl NoticeFormatter<'_> {
         })
     }
 
-    fn passed(&self, train: TrainId, passed: &PassedContact, next: Option<&DueContact>) -> String {
+    fn passed(&self, train: TrainId, passed: &PassedSensor, next: Option<&DueSensor>) -> String {
         let middle = passed.window.middle();
         let mut line = format!("{}  train {train} at {}", self.at(middle), self.sensor(passed.sensor));
         match (passed.late, passed.short) {

@@ -7,7 +7,7 @@ use footplate_core::model::MotionModel;
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::model::{MotionFit, Refit};
 use footplate_core::track::Layout;
-use footplate_core::tracking::PassedContact;
+use footplate_core::tracking::PassedSensor;
 use footplate_core::{Event, EventKind, Report, SpeedStep, TrainId};
 
 /// The fits of all trains, continued from those that the session began with.
@@ -60,7 +60,7 @@ impl Learning {
     }
 
     /// Takes in a detection of a train. A train that has only just been located has no known earlier position.
-    pub(super) fn passed(&mut self, train: TrainId, driver: &Driver, passed: &PassedContact) {
+    pub(super) fn passed(&mut self, train: TrainId, driver: &Driver, passed: &PassedSensor) {
         if passed.late.is_none()
             && let Some(fit) = self.fits.get_mut(&train)
         {

@@ -90,7 +90,7 @@ impl Walked {
                 });
             }
             for run in &recording.runs {
-                let claims = run.odometry.doubtful_claims();
+                let claims = run.odometry.implausible_claims();
                 let periods = run.odometry.summary().periods;
                 let name = match (run.id.as_deref(), language) {
                     (None, _) => String::new(),

@@ -40,7 +40,7 @@ fn chart(batch: &Batch, train: &BatchTrain, change: &Transient) -> Option<Change
     let mut before: Option<(f64, f64)> = None;
     let mut contacts = Vec::with_capacity(change.points.len());
     for ((point, residual), state) in change.points.iter().zip(&fitted.residuals).zip(&there.states) {
-        let way_mm = 1e3 * point.way;
+        let way_mm = 1e3 * point.distance;
         let mean_speed = before.and_then(|(time, way)| {
             let took = point.since_command - time;
             (took > 0.0).then(|| [f64::midpoint(time, point.since_command), (way_mm - way) / took])
@@ -52,7 +52,9 @@ fn chart(batch: &Batch, train: &BatchTrain, change: &Transient) -> Option<Change
             doubt_s: point.variance.sqrt(),
             way_mm,
             residual_mm: residual.as_mm(),
-            doubt_mm: 1e3 * (speed * speed * point.variance + change.way_doubt * change.way_doubt).sqrt(),
+            doubt_mm: 1e3
+                * (speed * speed * point.variance + change.distance_deviation * change.distance_deviation)
+                    .sqrt(),
             mean_speed,
             told_by: batch
                 .event(change.run, point.entry)

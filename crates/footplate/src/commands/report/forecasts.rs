@@ -24,8 +24,8 @@ pub(super) fn of_train(
         let own = session.runs.iter().filter(|run| run.only_train().is_some_and(|only| only.train == train));
         for run in own {
             replay_run(context, run, &mut predictor, |raw, hit, _| {
-                let Passage { sensor, drive, way, window, .. } = &hit.passage;
-                let late = hit.forecast.map(|forecast| forecast.contact_error(window.until));
+                let Passage { sensor, drive, path, window, .. } = &hit.passage;
+                let late = hit.forecast.map(|forecast| forecast.detection_error(window.until));
                 let half = hit.forecast.map(|forecast| forecast.spread.half_width(LEVEL));
                 let speed = hit.forecast.map(|forecast| forecast.speed.as_mm_per_s());
                 let phase = hit.forecast.map(|forecast| match forecast.phase {
@@ -40,7 +40,7 @@ pub(super) fn of_train(
                     sensor: layout.sensor_name(*sensor).to_owned(),
                     step: drive.step.get(),
                     phase,
-                    missed: way.as_ref().map_or(0, footplate_core::track::Reach::missed),
+                    missed: path.as_ref().map_or(0, footplate_core::track::Reach::missed),
                     drift: hit.drift.is_some(),
                     late_ms: late.map(footplate_core::TimeSpan::as_ms),
                     half_90_ms: half.map(|half| 1e3 * half),

@@ -12,7 +12,7 @@ use crate::model::fit::unknowns::Columns;
 use crate::model::parameters::{SPEEDS, knots};
 use crate::model::survey::SectionIndex;
 
-/// A fit under way; see [`MotionFit::begin_refit`].
+/// A fit in progress; see [`MotionFit::begin_refit`].
 #[derive(Debug, Clone)]
 pub struct Refit {
     fit: MotionFit,

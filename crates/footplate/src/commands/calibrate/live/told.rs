@@ -74,10 +74,14 @@ fn happened(layout: &Layout, mishap: &Fault) -> String {
             last.map_or("?", |last| layout.node_name(last))
         ),
         Fault::LengthsDiffer { hops } => {
-            let each = hops.iter().filter_map(|(hop, surveyed, felt)| {
+            let each = hops.iter().filter_map(|(hop, surveyed, path_length)| {
                 let hop = layout.hop(*hop)?;
                 let (from, to) = (layout.node_name(hop.from), layout.node_name(hop.to));
-                Some(format!("{from} to {to} {:.0} instead of {:.0} mm", felt.as_mm(), surveyed.as_mm()))
+                Some(format!(
+                    "{from} to {to} {:.0} instead of {:.0} mm",
+                    path_length.as_mm(),
+                    surveyed.as_mm()
+                ))
             });
             format!("lengths differ from the layout: {}", each.collect::<Vec<_>>().join(", "))
         }

@@ -8,7 +8,7 @@ const CLEARLY: f64 = 3.0;
 
 /// Claims of a vehicle that a run contradicts.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct DoubtfulClaims {
+pub struct ImplausibleClaims {
     /// Periods in which no speed agreed with both the counts and the claims.
     pub contradicted: u64,
     /// Periods in which both wheelsets turned clearly faster than the highest speed of the train.
@@ -20,7 +20,7 @@ pub struct DoubtfulClaims {
 impl Odometer {
     /// Claims of the vehicle that the run contradicts.
     #[must_use]
-    pub fn doubtful_claims(&self) -> DoubtfulClaims {
+    pub fn implausible_claims(&self) -> ImplausibleClaims {
         let outside = |scale: WheelScale, tolerance: f64| {
             let deviation = CLEARLY * scale.estimate.uncertainty;
             let off = (scale.estimate.value - 1.0).abs();
@@ -29,6 +29,6 @@ impl Odometer {
         let [first, second] = self.vehicle.wheelsets.map(|wheelset| wheelset.diameter_tolerance);
         let diameters =
             self.diameters().map_or([None; 2], |[one, other]| [outside(one, first), outside(other, second)]);
-        DoubtfulClaims { contradicted: self.bounds.contradictions(), above_top: self.above_top, diameters }
+        ImplausibleClaims { contradicted: self.bounds.contradictions(), above_top: self.above_top, diameters }
     }
 }

@@ -8,14 +8,14 @@ use crate::time::{TimeSpan, Timestamp};
 /// Both are stamps of the host. The time from the reading on the station to the stamp (φ in the literature)
 /// is the same for every report of a link, so it cancels in every difference of reports and is not subtracted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ContactWindow {
+pub struct DetectionWindow {
     /// Stamp of the last reading of the free sensor.
     pub after: Timestamp,
     /// Stamp of the first reading of the occupied sensor: the report.
     pub until: Timestamp,
 }
 
-impl ContactWindow {
+impl DetectionWindow {
     /// The window of a report stamped `stamp`: the recorded interval if the host kept one; otherwise the interval
     /// after a reporting or an idle poll, by the time since the last report of any sensor.
     #[must_use]
@@ -68,11 +68,12 @@ mod tests {
     #[test]
     fn the_interval_after_a_reporting_poll_is_the_longer_one() {
         let stamp = Timestamp::from_s(10.0);
-        let width =
-            |last: f64| ContactWindow::of_report(stamp, None, Some(Timestamp::from_s(last)), TIMING).width();
+        let width = |last: f64| {
+            DetectionWindow::of_report(stamp, None, Some(Timestamp::from_s(last)), TIMING).width()
+        };
         assert_eq!(width(10.0 - 0.06535), TimeSpan::from_us(65_350));
         assert_eq!(width(9.0), TimeSpan::from_us(61_400));
-        let recorded = ContactWindow::of_report(stamp, Some(TimeSpan::from_ms(80)), None, TIMING);
+        let recorded = DetectionWindow::of_report(stamp, Some(TimeSpan::from_ms(80)), None, TIMING);
         assert_eq!(recorded.width(), TimeSpan::from_ms(80));
         assert_eq!(recorded.middle(), Timestamp::from_s(9.96));
     }

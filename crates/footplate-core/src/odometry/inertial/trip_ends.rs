@@ -19,14 +19,14 @@ const BEFORE_ANY_TRIP: f64 = 5e-4;
 
 /// Takes the drift out of a trip between two stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TripClosure {
+pub struct TripEnds {
     lasted: f64,
     departure: f64,
     arrival: f64,
     rest: f64,
 }
 
-impl TripClosure {
+impl TripEnds {
     /// A trip of so much time, above zero, with what was read while standing before and after it, and what the readings add up
     /// to in between.
     #[must_use]
@@ -91,8 +91,8 @@ impl Default for BiasWalk {
 
 impl BiasWalk {
     /// Learns from a trip.
-    pub fn take(&mut self, closure: &TripClosure) {
-        self.sum += 12.0 * closure.rest * closure.rest / (closure.lasted * closure.lasted * closure.lasted);
+    pub fn take(&mut self, ends: &TripEnds) {
+        self.sum += 12.0 * ends.rest * ends.rest / (ends.lasted * ends.lasted * ends.lasted);
         self.trips = self.trips.saturating_add(1);
     }
 
@@ -139,35 +139,35 @@ mod tests {
         let points = added_up(45.0, |t| train(t) + 0.05 - 0.004 * t);
         let &(lasted, end, length) = points.last().unwrap();
         let standing = [0.05, 0.05 - 0.004 * 45.0].map(Acceleration::from_m_per_s2);
-        let closure = TripClosure::new(lasted, standing, end);
-        assert!(closure.rest().as_m_per_s().abs() < 1e-6);
-        assert!((closure.distance(lasted, length).as_m() - 487.5).abs() < 0.05);
+        let ends = TripEnds::new(lasted, standing, end);
+        assert!(ends.rest().as_m_per_s().abs() < 1e-6);
+        assert!((ends.distance(lasted, length).as_m() - 487.5).abs() < 0.05);
         let &(since, speed, _) = points.iter().find(|(since, ..)| since.as_s() >= 25.0).unwrap();
-        assert!((closure.speed(since, speed).as_m_per_s() - 15.0).abs() < 0.01);
+        assert!((ends.speed(since, speed).as_m_per_s() - 15.0).abs() < 0.01);
     }
 
     #[test]
     fn a_bias_that_bulges_leaves_a_rest_that_is_given_back() {
-        // The bulge of a bridge, from which the closure is exact.
+        // The bulge of a bridge, from which they are exact.
         let bulge = |t: f64| 0.1 * t * (45.0 - t) / (22.5 * 22.5);
         let points = added_up(45.0, |t| train(t) + bulge(t));
         let &(lasted, end, length) = points.last().unwrap();
-        let closure = TripClosure::new(lasted, [Acceleration::ZERO; 2], end);
+        let ends = TripEnds::new(lasted, [Acceleration::ZERO; 2], end);
         // 2/3 of the height over the whole time.
-        assert!((closure.rest().as_m_per_s() - 3.0).abs() < 1e-3);
-        assert!((closure.distance(lasted, length).as_m() - 487.5).abs() < 0.05);
-        assert!(closure.speed(lasted, end).as_m_per_s().abs() < 1e-12);
+        assert!((ends.rest().as_m_per_s() - 3.0).abs() < 1e-3);
+        assert!((ends.distance(lasted, length).as_m() - 487.5).abs() < 0.05);
+        assert!(ends.speed(lasted, end).as_m_per_s().abs() < 1e-12);
         let &(since, speed, distance) = points.iter().find(|(since, ..)| since.as_s() >= 25.0).unwrap();
-        assert!((closure.speed(since, speed).as_m_per_s() - 15.0).abs() < 0.01);
-        assert!((closure.distance(since, distance).as_m() - 262.5).abs() < 0.05);
+        assert!((ends.speed(since, speed).as_m_per_s() - 15.0).abs() < 0.01);
+        assert!((ends.distance(since, distance).as_m() - 262.5).abs() < 0.05);
         let acceleration =
-            closure.acceleration(since, Acceleration::from_m_per_s2(train(25.0) + bulge(since.as_s())));
+            ends.acceleration(since, Acceleration::from_m_per_s2(train(25.0) + bulge(since.as_s())));
         assert!(acceleration.as_m_per_s2().abs() < 1e-4);
     }
 
     #[test]
     fn the_deviation_of_lengths_is_true_for_a_bias_that_walks() {
-        // Standing ends pin the walk: subtract the line between them, as the closure does.
+        // Standing ends pin the walk: subtract the line between them, as they do.
         let mut state = 5_u64;
         let mut draw = || {
             // Sums of twelve even draws less six (splitmix64 below) are normal enough.
@@ -193,13 +193,13 @@ mod tests {
                 bias += 0.01 * f64::sqrt(step) * draw();
             }
             let lasted = TimeSpan::from_s(50.0);
-            let closure = TripClosure::new(
+            let ends = TripEnds::new(
                 lasted,
                 [0.0, bias].map(Acceleration::from_m_per_s2),
                 Speed::from_m_per_s(speed),
             );
-            walk.take(&closure);
-            squared += closure.distance(lasted, Length::from_m(distance)).as_m().powi(2) / f64::from(trips);
+            walk.take(&ends);
+            squared += ends.distance(lasted, Length::from_m(distance)).as_m().powi(2) / f64::from(trips);
         }
         let said = walk.length_deviation(TimeSpan::from_s(50.0)).as_m();
         // 0.01² × 50⁵ / 720 = 6.6 m squared.
