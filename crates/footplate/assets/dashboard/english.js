@@ -252,6 +252,7 @@ export const ENGLISH = {
   "library": "Track system", "joined-at": "Turnouts join at", "draft-toe": "the toe", "draft-straight-leg": "the straight leg", "draft-curved-leg": "the curved leg",
   "hand": "Hand of curves and turnouts", "hand-left": "Left", "hand-right": "Right", "draft-straights": "Straights", "draft-curves": "Curves", "draft-turnouts": "Turnouts", "draft-crossings": "Crossings",
   "draft-arc": "{0} mm along the curve", "draft-file": "Layout file", "draft-name": "Name", "draft-unnamed": "my layout", "draft-save": "Save",
+  "draft-slips": "Double slips", "draft-slip-about": "A double slip is two turnouts, one for each end, with a number and a drive each. A slip with a single drive for both ends cannot be used.",
   "draft-saved": "Saved as {0}. Set the sensor and turnout numbers to those of your wiring, then run `footplate layout check {0}`.", "draft-written": "The file",
   "draft-empty": "Choose a piece to begin.", "draft-no-sensor": "No sensor yet: click a joint between two pieces, then `Sensor here` or, between two blocks, `Boundary here`.",
   "draft-too-many": "More than {0} sensors: five modules of 16 contacts have no more.", "draft-gap": "Two open ends are {0} mm apart and do not join.",

@@ -253,6 +253,7 @@ export const GERMAN = {
   "library": "Gleissystem", "joined-at": "Weichen anlegen mit", "draft-toe": "der Spitze", "draft-straight-leg": "dem geraden Strang", "draft-curved-leg": "dem Abzweig",
   "hand": "Richtung von Bögen und Weichen", "hand-left": "Links", "hand-right": "Rechts", "draft-straights": "Geraden", "draft-curves": "Bögen", "draft-turnouts": "Weichen", "draft-crossings": "Kreuzungen",
   "draft-arc": "{0} mm entlang des Bogens", "draft-file": "Anlagendatei", "draft-name": "Name", "draft-unnamed": "meine Anlage", "draft-save": "Speichern",
+  "draft-slips": "Doppelkreuzungsweichen", "draft-slip-about": "Eine Doppelkreuzungsweiche sind zwei Weichen, für jedes Ende eine, mit je einer Nummer und einem Antrieb. Mit nur einem Antrieb für beide Enden lässt sie sich nicht verwenden.",
   "draft-saved": "Gespeichert als {0}. Nummern der Rückmelder und Weichen an die Verdrahtung anpassen, dann `footplate layout check {0}` aufrufen.", "draft-written": "Die Datei",
   "draft-empty": "Ein Gleisstück wählen, um zu beginnen.", "draft-no-sensor": "Noch kein Rückmelder: auf einen Stoß zwischen zwei Stücken klicken, dann `Rückmelder hier` oder, zwischen zwei Blöcken, `Trennstelle hier`.",
   "draft-too-many": "Mehr als {0} Rückmelder: Fünf Module mit 16 Kontakten haben nicht mehr.", "draft-gap": "Zwei offene Enden sind {0} mm voneinander entfernt und schließen nicht.",

@@ -13,6 +13,8 @@ const LETTER = 1.12;
 const REACH = 8;
 const TOUCH = 2.6;
 const BLADE = 5;
+/** Where a click means a turnout, as a part of its blades. */
+const PRESSED_AT = 0.4;
 /** Units of the longer side of a drawing, on a small and on a large screen. */
 const LEAST_WIDE = 105;
 const MOST_WIDE = 160;
@@ -79,7 +81,10 @@ export class Track {
       const blade = cut(curve, 0, Math.min(0.5, BLADE * this.#unit / (long || 1)));
       const path = svg("path", { d: written(blade), class: "blade", "stroke-width": this.#unit * 1.1 }, layer);
       this.#blades.push({ path, turnout: from.number, leg: edge.leg });
-      this.#turnouts.set(from.number, this.#plan.points.get(placeOf(edge.from)));
+      // Between the blades: the two turnouts of a slip have their toes in one point.
+      const [x, y] = between(blade, PRESSED_AT);
+      const [x2, y2] = this.#turnouts.get(from.number) ?? [x, y];
+      this.#turnouts.set(from.number, [(x + x2) / 2, (y + y2) / 2]);
     }
   }
 
