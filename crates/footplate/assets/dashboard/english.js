@@ -288,7 +288,7 @@ export const ENGLISH = {
   "setup-drive": "Switch on and drive", "setup-turnouts-unknown": "The positions of turnouts are unknown. Check that no train is standing on one; then set all of them straight.",
   "setup-lost": "{0}: position unknown. No train is sent anywhere before Footplate knows where all of them are.",
   "setup-straight": "Set all turnouts straight", "setup-setting": "setting turnouts …", "setup-sending": "sending …", "setup-train": "Train", "setup-place": "Stop at sensor",
-  "setup-go": "Drive there and stop", "setup-does": "Train {0}: {1}; {2} mm/s", "setup-stopped": "Train {0} stopped at {1} ({2} mm from the target).",
+  "setup-go": "Drive there and stop", "setup-stopped": "Train {0} stopped at {1} ({2} mm from the target).",
   "setup-promised": "Predicted, 95 %: {0} to {1} mm.", "setup-truth": "True position in the simulation: {0} mm from the target.", "setup-to-layout": "To the layout with all controls",
   "setup-again": "Back to the set-up", "setup-again-about": "Stops all trains and switches the track power off first.",
 };

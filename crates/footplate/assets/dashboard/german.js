@@ -289,7 +289,7 @@ export const GERMAN = {
   "setup-drive": "Einschalten und fahren", "setup-turnouts-unknown": "Die Lage von Weichen ist unbekannt. Prüfen Sie, dass kein Zug auf einer steht; stellen Sie dann alle auf gerade.",
   "setup-lost": "{0}: Position unbekannt. Kein Zug fährt irgendwohin, bevor Footplate weiß, wo alle sind.",
   "setup-straight": "Alle Weichen auf gerade stellen", "setup-setting": "Weichen werden gestellt …", "setup-sending": "wird gesendet …", "setup-train": "Zug", "setup-place": "Halt am Rückmelder",
-  "setup-go": "Hinfahren und halten", "setup-does": "Zug {0}: {1}; {2} mm/s", "setup-stopped": "Zug {0} hielt bei {1} ({2} mm vom Ziel).",
+  "setup-go": "Hinfahren und halten", "setup-stopped": "Zug {0} hielt bei {1} ({2} mm vom Ziel).",
   "setup-promised": "Vorhergesagt, 95 %: {0} bis {1} mm.", "setup-truth": "Wahre Lage in der Simulation: {0} mm vom Ziel.", "setup-to-layout": "Zur Anlage mit allen Bedienungen",
   "setup-again": "Zurück zur Einrichtung", "setup-again-about": "Hält zuerst alle Züge an und schaltet den Fahrstrom aus.",
 };

@@ -217,7 +217,12 @@ export function layoutPage(root, live, about) {
   function write(text) {
     const list = $("#said");
     const atEnd = list.scrollTop + list.clientHeight >= list.scrollHeight - 8;
-    list.append(make("li", {}, logged(text)));
+    const lines = logged(text).split("\n");
+    // The list of commands says what each of them does.
+    list.append(lines.length === 1 ? make("li", {}, lines[0]) : make("li", { class: "listing" }, ...lines.flatMap((line) => {
+      const [command, meaning = ""] = line.split(/(?<=\S) {2,}/);
+      return [make("b", {}, command), make("span", {}, meaning)];
+    })));
     while (list.childElementCount > LINES_SHOWN) list.firstElementChild.remove();
     if (atEnd) list.scrollTop = list.scrollHeight;
   }
