@@ -54,6 +54,7 @@ export class Track {
       rail.classList.add("restricted");
       svg("title", {}, rail).textContent = say("zone", edge.zone.name, edge.zone.max_mm_s);
     }
+    for (const tracks of layout.crossings) this.#cross(tracks.map(({ edge, offset_mm: mm }) => this.point(edge, mm)), rails);
     this.#bladesOf(layout, svg("g", {}, drawing));
     this.#truth = svg("g", {}, drawing);
     this.#layer = svg("g", {}, drawing);
@@ -69,6 +70,15 @@ export class Track {
   #curve(id) {
     const rail = this.#plan.rails.get(id >> 1) ?? [];
     return id % 2 ? rail.toReversed() : rail;
+  }
+
+  /** Marks a level crossing on both of its tracks; where they are drawn apart, a broken line says that they cross. */
+  #cross([one, other], layer) {
+    const arm = this.#unit * 1.2;
+    const mark = ([x, y]) => `M${x - arm} ${y - arm}L${x + arm} ${y + arm}M${x - arm} ${y + arm}L${x + arm} ${y - arm}`;
+    svg("path", { d: mark(one) + mark(other), class: "crossing", "stroke-width": this.#unit * 0.5 }, layer);
+    const between = svg("path", { d: written([one, other]), class: "crossing apart", "stroke-width": this.#unit * 0.4 }, layer);
+    svg("title", {}, between).textContent = say("crossing");
   }
 
   /** Each turnout shows the leg that is set. */

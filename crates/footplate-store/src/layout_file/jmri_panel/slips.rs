@@ -49,7 +49,7 @@ impl<'a> Tracks<'a, '_> {
             let state = |way: usize| {
                 let written = children(slip, "states")
                     .next()
-                    .and_then(|states| text_of(children(states, *WAYS.get(way)?).next()?, element));
+                    .and_then(|states| text_of(children(states, WAYS.get(way)?).next()?, element));
                 written.or_else(|| usual.get(way).copied())
             };
             let [one, other] = legs.map(|(letter, [way, same])| {
