@@ -25,12 +25,12 @@ const MOST_SAID: usize = 4;
 
 /// What a person has to know before any figure: the lengths may not be those of the layout.
 #[derive(Debug)]
-pub(crate) struct LengthDoubt {
+pub(crate) struct LengthWarning {
     pub(crate) english: String,
     pub(crate) german: String,
 }
 
-/// Checks runs against a layout; the doubt goes into the headline of what is made of them.
+/// Checks runs against a layout; the warning goes into the headline of what is made of them.
 ///
 /// # Errors
 /// The times are not in seconds. Or the runs are of another layout: sensors follow each other that no rails join, or the lengths are those of another
@@ -38,7 +38,7 @@ pub(crate) struct LengthDoubt {
 pub(crate) fn check_runs<'r>(
     layout: &Layout,
     runs: impl Iterator<Item = &'r Run>,
-) -> anyhow::Result<Option<LengthDoubt>> {
+) -> anyhow::Result<Option<LengthWarning>> {
     let sections = SectionIndex::of(layout);
     let lengths = tested(layout, &sections, runs)?;
     Ok(lengths_doubted(layout, &sections, &lengths))
@@ -124,7 +124,7 @@ impl<'l> LayoutWatch<'l> {
     }
 
     /// What a person is told about lengths when the session is over.
-    pub(crate) fn lengths_doubted(&self) -> Option<LengthDoubt> {
+    pub(crate) fn lengths_doubted(&self) -> Option<LengthWarning> {
         lengths_doubted(self.layout, &self.sections, &self.test.lengths(&self.sections))
     }
 }
@@ -192,7 +192,7 @@ fn odd_hops(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTest) -> V
 }
 
 /// What a person is told where lengths are not those of the layout, but no other is known that has them.
-fn lengths_doubted(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTest) -> Option<LengthDoubt> {
+fn lengths_doubted(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTest) -> Option<LengthWarning> {
     if lengths.is_passed() {
         return None;
     }
@@ -200,7 +200,7 @@ fn lengths_doubted(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTes
     let odd = odd_hops(layout, sections, lengths);
     if odd.is_empty() {
         let (factor, scale) = (lengths.factor, 100.0 * lengths.scale);
-        return Some(LengthDoubt {
+        return Some(LengthWarning {
             english: format!(
                 "the lengths of layout `{name}` are off by about {factor:.0} times what it says (length_uncertainty_mm): they \
                  are estimated together with speeds, which may all be off by {scale:.0} %; is it the right layout?"
@@ -212,8 +212,8 @@ fn lengths_doubted(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTes
             ),
         });
     }
-    let LengthDoubt { english, german } = lengths_said(layout, &odd);
-    Some(LengthDoubt {
+    let LengthWarning { english, german } = lengths_said(layout, &odd);
+    Some(LengthWarning {
         english: format!("lengths that are not those of layout `{name}`: {english}; is it the right layout?"),
         german: format!(
             "Längen, die nicht die der Anlage `{name}` sind: {german}; ist es die richtige Anlage?"
@@ -221,18 +221,18 @@ fn lengths_doubted(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTes
     })
 }
 
-fn lengths_said(layout: &Layout, odd: &[(HopId, Length, Length)]) -> LengthDoubt {
-    let said = odd.iter().take(MOST_SAID).filter_map(|(hop, surveyed, felt)| {
+fn lengths_said(layout: &Layout, odd: &[(HopId, Length, Length)]) -> LengthWarning {
+    let said = odd.iter().take(MOST_SAID).filter_map(|(hop, surveyed, found)| {
         let hop = layout.hop(*hop)?;
         let (from, to) = (layout.node_name(hop.from), layout.node_name(hop.to));
-        let (surveyed, felt) = (surveyed.as_mm(), felt.as_mm());
+        let (surveyed, found) = (surveyed.as_mm(), found.as_mm());
         Some([
-            format!("{from} to {to} takes as long as {felt:.0} mm, not {surveyed:.0}"),
-            format!("{from} bis {to} dauert so lange wie {felt:.0} mm, nicht {surveyed:.0}"),
+            format!("{from} to {to} takes as long as {found:.0} mm, not {surveyed:.0}"),
+            format!("{from} bis {to} dauert so lange wie {found:.0} mm, nicht {surveyed:.0}"),
         ])
     });
     let (english, german): (Vec<String>, Vec<String>) = said.map(|[one, other]| (one, other)).unzip();
-    LengthDoubt { english: english.join(", "), german: german.join(", ") }
+    LengthWarning { english: english.join(", "), german: german.join(", ") }
 }
 
 /// Another built-in layout with the lengths that are felt.

@@ -10,7 +10,7 @@
 //!         tracksegment                              blockname; what is at its ends: a point, or A, B or C of a turnout
 //!         layoutturnout                             turnoutname, blockname; A is the toe, B the leg that goes on at `continuing`
 //!         levelxing                                 the tracks A to C and B to D
-//!         layoutSlip                                turnout, turnoutB, and their states for each way through it
+//!         layoutSlip                                turnout, turnoutB, and their states for each route through it
 //!         layoutturntable                           not imported
 //! ```
 //!

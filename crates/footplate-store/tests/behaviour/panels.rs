@@ -102,7 +102,7 @@ fn tracks_that_lead_nowhere_end_in_the_layout_and_are_listed() {
 }
 
 /// Where the legs of both turnouts of the slip lead, straight and curved, by the node that a train comes to.
-fn ways(panel: &ImportedPanel) -> [[String; 2]; 2] {
+fn routes(panel: &ImportedPanel) -> [[String; 2]; 2] {
     let layout = &panel.file.layout;
     ["BR7", "BR8"].map(|branch| {
         let node = layout.node_named(branch).unwrap();
@@ -123,13 +123,13 @@ fn a_double_slip_becomes_two_turnouts_that_are_joined_at_their_toes() {
     assert_eq!((between.length, between.known), (Length::ZERO, Length::ZERO.into()));
     let names = |[one, other]: [[&str; 2]; 2]| [one.map(str::to_owned), other.map(str::to_owned)];
     // From A into the block of the middle, by a boundary there; from B over the crossing to the bumper.
-    assert_eq!(ways(&panel), names([["SL1Aa", "EX_EB2"], ["EX_EB3", "EX_EB4"]]));
+    assert_eq!(routes(&panel), names([["SL1Aa", "EX_EB2"], ["EX_EB3", "EX_EB4"]]));
     // Thrown for what closed usually is, at the first end only.
     let state = |turnout: &str| format!("<turnout>{turnout}</turnout><turnoutB>");
     let inverted = SLIP.replace(&state("2"), "<turnout>x").replace(&state("4"), &state("2"));
     let inverted = inverted.replace("<turnout>x", &state("4"));
-    assert_eq!(ways(&imported(&inverted).unwrap()), names([["EX_EB2", "SL1Aa"], ["EX_EB3", "EX_EB4"]]));
-    // One drive for both ends: it lies alike for both ways that are straight, and for both that are curved.
+    assert_eq!(routes(&imported(&inverted).unwrap()), names([["EX_EB2", "SL1Aa"], ["EX_EB3", "EX_EB4"]]));
+    // One drive for both ends: it lies alike for both routes that are straight, and for both that are curved.
     let single_drive =
         SLIP.replace("<B-D><turnout>4</turnout><turnoutB>4", "<B-D><turnout>2</turnout><turnoutB>2");
     let left_out = imported(&single_drive).unwrap().left_out;

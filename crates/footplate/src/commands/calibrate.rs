@@ -166,10 +166,10 @@ impl Arguments {
         let layout = layout_named(layout)?.layout;
         let train = self.train.map(|named| named.train);
         let logs = LogFile::read_all(&self.from, &layout, train)?;
-        let doubt = check_runs(&layout, logs.iter().flat_map(|log| &log.recording.runs))?;
-        let outcome = if doubt.is_none() { Outcome::Done } else { Outcome::FallsShort };
-        if let Some(doubt) = doubt.as_ref().filter(|_| !self.json) {
-            writeln!(output, "WARNING: {}\n", doubt.english)?;
+        let warning = check_runs(&layout, logs.iter().flat_map(|log| &log.recording.runs))?;
+        let outcome = if warning.is_none() { Outcome::Done } else { Outcome::FallsShort };
+        if let Some(warning) = warning.as_ref().filter(|_| !self.json) {
+            writeln!(output, "WARNING: {}\n", warning.english)?;
         }
         let (batch, mut store) = match &self.store {
             None => {
@@ -210,7 +210,7 @@ impl Arguments {
             Some(question) => question.answer(&layout, &batch, self.json, output)?,
             None if self.json => {
                 let mut value = serde_json::to_value(&report)?;
-                value["warnings"] = doubt.iter().map(|doubt| doubt.english.as_str()).collect();
+                value["warnings"] = warning.iter().map(|warning| warning.english.as_str()).collect();
                 writeln!(output, "{}", serde_json::to_string_pretty(&value)?)?;
             }
             None => table::write(&report, output)?,

@@ -73,8 +73,8 @@ impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = layout_named(&self.layout)?.layout;
         let recordings = LogFile::recordings(&self.logs, &layout, self.train.map(TrainId))?;
-        let doubt = check_runs(&layout, recordings.iter().flat_map(|recording| &recording.runs))?;
-        let outcome = if doubt.is_none() { Outcome::Done } else { Outcome::FallsShort };
+        let warning = check_runs(&layout, recordings.iter().flat_map(|recording| &recording.runs))?;
+        let outcome = if warning.is_none() { Outcome::Done } else { Outcome::FallsShort };
         let calibration = self.calibration.as_deref().map(MotionFile::read).transpose()?;
         let scored = self.score(&layout, &recordings, calibration.as_ref())?;
         if let Some(plot) = &self.plot {
@@ -89,12 +89,12 @@ impl Arguments {
         }
         if self.json {
             let mut value = json::scores(&layout, &scored, !self.summary);
-            value["warnings"] = doubt.iter().map(|doubt| doubt.english.as_str()).collect();
+            value["warnings"] = warning.iter().map(|warning| warning.english.as_str()).collect();
             writeln!(output, "{}", serde_json::to_string_pretty(&value)?)?;
             return Ok(outcome);
         }
-        if let Some(doubt) = doubt {
-            writeln!(output, "WARNING: {}\n", doubt.english)?;
+        if let Some(warning) = warning {
+            writeln!(output, "WARNING: {}\n", warning.english)?;
         }
         if self.markdown {
             report::write(output, &layout, &scored)?;

@@ -76,12 +76,12 @@ impl Arguments {
                 (recordings.into_iter().map(session).collect(), batch)
             }
         };
-        let doubt = check_runs(&layout, sessions.iter().flat_map(|session| &session.runs))?;
+        let warning = check_runs(&layout, sessions.iter().flat_map(|session| &session.runs))?;
         let language = self.language;
-        let outcome = if doubt.is_none() { Outcome::Done } else { Outcome::FallsShort };
-        let warning = doubt.map(|doubt| match language {
-            Language::English => doubt.english,
-            Language::German => doubt.german,
+        let outcome = if warning.is_none() { Outcome::Done } else { Outcome::FallsShort };
+        let warning = warning.map(|warning| match language {
+            Language::English => warning.english,
+            Language::German => warning.german,
         });
         if let Some(warning) = &warning {
             writeln!(output, "{}: {warning}", language.pick("WARNING", "WARNUNG"))?;

@@ -2,11 +2,11 @@
 //!
 //! ```text
 //! A == D      the first turnout decides between A and B, the second between C and D;
-//!    X        each of the four ways has a state of both
+//!    X        each of the four routes has a state of both
 //! B == C
 //! ```
 //!
-//! A single slip lacks the way from B to C. Its turnouts are not thrown for that way, but a layout has no word for it.
+//! A single slip lacks the route from B to C. Its turnouts are not thrown for that route, but a layout has no word for it.
 
 use std::collections::BTreeSet;
 
@@ -17,13 +17,13 @@ use roxmltree::Node;
 use super::tracks::{CLOSED, Port, Tracks, number_of, stretch};
 use super::{children, text_of};
 
-/// The two turnouts, each with its state for each of the ways A-C, A-D, B-D and B-C as JMRI numbers states, where a panel does not
+/// The two turnouts, each with its state for each of the routes A-C, A-D, B-D and B-C as JMRI numbers states, where a panel does not
 /// say otherwise.
 const USUAL_STATES: [(&str, [&str; 4]); 2] =
     [("turnout", [CLOSED, CLOSED, THROWN, THROWN]), ("turnoutB", [CLOSED, THROWN, THROWN, CLOSED])];
-const WAYS: [&str; 4] = ["A-C", "A-D", "B-D", "B-C"];
+const ROUTES: [&str; 4] = ["A-C", "A-D", "B-D", "B-C"];
 const THROWN: &str = "4";
-/// The connections of each turnout, and a way over each of them by its place in `WAYS`, and the other way over it.
+/// The connections of each turnout, and a route over each of them by its place in `ROUTES`, and the other route over it.
 const LEGS: [[(&str, [usize; 2]); 2]; 2] = [[("A", [0, 1]), ("B", [2, 3])], [("C", [0, 3]), ("D", [1, 2])]];
 
 impl<'a> Tracks<'a, '_> {
@@ -39,21 +39,21 @@ impl<'a> Tracks<'a, '_> {
 
     fn slip(&mut self, slip: Node<'a, '_>, ident: &str) -> Result<(), String> {
         if !matches!(slip.attribute("slipType"), Some("DOUBLE_SLIP" | "8")) {
-            return Err("it is a single slip, and a layout cannot say which way it lacks".to_owned());
+            return Err("it is a single slip, and a layout cannot say which route it lacks".to_owned());
         }
         let mut turnouts = Vec::new();
         for ((element, usual), legs) in USUAL_STATES.into_iter().zip(LEGS) {
             let name = self.system_name(text_of(slip, element).unwrap_or_default());
             let number =
                 number_of(name).ok_or_else(|| format!("its `{element}` is `{name}`, without a number"))?;
-            let state = |way: usize| {
+            let state = |route: usize| {
                 let written = children(slip, "states")
                     .next()
-                    .and_then(|states| text_of(children(states, WAYS.get(way)?).next()?, element));
-                written.or_else(|| usual.get(way).copied())
+                    .and_then(|states| text_of(children(states, ROUTES.get(route)?).next()?, element));
+                written.or_else(|| usual.get(route).copied())
             };
-            let [one, other] = legs.map(|(letter, [way, same])| {
-                (state(way) == state(same)).then(|| (letter, state(way) == Some(CLOSED)))
+            let [one, other] = legs.map(|(letter, [route, same])| {
+                (state(route) == state(same)).then(|| (letter, state(route) == Some(CLOSED)))
             });
             let (Some((first, is_closed)), Some((second, is_other))) = (one, other) else {
                 return Err(format!("the states of its `{element}` are not those of a turnout at one end"));
