@@ -22,6 +22,7 @@ mod assets;
 mod board;
 mod calibration_picture;
 mod connections;
+mod crossing_picture;
 mod guard;
 mod history;
 mod model_picture;

@@ -23,7 +23,14 @@ const FEWEST_SPEEDS: usize = 4;
 /// More contradictions than these tell a person nothing new.
 const MOST_SAID: usize = 4;
 
-/// Checks runs against a layout, and returns how its lengths compare with them.
+/// What a person has to know before any figure: the lengths may not be those of the layout.
+#[derive(Debug)]
+pub(crate) struct LengthWarning {
+    pub(crate) english: String,
+    pub(crate) german: String,
+}
+
+/// Checks runs against a layout; the warning goes into the headline of what is made of them.
 ///
 /// # Errors
 /// The times are not in seconds. Or the runs are of another layout: sensors follow each other that no rails join, or the lengths are those of another
@@ -31,15 +38,25 @@ const MOST_SAID: usize = 4;
 pub(crate) fn check_runs<'r>(
     layout: &Layout,
     runs: impl Iterator<Item = &'r Run>,
-) -> anyhow::Result<SurveyTest> {
+) -> anyhow::Result<Option<LengthWarning>> {
     let sections = SectionIndex::of(layout);
+    let lengths = tested(layout, &sections, runs)?;
+    Ok(lengths_doubted(layout, &sections, &lengths))
+}
+
+/// How the lengths of a layout compare with its runs.
+fn tested<'r>(
+    layout: &Layout,
+    sections: &SectionIndex,
+    runs: impl Iterator<Item = &'r Run>,
+) -> anyhow::Result<SurveyTest> {
     let mut test = LayoutTest::default();
     let mut speeds = Vec::new();
     for run in runs {
         speeds.extend(mean_speeds(layout, run));
         test.begin_run(run.moving().len());
         for raw in &run.events {
-            test.take(layout, &sections, &raw.event);
+            test.take(layout, sections, &raw.event);
         }
     }
     if let Some(contradiction) = order_contradicts(layout, &test.sequence()) {
@@ -48,17 +65,14 @@ pub(crate) fn check_runs<'r>(
     if let Some(contradiction) = speeds_contradict(layout, speeds) {
         bail!(contradiction);
     }
-    let lengths = test.lengths(&sections);
-    let odd = odd_hops(layout, &sections, &lengths);
+    let lengths = test.lengths(sections);
+    let odd = odd_hops(layout, sections, &lengths);
     if let Some(other) = layout_with(layout, &odd) {
         bail!(
             "the recordings are not of layout `{}` but of `{other}`: {}; give --layout {other}",
             layout.name(),
-            lengths_said(layout, &odd)
+            lengths_said(layout, &odd).english
         );
-    }
-    if let Some(said) = lengths_doubted(layout, &sections, &lengths) {
-        eprintln!("{said}");
     }
     Ok(lengths)
 }
@@ -110,7 +124,7 @@ impl<'l> LayoutWatch<'l> {
     }
 
     /// What a person is told about lengths when the session is over.
-    pub(crate) fn lengths_doubted(&self) -> Option<String> {
+    pub(crate) fn lengths_doubted(&self) -> Option<LengthWarning> {
         lengths_doubted(self.layout, &self.sections, &self.test.lengths(&self.sections))
     }
 }
@@ -178,32 +192,47 @@ fn odd_hops(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTest) -> V
 }
 
 /// What a person is told where lengths are not those of the layout, but no other is known that has them.
-fn lengths_doubted(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTest) -> Option<String> {
+fn lengths_doubted(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTest) -> Option<LengthWarning> {
     if lengths.is_passed() {
         return None;
     }
+    let name = layout.name();
     let odd = odd_hops(layout, sections, lengths);
     if odd.is_empty() {
-        return Some(format!(
-            "the lengths of layout `{}` are off by about {:.0} times what it says (length_uncertainty_mm): they are \
-             estimated together with speeds, which may all be off by {:.0} %",
-            layout.name(),
-            lengths.factor,
-            100.0 * lengths.scale
-        ));
+        let (factor, scale) = (lengths.factor, 100.0 * lengths.scale);
+        return Some(LengthWarning {
+            english: format!(
+                "the lengths of layout `{name}` are off by about {factor:.0} times what it says (length_uncertainty_mm): they \
+                 are estimated together with speeds, which may all be off by {scale:.0} %; is it the right layout?"
+            ),
+            german: format!(
+                "die Längen der Anlage `{name}` sind um etwa das {factor:.0}-Fache dessen falsch, was sie angibt \
+                 (length_uncertainty_mm): sie werden zusammen mit den Tempi geschätzt, die alle um {scale:.0} % falsch sein \
+                 können; ist es die richtige Anlage?"
+            ),
+        });
     }
-    let layout_name = layout.name();
-    Some(format!("lengths that are not those of layout `{layout_name}`: {}", lengths_said(layout, &odd)))
+    let LengthWarning { english, german } = lengths_said(layout, &odd);
+    Some(LengthWarning {
+        english: format!("lengths that are not those of layout `{name}`: {english}; is it the right layout?"),
+        german: format!(
+            "Längen, die nicht die der Anlage `{name}` sind: {german}; ist es die richtige Anlage?"
+        ),
+    })
 }
 
-fn lengths_said(layout: &Layout, odd: &[(HopId, Length, Length)]) -> String {
-    let said = odd.iter().take(MOST_SAID).filter_map(|(hop, surveyed, path_length)| {
+fn lengths_said(layout: &Layout, odd: &[(HopId, Length, Length)]) -> LengthWarning {
+    let said = odd.iter().take(MOST_SAID).filter_map(|(hop, surveyed, found)| {
         let hop = layout.hop(*hop)?;
         let (from, to) = (layout.node_name(hop.from), layout.node_name(hop.to));
-        let (surveyed, path_length) = (surveyed.as_mm(), path_length.as_mm());
-        Some(format!("{from} to {to} takes as long as {path_length:.0} mm, not {surveyed:.0}"))
+        let (surveyed, found) = (surveyed.as_mm(), found.as_mm());
+        Some([
+            format!("{from} to {to} takes as long as {found:.0} mm, not {surveyed:.0}"),
+            format!("{from} bis {to} dauert so lange wie {found:.0} mm, nicht {surveyed:.0}"),
+        ])
     });
-    said.collect::<Vec<_>>().join(", ")
+    let (english, german): (Vec<String>, Vec<String>) = said.map(|[one, other]| (one, other)).unzip();
+    LengthWarning { english: english.join(", "), german: german.join(", ") }
 }
 
 /// Another built-in layout with the path lengths.
@@ -239,7 +268,7 @@ mod tests {
         let layout = built_in(layout)?.layout;
         let mut input = std::io::BufReader::new(std::fs::File::open(&path)?);
         let recording = parse_sensor_log(&path, &mut input, LogContext { sensors: &layout, train: None })?;
-        check_runs(&layout, recording.runs.iter())
+        tested(&layout, &SectionIndex::of(&layout), recording.runs.iter())
     }
 
     #[test]

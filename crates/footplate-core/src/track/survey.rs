@@ -106,8 +106,15 @@ impl Layout {
         for (stretch, known) in lengths.iter().enumerate() {
             let length = checked(stretch, *known, &layout.survey)?;
             let first = 2 * stretch;
+            let before = layout.edges.get(first).map_or(Length::ZERO, |edge| edge.length);
             for edge in layout.edges.get_mut(first..first + 2).into_iter().flatten() {
                 (edge.length, edge.known) = (length, *known);
+            }
+            // A crossing stays at its part of the edge.
+            for at in layout.crossings.iter_mut().flat_map(|crossing| &mut crossing.tracks) {
+                if usize::from(at.edge.0) == first && before > Length::ZERO {
+                    at.offset = at.offset * (length / before);
+                }
             }
         }
         layout.with_hops()
@@ -148,6 +155,8 @@ pub(super) fn surveyed_distances(layout: &Layout) -> Result<BTreeMap<HopId, Leng
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ids::EdgeId;
+    use crate::track::Position;
     use crate::track::example::{oval, oval_plan};
     use alloc::vec;
     use std::string::ToString;
@@ -185,6 +194,18 @@ mod tests {
         assert!((hop.length.as_mm() - 320.0).abs() < 1e-9);
         assert_eq!(surveyed.surveyed_distance(hop.id), Some(Length::from_mm(3.0)));
         assert_eq!(surveyed.least_length(&hop), Length::from_mm(314.0));
+    }
+
+    #[test]
+    fn a_crossing_stays_at_its_part_of_an_edge_of_another_length() {
+        let at = |edge, mm| Position { edge, offset: Length::from_mm(mm) };
+        // Stated from the other end of the first edge, of 100 mm.
+        let layout = oval().with_crossing([at(EdgeId(1), 25.0), at(EdgeId(14), 10.0)]).unwrap();
+        let mut lengths: Vec<StretchLength> = layout.edges().step_by(2).map(|(_, edge)| edge.known).collect();
+        lengths[0] = StretchLength::Measured(Length::from_mm(60.0));
+        let surveyed = layout.surveyed(&lengths, layout.survey().clone()).unwrap();
+        let offsets = surveyed.crossings()[0].tracks.map(|at| at.offset.as_mm().round());
+        assert_eq!(offsets, [45.0, 10.0]);
     }
 
     #[test]

@@ -279,14 +279,15 @@ impl Body {
         let runs_over = |body: &Self, at: Position| {
             body.path.iter().any(|under| under.edge.stretch() == at.edge.stretch())
         };
-        self.crosses(rails, other, runs_over)
-            || self.path.iter().any(|mine| {
-                other.path.iter().any(|others| {
-                    mine.edge.stretch() == others.edge.stretch()
-                        || legs(rails, mine.edge)
-                            .any(|leg| legs(rails, others.edge).any(|theirs| theirs.0 == leg.0))
-                })
-            })
+        let share_turnout = |mine: &Under, theirs: &Under| {
+            legs(rails, mine.edge)
+                .any(|(turnout, _)| legs(rails, theirs.edge).any(|(number, _)| number == turnout))
+        };
+        let is_beside = |mine: &Under| {
+            let mut others = other.path.iter();
+            others.any(|theirs| mine.edge.stretch() == theirs.edge.stretch() || share_turnout(mine, theirs))
+        };
+        self.crosses(rails, other, runs_over) || self.path.iter().any(is_beside)
     }
 
     /// Whether two trains satisfy a condition on the two tracks of a level crossing.
@@ -303,21 +304,23 @@ impl Body {
             body.reach_on(at.edge).is_some_and(|[from, to]| (from - spot).max(spot - to) < FOULING_MM)
         };
         self.crosses(rails, other, fouls_crossing)
-            || self.path.iter().any(|mine| {
-                let Some([from, to]) = self.reach_on(mine.edge) else { return false };
-                let shares =
-                    other.reach_on(mine.edge).is_some_and(|[begins, ends]| begins < to && from < ends);
-                shares
-                    || legs(rails, mine.edge).any(|(turnout, leg)| {
-                        let fouls = |path: &Self, under: &Under| {
-                            path.distance_from_toe(rails, under, turnout) < FOULING_MM
-                        };
-                        let stands_beside = |theirs: &Under| {
-                            legs(rails, theirs.edge).any(|(number, by)| number == turnout && by != leg)
-                                && fouls(other, theirs)
-                        };
-                        fouls(self, mine) && other.path.iter().any(stands_beside)
-                    })
+            || self.path.iter().any(|mine| self.touches_on(rails, mine, other))
+    }
+
+    /// Whether the part of the train on one edge touches another train: there, or on the other leg of a turnout.
+    fn touches_on(&self, rails: &Rails<'_>, mine: &Under, other: &Self) -> bool {
+        let Some([from, to]) = self.reach_on(mine.edge) else { return false };
+        let shares = other.reach_on(mine.edge).is_some_and(|[begins, ends]| begins < to && from < ends);
+        let fouls = |body: &Self, under: &Under, turnout: TurnoutId| {
+            body.distance_from_toe(rails, under, turnout) < FOULING_MM
+        };
+        let mut own = legs(rails, mine.edge).filter(|(turnout, _)| fouls(self, mine, *turnout));
+        shares
+            || own.any(|(turnout, leg)| {
+                let is_other_leg = |theirs: &Under| {
+                    legs(rails, theirs.edge).any(|(number, by)| number == turnout && by != leg)
+                };
+                other.path.iter().any(|theirs| is_other_leg(theirs) && fouls(other, theirs, turnout))
             })
     }
 

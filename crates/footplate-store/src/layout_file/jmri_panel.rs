@@ -9,13 +9,17 @@
 //!         positionablepoint                         ANCHOR, END_BUMPER or EDGE_CONNECTOR, and the segments at it
 //!         tracksegment                              blockname; what is at its ends: a point, or A, B or C of a turnout
 //!         layoutturnout                             turnoutname, blockname; A is the toe, B the leg that goes on at `continuing`
-//!         levelxing, layoutslip, layoutturntable    not imported
+//!         levelxing                                 the tracks A to C and B to D
+//!         layoutSlip                                turnout, turnoutB, and their states for each route through it
+//!         layoutturntable                           not imported
 //! ```
 //!
 //! Files before JMRI 4.21 write numbers for the types. An anchor between two detectors becomes a boundary, every other anchor
 //! disappears. JMRI draws tracks and does not measure them: only where a block is one track between two places does its length, if it
 //! has one, become that of an edge. DTDs are refused, so that no entity can grow, and the number of nodes is limited.
 
+mod level_crossings;
+mod slips;
 mod tracks;
 
 use footplate_core::track::{Layout, LayoutError};
@@ -111,11 +115,14 @@ pub fn import_panel(file: &str, text: &str, context: &ImportContext) -> Result<I
         ident: ident.to_owned(),
         name: name.to_owned(),
     })?;
+    tracks.read_slips();
+    tracks.read_level_crossings();
     tracks.read_points();
     tracks.join();
     let plan = tracks.plan(context);
     let layout =
         Layout::build(&plan).map_err(|problem| PanelError::Layout { file: file.to_owned(), problem })?;
+    let layout = tracks.cross(layout);
     let mut drawing = Drawing::default();
     for (name, point) in &tracks.drawn {
         if let Some(node) = layout.node_named(name) {

@@ -1,10 +1,11 @@
 //! A panel of JMRI's Layout Editor becomes a layout; what it does not say is listed and not made up.
 
-use footplate_core::track::{Leg, NodeKind, StretchLength, Survey};
+use footplate_core::track::{Crossing, Leg, NodeKind, StretchLength, Survey};
 use footplate_core::{Length, SensorId, TurnoutId};
 use footplate_store::{ImportContext, ImportedPanel, import_panel, parse_layout, write_layout};
 
 const SIDING: &str = include_str!("../../../../testdata/panels/jmri_siding.xml");
+const SLIP: &str = include_str!("../../../../testdata/panels/jmri_slip.xml");
 
 fn imported(text: &str) -> Result<ImportedPanel, String> {
     let context = ImportContext {
@@ -98,4 +99,62 @@ fn tracks_that_lead_nowhere_end_in_the_layout_and_are_listed() {
         "{:?}",
         panel.left_out
     );
+}
+
+/// Where the legs of both turnouts of the slip lead, straight and curved, by the node that a train comes to.
+fn routes(panel: &ImportedPanel) -> [[String; 2]; 2] {
+    let layout = &panel.file.layout;
+    ["BR7", "BR8"].map(|branch| {
+        let node = layout.node_named(branch).unwrap();
+        [Leg::Straight, Leg::Curved].map(|leg| {
+            let mut edges = layout.edges().map(|(_, edge)| edge);
+            let edge = edges.find(|edge| edge.from == node && edge.leg == Some(leg)).unwrap();
+            layout.node_name(edge.to).to_owned()
+        })
+    })
+}
+
+#[test]
+fn a_double_slip_becomes_two_turnouts_that_are_joined_at_their_toes() {
+    let panel = imported(SLIP).unwrap();
+    let layout = &panel.file.layout;
+    let [merge, branch] = ["MR7", "BR8"].map(|name| layout.node_named(name).unwrap());
+    let between = layout.edge(layout.edge_between(merge, branch).unwrap()).unwrap();
+    assert_eq!((between.length, between.known), (Length::ZERO, Length::ZERO.into()));
+    let names = |[one, other]: [[&str; 2]; 2]| [one.map(str::to_owned), other.map(str::to_owned)];
+    // From A into the block of the middle, by a boundary there; from B over the crossing to the bumper.
+    assert_eq!(routes(&panel), names([["SL1Aa", "EX_EB2"], ["EX_EB3", "EX_EB4"]]));
+    // Thrown for what closed usually is, at the first end only.
+    let state = |turnout: &str| format!("<turnout>{turnout}</turnout><turnoutB>");
+    let inverted = SLIP.replace(&state("2"), "<turnout>x").replace(&state("4"), &state("2"));
+    let inverted = inverted.replace("<turnout>x", &state("4"));
+    assert_eq!(routes(&imported(&inverted).unwrap()), names([["EX_EB2", "SL1Aa"], ["EX_EB3", "EX_EB4"]]));
+    // One drive for both ends: it lies alike for both routes that are straight, and for both that are curved.
+    let single_drive =
+        SLIP.replace("<B-D><turnout>4</turnout><turnoutB>4", "<B-D><turnout>2</turnout><turnoutB>2");
+    let left_out = imported(&single_drive).unwrap().left_out;
+    let expected =
+        "the slip SL1: the states of its `turnout` are not those of a turnout at one end; tracks end at it";
+    assert!(left_out.contains(&expected.to_owned()), "{left_out:?}");
+    let left_out = imported(&SLIP.replace("DOUBLE_SLIP", "SINGLE_SLIP")).unwrap().left_out;
+    assert!(left_out[0].starts_with("the slip SL1: it is a single slip"), "{left_out:?}");
+}
+
+#[test]
+fn a_level_crossing_is_on_both_of_its_tracks() {
+    let panel = imported(SLIP).unwrap();
+    let layout = &panel.file.layout;
+    let [Crossing { tracks: [one, other] }] = layout.crossings() else { panic!("one crossing") };
+    // One track changes its block there: the crossing is at the boundary. The other one is an edge of unknown length.
+    let ends =
+        |edge| layout.edge(edge).map(|edge| [edge.from, edge.to].map(|node| layout.node_name(node))).unwrap();
+    let at = [(ends(one.edge), one.offset.as_mm()), (ends(other.edge), other.offset.as_mm())];
+    assert_eq!(at[0].1, 0.0, "{at:?}");
+    assert!(at[0].0.contains(&"X1ACa"), "{at:?}");
+    assert_eq!(at[1].1, 175.0, "the middle of 350 mm, which stand for an unknown length: {at:?}");
+    let expected =
+        "where the tracks of level crossing X1 cross: assumed; measure it and correct `mm` in `crossings`";
+    assert!(panel.left_out.contains(&expected.to_owned()), "{:?}", panel.left_out);
+    let text = write_layout(&panel.file);
+    assert_eq!(write_layout(&parse_layout("junction.toml", text.as_bytes()).unwrap()), text);
 }

@@ -4,7 +4,7 @@ import { colour, dots, line, rounded } from "./chart.js";
 import { LiveChart, barsOf } from "./charts.js";
 import { make, put, shown, signed } from "./dom.js";
 import { ask, get } from "./server.js";
-import { LANGUAGE, say } from "./words.js";
+import { LANGUAGE, logged, say } from "./words.js";
 
 const SIDES = [["below", "first", -0.12], ["above", "second", 0.12], ["unknown", "third", 0]];
 /** Interval between two requests for a changed model (ms). */
@@ -116,7 +116,7 @@ export function calibrationPage(root, live, number) {
       + say("law-from", law.changes, shown(law.best.held_out_mm)), " ", whyButton(law.direction.toLowerCase() === "up" ? "LAW:up" : "LAW:down"))));
     const before = $("#change").value;
     $("#change").replaceChildren(...(report?.changes ?? []).map(({ steps: [from, to], recording, run }, place) =>
-      new Option(say("change-of", from, to, recording, run), place)));
+      new Option(say("change-of", from, to, logged(recording), run), place)));
     if (before) $("#change").value = before;
     $("#changes").hidden = !report?.changes.length;
   }

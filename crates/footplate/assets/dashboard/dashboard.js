@@ -56,6 +56,13 @@ function turn() {
     if (link.hash === here) link.setAttribute("aria-current", "page");
     else link.removeAttribute("aria-current");
   }
+  scrollToOwn();
+}
+
+/** On a phone the links are wider than the screen. */
+function scrollToOwn() {
+  const own = $("pages").querySelector("[aria-current]");
+  if (own) $("pages").scrollLeft = own.offsetLeft - ($("pages").clientWidth - own.offsetWidth) / 2;
 }
 
 /** A link for every train of the session. */
@@ -70,6 +77,7 @@ function links({ trains }) {
     after.after(link);
     after = link;
   }
+  scrollToOwn();
 }
 
 /** The state of the connection, with the number of alarms. */

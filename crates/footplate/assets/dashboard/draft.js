@@ -11,6 +11,8 @@ const GAP_MM = 60;
 const MOST_SENSORS = 40;
 
 const MARKS = ["sensors", "boundaries"];
+/** The turnouts that a piece is. */
+const TURNOUTS_OF = { turnout: 1, slip: 2 };
 const EMPTY = { pieces: [], sensors: [], boundaries: [], blocks: [] };
 const isAt = (joint, { x, y }) => Math.hypot(joint.x - x, joint.y - y) < JOINS_MM;
 
@@ -26,7 +28,7 @@ function endsOf({ kind, mm, radius, angle, side = 1 }) {
   const straight = { x: mm, y: 0, heading: 0 };
   const curved = { x: radius * Math.sin(bend), y: side * radius * (1 - Math.cos(bend)), heading: side * bend };
   if (kind === "straight") return [first, straight];
-  if (kind === "crossing") {
+  if (kind === "crossing" || kind === "slip") {
     // The other track crosses the middle.
     const [dx, dy] = [mm / 2 * Math.cos(bend), side * mm / 2 * Math.sin(bend)];
     return [first, straight, { x: mm / 2 - dx, y: -dy, heading: Math.PI + side * bend }, { x: mm / 2 + dx, y: dy, heading: side * bend }];
@@ -155,8 +157,16 @@ export class Draft {
       const part = bend * nth / 12;
       return [piece.radius * Math.sin(part), (piece.side ?? 1) * piece.radius * (1 - Math.cos(part))];
     });
-    const across = endsOf(piece).slice(2).map(({ x, y }) => [x, y]);
-    const curves = { straight: [line], curve: [arc], turnout: [line, arc], crossing: [line, across] }[piece.kind];
+    const ends = endsOf(piece).map(({ x, y }) => [x, y]);
+    const across = ends.slice(2);
+    // Between the ends of different tracks, with both tracks as tangents.
+    const bent = ([x1, y1], [x2, y2]) => Array.from({ length: 13 }, (_, nth) => {
+      const [t, u] = [nth / 12, 1 - nth / 12];
+      return [u * u * x1 + t * u * piece.mm + t * t * x2, u * u * y1 + t * t * y2];
+    });
+    const [a, c, b, d] = ends;
+    const curves = piece.kind === "slip" ? [line, across, bent(a, d), bent(b, c)]
+      : { straight: [line], curve: [arc], turnout: [line, arc], crossing: [line, across] }[piece.kind];
     return curves.map((curve) => curve.map(([x, y]) => { const point = at(piece.pose, { x, y, heading: 0 }); return [point.x, point.y]; }));
   }
 
@@ -176,7 +186,7 @@ export class Draft {
         if (gap < GAP_MM && one.ends[0].piece !== other.ends[0].piece) problems.push({ word: "draft-gap", blanks: [gap.toFixed(0)], at: one });
       }
     }
-    problems.push({ word: "draft-ends", blanks: [open.length, this.pieces.filter(({ kind }) => kind === "turnout").length, sensors, this.sections().filter(({ isWatched }) => isWatched).length] });
+    problems.push({ word: "draft-ends", blanks: [open.length, this.pieces.reduce((sum, { kind }) => sum + (TURNOUTS_OF[kind] ?? 0), 0), sensors, this.sections().filter(({ isWatched }) => isWatched).length] });
     return problems;
   }
 

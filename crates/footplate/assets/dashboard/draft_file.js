@@ -1,7 +1,7 @@
 // The text of a layout file from a drawing: sensors, boundaries, turnouts and open ends are its nodes; the pieces between them form its
-// edges. Where two edges run over one crossing, the file says so.
+// edges. Where two edges run over one crossing, the file says so. A slip is two turnouts, joined at their toes in its middle.
 
-import { arcOf } from "./pieces.js";
+import { arcOf, halfOfSlip } from "./pieces.js";
 
 /** Standard deviation of a catalogue length with its joint (mm). */
 const LENGTH_UNCERTAINTY_MM = 1;
@@ -32,7 +32,17 @@ export class DraftFile {
     }
     this.#sections = draft.sections();
     for (const [piece, laid] of draft.pieces.entries()) {
-      if (laid.kind === "turnout") this.#turnouts.push({ piece, number: this.#turnouts.length + 1, toe: this.#jointOf.get(`${piece} 0`) });
+      const number = this.#turnouts.length + 1;
+      const [straight, curved] = ["straight", "curved"].map((leg, nth) => ({ port: nth + 1, leg, mm: nth ? arcOf(laid) : laid.mm }));
+      if (laid.kind === "turnout") this.#turnouts.push({ piece, number, at: this.#jointOf.get(`${piece} 0`), toe: 0, legs: [straight, curved] });
+      if (laid.kind !== "slip") continue;
+      const [one, other] = [0, 1].map((port) => this.#jointOf.get(`${piece} ${port}`));
+      const at = { x: (one.x + other.x) / 2, y: (one.y + other.y) / 2 };
+      // Each end has a leg on either track; the first track is straight.
+      for (const end of [0, 1]) {
+        const legs = [{ ...straight, port: end, mm: halfOfSlip(laid) }, { ...curved, port: end + 2, mm: halfOfSlip(laid) }];
+        this.#turnouts.push({ piece, number: number + end, at, partner: number + 1 - end, legs });
+      }
     }
   }
 
@@ -54,10 +64,13 @@ export class DraftFile {
     const laid = this.#draft.pieces[piece];
     // Opposite ends of a crossing are neighbours in the list.
     if (laid.kind === "crossing") return this.#reach(piece, port ^ 1, mm + laid.mm, [...crossed, { piece, mm: mm + laid.mm / 2 }]);
-    if (laid.kind !== "turnout") return this.#reach(piece, 1 - port, mm + (laid.kind === "straight" ? laid.mm : arcOf(laid)), crossed);
-    const { number } = this.#turnouts.find((one) => one.piece === piece);
-    if (port === 0) return { name: `BR${number}`, mm, crossed };
-    return port === 1 ? { name: `MR${number} straight`, mm: mm + laid.mm, crossed } : { name: `MR${number} curved`, mm: mm + arcOf(laid), crossed };
+    if (laid.kind === "straight" || laid.kind === "curve") return this.#reach(piece, 1 - port, mm + (laid.kind === "straight" ? laid.mm : arcOf(laid)), crossed);
+    for (const { number, toe, legs } of this.#turnouts.filter((one) => one.piece === piece)) {
+      if (port === toe) return { name: `BR${number}`, mm, crossed };
+      const own = legs.find((leg) => leg.port === port);
+      if (own) return { name: `MR${number} ${own.leg}`, mm: mm + own.mm, crossed };
+    }
+    throw new Error(`no end ${port} at piece ${piece}`);
   }
 
   /** Every path out of a node, by the name of the node in this direction, and its name in the other direction. */
@@ -67,11 +80,9 @@ export class DraftFile {
       paths.push({ from: ahead, back, ...this.#through(other.piece, other.port, 0) });
       paths.push({ from: back, back: ahead, ...this.#through(one.piece, one.port, 0) });
     }
-    for (const { piece, number } of this.#turnouts) {
-      const laid = this.#draft.pieces[piece];
-      paths.push({ from: `MR${number}`, back: `BR${number}`, ...this.#reach(piece, 0, 0) });
-      paths.push({ from: `BR${number} straight`, back: `MR${number} straight`, ...this.#reach(piece, 1, laid.mm) });
-      paths.push({ from: `BR${number} curved`, back: `MR${number} curved`, ...this.#reach(piece, 2, arcOf(laid)) });
+    for (const { piece, number, toe, partner, legs } of this.#turnouts) {
+      paths.push({ from: `MR${number}`, back: `BR${number}`, ...(partner ? { name: `BR${partner}`, mm: 0, crossed: [] } : this.#reach(piece, toe, 0)) });
+      for (const { leg, port, mm } of legs) paths.push({ from: `BR${number} ${leg}`, back: `MR${number} ${leg}`, ...this.#reach(piece, port, mm) });
     }
     for (const joint of this.#ends) {
       const [{ piece, port }] = joint.ends;
@@ -105,7 +116,7 @@ export class DraftFile {
       ...list("sensors", this.#sensors.map((joint) => `  { names = ["${joint.names.join('", "')}"], at = ${point(joint)} },`)),
       ...list("blocks", this.#sections.filter(({ isWatched }) => isWatched).map(({ name, number }) => `  { name = ${quoted(name)}, number = ${number} },`)),
       ...list("boundaries", this.#boundaries.map((joint) => `  { names = ["${joint.names.join('", "')}"], enters = [${this.#block(joint.ends[1])}, ${this.#block(joint.ends[0])}], at = ${point(joint)} },`)),
-      ...list("turnouts", this.#turnouts.map(({ number, toe }) => `  { number = ${number}, names = ["BR${number}", "MR${number}"], at = ${point(toe)} },`)),
+      ...list("turnouts", this.#turnouts.map(({ number, at }) => `  { number = ${number}, names = ["BR${number}", "MR${number}"], at = ${point(at)} },`)),
       ...list("ends", this.#ends.map((joint) => `  { names = ["EN${joint.end}", "EX${joint.end}"], at = ${point(joint)} },`)),
       ...list("edges", edges),
       ...list("crossings", [...crossed.values()].filter(({ length }) => length === 2).map((tracks) => `  { tracks = [${tracks.join(", ")}] },`)), "",

@@ -168,8 +168,8 @@ export function editorPage(root, live) {
       return made;
     };
     const has = (kind) => LIBRARIES[$("#library").value].some((piece) => piece.kind === kind);
-    const groups = ["straight", "curve", "turnout", "crossing"].filter(has).map((kind) => make("div", { role: "group", "aria-label": say(`draft-${kind}s`) },
-      make("h3", {}, say(`draft-${kind}s`)), make("div", { class: "does" }, ...LIBRARIES[$("#library").value].filter((piece) => piece.kind === kind).map(button))));
+    const groups = ["straight", "curve", "turnout", "crossing", "slip"].filter(has).map((kind) => make("div", { role: "group", "aria-label": say(`draft-${kind}s`) },
+      make("h3", {}, say(`draft-${kind}s`)), kind === "slip" ? make("p", { class: "quiet" }, say("draft-slip-about")) : "", make("div", { class: "does" }, ...LIBRARIES[$("#library").value].filter((piece) => piece.kind === kind).map(button))));
     $("#pieces").replaceChildren(...groups);
   }
 

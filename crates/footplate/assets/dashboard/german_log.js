@@ -1,6 +1,9 @@
 // The lines of the log, and the reasons of refused commands, in German. A line that is not known stays English as a whole.
 
 import { ERRORS } from "./german_errors.js";
+import { helpInGerman } from "./german_help.js";
+import { ODOMETRY_ERRORS, ofRecording } from "./german_odometry.js";
+import { CALIBRATION } from "./german_report.js";
 
 const LEGS = { straight: "gerade", curved: "auf Abzweig" };
 const trains = (list) => list.replace("no train that can move", "kein Zug, der fahren kann").replace(/train (\d+)/g, "Zug $1");
@@ -109,7 +112,9 @@ const LINES = [
   [/^(\S+) mm\/s cannot be held: use (\S+) to (\S+) mm\/s$/, "$1 mm/s lassen sich nicht halten: $2 bis $3 mm/s"], [/^no sensor reported train (\d+) within (\S+) s: .*$/, "kein Rückmelder hat Zug $1 in $2 s gemeldet: prüfen, ob er fährt und auf dieser Anlage ist"],
   [/^the position is not on this layout$/, "die Stelle ist nicht auf dieser Anlage"], [/^a distance should be a finite number$/, "eine Strecke sollte eine endliche Zahl sein"],
   [/^the position of turnout (\d+), (\S+) mm before the end of the path, is unknown: .*$/, "die Stellung von Weiche $1, $2 mm vor dem Ende des Weges, ist unbekannt: erst stellen"], [/^the track ends at `(.*)`, (\S+) mm before the end of the path$/, "das Gleis endet bei `$1`, $2 mm vor dem Ende des Weges"],
-  ...ERRORS,
+  // The names of recorded sessions.
+  [/^calibration of train (\d+), (\d.*)$/, "Kalibrierung von Zug $1, $2"], [/^drive (\d.*)$/, "Fahrt $1"], [/^demo (\d.*)$/, "Vorführung $1"],
+  ...CALIBRATION, ...ODOMETRY_ERRORS, ...ERRORS,
 ];
 
 const tailed = (text) => TAILS.reduce((line, [english, german]) => line.replace(english, german), text);
@@ -118,6 +123,6 @@ const tailed = (text) => TAILS.reduce((line, [english, german]) => line.replace(
 export function logInGerman(text) {
   return text.split("\n").map((line) => {
     const known = LINES.find(([is]) => is.test(line));
-    return known ? line.replace(...known) : line;
+    return ofRecording(line) ?? helpInGerman(line) ?? (known ? line.replace(...known) : line);
   }).join("\n");
 }

@@ -46,6 +46,30 @@ const WHYS = {
   "the sensors report in an order that is impossible on this layout: check `--layout`": "die Rückmelder melden in einer Folge, die es auf dieser Anlage nicht gibt: die Anlage prüfen",
 };
 
+const SIDES = { "above": "von oben", "below": "von unten" };
+const STOPS = { "past": "hinter", "short of": "vor" };
+/** An experiment of a calibration. */
+const EXPERIMENT = [
+  [/speed at step (\d+) from (above|below)/, (_, step, side) => `Tempo bei Fahrstufe ${step} ${SIDES[side]}`],
+  [/stop from step (\d+) from (above|below), (past|short of) a sensor/, (_, step, side, of) => `Halt aus Fahrstufe ${step} ${SIDES[side]}, ${STOPS[of]} einem Rückmelder`],
+  [/short move of (\S+) s at step (\d+)/, "kurze Fahrt von $1 s bei Fahrstufe $2"],
+];
+const experiment = (text) => EXPERIMENT.reduce((line, [english, german]) => line.replace(english, german), text);
+
+/** The lines of a calibration while it runs. */
+export const CALIBRATION = [
+  [/^( *(?:speed at|stop from|short move) .*): (.*), in (\S+) s$/, (_, what, result, took) => `${experiment(what)}: ${result.replace("(was", "(war")}, in ${took} s`],
+  [/^((?:speed at|stop from|short move) .*): takes (\S+) s; expected information (\S+)$/, (_, what, takes, gain) => `${experiment(what)}: dauert ${takes} s; erwartete Information ${gain}`],
+  [/^found at (\S+) at step (\d+)$/, "gefunden bei $1 mit Stufe $2"],
+  [/^circuit: (\d+) sensors in (\S+) m, turnouts (.*)$/, (_, sensors, length, turnouts) => `Kreis: ${sensors} Rückmelder auf ${length} m, Weichen ${turnouts.replaceAll("straight", "gerade").replaceAll("curved", "auf Abzweig")}`],
+  [/^no circuit can be reached beyond (\S+): it reverses$/, "hinter $1 ist kein Kreis erreichbar: er wendet"],
+  [/^! it stalled at step (\d+); .*$/, "! er blieb mit Stufe $1 stehen; sie wird nicht mehr verwendet"], [/^! (\d+) sensor\(s\) before (\S+) did not report$/, "! $1 Rückmelder vor $2 haben nicht gemeldet"],
+  [/^! (\S+) reported, where the train cannot be$/, "! $1 hat gemeldet, wo der Zug nicht sein kann"], [/^! turnout (\d+) is not (\w+) as commanded; .*$/, "! Weiche $1 liegt nicht wie befohlen; noch einmal gestellt"],
+  [/^! it is at (\S+), where it cannot have run to from (\S+): .*$/, "! er ist bei $1, wohin er von $2 nicht gefahren sein kann: wurde er hochgehoben?"],
+  [/^! no sensor report for too long after (\S+): .*$/, "! zu lange keine Meldung nach $1: er hält und wird neu lokalisiert"],
+  [/^! lengths differ from the layout: (.*)$/, (_, list) => `! Längen stimmen nicht mit der Anlage überein: ${list.replace(/(\S+) to (\S+) (\S+) instead of/g, "$1 bis $2 $3 statt")}`],
+];
+
 function lineInGerman(line) {
   for (const [is, german] of RESULT) {
     if (is.test(line)) return line.replace(is, german);

@@ -69,6 +69,9 @@ export class Guide {
   #toRoute({ what, blanks }, answer) {
     const trains = this.#live.picture.trains.map(({ train }) => train);
     const named = (blanks[0] ?? "").split(", ").map(Number).filter((train) => trains.includes(train) && train !== this.#train);
+    // Beside a crossing every command to run would be refused.
+    const held = this.#live.picture.crossings_held?.find((pair) => pair.trains.includes(this.#train));
+    if (held) return make("ol", {}, make("li", {}, say("crossing-held", ...held.trains, held.at[0])));
     const others = what === "diverged" || what === "track-ends" ? [] : named;
     return make("ol", {}, make("li", {}, say("guide-reverse"), " ", ...[this.#train, ...others].flatMap((train) =>
       [this.#button(say("reverse-train", train), `reverse ${train}`, answer), " "])),

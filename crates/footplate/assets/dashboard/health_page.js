@@ -128,6 +128,8 @@ export function healthPage(root, live) {
       // The state of the connection shows the failure already.
       return;
     }
+    // Another page may be open by now.
+    if (!$("#poll")) return;
     for (const [place, of] of [["poll", "poll_period"], ["first-byte", "first_byte"], ["turn", "loop_turn"]]) put($(`#${place}`), quantiles(line[of]));
     charts.forEach(({ chart, data }) => chart.set(data()));
   }

@@ -113,7 +113,7 @@ export function layoutPage(root, live, about) {
   const blocks = live.layout.blocks.map(({ name, detector }) => ({ name, detector, row: make("li") }));
   $("#block-list").append(...blocks.map(({ row }) => row));
   const { nodes } = live.layout;
-  const has = { blocks: blocks.length > 0, turnouts: nodes.some(({ kind }) => kind === "branch"), sensors: nodes.some(({ kind, is_boundary: isBoundary }) => kind === "contact" && !isBoundary) };
+  const has = { blocks: blocks.length > 0, crossings: live.layout.crossings.length > 0, turnouts: nodes.some(({ kind }) => kind === "branch"), sensors: nodes.some(({ kind, is_boundary: isBoundary }) => kind === "contact" && !isBoundary) };
   for (const [what, is] of Object.entries(has)) for (const part of root.querySelectorAll(`.of-${what}`)) part.hidden = !is;
 
   const scales = $("#scale");
@@ -193,6 +193,7 @@ export function layoutPage(root, live, about) {
     guide?.show(picture);
     routes.show(picture);
     listTurnouts(picture);
+    put($("#crossings-held"), (picture.crossings_held ?? []).map(({ trains, at }) => say("crossing-held", ...trains, at[0])).join(" "));
     for (const { name, detector, row } of blocks) put(row, say("block-is", name, say(`block-${picture.blocks?.[detector] ?? "unknown"}`)));
     picture.trains.forEach((train, nth) => {
       const parts = cards.get(train.train) ?? card(train, nth);
@@ -217,7 +218,12 @@ export function layoutPage(root, live, about) {
   function write(text) {
     const list = $("#said");
     const atEnd = list.scrollTop + list.clientHeight >= list.scrollHeight - 8;
-    list.append(make("li", {}, logged(text)));
+    const lines = logged(text).split("\n");
+    // The list of commands says what each of them does.
+    list.append(lines.length === 1 ? make("li", {}, lines[0]) : make("li", { class: "listing" }, ...lines.flatMap((line) => {
+      const [command, meaning = ""] = line.split(/(?<=\S) {2,}/);
+      return [make("b", {}, command), make("span", {}, meaning)];
+    })));
     while (list.childElementCount > LINES_SHOWN) list.firstElementChild.remove();
     if (atEnd) list.scrollTop = list.scrollHeight;
   }

@@ -160,7 +160,7 @@ export function recordingsPage(root, live, number) {
         const walked = await get(`/api/recordings/${recording}/pictures`);
         const place = make("article", { class: "session" });
         $("#sessions").append(place);
-        shownSessions.set(name, new Walked(place, name, walked));
+        shownSessions.set(logged(name), new Walked(place, logged(name), walked));
       }
       put($("#answer"), "");
     } catch (error) {
@@ -207,7 +207,7 @@ export function recordingsPage(root, live, number) {
         if (checked.length > 2) checked.find((other) => other !== box).checked = false;
         open();
       });
-      return make("tr", {}, make("th", { scope: "row" }, make("label", {}, box, ` ${one.name}`)), make("td", {}, one.layout),
+      return make("tr", {}, make("th", { scope: "row" }, make("label", {}, box, ` ${logged(one.name)}`)), make("td", {}, one.layout),
         make("td", { class: "number" }, String(one.events)), make("td", { class: "number" }, String(one.excluded)), make("td", {}, one.machines.length ? one.machines.map((kind) => say(`machine-${kind}`)).join(", ") : "–"));
     }));
     put($("#answer"), list.length ? say("choose-two") : say("no-recordings"));

@@ -1,6 +1,7 @@
 // The set-up of a railway: from the command station to the first stop, step by step.
 
 import { aboutCalibration } from "./calibration_page.js";
+import { doingNow } from "./doing_now.js";
 import { make, put, shown, signed } from "./dom.js";
 import { ask, get, order } from "./server.js";
 import { inOwnLanguage, logged, say } from "./words.js";
@@ -260,7 +261,7 @@ export function setupPage(root, live, wanted) {
         $("#first-go").hidden = !isKnown;
         lost(picture);
         const own = picture.trains.find(({ train }) => String(train) === $("#first-train").value);
-        put($("#first-does"), own?.doing ? say("setup-does", own.train, own.doing, shown(own.speed_mm_per_s)) : "");
+        put($("#first-does"), own?.doing ? `${live.called(own.train)}: ${doingNow(own)}` : "");
       }
     },
     line: lines,

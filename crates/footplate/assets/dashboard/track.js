@@ -13,6 +13,8 @@ const LETTER = 1.12;
 const REACH = 8;
 const TOUCH = 2.6;
 const BLADE = 5;
+/** Where a click means a turnout, as a part of its blades. */
+const PRESSED_AT = 0.4;
 /** Units of the longer side of a drawing, on a small and on a large screen. */
 const LEAST_WIDE = 105;
 const MOST_WIDE = 160;
@@ -52,6 +54,7 @@ export class Track {
       rail.classList.add("restricted");
       svg("title", {}, rail).textContent = say("zone", edge.zone.name, edge.zone.max_mm_s);
     }
+    for (const tracks of layout.crossings) this.#cross(tracks.map(({ edge, offset_mm: mm }) => this.point(edge, mm)), rails);
     this.#bladesOf(layout, svg("g", {}, drawing));
     this.#truth = svg("g", {}, drawing);
     this.#layer = svg("g", {}, drawing);
@@ -69,6 +72,15 @@ export class Track {
     return id % 2 ? rail.toReversed() : rail;
   }
 
+  /** Marks a level crossing on both of its tracks; where they are drawn apart, a broken line says that they cross. */
+  #cross([one, other], layer) {
+    const arm = this.#unit * 1.2;
+    const mark = ([x, y]) => `M${x - arm} ${y - arm}L${x + arm} ${y + arm}M${x - arm} ${y + arm}L${x + arm} ${y - arm}`;
+    svg("path", { d: mark(one) + mark(other), class: "crossing", "stroke-width": this.#unit * 0.5 }, layer);
+    const between = svg("path", { d: written([one, other]), class: "crossing apart", "stroke-width": this.#unit * 0.4 }, layer);
+    svg("title", {}, between).textContent = say("crossing");
+  }
+
   /** Each turnout shows the leg that is set. */
   #bladesOf(layout, layer) {
     for (const edge of layout.edges) {
@@ -79,7 +91,10 @@ export class Track {
       const blade = cut(curve, 0, Math.min(0.5, BLADE * this.#unit / (long || 1)));
       const path = svg("path", { d: written(blade), class: "blade", "stroke-width": this.#unit * 1.1 }, layer);
       this.#blades.push({ path, turnout: from.number, leg: edge.leg });
-      this.#turnouts.set(from.number, this.#plan.points.get(placeOf(edge.from)));
+      // Between the blades: the two turnouts of a slip have their toes in one point.
+      const [x, y] = between(blade, PRESSED_AT);
+      const [x2, y2] = this.#turnouts.get(from.number) ?? [x, y];
+      this.#turnouts.set(from.number, [(x + x2) / 2, (y + y2) / 2]);
     }
   }
 

@@ -166,7 +166,11 @@ impl Arguments {
         let layout = layout_named(layout)?.layout;
         let train = self.train.map(|named| named.train);
         let logs = LogFile::read_all(&self.from, &layout, train)?;
-        check_runs(&layout, logs.iter().flat_map(|log| &log.recording.runs))?;
+        let warning = check_runs(&layout, logs.iter().flat_map(|log| &log.recording.runs))?;
+        let outcome = if warning.is_none() { Outcome::Done } else { Outcome::FallsShort };
+        if let Some(warning) = warning.as_ref().filter(|_| !self.json) {
+            writeln!(output, "WARNING: {}\n", warning.english)?;
+        }
         let (batch, mut store) = match &self.store {
             None => {
                 let recordings: Vec<Recording> = logs.into_iter().map(|log| log.recording).collect();
@@ -192,11 +196,11 @@ impl Arguments {
         }
         if self.method == Method::TwoSensor {
             two_sensor::write(&layout, &batch, self.json, output)?;
-            return Ok(Outcome::Done);
+            return Ok(outcome);
         }
         if self.method == Method::ShortMoves {
             short_moves::write_calibrated(&batch, self.json, output)?;
-            return Ok(Outcome::Done);
+            return Ok(outcome);
         }
         let report = Findings::of(&layout, &batch);
         if let Some(plot) = &self.plot {
@@ -204,10 +208,14 @@ impl Arguments {
         }
         match &self.explain {
             Some(question) => question.answer(&layout, &batch, self.json, output)?,
-            None if self.json => writeln!(output, "{}", serde_json::to_string_pretty(&report)?)?,
+            None if self.json => {
+                let mut value = serde_json::to_value(&report)?;
+                value["warnings"] = warning.iter().map(|warning| warning.english.as_str()).collect();
+                writeln!(output, "{}", serde_json::to_string_pretty(&value)?)?;
+            }
             None => table::write(&report, output)?,
         }
-        Ok(Outcome::Done)
+        Ok(outcome)
     }
 
     /// Where models of the batch's trains go: one train's to the file itself, several to a file each with the train's number

@@ -406,8 +406,8 @@ impl Arguments {
         let at = runtime.link().now();
         let closing = runtime.close();
         drop(runtime);
-        if let Some(said) = watch.lengths_doubted() {
-            eprintln!("{said}");
+        if let Some(warning) = watch.lengths_doubted() {
+            eprintln!("{}", warning.english);
         }
         // A session whose trains may still run has no end: the next one stops them first.
         let mut script_runner =

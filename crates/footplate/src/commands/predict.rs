@@ -73,7 +73,8 @@ impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = layout_named(&self.layout)?.layout;
         let recordings = LogFile::recordings(&self.logs, &layout, self.train.map(TrainId))?;
-        check_runs(&layout, recordings.iter().flat_map(|recording| &recording.runs))?;
+        let warning = check_runs(&layout, recordings.iter().flat_map(|recording| &recording.runs))?;
+        let outcome = if warning.is_none() { Outcome::Done } else { Outcome::FallsShort };
         let calibration = self.calibration.as_deref().map(MotionFile::read).transpose()?;
         let scored = self.score(&layout, &recordings, calibration.as_ref())?;
         if let Some(plot) = &self.plot {
@@ -87,9 +88,15 @@ impl Arguments {
             plot.write(&picture)?;
         }
         if self.json {
-            let value = json::scores(&layout, &scored, !self.summary);
+            let mut value = json::scores(&layout, &scored, !self.summary);
+            value["warnings"] = warning.iter().map(|warning| warning.english.as_str()).collect();
             writeln!(output, "{}", serde_json::to_string_pretty(&value)?)?;
-        } else if self.markdown {
+            return Ok(outcome);
+        }
+        if let Some(warning) = warning {
+            writeln!(output, "WARNING: {}\n", warning.english)?;
+        }
+        if self.markdown {
             report::write(output, &layout, &scored)?;
         } else {
             for recording in scored.iter().filter(|_| !self.summary) {
@@ -97,7 +104,7 @@ impl Arguments {
             }
             tables::write(output, &scored)?;
         }
-        Ok(Outcome::Done)
+        Ok(outcome)
     }
 
     fn score(

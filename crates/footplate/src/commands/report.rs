@@ -76,9 +76,17 @@ impl Arguments {
                 (recordings.into_iter().map(session).collect(), batch)
             }
         };
-        check_runs(&layout, sessions.iter().flat_map(|session| &session.runs))?;
+        let warning = check_runs(&layout, sessions.iter().flat_map(|session| &session.runs))?;
         let language = self.language;
-        let data = gather(&layout, &sessions, &batch, language)?;
+        let outcome = if warning.is_none() { Outcome::Done } else { Outcome::FallsShort };
+        let warning = warning.map(|warning| match language {
+            Language::English => warning.english,
+            Language::German => warning.german,
+        });
+        if let Some(warning) = &warning {
+            writeln!(output, "{}: {warning}", language.pick("WARNING", "WARNUNG"))?;
+        }
+        let data = ReportData { warning, ..gather(&layout, &sessions, &batch, language)? };
         write_whole(&self.out, page::page(&data, language)?.as_bytes())
             .with_context(|| format!("writing {}", self.out.display()))?;
         for train in &data.trains {
@@ -94,7 +102,7 @@ impl Arguments {
         }
         let open = language.pick("open it in a browser", "in einem Browser öffnen");
         writeln!(output, "{}: {open}", self.out.display())?;
-        Ok(Outcome::Done)
+        Ok(outcome)
     }
 }
 
@@ -153,6 +161,7 @@ fn gather(
         })
     });
     Ok(ReportData {
+        warning: None,
         trains: trains.collect::<anyhow::Result<_>>()?,
         layout: findings.layout,
         polling: findings.polling,

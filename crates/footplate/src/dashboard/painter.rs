@@ -17,6 +17,7 @@ use super::alarm::{Alarm, Grade};
 use super::alarm_list::{ActiveAlarm, AlarmList};
 use super::board::Board;
 use super::calibration_picture::CalibrationPicture;
+use super::crossing_picture::held_at_crossings;
 use super::history::Sample;
 use super::picture::{
     Picture, SessionState, TrainTask, block_states, ignored_sensors, millis, paint_train, tenths,
@@ -305,6 +306,7 @@ impl Painter {
             ignored: ignored_sensors(driver),
             calibration: self.calibration.clone(),
             alarms: self.alarms.ranked(),
+            crossings_held: dispatcher.map_or_else(Vec::new, |of| held_at_crossings(of, now)),
             schedules: session.schedules,
             passed: self.flashes.iter().map(|(sensor, at)| (sensor.0, millis(seconds_since(*at)))).collect(),
         });

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use footplate_core::control::Driver;
-use footplate_core::track::{Block, Landmark, NodeKind};
+use footplate_core::track::{Block, Landmark, NodeKind, Position};
 use footplate_core::tracking::PathPoint;
 use footplate_core::{HALF_95, Length, SensorId, SpeedStep, Timestamp, TrainId};
 use footplate_store::LayoutFile;
@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::alarm_list::ActiveAlarm;
 use super::calibration_picture::CalibrationPicture;
+use super::crossing_picture::HeldAtCrossing;
 use super::spans::{Span, spans};
 
 /// The drawn size of a train of unknown length: a short locomotive of this gauge (mm from the leading end of its
@@ -73,6 +74,9 @@ pub(super) struct Picture {
     pub(super) blocks: BTreeMap<u16, BlockState>,
     /// The active alarms, the most severe first.
     pub(super) alarms: Vec<ActiveAlarm>,
+    /// Trains that hold each other at a level crossing.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) crossings_held: Vec<HeldAtCrossing>,
     /// The schedules that run, and those that have ended.
     pub(super) schedules: Vec<SchedulePicture>,
     /// A calibration in progress.
@@ -237,6 +241,8 @@ pub(crate) struct LayoutPicture {
     nodes: Vec<NodePicture>,
     edges: Vec<EdgePicture>,
     blocks: Vec<BlockPicture>,
+    /// The level crossings, each as a place on either track.
+    crossings: Vec<[Spot; 2]>,
 }
 
 #[derive(Debug, Serialize)]
@@ -309,8 +315,10 @@ impl LayoutPicture {
             }),
             block: layout.block_of_edge(id).map(|block| block.detector.0),
         };
+        let spot = |at: Position| Spot { edge: at.edge.0, offset_mm: tenths(at.offset.as_mm()) };
         Self {
             name: layout.name().to_owned(),
+            crossings: layout.crossings().iter().map(|crossing| crossing.tracks.map(spot)).collect(),
             nodes: layout.nodes().map(node).collect(),
             edges: layout.edges().map(edge).collect(),
             blocks: layout

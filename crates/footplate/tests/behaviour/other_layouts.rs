@@ -25,3 +25,28 @@ fn a_log_of_track_a_is_refused_as_one_of_track_b() {
     }
     assert!(!page.exists());
 }
+
+#[test]
+fn a_log_that_is_too_short_to_refuse_is_marked_before_any_figure() {
+    // Five laps of track A, on which one of the two distances that differ is certain.
+    let log = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../testdata/sensor-logs/choochoos_2020_track_a_train1_run.csv");
+    let log = log.to_str().unwrap();
+    let page = Path::new(env!("CARGO_TARGET_TMPDIR")).join("short_log.html");
+    let out = page.to_str().unwrap();
+    let said = "lengths that are not those of layout `track-b`: D9 to E12 takes as long as 377 mm, not 282";
+    for (command, begins) in [
+        (vec!["predict", log, "--summary"], "WARNING: "),
+        (vec!["calibrate", "--from", log], "WARNING: "),
+        (vec!["predict", log, "--summary", "--json"], "{"),
+        (vec!["calibrate", "--from", log, "--json"], "{"),
+        (vec!["report", log, "--out", out], "WARNING: "),
+    ] {
+        let run = footplate(&[&command[..], &["--layout", "track-b"]].concat());
+        assert_eq!(run.status, 1, "{command:?}: {}", run.errors);
+        assert!(run.output.starts_with(begins) && run.output.contains(said), "{command:?}: {}", run.output);
+        assert!(!run.errors.contains(said), "said once: {}", run.errors);
+    }
+    let html = std::fs::read_to_string(&page).unwrap();
+    assert!(html.contains(&format!("<p class=\"warning\" role=\"alert\">{said}")));
+}

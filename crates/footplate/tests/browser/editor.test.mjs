@@ -118,6 +118,63 @@ test("a level crossing is placed and joined, and the file says where its tracks 
   running.delete(program);
 });
 
+test("a double slip is two turnouts in one place, and a click on either end throws that one", async () => {
+  const program = await started("sim:track-a?seed=7", "slip.db");
+  const { page, complaints } = await openQuietly(browser, `${program.url}#/editor`);
+  await page.waitForSelector("#pieces button");
+  const lay = (name) => page.locator("#pieces button", { hasText: name }).first().click();
+  await page.click("#hand-right");
+  // In a straight of an oval; the other track leads from one end to another.
+  const half = Array(6).fill("24130");
+  for (const name of ["24188", "24624", "24188", ...half, "24188", "24188", "24188", ...half]) await lay(name);
+  // The other track crosses the middle of the slip by 24.3°: 94.15 mm from there, 85.8 mm along the first track and 38.7 mm beside it.
+  for (const [x, y] of [[368, 39], [197, -39]]) {
+    await pressJoint(page, "open", x, y);
+    await lay("24172");
+  }
+  for (const [x, y] of [[188, 0], [377, 0], [188, 720], [368, 39], [197, -39]]) {
+    await pressJoint(page, "joined", x, y);
+    await page.click("#draft-sensor");
+  }
+  assert.match(await page.locator("#draft-says").textContent(), /Track ends: 2\. Turnouts: 2\. Sensors: 5\./);
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "editor-slip.png") });
+  const [download] = await Promise.all([page.waitForEvent("download", { timeout: PATIENCE }), page.click("#draft-save")]);
+  const file = join(folder, "slip.toml");
+  await download.saveAs(file);
+  assert.match(footplate("layout", "check", file), /a sound layout of 18 nodes and 18 edges$/m);
+  const toml = readFileSync(file, "utf8");
+  assert.match(toml, /from = "MR1", to = "BR2", mm = 0\.0/);
+  // Half the mean of 188.3 mm and of an arc of 437.5 mm and 24.3°.
+  assert.equal([...toml.matchAll(/to = "MR[12] (?:straight|curved)", mm = 93\.4 /g)].length, 4);
+  assert.deepEqual(complaints, []);
+  await page.close();
+  await end(program);
+  running.delete(program);
+
+  const drives = await started(`sim:${file}?seed=7`, "slip.db");
+  const seen = await openQuietly(browser, drives.url);
+  await seen.page.waitForSelector(".train");
+  await seen.page.locator("#track").scrollIntoViewIfNeeded();
+  // The straight blades come first.
+  for (const [blade, turnout] of [[0, 1], [1, 2]]) {
+    const [x, y] = await seen.page.$$eval("#track .blade", (all, nth) => {
+      const { x, y } = all[nth].getPointAtLength(all[nth].getTotalLength() / 2);
+      const at = new DOMPoint(x, y).matrixTransform(all[nth].getScreenCTM());
+      return [at.x, at.y];
+    }, blade);
+    await seen.page.mouse.click(x, y);
+    await seen.page.waitForFunction((number) => document.querySelector("#picked").textContent.includes(`turnout ${number} is unknown`), turnout, { timeout: PATIENCE });
+    await seen.page.locator("#here-does button", { hasText: "Set curved" }).click();
+    await seen.page.waitForFunction((number) => document.querySelector("#picked").textContent === `Turnout ${number} is set to curved.`, turnout, { timeout: PATIENCE });
+  }
+  await seen.page.screenshot({ path: join(AT, "slip-driven.png") });
+  assert.deepEqual(seen.complaints, []);
+  await seen.page.close();
+  await end(drives);
+  running.delete(drives);
+});
+
 test("the editor fits a phone, in the dark and in German", async () => {
   const program = await started("sim:track-a?seed=7", "phone.db");
   const { page, complaints } = await openQuietly(browser, `${program.url}#/editor`, { viewport: { width: 390, height: 800 }, locale: "de-DE", colorScheme: "dark", hasTouch: true });

@@ -19,15 +19,17 @@ const SOURCES = [
   "footplate-core/src/track/position.rs", "footplate-core/src/track/landmark.rs",
 ];
 /** The sources of errors of a request, among texts for the terminal. */
-const REQUESTS = [`${SERVE}/set_up/routes.rs`, `${SERVE}/set_up/set_up_file.rs`, `${SERVE}/schedules.rs`, `${SERVE}/answer_queue.rs`, `${SERVE}/odometry_pages.rs`];
+const REQUESTS = [`${SERVE}/set_up/routes.rs`, `${SERVE}/set_up/set_up_file.rs`, `${SERVE}/schedules.rs`, `${SERVE}/answer_queue.rs`, `${SERVE}/odometry_pages.rs`, "footplate/src/commands/odometry/uploaded.rs", `${SERVE}/archive.rs`];
+/** The sources of errors of recordings and vehicle files. */
+const FILES = ["footplate-store/src/tachometer/error.rs", "footplate-store/src/table/error.rs", "footplate-store/src/vehicle_file/error.rs", "footplate-core/src/odometry/wheels/vehicle.rs"];
 const ERROR = /(?:bail!|with_context|context|refused|let why =)\(?\s*(?:\|\| )?\{?\s*(?:format!\()?\s*$/;
 /** No page shows these: they are for programs, for developers, or for the line below the terminal's prompt. */
 const FOR_OTHERS = [
-  "{train} {place} ±{half:.0} mm {speed:.0} mm/s", "cannot start a process to compute the answer", "making room for an answer", "the request failed without a reason",
+  "{train} {place} ±{half:.0} mm {speed:.0} mm/s", "cannot start a process to compute the answer", "making room for an answer", "the request failed without a reason", "making room for `{name}`", "{}; write {right}", " and to ",
 ];
 /** Values for a blank whose kind is not known from its name. */
 const GUESSES = ["24", "C13", "train 24", "`stop 24 at C13`", "curved"];
-const NAMED = { zone: "yard", end: "EX1", from: "C13", target: "C13", nearest: "C14", or: "by train 58", why: "the station does not answer", found: "its model is unchanged", name: "Evening", near: "", by: "early", error: "the track ends at `EX1`, 30 mm before the end of the path", moves: "at rest" };
+const NAMED = { zone: "yard", end: "EX1", from: "C13", target: "C13", nearest: "C14", or: "by train 58", why: "the station does not answer", found: "its model is unchanged", name: "Evening", near: "", by: "early", error: "the track ends at `EX1`, 30 mm before the end of the path", moves: "at rest", file: "run.csv" };
 /** The most combinations of guesses for one text. */
 const MOST_TRIED = 3000;
 /** The sentences of which a text may be a part, as `…`. */
@@ -37,6 +39,7 @@ const WHOLE = [
   "    1.000 s  train 24 will be commanded to stop…; rests at -3 mm to +3 mm (95 %)",
   "    1.000 s  C13 was reported by train 24 or …: the next reports decide", "train 24 is in a deadlock: … makes room", "route set for train 24: about 9 s…", "train 24: C13 ± 3 mm (95 %), …",
   "`C13` is too close to stop at: the nearest possible place is `C14`, 20 mm beyond it…",
+  "run.csv, line 4: …", "the vehicle's file, line 4, column 1: …", "the vehicle's file, line 4, column 1: `key` is not a key of vehicle; …",
 ];
 
 /** The texts of a source that are sentences: literals with several words, outside its tests and comments. */
@@ -49,7 +52,7 @@ function sentences(path, isWanted = () => true) {
 
 /** Whether some values for the blanks of a text make a sentence whose German has none of its English. */
 function isKnown(text) {
-  const named = text.replace(/^\{\} {2}/, "    1.000 s  ").replace("yet{why}", "yet: {why}").replace(/\{(\w+)(?::[^}]*)?\}/g, (_, name) => NAMED[name] ?? "24");
+  const named = text.replace(/^\{\} {2}/, "    1.000 s  ").replace("yet{why}", "yet: {why}").replace(/^\{place\}: no/, "the vehicle's file: no").replace("{table}; {}", "vehicle; did you mean `teeth`?").replace(/\{(\w+)(?::[^}]*)?\}/g, (_, name) => NAMED[name] ?? "24");
   const parts = named.split(/\{[^}]*\}/);
   // The longest English of the text, which must not stay.
   const [own] = named.replace(/\(95 %\)/, "").split(/\{[^}]*\}|`[^`]*`|\d\S*/).sort((one, other) => other.length - one.length);
@@ -61,7 +64,7 @@ function isKnown(text) {
 }
 
 test("every message of the server is known in German", () => {
-  const all = [...SOURCES.map((path) => [path, sentences(path)]), ...REQUESTS.map((path) => [path, sentences(path, (before) => ERROR.test(before))])];
+  const all = [...SOURCES.map((path) => [path, sentences(path)]), ...REQUESTS.map((path) => [path, sentences(path, (before) => ERROR.test(before))]), ...FILES.map((path) => [path, sentences(path)])];
   assert.ok(all.flatMap(([, texts]) => texts).length > 150, "the texts were found");
   const unknown = all.flatMap(([path, texts]) => texts.filter((text) => !isKnown(text)).map((text) => `${path}: ${text}`));
   assert.deepEqual(unknown, []);
@@ -71,4 +74,16 @@ test("every word of the pages is in both languages, with the same blanks", () =>
   const blanks = (text) => [...text.matchAll(/\{\d\}/g)].map(String).sort();
   assert.deepEqual(Object.keys(GERMAN).sort(), Object.keys(ENGLISH).sort());
   for (const [word, text] of Object.entries(ENGLISH)) assert.deepEqual(blanks(GERMAN[word]), blanks(text), word);
+});
+
+test("every line of the list of commands and of a calibration is known in German", () => {
+  const [, list] = /HELP: &str = "\\\n([^"]*)"/.exec(readFileSync(join(CRATES, `${DRIVE}/instruction.rs`), "utf8"));
+  const lines = list.split("\n").filter((line) => !line.startsWith("#"));
+  assert.ok(lines.length > 25, "the list was found");
+  assert.deepEqual(lines.filter((line) => logInGerman(line) === line), []);
+  // As `footplate calibrate` wrote them.
+  for (const line of ["  speed at step 12 from above: 476 ± 7.5 mm/s, in 5 s", "  stop from step 10 from below, short of a sensor: 476 ± 37 mm (was ± 191), in 14 s", "  short move of 1.2 s at step 5: 155 ± 10 mm (was ± 10), in 13 s",
+    "stop from step 7 from above, past a sensor: takes 8 s; expected information 2.4", "found at C13 at step 6", "circuit: 11 sensors in 7.51 m, turnouts 5 straight, 11 curved"]) {
+    assert.doesNotMatch(logInGerman(line), /\b(step|speed|stop|from|takes|short|move|was|found|at|sensors|straight|curved)\b/, line);
+  }
 });

@@ -145,3 +145,47 @@ test("a click asks for the position of a turnout, then throws it, and is refused
   await phone.page.close();
   await ended(program);
 });
+
+/** An oval of 3.4 m with a level crossing, 94 mm behind A1 and 282 mm behind B1. */
+const CROSSING = `format = 1
+name = "crossing"
+length_uncertainty_mm = 1
+length_origin = "invented"
+sensors = [{ names = ["A1", "A2"] }, { names = ["A3", "A4"] }, { names = ["A5", "A6"] }, { names = ["A7", "A8"] }, { names = ["B1", "B2"] }, { names = ["B3", "B4"] }]
+ends = [{ names = ["EN1", "EX1"] }, { names = ["EN2", "EX2"] }]
+edges = [
+  { from = "A1", to = "A3", mm = 188 }, { from = "A3", to = "A5", mm = 565 }, { from = "A5", to = "A7", mm = 1130 }, { from = "A7", to = "A1", mm = 1507 },
+  { from = "EN1", to = "B1", mm = 188 }, { from = "B1", to = "B3", mm = 565 }, { from = "B3", to = "EX2", mm = 500 },
+]
+crossings = [{ tracks = [{ from = "A1", to = "A3", mm = 94 }, { from = "B1", to = "B3", mm = 282 }] }]
+`;
+
+test("two trains beside one crossing are told why neither may start, and how it goes on", async () => {
+  const path = join(folder, "crossing.toml");
+  writeFileSync(path, CROSSING);
+  const program = await begin(["serve", "0", "--link", `sim:${path}?seed=7&speed=4`, "--train", "24", "--store", join(folder, "crossing.db")]);
+  running.add(program);
+  const { page, complaints } = await openQuietly(browser, program.url);
+  await page.waitForSelector(".train");
+  assert.equal(await page.locator("#track .crossing.apart title").textContent(), "level crossing: one train at a time");
+  const held = () => page.locator("#crossings-held").textContent();
+  await say(program, "place 24 at A1+60mm");
+  // 32 mm short of it, on the other track.
+  await say(program, "place 58 at B1+250mm");
+  await until(page, () => document.querySelector("#crossings-held").textContent);
+  assert.match(await held(), /^Train 24 and train 58 stand near the level crossing at A1\+94mm: neither may start while .* 200 mm .* click where it is\.$/);
+  assert.deepEqual(await findings(page), []);
+  await page.screenshot({ path: join(AT, "crossing-held.png") });
+  // A command is refused or waits; the remedy of its alarm is the same.
+  await say(program, "speed 24 8");
+  await page.waitForSelector("#alarmed a.button", { timeout: PATIENCE });
+  await page.click("#alarmed a.button");
+  await until(page, () => /less than 200 mm/.test(document.querySelector("#guide").textContent));
+  assert.equal(await page.locator("#guide button", { hasText: "Reverse" }).count(), 0);
+  // 600 mm from the crossing, nothing holds train 24.
+  await say(program, "place 58 at B3+250mm");
+  await until(page, () => document.querySelector("#crossings-held").textContent === "");
+  assert.deepEqual(complaints, []);
+  await page.close();
+  await ended(program);
+});

@@ -56,13 +56,12 @@ impl Reservation {
 
     /// The reserved rails, stretch by stretch.
     pub fn spans(&self) -> impl Iterator<Item = (StretchId, Span)> {
-        self.spans.iter().flat_map(|(stretch, spans)| spans.iter().map(|span| (*stretch, *span)))
+        each(&self.spans)
     }
 
     /// The rails that no other train may reserve: the reserved ones, and those that cross them.
     pub(super) fn obstructed(&self) -> impl Iterator<Item = (StretchId, Span)> {
-        let crossed = self.crossed.iter();
-        self.spans().chain(crossed.flat_map(|(stretch, spans)| spans.iter().map(|span| (*stretch, *span))))
+        each(&self.spans).chain(each(&self.crossed))
     }
 
     /// The reserved turnouts, with those that share their place.
@@ -256,6 +255,11 @@ impl Blocks {
         }
         around
     }
+}
+
+/// Spans, stretch by stretch.
+fn each(spans: &BTreeMap<StretchId, Vec<Span>>) -> impl Iterator<Item = (StretchId, Span)> {
+    spans.iter().flat_map(|(stretch, spans)| spans.iter().map(|span| (*stretch, *span)))
 }
 
 /// Reservations of other trains in a path search: track that is closed, or costs waiting time.

@@ -12,7 +12,7 @@ use super::{PanelError, children, descendants, text_of};
 /// The longest name of a place, less what is added to it.
 const LONGEST_NAME: usize = 28;
 /// `continuing`: the leg B is the one of a closed turnout, as everywhere unless somebody changed it.
-const CLOSED: &str = "2";
+pub(super) const CLOSED: &str = "2";
 
 /// A block of the panel.
 #[derive(Debug, Clone, Default)]
@@ -24,13 +24,13 @@ struct PanelBlock {
 
 /// A connection of a place: how rails leave the place through it, and how they arrive.
 #[derive(Debug, Clone)]
-struct Port {
+pub(super) struct Port {
     leaving: RailEnd,
     arriving: RailEnd,
 }
 
 impl Port {
-    fn of(leaving: &str, arriving: &str, leg: Option<Leg>) -> Self {
+    pub(super) fn of(leaving: &str, arriving: &str, leg: Option<Leg>) -> Self {
         let end = |node: &str| RailEnd { node: node.to_owned(), leg };
         Self { leaving: end(leaving), arriving: end(arriving) }
     }
@@ -41,19 +41,23 @@ pub(super) struct Tracks<'a, 'i> {
     blocks: BTreeMap<String, PanelBlock>,
     /// System names of turnouts, by the names that a user gave them.
     turnout_names: BTreeMap<String, String>,
-    editor: Node<'a, 'i>,
+    pub(super) editor: Node<'a, 'i>,
     segments: BTreeMap<&'a str, Node<'a, 'i>>,
     /// The places, and where they are drawn, by the name of their first node.
-    places: Vec<Place>,
+    pub(super) places: Vec<Place>,
     pub(super) drawn: Vec<(String, [f64; 2])>,
     /// The connections of places: by the object and which of its connections.
     ports: BTreeMap<(String, String), Port>,
-    /// Anchors that disappear, and the segments that they join.
+    /// Anchors and tracks of level crossings that are no places, and the segments that they join.
     joined: BTreeMap<String, [String; 2]>,
     /// Edges, each with the blocks that it runs through.
-    stretches: Vec<(Stretch, BTreeSet<String>)>,
+    pub(super) stretches: Vec<(Stretch, BTreeSet<String>)>,
+    /// What is joined on each edge, in order, by the number of the edge.
+    pub(super) passed: BTreeMap<usize, Vec<String>>,
+    /// Edges without length, between the turnouts of a slip.
+    pub(super) in_one_place: BTreeSet<usize>,
     /// Blocks that turnouts lie in.
-    with_turnouts: BTreeSet<String>,
+    pub(super) with_turnouts: BTreeSet<String>,
     pub(super) left_out: Vec<String>,
 }
 
@@ -87,13 +91,9 @@ impl<'a, 'i> Tracks<'a, 'i> {
         }
         let segments = children(editor, "tracksegment");
         let segments = segments.filter_map(|segment| Some((segment.attribute("ident")?, segment))).collect();
-        for (element, word) in
-            [("levelxing", "level crossing"), ("layoutslip", "slip"), ("layoutturntable", "turntable")]
-        {
-            for one in children(editor, element) {
-                let ident = one.attribute("ident").unwrap_or_default();
-                left_out.push(format!("the {word} {ident}: tracks end at it"));
-            }
+        for one in children(editor, "layoutturntable") {
+            let ident = one.attribute("ident").unwrap_or_default();
+            left_out.push(format!("the turntable {ident}: tracks end at it"));
         }
         Self {
             blocks,
@@ -105,13 +105,15 @@ impl<'a, 'i> Tracks<'a, 'i> {
             ports: BTreeMap::new(),
             joined: BTreeMap::new(),
             stretches: Vec::new(),
+            passed: BTreeMap::new(),
+            in_one_place: BTreeSet::new(),
             with_turnouts: BTreeSet::new(),
             left_out,
         }
     }
 
     /// The block with a detector that an object lies in.
-    fn detected(&self, object: Node<'_, '_>) -> Option<String> {
+    pub(super) fn detected(&self, object: Node<'_, '_>) -> Option<String> {
         let name = object.attribute("blockname")?;
         self.blocks.get(name)?.detector?;
         Some(name.to_owned())
@@ -131,8 +133,7 @@ impl<'a, 'i> Tracks<'a, 'i> {
                     .push(format!("{ident}: neither a left, a right nor a wye turnout; tracks end at it"));
                 continue;
             }
-            let name = turnout.attribute("turnoutname").unwrap_or_default();
-            let name = self.turnout_names.get(name).map_or(name, String::as_str);
+            let name = self.system_name(turnout.attribute("turnoutname").unwrap_or_default());
             let number = number_of(name).ok_or_else(|| no_number(turnout, ident, name))?;
             let names = [format!("BR{number}"), format!("MR{number}")];
             let [branch, merge] = &names;
@@ -147,29 +148,63 @@ impl<'a, 'i> Tracks<'a, 'i> {
             let lies_in = self.detected(turnout);
             self.with_turnouts.extend(turnout.attribute("blockname").map(str::to_owned));
             for (letter, port) in [("A", Port::of(merge, branch, None)), ("B", b), ("C", c)] {
-                let segment =
-                    turnout.attribute(format!("connect{}name", letter.to_ascii_lowercase()).as_str());
-                let Some(segment) = segment.and_then(|segment| self.segments.get(segment).copied()) else {
-                    self.left_out.push(format!(
-                        "leg {letter} of turnout {ident}: nothing is connected; an end was put there"
-                    ));
-                    self.end(&format!("{ident}{letter}"), Some(port));
-                    continue;
-                };
-                let leads_to = self.detected(segment);
-                let port = if leads_to == lies_in {
-                    port
-                } else {
-                    let place = format!("{ident}{letter}");
-                    let [inner, outer] = self.boundary(&place, [lies_in.clone(), leads_to]);
-                    self.stretches.push((stretch(&port, &inner), BTreeSet::new()));
-                    outer
-                };
-                self.ports.insert((ident.to_owned(), letter.to_owned()), port);
+                self.connect(turnout, ident, letter, port, lies_in.clone());
             }
             self.places.push(Place::Turnout { names, turnout: TurnoutId(number) });
         }
         Ok(())
+    }
+
+    /// The system name of a turnout that is called by it or by the name that a user gave it.
+    pub(super) fn system_name<'n>(&'n self, name: &'n str) -> &'n str {
+        self.turnout_names.get(name).map_or(name, String::as_str)
+    }
+
+    /// The segment at a connection of an object.
+    pub(super) fn segment_at(&self, object: Node<'a, '_>, letter: &str) -> Option<(&'a str, Node<'a, 'i>)> {
+        let ident = object.attribute(format!("connect{}name", letter.to_ascii_lowercase()).as_str())?;
+        self.segments.get_key_value(ident).map(|(ident, segment)| (*ident, *segment))
+    }
+
+    /// Connects a turnout that lies in a block: with a boundary where the segment is in another block, or with an end where
+    /// there is none.
+    pub(super) fn connect(
+        &mut self,
+        turnout: Node<'a, '_>,
+        ident: &str,
+        letter: &str,
+        port: Port,
+        lies_in: Option<String>,
+    ) {
+        let place = format!("{ident}{letter}");
+        let Some((_, segment)) = self.segment_at(turnout, letter) else {
+            self.left_out
+                .push(format!("leg {letter} of turnout {ident}: nothing is connected; an end was put there"));
+            self.end(&place, Some(port));
+            return;
+        };
+        let leads_to = self.detected(segment);
+        let port = if leads_to == lies_in {
+            port
+        } else {
+            let [inner, outer] = self.boundary(&place, [lies_in, leads_to]);
+            self.stretches.push((stretch(&port, &inner), BTreeSet::new()));
+            outer
+        };
+        self.ports.insert((ident.to_owned(), letter.to_owned()), port);
+    }
+
+    /// Joins the segments on either side of a level crossing, or puts a boundary there where they are in different blocks.
+    pub(super) fn join_over(&mut self, ident: &str, letters: [&str; 2], segments: [(&str, Node<'_, '_>); 2]) {
+        let track = ident.to_owned() + &letters.concat();
+        let blocks = segments.map(|(_, segment)| self.detected(segment));
+        if blocks[0] == blocks[1] {
+            self.joined.insert(track, segments.map(|(name, _)| name.to_owned()));
+            return;
+        }
+        for (letter, port) in letters.into_iter().zip(self.boundary(&track, blocks)) {
+            self.ports.insert((ident.to_owned(), letter.to_owned()), port);
+        }
     }
 
     pub(super) fn read_points(&mut self) {
@@ -224,7 +259,7 @@ impl<'a, 'i> Tracks<'a, 'i> {
                     continue;
                 }
                 let (mut ident, mut segment, mut side) = (*first, *segment, side);
-                let mut blocks = BTreeSet::new();
+                let (mut blocks, mut passed) = (BTreeSet::new(), Vec::new());
                 let to = loop {
                     if !seen.insert(ident) {
                         break None;
@@ -234,20 +269,22 @@ impl<'a, 'i> Tracks<'a, 'i> {
                     if let Some(port) = self.port_at(ident, segment, far) {
                         break Some(port);
                     }
-                    let anchor = segment.attribute(format!("connect{far}name").as_str()).unwrap_or_default();
+                    let joint = joint_at(segment, far);
                     let next =
-                        self.joined.get(anchor).and_then(|both| both.iter().find(|other| *other != ident));
+                        self.joined.get(&joint).and_then(|both| both.iter().find(|other| *other != ident));
                     let Some((name, next)) = next.and_then(|next| self.segments.get_key_value(next.as_str()))
                     else {
                         break None;
                     };
-                    side = if next.attribute("connect1name") == Some(anchor) { 1 } else { 2 };
+                    side = if joint_at(*next, 1) == joint { 1 } else { 2 };
                     (ident, segment) = (*name, *next);
+                    passed.push(joint);
                 };
                 let to = to.unwrap_or_else(|| {
                     self.left_out.push(format!("what follows track segment {ident}: an end was put there"));
                     self.end(ident, None)
                 });
+                self.passed.insert(self.stretches.len(), passed);
                 self.stretches.push((stretch(&from, &to), blocks));
             }
         }
@@ -262,18 +299,12 @@ impl<'a, 'i> Tracks<'a, 'i> {
     /// The connection of a place at one end of a segment.
     fn port_at(&self, ident: &str, segment: Node<'_, '_>, side: u8) -> Option<Port> {
         let object = segment.attribute(format!("connect{side}name").as_str())?;
-        let kind = segment.attribute(format!("type{side}").as_str()).unwrap_or_default();
-        let connection = match kind {
-            "TURNOUT_A" | "2" => "A",
-            "TURNOUT_B" | "3" => "B",
-            "TURNOUT_C" | "4" => "C",
-            _ => ident,
-        };
+        let connection = connection(segment, side).unwrap_or(ident);
         self.ports.get(&(object.to_owned(), connection.to_owned())).cloned()
     }
 
     /// Adds a boundary; returns its connections to the first of the two blocks and to the second.
-    fn boundary(&mut self, ident: &str, [first, second]: [Option<String>; 2]) -> [Port; 2] {
+    pub(super) fn boundary(&mut self, ident: &str, [first, second]: [Option<String>; 2]) -> [Port; 2] {
         let names = ["a", "b"].map(|direction| name_of(ident) + direction);
         let ports = [Port::of(&names[1], &names[0], None), Port::of(&names[0], &names[1], None)];
         self.places.push(Place::Boundary { names, enters: [second, first] });
@@ -281,7 +312,7 @@ impl<'a, 'i> Tracks<'a, 'i> {
     }
 
     /// Adds the end of a track, with the rails to it where a connection is left open.
-    fn end(&mut self, ident: &str, open: Option<Port>) -> Port {
+    pub(super) fn end(&mut self, ident: &str, open: Option<Port>) -> Port {
         let names = ["EN_", "EX_"].map(|kind| kind.to_owned() + &name_of(ident));
         let port = Port::of(&names[0], &names[1], None);
         self.places.push(Place::End { names });
@@ -291,7 +322,7 @@ impl<'a, 'i> Tracks<'a, 'i> {
         port
     }
 
-    fn draw(&mut self, names: &[String; 2], object: Node<'_, '_>, keys: [&str; 2]) {
+    pub(super) fn draw(&mut self, names: &[String; 2], object: Node<'_, '_>, keys: [&str; 2]) {
         let [x, y] = keys.map(|key| object.attribute(key).and_then(|number| number.parse::<f64>().ok()));
         if let (Some(x), Some(y)) = (x, y) {
             self.drawn.push((names[0].clone(), [x, y]));
@@ -313,15 +344,12 @@ impl<'a, 'i> Tracks<'a, 'i> {
             let mm: Option<Vec<f64>> = blocks.iter().map(of_block).collect();
             mm.filter(|mm| !mm.is_empty()).map(|mm| mm.iter().sum::<f64>())
         };
-        let stretches: Vec<Stretch> = self
-            .stretches
-            .iter()
-            .map(|(stretch, blocks)| {
-                let mm = measured(blocks);
-                let length = mm.map_or(StretchLength::Unknown, |mm| Length::from_mm(mm).into());
-                Stretch { length, ..stretch.clone() }
-            })
-            .collect();
+        let stretches = self.stretches.iter().enumerate().map(|(number, (stretch, blocks))| {
+            let mm = if self.in_one_place.contains(&number) { Some(0.0) } else { measured(blocks) };
+            let length = mm.map_or(StretchLength::Unknown, |mm| Length::from_mm(mm).into());
+            Stretch { length, ..stretch.clone() }
+        });
+        let stretches: Vec<Stretch> = stretches.collect();
         let unknown = stretches.iter().filter(|stretch| stretch.length == StretchLength::Unknown).count();
         if unknown > 0 {
             let all = stretches.len();
@@ -346,12 +374,30 @@ impl<'a, 'i> Tracks<'a, 'i> {
     }
 }
 
-fn stretch(from: &Port, to: &Port) -> Stretch {
+/// The connection of an object at one end of a segment, by its letter; `None` if the object is a point.
+fn connection(segment: Node<'_, '_>, side: u8) -> Option<&'static str> {
+    Some(match segment.attribute(format!("type{side}").as_str())? {
+        "TURNOUT_A" | "2" | "LEVEL_XING_A" | "6" | "SLIP_A" | "21" => "A",
+        "TURNOUT_B" | "3" | "LEVEL_XING_B" | "7" | "SLIP_B" | "22" => "B",
+        "TURNOUT_C" | "4" | "LEVEL_XING_C" | "8" | "SLIP_C" | "23" => "C",
+        "TURNOUT_D" | "5" | "LEVEL_XING_D" | "9" | "SLIP_D" | "24" => "D",
+        _ => return None,
+    })
+}
+
+/// What one end of a segment is joined at: an anchor, or one of the two tracks of a level crossing.
+fn joint_at(segment: Node<'_, '_>, side: u8) -> String {
+    let object = segment.attribute(format!("connect{side}name").as_str()).unwrap_or_default();
+    let track = connection(segment, side).map(|letter| if matches!(letter, "A" | "C") { "AC" } else { "BD" });
+    object.to_owned() + track.unwrap_or_default()
+}
+
+pub(super) fn stretch(from: &Port, to: &Port) -> Stretch {
     Stretch { from: from.leaving.clone(), to: to.arriving.clone(), length: StretchLength::Unknown }
 }
 
 /// A name in a panel with what layouts do not allow in names left out.
-fn name_of(ident: &str) -> String {
+pub(super) fn name_of(ident: &str) -> String {
     ident
         .chars()
         .filter(|letter| letter.is_ascii_alphanumeric() || "_.".contains(*letter))
@@ -360,7 +406,7 @@ fn name_of(ident: &str) -> String {
 }
 
 /// The number at the end of a system name: LS17 is input 17, LT5 turnout 5.
-fn number_of(name: &str) -> Option<u16> {
+pub(super) fn number_of(name: &str) -> Option<u16> {
     let digits = name.len() - name.bytes().rev().take_while(u8::is_ascii_digit).count();
     name.get(digits..)?.parse().ok()
 }

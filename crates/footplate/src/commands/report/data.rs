@@ -8,6 +8,9 @@ use crate::commands::web_page::Language;
 /// The whole report.
 #[derive(Debug, Serialize)]
 pub(super) struct ReportData {
+    /// What has to be known before any figure.
+    #[serde(skip)]
+    pub(super) warning: Option<String>,
     pub(super) layout: String,
     pub(super) polling: Vec<PollingForm>,
     pub(super) trains: Vec<TrainReport>,

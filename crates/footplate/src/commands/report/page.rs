@@ -30,10 +30,13 @@ pub(super) fn page(data: &ReportData, language: Language) -> serde_json::Result<
     main.push_str(&tables::polling(&data.polling, language));
     main.push_str("</section>\n");
     let [introduction, german_introduction] = INTRODUCTION;
+    let warning =
+        data.warning.iter().map(|said| format!("<p class=\"warning\" role=\"alert\">{}</p>\n", text(said)));
+    let introduction = warning.collect::<String>() + language.pick(introduction, german_introduction);
     let page = WebPage {
         language,
         title: &title,
-        introduction: language.pick(introduction, german_introduction),
+        introduction: &introduction,
         main: &main,
         style: "",
         script: CHARTS,
