@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use serde_json::{Value, json};
 
-use super::json::{Malformed, line_of, number_of, parts, state_in, text_in};
+use super::json::{Malformed, Properties, line_of, number_of, parts, state_in, text_in};
 use super::throttle::ThrottleMessage;
 
 /// JMRI's number for a state that it does not know.
@@ -79,10 +79,11 @@ impl Reply {
             Self::Pong => json!({ "type": "pong" }),
             Self::Goodbye => json!({ "type": "goodbye" }),
             Self::Power { system, prefix, is_default, on } => {
-                let mut data = json!({ "name": system, "default": is_default, "state": state(*on) });
-                if let Some(prefix) = prefix {
-                    data["prefix"] = json!(prefix);
-                }
+                let mut data = Properties::new();
+                data.insert("name".into(), json!(system));
+                data.extend(prefix.iter().map(|prefix| ("prefix".into(), json!(prefix))));
+                data.insert("default".into(), json!(is_default));
+                data.insert("state".into(), state(*on));
                 json!({ "type": "power", "data": data })
             }
             Self::Sensor { name, active } => {
@@ -95,7 +96,7 @@ impl Reply {
             Self::Throttle(message) => {
                 let mut data = message.write();
                 // Under its old key, too, as JMRI says it.
-                data["throttle"] = json!(message.name);
+                data.insert("throttle".into(), json!(message.name));
                 json!({ "type": "throttle", "data": data })
             }
             Self::Error { code, message } => {

@@ -7,7 +7,7 @@ use core::ops::RangeInclusive;
 
 use serde_json::{Value, json};
 
-use super::json::{Malformed, line_of, number_of, parts, state_in, text_in};
+use super::json::{Malformed, Properties, line_of, number_of, parts, state_in, text_in};
 use super::throttle::ThrottleMessage;
 
 /// Addresses of locomotives (NMRA S-9.2.1: 7-bit and 14-bit addresses up to 10239).
@@ -53,10 +53,9 @@ impl Request {
             Self::Ping => json!({ "type": "ping" }),
             Self::Powers => json!({ "type": "power", "method": "list" }),
             Self::Power { system, on } => {
-                let mut data = json!({ "state": number_of(*on) });
-                if let Some(system) = system {
-                    data["name"] = json!(system);
-                }
+                let mut data = Properties::new();
+                data.extend(system.iter().map(|system| ("name".into(), json!(system))));
+                data.insert("state".into(), number_of(*on));
                 json!({ "type": "power", "method": "post", "data": data })
             }
             Self::Sensors => json!({ "type": "sensor", "method": "list" }),

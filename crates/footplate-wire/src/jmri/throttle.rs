@@ -35,7 +35,7 @@ pub struct ThrottleMessage {
 
 impl ThrottleMessage {
     /// The same in JSON. JMRI acts on one property after the other: the question for the state is the last.
-    pub(super) fn write(&self) -> Value {
+    pub(super) fn write(&self) -> Properties {
         let mut data = Properties::new();
         data.insert("name".into(), json!(self.name));
         if let Some(address) = self.address {
@@ -58,7 +58,7 @@ impl ThrottleMessage {
         if self.is_released {
             data.insert("release".into(), Value::Null);
         }
-        Value::Object(data)
+        data
     }
 
     /// Reads it. Clients of versions before 5 call the name `throttle`; `idle` and `eStop` are speeds, too.
