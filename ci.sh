@@ -204,6 +204,8 @@ readonly DCC_EX_PY=DCC-EX-py==1.0.0
 readonly DCC_EX_COMMANDS=@cloudthrottle/dcc-ex--commands@0.12.0
 readonly Z21AIO=z21aio==1.0.7
 readonly PYTHON_CAN="python-can[serial]==4.6.1"
+readonly PYJMRI=pyjmri==1.2.1
+readonly JMRI_CLIENT=jmri-client@4.2.0-beta.2
 
 # Two ends of our own that agree prove nothing.
 step_stations() {
@@ -217,7 +219,9 @@ step_stations() {
   "$at/venv/bin/python" -c "import dcc_ex_py" 2>/dev/null || "$at/venv/bin/pip" install --quiet "$DCC_EX_PY"
   "$at/venv/bin/python" -c "import z21aio" 2>/dev/null || "$at/venv/bin/pip" install --quiet "$Z21AIO"
   "$at/venv/bin/python" -c "import can, serial" 2>/dev/null || "$at/venv/bin/pip" install --quiet "$PYTHON_CAN"
-  [[ -d $at/node_modules/@cloudthrottle ]] || npm install --silent --no-save --prefix "$at" "$DCC_EX_COMMANDS"
+  "$at/venv/bin/python" -c "import pyjmri" 2>/dev/null || "$at/venv/bin/pip" install --quiet "$PYJMRI"
+  [[ -d $at/node_modules/@cloudthrottle && -d $at/node_modules/jmri-client ]] ||
+    npm install --silent --no-save --prefix "$at" "$DCC_EX_COMMANDS" "$JMRI_CLIENT"
   cargo build --quiet --workspace --bins --profile test
   FOOTPLATE="$TARGET/debug/footplate" "$at/venv/bin/python" crates/footplate/tests/stations/dcc_ex_client.py
   FOOTPLATE="$TARGET/debug/footplate" STATIONS_AT="$at" node crates/footplate/tests/stations/dcc_ex_commands.mjs
@@ -226,6 +230,8 @@ step_stations() {
   FOOTPLATE="$TARGET/debug/footplate" CARGO_TARGET_DIR="$at/z21_driver" \
     cargo run --quiet --locked --manifest-path crates/footplate/tests/stations/z21_driver/Cargo.toml
   FOOTPLATE="$TARGET/debug/footplate" "$at/venv/bin/python" crates/footplate/tests/stations/can_client.py
+  FOOTPLATE="$TARGET/debug/footplate" "$at/venv/bin/python" crates/footplate/tests/stations/jmri_client.py
+  FOOTPLATE="$TARGET/debug/footplate" STATIONS_AT="$at" node crates/footplate/tests/stations/jmri_client.mjs
 }
 
 refresh_table() {

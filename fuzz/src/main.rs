@@ -14,6 +14,7 @@
 mod command;
 mod dcc_ex;
 mod dcc_ex_session;
+mod jmri;
 mod layout_file;
 mod loconet;
 mod marklin_can;
@@ -64,6 +65,15 @@ const LINES: &[&[u8]] = &[
     b"E7 0E 05 33 18 3F 10 07 00 00 00 00 00 10",
     b"\n",
 ];
+const MESSAGES: &[&[u8]] = &[
+    br#"{"type":"sensor","data":{"name":"LS1","state":2}}"#,
+    br#"[{"type":"power","data":{"name":"LocoNet","prefix":"L","default":true,"state":4}}]"#,
+    br#"{"type":"throttle","data":{"name":"24","address":24,"speed":0.5,"forward":true,"F0":true}}"#,
+    b"\n",
+    b"1e999",
+    b"null",
+    b"[[[[",
+];
 const DATASETS: &[&[u8]] =
     &[b"\x0f\x00\x80\x00", b"\x07\x00\x40\x00\x61", b"\x09\x00\x40\x00\x43", b"\x04\x00\x10\x00"];
 const PROFILE: &[&[u8]] = &[
@@ -96,6 +106,7 @@ const TARGETS: &[Target] = &[
     target("marklin_serial_session", marklin_serial_session::fuzz, &[], BYTES),
     target("dcc_ex", dcc_ex::fuzz, &[], BOARD),
     target("dcc_ex_session", dcc_ex_session::fuzz, &[], BOARD),
+    target("jmri", jmri::fuzz, &["testdata/wire/jmri.csv"], MESSAGES),
     target("loconet", loconet::fuzz, &["testdata/wire/loconet.csv"], LINES),
     target("marklin_can", marklin_can::fuzz, &[], FRAMES),
     target("marklin_can_session", marklin_can_session::fuzz, &[], FRAMES),

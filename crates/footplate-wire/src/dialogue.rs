@@ -174,7 +174,7 @@ impl<A: Awaited> Dialogue<A> {
     pub(crate) fn next_repeat(&mut self, now: Timestamp, only_urgent: bool) -> Option<Repeat<A>> {
         loop {
             let due = self.outstanding.take_due(now, only_urgent)?;
-            let Outstanding { request, awaited, command, tries, .. } = due;
+            let (command, tries) = (due.command, due.tries);
             if command.is_some_and(|command| self.waiting.outdates(command)) {
                 continue;
             }
@@ -188,7 +188,17 @@ impl<A: Awaited> Dialogue<A> {
                 self.notify(LinkNotice::Repeated { command });
             }
             let tries = tries.saturating_add(1);
+            let Outstanding { request, awaited, .. } = due;
             return Some(Repeat::Again(Outgoing { request, awaited: Some(awaited), command, tries }));
+        }
+    }
+
+    /// Returns the next request to write again; those that were given up are dropped.
+    pub(crate) fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<A>> {
+        loop {
+            if let Repeat::Again(outgoing) = self.next_repeat(now, only_urgent)? {
+                return Some(outgoing);
+            }
         }
     }
 

@@ -10,6 +10,8 @@ mod blocks;
 pub mod dcc_ex;
 mod dialogue;
 mod farewell;
+pub mod jmri;
+mod lines;
 mod locomotives;
 pub mod loconet;
 pub mod marklin_can;

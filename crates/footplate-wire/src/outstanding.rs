@@ -38,7 +38,7 @@ pub(crate) enum Subject {
 /// What an answer to a request looks like.
 pub(crate) trait Awaited: Copy + Debug + PartialEq {
     /// What is written to the station.
-    type Request: Copy + Debug;
+    type Request: Clone + Debug;
     /// What the station says.
     type Reply;
     const REPEATS: Repeats;
@@ -89,7 +89,7 @@ pub(crate) trait Awaited: Copy + Debug + PartialEq {
 }
 
 /// A request that is about to be written.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Outgoing<A: Awaited> {
     pub(crate) request: A::Request,
     pub(crate) awaited: Option<A>,
@@ -116,7 +116,7 @@ impl<A: Awaited> Outgoing<A> {
 }
 
 /// A request that was written and not answered yet.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Outstanding<A: Awaited> {
     pub(crate) request: A::Request,
     pub(crate) awaited: A,

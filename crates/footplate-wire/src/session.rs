@@ -150,6 +150,11 @@ pub enum LinkNotice {
         /// The turnout.
         turnout: TurnoutId,
     },
+    /// The station refused a request.
+    Refused {
+        /// Its own words.
+        message: String,
+    },
     /// The station has no slot for a train: others use all of them.
     NoSlot {
         /// The train.
@@ -381,6 +386,7 @@ impl Display for LinkNotice {
                 "the station has no turnout {turnout}: define it there (<T {turnout} DCC address sub>), or leave out \
                  `turnouts=defined`"
             ),
+            Self::Refused { message } => write!(f, "the station refused a request: {message}"),
             Self::NoSlot { train } => write!(
                 f,
                 "the station has no free slot for train {train}: release a locomotive at a throttle that drives none, or \

@@ -40,8 +40,8 @@ const FLOATING_POINT: [&str; 9] =
 const DEPENDENCIES: [(&str, &[&str]); 2] = [
     // Elementary functions, and derives for the crates that write files.
     ("crates/footplate-core/Cargo.toml", &["libm", "serde"]),
-    // Inflates the list of locomotives that a Central Station sends compressed.
-    ("crates/footplate-wire/Cargo.toml", &["footplate-core", "miniz_oxide"]),
+    // Inflates the list of locomotives that a Central Station sends compressed; reads JMRI's JSON.
+    ("crates/footplate-wire/Cargo.toml", &["footplate-core", "miniz_oxide", "serde_json"]),
 ];
 
 fn worldly_paths(source: &Source) -> impl Iterator<Item = Fault> {

@@ -5,6 +5,7 @@
 //! board  board_switches    the virtual DCC-EX board: requests in, replies and sensors out, with its delays
 //! z21  z21_switches        the virtual Z21: datagrams of many clients in and out, over a network with faults
 //! central_station  can_switches  the virtual Central Station: frames of Märklin's CAN bus over datagrams, a stream or an adapter
+//! jmri                     JMRI and the hardware behind it: lines of JSON in and out
 //! loconet                  a command station on LocoNet behind a server: lines in and out, at the pace of its bus
 //! network  delivery        datagrams through a network; the portions of a stream
 //! due_queue                what is due later
@@ -29,6 +30,7 @@ mod drive;
 mod due_queue;
 mod hands;
 mod incident;
+mod jmri;
 mod live_train;
 mod loconet;
 mod network;
@@ -51,6 +53,7 @@ pub use cts::CtsSwitch;
 pub use delivery::Delivery;
 pub use hands::HandError;
 pub use incident::{Incident, IncidentKind};
+pub use jmri::{JmriSwitches, VirtualJmri};
 pub use live_train::End;
 pub use loconet::{LocoNetSwitches, VirtualLocoNet};
 pub use station::{CoilAlarm, FromStation, StationSwitches, VirtualStation};

@@ -18,6 +18,7 @@ mod speeds;
 mod stops;
 mod virtual_board;
 mod virtual_central_station;
+mod virtual_jmri;
 mod virtual_loconet;
 mod virtual_z21;
 mod yard;

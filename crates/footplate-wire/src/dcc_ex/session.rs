@@ -15,7 +15,7 @@ use super::opening::Opening;
 use super::outstanding::Awaited;
 use super::request::{CABS, Power, Request, Throttle, speed_of};
 use super::settings::{Settings, TurnoutRequests};
-use crate::dialogue::{Dialogue, Repeat};
+use crate::dialogue::Dialogue;
 use crate::outstanding::Outgoing;
 use crate::pacing::Pacing;
 use crate::sensors::Sensors;
@@ -108,7 +108,7 @@ impl Client {
         if let Some(command) = self.dialogue.next_stop(now, true) {
             return Some(self.outgoing(command));
         }
-        if let Some(repeat) = self.next_repeat(now, true) {
+        if let Some(repeat) = self.dialogue.next_again(now, true) {
             return Some(repeat);
         }
         if let Some(train) = self.dialogue.undirected_at_end() {
@@ -120,15 +120,7 @@ impl Client {
         if now < self.dialogue.pacing.usual_at() || is_closing {
             return None;
         }
-        self.next_repeat(now, false).or_else(|| self.next_usual(now))
-    }
-
-    fn next_repeat(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
-        loop {
-            if let Repeat::Again(outgoing) = self.dialogue.next_repeat(now, only_urgent)? {
-                return Some(outgoing);
-            }
-        }
+        self.dialogue.next_again(now, false).or_else(|| self.next_usual(now))
     }
 
     fn next_usual(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {

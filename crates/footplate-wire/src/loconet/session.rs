@@ -18,7 +18,7 @@ use super::outstanding::Awaited;
 use super::request::{INTERROGATIONS, LOCOMOTIVES, Request, speed_of};
 use super::settings::Settings;
 use super::slot::DrivenSlots;
-use crate::dialogue::{Dialogue, Opening, Repeat};
+use crate::dialogue::{Dialogue, Opening};
 use crate::outstanding::Outgoing;
 use crate::pacing::Pacing;
 use crate::sensors::Sensors;
@@ -146,7 +146,7 @@ impl Client {
         if let Some(command) = self.dialogue.next_stop(now, true) {
             return Some(self.outgoing(now, command));
         }
-        if let Some(repeat) = self.next_repeat(now, true) {
+        if let Some(repeat) = self.dialogue.next_again(now, true) {
             return Some(repeat);
         }
         if let Some((address, closed, _)) = self.pulse.take_if(|(.., until)| now >= *until) {
@@ -162,7 +162,7 @@ impl Client {
             return None;
         }
         // At the end, too: a train whose slot is asked for can be stopped only when that is answered.
-        let repeat = self.next_repeat(now, false);
+        let repeat = self.dialogue.next_again(now, false);
         if self.dialogue.farewell.has_begun() { repeat } else { repeat.or_else(|| self.next_usual(now)) }
     }
 
@@ -231,14 +231,6 @@ impl Client {
         match self.slots.of(train).and_then(|slot| slot.number) {
             Some(slot) => Outgoing::asks(Request::Slot(slot), Awaited::Locomotive(train)),
             None => acquire(train),
-        }
-    }
-
-    fn next_repeat(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
-        loop {
-            if let Repeat::Again(outgoing) = self.dialogue.next_repeat(now, only_urgent)? {
-                return Some(outgoing);
-            }
         }
     }
 

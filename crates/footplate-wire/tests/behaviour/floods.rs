@@ -2,7 +2,7 @@
 //! entry for each address.
 
 use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp};
-use footplate_wire::{LinkNotice, Session, Transmit, dcc_ex, loconet, marklin_can, z21};
+use footplate_wire::{LinkNotice, Session, Transmit, dcc_ex, jmri, loconet, marklin_can, z21};
 
 use crate::desk::{T24, ms};
 
@@ -129,4 +129,26 @@ fn a_bus_that_talks_without_end_is_stopped() {
         "{}",
         String::from_utf8_lossy(&written)
     );
+}
+
+#[test]
+fn jmri_that_talks_without_end_is_stopped() {
+    let (notices, written) = flooded(jmri::Client::new(ms(0), jmri::Settings::default()), |state| {
+        let [kind, first, second] = [next(state), next(state), next(state)];
+        let name = |letter: char| format!("L{letter}{}", first % 65_536);
+        match kind % 4 {
+            0 => jmri::Reply::Sensor { name: name('S'), active: Some(second % 2 == 0) },
+            1 => jmri::Reply::Turnout { name: name('T'), thrown: Some(second % 2 == 0) },
+            2 => jmri::Reply::Error { code: 404, message: "no such thing".to_owned() },
+            _ => jmri::Reply::Throttle(jmri::ThrottleMessage {
+                name: (first % 10_240).to_string(),
+                forward: Some(second % 2 == 0),
+                ..jmri::ThrottleMessage::default()
+            }),
+        }
+        .text()
+        .into_bytes()
+    });
+    assert!(notices < 10, "{notices}");
+    assert!(holds(&written, br#""data":{"state":4}"#), "{}", String::from_utf8_lossy(&written));
 }

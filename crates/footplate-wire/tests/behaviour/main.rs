@@ -11,6 +11,8 @@ mod dcc_ex_session;
 mod dcc_ex_vectors;
 mod desk;
 mod floods;
+mod jmri_codec;
+mod jmri_session;
 mod loconet_codec;
 mod loconet_session;
 mod marklin_can_round_trip;

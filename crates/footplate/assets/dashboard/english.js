@@ -275,7 +275,7 @@ export const ENGLISH = {
   "setup-search": "Search again", "setup-typed": "A station at a known address", "setup-kind": "Station", "setup-host": "Address, with port if unusual",
   "setup-use-typed": "Use this address", "setup-host-missing": "Enter the address of the station, such as 192.168.0.111.", "setup-use": "Use as {0}",
   "station-serial": "Serial port", "station-z21": "Z21", "station-marklin-can": "Märklin CS2/CS3 (CAN)", "station-dcc-ex": "DCC-EX",
-  "station-loconet": "LocoNet server", "station-marklin-serial": "Märklin 6050/6051", "setup-draw": "Draw your layout from the pieces of your track system",
+  "station-loconet": "LocoNet server", "station-jmri": "JMRI", "station-marklin-serial": "Märklin 6050/6051", "setup-draw": "Draw your layout from the pieces of your track system",
   "setup-layout-file": "or open a layout file:", "setup-built-in": "Built-in layouts", "draft-use": "Use this layout",
   "setup-train-row": "Train {0}", "setup-address": "Address", "setup-name": "Name (optional)", "setup-remove": "Remove", "setup-add": "Add a train",
   "setup-save": "Save and continue", "setup-address-about": "The address is the number by which the command station calls the decoder, {0} to {1}.",

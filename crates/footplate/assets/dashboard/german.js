@@ -276,7 +276,7 @@ export const GERMAN = {
   "setup-search": "Erneut suchen", "setup-typed": "Eine Zentrale mit bekannter Adresse", "setup-kind": "Zentrale", "setup-host": "Adresse, mit Port, falls unüblich",
   "setup-use-typed": "Diese Adresse verwenden", "setup-host-missing": "Geben Sie die Adresse der Zentrale ein, zum Beispiel 192.168.0.111.", "setup-use": "Verwenden als {0}",
   "station-serial": "Serielle Schnittstelle", "station-z21": "Z21", "station-marklin-can": "Märklin CS2/CS3 (CAN)", "station-dcc-ex": "DCC-EX",
-  "station-loconet": "LocoNet-Server", "station-marklin-serial": "Märklin 6050/6051", "setup-draw": "Ihre Anlage aus den Gleisen Ihres Systems zeichnen",
+  "station-loconet": "LocoNet-Server", "station-jmri": "JMRI", "station-marklin-serial": "Märklin 6050/6051", "setup-draw": "Ihre Anlage aus den Gleisen Ihres Systems zeichnen",
   "setup-layout-file": "oder eine Anlagendatei öffnen:", "setup-built-in": "Eingebaute Anlagen", "draft-use": "Diese Anlage verwenden",
   "setup-train-row": "Zug {0}", "setup-address": "Adresse", "setup-name": "Name (freiwillig)", "setup-remove": "Entfernen", "setup-add": "Zug hinzufügen",
   "setup-save": "Speichern und weiter", "setup-address-about": "Die Adresse ist die Nummer, unter der die Zentrale den Decoder anspricht, {0} bis {1}.",

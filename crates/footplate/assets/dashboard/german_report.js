@@ -6,7 +6,7 @@ const LABELS = {
   "line": "Leitung", "interface": "Interface", "replies": "Antworten", "polls": "Abfragen", "poll period": "Periode", "first byte": "Antwortzeit",
   "command": "Befehl", "requests": "Anfragen", "answers": "Antworten", "noise": "Störungen", "station": "Zentrale", "sensors": "Rückmelder", "delay": "Verzögerung",
   "track": "Gleis", "railcom": "RailCom", "checksums": "Prüfsummen", "on the bus": "Am Bus", "locomotive": "Lok", "contacts": "Rückmelder", "cycle": "Zyklus",
-  "server": "Server", "bus": "Bus",
+  "server": "Server", "bus": "Bus", "system": "System",
 };
 /** Phrases in the second column, the longest first where one is part of another. */
 const PHRASES = [

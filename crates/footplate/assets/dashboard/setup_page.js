@@ -15,6 +15,7 @@ const LINKS = {
   "marklin-can": (host) => `marklin-can:${host}`,
   "dcc-ex": (host) => `dcc-ex:tcp://${host.includes(":") ? host : `${host}:2560`}`,
   "loconet": (host) => `loconet:${host}`,
+  "jmri": (host) => `jmri:${host}`,
   "marklin-serial": (host) => `marklin-serial:tcp://${host}`,
 };
 

@@ -158,6 +158,7 @@ impl<'l> FaultyLine<'l> {
             SimulatedStation::Z21(station) => station.restart(),
             SimulatedStation::Can(station) => station.restart(),
             SimulatedStation::LocoNet(station) => station.restart(),
+            SimulatedStation::Jmri(jmri) => jmri.restart(),
         }
     }
 

@@ -67,7 +67,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "LOG", num_args = 1..)]
     from: Vec<PathBuf>,
     /// Drive the train over this link: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0,
-    /// z21:192.168.0.111, marklin-can:192.168.0.5, loconet:192.168.0.20, or tcp://host:port in place of a device.
+    /// z21:192.168.0.111, marklin-can:192.168.0.5, loconet:192.168.0.20, jmri:192.168.0.20, or tcp://host:port in place of a device.
     #[arg(long, value_name = "URL", conflicts_with_all = ["from", "as_of", "explain"], requires = "train")]
     link: Option<Address>,
     /// Track time that driving may take, such as 5m or 90s.

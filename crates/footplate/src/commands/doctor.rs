@@ -4,6 +4,7 @@ mod answers;
 mod board_figures;
 mod can_figures;
 mod figures;
+mod jmri_figures;
 mod loconet_figures;
 mod z21_figures;
 
@@ -23,6 +24,7 @@ use footplate_wire::{CommandError, LinkNotice};
 use self::board_figures::BoardFigures;
 use self::can_figures::CanFigures;
 use self::figures::{Figures, StationFigures};
+use self::jmri_figures::JmriFigures;
 use self::loconet_figures::LocoNetFigures;
 use self::z21_figures::Z21Figures;
 use super::Outcome;
@@ -47,10 +49,11 @@ Examples:
   footplate doctor --link dcc-ex:tcp://192.168.4.1:2560
   footplate doctor --link z21:192.168.0.111
   footplate doctor --link marklin-can:192.168.0.5
-  footplate doctor --link loconet:192.168.0.20")]
+  footplate doctor --link loconet:192.168.0.20
+  footplate doctor --link jmri:192.168.0.20")]
 pub(crate) struct Arguments {
     /// The station: sim:track-a, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, z21:192.168.0.111,
-    /// marklin-can:192.168.0.5, loconet:192.168.0.20, or tcp://host:port in place of a device.
+    /// marklin-can:192.168.0.5, loconet:192.168.0.20, jmri:192.168.0.20, or tcp://host:port in place of a device.
     #[arg(long)]
     link: Address,
     /// The layout, whose contacts say how many sensor modules there are; a simulated link names its own.
@@ -109,6 +112,7 @@ impl Arguments {
             Station::LocoNet(session) => {
                 self.report(&LocoNetFigures::of(heard.passed, session.settings()), &heard, output)?
             }
+            Station::Jmri(session) => self.report(&JmriFigures::of(heard.passed, session), &heard, output)?,
         };
         Ok(if lost_share > LOST_SHARE { Outcome::FallsShort } else { Outcome::Done })
     }

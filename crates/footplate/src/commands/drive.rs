@@ -101,7 +101,7 @@ pub(crate) struct Arguments {
 #[derive(Args)]
 pub(crate) struct Railway {
     /// The command station: sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5,
-    /// loconet:192.168.0.20, or tcp://host:port in place of a device.
+    /// loconet:192.168.0.20, jmri:192.168.0.20, or tcp://host:port in place of a device.
     #[arg(long, value_name = "URL")]
     link: Option<Address>,
     /// The layout: the name of a built-in layout, or a layout file; not needed for a simulated link.
@@ -207,7 +207,8 @@ impl Arguments {
             | Address::Board(_)
             | Address::Z21(_)
             | Address::Can(_)
-            | Address::LocoNet(_) => {
+            | Address::LocoNet(_)
+            | Address::Jmri(_) => {
                 let link = opened.map_or_else(|| open(address, layout, pace), Ok)?;
                 self.drive(&written, link, beginning, output)
             }

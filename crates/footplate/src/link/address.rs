@@ -3,19 +3,20 @@
 //! `sim:LAYOUT[?seed=7&trains=24,58&steps=126&speed=20&law=…&faults=…&world=…]` is a simulated one in this process,
 //! `marklin-serial:DEVICE` or `marklin-serial:tcp://HOST:PORT` a 6050 or 6051 behind a cable, with
 //! `[?pace=careful&cts=no&modules=5&speed=20]`, `dcc-ex:DEVICE` or `dcc-ex:tcp://HOST:PORT` a DCC-EX board, `z21:HOST` a Z21, `marklin-can:HOST` a
-//! Central Station.
+//! Central Station, `loconet:HOST` a LocoNet server, `jmri:HOST` JMRI.
 
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
 use footplate_core::{DecoderSteps, Ratio, TrainId};
 use footplate_sim::{
-    BoardSwitches, CanSwitches, Delivery, LawFamily, LocoNetSwitches, PhysicsRange, Z21Switches,
+    BoardSwitches, CanSwitches, Delivery, JmriSwitches, LawFamily, LocoNetSwitches, PhysicsRange, Z21Switches,
 };
 
 use super::board_address::BoardAddress;
 use super::cable::Cable;
 use super::can_address::{self, CanAddress};
+use super::jmri_address::{self, JmriAddress};
 use super::loconet_address::{self, LocoNetAddress};
 use super::named_train::{NamedTrain, decoder_of, trains};
 use super::port::Port;
@@ -28,6 +29,7 @@ const BOARD: &str = "dcc-ex:";
 const Z21: &str = "z21:";
 const CAN: &str = "marklin-can:";
 const LOCONET: &str = "loconet:";
+const JMRI: &str = "jmri:";
 /// The port that a served simulated 6051 is written with in examples.
 const EXAMPLE_PORT: u16 = 2400;
 
@@ -50,6 +52,8 @@ pub(crate) enum Address {
     Can(CanAddress),
     /// A LocoNet server in a network.
     LocoNet(LocoNetAddress),
+    /// JMRI in a network.
+    Jmri(JmriAddress),
 }
 
 impl Address {
@@ -57,7 +61,7 @@ impl Address {
     pub(crate) const fn simulated(&self) -> Option<&SimulatedAddress> {
         match self {
             Self::Simulated(simulated) => Some(simulated),
-            Self::Serial(_) | Self::Board(_) | Self::Z21(_) | Self::Can(_) | Self::LocoNet(_) => None,
+            _ => None,
         }
     }
 }
@@ -72,6 +76,7 @@ impl Address {
             Self::Z21(_) => StationKind::Z21,
             Self::Can(_) => StationKind::MarklinCan,
             Self::LocoNet(_) => StationKind::LocoNet,
+            Self::Jmri(_) => StationKind::Jmri,
         }
     }
 
@@ -112,6 +117,7 @@ impl Address {
             Self::Z21(z21) => Some(z21.into()),
             Self::Can(can) => Some(can.into()),
             Self::LocoNet(server) => Some(server.into()),
+            Self::Jmri(jmri) => Some(jmri.into()),
         }
     }
 }
@@ -152,6 +158,8 @@ pub(crate) struct Quirks {
     pub(crate) can: CanSwitches,
     /// Quirks of a LocoNet server.
     pub(crate) loconet: LocoNetSwitches,
+    /// Quirks of JMRI.
+    pub(crate) jmri: JmriSwitches,
 }
 
 /// How fast a simulated clock runs.
@@ -220,10 +228,14 @@ impl FromStr for Address {
             let mut address = LocoNetAddress::of(place)?;
             pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
             Ok(Self::LocoNet(address))
+        } else if let Some(place) = place.strip_prefix(JMRI) {
+            let mut address = JmriAddress::of(place)?;
+            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
+            Ok(Self::Jmri(address))
         } else {
             Err(format!(
                 "`{text}` is not a link: use sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, \
-                 dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5, loconet:192.168.0.20, or tcp://host:port in place of a port"
+                 dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5, loconet:192.168.0.20, jmri:192.168.0.20, or tcp://host:port in place of a port"
             ))
         }
     }
@@ -308,11 +320,12 @@ const LOSSY: Ratio = Ratio::from_percent(0.2);
 
 /// Reads quirks of a DCC-EX board, a Z21 or a Central Station as `chatter,split`.
 pub(crate) fn quirks(value: &str) -> Result<Quirks, String> {
-    let Quirks { mut board, mut z21, mut can, mut loconet } = Quirks::default();
+    let Quirks { mut board, mut z21, mut can, mut loconet, mut jmri } = Quirks::default();
     for one in value.split(',') {
         let is_of_another = set_quirk(&mut z21, one)
             | can_address::set_quirk(&mut can, one)
-            | loconet_address::set_quirk(&mut loconet, one);
+            | loconet_address::set_quirk(&mut loconet, one)
+            | jmri_address::set_quirk(&mut jmri, one);
         match one {
             "chatter" => board.chatter = CHATTER,
             "merged" => (board.delivery, loconet.delivery) = (Delivery::Merged, Delivery::Merged),
@@ -324,14 +337,15 @@ pub(crate) fn quirks(value: &str) -> Result<Quirks, String> {
                 return Err(format!(
                     "there is no quirk `{one}`; there are chatter (other text between messages), merged and split \
                      (messages arrive together or in parts), lossy (bytes are lost), silent (no banner after a reset) of a \
-                     DCC-EX board, of a Z21 {QUIRKS}, of a Central Station {}, and of a LocoNet server {}",
+                     DCC-EX board, of a Z21 {QUIRKS}, of a Central Station {}, of a LocoNet server {}, and of JMRI {}",
                     can_address::QUIRKS,
-                    loconet_address::QUIRKS
+                    loconet_address::QUIRKS,
+                    jmri_address::QUIRKS
                 ));
             }
         }
     }
-    Ok(Quirks { board, z21, can, loconet })
+    Ok(Quirks { board, z21, can, loconet, jmri })
 }
 
 /// The law of a name.
@@ -447,7 +461,7 @@ mod tests {
             ("sim:track-a?faults=all", "faults=some"),
             ("sim:track-a?sped=20", "seed, speed, trains, steps, law, faults, world, station and quirks"),
             ("sim:track-a?world=mars", "there are usual, "),
-            ("sim:track-a?station=intellibox", "marklin, dcc-ex, z21, marklin-can and loconet"),
+            ("sim:track-a?station=intellibox", "marklin, dcc-ex, z21, marklin-can, loconet and jmri"),
             ("sim:track-a?quirks=none", "wrong-xor"),
             ("marklin-serial:", "marklin-serial:/dev/ttyUSB0"),
             ("marklin-serial:tcp://host", "tcp://host:port"),

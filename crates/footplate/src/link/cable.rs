@@ -15,10 +15,12 @@ use super::address::SerialAddress;
 use super::board_address::BoardAddress;
 use super::can_address::{CanAddress, CanPlace};
 use super::datagrams::{Correspondent, exchange_datagrams};
+use super::jmri_address::JmriAddress;
 use super::line::PERSON_MS;
 use super::loconet_address::LocoNetAddress;
 use super::port::Port;
 use super::stream::{SerialFormat, connect, open_device};
+use super::web_socket::connect_socket;
 use super::z21_address::Z21Address;
 use super::{Heard, Link, Lost};
 use crate::clock::Stopwatch;
@@ -44,6 +46,7 @@ pub(crate) struct Cable {
 enum Place {
     Stream(Port, SerialFormat),
     Datagrams(Correspondent),
+    WebSocket { host: String, port: u16 },
 }
 
 impl From<&SerialAddress> for Cable {
@@ -95,6 +98,13 @@ impl From<&LocoNetAddress> for Cable {
     }
 }
 
+impl From<&JmriAddress> for Cable {
+    fn from(address: &JmriAddress) -> Self {
+        let JmriAddress { host, port, speed, .. } = address.clone();
+        Self { place: Place::WebSocket { host, port }, speed, has_answers: true }
+    }
+}
+
 /// This computer's end of an open cable.
 pub(crate) struct CableEnd {
     /// Where bytes are put on the line; with datagrams, each call of `write` sends one. Dropped, it closes the line.
@@ -127,7 +137,7 @@ impl Cable {
 
     /// Whether bytes go over a connection, whose other end may be gone without notice.
     pub(crate) const fn is_connection(&self) -> bool {
-        matches!(self.place, Place::Stream(Port::Tcp { .. }, _))
+        matches!(self.place, Place::Stream(Port::Tcp { .. }, _) | Place::WebSocket { .. })
     }
 
     /// Whether the station answers each command.
@@ -147,6 +157,7 @@ impl Cable {
             Place::Stream(Port::Tcp { host, port }, _) => connect(host, *port, deliver),
             Place::Stream(Port::Device(path), format) => open_device(path, format, deliver),
             Place::Datagrams(correspondent) => exchange_datagrams(correspondent, deliver),
+            Place::WebSocket { host, port } => connect_socket(host, *port, deliver),
         }
     }
 }
@@ -156,6 +167,7 @@ impl Display for Cable {
         match &self.place {
             Place::Stream(port, _) => port.fmt(f),
             Place::Datagrams(correspondent) => correspondent.fmt(f),
+            Place::WebSocket { host, port } => write!(f, "{host}:{port}"),
         }
     }
 }

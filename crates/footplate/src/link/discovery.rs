@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use footplate_wire::marklin_can::{FRAME_BYTES, Frame, Message};
 use footplate_wire::z21::{Datasets, LONGEST_DATAGRAM, Reply, Request};
-use mdns_sd::{ServiceDaemon, ServiceEvent};
+use mdns_sd::{ResolvedService, ServiceDaemon, ServiceEvent};
 use serde::Serialize;
 use serialport::SerialPortType;
 
@@ -23,11 +23,14 @@ const CAN_PORTS: (u16, u16) = (15_731, 15_730);
 /// The service by which DCC-EX boards announce themselves, and the beginning of their names.
 const DCC_EX_SERVICE: &str = "_withrottle._tcp.local.";
 const DCC_EX_NAME: &str = "dccex";
+/// The service by which JMRI announces its web server, and the property in which it states its version.
+const JMRI_SERVICE: &str = "_http._tcp.local.";
+const JMRI_PROPERTY: &str = "jmri";
 
 /// A place where a station is, or may be.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub(crate) struct FoundStation {
-    /// `serial` for a port whose station is unknown, or `z21`, `marklin-can`, `dcc-ex`.
+    /// `serial` for a port whose station is unknown, or `z21`, `marklin-can`, `dcc-ex`, `jmri`.
     kind: &'static str,
     /// The link, or the name of the port.
     place: String,
@@ -37,7 +40,8 @@ pub(crate) struct FoundStation {
 
 /// Searches for stations. Takes a second or two.
 pub(crate) fn find_stations() -> Vec<FoundStation> {
-    let searches = [serial_ports, z21_stations, can_stations, dcc_ex_boards].map(std::thread::spawn);
+    let searches =
+        [serial_ports, z21_stations, can_stations, dcc_ex_boards, jmri_servers].map(std::thread::spawn);
     let found = searches.into_iter().flat_map(|search| search.join().unwrap_or_default());
     found.collect::<BTreeSet<_>>().into_iter().collect()
 }
@@ -111,20 +115,36 @@ fn can_stations() -> Vec<FoundStation> {
 }
 
 fn dcc_ex_boards() -> Vec<FoundStation> {
+    announced(DCC_EX_SERVICE, |service| {
+        let is_board = service.host.to_ascii_lowercase().starts_with(DCC_EX_NAME);
+        is_board.then(|| ("dcc-ex", "dcc-ex:tcp://", service.host.clone()))
+    })
+}
+
+fn jmri_servers() -> Vec<FoundStation> {
+    announced(JMRI_SERVICE, |service| {
+        let version = service.get_property_val_str(JMRI_PROPERTY)?;
+        Some(("jmri", "jmri:", format!("version {version} on {}", service.host)))
+    })
+}
+
+/// Listens to what announces itself as a service. `read` returns the kind of station, how its link begins, and a note.
+fn announced(
+    service: &str,
+    read: impl Fn(&ResolvedService) -> Option<(&'static str, &'static str, String)>,
+) -> Vec<FoundStation> {
     let Ok(daemon) = ServiceDaemon::new() else { return Vec::new() };
     let began = Stopwatch::start();
     let mut found = Vec::new();
-    if let Ok(events) = daemon.browse(DCC_EX_SERVICE) {
+    if let Ok(events) = daemon.browse(service) {
         while let Some(left) = ANSWERS_WITHIN.checked_sub(began.elapsed()) {
             match events.recv_timeout(left) {
-                Ok(ServiceEvent::ServiceResolved(service))
-                    if service.host.to_ascii_lowercase().starts_with(DCC_EX_NAME) =>
-                {
+                Ok(ServiceEvent::ServiceResolved(service)) => {
+                    let Some((kind, scheme, note)) = read(&service) else { continue };
                     let addresses = service.addresses.iter().map(mdns_sd::ScopedIp::to_ip_addr);
-                    found.extend(addresses.filter(std::net::IpAddr::is_ipv4).map(|address| FoundStation {
-                        kind: "dcc-ex",
-                        place: format!("dcc-ex:tcp://{address}:{}", service.port),
-                        note: service.host.clone(),
+                    found.extend(addresses.filter(std::net::IpAddr::is_ipv4).map(|address| {
+                        let place = format!("{scheme}{address}:{}", service.port);
+                        FoundStation { kind, place, note: note.clone() }
                     }));
                 }
                 Ok(_) => {}

@@ -11,7 +11,8 @@ use super::port::{Port, host_and_port};
 const SCHEME: &str = "loconet:";
 /// The port at which servers listen (LbServer).
 const PORT: u16 = 1234;
-/// The longest delay of a sensor that can be meant, in ms.
+/// The shortest and the longest delay of a sensor that can be meant as its longest, in ms.
+const SHORTEST_DELAY_MS: u16 = 3;
 const LONGEST_DELAY_MS: u16 = 2_000;
 
 /// A LocoNet server.
@@ -42,24 +43,12 @@ impl LocoNetAddress {
     }
 
     pub(super) fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
-        match (key, value) {
-            ("first-sensor", _) => self.settings.first_sensor = number(key, value, "17")?,
-            ("first-turnout", _) => self.settings.first_turnout = number(key, value, "5")?,
-            ("straight", "closed") => self.settings.closed_is_straight = true,
-            ("straight", "thrown") => self.settings.closed_is_straight = false,
-            ("straight", _) => {
-                return Err(format!(
-                    "`{value}` is no state of a turnout: use straight=closed or straight=thrown"
-                ));
-            }
-            ("sensor-delay", _) => {
-                let ms: u16 = number(key, value, "60")?;
-                if !(3..=LONGEST_DELAY_MS).contains(&ms) {
-                    return Err(format!("sensor-delay {ms} is not between 3 and {LONGEST_DELAY_MS} ms"));
-                }
-                self.settings.sensor_delay = TimeSpan::from_ms(ms.into());
-            }
-            ("speed", _) => self.speed = times(value)?,
+        match key {
+            "first-sensor" => self.settings.first_sensor = number(key, value, "17")?,
+            "first-turnout" => self.settings.first_turnout = number(key, value, "5")?,
+            "straight" => self.settings.closed_is_straight = is_closed_straight(value)?,
+            "sensor-delay" => self.settings.sensor_delay = sensor_delay(key, value)?,
+            "speed" => self.speed = times(value)?,
             _ => {
                 return Err(format!(
                     "a LocoNet link has no `{key}`; it has first-sensor, first-turnout, straight, sensor-delay and speed"
@@ -68,6 +57,24 @@ impl LocoNetAddress {
         }
         Ok(())
     }
+}
+
+/// Whether a closed turnout lies straight.
+pub(super) fn is_closed_straight(value: &str) -> Result<bool, String> {
+    match value {
+        "closed" => Ok(true),
+        "thrown" => Ok(false),
+        _ => Err(format!("`{value}` is no state of a turnout: use straight=closed or straight=thrown")),
+    }
+}
+
+/// The longest delay of a sensor, in ms.
+pub(super) fn sensor_delay(key: &str, value: &str) -> Result<TimeSpan, String> {
+    let ms: u16 = number(key, value, "60")?;
+    if !(SHORTEST_DELAY_MS..=LONGEST_DELAY_MS).contains(&ms) {
+        return Err(format!("{key} {ms} is not between {SHORTEST_DELAY_MS} and {LONGEST_DELAY_MS} ms"));
+    }
+    Ok(TimeSpan::from_ms(ms.into()))
 }
 
 /// How often the bus refuses a message of a simulated server that is bad: one in twenty.

@@ -97,6 +97,7 @@ impl Address {
                 CanPlace::Datagrams { host, port, .. } => format!("marklin-can:{host}:{port}"),
             },
             Self::LocoNet(server) => format!("loconet:{}", server.port),
+            Self::Jmri(jmri) => format!("jmri:{}:{}", jmri.host, jmri.port),
         }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`; board_address  port
-//! can_address  loconet_address  z21_address   a station on Märklin's CAN bus; a LocoNet server; a Z21
+//! can_address  jmri_address  loconet_address  z21_address   a station on Märklin's CAN bus; JMRI; a LocoNet server; a Z21
 //! named_train  station_kind   a train by its address; which addresses and decoders a station commands
 //! station_session   the session of any station, as one type
 //! line        what every link can do, and what is heard of it
@@ -16,7 +16,7 @@
 //! rhythm      what bytes tell of how often sensors are asked for
 //! observed    any of them, with its times counted while it is used
 //! cable       a line outside this process, read by a thread, with the clock of this computer
-//! stream  datagrams   how it is opened: a serial port or a connection; a station behind UDP
+//! stream  datagrams  web_socket   how it is opened: a serial port or a connection; a station behind UDP; JMRI
 //! ```
 
 mod address;
@@ -25,6 +25,7 @@ mod cable;
 mod can_address;
 mod datagrams;
 mod discovery;
+mod jmri_address;
 mod line;
 mod loconet_address;
 mod measured;
@@ -41,6 +42,7 @@ mod station_session;
 mod stream;
 mod tapped;
 mod time_models;
+mod web_socket;
 mod z21_address;
 
 pub(crate) use address::{Address, Quirks, SimulatedAddress, Speed, law_named, quirks};
@@ -58,3 +60,4 @@ pub(crate) use simulated_station::{FromSimulated, SimulatedStation};
 pub(crate) use station_kind::StationKind;
 pub(crate) use station_session::{Station, StationSession};
 pub(crate) use tapped::{Passed, TappedLink};
+pub(crate) use web_socket::listen_for_sockets;

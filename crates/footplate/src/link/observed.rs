@@ -88,9 +88,10 @@ impl<L: Link> Link for ObservedLink<L> {
     fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
         // Single bytes go to a 6051; other stations get whole messages and are not polled.
         if let (Some(observed), [_, _, ..]) = (&mut self.observed, bytes) {
-            // Messages to a DCC-EX board begin with a bracket, to a LocoNet server with a word, to a Z21 with their length, which is neither.
+            // Messages to a DCC-EX board and to JMRI begin with a bracket, to a LocoNet server with a word, to a Z21 with their length, which is neither.
             match bytes {
                 [b'<', ..] => observed.rhythm.wrote_message(bytes),
+                [b'{', ..] => observed.rhythm.wrote_request(bytes),
                 [b'S', b'E', ..] => observed.rhythm.wrote_line(bytes),
                 // A frame of Märklin's CAN bus begins with 0, or as a line of an adapter; no length of a Z21's dataset does.
                 [0 | b'T' | b'\r', ..] => observed.rhythm.wrote_frame(bytes),
@@ -120,6 +121,7 @@ impl<L: Link> Link for ObservedLink<L> {
             observed.rhythm.heard_of_board(byte);
             observed.rhythm.heard_of_bus(byte);
             observed.rhythm.heard_of_server(byte);
+            observed.rhythm.heard_of_jmri(byte);
             if let Some(span) = observed.rhythm.heard(self.link.now()) {
                 observed.own.first_bytes.add(span.as_ms());
             }

@@ -4,7 +4,7 @@ use footplate_core::track::Layout;
 use footplate_core::{Ratio, TimeSpan};
 use footplate_sim::living::{LivingLayout, LivingSwitches, StationSwitches};
 use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, Interface, Pace, Settings};
-use footplate_wire::{dcc_ex, loconet, marklin_can, z21};
+use footplate_wire::{dcc_ex, jmri, loconet, marklin_can, z21};
 
 use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed};
 use super::can_address::CanAddress;
@@ -33,6 +33,7 @@ pub(crate) fn open<'l>(
         Address::Z21(z21) => open_cable(z21.into())?,
         Address::Can(can) => open_cable(can.into())?,
         Address::LocoNet(server) => open_cable(server.into())?,
+        Address::Jmri(jmri) => open_cable(jmri.into())?,
     })
 }
 
@@ -115,6 +116,9 @@ pub(crate) fn open_session(
                 marklin_can::Client::new(now, settings).into()
             }
             StationKind::LocoNet => loconet::Client::new(now, loconet::Settings::default()).into(),
+            StationKind::Jmri => {
+                jmri::Client::new(now, jmri_settings(jmri::Settings::default(), layout)).into()
+            }
         },
         Address::Serial(serial) => {
             Interface::new(now, serial_settings(serial, link.cts().is_some(), modules))?.into()
@@ -123,6 +127,7 @@ pub(crate) fn open_session(
         Address::Z21(z21) => z21::Client::new(now, z21_settings(z21.settings, layout)).into(),
         Address::Can(can) => marklin_can::Client::new(now, can_settings(can, layout)).into(),
         Address::LocoNet(server) => loconet::Client::new(now, server.settings).into(),
+        Address::Jmri(jmri) => jmri::Client::new(now, jmri_settings(jmri.settings.clone(), layout)).into(),
     };
     Ok(session.with_blocks(layout))
 }
@@ -131,6 +136,12 @@ pub(crate) fn open_session(
 fn z21_settings(settings: z21::Settings, layout: &Layout) -> z21::Settings {
     let highest = highest_input(layout);
     z21::Settings { last_sensor: highest.saturating_add(settings.first_sensor), ..settings }
+}
+
+/// Settings that know how many sensors the layout has.
+fn jmri_settings(settings: jmri::Settings, layout: &Layout) -> jmri::Settings {
+    let highest = highest_input(layout);
+    jmri::Settings { last_sensor: highest.saturating_add(settings.first_sensor), ..settings }
 }
 
 /// Settings that know which modules the layout's contacts are on.

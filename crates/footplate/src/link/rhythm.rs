@@ -3,7 +3,7 @@
 use footplate_core::{TimeSpan, Timestamp};
 use footplate_wire::dcc_ex::{self, Framing, Reply};
 use footplate_wire::marklin_serial::{BYTE_TIME, Message};
-use footplate_wire::{loconet, marklin_can, z21};
+use footplate_wire::{jmri, loconet, marklin_can, z21};
 use serde::Serialize;
 
 /// Reads a line's bytes as they pass.
@@ -22,6 +22,8 @@ pub(crate) struct Rhythm {
     frames: Option<marklin_can::Framing>,
     /// Lines from a LocoNet server, once something was written to one.
     lines: Option<loconet::Lines>,
+    /// Messages from JMRI, once something was written to it.
+    messages: Option<jmri::Lines>,
 }
 
 /// What the station was commanded last of the power, and whether anything was heard of it since.
@@ -151,6 +153,26 @@ impl Rhythm {
         }
     }
 
+    /// A request to JMRI was written.
+    pub(crate) fn wrote_request(&mut self, text: &[u8]) {
+        self.messages.get_or_insert_default();
+        let request =
+            std::str::from_utf8(text).ok().and_then(|text| jmri::Request::read(text).ok().flatten());
+        if let Some(jmri::Request::Power { on, .. }) = request {
+            self.power = Some(PowerCommand { is_on: on, has_answered: false });
+        }
+    }
+
+    /// A byte was heard; if JMRI confirms the power with it, that counts.
+    pub(crate) fn heard_of_jmri(&mut self, byte: u8) {
+        let reply = self.messages.as_mut().and_then(|messages| messages.push(byte)).map(jmri::Reply::read);
+        if let Some(Ok(Some(jmri::Reply::Power { on: Some(on), .. }))) = reply
+            && let Some(power) = self.power.as_mut().filter(|power| on == power.is_on)
+        {
+            power.has_answered = true;
+        }
+    }
+
     /// The last power command, and whether the station has confirmed it.
     pub(crate) const fn power(&self) -> Option<PowerCommand> {
         self.power
@@ -203,6 +225,19 @@ mod tests {
             (b"RECEIVE E7 0E 05 33 18 3F 10 07 00 00 00 00 00 10\r\n", true),
         ] {
             line.iter().for_each(|byte| rhythm.heard_of_server(*byte));
+            assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered }));
+        }
+    }
+
+    #[test]
+    fn jmri_confirms_the_power_when_its_hardware_has_switched_it() {
+        let mut rhythm = Rhythm::default();
+        rhythm.wrote_request(b"{\"type\":\"power\",\"method\":\"post\",\"data\":{\"state\":2}}\n");
+        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
+        for (state, has_answered) in [(0, false), (2, true)] {
+            let power =
+                format!("{{\"type\":\"power\",\"data\":{{\"name\":\"LocoNet\",\"state\":{state}}}}}\n");
+            power.bytes().for_each(|byte| rhythm.heard_of_jmri(byte));
             assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered }));
         }
     }

@@ -109,9 +109,13 @@ impl<'l> Server<'l> {
             Incoming::Client(id, client) => {
                 self.waiting.clear();
                 self.client = Some((id, client));
+                self.station.connect();
             }
             Incoming::Byte(id, byte) if self.is_client(id) => self.waiting.push_back(byte),
-            Incoming::Gone(id) if self.is_client(id) => self.client = None,
+            Incoming::Gone(id) if self.is_client(id) => {
+                self.client = None;
+                self.station.disconnect();
+            }
             Incoming::Peer(id, peer) => drop(self.peers.insert(id, peer)),
             Incoming::Datagram(id, datagram) => self.station.write_of(id, &datagram),
             Incoming::Byte(..) | Incoming::Gone(_) => {}
@@ -186,7 +190,7 @@ pub(crate) fn listen_on(address: &str) -> std::io::Result<(u16, Receiver<Incomin
     Ok((port, incoming))
 }
 
-/// `None` when nobody serves any more.
+/// `None` when the server has gone.
 fn welcome(id: usize, client: TcpStream, sender: &Sender<Incoming>) -> Option<()> {
     let (Ok(()), Ok(writer)) = (client.set_nodelay(true), client.try_clone()) else { return Some(()) };
     sender.send(Incoming::Client(id, Box::new(writer))).ok()?;
@@ -207,7 +211,7 @@ pub(crate) fn listen_to(id: usize, mut client: impl Read + Send + 'static, sende
     });
 }
 
-/// Clients that are told apart by where their datagrams come from: more than a station knows. One more takes the place of the first.
+/// Clients that are distinguished by where their datagrams come from: more than a station knows. One more takes the place of the first.
 const MOST_PEERS: usize = 64;
 
 /// Lets clients send datagrams to a port, on a thread of its own; returns the port, which the system chooses if none was asked for,

@@ -11,7 +11,7 @@ use super::simulated_station::{FromSimulated, SimulatedStation};
 use super::{Heard, Link, Lost};
 use crate::clock::Stopwatch;
 
-/// While nobody paces it, a virtual clock makes steps of this size at most, so that orders are looked for.
+/// A virtual clock that is not paced makes steps of this size at most, so that orders are looked for.
 const VIRTUAL_PATIENCE: TimeSpan = TimeSpan::from_ms(1_000);
 
 /// A link into a simulated world.
@@ -31,7 +31,7 @@ impl<'l> SimulatedLink<'l> {
         Self { station, heard: VecDeque::new(), speed, began, stopwatch: Stopwatch::start() }
     }
 
-    /// The station and the world behind it: for hands and for scorers.
+    /// The station and the world behind it: for operator intervention and for scorers.
     pub(crate) fn station(&self) -> &SimulatedStation<'l> {
         &self.station
     }
@@ -95,6 +95,7 @@ impl Link for SimulatedLink<'_> {
     }
 
     fn reopen(&mut self) -> Result<(), Lost> {
+        self.station.connect();
         Ok(())
     }
 }

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use footplate_core::Timestamp;
 use footplate_sim::living::{
     CanTransport, CoilAlarm, FromStation, LivingLayout, StationSwitches, VirtualBoard, VirtualCentralStation,
-    VirtualLocoNet, VirtualStation, VirtualZ21,
+    VirtualJmri, VirtualLocoNet, VirtualStation, VirtualZ21,
 };
 
 use super::{Quirks, StationKind};
@@ -23,6 +23,8 @@ pub(crate) enum SimulatedStation<'l> {
     Can(Box<VirtualCentralStation<'l>>),
     /// A command station on LocoNet.
     LocoNet(Box<VirtualLocoNet<'l>>),
+    /// JMRI.
+    Jmri(Box<VirtualJmri<'l>>),
 }
 
 impl<'l> From<VirtualStation<'l>> for SimulatedStation<'l> {
@@ -51,13 +53,14 @@ impl<'l> SimulatedStation<'l> {
         marklin: StationSwitches,
         quirks: Quirks,
     ) -> Self {
-        let Quirks { board, z21, can, loconet } = quirks;
+        let Quirks { board, z21, can, loconet, jmri } = quirks;
         match kind {
             StationKind::Marklin => VirtualStation::new(world, seed, marklin).into(),
             StationKind::DccEx => Self::DccEx(Box::new(VirtualBoard::new(world, seed, board))),
             StationKind::Z21 => Self::Z21(Box::new(VirtualZ21::new(world, seed, z21))),
             StationKind::MarklinCan => Self::Can(Box::new(VirtualCentralStation::new(world, seed, can))),
             StationKind::LocoNet => Self::LocoNet(Box::new(VirtualLocoNet::new(world, seed, loconet))),
+            StationKind::Jmri => Self::Jmri(Box::new(VirtualJmri::new(world, seed, jmri))),
         }
     }
 
@@ -69,6 +72,7 @@ impl<'l> SimulatedStation<'l> {
             Self::Z21(station) => station.now(),
             Self::Can(station) => station.now(),
             Self::LocoNet(station) => station.now(),
+            Self::Jmri(jmri) => jmri.now(),
         }
     }
 
@@ -84,6 +88,7 @@ impl<'l> SimulatedStation<'l> {
                 station.advance(until).map(|(client, datagram)| FromSimulated::Datagram(client, datagram))
             }
             Self::LocoNet(station) => station.advance(until).map(|bytes| FromSimulated::Bytes(bytes.into())),
+            Self::Jmri(jmri) => jmri.advance(until).map(|bytes| FromSimulated::Bytes(bytes.into())),
             Self::Can(station) => station.advance(until).map(|(client, bytes)| match station.transport() {
                 CanTransport::Datagrams => FromSimulated::Datagram(client, bytes),
                 CanTransport::Stream | CanTransport::Adapter => FromSimulated::Bytes(bytes.into()),
@@ -104,6 +109,21 @@ impl<'l> SimulatedStation<'l> {
             Self::Z21(station) => station.write(client, bytes),
             Self::Can(station) => station.write(client, bytes),
             Self::LocoNet(station) => station.write(bytes),
+            Self::Jmri(jmri) => jmri.write(bytes),
+        }
+    }
+
+    /// A client has connected in the place of the one before. Only JMRI watches its clients.
+    pub(crate) fn connect(&mut self) {
+        if let Self::Jmri(jmri) = self {
+            jmri.connect();
+        }
+    }
+
+    /// The client has gone.
+    pub(crate) fn disconnect(&mut self) {
+        if let Self::Jmri(jmri) = self {
+            jmri.disconnect();
         }
     }
 
@@ -111,7 +131,7 @@ impl<'l> SimulatedStation<'l> {
     pub(crate) const fn cts(&self) -> Option<bool> {
         match self {
             Self::Marklin(station) => Some(station.cts()),
-            Self::DccEx(_) | Self::Z21(_) | Self::Can(_) | Self::LocoNet(_) => None,
+            _ => None,
         }
     }
 
@@ -123,6 +143,7 @@ impl<'l> SimulatedStation<'l> {
             Self::Z21(station) => station.world(),
             Self::Can(station) => station.world(),
             Self::LocoNet(station) => station.world(),
+            Self::Jmri(jmri) => jmri.world(),
         }
     }
 
@@ -134,6 +155,7 @@ impl<'l> SimulatedStation<'l> {
             Self::Z21(station) => station.world_mut(),
             Self::Can(station) => station.world_mut(),
             Self::LocoNet(station) => station.world_mut(),
+            Self::Jmri(jmri) => jmri.world_mut(),
         }
     }
 
@@ -141,7 +163,7 @@ impl<'l> SimulatedStation<'l> {
     pub(crate) fn alarms(&self) -> &[CoilAlarm] {
         match self {
             Self::Marklin(station) => station.alarms(),
-            Self::DccEx(_) | Self::Z21(_) | Self::Can(_) | Self::LocoNet(_) => &[],
+            _ => &[],
         }
     }
 }

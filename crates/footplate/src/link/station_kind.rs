@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use footplate_core::{DecoderSteps, TrainId};
 use footplate_wire::marklin_can::LocomotiveProtocol;
-use footplate_wire::{dcc_ex, loconet, marklin_serial, z21};
+use footplate_wire::{dcc_ex, jmri, loconet, marklin_serial, z21};
 
 /// Which station a simulated layout is behind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -20,6 +20,8 @@ pub(crate) enum StationKind {
     MarklinCan,
     /// A command station on LocoNet, behind a server.
     LocoNet,
+    /// JMRI.
+    Jmri,
 }
 
 impl StationKind {
@@ -34,6 +36,7 @@ impl StationKind {
             Self::Z21 => "a Z21",
             Self::MarklinCan => "a Central Station",
             Self::LocoNet => "LocoNet",
+            Self::Jmri => "JMRI",
         };
         let addresses = self.addresses();
         if !addresses.contains(&train.0) {
@@ -57,6 +60,7 @@ impl StationKind {
             Self::Z21 => z21::LOCOMOTIVES,
             Self::MarklinCan => LocomotiveProtocol::Mfx.addresses(),
             Self::LocoNet => loconet::LOCOMOTIVES,
+            Self::Jmri => jmri::LOCOMOTIVES,
         }
     }
 
@@ -65,10 +69,10 @@ impl StationKind {
     /// # Errors
     /// The names that exist, if there is no such name.
     pub(crate) fn named(value: &str) -> Result<Self, String> {
-        let all = [Self::Marklin, Self::DccEx, Self::Z21, Self::MarklinCan, Self::LocoNet];
+        let all = [Self::Marklin, Self::DccEx, Self::Z21, Self::MarklinCan, Self::LocoNet, Self::Jmri];
         all.into_iter().find(|kind| kind.key() == value).ok_or_else(|| {
             format!(
-                "there is no simulated station `{value}`; there are marklin, dcc-ex, z21, marklin-can and loconet"
+                "there is no simulated station `{value}`; there are marklin, dcc-ex, z21, marklin-can, loconet and jmri"
             )
         })
     }
@@ -81,6 +85,7 @@ impl StationKind {
             Self::Z21 => "z21",
             Self::MarklinCan => "marklin-can",
             Self::LocoNet => "loconet",
+            Self::Jmri => "jmri",
         }
     }
 }

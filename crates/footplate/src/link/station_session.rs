@@ -4,7 +4,7 @@ use footplate_core::track::Layout;
 use footplate_core::{Command, DecoderSteps, SensorId, Timestamp, TrainId};
 use footplate_wire::marklin_serial::Interface;
 use footplate_wire::{
-    BlockReports, Closing, CommandError, Session, Transmit, dcc_ex, loconet, marklin_can, z21,
+    BlockReports, Closing, CommandError, Session, Transmit, dcc_ex, jmri, loconet, marklin_can, z21,
 };
 
 /// A session with any station that there is.
@@ -51,6 +51,8 @@ pub(crate) enum Station {
     Can(Box<marklin_can::Client>),
     /// A command station on LocoNet.
     LocoNet(Box<loconet::Client>),
+    /// JMRI.
+    Jmri(Box<jmri::Client>),
 }
 
 impl From<Interface> for Station {
@@ -83,6 +85,12 @@ impl From<loconet::Client> for Station {
     }
 }
 
+impl From<jmri::Client> for Station {
+    fn from(session: jmri::Client) -> Self {
+        Self::Jmri(Box::new(session))
+    }
+}
+
 impl Station {
     fn any(&self) -> &dyn Session {
         match self {
@@ -91,6 +99,7 @@ impl Station {
             Self::Z21(session) => session,
             Self::Can(session) => session.as_ref(),
             Self::LocoNet(session) => session.as_ref(),
+            Self::Jmri(session) => session.as_ref(),
         }
     }
 
@@ -101,6 +110,7 @@ impl Station {
             Self::Z21(session) => session,
             Self::Can(session) => session.as_mut(),
             Self::LocoNet(session) => session.as_mut(),
+            Self::Jmri(session) => session.as_mut(),
         }
     }
 }

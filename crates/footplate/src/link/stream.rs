@@ -1,5 +1,6 @@
 //! Opens a serial port or a network connection; a thread of its own reads bytes and the hand-shake line.
 
+use std::fmt::Display;
 use std::io::{ErrorKind, Read};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
@@ -25,16 +26,8 @@ pub(super) fn connect(
     port: u16,
     mut deliver: impl FnMut(Arrival<'_>) -> bool + Send + 'static,
 ) -> Result<CableEnd, Lost> {
-    let failed = |error: &dyn std::fmt::Display| {
-        Lost(format!("cannot connect to {host}:{port}: {error}; check that the station's server runs there"))
-    };
-    let mut addresses = (host, port).to_socket_addrs().map_err(|error| failed(&error))?;
-    let address = addresses.next().ok_or_else(|| failed(&"the name has no address"))?;
-    let stream = TcpStream::connect_timeout(&address, CONNECT_WITHIN).map_err(|error| failed(&error))?;
-    // Each byte leaves at once.
-    stream.set_nodelay(true).map_err(|error| failed(&error))?;
-    stream.set_write_timeout(Some(WRITE_WITHIN)).map_err(|error| failed(&error))?;
-    let mut reader = stream.try_clone().map_err(|error| failed(&error))?;
+    let stream = dial(host, port)?;
+    let mut reader = stream.try_clone().map_err(|error| unreached(host, port, &error))?;
     std::thread::spawn(move || {
         let mut bytes = [0; 64];
         loop {
@@ -57,6 +50,25 @@ pub(super) fn connect(
         }
     });
     Ok(CableEnd { writer: Box::new(stream), cts: None })
+}
+
+/// Makes a connection to a server of the network.
+///
+/// # Errors
+/// When the name has no address or no server answers.
+pub(super) fn dial(host: &str, port: u16) -> Result<TcpStream, Lost> {
+    let failed = |error: &dyn Display| unreached(host, port, error);
+    let mut addresses = (host, port).to_socket_addrs().map_err(|error| failed(&error))?;
+    let address = addresses.next().ok_or_else(|| failed(&"the name has no address"))?;
+    let stream = TcpStream::connect_timeout(&address, CONNECT_WITHIN).map_err(|error| failed(&error))?;
+    // Each byte leaves at once.
+    stream.set_nodelay(true).map_err(|error| failed(&error))?;
+    stream.set_write_timeout(Some(WRITE_WITHIN)).map_err(|error| failed(&error))?;
+    Ok(stream)
+}
+
+fn unreached(host: &str, port: u16, error: &dyn Display) -> Lost {
+    Lost(format!("cannot connect to {host}:{port}: {error}; check that the station's server runs there"))
 }
 
 /// How a serial port is used.

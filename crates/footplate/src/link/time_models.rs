@@ -1,7 +1,7 @@
 //! How long the link to each kind of station takes.
 
 use footplate_core::link::{TimeModel, UsualLine};
-use footplate_wire::{dcc_ex, loconet, marklin_can, marklin_serial, z21};
+use footplate_wire::{dcc_ex, jmri, loconet, marklin_can, marklin_serial, z21};
 
 use super::station_kind::StationKind;
 
@@ -14,6 +14,7 @@ impl StationKind {
             Self::Z21 => z21::TIME_MODEL,
             Self::MarklinCan => marklin_can::TIME_MODEL,
             Self::LocoNet => loconet::TIME_MODEL,
+            Self::Jmri => jmri::TIME_MODEL,
         }
     }
 
@@ -25,6 +26,7 @@ impl StationKind {
             Self::Z21 => Some(z21::USUAL_LINE),
             Self::MarklinCan => Some(marklin_can::USUAL_LINE),
             Self::LocoNet => Some(loconet::USUAL_LINE),
+            Self::Jmri => Some(jmri::USUAL_LINE),
         }
     }
 }

@@ -14,8 +14,8 @@ use footplate_wire::{CommandError, LinkNotice};
 use super::over_a_simulation::Runs;
 use super::{Attendant, Ended, Runtime, Wish};
 use crate::link::{
-    Address, CableLink, Server, SimulatedAddress, StationKind, listen_for_datagrams, listen_on, open_session,
-    station,
+    Address, CableLink, Server, SimulatedAddress, StationKind, listen_for_datagrams, listen_for_sockets,
+    listen_on, open_session, station,
 };
 
 /// So many times real time.
@@ -146,7 +146,11 @@ impl<M: Machine> Attendant<M> for Watches<'_> {
 /// after the other end had vanished, and the connections made.
 fn runs_over(kind: StationKind, scheme: &str) -> (TimeSpan, TimeSpan, usize) {
     let datagrams = kind == StationKind::Z21;
-    let listen = if datagrams { listen_for_datagrams } else { listen_on };
+    let listen = match kind {
+        StationKind::Z21 => listen_for_datagrams,
+        StationKind::Jmri => listen_for_sockets,
+        _ => listen_on,
+    };
     let (port, incoming) = listen("127.0.0.1:0").expect("a free port");
     let stop = Arc::new(AtomicBool::new(false));
     let stopped = Arc::clone(&stop);
@@ -188,6 +192,7 @@ fn a_station_that_vanished_without_notice_is_noticed_in_time_and_found_over_a_ne
         (StationKind::DccEx, "dcc-ex:tcp://", 2.0),
         (StationKind::MarklinCan, "marklin-can:tcp://", 2.5),
         (StationKind::LocoNet, "loconet:", 2.0),
+        (StationKind::Jmri, "jmri:", 2.0),
         (StationKind::Z21, "z21:", 1.7),
     ] {
         let (silent, answers, connections) = runs_over(kind, scheme);

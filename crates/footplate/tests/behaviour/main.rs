@@ -17,6 +17,7 @@ mod guardian;
 mod guardian_datagrams;
 mod imported_profile;
 mod inertial_slides;
+mod jmri;
 mod killed;
 mod layout;
 mod left_running;

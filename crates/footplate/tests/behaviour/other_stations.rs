@@ -85,21 +85,25 @@ fn assert_valid_over_all(figures: &[[f64; 2]]) {
 fn a_calibration_made_over_a_6051_is_valid_over_every_other_station() {
     // The worlds below 17 whose train faces the direction of the script's places.
     let worlds = [4, 7, 10, 11, 12, 14, 15, 16].map(|seed| (seed, SCRIPT));
-    let stations = [CALIBRATED_OVER, "dcc-ex", "z21", "marklin-can", "loconet"];
-    assert_valid_over_all(&measured("track-a", "5m", &worlds, stations));
+    let stations = [CALIBRATED_OVER, "dcc-ex", "z21", "marklin-can", "loconet", "jmri"];
+    let [over_6051, dcc_ex, z21, can, loconet, jmri] = measured("track-a", "5m", &worlds, stations);
+    assert_valid_over_all(&[over_6051, dcc_ex, z21, can, loconet]);
+    // The hardware behind JMRI takes 4 to 30 ms for a command, of which a calibration over another station knows nothing: 5 mm at the
+    // speeds of the script. So the middle of the errors is further out, and the mean, in which the model's own errors count, is not.
+    assert!(jmri[0] <= 1.2 * over_6051[0], "{jmri:.1?} {over_6051:.1?}");
 }
 
 #[test]
 fn on_blocks_alone_it_is_valid_over_every_other_station_too() {
     let [one, other] = BLOCKS;
     let worlds = [(1, one), (2, other), (3, one), (4, one), (5, one), (7, one), (8, one), (12, other)];
-    let [over_6051, dcc_ex, z21, can, loconet, quick_can] = measured(
+    let [over_6051, dcc_ex, z21, can, loconet, jmri, quick_can] = measured(
         "oval-blocks",
         "8m",
         &worlds,
-        [CALIBRATED_OVER, "dcc-ex", "z21", "marklin-can", "loconet", QUICK_CAN],
+        [CALIBRATED_OVER, "dcc-ex", "z21", "marklin-can", "loconet", "jmri", QUICK_CAN],
     );
-    assert_valid_over_all(&[over_6051, dcc_ex, z21, loconet, quick_can]);
+    assert_valid_over_all(&[over_6051, dcc_ex, z21, loconet, jmri, quick_can]);
     // A new Central Station reads its contacts every 100 ms, in which the train of most scripts runs 18 mm: the middle of its errors is
     // further out, and the mean, in which the stops of the model's own errors count, is not.
     assert!(can[0] <= 1.2 * over_6051[0], "{can:.1?} {over_6051:.1?}");

@@ -127,6 +127,7 @@ fn a_line_of_garbage_is_called_that_with_what_to_check() {
     });
     for (link, check) in [
         (format!("marklin-serial:tcp://{place}"), "belongs to a 6050 or 6051"),
+        (format!("jmri:{place}"), "belongs to JMRI's web server"),
         (format!("dcc-ex:tcp://{place}"), "115200 baud"),
         (format!("loconet:{place}"), "LocoNet-over-TCP server"),
     ] {

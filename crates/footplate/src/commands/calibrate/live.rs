@@ -128,7 +128,8 @@ impl Session<'_> {
             | Address::Board(_)
             | Address::Z21(_)
             | Address::Can(_)
-            | Address::LocoNet(_) => {
+            | Address::LocoNet(_)
+            | Address::Jmri(_) => {
                 let store = self.store.filter(|path| path.exists()).map(Store::open).transpose()?;
                 let stop = |store: &Store| stop_left_running(self.link, &real, store, pace);
                 let opened = store.as_ref().map(stop).transpose()?.flatten();

@@ -8,6 +8,9 @@ use footplate_core::{TimeSpan, Timestamp};
 use super::figures::{histogram, line, quantiles};
 use crate::commands::plot::{Ink, Layer, Panel, Picture, Shape, shares};
 
+/// No session repeats a request sooner (Z21: after 100 ms).
+const REPEATED_SOONEST: TimeSpan = TimeSpan::from_ms(100);
+
 /// Requests by their kinds, as they pass.
 pub(super) struct Waiting<K> {
     waiting: Vec<(K, Timestamp)>,
@@ -32,6 +35,11 @@ impl<K: PartialEq> Default for Waiting<K> {
 impl<K: PartialEq> Waiting<K> {
     /// A request was written.
     pub(super) fn asked(&mut self, kind: K, at: Timestamp) {
+        let is_asked = |(other, since): &(K, Timestamp)| *other == kind && at - *since < REPEATED_SOONEST;
+        if self.waiting.iter().any(is_asked) {
+            // Two requests whose answers look alike, such as a sign of life and a command.
+            return;
+        }
         self.answers.asked += 1;
         // A request is repeated before its answer only if the answer is missing.
         let before = self.waiting.len();
@@ -144,4 +152,27 @@ pub(super) fn write_noise(unread: usize, output: &mut dyn Write) -> std::io::Res
         writeln!(output, "noise         {unread} bytes could not be read")?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_request_is_lost_when_it_is_repeated_and_not_when_another_looks_like_it() {
+        let at = |ms| Timestamp::ZERO + TimeSpan::from_ms(ms);
+        let mut waiting = Waiting::default();
+        // Slot 0 is read as a sign of life and after a command, 5 ms apart; both are answered.
+        waiting.asked(0, at(0));
+        waiting.asked(0, at(5));
+        waiting.answered(&0, at(18));
+        waiting.answered(&0, at(36));
+        // One without an answer is repeated.
+        waiting.asked(0, at(500));
+        waiting.asked(0, at(800));
+        waiting.answered(&0, at(820));
+        let answers = waiting.finish();
+        assert_eq!((answers.asked, answers.lost), (3, 1));
+        assert_eq!(answers.times, [18.0, 20.0]);
+    }
 }

@@ -54,8 +54,8 @@ pub(super) struct Arguments {
     /// pseudo-terminal.
     #[arg(long, value_parser = place_named, conflicts_with_all = ["scenario", "out", "json"])]
     station: Option<Place>,
-    /// What the station is: `marklin`, a 6051, `dcc-ex`, a DCC-EX board, `z21`, a Z21, `marklin-can`, a Central Station, or `loconet`, a
-    /// command station on LocoNet behind a server.
+    /// What the station is: `marklin`, a 6051, `dcc-ex`, a DCC-EX board, `z21`, a Z21, `marklin-can`, a Central Station, `loconet`, a
+    /// command station on LocoNet behind a server, or `jmri`, JMRI.
     #[arg(long, value_parser = StationKind::named, default_value = "marklin", requires = "station")]
     protocol: StationKind,
     /// The steps of the trains' decoders: 14, 28 or 126.
@@ -63,7 +63,7 @@ pub(super) struct Arguments {
     steps: DecoderSteps,
     /// How a station behaves, with commas between: chatter, merged, split, lossy, silent (DCC-EX); lossy, twice, overtaken,
     /// unsubscribed, strict, wrong-xor, short, first-only, locked, can, loconet (Z21); refused, no-echo, no-version, one-slot, merged,
-    /// split (LocoNet).
+    /// split (LocoNet); no-prefix, no-power, polled, one-throttle (JMRI).
     #[arg(long, value_parser = quirks, requires = "station")]
     quirks: Option<Quirks>,
     /// How many times faster than real time the station runs.

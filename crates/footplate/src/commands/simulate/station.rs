@@ -10,8 +10,8 @@ use footplate_sim::{CanTransport, LawFamily};
 use footplate_wire::z21::Feedback;
 
 use crate::link::{
-    Incoming, Quirks, Server, SimulatedAddress, StationKind, listen_for_datagrams, listen_on,
-    open_pseudo_terminal, station, trains,
+    Incoming, Quirks, Server, SimulatedAddress, StationKind, listen_for_datagrams, listen_for_sockets,
+    listen_on, open_pseudo_terminal, station, trains,
 };
 use crate::runtime::StopFlag;
 
@@ -86,13 +86,13 @@ pub(super) fn serve(
                 "only a Z21 and a Central Station are spoken to over UDP: write --protocol z21 or marklin-can, or --station tcp:127.0.0.1:0"
             )
         }
-        (StationKind::LocoNet, Place::PseudoTerminal) => {
-            bail!("a LocoNet server is spoken to over TCP: write --station tcp:127.0.0.1:0")
+        (StationKind::LocoNet | StationKind::Jmri, Place::PseudoTerminal) => {
+            bail!("such a server is spoken to over TCP: write --station tcp:127.0.0.1:0")
         }
         _ => {}
     }
     let station = station(&address, layout)?;
-    let (port, incoming) = open(place)?;
+    let (port, incoming) = open(place, wanted.protocol)?;
     let stop = StopFlag::install_saying("\nthe station is switched off");
     let speed = wanted.speed;
     let name = match wanted.protocol {
@@ -126,6 +126,11 @@ pub(super) fn serve(
             writeln!(output, "loconet:{port}?speed={speed}")?;
             "command station on LocoNet"
         }
+        StationKind::Jmri => {
+            let system = if wanted.quirks.jmri.has_prefix { "" } else { "system=L&" };
+            writeln!(output, "jmri:{port}?{system}speed={speed}")?;
+            "JMRI"
+        }
     };
     output.flush()?;
     let named: Vec<String> = address.trains.iter().map(ToString::to_string).collect();
@@ -141,11 +146,11 @@ pub(super) fn serve(
     Ok(())
 }
 
-fn open(place: &Place) -> anyhow::Result<(String, Receiver<Incoming>)> {
+fn open(place: &Place, protocol: StationKind) -> anyhow::Result<(String, Receiver<Incoming>)> {
     match place {
         Place::Tcp(address) => {
-            let (port, incoming) =
-                listen_on(address).with_context(|| format!("cannot listen on {address}"))?;
+            let listen = if protocol == StationKind::Jmri { listen_for_sockets } else { listen_on };
+            let (port, incoming) = listen(address).with_context(|| format!("cannot listen on {address}"))?;
             let host = address.rsplit_once(':').map_or(address.as_str(), |(host, _)| host);
             Ok((format!("tcp://{host}:{port}"), incoming))
         }

@@ -1,0 +1,137 @@
+//! What a person writes to name JMRI: `jmri:192.168.0.20` or `jmri:HOST:PORT`, with
+//! `[?system=L&first-sensor=17&first-turnout=5&straight=thrown&sensor-delay=150&speed=20]`.
+
+use footplate_sim::JmriSwitches;
+use footplate_wire::jmri::Settings;
+
+use super::address::{number, times};
+use super::loconet_address::{is_closed_straight, sensor_delay};
+use super::port::host_and_port;
+
+const SCHEME: &str = "jmri:";
+/// The port of JMRI's web server.
+const PORT: u16 = 12_080;
+
+/// JMRI.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct JmriAddress {
+    /// The computer on which it runs.
+    pub(crate) host: String,
+    /// The port of its web server.
+    pub(crate) port: u16,
+    /// How it names sensors and turnouts.
+    pub(crate) settings: Settings,
+    /// How many times faster than real time it runs; 1 for a real one.
+    pub(crate) speed: f64,
+}
+
+impl JmriAddress {
+    /// Returns JMRI at a place in the network.
+    ///
+    /// # Errors
+    /// When no place is named.
+    pub(super) fn of(place: &str) -> Result<Self, String> {
+        let named = place.strip_prefix("tcp://").unwrap_or(place);
+        let (host, port) = host_and_port(named, PORT).ok_or_else(|| {
+            format!(
+                "`{SCHEME}{place}` names no computer: write {SCHEME}192.168.0.20 or {SCHEME}HOST:{PORT}, where JMRI's web server runs"
+            )
+        })?;
+        Ok(Self { host, port, settings: Settings::default(), speed: 1.0 })
+    }
+
+    pub(super) fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
+        match key {
+            "system" => self.settings.prefix = Some(prefix_of(value)?),
+            "first-sensor" => self.settings.first_sensor = number(key, value, "17")?,
+            "first-turnout" => self.settings.first_turnout = number(key, value, "5")?,
+            "straight" => self.settings.closed_is_straight = is_closed_straight(value)?,
+            "sensor-delay" => self.settings.sensor_delay = sensor_delay(key, value)?,
+            "speed" => self.speed = times(value)?,
+            _ => {
+                return Err(format!(
+                    "a JMRI link has no `{key}`; it has system, first-sensor, first-turnout, straight, sensor-delay and speed"
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The prefix of a system: a letter, and a number where there are several of one kind.
+fn prefix_of(value: &str) -> Result<String, String> {
+    let is_prefix = |text: &str| {
+        let mut rest = text.chars();
+        rest.next().is_some_and(|first| first.is_ascii_alphabetic()) && rest.all(|one| one.is_ascii_digit())
+    };
+    if is_prefix(value) {
+        return Ok(value.to_owned());
+    }
+    Err(format!(
+        "`{value}` is no prefix of a system: write system=L where JMRI's sensors are called LS1, LS2, …"
+    ))
+}
+
+/// The quirks of a simulated JMRI, as they are listed for people.
+pub(super) const QUIRKS: &str = "no-prefix (it does not state the prefix of its system), no-power (it does not know whether the track \
+                                 has power), polled (its sensors are polled), one-throttle (its hardware drives one locomotive)";
+
+/// Sets a quirk of a simulated JMRI; returns whether there is one of that name.
+pub(super) fn set_quirk(switches: &mut JmriSwitches, name: &str) -> bool {
+    match name {
+        "no-prefix" => switches.has_prefix = false,
+        "no-power" => switches.knows_power = false,
+        "polled" => switches.polls = true,
+        "one-throttle" => switches.throttles = 1,
+        _ => return false,
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use footplate_core::TimeSpan;
+
+    use super::super::address::Address;
+    use super::*;
+
+    #[test]
+    fn jmri_is_named_by_its_place_in_the_network() {
+        for (text, place) in [
+            ("jmri:192.168.0.20", ("192.168.0.20", 12_080)),
+            ("jmri:attic.local:12081", ("attic.local", 12_081)),
+            ("jmri:tcp://[::1]:12081", ("::1", 12_081)),
+        ] {
+            let Ok(Address::Jmri(jmri)) = text.parse() else { panic!("{text}") };
+            assert_eq!((jmri.host.as_str(), jmri.port), place);
+        }
+        let written =
+            "jmri:host?system=L2&first-sensor=17&first-turnout=5&straight=thrown&sensor-delay=150&speed=20";
+        let Ok(Address::Jmri(jmri)) = written.parse() else { panic!("JMRI") };
+        let expected = Settings {
+            prefix: Some("L2".to_owned()),
+            first_sensor: 17,
+            first_turnout: 5,
+            closed_is_straight: false,
+            sensor_delay: TimeSpan::from_ms(150),
+            ..Settings::default()
+        };
+        assert_eq!((jmri.settings, jmri.speed), (expected, 20.0));
+    }
+
+    #[test]
+    fn what_is_wrong_is_answered_with_what_would_be_right() {
+        for (text, right) in [
+            ("jmri:", "jmri:192.168.0.20"),
+            ("jmri:/dev/ttyUSB0", "web server"),
+            ("jmri:host:many", "HOST:12080"),
+            ("jmri:host?system=LocoNet", "system=L"),
+            ("jmri:host?straight=left", "straight=thrown"),
+            ("jmri:host?sensor-delay=1", "between 3 and 2000 ms"),
+            ("jmri:host?modules=5", "system, first-sensor"),
+        ] {
+            let refused = text.parse::<Address>().expect_err(text);
+            assert!(refused.contains(right), "{text}: {refused}");
+        }
+    }
+}
