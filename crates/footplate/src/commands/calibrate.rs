@@ -23,7 +23,7 @@ use super::log_file::LogFile;
 use super::plot::PictureFile;
 use crate::clock::{Moment, now};
 use crate::dashboard::ServedAt;
-use crate::layout_check::check_runs;
+use crate::layout_check::{LengthWarning, check_runs};
 use crate::link::{Address, NamedTrain};
 pub(super) use explain::Question;
 pub(crate) use live::CalibrationBeginning;
@@ -167,7 +167,7 @@ impl Arguments {
         let train = self.train.map(|named| named.train);
         let logs = LogFile::read_all(&self.from, &layout, train)?;
         let warning = check_runs(&layout, logs.iter().flat_map(|log| &log.recording.runs))?;
-        let outcome = if warning.is_none() { Outcome::Done } else { Outcome::FallsShort };
+        let outcome = LengthWarning::outcome(warning.as_ref());
         if let Some(warning) = warning.as_ref().filter(|_| !self.json) {
             writeln!(output, "WARNING: {}\n", warning.english)?;
         }

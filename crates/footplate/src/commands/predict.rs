@@ -21,7 +21,7 @@ use footplate_store::{MotionFile, Recording, layout_named};
 use super::Outcome;
 use super::log_file::LogFile;
 use super::plot::PictureFile;
-use crate::layout_check::check_runs;
+use crate::layout_check::{LengthWarning, check_runs};
 use crate::progress::with_progress;
 
 /// Forecast every next sensor of recorded logs, and score that.
@@ -74,7 +74,7 @@ impl Arguments {
         let layout = layout_named(&self.layout)?.layout;
         let recordings = LogFile::recordings(&self.logs, &layout, self.train.map(TrainId))?;
         let warning = check_runs(&layout, recordings.iter().flat_map(|recording| &recording.runs))?;
-        let outcome = if warning.is_none() { Outcome::Done } else { Outcome::FallsShort };
+        let outcome = LengthWarning::outcome(warning.as_ref());
         let calibration = self.calibration.as_deref().map(MotionFile::read).transpose()?;
         let scored = self.score(&layout, &recordings, calibration.as_ref())?;
         if let Some(plot) = &self.plot {

@@ -20,7 +20,7 @@ use footplate_store::{Batch, Findings, Run, Store, layout_named, write_whole};
 use super::Outcome;
 use super::log_file::LogFile;
 use super::web_page::Language;
-use crate::layout_check::check_runs;
+use crate::layout_check::{LengthWarning, check_runs};
 use data::{ReportData, TrainReport};
 use german_law::german_law;
 
@@ -78,7 +78,7 @@ impl Arguments {
         };
         let warning = check_runs(&layout, sessions.iter().flat_map(|session| &session.runs))?;
         let language = self.language;
-        let outcome = if warning.is_none() { Outcome::Done } else { Outcome::FallsShort };
+        let outcome = LengthWarning::outcome(warning.as_ref());
         let warning = warning.map(|warning| match language {
             Language::English => warning.english,
             Language::German => warning.german,
