@@ -1,8 +1,9 @@
 //! Trains in danger come back into service, or wait where creeping is not permitted.
 
-use footplate_core::control::{Alarm, Notice, Reservation};
+use footplate_core::control::{Alarm, LinkNews, Notice, Order, Reservation};
+use footplate_core::track::Leg;
 use footplate_core::tracking::PathPoint;
-use footplate_core::{Command, Length, SpeedStep, TimeSpan};
+use footplate_core::{Command, Length, SpeedStep, TimeSpan, TurnoutId};
 
 use crate::watching::{FIRST, Watched};
 
@@ -81,4 +82,21 @@ fn a_train_that_a_person_places_is_searched_no_more() {
     watched.run(8.0);
     assert!(watched.world.trains[0].speed_mm_per_s < 1.0, "{:#?}", watched.notices);
     assert!(!watched.dog.is_held(FIRST));
+}
+
+#[test]
+fn a_turnout_that_was_to_move_while_the_station_was_silent_is_unknown() {
+    for (silent_after_s, leg) in [(10.0, Some(Leg::Curved)), (1.5, None)] {
+        let mut watched = Watched::one();
+        let throw = Order::Turnout { turnout: TurnoutId(1), curved: true };
+        watched.dog.order(watched.world.now, throw).expect("no train is on it");
+        watched.run(silent_after_s);
+        watched.dog.handle_link(watched.world.now, LinkNews::Silent);
+        assert_eq!(watched.dog.driver().turnouts().get(TurnoutId(1)), leg, "{silent_after_s} s");
+        // Commanded again, it is known.
+        watched.dog.handle_link(watched.world.now, LinkNews::Answers);
+        watched.dog.order(watched.world.now, throw).expect("no train is on it");
+        watched.run(1.0);
+        assert_eq!(watched.dog.driver().turnouts().get(TurnoutId(1)), Some(Leg::Curved));
+    }
 }
