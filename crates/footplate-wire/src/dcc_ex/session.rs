@@ -91,7 +91,15 @@ impl Client {
             };
             let is_unconfirmed = matches!(request, Request::Accessory { .. });
             let times = if is_unconfirmed && self.dialogue.is_noisy() { TIMES_IN_NOISE } else { 1 };
-            self.dialogue.write(request.to_string().repeat(times).into_bytes());
+            let mut text = request.to_string().repeat(times);
+            // A train of unknown direction has to stop now: the stop of all may have been lost as well.
+            if matches!(request, Request::Locomotive { .. })
+                && next.tries > 1
+                && self.dialogue.farewell.has_begun()
+            {
+                text.insert_str(0, &Request::StopAll.to_string());
+            }
+            self.dialogue.write(text.into_bytes());
             self.dialogue.sent(now, next);
         }
     }
@@ -108,7 +116,8 @@ impl Client {
         if let Some(command) = self.dialogue.next_stop(now, true) {
             return Some(self.outgoing(command));
         }
-        if let Some(repeat) = self.dialogue.next_again(now, true) {
+        // At the end the stop of a train waits for the answer which way it runs.
+        if let Some(repeat) = self.dialogue.next_again(now, !is_closing) {
             return Some(repeat);
         }
         if let Some(train) = self.dialogue.undirected_at_end() {

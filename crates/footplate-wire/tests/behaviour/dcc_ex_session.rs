@@ -355,6 +355,17 @@ fn a_train_that_was_never_driven_here_is_stopped_at_the_end_if_that_was_commande
 }
 
 #[test]
+fn all_locomotives_are_stopped_again_while_a_direction_is_unknown_at_the_end() {
+    let mut desk = Desk::new(Settings::default());
+    desk.station.answers.retain(|(request, _)| *request != "<t 24>");
+    desk.command(speed(T24, 0));
+    desk.client.close(desk.now);
+    desk.run_for(800);
+    let stops: Vec<&str> = desk.texts().into_iter().filter(|text| text.contains("<!>")).collect();
+    assert_eq!(stops, ["<!>", "<!><t 24>", "<!><t 24>", "<!><t 24>"], "{:?}", desk.written);
+}
+
+#[test]
 fn what_was_not_confirmed_at_the_end_is_named() {
     let mut desk = Desk::opened();
     for command in [speed(T24, 8), speed(T58, 9)] {
