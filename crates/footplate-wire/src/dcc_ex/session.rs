@@ -116,7 +116,7 @@ impl Client {
         if let Some(command) = self.dialogue.next_stop(now, true) {
             return Some(self.outgoing(command));
         }
-        // At the end the stop of a train waits for the answer which way it runs.
+        // At the end the stop of a train waits for the answer in which direction it runs.
         if let Some(repeat) = self.dialogue.next_again(now, !is_closing) {
             return Some(repeat);
         }
