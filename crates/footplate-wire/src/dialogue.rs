@@ -259,6 +259,24 @@ impl<A: Awaited> Dialogue<A> {
         Some(kind)
     }
 
+    /// Puts a command in the queue if its train, its turnout and its step exist here.
+    pub(crate) fn accept(
+        &mut self,
+        command: Command,
+        trains: &RangeInclusive<u16>,
+        turnouts: &RangeInclusive<u16>,
+    ) -> Result<(), CommandError> {
+        self.check_step(&command)?;
+        match command {
+            Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. } => {
+                CommandError::check_train(train, trains)?;
+            }
+            Command::Turnout { turnout, .. } => CommandError::check_turnout(turnout, turnouts)?,
+            _ => {}
+        }
+        self.push(command)
+    }
+
     /// Puts a command in the queue.
     pub(crate) fn push(&mut self, command: Command) -> Result<(), CommandError> {
         if self.farewell.has_begun() {

@@ -258,17 +258,7 @@ impl Session for Client {
     }
 
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
-        self.dialogue.check_step(&command)?;
-        match command {
-            Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. } => {
-                CommandError::check_train(train, &LOCOMOTIVES)?;
-            }
-            Command::Turnout { turnout, .. } => {
-                CommandError::check_turnout(turnout, &self.settings.turnouts())?;
-            }
-            _ => {}
-        }
-        self.dialogue.push(command)?;
+        self.dialogue.accept(command, &LOCOMOTIVES, &self.settings.turnouts())?;
         self.go_on(now);
         Ok(())
     }
