@@ -88,7 +88,7 @@ function state() {
   shown.textContent = isAlarmed ? say("connected-alarmed", alarmed.dangers) : say(live.state);
 }
 
-/** How far the session is on disk, when that lags. */
+/** How far the session is on disk, when that lags: in few words, which do not move what is below the header. */
 function written({ t_s, written_until_s }) {
   const behind = written_until_s == null ? 0 : t_s - written_until_s;
   $("written").hidden = behind < LATE_ON_DISK_S;

@@ -8,7 +8,7 @@ export const ENGLISH = {
   "halt-taken": "all trains commanded to stop; track power is being switched off",
   "halt-told": "power-off sent to the station; no answer since: NOT CONFIRMED",
   "halt-heard": "power-off sent, and the station has answered since; a 6051 does not report track power: NOT CONFIRMED, check that all trains have stopped",
-  "written-until": "recorded on disk until {0} s ago; a power cut would lose the rest",
+  "written-until": "not on disk yet: the last {0} s",
   "halt-failed": "emergency stop NOT accepted: {0}", "power-failed": "the power was not switched on: {0}",
   "chart-png": "Save the picture of this chart as PNG: {0}", "chart-csv": "Save the data of this chart as CSV: {0}", "chart-keys": "Use the arrow keys to step through the values.", "skip": "To the page",
   "connected-alarmed": "live, alarms: {0}", "act-place": "Say where train {0} is", "act-route": "Find a route for train {0}", "act-power": "Switch the power on",

@@ -8,7 +8,7 @@ export const GERMAN = {
   "halt-taken": "allen Zügen ist Halt befohlen; der Fahrstrom wird abgeschaltet",
   "halt-told": "Abschaltbefehl an die Zentrale gesendet; seither keine Antwort: NICHT BESTÄTIGT",
   "halt-heard": "Abschaltbefehl gesendet, die Zentrale hat seither geantwortet; eine 6051 meldet den Fahrstrom nicht: NICHT BESTÄTIGT, prüfen, ob alle Züge stehen",
-  "written-until": "bis vor {0} s auf der Platte aufgezeichnet; ein Stromausfall verlöre den Rest",
+  "written-until": "noch nicht auf der Platte: die letzten {0} s",
   "power-failed": "der Strom wurde nicht eingeschaltet: {0}",
   "halt-failed": "Nothalt NICHT angenommen: {0}",
   "chart-png": "Bild dieses Diagramms als PNG speichern: {0}", "chart-csv": "Daten dieses Diagramms als CSV speichern: {0}", "chart-keys": "Mit den Pfeiltasten von Wert zu Wert gehen.", "skip": "Zur Seite",

@@ -9,7 +9,7 @@ import { join } from "node:path";
 import { after, before, test } from "node:test";
 
 import { findings } from "./axe.mjs";
-import { AT, launch, openQuietly, width } from "./browser.mjs";
+import { AT, below, clickUntil, launch, openQuietly, width } from "./browser.mjs";
 import { pressJoint } from "./oval.mjs";
 import { PATIENCE, begin, end, picture, say } from "./railway.mjs";
 
@@ -56,9 +56,7 @@ test("a block is occupied from the start and while the train is in it, and bound
   await page.screenshot({ path: join(AT, "blocks.png"), fullPage: true });
   assert.deepEqual(await findings(page), []);
 
-  const name = await page.locator("#track text", { hasText: "B5 B6" }).boundingBox();
-  await page.mouse.click(name.x + name.width / 2, name.y + name.height + 4);
-  await until(page, () => /^Selected: B[3456]\S*, in block (front right|right curve)$/.test(document.querySelector("#picked").textContent));
+  await clickUntil(page, below(page, "B5 B6", 4), () => /^Selected: B[3456]\S*, in block (front right|right curve)$/.test(document.querySelector("#picked").textContent));
   assert.deepEqual(complaints, []);
   await page.close();
 });

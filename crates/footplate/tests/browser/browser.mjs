@@ -33,6 +33,29 @@ export async function openQuietly(browser, address, options = {}) {
   return { page, complaints };
 }
 
+/** How long a click may take to show (ms) before it is repeated, and how long it is repeated. */
+const [SHOWS_WITHIN, REPEATED_FOR] = [3_000, 60_000];
+
+/** Clicks the point that `at` finds until `holds` is true in the page: a notice in the header may move a drawing just before the click. */
+export async function clickUntil(page, at, holds, arg) {
+  for (const began = Date.now(); ;) {
+    await page.mouse.click(...await at());
+    try {
+      return await page.waitForFunction(holds, arg, { timeout: SHOWS_WITHIN });
+    } catch (error) {
+      if (Date.now() - began > REPEATED_FOR) throw error;
+    }
+  }
+}
+
+/** The point this far (px) below the middle of a name in the drawing. */
+export const below = (page, name, px) => async () => {
+  const place = page.locator("#track text", { hasText: name }).first();
+  await place.scrollIntoViewIfNeeded();
+  const { x, y, width: wide, height } = await place.boundingBox();
+  return [x + wide / 2, y + height + px];
+};
+
 /** The number of different colours on each chart's canvas: a blank canvas has one. */
 export const colours = (page) => page.$$eval(".uplot canvas", (all) => all.map((canvas) => {
   const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);

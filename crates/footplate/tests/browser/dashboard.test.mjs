@@ -6,7 +6,7 @@ import { request } from "node:http";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 
-import { AT, launch, openQuietly } from "./browser.mjs";
+import { AT, below, clickUntil, launch, openQuietly } from "./browser.mjs";
 import { PATIENCE, calibratedStore, end, serve } from "./railway.mjs";
 
 /** A stop further from its target than this (mm) has failed: no interval of this train is as wide. */
@@ -55,9 +55,7 @@ test("a train is located, driven by clicking, stopped at its target, and stopped
 
   // After E7, C13 is a lap away. A click selects it, and the button on the card stops the train there.
   await page.waitForFunction(() => /at E7,[^]*$/.test(document.querySelector("#said").lastElementChild.textContent), null, { timeout: PATIENCE });
-  const spot = await page.locator("#track text", { hasText: "C13 C14" }).boundingBox();
-  await page.mouse.click(spot.x + spot.width / 2, spot.y + spot.height + 6);
-  await page.waitForFunction(() => /Stop at [A-E]\d/.test(document.querySelector(".train").textContent), null, { timeout: PATIENCE });
+  await clickUntil(page, below(page, "C13 C14", 6), () => /Stop at [A-E]\d/.test(document.querySelector(".train").textContent));
   const named = /Stop at (\S+)/.exec(await card.locator("button", { hasText: "Stop at" }).textContent())?.[1];
   await card.locator("button", { hasText: "Stop at" }).click();
   await page.waitForFunction(() => document.querySelectorAll(".train dd")[2].textContent !== "–", null, { timeout: PATIENCE });

@@ -9,7 +9,7 @@ import { join } from "node:path";
 import { after, before, test } from "node:test";
 
 import { findings } from "./axe.mjs";
-import { AT, launch, openQuietly, width } from "./browser.mjs";
+import { AT, clickUntil, launch, openQuietly, width } from "./browser.mjs";
 import { drawOval, pressJoint } from "./oval.mjs";
 import { PATIENCE, begin, end } from "./railway.mjs";
 
@@ -158,13 +158,12 @@ test("a double slip is two turnouts in one place, and a click on either end thro
   await seen.page.locator("#track").scrollIntoViewIfNeeded();
   // The straight blades come first.
   for (const [blade, turnout] of [[0, 1], [1, 2]]) {
-    const [x, y] = await seen.page.$$eval("#track .blade", (all, nth) => {
+    const middle = () => seen.page.$$eval("#track .blade", (all, nth) => {
       const { x, y } = all[nth].getPointAtLength(all[nth].getTotalLength() / 2);
       const at = new DOMPoint(x, y).matrixTransform(all[nth].getScreenCTM());
       return [at.x, at.y];
     }, blade);
-    await seen.page.mouse.click(x, y);
-    await seen.page.waitForFunction((number) => document.querySelector("#picked").textContent.includes(`turnout ${number} is unknown`), turnout, { timeout: PATIENCE });
+    await clickUntil(seen.page, middle, (number) => document.querySelector("#picked").textContent.includes(`turnout ${number} is unknown`), turnout);
     await seen.page.locator("#here-does button", { hasText: "Set curved" }).click();
     await seen.page.waitForFunction((number) => document.querySelector("#picked").textContent === `Turnout ${number} is set to curved.`, turnout, { timeout: PATIENCE });
   }

@@ -7,7 +7,7 @@ import { join } from "node:path";
 import { after, before, test } from "node:test";
 
 import { findings } from "./axe.mjs";
-import { AT, launch, openQuietly, width } from "./browser.mjs";
+import { AT, below, clickUntil, launch, openQuietly, width } from "./browser.mjs";
 import { PATIENCE, begin, calibratedStore, end, say, serve } from "./railway.mjs";
 
 let browser;
@@ -34,14 +34,6 @@ async function started(layout) {
 async function ended(program) {
   await end(program);
   running.delete(program);
-}
-
-/** Clicks the drawing beside a name. */
-async function press(page, name, below) {
-  const place = page.locator("#track text", { hasText: name }).first();
-  await place.scrollIntoViewIfNeeded();
-  const box = await place.boundingBox();
-  await page.mouse.click(box.x + box.width / 2, box.y + box.height + below);
 }
 
 /** Points along each drawn rail. */
@@ -91,14 +83,13 @@ test("a click asks for the position of a turnout, then throws it, and is refused
   running.add(program);
   const { page, complaints } = await openQuietly(browser, program.url);
   await page.waitForSelector(".train");
-  await press(page, "⟨12⟩", 4);
-  await until(page, () => /position of turnout 12 is unknown/.test(document.querySelector("#picked").textContent));
+  await clickUntil(page, below(page, "⟨12⟩", 4), () => /position of turnout 12 is unknown/.test(document.querySelector("#picked").textContent));
   const lies = async () => (await (await fetch(`${program.url}api/picture`)).json()).turnouts;
   assert.equal((await lies())[12], null, "nothing was thrown unasked");
   await page.locator("#here-does button", { hasText: "Set straight" }).click();
   await until(page, () => document.querySelector("#picked").textContent === "Turnout 12 is set to straight.");
   assert.equal((await lies())[12], "straight");
-  await press(page, "⟨12⟩", 4);
+  await page.mouse.click(...await below(page, "⟨12⟩", 4)());
   await until(page, () => document.querySelector("#picked").textContent === "Turnout 12 is set to curved.");
   await until(page, () => document.querySelector("#here-answer").textContent === "Done. Undo");
   await page.locator("#here-answer button").click();
@@ -114,8 +105,7 @@ test("a click asks for the position of a turnout, then throws it, and is refused
   assert.equal((await lies())[11], "straight");
 
   // A click on a place puts the train there, in the chosen direction.
-  await press(page, "E7 E8", 6);
-  await until(page, () => /^Selected: E[78]/.test(document.querySelector("#picked").textContent));
+  await clickUntil(page, below(page, "E7 E8", 6), () => /^Selected: E[78]/.test(document.querySelector("#picked").textContent));
   const first = await text(page, "#picked");
   await page.locator("#here-does button", { hasText: "Other direction" }).click();
   assert.notEqual(await text(page, "#picked"), first);
