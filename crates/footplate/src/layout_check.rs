@@ -1,5 +1,8 @@
 //! Recordings beside the layout that a person says they are of: refused if they are of another one.
 
+use std::cell::OnceCell;
+use std::rc::Rc;
+
 use anyhow::bail;
 use footplate_core::model::survey::{LayoutTest, SectionIndex, SurveyTest};
 use footplate_core::track::{HopId, Layout, SequenceVerdict, StrayReport};
@@ -25,6 +28,9 @@ const FEWEST_SPEEDS: usize = 4;
 /// short recordings of simulated trains on their own layout five are off by 2 times, by its curves and its survey, none by 3).
 const ANOTHER_LAYOUT: f64 = 3.0;
 
+/// Lengths are compared each time a session has as many more reports of sensors (chosen: a lap of two trains).
+const COMPARED_EVERY: usize = 24;
+
 /// More contradictions than these tell a person nothing new.
 const MOST_SAID: usize = 4;
 
@@ -33,6 +39,8 @@ const MOST_SAID: usize = 4;
 pub(crate) struct LengthWarning {
     pub(crate) english: String,
     pub(crate) german: String,
+    /// The lengths without a sentence about them, for an alarm.
+    pub(crate) differences: String,
     /// Whether the figures fall short: it may be another layout. Otherwise the survey is less accurate than it says, and the
     /// uncertainties say so.
     is_serious: bool,
@@ -83,7 +91,7 @@ fn tested<'r>(
     let lengths = test.lengths(sections);
     let odd = odd_hops(layout, sections, &lengths);
     if let Some(other) = layout_with(layout, &odd) {
-        let [said, _] = lengths_said(layout, &odd);
+        let [said, ..] = lengths_said(layout, &odd);
         bail!(
             "the recordings are not of layout `{}` but of `{other}`: {said}; give --layout {other}",
             layout.name()
@@ -121,11 +129,17 @@ fn speeds_contradict(layout: &Layout, mut speeds: Vec<f64>) -> Option<String> {
     })
 }
 
-/// Watches a session: ends it if the reports are not of the layout on which trains are driven.
+/// The serious warning of a session that is under way, once there is one.
+pub(crate) type LiveWarning = Rc<OnceCell<LengthWarning>>;
+
+/// Watches a session: ends it if the reports are not of the layout on which trains are driven, and warns of its lengths.
 pub(crate) struct LayoutWatch<'l> {
     layout: &'l Layout,
     sections: SectionIndex,
     test: LayoutTest,
+    /// Reports since lengths were last compared.
+    reports: usize,
+    warning: LiveWarning,
     /// Who writes the entries down, before they are judged.
     recorder: Option<&'l mut dyn Recorder>,
 }
@@ -135,10 +149,25 @@ impl<'l> LayoutWatch<'l> {
     pub(crate) fn new(layout: &'l Layout, trains: usize, recorder: Option<&'l mut dyn Recorder>) -> Self {
         let mut test = LayoutTest::default();
         test.begin_run_at_rest(trains);
-        Self { layout, sections: SectionIndex::of(layout), test, recorder }
+        let sections = SectionIndex::of(layout);
+        Self { layout, sections, test, reports: 0, warning: LiveWarning::default(), recorder }
     }
 
-    /// What a person is told about lengths when the session is over.
+    /// Where a serious warning will be.
+    pub(crate) fn warning(&self) -> LiveWarning {
+        Rc::clone(&self.warning)
+    }
+
+    fn compare_lengths(&mut self) {
+        self.reports = 0;
+        if self.warning.get().is_none()
+            && let Some(warning) = self.lengths_doubted().filter(|warning| warning.is_serious)
+        {
+            self.warning.get_or_init(|| warning);
+        }
+    }
+
+    /// What all lengths of the session come to.
     pub(crate) fn lengths_doubted(&self) -> Option<LengthWarning> {
         lengths_doubted(self.layout, &self.sections, &self.test.lengths(&self.sections))
     }
@@ -151,6 +180,10 @@ impl Recorder for LayoutWatch<'_> {
         }
         for event in events {
             self.test.take(self.layout, &self.sections, event);
+            self.reports += usize::from(matches!(event.kind, EventKind::Sensor(_)));
+        }
+        if self.reports >= COMPARED_EVERY {
+            self.compare_lengths();
         }
         match order_contradicts(self.layout, &self.test.sequence()) {
             Some(contradiction) => bail!(contradiction),
@@ -225,20 +258,23 @@ fn lengths_doubted(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTes
                  (length_uncertainty_mm): sie werden zusammen mit den Tempi geschätzt, die alle um {scale:.0} % falsch sein \
                  können; ist es die richtige Anlage?"
             ),
+            differences: format!("{factor:.0} × length_uncertainty_mm"),
             is_serious: factor >= ANOTHER_LAYOUT,
         });
     }
-    let [english, german] = lengths_said(layout, &odd);
+    let [english, german, differences] = lengths_said(layout, &odd);
     Some(LengthWarning {
         english: format!("lengths that are not those of layout `{name}`: {english}; is it the right layout?"),
         german: format!(
             "Längen, die nicht die der Anlage `{name}` sind: {german}; ist es die richtige Anlage?"
         ),
+        differences,
         is_serious: true,
     })
 }
 
-fn lengths_said(layout: &Layout, odd: &[(HopId, Length, Length)]) -> [String; 2] {
+/// Path lengths beside those of the layout: in English, in German, and in neither.
+fn lengths_said(layout: &Layout, odd: &[(HopId, Length, Length)]) -> [String; 3] {
     let said = odd.iter().take(MOST_SAID).filter_map(|(hop, surveyed, found)| {
         let hop = layout.hop(*hop)?;
         let (from, to) = (layout.node_name(hop.from), layout.node_name(hop.to));
@@ -246,10 +282,11 @@ fn lengths_said(layout: &Layout, odd: &[(HopId, Length, Length)]) -> [String; 2]
         Some([
             format!("{from} to {to} takes as long as {found:.0} mm, not {surveyed:.0}"),
             format!("{from} bis {to} dauert so lange wie {found:.0} mm, nicht {surveyed:.0}"),
+            format!("{from} → {to}: {found:.0} ≠ {surveyed:.0} mm"),
         ])
     });
-    let (english, german): (Vec<String>, Vec<String>) = said.map(|[one, other]| (one, other)).unzip();
-    [english.join(", "), german.join(", ")]
+    let said: Vec<[String; 3]> = said.collect();
+    [0, 1, 2].map(|form| said.iter().map(|one| one[form].as_str()).collect::<Vec<_>>().join(", "))
 }
 
 /// Another built-in layout with the path lengths.

@@ -93,7 +93,7 @@ impl SequenceTest {
     /// Adds the next event of the run.
     pub fn take(&mut self, layout: &Layout, event: &Event) {
         match event.kind {
-            EventKind::Sensor(_) if self.all_at_rest(event.time) => {}
+            EventKind::Sensor(_) if self.in_motion(event.time) == 0 => {}
             EventKind::Sensor(report) => self.report(layout, report.sensor),
             // The positions do not show which one is this train's, and it reverses there.
             EventKind::Reverse { .. } => self.forget_places(),
@@ -112,10 +112,11 @@ impl SequenceTest {
         }
     }
 
-    /// Whether the commands so far leave no train in motion.
-    fn all_at_rest(&self, now: Timestamp) -> bool {
+    /// How many trains may be in motion by the commands so far.
+    #[must_use]
+    pub fn in_motion(&self, now: Timestamp) -> usize {
         let rests = |stop: &Option<Timestamp>| stop.is_some_and(|since| now - since >= STOPS_WITHIN);
-        self.uncommanded == 0 && self.stops.values().all(rests)
+        self.uncommanded + self.stops.values().filter(|stop| !rests(stop)).count()
     }
 
     fn report(&mut self, layout: &Layout, sensor: SensorId) {

@@ -49,7 +49,9 @@ pub enum StoreError {
     },
     /// The file is damaged.
     #[error(
-        "the store {} is damaged ({what}); `footplate store salvage` copies what can still be read into a new one",
+        "the store {} is damaged ({what}); `footplate store salvage --store {} --out salvaged.db` copies what can still be \
+         read into a new one",
+        file.display(),
         file.display()
     )]
     Damaged {

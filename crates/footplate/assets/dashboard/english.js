@@ -136,7 +136,7 @@ export const ENGLISH = {
   "alarm-line-solenoid-late": "turnout {0} was powered for {1} ms: check whether its coil is hot",
   "alarm-line-power-lost": "track power went off without a command: look for a short circuit, then switch it on",
   "alarm-line-restarted": "the station restarted and lost all commands: trains stopped where they were when the power went off",
-  "alarm-line-says": "{0}",
+  "alarm-line-says": "{0}", "alarm-lengths-differ": "lengths that are not those of the layout: {0}; is it the right layout?",
   "alarm-deadlock": "deadlock; these trains move out of the way: {0}",
   "alarm-diverged": "stopped: it left its movement authority",
   "alarm-diverged-and-others": "stopped: it left its movement authority; also stopped, as they could meet it: {0}",

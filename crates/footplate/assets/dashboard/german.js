@@ -137,7 +137,7 @@ export const GERMAN = {
   "alarm-line-solenoid-late": "Weiche {0} hatte {1} ms lang Strom: prüfen, ob ihre Spule heiß ist",
   "alarm-line-power-lost": "Fahrstrom ohne Befehl ausgefallen: nach einem Kurzschluss suchen, dann einschalten",
   "alarm-line-restarted": "die Zentrale ist neu gestartet und hat alle Befehle verloren: Züge halten, wo sie beim Stromausfall waren",
-  "alarm-line-says": "{0}",
+  "alarm-line-says": "{0}", "alarm-lengths-differ": "Längen, die nicht die der Anlage sind: {0}; ist es die richtige Anlage?",
   "alarm-deadlock": "Verklemmung; diese Züge weichen aus: {0}",
   "alarm-diverged": "angehalten: er hat seine Fahrstraße verlassen",
   "alarm-diverged-and-others": "angehalten: er hat seine Fahrstraße verlassen; ebenfalls angehalten, da sie ihm begegnen könnten: {0}",

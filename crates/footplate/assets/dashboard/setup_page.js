@@ -2,8 +2,9 @@
 
 import { aboutCalibration } from "./calibration_page.js";
 import { doingNow } from "./doing_now.js";
-import { make, put, shown, signed } from "./dom.js";
+import { make, put, shown, signed, svg } from "./dom.js";
 import { ask, get, order } from "./server.js";
+import { Track } from "./track.js";
 import { inOwnLanguage, logged, say } from "./words.js";
 
 const STEPS = ["station", "layout", "trains", "link", "calibrate", "stop"];
@@ -21,6 +22,9 @@ const LINKS = {
 
 /** The last address of DCC decoders (NMRA S-9.2.1), before a station is chosen. */
 const LAST_ADDRESS = 10_239;
+
+/** Draws a layout as a whole. */
+const drawn = (drawing, layout) => drawing.setAttribute("viewBox", new Track(drawing, layout).whole.join(" "));
 
 /** The steps that are done. */
 function done({ mode, link, layout, trains = [], line }) {
@@ -132,7 +136,14 @@ export function setupPage(root, live, wanted) {
       });
       return [make("p", {}, make("a", { href: "#/editor", id: "draw" }, say("setup-draw"))),
         make("p", {}, make("label", {}, `${say("setup-layout-file")} `, file)), make("h3", {}, say("setup-built-in")),
-        make("div", { class: "does" }, ...setUp().layouts.map((name) => button(name, () => send({ layout: name }, "trains"), { "data-layout": name })))];
+        make("div", { class: "does" }, ...setUp().layouts.map((name) => {
+          const drawing = svg("svg", { "aria-hidden": "true" });
+          // Without its drawing, a layout can still be chosen by its name.
+          get(`/api/setup/layouts/${encodeURIComponent(name)}`).then((layout) => drawn(drawing, layout), () => drawing.remove());
+          const choice = button(name, () => send({ layout: name }, "trains"), { "data-layout": name, class: "preview" });
+          choice.prepend(drawing);
+          return choice;
+        }))];
     },
 
     trains() {
@@ -165,7 +176,7 @@ export function setupPage(root, live, wanted) {
       });
       return [make("p", {}, say("setup-link-about")),
         make("div", { class: "does" }, button(say("setup-check"), check, { id: "check-link" }),
-          setUp().line ? make("a", { href: "#/setup/calibrate", id: "link-next" }, say("setup-next")) : ""), report(setUp().line, true)];
+          setUp().line ? make("a", { href: "#/setup/calibrate", id: "link-next", class: "next" }, say("setup-next")) : ""), report(setUp().line, true)];
     },
 
     calibrate() {
@@ -180,7 +191,7 @@ export function setupPage(root, live, wanted) {
         report(train.calibration, false));
       return [make("p", {}, say("setup-calibrate-about")), setUp().link === "sim" ? make("p", { class: "quiet" }, say("setup-calibrate-fast")) : "",
         make("p", {}, make("label", { class: "check" }, clear, ` ${say("setup-clear")}`)), make("ul", { class: "plain cards" }, ...setUp().trains.map(one)),
-        make("p", {}, make("a", { href: "#/setup/stop", id: "calibrate-next" }, say("setup-next")))];
+        make("p", {}, make("a", { href: "#/setup/stop", id: "calibrate-next", class: "next" }, say("setup-next")))];
     },
 
     stop() {

@@ -47,7 +47,7 @@ use super::serve::{SetUpMode, SetUpRoute, open_dashboard};
 use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
 use crate::dashboard::{Answer, Board, Dashboard, LayoutPicture, ServedAt};
-use crate::layout_check::LayoutWatch;
+use crate::layout_check::{LayoutWatch, LengthWarning};
 use crate::link::{
     Address, Link, MeasuredLine, NamedTrain, ObservedLink, SharedTallies, Speed, open, open_session,
     open_simulated,
@@ -366,6 +366,7 @@ impl Arguments {
         let mut script_runner = Recorded::new(script_runner, scribe);
         let recorder = journal.as_mut().map(|journal| journal as &mut dyn Recorder);
         let mut watch = LayoutWatch::new(layout, trains, recorder);
+        console.watch_lengths(watch.warning());
         let mut runtime = Runtime::new(link, session, Some(&mut watch), Some(StopFlag::install()));
         let mut start_odometers = StartOdometers::default();
         let ending = loop {
@@ -407,7 +408,8 @@ impl Arguments {
         let at = runtime.link().now();
         let closing = runtime.close();
         drop(runtime);
-        if let Some(warning) = watch.lengths_doubted() {
+        let length_warning = watch.lengths_doubted();
+        if let Some(warning) = length_warning.as_ref().filter(|_| watch.warning().get().is_none()) {
             eprintln!("{}", warning.english);
         }
         // A session whose trains may still run has no end: the next one stops them first.
@@ -423,7 +425,7 @@ impl Arguments {
         }
         match ending {
             Ended::Finished if script_runner.fell_short() => Ok(Outcome::FallsShort),
-            Ended::Finished => Ok(Outcome::Done),
+            Ended::Finished => Ok(LengthWarning::outcome(length_warning.as_ref())),
             Ended::Interrupted => {
                 eprintln!("interrupted; {closing}");
                 Ok(Outcome::FallsShort)

@@ -223,6 +223,11 @@ impl Alarm {
         Self::new(Grade::Warning, "track-reserved", train, vec![listed(holders)])
     }
 
+    /// Lengths are not those of the layout; `differences` are the lengths, in no language.
+    pub(crate) fn lengths_differ(text: &str, differences: &str) -> Self {
+        Self::new(Grade::Warning, "lengths-differ", None, vec![differences.to_owned()]).said(text)
+    }
+
     /// Whether this alarm is about missed stop intervals.
     pub(crate) fn is_of_promises(&self) -> bool {
         self.what == MISSED_INTERVALS

@@ -50,3 +50,33 @@ fn a_log_that_is_too_short_to_refuse_is_marked_before_any_figure() {
     let html = std::fs::read_to_string(&page).unwrap();
     assert!(html.contains(&format!("<p class=\"warning\" role=\"alert\">{said}")));
 }
+
+#[test]
+fn a_train_that_is_driven_on_another_layout_says_so_while_it_runs() {
+    // Track B has the sensors and turnouts of track A, on which the simulated trains run; two lengths of this lap differ by 87 and 95 mm.
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("driven_elsewhere");
+    std::fs::create_dir_all(&folder).unwrap();
+    let script = folder.join("laps.txt");
+    std::fs::write(&script, "turnout all straight\nspeed 24 10\nwait 120s\nstop 24\n").unwrap();
+    for (layout, status) in [("track-a", 0), ("track-b", 1)] {
+        let script = script.to_str().unwrap();
+        let run = footplate(&[
+            "drive",
+            "--link",
+            "sim:track-a?seed=7",
+            "--layout",
+            layout,
+            "--train",
+            "24",
+            "--script",
+            script,
+        ]);
+        assert_eq!(run.status, status, "{layout}: {}{}", run.output, run.errors);
+        let lines: Vec<&str> = run.output.lines().chain(run.errors.lines()).collect();
+        let said = lines
+            .iter()
+            .filter(|line| line.contains("lengths that are not those of layout `track-b`"))
+            .count();
+        assert_eq!(said, usize::from(layout == "track-b"), "said once: {lines:#?}");
+    }
+}

@@ -56,6 +56,8 @@ test("from nothing to a calibrated train and its first stop", async () => {
   await page.selectOption("#sim-speed", "4");
   await page.click("#use-simulated");
   await isShown(page, "[data-layout='track-a']");
+  // Its 156 edges are 78 rails in two directions.
+  await page.waitForFunction(() => document.querySelectorAll("[data-layout='track-a'] .rail").length === 78, null, { timeout: PATIENCE });
   await page.screenshot({ path: join(AT, "setup-layout.png"), fullPage: true });
   await page.click("[data-layout='track-a']");
   await isShown(page, "#save-trains");

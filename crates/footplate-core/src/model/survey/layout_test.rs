@@ -33,8 +33,6 @@ const SCATTER: f64 = 0.013;
 pub struct LayoutTest {
     sequence: SequenceTest,
     turnouts: TurnoutStates,
-    /// Whether only one train runs: else nobody knows whose times these are.
-    is_sole: bool,
     last: Option<(NodeId, Timestamp)>,
     steady_from: Timestamp,
     /// Sections of the present stretch of running, with `ln(t/m)`.
@@ -55,7 +53,6 @@ impl LayoutTest {
         self.end_stretch();
         self.sequence.begin_run_at_rest(trains);
         self.turnouts = TurnoutStates::unknown();
-        self.is_sole = trains <= 1;
         (self.last, self.steady_from) = (None, Timestamp::from_ns(i64::MIN));
     }
 
@@ -78,6 +75,12 @@ impl LayoutTest {
     }
 
     fn pass(&mut self, layout: &Layout, sections: &SectionIndex, node: NodeId, time: Timestamp) {
+        if self.sequence.in_motion(time) > 1 {
+            // Nobody knows whose times these are.
+            self.running.clear();
+            self.last = None;
+            return;
+        }
         if time < self.steady_from || self.last.is_some_and(|(last, _)| last == node) {
             return;
         }
@@ -98,7 +101,7 @@ impl LayoutTest {
     /// Compares the sections of a stretch of running with each other.
     fn end_stretch(&mut self) {
         let running = core::mem::take(&mut self.running);
-        if running.len() < FEWEST_HOPS || !self.is_sole {
+        if running.len() < FEWEST_HOPS {
             return;
         }
         let Some(usual) = median(running.iter().map(|(_, slowness)| *slowness)) else { return };

@@ -21,6 +21,12 @@ const ODD: f64 = 4.0;
 /// it once in a hundred layouts.
 const DOUBTED: f64 = 1.8;
 
+/// As many lengths as one in so many may be wrong each by itself.
+const PARTS: usize = 4;
+
+/// Rounds after which it is settled which lengths agree: each adds or removes some of the few that are farthest off.
+const ROUNDS: usize = 4;
+
 /// Of a normal distribution, one standard deviation over the median of the sizes.
 pub(in crate::model) const PER_MEDIAN: f64 = 1.4826;
 
@@ -53,16 +59,30 @@ impl SurveyTest {
     pub fn of(sections: &SectionIndex, path_length: impl Iterator<Item = (usize, f64, f64)>) -> Self {
         let fits = Self { odd: Vec::new(), factor: 1.0, scale: 0.0 };
         let known: Vec<Compared> = compared(sections, path_length);
-        let Some(ratio) = median(known.iter().map(|one| one.path_length / one.surveyed)) else { return fits };
-        if known.len() < FEWEST || ratio <= 0.0 {
+        if known.len() < FEWEST {
             return fits;
         }
-        let off = |one: &Compared| one.path_length / ratio - one.surveyed;
-        let z = |one: &Compared| off(one).abs() / libm::sqrt(one.variance);
-        let factor = PER_MEDIAN * median(known.iter().map(z)).unwrap_or(0.0);
-        let factor = if factor > DOUBTED { factor } else { 1.0 };
+        let everything: Vec<&Compared> = known.iter().collect();
+        let Some(mut usual) = Usual::of(&everything) else { return fits };
+        // Wrong lengths make the right ones look off: the few that are farthest off count once the others agree with them.
+        let mut near = everything;
+        near.sort_by(|one, other| usual.z(one).total_cmp(&usual.z(other)));
+        near.truncate(known.len() - known.len() / PARTS);
+        for _ in 0..ROUNDS {
+            let Some(of_near) = Usual::of(&near) else { return fits };
+            usual = of_near;
+            let before = near.len();
+            near = known.iter().filter(|one| usual.z(one) <= ODD * usual.factor).collect();
+            if near.len() == before {
+                break;
+            }
+        }
+        let (off, z) = (|one: &Compared| usual.off(one), |one: &Compared| usual.z(one));
+        let ratio = usual.ratio;
+        let limit = ODD * usual.factor;
+        let factor = if usual.factor > DOUBTED { usual.factor } else { 1.0 };
         let part = PER_MEDIAN * median(known.iter().map(|one| off(one).abs() / one.surveyed)).unwrap_or(0.0);
-        let mut odd: Vec<&Compared> = known.iter().filter(|one| z(one) > ODD * factor).collect();
+        let mut odd: Vec<&Compared> = known.iter().filter(|one| z(one) > limit).collect();
         odd.sort_by(|one, other| z(other).total_cmp(&z(one)));
         let odd = odd.into_iter().map(|one| OddSection {
             section: one.section,
@@ -85,6 +105,34 @@ impl SurveyTest {
             let odd = self.odd.iter().find(|odd| odd.section == section);
             odd.map_or(0.0, |odd| (odd.path_length - odd.surveyed) * (odd.path_length - odd.surveyed))
         })
+    }
+}
+
+/// What most sections have in common.
+struct Usual {
+    /// Path length over surveyed length.
+    ratio: f64,
+    /// By how many of their standard deviations they are off, at least 1.
+    factor: f64,
+}
+
+impl Usual {
+    fn of(sections: &[&Compared]) -> Option<Self> {
+        let ratio =
+            median(sections.iter().map(|one| one.path_length / one.surveyed)).filter(|ratio| *ratio > 0.0)?;
+        let mut usual = Self { ratio, factor: 1.0 };
+        usual.factor = (PER_MEDIAN * median(sections.iter().map(|one| usual.z(one)))?).max(1.0);
+        Some(usual)
+    }
+
+    /// By how much a section is longer than surveyed (m).
+    fn off(&self, one: &Compared) -> f64 {
+        one.path_length / self.ratio - one.surveyed
+    }
+
+    /// The same in standard deviations, without its sign.
+    fn z(&self, one: &Compared) -> f64 {
+        self.off(one).abs() / libm::sqrt(one.variance)
     }
 }
 

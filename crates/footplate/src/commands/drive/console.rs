@@ -15,6 +15,7 @@ use super::script_runner::ScriptRunner;
 use super::session_message::{Ended, SessionMessage};
 use crate::clock::Stopwatch;
 use crate::dashboard::{Alarm, Answer, Board, Painter, PendingRequest, Request};
+use crate::layout_check::LiveWarning;
 use crate::recorded::{Input, Recorded};
 use crate::runtime::{Attendant, Wish};
 
@@ -62,6 +63,8 @@ pub(super) struct Console {
     live_view: Option<LiveView>,
     /// News of the link since the script runner was last called.
     news: Vec<LinkNews>,
+    /// The warning of lengths that are not those of the layout, until it was said.
+    lengths: Option<LiveWarning>,
     /// Messages that are scored against the simulated truth before time moves on.
     pub(super) for_scoring: Vec<SessionMessage>,
     /// Requests for the simulated truth.
@@ -174,6 +177,7 @@ impl Console {
             screen,
             live_view,
             news: Vec::new(),
+            lengths: None,
             for_scoring: Vec::new(),
             for_truth: Vec::new(),
             is_over: false,
@@ -187,6 +191,19 @@ impl Console {
     /// Stops printing: the terminal view shows the lines from now on.
     pub(super) const fn silence(&mut self) {
         self.screen.is_silent = true;
+    }
+
+    /// Says it when there is a warning of the layout's lengths, and raises an alarm.
+    pub(super) fn watch_lengths(&mut self, warning: LiveWarning) {
+        self.lengths = Some(warning);
+    }
+
+    fn warn_of_lengths(&mut self, now: Timestamp) {
+        let is_said = self.lengths.as_ref().is_some_and(|lengths| lengths.get().is_some());
+        let Some(lengths) = self.lengths.take_if(|_| is_said) else { return };
+        let Some(warning) = lengths.get() else { return };
+        self.screen.say(&warning.english, "");
+        self.alarm(now, &Alarm::lengths_differ(&warning.english, &warning.differences));
     }
 
     fn alarm(&mut self, now: Timestamp, alarm: &Alarm) {
@@ -247,6 +264,7 @@ impl Attendant<Recorded<ScriptRunner>> for Console {
     }
 
     fn attend(&mut self, now: Timestamp, script_runner: &mut Recorded<ScriptRunner>) -> Wish {
+        self.warn_of_lengths(now);
         for news in std::mem::take(&mut self.news) {
             script_runner.handle_word(now, &Input::Link(news));
         }

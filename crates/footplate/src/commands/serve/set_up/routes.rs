@@ -4,6 +4,7 @@
 //! GET  /api/setup             the mode of the program, and the set-up as far as it is complete
 //! POST /api/setup             {"link": ..}, {"layout": ..}, {"drawn": ..} or {"trains": ..}: a step
 //! GET  /api/setup/stations    stations that were found
+//! GET  /api/setup/layouts/x   a built-in layout, to draw it
 //! POST /api/setup/doctor      {}: check the link
 //! POST /api/setup/calibrate   {"train": 24, "turnouts_are_clear": true}
 //! POST /api/setup/drive       {}: the set-up is complete
@@ -11,19 +12,19 @@
 //! ```
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use anyhow::{Context, bail};
 use axum::Json;
 use axum::extract::rejection::JsonRejection;
-use axum::extract::{DefaultBodyLimit, State};
+use axum::extract::{DefaultBodyLimit, Path, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use footplate_core::Timestamp;
-use footplate_store::{BUILT_IN, write_whole};
+use footplate_store::{BUILT_IN, built_in, write_whole};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -32,7 +33,7 @@ use super::super::drawn_layout::{DrawnLayout, LARGEST_LAYOUT, drawn_layout_route
 use super::set_up_file::{SetUp, SetUpTrain};
 use super::{Next, check_link};
 use crate::clock::now;
-use crate::dashboard::Routes;
+use crate::dashboard::{LayoutPicture, Routes};
 use crate::error_text::error_text;
 use crate::link::find_stations;
 
@@ -137,7 +138,7 @@ struct Kept {
 }
 
 impl Kept {
-    fn of(set_up: SetUp, store: &Path) -> Self {
+    fn of(set_up: SetUp, store: &std::path::Path) -> Self {
         let (calibrated, problem) = match set_up.calibrated(store) {
             Ok(calibrated) => (calibrated, None),
             Err(error) => (BTreeSet::new(), Some(error_text(&error))),
@@ -193,6 +194,7 @@ impl Pages {
             [
                 ("/api/setup", get(state).merge(change)),
                 ("/api/setup/stations", get(stations)),
+                ("/api/setup/layouts/{name}", get(layout_to_draw)),
                 ("/api/setup/doctor", post(doctor)),
                 ("/api/setup/calibrate", post(calibrate)),
                 ("/api/setup/drive", post(drive)),
@@ -344,6 +346,14 @@ async fn change(State(pages): State<Pages>, body: Result<Json<Step>, JsonRejecti
 async fn stations() -> Response {
     let found = tokio::task::spawn_blocking(find_stations).await;
     answer(found.map_err(anyhow::Error::from).map(|found| json!(found)))
+}
+
+async fn layout_to_draw(Path(name): Path<String>) -> Response {
+    answer(
+        built_in(&name)
+            .map_err(Into::into)
+            .and_then(|file| Ok(serde_json::to_value(LayoutPicture::of(&file))?)),
+    )
 }
 
 async fn doctor(State(pages): State<Pages>) -> Response {
