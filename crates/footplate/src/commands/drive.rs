@@ -3,6 +3,7 @@
 mod beginning;
 mod console;
 mod formatter;
+mod fuzzed_session;
 mod instruction;
 mod learning;
 mod parse;
@@ -30,6 +31,7 @@ use footplate_wire::Session as _;
 pub(crate) use self::beginning::DriveBeginning;
 use self::console::{Console, ended, lines_of_stdin};
 pub(super) use self::formatter::NoticeFormatter;
+pub(crate) use self::fuzzed_session::FuzzedSession;
 use self::instruction::HELP;
 use self::reader::Known;
 use self::script::read_script;

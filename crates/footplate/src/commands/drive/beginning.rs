@@ -67,6 +67,11 @@ impl DriveBeginning {
         }
     }
 
+    /// The same with an operator, whose new order replaces the one before.
+    pub(crate) fn of_a_person(self) -> Self {
+        Self { source: CommandSource::Person, ..self }
+    }
+
     pub(crate) fn layout(&self) -> &str {
         &self.layout
     }
