@@ -22,6 +22,7 @@ const MIGRATIONS: &[&str] = &[
     include_str!("migrations/6_profiles.sql"),
     include_str!("migrations/7_schedules.sql"),
     include_str!("migrations/8_archives.sql"),
+    include_str!("migrations/9_directions.sql"),
 ];
 
 /// The longest wait for another process to finish writing (chosen: an import of a million events takes less).

@@ -43,7 +43,7 @@ use self::terminal::Terminal;
 use self::trains::{KnownTrains, Sources};
 use self::truth::{GroundTruth, StartOdometers};
 use super::Outcome;
-use super::left_running::stop_left_running;
+use super::left_running::{recall_directions, stop_left_running};
 use super::predict::turnout_state;
 use super::serve::{SetUpMode, SetUpRoute, open_dashboard};
 use super::written_layout::WrittenLayout;
@@ -334,6 +334,9 @@ impl Arguments {
         let link = ObservedLink::new(link, line.clone());
         let mut session = open_session(address, &link, layout)?;
         session.expect_delays(address.excess(self.railway.line()?.as_ref()));
+        if let (Some(store), None) = (&self.railway.store, address.simulated()) {
+            recall_directions(&mut session, &Store::open_to_read(store)?)?;
+        }
         for model in &beginning.models {
             session.set_decoder(model.train(), DecoderSteps::with(model.highest()))?;
         }
