@@ -84,6 +84,13 @@ impl Store {
         MIGRATIONS
     }
 
+    /// The size of its tables and indices with what the write-ahead log holds of them, in bytes.
+    pub fn size(&self) -> Result<u64, StoreError> {
+        let read = |name| self.connection.pragma_query_value(None, name, |row| row.get::<_, u64>(0));
+        let size = || Ok(read("page_count")? * read("page_size")?);
+        size().map_err(|error| self.error(error))
+    }
+
     /// Checks every page, every reference and the checksum of every row. Takes as long as reading the file.
     pub fn check(&self) -> Result<(), StoreError> {
         let check = || {
