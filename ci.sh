@@ -12,7 +12,7 @@
 #   scenarios    the tables in docs/tables are what the program and its examples print
 #   browser      set-up, pages and reports in a browser: driven, drawn, dark and light, on a phone, in German, by keyboard, axe
 #   stations     programs of others drive trains behind our virtual stations
-#   fuzz         random bytes against every decoder, session and reader, a minute in all; ./ci.sh fuzz --seconds 3600 an hour each
+#   fuzz         random bytes against every decoder, session, reader, order and HTTP body, a minute in all; ./ci.sh fuzz --seconds 3600 an hour each
 #
 # And three that are never part of "every step". `fresh` drives every scorer on seeds that nobody chose, drawn from the hash of
 # the commit, prints how often happened what must not, with 95 % intervals, and fails on grief: trains that touched,
@@ -246,7 +246,6 @@ step_chaos() {
   "$TARGET/debug/footplate" simulate chaos --seeds "$CHAOS_SEEDS"
 }
 
-# Orders are read inside the program: a property test beside their parser draws them. An HTTP body holds such a line as JSON.
 step_fuzz() {
   need_nextest
   cargo build --quiet --workspace --bins --profile test
@@ -336,7 +335,7 @@ print_summary() {
 
 steps=()
 CHAOS_SEEDS=1..64
-FUZZ_SECONDS=4 # for each of 15 targets
+FUZZ_SECONDS=4 # for each of 19 targets
 while [[ $# -gt 0 ]]; do
   case $1 in
     --seeds) CHAOS_SEEDS=${2:?"--seeds needs a range, such as 1..1000"} && shift 2 ;;

@@ -51,6 +51,40 @@ struct Target {
     words: &'static [&'static [u8]],
 }
 
+const ORDERS: &[&[u8]] = &[
+    b"stop 24 at C13+120mm at step 8",
+    b"go 24 to D5 facing",
+    b"go 3850 to C13",
+    b"follow 3850 behind 24 by 1.5s",
+    b"arrive 24 at D5 in 12s",
+    b"hold 24 250mm/s",
+    b"wait 24 at rest",
+    b"turnout all straight",
+    b"not-beyond 0.1%",
+    b"schedule run Evening",
+    b"-1",
+    b"1e309",
+    b"NaN",
+    b"999999999999999999999",
+    b" ",
+    b"\n",
+    b"#",
+    b"\xf0",
+];
+const JSON: &[&[u8]] = &[
+    br#"{"line":"go 24 to D5"}"#,
+    br#""rounds":4294967296"#,
+    br#""lines":["wait 1s"]"#,
+    br#""name":"""#,
+    b"null",
+    b"-1",
+    b"1e999",
+    b"[[[[",
+    b"\\u0000",
+    b"\"",
+    b",",
+    b"\xf0",
+];
 const BYTES: &[&[u8]] = &[b"\0", b"\xff", b"\x7f", b"\x80"];
 const TEXT: &[&[u8]] =
     &[b"-1", b"1e309", b"NaN", b"999999999999999999999", b"\n", b",", b"=", b"[[", b"\"", b"\xf0"];
@@ -118,13 +152,16 @@ const TARGETS: &[Target] = &[
     target("trains_and_lines", trains_and_lines::fuzz, &["testdata/trains", "testdata/lines"], TEXT),
     target("vehicle_file", vehicle_file::fuzz, &[], VEHICLE),
     target("tachometer_recording", tachometer_recording::fuzz, TACHOMETER, TEXT),
+    target("orders", footplate::fuzzed::orders, &["testdata/orders"], ORDERS),
+    target("http_body", footplate::fuzzed::http_body, &["testdata/http-bodies"], JSON),
     target("odometer", odometer::fuzz, TACHOMETER, TEXT),
 ];
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match asked(&arguments) {
-        Some(Asked::All { seconds, seed }) => fuzz_all(seconds, seed),
+        Some(Asked::All { seconds, seed }) => fuzz_all(TARGETS, seconds, seed),
+        Some(Asked::Only { target, seconds }) => fuzz_all(core::slice::from_ref(target), seconds, 1),
         Some(Asked::One { target, input }) => {
             let bytes = std::fs::read(&input).expect("the input can be read");
             (target.fuzz)(&bytes);
@@ -134,7 +171,7 @@ fn main() -> ExitCode {
         None => {
             let names: Vec<&str> = TARGETS.iter().map(|target| target.name).collect();
             eprintln!(
-                "usage: footplate-fuzz SECONDS [SEED], or footplate-fuzz TARGET FILE; targets: {}",
+                "usage: footplate-fuzz SECONDS [SEED], footplate-fuzz TARGET SECONDS, or footplate-fuzz TARGET FILE; targets: {}",
                 names.join(", ")
             );
             ExitCode::from(2)
@@ -145,6 +182,8 @@ fn main() -> ExitCode {
 enum Asked {
     /// Each target for so long.
     All { seconds: f64, seed: u64 },
+    /// One target for so long.
+    Only { target: &'static Target, seconds: f64 },
     /// One input again.
     One { target: &'static Target, input: PathBuf },
 }
@@ -153,7 +192,10 @@ fn asked(arguments: &[String]) -> Option<Asked> {
     match arguments {
         [name, input] if TARGETS.iter().any(|target| target.name == name) => {
             let target = TARGETS.iter().find(|target| target.name == name)?;
-            Some(Asked::One { target, input: input.into() })
+            Some(match input.parse() {
+                Ok(seconds) => Asked::Only { target, seconds },
+                Err(_) => Asked::One { target, input: input.into() },
+            })
         }
         [seconds] => Some(Asked::All { seconds: seconds.parse().ok()?, seed: 1 }),
         [seconds, seed] => Some(Asked::All { seconds: seconds.parse().ok()?, seed: seed.parse().ok()? }),
@@ -161,9 +203,9 @@ fn asked(arguments: &[String]) -> Option<Asked> {
     }
 }
 
-fn fuzz_all(seconds: f64, seed: u64) -> ExitCode {
+fn fuzz_all(targets: &[Target], seconds: f64, seed: u64) -> ExitCode {
     let mut found = 0;
-    for target in TARGETS {
+    for target in targets {
         let begins = inputs(target.begins);
         let mut choice = Choice::new(seed);
         let (began, mut count) = (now(), 0_u64);

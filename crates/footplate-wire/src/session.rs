@@ -32,14 +32,15 @@ pub trait Session {
     /// Sets how many steps a train's decoder has; 14 unless set. Steps of later commands count in these.
     ///
     /// # Errors
-    ///
     /// When the station has no such address, or cannot command decoders with so many steps.
     fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError>;
+
+    /// Sets whether an earlier session commanded a train forward last, for a station that may have forgotten it; no effect on others.
+    fn set_direction(&mut self, _train: TrainId, _forward: bool) {}
 
     /// Sends a command as soon as the line is free.
     ///
     /// # Errors
-    ///
     /// When the station has no such command, too many commands wait, or the session is closing. Nothing is sent then.
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError>;
 
@@ -88,6 +89,8 @@ pub enum Transmit {
     Notice(LinkNotice),
     /// What the station has reported of a train's functions, when that changes. A link without such reports has no such output.
     Functions(TrainId, ReportedFunctions),
+    /// Whether a train is commanded forward from now on, for [`set_direction`](Session::set_direction) of a later session.
+    Direction(TrainId, bool),
 }
 
 /// What a person should know about the line.

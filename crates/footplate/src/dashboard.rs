@@ -42,5 +42,5 @@ pub(crate) use painter::{Painter, TrainPassed};
 pub(crate) use picture::{LayoutPicture, SchedulePicture, SessionState, TrainTask};
 pub(crate) use read_only::{CalibrationFollower, ReadOnlyDashboard};
 pub(crate) use routes::Routes;
-pub(crate) use server::{Dashboard, ServedAt, ServedPages, answered};
+pub(crate) use server::{Dashboard, ServedAt, ServedPages, answered, answering, driving_routes};
 pub(crate) use token::Token;

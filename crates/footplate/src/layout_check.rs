@@ -7,7 +7,7 @@ use anyhow::bail;
 use footplate_core::model::survey::{LayoutTest, SectionIndex, SurveyTest};
 use footplate_core::track::{HopId, Layout, SequenceVerdict, StrayReport};
 use footplate_core::{Event, EventKind, Length, SensorId};
-use footplate_store::{BUILT_IN, Run, built_in};
+use footplate_store::{BUILT_IN, Direction, Run, built_in};
 
 use crate::commands::Outcome;
 use crate::runtime::Recorder;
@@ -188,6 +188,12 @@ impl Recorder for LayoutWatch<'_> {
         match order_contradicts(self.layout, &self.test.sequence()) {
             Some(contradiction) => bail!(contradiction),
             None => Ok(()),
+        }
+    }
+
+    fn record_direction(&mut self, direction: Direction) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.record_direction(direction);
         }
     }
 }

@@ -15,7 +15,7 @@ use std::thread::{self, JoinHandle};
 
 use anyhow::bail;
 use footplate_core::{Event, Timestamp};
-use footplate_store::{Journal, JournalEntry, TrainAtStart};
+use footplate_store::{Direction, Journal, JournalEntry, TrainAtStart};
 
 pub(crate) use self::scribe::Scribe;
 use self::writer::Writer;
@@ -272,6 +272,12 @@ impl Recorder for SessionJournal {
             (Some(_), IfUnkept::GoOn) => {}
         }
         Ok(())
+    }
+
+    fn record_direction(&mut self, direction: Direction) {
+        if !self.offer(Entry::Of(JournalEntry::Direction(direction))) {
+            self.shared.lost.fetch_add(1, Ordering::Relaxed);
+        }
     }
 }
 

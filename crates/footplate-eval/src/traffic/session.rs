@@ -30,6 +30,8 @@ const FAR: Length = Length::from_mm(1_000.0);
 const HELP_AFTER: TimeSpan = TimeSpan::from_s(20.0);
 /// The distance of trains past a sensor at the start.
 const PAST: Length = Length::from_mm(150.0);
+/// The trains, in the order in which they are put down.
+const TRAINS: [TrainId; 6] = [TrainId(24), TrainId(58), TrainId(1), TrainId(43), TrainId(54), TrainId(35)];
 /// Places tried for a train at the start.
 const TRIES: usize = 1_000;
 
@@ -120,36 +122,8 @@ impl<'l> Session<'l> {
     /// # Errors
     /// When there is no room for the trains.
     pub fn new(layout: &'l Layout, seed: u64, asked: Asked, talk: bool) -> anyhow::Result<Self> {
-        let trains: Vec<TrainId> =
-            [24, 58, 1, 43, 54, 35].into_iter().map(TrainId).take(asked.trains).collect();
-        let switches = LivingSwitches::well_kept();
-        let mut prepared = PreparedTrains::prepare(layout, seed, &trains, &switches, asked.budget)?;
-        let mut choice = Choice::new(seed);
-        let sensors: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
-        for nth in 0..trains.len() {
-            let mut is_put = false;
-            for _ in 0..TRIES {
-                let Some(node) = choice.of(&sensors) else { break };
-                if prepared.put(trains[nth], *node, PAST).is_err() {
-                    continue;
-                }
-                let dispatcher = dispatcher(&prepared, asked.by_blocks);
-                let holds = |train: &TrainId| dispatcher.reservation(*train);
-                let is_apart = trains[..nth].iter().all(|other| {
-                    holds(other).zip(holds(&trains[nth])).is_some_and(|(one, two)| !one.meets(two))
-                });
-                let is_off_turnouts =
-                    holds(&trains[nth]).is_some_and(|held| held.turnouts().next().is_none());
-                // Hardly a block has none.
-                if is_apart && (is_off_turnouts || asked.by_blocks) {
-                    is_put = true;
-                    break;
-                }
-            }
-            if !is_put {
-                bail!("there is no room for {} trains on this layout; ask for fewer", asked.trains);
-            }
-        }
+        let (prepared, choice) = set_out(layout, seed, asked)?;
+        let trains = TRAINS[..asked.trains.min(TRAINS.len())].to_vec();
         let dispatcher = dispatcher(&prepared, asked.by_blocks);
         let began = prepared.line.now();
         let tally =
@@ -357,6 +331,43 @@ impl<'l> Session<'l> {
         self.tally.hands += 1;
         self.dispatcher.place(now, train, at, HAND);
     }
+}
+
+/// Draws trains and rails from the seed, calibrates the trains, and puts them on reservations that do not overlap. The stream of
+/// random numbers goes on from there.
+///
+/// # Errors
+/// When there is no room for the trains.
+pub fn set_out(layout: &Layout, seed: u64, asked: Asked) -> anyhow::Result<(PreparedTrains<'_>, Choice)> {
+    let trains = &TRAINS[..asked.trains.min(TRAINS.len())];
+    let switches = LivingSwitches::well_kept();
+    let mut prepared = PreparedTrains::prepare(layout, seed, trains, &switches, asked.budget)?;
+    let mut choice = Choice::new(seed);
+    let sensors: Vec<NodeId> = layout.sensors().map(|(_, node)| node).collect();
+    for nth in 0..trains.len() {
+        let mut is_put = false;
+        for _ in 0..TRIES {
+            let Some(node) = choice.of(&sensors) else { break };
+            if prepared.put(trains[nth], *node, PAST).is_err() {
+                continue;
+            }
+            let dispatcher = dispatcher(&prepared, asked.by_blocks);
+            let holds = |train: &TrainId| dispatcher.reservation(*train);
+            let is_apart = trains[..nth]
+                .iter()
+                .all(|other| holds(other).zip(holds(&trains[nth])).is_some_and(|(one, two)| !one.meets(two)));
+            let is_off_turnouts = holds(&trains[nth]).is_some_and(|held| held.turnouts().next().is_none());
+            // Hardly a block has none.
+            if is_apart && (is_off_turnouts || asked.by_blocks) {
+                is_put = true;
+                break;
+            }
+        }
+        if !is_put {
+            bail!("there is no room for {} trains on this layout; ask for fewer", asked.trains);
+        }
+    }
+    Ok((prepared, choice))
 }
 
 /// Whether all track under a train is truly reserved for it.

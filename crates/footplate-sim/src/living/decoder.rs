@@ -30,8 +30,7 @@ impl LivingLayout<'_> {
                 let own = self.decoder(train).highest().get();
                 self.command(train, nearest(step, highest, own), at);
             }
-            // What is turned around twice while it runs stops at once and leads with the same end.
-            DecoderSpeed::EmergencyStop => (0..2).for_each(|_| self.reverse(train, at)),
+            DecoderSpeed::EmergencyStop => self.halt(train, at),
         }
     }
 }

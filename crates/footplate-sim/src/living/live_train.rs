@@ -51,6 +51,8 @@ impl End {
 pub(crate) enum Order {
     Step(SpeedStep),
     Turn,
+    /// Stop at once, in the same direction.
+    Halt,
 }
 
 /// One train.
@@ -311,6 +313,11 @@ impl LiveTrain {
                 if self.halting.is_none() {
                     self.motor.command(step, &mut self.draws);
                 }
+                false
+            }
+            Order::Halt => {
+                self.heard = SpeedStep::STAND;
+                self.halt(TURNED_MM_PER_S2);
                 false
             }
             Order::Turn => {

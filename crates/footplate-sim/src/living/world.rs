@@ -158,6 +158,14 @@ impl<'l> LivingLayout<'l> {
         }
     }
 
+    /// The station commands a train to stop at once.
+    pub(crate) fn halt(&mut self, train: TrainId, sent: Timestamp) {
+        if let Some(place) = self.trains.iter().position(|found| found.id == train) {
+            self.commanded[place] = SpeedStep::STAND;
+            self.send(place, Order::Halt, sent);
+        }
+    }
+
     /// Whether the front end of a train will lead once it has received all commands that were sent.
     pub(crate) fn runs_forward(&self, train: TrainId) -> Option<bool> {
         self.trains.iter().find(|found| found.id == train).map(LiveTrain::runs_forward)

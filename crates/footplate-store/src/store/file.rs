@@ -22,6 +22,7 @@ const MIGRATIONS: &[&str] = &[
     include_str!("migrations/6_profiles.sql"),
     include_str!("migrations/7_schedules.sql"),
     include_str!("migrations/8_archives.sql"),
+    include_str!("migrations/9_directions.sql"),
 ];
 
 /// The longest wait for another process to finish writing (chosen: an import of a million events takes less).
@@ -81,6 +82,13 @@ impl Store {
     /// The migrations that make the tables of a store.
     pub(super) const fn migrations() -> &'static [&'static str] {
         MIGRATIONS
+    }
+
+    /// The size of its tables and indices with what the write-ahead log holds of them, in bytes.
+    pub fn size(&self) -> Result<u64, StoreError> {
+        let read = |name| self.connection.pragma_query_value(None, name, |row| row.get::<_, u64>(0));
+        let size = || Ok(read("page_count")? * read("page_size")?);
+        size().map_err(|error| self.error(error))
     }
 
     /// Checks every page, every reference and the checksum of every row. Takes as long as reading the file.

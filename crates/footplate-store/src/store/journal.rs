@@ -9,6 +9,7 @@ use footplate_core::{Event, RunId, Timestamp};
 
 use super::archives;
 use super::decisions::{self, MachineKey, NewMachine, Traced};
+use super::directions::{self, Direction};
 use super::error::StoreError;
 use super::file::Store;
 use super::recordings::{RecordingKey, RunKey};
@@ -22,6 +23,8 @@ pub enum JournalEntry {
     Event(Event),
     /// An input or a decision of the machine that began last.
     Traced(Traced),
+    /// The direction that a train was commanded in.
+    Direction(Direction),
 }
 
 impl JournalEntry {
@@ -30,7 +33,7 @@ impl JournalEntry {
     pub const fn event(&self) -> Option<&Event> {
         match self {
             Self::Event(event) => Some(event),
-            Self::Traced(_) => None,
+            Self::Traced(_) | Self::Direction(_) => None,
         }
     }
 }
@@ -136,13 +139,15 @@ impl Journal {
         let (run, machine) = (self.run, self.machine.unwrap_or(NO_MACHINE));
         let transaction = self.store.write()?;
         let events = entries.iter().filter_map(JournalEntry::event).count() as u64;
-        let loose = self.loose + (entries.len() as u64 - events);
+        let is_traced = |entry: &&JournalEntry| matches!(entry, JournalEntry::Traced(_));
+        let loose = self.loose + entries.iter().filter(is_traced).count() as u64;
         let is_much = loose >= archives::MOST_LOOSE;
         let append = || {
             let mut statement = transaction.prepare_cached(row::INSERT)?;
             entries.iter().try_for_each(|entry| match entry {
                 JournalEntry::Event(event) => row::insert(&mut statement, run, None, now, *event),
                 JournalEntry::Traced(traced) => decisions::insert(&transaction, machine, traced),
+                JournalEntry::Direction(direction) => directions::insert(&transaction, *direction, now),
             })?;
             if is_much { archives::archive(&transaction) } else { Ok(()) }
         };

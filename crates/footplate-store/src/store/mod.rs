@@ -15,6 +15,7 @@
 //! calibrations  models of trains by date
 //! profiles      speeds from other programs, the prior of a train
 //! schedules     scripts that owners saved
+//! directions    the direction that each decoder was commanded in last
 //! replays       the state of a replay of all sessions, from which the next one continues
 //! checksum      checksums of rows, which detect changed values
 //! unfinished    the session that was running when the program died
@@ -25,6 +26,7 @@ mod archives;
 mod calibrations;
 mod checksum;
 mod decisions;
+mod directions;
 mod error;
 mod file;
 mod history;
@@ -40,6 +42,7 @@ mod unfinished;
 
 pub use calibrations::{Calibration, NewCalibration};
 pub use decisions::{MachineKey, NewMachine, Side, StoredMachine, Traced};
+pub use directions::Direction;
 pub use error::StoreError;
 pub use file::Store;
 pub use history::{Change, StoredEvent, StoredRecording, StoredRun};

@@ -55,7 +55,7 @@ pub struct SalvagedTable {
 }
 
 /// The tables with their parents, parents first. States of replays are not copied: they follow from the rest.
-const TABLES: [(&str, Option<Parent>); 13] = [
+const TABLES: [(&str, Option<Parent>); 14] = [
     ("recordings", None),
     ("runs", Some(Parent { column: "recording", table: "recordings", stand_in: STAND_IN_RECORDING })),
     ("starts", Some(Parent { column: "run", table: "runs", stand_in: STAND_IN_RUN })),
@@ -66,6 +66,7 @@ const TABLES: [(&str, Option<Parent>); 13] = [
     ("calibrations", None),
     ("profiles", None),
     ("schedules", None),
+    ("directions", None),
     ("machines", Some(Parent { column: "recording", table: "recordings", stand_in: STAND_IN_RECORDING })),
     // Without the initial state no decision can be replayed.
     ("inputs", None),

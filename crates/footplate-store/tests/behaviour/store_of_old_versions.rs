@@ -10,7 +10,7 @@ use crate::recordings::{ALL, real};
 use crate::stores::{Shelf, minute};
 
 /// The committed stores, one of every version. A new version adds its own and leaves these alone.
-const OLD: [&str; 7] = [
+const OLD: [&str; 8] = [
     "store-1.sqlite",
     "store-2.sqlite",
     "store-3.sqlite",
@@ -18,6 +18,7 @@ const OLD: [&str; 7] = [
     "store-5.sqlite",
     "store-6.sqlite",
     "store-7.sqlite",
+    "store-8.sqlite",
 ];
 
 fn copy_of(file: &str) -> Shelf {
@@ -34,15 +35,16 @@ fn every_old_store_opens_with_all_it_had() {
         let store = shelf.store();
         store.check().unwrap();
         // Decisions are kept from version 3 on.
-        assert_eq!(store.machines().unwrap().len(), [0, 0, 1, 2, 3, 0, 0][number], "{file}");
+        assert_eq!(store.machines().unwrap().len(), [0, 0, 1, 2, 3, 0, 0, 3][number], "{file}");
         let late = minute(1_000_000);
         let recordings = store.recordings(late).unwrap();
         let counts: Vec<_> =
             recordings.iter().map(|recording| (recording.events, recording.excluded)).collect();
         assert_eq!(counts[..2], [(91, 1), (580, 0)], "{file}");
-        // Live sessions: none, one, and those whose decisions are kept; the last two files come from the first.
-        let live = [0, 1, 2, 3, 4, 0, 0][number];
-        assert_eq!(counts.get(2), (live > 0).then_some(&(200, 0)), "{file}");
+        // Live sessions: none, one, and those whose decisions are kept; the last three files come from the first.
+        let live = [0, 1, 2, 3, 4, 0, 0, 3][number];
+        let events = [0, 200, 200, 200, 200, 0, 0, 22][number];
+        assert_eq!(counts.get(2), (live > 0).then_some(&(events, 0)), "{file}");
         assert_eq!(counts.len(), live + 2, "{file}");
         let light_gates = store.runs(recordings[1].key, late).unwrap();
         assert_eq!(light_gates.iter().map(StoredRun::accepted).collect::<Vec<Run>>(), real(ALL[8]).runs);
@@ -97,4 +99,16 @@ fn a_profile_of_version_6_and_a_schedule_of_version_7_are_still_read() {
         };
         assert_eq!(schedules, if file == "store-7.sqlite" { vec![expected] } else { vec![] }, "{file}");
     }
+}
+
+#[test]
+fn an_archive_of_version_8_is_still_read_and_its_trains_have_no_direction() {
+    let shelf = copy_of("store-8.sqlite");
+    let store = shelf.store();
+    let machines = store.machines().unwrap();
+    let trace = store.trace(machines[0].key).unwrap();
+    assert!(trace.iter().zip(0..).all(|(row, number)| row.number == number));
+    assert_eq!(trace.last().map(|row| row.kind.as_ref()), Some("end"));
+    assert!(trace.iter().any(|row| row.kind == "command" && row.text == "step 9 for train 24"));
+    assert!(store.directions().unwrap().is_empty());
 }

@@ -51,7 +51,7 @@ pub struct Client {
     sensors: Sensors,
     /// Locomotives whose state must be read again.
     unverified: Vec<TrainId>,
-    /// Whether each locomotive ran forward when its direction was last reported.
+    /// Whether each locomotive ran forward when its direction was last reported, or when an earlier session commanded it.
     directions: BTreeMap<TrainId, bool>,
     /// Since when the station was silent, until its states have been read again.
     blind_since: Option<Timestamp>,
@@ -180,7 +180,11 @@ impl Client {
     }
 
     fn drive(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> (Request, Option<Awaited>) {
+        let is_first = self.dialogue.locomotives.get(train).is_none_or(|known| !known.is_driven);
         let forward = self.dialogue.commanded(train, step, reverses);
+        if is_first || reverses {
+            self.dialogue.output.push_back(Transmit::Direction(train, forward));
+        }
         let throttle = self.throttle(train, step);
         (Request::Drive { cab: train.0, throttle, forward }, Some(Awaited::Driven(train, throttle, forward)))
     }
@@ -237,6 +241,10 @@ impl Session for Client {
 
     fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
         self.dialogue.set_decoder(train, &CABS, steps)
+    }
+
+    fn set_direction(&mut self, train: TrainId, forward: bool) {
+        self.directions.insert(train, forward);
     }
 
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {

@@ -29,7 +29,7 @@ impl Station for Board {
 type Desk = crate::desk::Desk<Client, Board>;
 
 /// As the firmware answers when one locomotive is known to run backwards.
-const ANSWERS: [(&str, &str); 14] = [
+const ANSWERS: [(&str, &str); 15] = [
     ("<s>", "<iDCC-EX V-5.6.0 / MEGA / STANDARD_MOTOR_SHIELD G-x>\n<p0 A>\n<p0 B>\n<p0>\n"),
     ("<Q>", "<q 0>\n<Q 3>\n<q 5>\n"),
     ("<T>", "<H 7 0>\n<H 9 1>\n"),
@@ -43,6 +43,7 @@ const ANSWERS: [(&str, &str); 14] = [
     ("<t 24 0 1>", "<l 24 0 128 0>\n"),
     ("<t 24 72 1>", "<l 24 0 201 0>\n"),
     ("<t 58 81 1>", "<l 58 1 210 0>\n"),
+    ("<t 58 81 0>", "<l 58 1 82 0>\n"),
     ("<t 58 0 1>", "<l 58 1 128 0>\n"),
 ];
 
@@ -467,4 +468,24 @@ fn a_function_whose_answer_was_lost_is_asked_for() {
     desk.run_for(1_000);
     assert_eq!(desk.texts().into_iter().filter(|text| text.starts_with("<F 24 28 1>")).count(), 1);
     assert!(!desk.notices.iter().any(|notice| matches!(notice, LinkNotice::Unconfirmed { .. })));
+}
+
+#[test]
+fn a_locomotive_that_the_board_forgot_goes_on_in_the_direction_of_the_session_before() {
+    let mut desk = Desk::opened();
+    for (train, forward) in [(T58, false), (T24, true)] {
+        desk.client.set_direction(train, forward);
+        desk.command(speed(train, if forward { 8 } else { 9 }));
+        desk.run_for(300);
+    }
+    // The board knows train 24 (its register is not -1): another throttle may have reversed it since, and it says so twice.
+    assert_eq!(desk.texts(), ["<t 58>", "<t 58 81 0>", "<t 24>", "<t 24>", "<t 24 72 0>"]);
+    for command in [speed(T24, 0), Command::Reverse { train: T24 }, speed(T24, 8)] {
+        desk.command(command);
+        desk.run_for(300);
+    }
+    desk.hear("<l 24 0 73 0>\n");
+    desk.run_for(1);
+    // The next session has to know of every reversal: the last one is another throttle's.
+    assert_eq!(desk.directions, [(T58, false), (T24, false), (T24, true), (T24, false)]);
 }

@@ -46,13 +46,15 @@ pub(crate) struct Desk<C, S: Station> {
     pub(crate) notices: Vec<LinkNotice>,
     /// What the station has reported of each train's functions.
     pub(crate) functions: BTreeMap<TrainId, ReportedFunctions>,
+    /// The directions that a later session has to know.
+    pub(crate) directions: Vec<(TrainId, bool)>,
 }
 
 impl<C: Session, S: Station> Desk<C, S> {
     pub(crate) fn with(client: C, station: S) -> Self {
         let (coming, written, events, notices) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let functions = BTreeMap::new();
-        Self { client, now: ms(0), station, coming, written, events, notices, functions }
+        let (functions, directions) = (BTreeMap::new(), Vec::new());
+        Self { client, now: ms(0), station, coming, written, events, notices, functions, directions }
     }
 
     pub(crate) fn run_until(&mut self, end: Timestamp) {
@@ -71,6 +73,7 @@ impl<C: Session, S: Station> Desk<C, S> {
                     Transmit::Functions(train, reported) => {
                         self.functions.insert(train, reported);
                     }
+                    Transmit::Direction(train, forward) => self.directions.push((train, forward)),
                     Transmit::Byte(byte) => unreachable!("a lone byte {byte}"),
                 }
             }

@@ -219,7 +219,9 @@ impl Bench {
     fn take(&mut self) {
         while let Some(output) = self.session.poll_output() {
             match output {
-                Transmit::Message(_) | Transmit::Functions(..) => unreachable!("a 6051: {output:?}"),
+                Transmit::Message(_) | Transmit::Functions(..) | Transmit::Direction(..) => {
+                    unreachable!("a 6051: {output:?}")
+                }
                 Transmit::Byte(byte) => {
                     self.written.push((self.now, byte));
                     self.station.write(self.now, byte);

@@ -12,7 +12,7 @@ use std::rc::Rc;
 use anyhow::{Context, bail, ensure};
 use footplate_core::{Event, EventKind, TimeSpan, Timestamp, TrainId};
 use footplate_eval::seeds::Choice;
-use footplate_store::{Journal, JournalEntry, NewMachine, Side, Store, Traced};
+use footplate_store::{Direction, Journal, JournalEntry, NewMachine, Side, Store, Traced};
 
 use super::life::Life;
 use super::plan::{Planned, Trouble};
@@ -43,7 +43,7 @@ pub(super) struct FaultyDisk {
     began: Timestamp,
     /// The calendar of the computer, when the life began.
     calendar: Timestamp,
-    pending: VecDeque<Event>,
+    pending: VecDeque<JournalEntry>,
     commit: Option<Commit>,
     retry_at: Timestamp,
     is_in_trouble: bool,
@@ -133,7 +133,7 @@ impl FaultyDisk {
     }
 
     fn append(&mut self, count: usize) -> anyhow::Result<()> {
-        let entries: Vec<JournalEntry> = self.pending.drain(..count).map(JournalEntry::Event).collect();
+        let entries: Vec<JournalEntry> = self.pending.drain(..count).collect();
         let calendar = self.calendar(self.now);
         self.acknowledged = usize::try_from(self.journal.append_all(&entries, calendar)?)?;
         Ok(())
@@ -183,12 +183,16 @@ impl Recorder for FaultyDisk {
         if !self.life.step() {
             bail!("this program is dead");
         }
-        self.pending.extend(events);
+        self.pending.extend(events.iter().copied().map(JournalEntry::Event));
         self.recorded.extend(events);
         if self.is_in_trouble && self.if_unkept == IfUnkept::Stop {
             bail!("the session cannot be written down: the disk is full");
         }
         Ok(())
+    }
+
+    fn record_direction(&mut self, direction: Direction) {
+        self.pending.push_back(JournalEntry::Direction(direction));
     }
 }
 

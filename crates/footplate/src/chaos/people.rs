@@ -9,6 +9,7 @@ use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Command, Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_eval::seeds::Choice;
 use footplate_eval::traffic::{HAND, is_on_reserved_track, place_by_hand};
+use footplate_store::Direction;
 use footplate_wire::{CommandError, LinkNotice};
 
 use super::disk::FaultyDisk;
@@ -265,5 +266,9 @@ pub(super) struct SharedDisk(pub(super) Rc<RefCell<FaultyDisk>>);
 impl Recorder for SharedDisk {
     fn record(&mut self, events: &[footplate_core::Event]) -> anyhow::Result<()> {
         self.0.borrow_mut().record(events)
+    }
+
+    fn record_direction(&mut self, direction: Direction) {
+        self.0.borrow_mut().record_direction(direction);
     }
 }

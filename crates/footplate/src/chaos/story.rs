@@ -21,7 +21,7 @@ use super::life::{Death, Life, Spell};
 use super::line::{FaultyLine, LATE, SharedStation};
 use super::people::{People, Seen, SharedDisk};
 use super::plan::{Plan, PlannedLife};
-use crate::commands::stop_all;
+use crate::commands::{recall_directions, stop_all};
 use crate::link::{Address, Link, Quirks, SimulatedStation, StationSession, open_session};
 use crate::runtime::{Ended, Runtime, carry_out};
 
@@ -237,7 +237,8 @@ impl<'l> Teller<'_, 'l> {
         let began = self.now();
         let life = Rc::new(Life::new(None));
         let mut line = FaultyLine::new(Rc::clone(&self.station), life, &TRAINS, &[], Choice::new(0));
-        let session = self.session(&line)?;
+        let mut session = self.session(&line)?;
+        recall_directions(&mut session, &Store::open(self.store)?)?;
         let closing = stop_all(&mut line, session, unfinished.trains);
         if !line.all_stopped() {
             // The end of a session takes its time; stops come first in it.
@@ -275,7 +276,8 @@ impl<'l> Teller<'_, 'l> {
         let noise = Choice::new(self.choice.between(0.0, 1e15) as u64);
         let mut line =
             FaultyLine::new(Rc::clone(&self.station), Rc::clone(&life), &TRAINS, &planned.troubles, noise);
-        let session = self.session(&line)?;
+        let mut session = self.session(&line)?;
+        recall_directions(&mut session, &Store::open(self.store)?)?;
         let mut recorder = SharedDisk(Rc::clone(&disk));
         let mut people = People::new(
             self.stage.layout,

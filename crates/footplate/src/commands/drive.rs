@@ -3,8 +3,10 @@
 mod beginning;
 mod console;
 mod formatter;
+mod fuzzed_session;
 mod instruction;
 mod learning;
+mod long_drive;
 mod parse;
 mod reader;
 mod script;
@@ -24,13 +26,15 @@ use anyhow::{anyhow, bail};
 use clap::Args;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{DecoderSteps, Timestamp, TurnoutId};
-use footplate_store::{Journal, NewMachine, Schedule, Store, layout_named, parse_layout};
+use footplate_store::{Schedule, Store, layout_named, parse_layout};
 use footplate_wire::Session as _;
 
 pub(crate) use self::beginning::DriveBeginning;
 use self::console::{Console, ended, lines_of_stdin};
 pub(super) use self::formatter::NoticeFormatter;
+pub(crate) use self::fuzzed_session::FuzzedSession;
 use self::instruction::HELP;
+pub(crate) use self::long_drive::LongDrive;
 use self::reader::Known;
 use self::script::read_script;
 use self::script_runner::CommandSource;
@@ -41,11 +45,11 @@ use self::terminal::Terminal;
 use self::trains::{KnownTrains, Sources};
 use self::truth::{GroundTruth, StartOdometers};
 use super::Outcome;
-use super::left_running::stop_left_running;
+use super::left_running::{recall_directions, stop_left_running};
 use super::predict::turnout_state;
 use super::serve::{SetUpMode, SetUpRoute, open_dashboard};
 use super::written_layout::WrittenLayout;
-use crate::clock::{local, now};
+use crate::clock::now;
 use crate::dashboard::{Answer, Board, Dashboard, LayoutPicture, ServedAt};
 use crate::layout_check::{LayoutWatch, LengthWarning};
 use crate::link::{
@@ -55,7 +59,7 @@ use crate::link::{
 use crate::phones::{Phones, PhonesAt};
 use crate::recorded::Recorded;
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
-use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
+use crate::session_journal::{SessionJournal, WhenFull};
 
 /// Drive trains: speeds, turnouts, exact stops, moves, following.
 ///
@@ -301,18 +305,10 @@ impl Arguments {
         beginning: &DriveBeginning,
     ) -> anyhow::Result<Option<SessionJournal>> {
         let Some(path) = &self.railway.store else { return Ok(None) };
-        let now = now();
-        let began_at = Some(now + (Timestamp::ZERO - at));
-        let name = format!("drive {}", local(now));
-        let store = Store::open_or_create(path)?;
-        let mut journal = Journal::begin(store, &name, layout.name(), began_at, &[], now)?;
-        let body = serde_json::to_string(beginning)?;
-        journal
-            .begin_machine(NewMachine { kind: DriveBeginning::KIND, program: PROGRAM, body: &body }, now)?;
         // A simulated clock can wait for a slow disk; a real railway cannot.
         let is_simulated = self.railway.station()?.simulated().is_some();
         let when_full = if is_simulated { WhenFull::Wait } else { WhenFull::Lose };
-        Ok(Some(SessionJournal::start(journal, began_at, when_full, IfUnkept::Stop)?))
+        beginning.journal(path, layout, at, when_full).map(Some)
     }
 
     fn drive<L: Link + GroundTruth>(
@@ -332,6 +328,9 @@ impl Arguments {
         let link = ObservedLink::new(link, line.clone());
         let mut session = open_session(address, &link, layout)?;
         session.expect_delays(address.excess(self.railway.line()?.as_ref()));
+        if let (Some(store), None) = (&self.railway.store, address.simulated()) {
+            recall_directions(&mut session, &Store::open_to_read(store)?)?;
+        }
         for model in &beginning.models {
             session.set_decoder(model.train(), DecoderSteps::with(model.highest()))?;
         }

@@ -27,9 +27,22 @@ pub(crate) fn stop_left_running<'l>(
     };
     eprintln!("{}", said(&unfinished));
     let mut link = open(address, layout, pace)?;
-    let session = open_session(address, &link, layout)?;
+    let mut session = open_session(address, &link, layout)?;
+    recall_directions(&mut session, store)?;
     eprintln!("{}", stop_all(&mut link, session, unfinished.trains));
     Ok(Some(link))
+}
+
+/// Tells a session in which direction the trains of a store were commanded last. Not for a simulated railway, which is new each
+/// time.
+///
+/// # Errors
+/// The store cannot be read.
+pub(crate) fn recall_directions(session: &mut StationSession, store: &Store) -> anyhow::Result<()> {
+    for (train, forward) in store.directions()? {
+        session.set_direction(train, forward);
+    }
+    Ok(())
 }
 
 /// Stops trains and switches the power off over a line that has just been opened.

@@ -30,6 +30,8 @@ mod web_page;
 mod written_layout;
 
 pub(crate) use command::{Command, Outcome};
-pub(crate) use left_running::stop_all;
+pub(crate) use drive::FuzzedSession;
+pub(crate) use left_running::{recall_directions, stop_all};
+pub(crate) use serve::answer_fuzzed;
 #[cfg(test)]
 pub(crate) use serve::{session_paths, set_up_paths};

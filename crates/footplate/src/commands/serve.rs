@@ -3,6 +3,7 @@
 mod answer_queue;
 mod archive;
 mod drawn_layout;
+mod fuzzed_body;
 mod odometry_pages;
 mod schedules;
 mod set_up;
@@ -26,6 +27,7 @@ pub(crate) use answer_queue::{AnswerForm, AnswerQueue};
 pub(crate) use archive::StoreQuery;
 use archive::{Archive, archive_routes};
 use drawn_layout::drawn_layout_routes;
+pub(crate) use fuzzed_body::answer_fuzzed;
 use odometry_pages::odometry_routes;
 use schedules::schedule_routes;
 #[cfg(test)]

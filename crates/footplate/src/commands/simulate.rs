@@ -5,6 +5,7 @@ mod chaos;
 mod driving;
 mod layout;
 mod line;
+mod long;
 mod recording;
 mod score_form;
 mod seed_scores;
@@ -48,6 +49,7 @@ enum World {
     Driving(driving::Arguments),
     Layout(layout::Arguments),
     Line(line::Arguments),
+    Long(long::Arguments),
     /// Let calibrated trains hold speeds between those of steps, arrive in time and follow each other, and score them by the truth.
     ///
     /// Each seed is a layout with three trains. Simpler drivers carry out the same orders in the same world.
@@ -72,6 +74,7 @@ impl Arguments {
             Some(World::Driving(arguments)) => arguments.run(output),
             Some(World::Layout(arguments)) => arguments.run(output),
             Some(World::Line(arguments)) => arguments.run(output),
+            Some(World::Long(arguments)) => arguments.run(output),
             Some(World::Pacing(scores)) => scores.pacing(output),
             Some(World::Survey(arguments)) => arguments.run(output),
             Some(World::Traffic(arguments)) => arguments.run(output),

@@ -233,6 +233,16 @@ impl Alarm {
         self.what == MISSED_INTERVALS
     }
 
+    /// Whether trains wait until an operator places this one, or switches the power on.
+    pub(crate) fn needs_operator(&self) -> bool {
+        matches!(self.what, "needs-person" | "deadlocked" | "unauthorised" | "power-off")
+    }
+
+    /// The train that it is about, if it is about one.
+    pub(crate) const fn train(&self) -> Option<TrainId> {
+        self.train
+    }
+
     /// A command that the session rejected.
     pub(crate) fn not_sent(text: &str) -> Self {
         let alarm = Self::new(Grade::Danger, "not-sent", None, vec![text.to_owned()]);

@@ -222,6 +222,20 @@ fn router(guard: Guard, routes: Routes) -> Router {
         .layer(from_fn_with_state(guard, guarded))
 }
 
+/// What answers requests without a connection, as at the usual address of this machine.
+pub(crate) fn answering(routes: Routes) -> Router {
+    router(Guard::new(ServedAt::USUAL.0, None), routes)
+}
+
+/// The routes of a driving session over a board, without the timing of its link.
+///
+/// # Errors
+/// The layout cannot be drawn.
+pub(crate) fn driving_routes(board: &Arc<Board>, layout: &LayoutFile) -> anyhow::Result<Routes> {
+    let layout = serde_json::to_string(&LayoutPicture::of(layout))?.into();
+    Ok(own_routes(Shared { board: Arc::clone(board), layout, line: SharedTallies::default() }))
+}
+
 /// The routes of a driving session.
 fn own_routes(shared: Shared) -> Routes {
     Routes::new(
@@ -405,5 +419,24 @@ mod tests {
         let described: BTreeSet<&str> =
             described["paths"].as_object().expect("paths").keys().map(String::as_str).collect();
         assert_eq!(there, described);
+    }
+
+    #[test]
+    fn every_path_that_takes_a_body_is_fuzzed_from_an_example() {
+        // Answered by another process: what reads recordings has targets of its own, and the doctor takes nothing.
+        const OF_OTHERS: [&str; 2] = ["/api/odometry/{name}", "/api/setup/doctor"];
+        let described: serde_json::Value = serde_json::from_str(OPENAPI).expect("JSON");
+        let takes = described["paths"].as_object().expect("paths").iter();
+        let takes: BTreeSet<String> = takes
+            .filter(|(path, methods)| methods.get("post").is_some() && !OF_OTHERS.contains(&path.as_str()))
+            .map(|(path, _)| path.replace("{alarm}", "3"))
+            .collect();
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/http-bodies");
+        let examples: BTreeSet<String> = std::fs::read_dir(folder)
+            .expect("examples")
+            .map(|entry| std::fs::read_to_string(entry.expect("a file").path()).expect("text"))
+            .map(|text| text.lines().next().unwrap_or_default().to_owned())
+            .collect();
+        assert_eq!(examples, takes);
     }
 }

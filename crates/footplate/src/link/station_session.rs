@@ -128,6 +128,9 @@ impl Session for StationSession {
     fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
         self.station.any_mut().set_decoder(train, steps)
     }
+    fn set_direction(&mut self, train: TrainId, forward: bool) {
+        self.station.any_mut().set_direction(train, forward);
+    }
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
         self.station.any_mut().handle_command(now, command)
     }

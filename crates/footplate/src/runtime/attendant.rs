@@ -2,6 +2,7 @@
 
 use footplate_core::control::Machine;
 use footplate_core::{Command, Event, Timestamp, TrainId};
+use footplate_store::Direction;
 use footplate_wire::{BlockReports, CommandError, LinkNotice, ReportedFunctions};
 
 /// Records the entries of a run before the machine receives them.
@@ -11,6 +12,9 @@ pub(crate) trait Recorder {
     /// # Errors
     /// The entries cannot be recorded. The run ends, and all trains are commanded to stop.
     fn record(&mut self, events: &[Event]) -> anyhow::Result<()>;
+
+    /// Takes the direction that a train is commanded in from now on.
+    fn record_direction(&mut self, _direction: Direction) {}
 }
 
 /// Whether a run continues.

@@ -207,7 +207,10 @@ fn farewell_of(session: &StationSession, began: Timestamp, has_cts: bool) -> Vec
             let bytes = match output {
                 Transmit::Byte(byte) => vec![byte],
                 Transmit::Message(bytes) => bytes,
-                Transmit::Event(_) | Transmit::Notice(_) | Transmit::Functions(..) => continue,
+                Transmit::Event(_)
+                | Transmit::Notice(_)
+                | Transmit::Functions(..)
+                | Transmit::Direction(..) => continue,
             };
             said.push(Bequest { after: now - last, bytes });
             (last, wrote) = (now, true);

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use footplate_core::control::{Machine, Output};
 use footplate_core::{Event, TimeSpan, Timestamp, TrainId};
+use footplate_store::Direction;
 use footplate_wire::{Closing, LinkNotice, ReportedFunctions, Session, Transmit};
 
 use super::attendant::{Attendant, Recorder, Wish};
@@ -238,6 +239,11 @@ impl<'r, L: Link> Runtime<'r, L> {
                     }
                 }
                 Transmit::Functions(train, reported) => self.functions.push((train, reported)),
+                Transmit::Direction(train, forward) => {
+                    if let Some(recorder) = &mut self.recorder {
+                        recorder.record_direction(Direction { train, forward });
+                    }
+                }
             }
         }
         self.will.keep(&self.session, &mut self.link)

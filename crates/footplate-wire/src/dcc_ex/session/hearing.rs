@@ -14,7 +14,7 @@ use super::Client;
 use crate::locomotives::ReportedFunctions;
 use crate::outstanding::Awaited as _;
 use crate::sensors::Change;
-use crate::session::LinkNotice;
+use crate::session::{LinkNotice, Transmit};
 
 impl Client {
     pub(super) fn hear(&mut self, now: Timestamp, byte: u8) {
@@ -119,6 +119,11 @@ impl Client {
             return;
         }
         let Some(forward) = locomotive.forward else {
+            // A board says `forward` of a locomotive that it does not drive. Its decoder goes on as it ran last.
+            if let Some(before) = self.directions.get(&train).filter(|_| driven.register < 0) {
+                locomotive.forward = Some(*before);
+                return;
+            }
             // Messages have no checksum, and `128`, forward, without its first digit is a speed backward: two have to agree.
             let before = self.directions.insert(train, driven.forward);
             locomotive.forward = before.filter(|forward| *forward == driven.forward);
@@ -143,6 +148,9 @@ impl Client {
         locomotive.forward = Some(driven.forward);
         locomotive.is_stopped = false;
         self.dialogue.stop_at_end(train);
+        if reversed {
+            self.dialogue.output.push_back(Transmit::Direction(train, driven.forward));
+        }
         self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed });
     }
 

@@ -1,20 +1,24 @@
 //! The inputs of a driving session, as they are recorded: enough to build its script runner again for a replay.
 
+use std::path::Path;
+
 use anyhow::Context;
 use footplate_core::control::Driver;
 use footplate_core::link::TimeModel;
 use footplate_core::model::MotionFit;
 use footplate_core::model::MotionModel;
-use footplate_core::track::{Leg, TurnoutStates};
-use footplate_core::{SpeedStep, TimeSpan, TrainId, TurnoutId};
-use footplate_store::Schedule;
+use footplate_core::track::{Layout, Leg, TurnoutStates};
+use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_store::{Journal, NewMachine, Schedule, Store};
 use serde::{Deserialize, Serialize};
 
 use super::learning::Learning;
 use super::reader::Known;
 use super::script::step;
 use super::script_runner::{CommandSource, ScriptRunner};
+use crate::clock::{local, now};
 use crate::commands::written_layout::WrittenLayout;
+use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
 
 /// Everything that a [`ScriptRunner`] is built from, both in a live session and in its replay.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -65,6 +69,32 @@ impl DriveBeginning {
             schedules: Vec::new(),
             link: TimeModel::default(),
         }
+    }
+
+    /// The same with an operator, whose new order replaces the one before.
+    pub(crate) fn of_a_person(self) -> Self {
+        Self { source: CommandSource::Person, ..self }
+    }
+
+    /// Begins a session in the store at `path`, whose journal records it; the clock of the link reads `at` now.
+    ///
+    /// # Errors
+    /// The store cannot be written.
+    pub(super) fn journal(
+        &self,
+        path: &Path,
+        layout: &Layout,
+        at: Timestamp,
+        when_full: WhenFull,
+    ) -> anyhow::Result<SessionJournal> {
+        let now = now();
+        let began_at = Some(now + (Timestamp::ZERO - at));
+        let name = format!("drive {}", local(now));
+        let store = Store::open_or_create(path)?;
+        let mut journal = Journal::begin(store, &name, layout.name(), began_at, &[], now)?;
+        let body = serde_json::to_string(self)?;
+        journal.begin_machine(NewMachine { kind: Self::KIND, program: PROGRAM, body: &body }, now)?;
+        Ok(SessionJournal::start(journal, began_at, when_full, IfUnkept::Stop)?)
     }
 
     pub(crate) fn layout(&self) -> &str {

@@ -31,6 +31,13 @@ struct EdgePart {
     to_mm: f64,
 }
 
+impl TrainWhereabouts {
+    /// Its place as the prompt takes it; none while it is off the track.
+    pub(super) fn place(&self) -> Option<&str> {
+        self.at.as_deref()
+    }
+}
+
 /// The true state of the railway; `None` on a real one.
 pub(super) trait GroundTruth {
     /// Where a train is.

@@ -20,7 +20,7 @@ use anyhow::{Context, bail};
 use self::routes::Pages;
 #[cfg(test)]
 pub(crate) use self::routes::set_up_paths;
-pub(crate) use self::routes::{SetUpMode, SetUpRoute};
+pub(crate) use self::routes::{SetUpMode, SetUpRoute, fuzzed_set_up_routes};
 use self::set_up_file::{SetUp, StepResult, file_beside};
 use crate::commands::Outcome;
 use crate::dashboard::{ServedAt, ServedPages, Token};

@@ -35,6 +35,8 @@ impl ScriptRunner {
 
     /// Cancels the journeys of a script that exceed the wait limit.
     pub(super) fn cancel_late_journeys(&mut self, now: Timestamp) {
+        // Those that have ended: a day of them would be looked through in every turn of the loop.
+        self.journeys.retain(|order, _| self.pending.contains_key(order));
         if self.journey_deadline().is_none_or(|at| now < at) {
             return;
         }
@@ -49,7 +51,6 @@ impl ScriptRunner {
                 self.refuse(now, &step, &Refusal::NotArrived { train, within: self.wait_limit });
             }
         }
-        self.journeys.retain(|order, _| self.pending.contains_key(order));
         self.forward_outputs(now);
     }
 

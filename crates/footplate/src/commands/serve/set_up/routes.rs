@@ -379,10 +379,15 @@ async fn drive(State(pages): State<Pages>) -> Response {
     answer(pages.drive())
 }
 
+/// The routes of a set-up that has not begun and leads to no other process, for the fuzzer.
+pub(crate) fn fuzzed_set_up_routes(store: PathBuf) -> Routes {
+    let (chosen, _) = std::sync::mpsc::sync_channel(1);
+    Pages::new(SetUp::default(), store, None, chosen).routes()
+}
+
 /// The paths of the set-up, for the test of the description.
 #[cfg(test)]
 pub(crate) fn set_up_paths() -> Vec<&'static str> {
-    let (chosen, _) = std::sync::mpsc::sync_channel(1);
-    let pages = Pages::new(SetUp::default(), PathBuf::new(), None, chosen);
-    pages.routes().paths().iter().chain(SetUpRoute::fixed().routes().paths()).copied().collect()
+    let pages = fuzzed_set_up_routes(PathBuf::new());
+    pages.paths().iter().chain(SetUpRoute::fixed().routes().paths()).copied().collect()
 }
