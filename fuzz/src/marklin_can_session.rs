@@ -43,7 +43,7 @@ impl Witness {
         for message in std::mem::take(&mut self.asked) {
             let answer = match message {
                 Message::Ping => Message::Participant { uid: Uid(1), version: (1, 0), kind: 0x10 },
-                Message::ModulePoll { uid, .. } => Message::ModuleState { uid, module: 1, contacts: 0 },
+                Message::ModulePoll { uid, .. } => Message::ModuleState { uid, module: 1, inputs: 0 },
                 Message::Direction { uid, direction: None } => {
                     Message::Direction { uid, direction: Some(Direction::Forward) }
                 }
@@ -95,10 +95,10 @@ pub(crate) fn fuzz(bytes: &[u8]) {
                 });
             }
             2 => witness.hear(
-                Message::Contact {
+                Message::Input {
                     device: 0,
-                    contact: first.into(),
-                    change: Some(footplate_wire::marklin_can::ContactChange {
+                    input: first.into(),
+                    change: Some(footplate_wire::marklin_can::InputChange {
                         was_occupied: second & 1 != 0,
                         is_occupied: second & 2 != 0,
                         lasted: Some(u16::from(third) << (second >> 5)),

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BinaryHeap};
 
 use footplate_core::track::Layout;
 use footplate_core::{SensorId, TimeSpan, Timestamp, TrainId};
-use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, ModuleState};
+use footplate_wire::marklin_serial::{INPUTS_PER_MODULE, ModuleState};
 
 use crate::draws::Draws;
 use crate::living::detectors::Detectors;
@@ -145,8 +145,8 @@ impl S88 {
     /// Without latches nothing is remembered.
     pub(crate) fn read(&mut self, module: u8, at: Timestamp, forget: bool, latches: bool) -> ModuleState {
         self.settle(at);
-        let first = u16::from(module.saturating_sub(1)) * CONTACTS_PER_MODULE;
-        let numbers = first..first + CONTACTS_PER_MODULE;
+        let first = u16::from(module.saturating_sub(1)) * INPUTS_PER_MODULE;
+        let numbers = first..first + INPUTS_PER_MODULE;
         let closed = numbers.filter_map(|number| {
             let is_held = self.is_closed(SensorId(number));
             let (_, remembered) = self.states.get_mut(usize::from(number))?;

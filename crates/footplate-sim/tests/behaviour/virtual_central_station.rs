@@ -6,7 +6,7 @@ use footplate_sim::{
     CanSwitches, CanTransport, End, LawFamily, LivingLayout, LivingSwitches, Train, VirtualCentralStation,
 };
 use footplate_wire::marklin_can::{
-    ContactChange, Direction, Frame, Framing, Message, Transport, Uid, read_list,
+    Direction, Frame, Framing, InputChange, Message, Transport, Uid, read_list,
 };
 
 use crate::yard::{TRAIN, two_loops};
@@ -134,7 +134,7 @@ fn sensors_are_reported_within_a_cycle_with_the_time_since_the_change_before() {
     let heard = ask(&mut station, Message::Speed { uid: UID, speed: Some(800) }, 60_000);
     let changes = |is: bool| {
         heard.iter().filter_map(move |(at, frame)| match Message::of(frame) {
-            Message::Contact { contact: input, change: Some(change), .. } if change.is_occupied == is => {
+            Message::Input { input, change: Some(change), .. } if change.is_occupied == is => {
                 Some((*at, input, change))
             }
             _ => None,
@@ -200,13 +200,10 @@ fn the_quirks_that_were_reported_can_be_switched_on() {
     assert!((35..=65).contains(&answered), "{answered} of 100, half on average");
     let mut twice = station(&layout, CanSwitches { duplicated: Ratio::from_percent(100.0), ..default() });
     assert_eq!(answers(&mut twice, speed).len(), 4);
-    let of_input = |change| Message::Contact { device: 0, contact: 2, change };
+    let of_input = |change| Message::Input { device: 0, input: 2, change };
     let state = answers(&mut bare, of_input(None));
     assert!(
-        matches!(
-            state[..],
-            [Message::Contact { change: Some(ContactChange { is_occupied: false, .. }), .. }]
-        ),
+        matches!(state[..], [Message::Input { change: Some(InputChange { is_occupied: false, .. }), .. }]),
         "{state:?}"
     );
 }

@@ -6,7 +6,7 @@
 use footplate_core::odometry::WheelState;
 use footplate_core::{Length, Speed, TimeSpan, Timestamp};
 
-use super::counted_way::CountedWay;
+use super::counted_distances::CountedDistances;
 use crate::tachometer::Truth;
 
 /// A wheel whose creepage is beyond this really slips or slides: past the peak of adhesion on any rail.
@@ -20,7 +20,7 @@ const PERIODS: usize = 5;
 #[derive(Debug, Clone)]
 pub(super) struct SlipWatch {
     pitches: [Length; 2],
-    /// Ways, time and true way of the last periods.
+    /// Distances, time and true distance of the last periods.
     recent: [Recent; PERIODS],
     next: usize,
     first: Option<FirstSlip>,
@@ -28,9 +28,9 @@ pub(super) struct SlipWatch {
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Recent {
-    ways: [Option<Length>; 2],
+    distances: [Option<Length>; 2],
     span: TimeSpan,
-    true_way: Length,
+    true_distance: Length,
 }
 
 /// The first real slip or slide of a run.
@@ -46,10 +46,15 @@ impl SlipWatch {
     }
 
     /// Takes in a period; the first slip or slide of the run, if there has been any up to now.
-    pub(super) fn see(&mut self, time: Timestamp, counted: &CountedWay, truth: &Truth) -> Option<FirstSlip> {
+    pub(super) fn see(
+        &mut self,
+        time: Timestamp,
+        counted: &CountedDistances,
+        truth: &Truth,
+    ) -> Option<FirstSlip> {
         let Some(train) = truth.speed.filter(|_| self.first.is_none()) else { return self.first };
         let span = counted.span.unwrap_or(TimeSpan::ZERO);
-        self.recent[self.next] = Recent { ways: counted.ways, span, true_way: train * span };
+        self.recent[self.next] = Recent { distances: counted.distances, span, true_distance: train * span };
         self.next = (self.next + 1) % PERIODS;
         let slips = |wheel: &usize| match truth.wheels[*wheel] {
             Some(speed) => is_slip(speed, train, Speed::ZERO),
@@ -62,17 +67,17 @@ impl SlipWatch {
 
     /// Whether a wheel counted something else than the train ran over the last periods.
     fn counts_otherwise(&self, wheel: usize) -> bool {
-        let (mut way, mut true_way, mut span) = (Length::ZERO, Length::ZERO, TimeSpan::ZERO);
+        let (mut distance, mut true_distance, mut span) = (Length::ZERO, Length::ZERO, TimeSpan::ZERO);
         for period in &self.recent {
-            let (Some(counted), true) = (period.ways[wheel], period.span > TimeSpan::ZERO) else {
+            let (Some(counted), true) = (period.distances[wheel], period.span > TimeSpan::ZERO) else {
                 return false;
             };
-            way += counted;
-            true_way += period.true_way;
+            distance += counted;
+            true_distance += period.true_distance;
             span += period.span;
         }
-        let per_span = |way: Length| Speed::from_m_per_s(way.as_m() / span.as_s());
-        is_slip(per_span(way), per_span(true_way), per_span(self.pitches[wheel]))
+        let per_span = |distance: Length| Speed::from_m_per_s(distance.as_m() / span.as_s());
+        is_slip(per_span(distance), per_span(true_distance), per_span(self.pitches[wheel]))
     }
 }
 
@@ -117,8 +122,8 @@ mod tests {
             let locked = period >= 20;
             let wheel = Speed::from_m_per_s(if locked { 0.0 } else { 10.0 });
             let rolled = Length::from_m(0.5);
-            let counted = CountedWay {
-                ways: [Some(rolled), Some(if locked { Length::ZERO } else { rolled })],
+            let counted = CountedDistances {
+                distances: [Some(rolled), Some(if locked { Length::ZERO } else { rolled })],
                 span: (period > 0).then(|| TimeSpan::from_ms(50)),
             };
             let speed = Some(Speed::from_m_per_s(10.0));

@@ -1,9 +1,9 @@
 //! Recordings through the odometer: what each run comes to, and how good that is where the truth is known.
 //!
-//! An [`OdometryRun`] takes the rows of one run and returns an estimate for each. If it is told to score, it walks
+//! An [`OdometryRun`] takes the rows of one run and returns an estimate for each. If it is to score, it walks
 //! both presets and what others would do beside it, and compares all of them with the truth.
 
-mod counted_way;
+mod counted_distances;
 mod detection;
 mod oracle;
 mod placed_run;
@@ -15,7 +15,7 @@ mod simulated;
 mod summary;
 mod world_score;
 
-pub use counted_way::{CountedWay, WayCounter};
+pub use counted_distances::{CountedDistances, DistanceCounter};
 pub use result_rows::{LiveResult, ResultWriter};
 pub use rival::Rival;
 pub use run::{OdometryRun, Preset, RunContext, RunScores};

@@ -6,7 +6,7 @@
 use footplate_core::{Length, Speed};
 use footplate_sim::line::{LineRun, WheelTruth};
 
-use super::counted_way::CountedWay;
+use super::counted_distances::CountedDistances;
 use super::score::Claim;
 
 /// Random walk of the acceleration of a train (m/s² per square root of a second).
@@ -44,14 +44,14 @@ impl Oracle {
     }
 
     /// Takes in a period: its counts, and which wheelsets roll and are read.
-    pub(super) fn step(&mut self, counted: &CountedWay, rolls: [bool; 2]) -> Claim {
+    pub(super) fn step(&mut self, counted: &CountedDistances, rolls: [bool; 2]) -> Claim {
         let t = counted.span.map_or(0.0, footplate_core::TimeSpan::as_s);
         if t > 0.0 {
             self.predict(t);
             self.lost_for += t;
-            for ((way, rolls), pitch) in counted.ways.into_iter().zip(rolls).zip(self.pitches) {
-                if let (Some(way), true) = (way, rolls) {
-                    self.take(way.as_m(), pitch, t);
+            for ((distance, rolls), pitch) in counted.distances.into_iter().zip(rolls).zip(self.pitches) {
+                if let (Some(distance), true) = (distance, rolls) {
+                    self.take(distance.as_m(), pitch, t);
                 }
             }
             self.distance += self.speed * t;
@@ -71,14 +71,14 @@ impl Oracle {
     }
 
     /// The mean speed of a period, half a period old.
-    fn take(&mut self, way: f64, pitch: f64, t: f64) {
+    fn take(&mut self, distance: f64, pitch: f64, t: f64) {
         let [vv, va, aa] = self.covariance;
         // Two edges of a window, each anywhere within a pulse.
         let noise = pitch * pitch / (6.0 * t * t);
         let back = -0.5 * t;
         let [pv, pa] = [vv + back * va, va + back * aa];
         let variance = pv + back * pa + noise;
-        let surprise = way / t - (self.speed + back * self.acceleration);
+        let surprise = distance / t - (self.speed + back * self.acceleration);
         if surprise * surprise > GATE * GATE * variance && self.lost_for < LOST_S {
             return;
         }
@@ -152,8 +152,8 @@ mod tests {
             // From 20 m/s with -0.5 m/s²: the first wheel locks at 8 s, both from 16 s on.
             let train = (20.0 - 0.5 * time) * 0.05;
             let locked = if time > 8.0 { 0.0 } else { train };
-            let counted = CountedWay {
-                ways: [
+            let counted = CountedDistances {
+                distances: [
                     Some(Length::from_m(locked)),
                     Some(Length::from_m(if time > 16.0 { 0.0 } else { train })),
                 ],

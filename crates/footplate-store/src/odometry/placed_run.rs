@@ -4,7 +4,7 @@ use footplate_core::Length;
 use footplate_core::odometry::wheels::{Period, Vehicle};
 use footplate_core::odometry::{Mode, MotionBounds, MotionEstimate, PlacedValue, StatedPlaces, WheelState};
 
-use super::counted_way::WayCounter;
+use super::counted_distances::DistanceCounter;
 
 /// How far a place with a bound may have moved the reckoned distance (m). Chosen: beyond what such places are off.
 const MOVED_M: f64 = 5.0;
@@ -12,7 +12,7 @@ const MOVED_M: f64 = 5.0;
 #[derive(Debug, Clone)]
 pub(super) struct PlacedRun {
     places: StatedPlaces,
-    counter: WayCounter,
+    counter: DistanceCounter,
     /// How far the train went by the odometer while each wheelset rolled, and how far that turned (m).
     rolled: [[f64; 2]; 2],
     /// The reckoned distance of the period before, and how far off it may be by the present slide (m).
@@ -27,7 +27,7 @@ impl PlacedRun {
         let tolerances = vehicle.wheelsets.map(|wheelset| wheelset.diameter_tolerance);
         Self {
             places: StatedPlaces::new(tolerances.into_iter().fold(0.0, f64::max)),
-            counter: WayCounter::new(vehicle),
+            counter: DistanceCounter::new(vehicle),
             rolled: [[0.0; 2]; 2],
             before,
             slide: 0.0,
@@ -40,11 +40,12 @@ impl PlacedRun {
         let counted = self.counter.count(period);
         let ran = (estimate.distance - self.before).as_m();
         self.before = estimate.distance;
-        for ((rolled, way), state) in self.rolled.iter_mut().zip(counted.ways).zip(estimate.wheels) {
-            if let (Some(way), WheelState::Rolling) = (way, state) {
+        for ((rolled, distance), state) in self.rolled.iter_mut().zip(counted.distances).zip(estimate.wheels)
+        {
+            if let (Some(distance), WheelState::Rolling) = (distance, state) {
                 let [by_odometer, turned] = rolled;
                 *by_odometer += ran;
-                *turned += way.as_m();
+                *turned += distance.as_m();
             }
         }
         self.slide(estimate, counted.span.map_or(0.0, footplate_core::TimeSpan::as_s));
@@ -89,7 +90,7 @@ impl PlacedRun {
         }
     }
 
-    /// True over believed diameter of each wheelset that has rolled.
+    /// True over stated diameter of each wheelset that has rolled.
     pub(super) fn scales(&self) -> [Option<PlacedValue>; 2] {
         let PlacedValue { value, deviation } = self.places.scale();
         self.rolled.map(|[by_odometer, turned]| {

@@ -3,13 +3,13 @@
 use footplate_core::odometry::wheels::Vehicle;
 use footplate_core::{Length, Speed, TimeSpan};
 
-use super::counted_way::CountedWay;
+use super::counted_distances::CountedDistances;
 use super::score::Claim;
 
 /// Time constant with which plain software smooths a wheel speed (s): five periods of 50 ms, a usual choice.
 const SMOOTHED_OVER: TimeSpan = TimeSpan::from_ms(250);
 
-/// A way to do odometry without knowing of slip and slide.
+/// A method of odometry that knows nothing of slip and slide.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Rival {
     /// The mean of both counts of the period.
@@ -45,8 +45,8 @@ impl Rival {
     }
 
     /// How far the train went in a period by these counts, if there is any.
-    fn way(self, ways: [Option<Length>; 2]) -> Option<Length> {
-        match ways {
+    fn distance(self, distances: [Option<Length>; 2]) -> Option<Length> {
+        match distances {
             [Some(one), Some(other)] if self == Self::RawMax => {
                 Some(if other.abs() > one.abs() { other } else { one })
             }
@@ -56,7 +56,7 @@ impl Rival {
     }
 }
 
-/// A rival on its way.
+/// A rival at work.
 #[derive(Debug, Clone)]
 pub(super) struct RivalOdometer {
     rival: Rival,
@@ -70,12 +70,12 @@ impl RivalOdometer {
         Self { rival, period: vehicle.period, speed: Speed::ZERO, distance: Length::ZERO }
     }
 
-    /// Takes in a period. Without a count the speed is held; the way of the first period is before the beginning.
-    pub(super) fn step(&mut self, counted: &CountedWay) -> Claim {
+    /// Takes in a period. Without a count the speed is held; the distance of the first period is before the beginning.
+    pub(super) fn step(&mut self, counted: &CountedDistances) -> Claim {
         let span = counted.span.unwrap_or(self.period);
-        let way = self.rival.way(counted.ways);
-        if let Some(way) = way {
-            let speed = Speed::from_m_per_s(way.as_m() / span.as_s());
+        let distance = self.rival.distance(counted.distances);
+        if let Some(distance) = distance {
+            let speed = Speed::from_m_per_s(distance.as_m() / span.as_s());
             self.speed = match self.rival {
                 Rival::WheelsOnly => {
                     let share = span.as_s() / (span + SMOOTHED_OVER).as_s();
@@ -85,7 +85,7 @@ impl RivalOdometer {
             };
         }
         if counted.span.is_some() {
-            self.distance += way.unwrap_or(self.speed * span);
+            self.distance += distance.unwrap_or(self.speed * span);
         }
         Claim::plain(self.speed, self.distance)
     }
@@ -96,13 +96,13 @@ mod tests {
     use footplate_core::Timestamp;
     use footplate_core::odometry::wheels::Period;
 
-    use super::super::counted_way::WayCounter;
+    use super::super::counted_distances::DistanceCounter;
     use super::*;
     use crate::vehicle_file::default_vehicle;
 
     fn run(rival: Rival, periods: &[[i64; 2]]) -> Claim {
         let vehicle = default_vehicle().unwrap().vehicle;
-        let mut counter = WayCounter::new(&vehicle);
+        let mut counter = DistanceCounter::new(&vehicle);
         let mut odometer = RivalOdometer::new(rival, &vehicle);
         let mut last = None;
         for (at, pulses) in periods.iter().enumerate() {

@@ -5,7 +5,7 @@ use footplate_core::odometry::diameter::WheelScale;
 use footplate_core::odometry::wheels::{Period, Vehicle, VehicleError};
 use footplate_core::odometry::{ImplausibleClaims, MotionEstimate, Odometer, OdometrySettings, PlacedValue};
 
-use super::counted_way::WayCounter;
+use super::counted_distances::DistanceCounter;
 use super::detection::{FlagWatch, SlipWatch};
 use super::placed_run::PlacedRun;
 use super::rival::{Rival, RivalOdometer};
@@ -13,7 +13,7 @@ use super::score::{Claim, OdometryScore, Scorer};
 use super::summary::RunSummary;
 use crate::tachometer::Truth;
 
-/// Which of the ways to estimate is taken.
+/// Which method of estimation is used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Preset {
     /// The published algorithm, read so that its printed figures come out.
@@ -106,7 +106,7 @@ struct Scoring {
     preset: Preset,
     /// The odometer of the other preset.
     other: Odometer,
-    counter: WayCounter,
+    counter: DistanceCounter,
     rivals: [RivalOdometer; 3],
     slip: SlipWatch,
     flags: [FlagWatch; 2],
@@ -146,7 +146,7 @@ impl OdometryRun {
         self.placed.get_or_insert_with(new).step(period, estimate)
     }
 
-    /// True over believed diameter of each wheelset, as far as known places say.
+    /// True over stated diameter of each wheelset, as far as known places say.
     #[must_use]
     pub fn wheel_scales(&self) -> [Option<PlacedValue>; 2] {
         if let Some(placed) = &self.placed {
@@ -192,7 +192,7 @@ impl Scoring {
             Preset::Paper | Preset::Literal => Preset::Recommended,
             Preset::Recommended => Preset::Paper,
         };
-        let counter = WayCounter::new(vehicle);
+        let counter = DistanceCounter::new(vehicle);
         Ok(Self {
             preset: *preset,
             other: Odometer::new(*vehicle, context.settings(other))?,

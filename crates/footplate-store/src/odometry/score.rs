@@ -46,7 +46,7 @@ pub struct OdometryScore {
     pub speed_max_m_s: Option<f64>,
     /// Distance less true distance at the end of the run.
     pub distance_end_m: Option<f64>,
-    /// The same in per cent of the way travelled.
+    /// The same in per cent of the distance travelled.
     pub distance_end_pct: Option<f64>,
     /// Its largest amount within the run.
     pub distance_max_m: Option<f64>,
@@ -317,8 +317,8 @@ mod tests {
         let run = |errors: &[f64], delay| {
             let mut scorer = Scorer::default();
             for (at, error) in errors.iter().enumerate() {
-                let way = 10.0 * at as f64;
-                scorer.see(&claim(10.0 + error, way + error, 2.0), &truth(10.0, way));
+                let distance = 10.0 * at as f64;
+                scorer.see(&claim(10.0 + error, distance + error, 2.0), &truth(10.0, distance));
             }
             scorer.set_detect_delay(delay);
             scorer

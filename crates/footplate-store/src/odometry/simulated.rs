@@ -1,4 +1,4 @@
-//! Simulated runs as odometers and recordings know them: what is believed of the train, what was read, and the truth.
+//! Simulated runs as odometers and recordings know them: what is assumed of the train, what was read, and the truth.
 
 use footplate_core::odometry::wheels::{
     Axle, BrakeCommand, Count, Direction, Period, SlideProtection, Vehicle, VehicleError, WheelReading,
@@ -12,29 +12,29 @@ use footplate_sim::line::{
 use crate::tachometer::{Truth, WrittenColumns};
 use crate::vehicle_file::VehicleFile;
 
-/// What is believed of a simulated train.
+/// What is assumed of a simulated train.
 ///
 /// # Errors
 /// The first value that no railway has.
-pub fn simulated_vehicle(believed: &LineVehicle) -> Result<VehicleFile, VehicleError> {
+pub fn simulated_vehicle(assumed: &LineVehicle) -> Result<VehicleFile, VehicleError> {
     let wheelset = |wheelset: LineWheelset| Wheelset {
         teeth: wheelset.teeth,
         diameter: wheelset.diameter,
         diameter_tolerance: wheelset.diameter_tolerance,
         axle: if wheelset.is_powered { Axle::Powered } else { Axle::Trailing },
     };
-    let limits = [believed.max_traction, believed.max_brake];
-    let wheelsets = believed.wheelsets.map(wheelset);
-    let mut vehicle = Vehicle::new(believed.period, believed.max_speed, limits, wheelsets)?;
-    let LineBrake { full, tolerance, gradient, resistance, build_up, release } = believed.brake_command;
+    let limits = [assumed.max_traction, assumed.max_brake];
+    let wheelsets = assumed.wheelsets.map(wheelset);
+    let mut vehicle = Vehicle::new(assumed.period, assumed.max_speed, limits, wheelsets)?;
+    let LineBrake { full, tolerance, gradient, resistance, build_up, release } = assumed.brake_command;
     let release = release.unwrap_or(vehicle.brake_command.release);
     vehicle.brake_command = BrakeCommand { full, tolerance, gradient, resistance, build_up, release };
-    vehicle.slide_protection = believed
+    vehicle.slide_protection = assumed
         .slide_protection
         .map(|LineSlideProtection { creepage, longest }| SlideProtection { creepage, longest });
-    vehicle.independent = believed.independent;
+    vehicle.independent = assumed.independent;
     vehicle.check()?;
-    Ok(VehicleFile { name: believed.name.clone(), vehicle })
+    Ok(VehicleFile { name: assumed.name.clone(), vehicle })
 }
 
 /// Which columns a recording of a simulated run has: all but those that would be empty.
@@ -123,12 +123,12 @@ mod tests {
 
     #[test]
     fn what_a_simulated_train_claims_is_what_an_odometer_believes() {
-        let believed = run("S5").vehicle;
-        let VehicleFile { name, vehicle } = simulated_vehicle(&believed).unwrap();
+        let assumed = run("S5").vehicle;
+        let VehicleFile { name, vehicle } = simulated_vehicle(&assumed).unwrap();
         assert_eq!((name.as_str(), vehicle.independent), ("S5", false));
         assert_eq!(vehicle.wheelsets.map(|wheelset| wheelset.axle), [Axle::Powered, Axle::Trailing]);
-        assert_eq!(vehicle.brake_command.resistance, believed.brake_command.resistance);
-        assert_eq!(vehicle.max_brake, believed.max_brake);
+        assert_eq!(vehicle.brake_command.resistance, assumed.brake_command.resistance);
+        assert_eq!(vehicle.max_brake, assumed.max_brake);
         assert!(simulated_vehicle(&run("S8").vehicle).unwrap().vehicle.independent);
     }
 }

@@ -13,7 +13,7 @@ pub struct RunSummary {
     pub begin: Option<Timestamp>,
     /// The estimate of the last one.
     pub last: Option<MotionEstimate>,
-    /// The highest speed, either way.
+    /// The highest speed, in either direction.
     pub top_speed: Speed,
     /// How many periods were of each mode.
     pub modes: ModeCounts,

@@ -5,7 +5,7 @@ use footplate_core::odometry::{Mode, MotionEstimate, Odometer};
 use footplate_core::{Speed, TimeSpan, Timestamp};
 use footplate_sim::line::{LineEventKind, LineRun, LineTruth, WheelTruth};
 
-use super::counted_way::WayCounter;
+use super::counted_distances::DistanceCounter;
 use super::oracle::{Oracle, hindsight};
 use super::rival::{Rival, RivalOdometer};
 use super::run::{Preset, claim};
@@ -78,7 +78,7 @@ pub enum WorldOdometer {
     RawMean,
     /// The larger count.
     RawMax,
-    /// One that is told which wheelset slips, and when.
+    /// One that knows which wheelset slips, and when.
     Oracle,
     /// One that knows the truth but while both slip, and then the mean acceleration, in hindsight.
     Hindsight,
@@ -136,7 +136,7 @@ impl WorldScores {
     /// The first value of the vehicle that no railway has.
     pub fn of(run: &LineRun) -> Result<Self, VehicleError> {
         let vehicle = simulated_vehicle(&run.vehicle)?.vehicle;
-        let mut counter = WayCounter::new(&vehicle);
+        let mut counter = DistanceCounter::new(&vehicle);
         let mut ours = Odometer::new(vehicle, Preset::Recommended.settings())?;
         let mut paper = Odometer::new(vehicle, Preset::Paper.settings())?;
         let mut rivals = [Rival::RawMean, Rival::RawMax].map(|rival| RivalOdometer::new(rival, &vehicle));

@@ -82,7 +82,7 @@ pub enum Reply {
 /// Names of the tracks on which trains run: all of them, by their use, and the first output of a motor shield.
 const MAIN_TRACKS: [&str; 3] = ["", "MAIN", "A"];
 
-/// A message of a known kind with impossible parameters: it was damaged on its way.
+/// A message of a known kind with impossible parameters: it was damaged in transit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Malformed;
 

@@ -11,7 +11,7 @@ mod command {
     pub(super) const FUNCTION: u8 = 0x06;
     pub(super) const ACCESSORY: u8 = 0x0B;
     pub(super) const MODULES: u8 = 0x10;
-    pub(super) const CONTACT: u8 = 0x11;
+    pub(super) const INPUT: u8 = 0x11;
     pub(super) const PING: u8 = 0x18;
     pub(super) const BOOT: u8 = 0x1B;
     pub(super) const FILE: u8 = 0x20;
@@ -71,9 +71,9 @@ impl Direction {
     }
 }
 
-/// How a contact has changed.
+/// How an input has changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ContactChange {
+pub struct InputChange {
     /// Whether it was occupied.
     pub was_occupied: bool,
     /// Whether it is.
@@ -144,23 +144,23 @@ pub enum Message {
         /// From the first to this one.
         modules: u8,
     },
-    /// The contacts of a module.
+    /// The inputs of a module.
     ModuleState {
         /// The device that it is behind.
         uid: Uid,
         /// From 1.
         module: u8,
-        /// Contact 1 in the lowest bit.
-        contacts: u16,
+        /// Input 1 in the lowest bit.
+        inputs: u16,
     },
-    /// A contact: what has become of it; `None` asks.
-    Contact {
+    /// An input: what has become of it; `None` asks.
+    Input {
         /// The device that it is behind.
         device: u16,
         /// Its number there, from 1.
-        contact: u16,
+        input: u16,
         /// What has become of it.
-        change: Option<ContactChange>,
+        change: Option<InputChange>,
     },
     /// Who is there?
     Ping,
@@ -186,7 +186,7 @@ pub enum Message {
     },
     /// Eight more bytes of it.
     StreamGoesOn([u8; MOST_DATA]),
-    /// Something else, or something that was changed on its way.
+    /// Something else, or something that was changed in transit.
     Unknown {
         /// The command of the frame.
         command: u8,
@@ -244,25 +244,21 @@ impl Message {
             }
             (command::MODULES, [modules]) => Self::ModulePoll { uid, modules: *modules },
             (command::MODULES, [module, high, low]) => {
-                Self::ModuleState { uid, module: *module, contacts: word(high, low) }
+                Self::ModuleState { uid, module: *module, inputs: word(high, low) }
             }
-            (command::CONTACT, rest) => {
+            (command::INPUT, rest) => {
                 let [d0, d1, c0, c1] = first;
                 let lasted = match rest {
                     [] => {
-                        return Some(Self::Contact {
-                            device: word(d0, d1),
-                            contact: word(c0, c1),
-                            change: None,
-                        });
+                        return Some(Self::Input { device: word(d0, d1), input: word(c0, c1), change: None });
                     }
                     [_, _] => None,
                     [_, _, high, low] => Some(word(high, low)),
                     _ => return None,
                 };
                 let (was_occupied, is_occupied) = (flag(rest.first()?)?, flag(rest.get(1)?)?);
-                let change = Some(ContactChange { was_occupied, is_occupied, lasted });
-                Self::Contact { device: word(d0, d1), contact: word(c0, c1), change }
+                let change = Some(InputChange { was_occupied, is_occupied, lasted });
+                Self::Input { device: word(d0, d1), input: word(c0, c1), change }
             }
             (command::PING, [major, minor, high, low]) => {
                 Self::Participant { uid, version: (*major, *minor), kind: word(high, low) }
@@ -312,15 +308,15 @@ impl Message {
                 (command::ACCESSORY, with(uid, &[position, current, high, low]))
             }
             Self::ModulePoll { uid, modules } => (command::MODULES, with(uid, &[modules])),
-            Self::ModuleState { uid, module, contacts } => {
-                let [high, low] = contacts.to_be_bytes();
+            Self::ModuleState { uid, module, inputs } => {
+                let [high, low] = inputs.to_be_bytes();
                 (command::MODULES, with(uid, &[module, high, low]))
             }
-            Self::Contact { device, contact, change } => {
-                let place = Uid(u32::from(device) << 16 | u32::from(contact));
+            Self::Input { device, input, change } => {
+                let place = Uid(u32::from(device) << 16 | u32::from(input));
                 let data = match change {
                     None => with(place, &[]),
-                    Some(ContactChange { was_occupied, is_occupied, lasted }) => {
+                    Some(InputChange { was_occupied, is_occupied, lasted }) => {
                         let (old, new) = (u8::from(was_occupied), u8::from(is_occupied));
                         match lasted.map(u16::to_be_bytes) {
                             None => with(place, &[old, new]),
@@ -328,7 +324,7 @@ impl Message {
                         }
                     }
                 };
-                (command::CONTACT, data)
+                (command::INPUT, data)
             }
             Self::Ping => (command::PING, Payload::default()),
             Self::Participant { uid, version: (major, minor), kind } => {

@@ -5,7 +5,7 @@
 pub(super) enum Question {
     /// Who is there.
     Ping,
-    /// The contacts of all modules.
+    /// The inputs of all modules.
     Modules,
     /// Sets the track power.
     Power,

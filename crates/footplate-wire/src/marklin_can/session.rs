@@ -7,9 +7,9 @@ use alloc::vec::Vec;
 
 use footplate_core::{Command, DecoderSteps, SensorId, TimeSpan, Timestamp, TrainId};
 
-use super::contacts::Contacts;
 use super::frame::hash_of;
 use super::framing::Framing;
+use super::inputs::Inputs;
 use super::message::Message;
 use super::opening::Question;
 use super::outstanding::Awaited;
@@ -27,7 +27,7 @@ use crate::silence::Checks;
 /// 2 ms after the frame before it.
 const PACING: Pacing = Pacing::new(TimeSpan::from_ms(10), 4, TimeSpan::from_ms(2));
 
-/// The interval between polls of all contacts, which find changes whose reports were lost and show that the station is alive.
+/// The interval between polls of all inputs, which find changes whose reports were lost and show that the station is alive.
 const POLL_EVERY: TimeSpan = TimeSpan::from_ms(1_000);
 
 /// The rest of a frame arrives within this time.
@@ -62,7 +62,7 @@ pub struct Client {
     /// Whether to halt all locomotives next, whatever their numbers.
     halts_all: bool,
     roster: Roster,
-    contacts: Contacts,
+    inputs: Inputs,
     /// Participants that have identified themselves.
     participants: Vec<Uid>,
     solenoid: Option<Solenoid>,
@@ -101,7 +101,7 @@ impl Client {
             opening: Opening::asking(Question::ALL),
             halts_all: false,
             roster: Roster::default(),
-            contacts: Contacts::default(),
+            inputs: Inputs::default(),
             participants: Vec::new(),
             solenoid: None,
             unverified: Vec::new(),

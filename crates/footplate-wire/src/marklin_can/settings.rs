@@ -26,13 +26,13 @@ pub struct Settings {
     pub locomotives: LocomotiveProtocol,
     /// The protocol of turnouts.
     pub turnouts: AccessoryProtocol,
-    /// The contact that is the layout's sensor 0.
-    pub first_contact: u16,
-    /// The device that the contacts are behind; `None`: any.
+    /// The input that is the layout's sensor 0.
+    pub first_input: u16,
+    /// The device that the inputs are behind; `None`: any.
     pub device: Option<u16>,
     /// S88 modules behind it.
     pub modules: u8,
-    /// How often the station reads its contacts.
+    /// How often the station reads its inputs.
     pub scan: TimeSpan,
 }
 
@@ -44,7 +44,7 @@ impl Default for Settings {
             uid: Uid(0x4650_4C54),
             locomotives: LocomotiveProtocol::default(),
             turnouts: AccessoryProtocol::default(),
-            first_contact: 1,
+            first_input: 1,
             device: None,
             modules: 1,
             scan: SCAN_EVERY,

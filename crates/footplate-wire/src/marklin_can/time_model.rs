@@ -1,9 +1,9 @@
 //! Delays between the track, the station and this program.
 //!
-//! A station loads all contacts into the S88 bus at once, a cycle apart, shifts out one after the other and reports what has changed
+//! A station loads all inputs into the S88 bus at once, a cycle apart, shifts out one after the other and reports what has changed
 //! since the cycle before. A report says for how
-//! long the contact was in the state before, in units of 10 ms by the station's clock. So the times at which the station saw two
-//! changes of one contact are known to lie so far apart, whatever the network did to the reports: where the delay of one is uncertain,
+//! long the input was in the state before, in units of 10 ms by the station's clock. So the times at which the station saw two
+//! changes of one input are known to lie so far apart, whatever the network did to the reports: where the delay of one is uncertain,
 //! the other one narrows it.
 
 use footplate_core::link::{TimeModel, UsualLine};
@@ -11,13 +11,13 @@ use footplate_core::{TimeSpan, Timestamp};
 
 use super::outstanding::REPEATED_AFTER;
 
-/// Contacts of an S88 module.
-pub const CONTACTS_PER_MODULE: u16 = 16;
+/// Inputs of an S88 module.
+pub const INPUTS_PER_MODULE: u16 = 16;
 
-/// How often a station loads its contacts, unless its owner has set another cycle (10 to 1000 ms on a Link S88).
+/// How often a station loads its inputs, unless its owner has set another cycle (10 to 1000 ms on a Link S88).
 pub const SCAN_EVERY: TimeSpan = TimeSpan::from_ms(100);
 
-/// What shifting out one contact takes (Link S88, unless its owner has set another).
+/// What shifting out one input takes (Link S88, unless its owner has set another).
 pub const BIT_TIME: TimeSpan = TimeSpan::from_us(167);
 
 /// The shortest time from the station seeing a change until the host has the report: a frame with eight bytes has about 130 bits,
@@ -98,10 +98,10 @@ impl Span {
         (earliest <= latest).then_some(Self { earliest, latest })
     }
 
-    /// The end of an entry in the recording and the width of the span before it: entries stay in order, and a contact became
+    /// The end of an entry in the recording and the width of the span before it: entries stay in order, and an input became
     /// occupied up to one cycle before it was loaded, which was before it was shifted out.
-    pub(super) fn entry(self, contact: u16, scan: TimeSpan, order: Order) -> (Timestamp, TimeSpan) {
-        let shifted = TimeSpan::from_ns(BIT_TIME.as_ns() * i64::from(contact));
+    pub(super) fn entry(self, input: u16, scan: TimeSpan, order: Order) -> (Timestamp, TimeSpan) {
+        let shifted = TimeSpan::from_ns(BIT_TIME.as_ns() * i64::from(input));
         let latest = (self.latest - shifted).max(order.not_before).min(order.now);
         (latest, (latest - (self.earliest - shifted - scan)).max(TimeSpan::ZERO))
     }
@@ -131,7 +131,7 @@ mod tests {
         let (now, scan) = (Timestamp::from_s(10.0), TimeSpan::from_ms(100));
         let span = Span::of_report(now);
         let (latest, width) = span.entry(12, scan, Order { not_before: Timestamp::ZERO, now });
-        // The twelfth contact is shifted out 12 × 0.167 = 2.004 ms after it was loaded.
+        // The twelfth input is shifted out 12 × 0.167 = 2.004 ms after it was loaded.
         assert_eq!(now - latest, TimeSpan::from_us(2_524));
         assert_eq!(width, TimeSpan::from_us(119_480));
         let (latest, width) = span.entry(12, scan, Order { not_before: now, now });

@@ -77,7 +77,7 @@ pub enum Message {
     Go,
     /// Switch the track power off.
     Stop,
-    /// Whether reading a module clears its memory of closed contacts.
+    /// Whether reading a module clears its memory of closed inputs.
     ResetMode {
         /// `true` to forget.
         on: bool,

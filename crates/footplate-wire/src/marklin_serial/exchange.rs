@@ -22,8 +22,8 @@ pub(super) const REPLY_ALLOWANCE: TimeSpan = TimeSpan::from_ms(20);
 /// way after four times that.
 const STOP_SILENCE: TimeSpan = TimeSpan::from_ms(20);
 
-/// After a whole reply with a newly closed contact, one byte more would still come within this time if one too many
-/// is on its way, and then none of them can be trusted.
+/// After a whole reply with a newly closed input, one byte more would still come within this time if one too many
+/// is in transit, and then none of them can be trusted.
 const SETTLING: TimeSpan = TimeSpan::from_us(6_000);
 
 /// Why a frame is sent.
@@ -52,7 +52,7 @@ pub(super) enum Exchange {
     Quiet(Quiet),
 }
 
-/// A frame on its way out.
+/// A frame being written.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sending {
     pub(super) frame: Frame,
@@ -74,7 +74,7 @@ impl Sending {
     }
 }
 
-/// A reply on its way in.
+/// A reply being read.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Awaited {
     pub(super) request: Message,
@@ -110,15 +110,15 @@ pub(super) struct Quiet {
     heard: Timestamp,
     /// Whether the interface may be waiting for a second byte, so that nothing may be said to it but what brings it
     /// back into step.
-    pub(super) in_doubt: bool,
+    pub(super) is_uncertain: bool,
     /// The reply that was given up.
     pub(super) lost: Option<Awaited>,
 }
 
 impl Quiet {
     /// The line has been silent since a time.
-    pub(super) fn begin(now: Timestamp, heard: Timestamp, in_doubt: bool) -> Self {
-        Self { until: heard + SILENCE, limit: now + LONGEST_SILENCE, heard, in_doubt, lost: None }
+    pub(super) fn begin(now: Timestamp, heard: Timestamp, is_uncertain: bool) -> Self {
+        Self { until: heard + SILENCE, limit: now + LONGEST_SILENCE, heard, is_uncertain, lost: None }
     }
 
     pub(super) fn disturb(&mut self, now: Timestamp) {
@@ -126,7 +126,7 @@ impl Quiet {
         self.until = (now + SILENCE).min(self.limit);
     }
 
-    /// From when on a stop may be said although the silence is not over: by then no reply is under way any more.
+    /// From when on a stop may be said although the silence is not over: by then no reply is in transit any more.
     pub(super) fn stops_may_go(&self) -> Timestamp {
         (self.heard + STOP_SILENCE).min(self.until)
     }

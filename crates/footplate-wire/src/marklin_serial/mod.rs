@@ -29,6 +29,6 @@ pub use line::{
 };
 pub use module_reads::ModuleReads;
 pub use pacing::Pace;
-pub use s88::{CONTACTS_PER_MODULE, ModuleState, ReplyError, decode_reply};
+pub use s88::{INPUTS_PER_MODULE, ModuleState, ReplyError, decode_reply};
 pub use session::Interface;
 pub use settings::Settings;

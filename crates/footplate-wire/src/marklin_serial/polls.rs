@@ -8,10 +8,10 @@ use super::line::time_on_line;
 use super::module_reads::{ModuleReads, ReadsProbe};
 use super::readings::Readings;
 use super::reply_time::ReplyTime;
-use super::s88::CONTACTS_PER_MODULE;
+use super::s88::INPUTS_PER_MODULE;
 use super::solenoid::Solenoid;
 
-/// While one module is watched, all are asked this often: a contact elsewhere is kept by its module and so not
+/// While one module is watched, all are asked this often: an input elsewhere is kept by its module and so not
 /// missed, only less well dated, and a poll of five modules takes 60 ms, an eighth of the line's time.
 const ALL_EVERY: TimeSpan = TimeSpan::from_ms(500);
 
@@ -41,7 +41,7 @@ impl Polls {
     }
 
     pub(super) fn watch(&mut self, sensor: Option<SensorId>) {
-        let module = sensor.and_then(|sensor| u8::try_from(sensor.0 / CONTACTS_PER_MODULE + 1).ok());
+        let module = sensor.and_then(|sensor| u8::try_from(sensor.0 / INPUTS_PER_MODULE + 1).ok());
         self.watched = module.filter(|module| *module <= self.modules);
     }
 

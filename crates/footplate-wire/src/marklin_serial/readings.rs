@@ -8,7 +8,7 @@ use super::s88::ModuleState;
 
 /// The last complete readings of all modules.
 ///
-/// A contact is reported once when it closes, not again at every poll that still sees it: it closed once, and only the
+/// An input is reported once when it closes, not again at every poll that still sees it: it closed once, and only the
 /// first reading bounds when. It is reported again when it opens. What the first reading of a module shows may be a memory of before and is not reported.
 #[derive(Debug, Clone)]
 pub(super) struct Readings {
@@ -24,7 +24,7 @@ struct Reading {
     first_two: bool,
 }
 
-/// The meaning of one reading of a contact.
+/// The meaning of one reading of an input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Read {
     /// It closed after the previous reading.
@@ -41,7 +41,7 @@ impl Readings {
         Self { modules: (1..=count).map(reading).collect() }
     }
 
-    /// Whether a state shows a contact newly closed.
+    /// Whether a state shows an input newly closed.
     pub(super) fn shows_new(&self, state: ModuleState) -> bool {
         self.reading(state.module)
             .is_some_and(|known| known.asked.is_some() && !state.since(known.state).is_open())
@@ -90,7 +90,7 @@ mod tests {
     }
 
     fn read(readings: &mut Readings, asked: i64, closed: &[u16]) -> Vec<Read> {
-        let state = ModuleState::with_closed(1, closed.iter().map(|contact| SensorId(*contact)));
+        let state = ModuleState::with_closed(1, closed.iter().map(|input| SensorId(*input)));
         let mut found = Vec::new();
         readings.take(ms(asked), state, |read| found.push(read));
         found
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn a_contact_is_reported_once_each_time_it_closes() {
+    fn an_input_is_reported_once_each_time_it_closes() {
         let mut readings = Readings::new(1);
         assert_eq!(read(&mut readings, 0, &[]), []);
         assert_eq!(read(&mut readings, 60, &[3]), [closed(60, 3, 60)]);

@@ -1,6 +1,6 @@
-//! Replies of the interface: the contacts of its S88 sensor modules.
+//! Replies of the interface: the inputs of its S88 sensor modules.
 //!
-//! Two bytes a module, the first contact in the highest bit of the first byte.
+//! Two bytes a module, the first input in the highest bit of the first byte.
 
 use core::fmt::{Display, Formatter, Result as FmtResult};
 
@@ -8,18 +8,18 @@ use footplate_core::SensorId;
 
 use super::codec::Message;
 
-/// Contacts on one S88 module.
-pub const CONTACTS_PER_MODULE: u16 = 16;
+/// Inputs on one S88 module.
+pub const INPUTS_PER_MODULE: u16 = 16;
 
-const FIRST_CONTACT: u16 = 1 << (CONTACTS_PER_MODULE - 1);
+const FIRST_INPUT: u16 = 1 << (INPUTS_PER_MODULE - 1);
 const BYTES_PER_MODULE: usize = 2;
 
-/// The contacts of one module, as one reply shows them.
+/// The inputs of one module, as one reply shows them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ModuleState {
     /// The module, counted from 1.
     pub module: u8,
-    /// The contacts that are closed, the first in the highest bit.
+    /// The inputs that are closed, the first in the highest bit.
     closed: u16,
 }
 
@@ -37,11 +37,11 @@ pub enum ReplyError {
 }
 
 impl ModuleState {
-    /// A module on which these contacts are closed, and no others; contacts of other modules do not count.
+    /// A module on which these inputs are closed, and no others; inputs of other modules do not count.
     #[must_use]
-    pub fn with_closed(module: u8, contacts: impl IntoIterator<Item = SensorId>) -> Self {
+    pub fn with_closed(module: u8, inputs: impl IntoIterator<Item = SensorId>) -> Self {
         let open = Self { module, closed: 0 };
-        let bits = contacts.into_iter().filter_map(|contact| open.bit_of(contact));
+        let bits = inputs.into_iter().filter_map(|input| open.bit_of(input));
         Self { module, closed: bits.fold(0, |closed, bit| closed | bit) }
     }
 
@@ -57,14 +57,14 @@ impl ModuleState {
         Self { module, closed: u16::from_be_bytes(reply) }
     }
 
-    /// The closed contacts in the order of their numbers.
+    /// The closed inputs in the order of their numbers.
     pub fn closed(self) -> impl Iterator<Item = SensorId> {
-        let first = self.first_contact();
-        let contacts = (0..CONTACTS_PER_MODULE).filter(move |at| self.closed & (FIRST_CONTACT >> at) != 0);
-        contacts.map(move |at| SensorId(first + at))
+        let first = self.first_input();
+        let inputs = (0..INPUTS_PER_MODULE).filter(move |at| self.closed & (FIRST_INPUT >> at) != 0);
+        inputs.map(move |at| SensorId(first + at))
     }
 
-    /// A module without closed contacts.
+    /// A module without closed inputs.
     pub(super) const fn all_open(module: u8) -> Self {
         Self { module, closed: 0 }
     }
@@ -73,7 +73,7 @@ impl ModuleState {
         self.closed == 0
     }
 
-    /// The contacts that are closed now and were not in an earlier state.
+    /// The inputs that are closed now and were not in an earlier state.
     pub(super) const fn since(self, before: Self) -> Self {
         Self { module: self.module, closed: self.closed & !before.closed }
     }
@@ -83,13 +83,13 @@ impl ModuleState {
         Self { module: self.module, closed: self.closed & other.closed }
     }
 
-    fn bit_of(self, contact: SensorId) -> Option<u16> {
-        let at = contact.0.checked_sub(self.first_contact()).filter(|at| *at < CONTACTS_PER_MODULE)?;
-        Some(FIRST_CONTACT >> at)
+    fn bit_of(self, input: SensorId) -> Option<u16> {
+        let at = input.0.checked_sub(self.first_input()).filter(|at| *at < INPUTS_PER_MODULE)?;
+        Some(FIRST_INPUT >> at)
     }
 
-    fn first_contact(self) -> u16 {
-        u16::from(self.module).saturating_sub(1) * CONTACTS_PER_MODULE
+    fn first_input(self) -> u16 {
+        u16::from(self.module).saturating_sub(1) * INPUTS_PER_MODULE
     }
 }
 
@@ -132,13 +132,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_first_contact_is_the_highest_bit() {
+    fn the_first_input_is_the_highest_bit() {
         let state = ModuleState::decode(1, [0b1000_0000, 0b0000_0001]);
         assert_eq!(state.closed().collect::<Vec<_>>(), [SensorId(0), SensorId(15)]);
     }
 
     #[test]
-    fn contacts_of_another_module_do_not_count() {
+    fn inputs_of_another_module_do_not_count() {
         let state = ModuleState::with_closed(2, [SensorId(15), SensorId(16), SensorId(32)]);
         assert_eq!(state.closed().collect::<Vec<_>>(), [SensorId(16)]);
     }

@@ -192,7 +192,7 @@ impl Interface {
         }
         if core::mem::take(&mut self.is_overtaken) {
             self.recovery.cancel();
-            self.put_in_doubt(now, self.pacing.gone().unwrap_or(now));
+            self.distrust(now, self.pacing.gone().unwrap_or(now));
             return None;
         }
         if self.farewell.begun {
@@ -223,7 +223,7 @@ impl Interface {
         (!self.farewell.is_over()).then_some((Message::Stop, Purpose::PowerAtClose))
     }
 
-    /// Writes the next byte of the frame on its way, if there is one.
+    /// Writes the next byte of the frame in transit, if there is one.
     fn write(&mut self, now: Timestamp) {
         if let Exchange::Sending(sending) = &mut self.exchange
             && let Some(byte) = sending.next_byte()
@@ -349,7 +349,7 @@ impl Session for Interface {
         self.reply_time.forget();
         // Its next answer is news: trains wait for it.
         self.silence = Silence::default();
-        self.put_in_doubt(now, now);
+        self.distrust(now, now);
         self.recovery.begin_anew(self.power_word());
         self.pacing = Pacing::new(now, self.settings.pace);
         self.go_on(now);
@@ -412,7 +412,7 @@ impl Session for Interface {
             Exchange::Sending(_) => self.pacing.ready_at(),
             Exchange::Awaiting(awaited) | Exchange::Settling(awaited) => Some(awaited.until),
             Exchange::Quiet(quiet) => {
-                let stops = (quiet.in_doubt && self.waiting.has_urgent()).then(|| quiet.stops_may_go());
+                let stops = (quiet.is_uncertain && self.waiting.has_urgent()).then(|| quiet.stops_may_go());
                 let release = [self.solenoid.due(), self.solenoid.hurries_at(), stops];
                 let coming = release.into_iter().flatten().filter(|at| *at > self.now);
                 coming.chain([quiet.until]).min()

@@ -63,7 +63,7 @@ impl Solenoid {
         Some(self.since()? + HURRY_AFTER)
     }
 
-    /// When the line has to be free for its release at the latest: a whole command may be under way by then.
+    /// When the line has to be free for its release at the latest: a whole command may be in transit by then.
     pub(super) fn latest(&self) -> Option<Timestamp> {
         const ROOM: i64 = 4;
         Some(self.since()? + SOLENOID_HOLD_LONGEST - TimeSpan::from_ns(BYTE_TIME.as_ns() * ROOM))

@@ -73,7 +73,7 @@ pub enum Reply {
     RailCom(RailCom),
 }
 
-/// A dataset of a known kind with impossible contents: it was damaged on its way.
+/// A dataset of a known kind with impossible contents: it was damaged in transit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Malformed;
 

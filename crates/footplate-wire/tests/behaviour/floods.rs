@@ -98,7 +98,7 @@ fn a_can_bus_that_talks_without_end_is_stopped() {
         let message = match kind % 3 {
             0 => marklin_can::Message::Participant { uid, version: (1, 0), kind: second as u16 },
             1 => marklin_can::Message::Accessory { uid, position: second as u8 & 1, current: 1, time: None },
-            _ => marklin_can::Message::ModuleState { uid, module: 1, contacts: second as u16 },
+            _ => marklin_can::Message::ModuleState { uid, module: 1, inputs: second as u16 },
         };
         message.frame(true, 0x4711).encode().to_vec()
     });

@@ -1,7 +1,7 @@
 //! What is written is what is read, wherever the line cuts it, and noise is read without a panic.
 
 use footplate_wire::marklin_can::{
-    ContactChange, Direction, Frame, Framing, Message, Payload, Transport, Uid, read_list,
+    Direction, Frame, Framing, InputChange, Message, Payload, Transport, Uid, read_list,
 };
 use proptest::prelude::{Just, Strategy, any, prop_assert, prop_assert_eq, prop_oneof, proptest};
 
@@ -9,9 +9,9 @@ fn uids() -> impl Strategy<Value = Uid> {
     any::<u32>().prop_map(Uid)
 }
 
-fn changes() -> impl Strategy<Value = ContactChange> {
+fn changes() -> impl Strategy<Value = InputChange> {
     (any::<bool>(), any::<bool>(), any::<Option<u16>>())
-        .prop_map(|(was_occupied, is_occupied, lasted)| ContactChange { was_occupied, is_occupied, lasted })
+        .prop_map(|(was_occupied, is_occupied, lasted)| InputChange { was_occupied, is_occupied, lasted })
 }
 
 fn directions() -> impl Strategy<Value = Direction> {
@@ -54,13 +54,13 @@ fn messages() -> impl Strategy<Value = Message> {
         (uids(), any::<(u8, u8, Option<u16>)>())
             .prop_map(|(uid, (position, current, time))| Message::Accessory { uid, position, current, time }),
         (uids(), any::<u8>()).prop_map(|(uid, modules)| Message::ModulePoll { uid, modules }),
-        (uids(), any::<(u8, u16)>()).prop_map(|(uid, (module, contacts))| Message::ModuleState {
+        (uids(), any::<(u8, u16)>()).prop_map(|(uid, (module, inputs))| Message::ModuleState {
             uid,
             module,
-            contacts
+            inputs
         }),
         (any::<(u16, u16)>(), proptest::option::of(changes()))
-            .prop_map(|((device, contact), change)| Message::Contact { device, contact, change }),
+            .prop_map(|((device, input), change)| Message::Input { device, input, change }),
     ];
     prop_oneof![of_all, of_one]
 }

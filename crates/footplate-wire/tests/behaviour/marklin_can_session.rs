@@ -51,7 +51,7 @@ impl Station for Central {
 
 type Desk = crate::desk::Desk<Client, Central>;
 
-/// As a station answers on which one locomotive runs backwards and contact 4 is occupied.
+/// As a station answers on which one locomotive runs backwards and input 4 is occupied.
 fn answers(message: Message) -> Vec<Message> {
     match message {
         Message::Ping => vec![Message::Participant { uid: Uid(0x4746_81D4), version: (1, 39), kind: 0x10 }],
@@ -59,7 +59,7 @@ fn answers(message: Message) -> Vec<Message> {
             .map(|module| Message::ModuleState {
                 uid: Uid::ALL,
                 module,
-                contacts: if module == 1 { 8 } else { 0 },
+                inputs: if module == 1 { 8 } else { 0 },
             })
             .collect(),
         Message::Direction { uid, direction: None } => {
@@ -96,10 +96,10 @@ impl Desk {
         messages.filter(|message| !matches!(message, Message::ModulePoll { .. })).collect()
     }
 
-    fn contact(&mut self, contact: u16, was_occupied: bool, is_occupied: bool, lasted: u16) {
+    fn input(&mut self, input: u16, was_occupied: bool, is_occupied: bool, lasted: u16) {
         let change =
-            footplate_wire::marklin_can::ContactChange { was_occupied, is_occupied, lasted: Some(lasted) };
-        self.hear(Message::Contact { device: 0, contact, change: Some(change) }, true);
+            footplate_wire::marklin_can::InputChange { was_occupied, is_occupied, lasted: Some(lasted) };
+        self.hear(Message::Input { device: 0, input, change: Some(change) }, true);
     }
 }
 
@@ -214,10 +214,10 @@ fn a_report_is_dated_by_the_network_the_cycle_and_the_time_it_carries() {
     let mut desk = Desk::opened();
     desk.station.ignores = |message| matches!(message, Message::ModulePoll { .. });
     let began = desk.now;
-    desk.contact(17, false, true, 0);
-    // The same datagram again, one without the response bit, one of contact 4 that was occupied from the start.
-    desk.contact(17, false, true, 0);
-    desk.contact(4, true, false, 300);
+    desk.input(17, false, true, 0);
+    // The same datagram again, one without the response bit, one of input 4 that was occupied from the start.
+    desk.input(17, false, true, 0);
+    desk.input(4, true, false, 300);
     desk.run_for(1);
     let Event { time, kind: EventKind::Sensor(Report { sensor, poll_interval }) } = desk.events[0] else {
         panic!("{:?}", desk.events)
@@ -228,9 +228,9 @@ fn a_report_is_dated_by_the_network_the_cycle_and_the_time_it_carries() {
     assert_eq!(poll_interval, Some(TimeSpan::from_us(100_000 + 20_000 - 520)));
     // It became free after 0.50 s and occupied 2.00 s later; both reports were quick. The third is held up by 15 ms.
     desk.run_for(499);
-    desk.contact(17, true, false, 50);
+    desk.input(17, true, false, 50);
     desk.run_for(2_015);
-    desk.contact(17, false, true, 200);
+    desk.input(17, false, true, 200);
     desk.run_for(1);
     let Event { kind: EventKind::Sensor(report), .. } = desk.events[1] else { panic!("{:?}", desk.events) };
     assert!(report.poll_interval.unwrap() < TimeSpan::from_ms(120) - TimeSpan::from_us(5_000), "{report:?}");
@@ -240,7 +240,7 @@ fn a_report_is_dated_by_the_network_the_cycle_and_the_time_it_carries() {
 fn a_report_that_was_lost_is_made_up_for_by_asking() {
     let mut desk = Desk::opened();
     desk.station.ignores = |message| matches!(message, Message::ModulePoll { .. });
-    desk.hear(Message::ModuleState { uid: Uid::ALL, module: 2, contacts: 1 }, true);
+    desk.hear(Message::ModuleState { uid: Uid::ALL, module: 2, inputs: 1 }, true);
     desk.run_for(1);
     let Event { kind: EventKind::Sensor(report), .. } = desk.events[0] else { panic!("{:?}", desk.events) };
     assert_eq!(report.sensor, SensorId(16));

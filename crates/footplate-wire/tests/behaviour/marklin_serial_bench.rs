@@ -57,7 +57,7 @@ pub(crate) struct Station {
     /// Turnouts as they were thrown, powered from when until when.
     pub(crate) coils: Vec<(TurnoutId, Timestamp, Option<Timestamp>)>,
     pub(crate) messages: Vec<(Timestamp, Message)>,
-    /// Contacts that are closed, and those that were since they were read.
+    /// Inputs that are closed, and those that were since they were read.
     closed: BTreeSet<SensorId>,
     memory: BTreeSet<SensorId>,
     cts: bool,
@@ -89,7 +89,7 @@ impl Station {
         }
     }
 
-    pub(crate) fn contact(&mut self, sensor: u16, closed: bool) {
+    pub(crate) fn input(&mut self, sensor: u16, closed: bool) {
         let sensor = SensorId(sensor);
         if closed {
             self.closed.insert(sensor);
@@ -293,7 +293,7 @@ impl Bench {
         cable.lost_to_host = places.iter().map(|place| cable.to_host + place).collect();
     }
 
-    /// The reports of one contact: when, and how long before it at most.
+    /// The reports of one input: when, and how long before it at most.
     pub(crate) fn reports(&self, sensor: u16) -> Vec<(Timestamp, TimeSpan)> {
         let of = |event: &Event| match event.kind {
             EventKind::Sensor(report) if report.sensor == SensorId(sensor) => {

@@ -1,4 +1,4 @@
-//! Polls and commands share the line: each report says since when its contact may have been closed, commands go first,
+//! Polls and commands share the line: each report says since when its input may have been closed, commands go first,
 //! and nothing is written that the interface would not take.
 
 use footplate_core::{
@@ -64,7 +64,7 @@ fn a_poll_of_five_modules_comes_every_sixty_milliseconds() {
 }
 
 #[test]
-fn a_watched_contact_is_read_four_times_as_often_and_the_others_not_forgotten() {
+fn a_watched_input_is_read_four_times_as_often_and_the_others_not_forgotten() {
     let mut bench = Bench::with_cts();
     bench.session.watch(Some(SensorId(40)));
     bench.run_until(ms(1_000));
@@ -75,8 +75,8 @@ fn a_watched_contact_is_read_four_times_as_often_and_the_others_not_forgotten() 
     assert!(count("read module 3") >= 420, "{} of the watched module", count("read module 3"));
     assert!((17..=21).contains(&count("read modules 1 to 5")), "{} of all", count("read modules 1 to 5"));
 
-    // A contact elsewhere is reported with the interval that its module was really left alone.
-    bench.station.contact(70, true);
+    // An input elsewhere is reported with the interval that its module was really left alone.
+    bench.station.input(70, true);
     let closed = bench.now;
     bench.run_for(1_000);
     let [(read, interval)] = bench.reports(70)[..] else { panic!("one closure, one report") };
@@ -86,7 +86,7 @@ fn a_watched_contact_is_read_four_times_as_often_and_the_others_not_forgotten() 
 
 proptest! {
     #[test]
-    fn a_contact_closed_within_the_poll_interval_before_its_report(
+    fn an_input_closed_within_the_poll_interval_before_its_report(
         closes_us in proptest::collection::vec(5_000_i64..400_000, 1..12),
         lasts_us in 100_i64..200_000,
         watched in 0_u16..160,
@@ -99,10 +99,10 @@ proptest! {
         let mut closures = Vec::new();
         for wait_us in closes_us {
             bench.run_until(bench.now + TimeSpan::from_us(wait_us));
-            bench.station.contact(33, true);
+            bench.station.input(33, true);
             closures.push(bench.now);
             bench.run_until(bench.now + TimeSpan::from_us(lasts_us));
-            bench.station.contact(33, false);
+            bench.station.input(33, false);
         }
         bench.run_for(2_000);
         let reports = bench.reports(33);

@@ -44,8 +44,8 @@ fn sensors_are_read_again_within_300_ms_of_a_lost_reply() {
             let mut bench = losing(pace, &places);
             let began = bench.now;
             let noticed = run_until_lost(&mut bench);
-            // when a train comes over a contact then,
-            bench.station.contact(70, true);
+            // when a train comes over an input then,
+            bench.station.input(70, true);
             bench.run_for(1_000);
             // then its reading is over within 300 ms of the moment in which the loss was noticed.
             let reply = TimeSpan::from_us(10 * 4_870 + 2_000);
@@ -113,10 +113,10 @@ fn an_interface_that_answers_reads_of_all_modules_only_is_found_out_and_read_so(
         bench.run_until(ms(3_000));
         assert_eq!(bench.session.module_reads(), Some(ModuleReads::AllOnly), "{pace:?} {lateness} ms");
         assert!(bench.notices.contains(&LinkNotice::Reads(ModuleReads::AllOnly)));
-        // Nothing is lost any more, a watched contact or not, and every contact is seen.
+        // Nothing is lost any more, a watched input or not, and every input is seen.
         let (lost, before) = (bench.notices.len(), bench.now);
         bench.session.watch(Some(SensorId(3)));
-        bench.station.contact(3, true);
+        bench.station.input(3, true);
         bench.run_until(ms(6_000));
         assert_eq!(bench.notices.len(), lost, "{:?}", bench.notices);
         assert_eq!(bench.reports(3).len(), 1);

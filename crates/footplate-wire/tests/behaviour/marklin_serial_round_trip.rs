@@ -89,7 +89,7 @@ proptest! {
     }
 
     #[test]
-    fn a_contact_is_heard_under_its_own_number(sensor in 0_u16..496) {
+    fn an_input_is_heard_under_its_own_number(sensor in 0_u16..496) {
         let module = u8::try_from(sensor / 16 + 1).unwrap();
         let reply = ModuleState::with_closed(module, [SensorId(sensor)]).encode();
         let mut heard = decode_reply(Message::ReadModule { module }, &reply).unwrap().flat_map(|s| s.closed().collect::<Vec<_>>());

@@ -29,7 +29,7 @@ fn transcript(bench: &Bench) -> String {
     lines.extend(entries);
     lines.sort_by_key(|(at, _)| *at);
     let mut text = String::from(
-        "# Two modules, CTS; a train is told to drive, a turnout thrown, contact 20 closed and watched, all is closed.\n\
+        "# Two modules, CTS; a train is told to drive, a turnout thrown, input 20 closed and watched, all is closed.\n\
          # Times in ms: of a message, when its last byte was written; of an entry, what it is recorded with.\n",
     );
     for (at, line) in lines {
@@ -47,7 +47,7 @@ fn a_conversation_is_what_is_committed() {
     bench.run_until(ms(400));
     bench.session.watch(Some(SensorId(20)));
     bench.run_until(ms(450));
-    bench.station.contact(20, true);
+    bench.station.input(20, true);
     bench.run_until(ms(500));
     bench.session.close(bench.now);
     bench.run_until(ms(800));

@@ -20,13 +20,13 @@ fn vectors() -> Vec<Vector> {
         let hex = |text: &str| {
             text.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).unwrap()).collect::<Vec<_>>()
         };
-        // The table counts contacts from 1, as the modules' sockets are printed.
-        let contact = |number: &str| SensorId(number.parse::<u16>().unwrap() - 1);
+        // The table counts inputs from 1, as the modules' sockets are printed.
+        let input = |number: &str| SensorId(number.parse::<u16>().unwrap() - 1);
         Vector {
             bytes: hex(&row[0]),
             meaning: row[1].into(),
             reply: hex(&row[2]),
-            closed: row[3].split_whitespace().map(contact).collect(),
+            closed: row[3].split_whitespace().map(input).collect(),
         }
     };
     reader.records().map(|row| read(row.unwrap())).collect()
@@ -53,7 +53,7 @@ fn what_is_known_is_said_with_the_same_bytes() {
 }
 
 #[test]
-fn replies_show_the_contacts_beside_them() {
+fn replies_show_the_inputs_beside_them() {
     for vector in vectors().iter().filter(|vector| !vector.reply.is_empty()) {
         let (request, _) = Message::decode(&vector.bytes).expect("the vector should be complete");
         let states: Vec<ModuleState> = decode_reply(request, &vector.reply).expect(&vector.meaning).collect();

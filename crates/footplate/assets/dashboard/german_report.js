@@ -5,7 +5,7 @@ const LABEL = 14;
 const LABELS = {
   "line": "Leitung", "interface": "Interface", "replies": "Antworten", "polls": "Abfragen", "poll period": "Periode", "first byte": "Antwortzeit",
   "command": "Befehl", "requests": "Anfragen", "answers": "Antworten", "noise": "Störungen", "station": "Zentrale", "sensors": "Rückmelder", "delay": "Verzögerung",
-  "track": "Gleis", "railcom": "RailCom", "checksums": "Prüfsummen", "on the bus": "Am Bus", "locomotive": "Lok", "contacts": "Rückmelder", "cycle": "Zyklus",
+  "track": "Gleis", "railcom": "RailCom", "checksums": "Prüfsummen", "on the bus": "Am Bus", "locomotive": "Lok", "cycle": "Zyklus",
   "server": "Server", "bus": "Bus", "system": "System",
 };
 /** Phrases in the second column, the longest first where one is part of another. */
@@ -22,7 +22,7 @@ const PHRASES = [
   [/hardware (\S+), firmware (\S+), serial number/, "Hardware $1, Firmware $2, Seriennummer"], [/serial number (\S+), does not say what it is/, "Seriennummer $1, nennt ihre Art nicht"],
   ["does not say what it is", "nennt seine Art nicht"], ["station at", "Zentrale bei"], [/train (\d+): (\d+) received, (\d+) errors/, "Zug $1: $2 empfangen, $3 Fehler"], ["reports speed", "meldet Tempo"],
   ["wrong; they are not relied on", "falsch; sie werden nicht verwendet"], [/number (\S+), version/, "Nummer $1, Version"], [/, number (0x)/, ", Nummer $1"],
-  [/of contacts taken to be (\S+) ms, as set in the station \(scan\)/, "der Rückmelder, angenommen: $1 ms, wie in der Zentrale eingestellt (scan)"],
+  [/of sensors taken to be (\S+) ms, as set in the station \(scan\)/, "der Rückmelder, angenommen: $1 ms, wie in der Zentrale eingestellt (scan)"],
   [/(\d+) in slot (\d+), used by a throttle/, "$1 in Slot $2, von einem Fahrregler belegt"], [/(\d+) in slot (\d+), used by nobody/, "$1 in Slot $2, frei"], [/refused (\d+) messages/, "$1 Nachrichten abgelehnt"],
   [/as fast as usual: 99 of 100 answers within (\S+) ms/, "so schnell wie üblich: 99 von 100 Antworten innerhalb von $1 ms"],
   [/(\S+) ms slower than usual \((\S+) ms\), (\S+) % lost: a command may need (\d+) more tries/, "$1 ms langsamer als üblich ($2 ms), $3 % verloren: ein Befehl kann $4 weitere Versuche brauchen"],

@@ -90,7 +90,7 @@ fn limit() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Which limit ended a clerk, in words for whoever asked.
+/// Which limit ended a clerk, in words for the person who asked.
 pub(super) fn limit_that_ended(status: ExitStatus, errors: &str) -> Option<String> {
     let memory = || {
         format!(

@@ -61,7 +61,7 @@ pub(crate) struct Arguments {
     /// The same pairs in a TOML file; pairs of the command line replace them.
     #[arg(long, value_name = "M.toml")]
     map_file: Option<PathBuf>,
-    /// Which of the ways to estimate.
+    /// Which method of estimation.
     #[arg(long, value_enum, default_value_t = PresetName::Recommended)]
     preset: PresetName,
     /// Probability that the truth lies within the confidence interval.

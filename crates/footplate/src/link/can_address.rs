@@ -86,7 +86,7 @@ impl CanAddress {
             ("turnouts", _) => {
                 return Err(format!("`{value}` is no protocol of turnouts: use turnouts=mm or turnouts=dcc"));
             }
-            ("first-contact", _) => self.settings.first_contact = number(key, value, "17")?,
+            ("first-contact", _) => self.settings.first_input = number(key, value, "17")?,
             ("device", _) => self.settings.device = Some(number(key, value, "0")?),
             ("modules", _) => {
                 let modules: u8 = number(key, value, "5")?;
@@ -194,7 +194,7 @@ mod tests {
             uid: can.settings.uid,
             locomotives: LocomotiveProtocol::Dcc,
             turnouts: AccessoryProtocol::Dcc,
-            first_contact: 17,
+            first_input: 17,
             device: Some(2),
             scan: TimeSpan::from_ms(20),
             ..Settings::default()

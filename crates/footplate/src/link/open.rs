@@ -3,7 +3,7 @@
 use footplate_core::track::Layout;
 use footplate_core::{Ratio, TimeSpan};
 use footplate_sim::living::{LivingLayout, LivingSwitches, StationSwitches};
-use footplate_wire::marklin_serial::{CONTACTS_PER_MODULE, Interface, Pace, Settings};
+use footplate_wire::marklin_serial::{INPUTS_PER_MODULE, Interface, Pace, Settings};
 use footplate_wire::{dcc_ex, jmri, loconet, marklin_can, z21};
 
 use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed};
@@ -88,7 +88,7 @@ fn highest_input(layout: &Layout) -> u16 {
 /// How many modules the contacts of a layout are on.
 pub(crate) fn module_count(layout: &Layout) -> u8 {
     let highest = highest_input(layout);
-    u8::try_from(highest / CONTACTS_PER_MODULE + 1).unwrap_or(u8::MAX)
+    u8::try_from(highest / INPUTS_PER_MODULE + 1).unwrap_or(u8::MAX)
 }
 
 /// The session over an open line.
@@ -148,8 +148,8 @@ fn jmri_settings(settings: jmri::Settings, layout: &Layout) -> jmri::Settings {
 fn can_settings(address: &CanAddress, layout: &Layout) -> marklin_can::Settings {
     let CanAddress { settings, modules, .. } = address;
     let highest = highest_input(layout);
-    let last = highest.saturating_add(settings.first_contact.max(1));
-    let needed = u8::try_from(last.div_ceil(CONTACTS_PER_MODULE)).unwrap_or(u8::MAX);
+    let last = highest.saturating_add(settings.first_input.max(1));
+    let needed = u8::try_from(last.div_ceil(INPUTS_PER_MODULE)).unwrap_or(u8::MAX);
     marklin_can::Settings { modules: modules.unwrap_or(needed), ..*settings }
 }
 

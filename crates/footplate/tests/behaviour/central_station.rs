@@ -63,7 +63,7 @@ fn the_doctor_names_the_station_and_its_locomotives() {
     assert_eq!(doctor.status, 0, "{}{}", doctor.output, doctor.errors);
     let figures: Value = serde_json::from_str(&doctor.output).expect("JSON");
     assert_eq!(
-        (figures["contacts"].as_u64(), figures["lost_answers"].as_u64()),
+        (figures["sensors"].as_u64(), figures["lost_answers"].as_u64()),
         (Some(80), Some(0)),
         "{figures}"
     );

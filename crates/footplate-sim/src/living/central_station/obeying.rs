@@ -75,13 +75,13 @@ impl VirtualCentralStation<'_> {
             Message::ModulePoll { modules, .. } if self.switches.answers_polls => {
                 for module in 1..=modules {
                     let state = self.scanning.module(module);
-                    self.say(Message::ModuleState { uid: Uid::ALL, module, contacts: state });
+                    self.say(Message::ModuleState { uid: Uid::ALL, module, inputs: state });
                 }
             }
-            Message::Contact { device: 0, contact: input, change: None } => {
+            Message::Input { device: 0, input, change: None } => {
                 let change = self.scanning.input(input, self.now);
                 if change.is_some() {
-                    self.say(Message::Contact { device: 0, contact: input, change });
+                    self.say(Message::Input { device: 0, input, change });
                 }
             }
             Message::Ping => match self.switches.transport {

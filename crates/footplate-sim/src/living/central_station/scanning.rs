@@ -1,8 +1,8 @@
 //! The S88 bus: all inputs are loaded at once, a cycle apart, then shifted out one by one.
 
 use footplate_core::{TimeSpan, Timestamp};
-use footplate_wire::marklin_can::{ContactChange, Message};
-use footplate_wire::marklin_serial::CONTACTS_PER_MODULE;
+use footplate_wire::marklin_can::{InputChange, Message};
+use footplate_wire::marklin_serial::INPUTS_PER_MODULE;
 
 use crate::draws::Draws;
 use crate::living::due_queue::DueQueue;
@@ -36,7 +36,7 @@ impl Scanning {
             world.s88.sensors().iter().map(|sensor| usize::from(sensor.0) + 1).max().unwrap_or_default();
         let due = now + TimeSpan::from_s(draws.uniform(0.0..cycle.as_s()));
         // What closed before the station was switched on is forgotten.
-        let per_module = usize::from(CONTACTS_PER_MODULE);
+        let per_module = usize::from(INPUTS_PER_MODULE);
         let held: Vec<u16> = (0..count.div_ceil(per_module))
             .flat_map(|module| {
                 world.s88.read(module as u8 + 1, now, true, false).closed().collect::<Vec<_>>()
@@ -56,7 +56,7 @@ impl Scanning {
     pub(super) fn scan(&mut self, world: &mut LivingLayout<'_>, has_times: bool, draws: &mut Draws) {
         let at = self.due;
         self.due += self.cycle;
-        let per_module = usize::from(CONTACTS_PER_MODULE);
+        let per_module = usize::from(INPUTS_PER_MODULE);
         let modules = self.inputs.len().div_ceil(per_module);
         for module in 0..modules {
             let state = world.s88.read(module as u8 + 1, at, true, true);
@@ -74,8 +74,8 @@ impl Scanning {
                 let input = place as u16 + 1;
                 let shifted = TimeSpan::from_ns(BIT_TIME.as_ns() * i64::from(input));
                 let due = at + shifted + TimeSpan::from_s(draws.uniform(HANDS_ON_S));
-                let change = Some(ContactChange { was_occupied, is_occupied, lasted });
-                self.reports.add(due, Message::Contact { device: 0, contact: input, change });
+                let change = Some(InputChange { was_occupied, is_occupied, lasted });
+                self.reports.add(due, Message::Input { device: 0, input, change });
             }
         }
     }
@@ -90,16 +90,16 @@ impl Scanning {
 
     /// The inputs of a module, the first in the lowest bit.
     pub(super) fn module(&self, module: u8) -> u16 {
-        let first = (usize::from(module.max(1)) - 1) * usize::from(CONTACTS_PER_MODULE);
-        let inputs = self.inputs.iter().skip(first).take(usize::from(CONTACTS_PER_MODULE));
+        let first = (usize::from(module.max(1)) - 1) * usize::from(INPUTS_PER_MODULE);
+        let inputs = self.inputs.iter().skip(first).take(usize::from(INPUTS_PER_MODULE));
         inputs.enumerate().fold(0, |bits, (bit, (occupied, _))| bits | u16::from(*occupied) << bit)
     }
 
     /// Whether an input is occupied, and for how long it has been so or free.
-    pub(super) fn input(&self, input: u16, now: Timestamp) -> Option<ContactChange> {
+    pub(super) fn input(&self, input: u16, now: Timestamp) -> Option<InputChange> {
         let (occupied, since) = *self.inputs.get(usize::from(input.checked_sub(1)?))?;
         let ticks = (now - since).as_ns() / TICK.as_ns();
         let lasted = Some(u16::try_from(ticks).unwrap_or(u16::MAX));
-        Some(ContactChange { was_occupied: occupied, is_occupied: occupied, lasted })
+        Some(InputChange { was_occupied: occupied, is_occupied: occupied, lasted })
     }
 }

@@ -4,13 +4,13 @@ use alloc::format;
 
 use footplate_core::{EventKind, FunctionNumber, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
 
-use super::super::contacts::News;
 use super::super::frame::Frame;
-use super::super::message::{ContactChange, Direction, Message, kind_in_words};
+use super::super::inputs::News;
+use super::super::message::{Direction, InputChange, Message, kind_in_words};
 use super::super::opening::Question;
 use super::super::outstanding::Awaited;
 use super::super::speed::step_of;
-use super::super::time_model::{CONTACTS_PER_MODULE, Order};
+use super::super::time_model::{INPUTS_PER_MODULE, Order};
 use super::super::uid::Uid;
 use super::{Client, Query};
 use crate::dialogue::Opening;
@@ -108,11 +108,11 @@ impl Client {
                     self.hear_of_turnout(now, turnout, position == 0, answered.is_some());
                 }
             }
-            Message::ModuleState { module, contacts, .. } => self.hear_of_module(now, module, contacts),
-            Message::Contact { device, contact, change: Some(change) }
+            Message::ModuleState { module, inputs, .. } => self.hear_of_module(now, module, inputs),
+            Message::Input { device, input, change: Some(change) }
                 if self.settings.device.is_none_or(|wanted| wanted == device) =>
             {
-                self.hear_of_contact(now, contact, change);
+                self.hear_of_input(now, input, change);
             }
             _ => {}
         }
@@ -241,34 +241,34 @@ impl Client {
         }
     }
 
-    fn hear_of_module(&mut self, now: Timestamp, module: u8, contacts: u16) {
+    fn hear_of_module(&mut self, now: Timestamp, module: u8, inputs: u16) {
         let Some(before) = module.checked_sub(1).filter(|_| module <= self.settings.modules) else { return };
         self.has_modules = true;
         let listing = !self.opening.is_open();
-        for bit in 0..CONTACTS_PER_MODULE {
-            let contact = u16::from(before) * CONTACTS_PER_MODULE + bit + 1;
-            let Some(number) = contact.checked_sub(self.settings.first_contact) else { continue };
-            let news = self.contacts.asked(now, contact, contacts & 1 << bit != 0, listing);
-            self.report(now, contact, SensorId(number), news);
+        for bit in 0..INPUTS_PER_MODULE {
+            let input = u16::from(before) * INPUTS_PER_MODULE + bit + 1;
+            let Some(number) = input.checked_sub(self.settings.first_input) else { continue };
+            let news = self.inputs.asked(now, input, inputs & 1 << bit != 0, listing);
+            self.report(now, input, SensorId(number), news);
         }
     }
 
-    fn hear_of_contact(&mut self, now: Timestamp, contact: u16, change: ContactChange) {
-        let Some(number) = contact.checked_sub(self.settings.first_contact) else { return };
-        let news = self.contacts.changed(now, contact, change);
-        self.report(now, contact, SensorId(number), news);
+    fn hear_of_input(&mut self, now: Timestamp, input: u16, change: InputChange) {
+        let Some(number) = input.checked_sub(self.settings.first_input) else { return };
+        let news = self.inputs.changed(now, input, change);
+        self.report(now, input, SensorId(number), news);
     }
 
-    fn report(&mut self, now: Timestamp, contact: u16, sensor: SensorId, news: News) {
+    fn report(&mut self, now: Timestamp, input: u16, sensor: SensorId, news: News) {
         match news {
             News::Occupied(span) => {
                 let order = Order { not_before: self.dialogue.last_entry, now };
-                let (latest, width) = span.entry(contact, self.settings.scan, order);
+                let (latest, width) = span.entry(input, self.settings.scan, order);
                 self.dialogue.report(sensor, latest, width);
             }
             News::Freed(span) => {
                 let order = Order { not_before: self.dialogue.last_entry, now };
-                let (latest, width) = span.entry(contact, self.settings.scan, order);
+                let (latest, width) = span.entry(input, self.settings.scan, order);
                 self.dialogue.report_free(sensor, latest, width);
             }
             News::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),

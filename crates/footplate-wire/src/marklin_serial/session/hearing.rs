@@ -18,7 +18,7 @@ impl Interface {
         self.polls.lost(awaited.request, found);
         let silent = self.silence.lost(now);
         self.output.extend(silent.map(Transmit::Notice));
-        self.put_in_doubt(now, awaited.heard);
+        self.distrust(now, awaited.heard);
         if let Exchange::Quiet(quiet) = &mut self.exchange {
             quiet.lost = Some(awaited);
         }
@@ -27,7 +27,7 @@ impl Interface {
 
     /// Bytes may be lost in either direction: wait until the line has been silent for a while, bring the interface into
     /// step, and say again what it may have missed.
-    pub(super) fn put_in_doubt(&mut self, now: Timestamp, heard: Timestamp) {
+    pub(super) fn distrust(&mut self, now: Timestamp, heard: Timestamp) {
         // What was being said may have come half. A release is said again by itself.
         if let Exchange::Sending(sending @ Sending { purpose: Purpose::Command(command), .. }) = self.exchange
         {
@@ -96,11 +96,11 @@ impl Interface {
         let is_over = now >= quiet.until || self.solenoid.hurries(now);
         let release_is_due = self.solenoid.due().is_some_and(|due| now >= due);
         let command_may_go = self.waiting.has_next(|waiting| self.solenoid.lets(waiting));
-        let interrupted = !quiet.in_doubt && (self.farewell.begun || command_may_go || release_is_due);
-        let overtakes = quiet.in_doubt && self.waiting.has_urgent() && now >= quiet.stops_may_go();
+        let interrupted = !quiet.is_uncertain && (self.farewell.begun || command_may_go || release_is_due);
+        let overtakes = quiet.is_uncertain && self.waiting.has_urgent() && now >= quiet.stops_may_go();
         if is_over {
             self.complain();
-            if quiet.in_doubt {
+            if quiet.is_uncertain {
                 self.say_again();
             }
         } else if interrupted {
@@ -108,7 +108,7 @@ impl Interface {
             self.recovery.cancel();
             self.disturbed = true;
         } else if overtakes {
-            // It is said again once the silence is over, because it may be lost in what is under way.
+            // It is said again once the silence is over, because it may be lost in what is in transit.
             self.is_overtaken = true;
         }
         let goes_on = is_over || interrupted || overtakes;

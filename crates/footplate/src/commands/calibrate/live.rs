@@ -4,9 +4,9 @@ mod beginning;
 mod ended;
 mod figures;
 mod kept;
+mod printed;
 #[cfg(test)]
 mod promises;
-mod told;
 mod watcher;
 
 use std::io::Write;
@@ -24,7 +24,7 @@ use footplate_wire::Session as _;
 
 pub(crate) use self::beginning::CalibrationBeginning;
 use self::ended::{Why, outcome_of};
-pub(in crate::commands) use self::told::line as calibration_line;
+pub(in crate::commands) use self::printed::line as calibration_line;
 use self::watcher::Watcher;
 use super::picture;
 use crate::clock::now;
@@ -43,7 +43,7 @@ use crate::session_journal::SessionJournal;
 
 /// The shortest session that finds a train and learns anything (s) ...
 const SHORTEST_S: f64 = 20.0;
-/// ... and one that nobody wants to wait for.
+/// ... and one that is too long to wait for.
 const LONGEST_S: f64 = 24.0 * 3_600.0;
 
 /// Reads a span of track time such as `5m`, `90s` or `1h`.

@@ -1,4 +1,4 @@
-//! What is known of a train, step by step, as a picture: speeds and ways to rest with what is not known of them.
+//! What is known of a train, step by step, as a picture: speeds and stopping distances with their uncertainty.
 
 use anyhow::bail;
 use footplate_core::control::learn::StepAccuracy;
@@ -56,7 +56,7 @@ pub(super) fn of_session(train: TrainId, layout: &str, accuracy: &[StepAccuracy]
         value: line.speed.value.as_mm_per_s(),
         half: HALF_95 * line.speed.uncertainty.as_mm_per_s(),
     });
-    let ways = accuracy.iter().map(|line| AtStep {
+    let distances = accuracy.iter().map(|line| AtStep {
         step: line.step.get(),
         approach: line.approach,
         value: line.stop.distance.as_mm(),
@@ -64,7 +64,7 @@ pub(super) fn of_session(train: TrainId, layout: &str, accuracy: &[StepAccuracy]
     });
     let panels = vec![
         panel("steady speed (mm/s)", &speeds.collect::<Vec<_>>()),
-        panel("stopping distance (mm)", &ways.collect::<Vec<_>>()),
+        panel("stopping distance (mm)", &distances.collect::<Vec<_>>()),
     ];
     picture(train, layout, "bars: 95 % intervals of speeds, and of single stops", panels)
 }

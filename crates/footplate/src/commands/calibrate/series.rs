@@ -43,8 +43,8 @@ fn write_text(series: &PositionSeries, fit: &SeriesFit, output: &mut dyn Write) 
         let [value, deviation] = [friction.value, friction.uncertainty].map(Acceleration::as_mm_per_s2);
         line("friction", value, deviation, "mm/s²", 1)?;
     }
-    if let Some(way) = fit.stopping_distance {
-        line("stopping distance", way.value.as_mm(), way.uncertainty.as_mm(), "mm", 1)?;
+    if let Some(distance) = fit.stopping_distance {
+        line("stopping distance", distance.value.as_mm(), distance.uncertainty.as_mm(), "mm", 1)?;
     }
     writeln!(
         output,
@@ -73,8 +73,8 @@ fn form(series: &PositionSeries, fit: &SeriesFit) -> Value {
         "friction_mm_per_s2": fit.friction.map(|friction| json!({
             "value": friction.value.as_mm_per_s2(), "uncertainty": friction.uncertainty.as_mm_per_s2()
         })),
-        "stopping_distance_mm": fit.stopping_distance.map(|way| json!({
-            "value": way.value.as_mm(), "uncertainty": way.uncertainty.as_mm()
+        "stopping_distance_mm": fit.stopping_distance.map(|distance| json!({
+            "value": distance.value.as_mm(), "uncertainty": distance.uncertainty.as_mm()
         })),
         "residual_rms_mm": fit.residual.as_mm(),
         "even_residual_rms_mm": fit.even_residual.as_mm(),

@@ -6,7 +6,7 @@ use footplate_core::Approach;
 use footplate_core::model::report::Direction;
 use footplate_store::{Findings, MotionStepForm, Quantity, TrainFindings};
 
-/// How many other laws are told beside the best.
+/// How many other laws are printed beside the best.
 const RUNNERS_UP: usize = 2;
 
 pub(super) fn write(report: &Findings, output: &mut dyn Write) -> io::Result<()> {

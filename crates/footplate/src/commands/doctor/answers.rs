@@ -1,4 +1,4 @@
-//! How soon a station answers: requests whose answers can be told from other messages, and those that stayed without one.
+//! How soon a station answers: requests whose answers differ from all other messages, and those that stayed without one.
 
 use std::io::Write;
 

@@ -94,7 +94,7 @@ impl StationFigures for BoardFigures {
     }
 }
 
-/// Whether a request has an answer that can be told from other messages.
+/// Whether a request has an answer that differs from all other messages.
 const fn is_answered(request: Request) -> bool {
     matches!(request, Request::Status | Request::Slots | Request::Power { .. })
 }

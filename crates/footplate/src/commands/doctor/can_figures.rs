@@ -1,4 +1,4 @@
-//! What the frames of a Märklin CAN bus come to: who is on it, how soon commands are confirmed, and what contacts report.
+//! What the frames of a Märklin CAN bus come to: who is on it, how soon commands are confirmed, and what inputs report.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -12,20 +12,20 @@ use crate::link::Passed;
 
 /// The figures of a bus.
 pub(super) struct CanFigures {
-    /// The cycle of contacts that reports are dated with.
+    /// The cycle of inputs that reports are dated with.
     scan: TimeSpan,
     /// The locomotives of the station's list.
     listed: Vec<ListedLocomotive>,
     /// Devices that identified themselves: number, version and kind.
     participants: BTreeMap<u32, ((u8, u8), u16)>,
     answers: Answers,
-    contacts: Sensors,
+    inputs: Sensors,
     /// Reports that say how long the state before lasted.
     timed: usize,
     unread: usize,
 }
 
-/// A kind of request whose answer can be told from other frames.
+/// A kind of request whose answer differs from all other frames.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Ping,
@@ -42,7 +42,7 @@ impl CanFigures {
             listed: session.listed_locomotives().to_vec(),
             participants: BTreeMap::new(),
             answers: Answers::default(),
-            contacts: Sensors::default(),
+            inputs: Sensors::default(),
             timed: 0,
             unread: 0,
         };
@@ -76,15 +76,15 @@ impl CanFigures {
             Message::Participant { uid, version, kind } => {
                 self.participants.insert(uid.0, (version, kind));
             }
-            Message::ModuleState { module, contacts, .. } => {
+            Message::ModuleState { module, inputs, .. } => {
                 for bit in 0..u16::BITS as u16 {
-                    let contact = (u16::from(module.max(1)) - 1) * u16::BITS as u16 + bit + 1;
-                    self.contacts.is(contact, contacts & 1 << bit != 0);
+                    let input = (u16::from(module.max(1)) - 1) * u16::BITS as u16 + bit + 1;
+                    self.inputs.is(input, inputs & 1 << bit != 0);
                 }
             }
-            Message::Contact { contact, change: Some(change), .. } => {
-                self.contacts.is(contact, change.is_occupied);
-                self.contacts.reported(change.is_occupied && !change.was_occupied);
+            Message::Input { input, change: Some(change), .. } => {
+                self.inputs.is(input, change.is_occupied);
+                self.inputs.reported(change.is_occupied && !change.was_occupied);
                 self.timed += usize::from(change.is_occupied && change.lasted.is_some_and(|ticks| ticks > 0));
             }
             _ => {}
@@ -114,11 +114,11 @@ impl StationFigures for CanFigures {
         let locomotives = self.listed.iter().map(|listed| {
             serde_json::json!({ "number": listed.uid.0, "address": listed.address, "name": listed.name })
         });
-        let [contacts, occupied, reports] = self.contacts.counts();
+        let [inputs, occupied, reports] = self.inputs.counts();
         serde_json::json!({
             "participants": participants.collect::<Vec<_>>(),
             "locomotives": locomotives.collect::<Vec<_>>(),
-            "contacts": contacts,
+            "sensors": inputs,
             "occupied": occupied,
             "reports": reports,
             "reports_with_time": self.timed,
@@ -141,13 +141,13 @@ impl StationFigures for CanFigures {
     }
 
     fn write_reports(&self, output: &mut dyn Write) -> std::io::Result<()> {
-        let ([count, occupied, reports], timed) = (self.contacts.counts(), self.timed);
+        let ([count, occupied, reports], timed) = (self.inputs.counts(), self.timed);
         writeln!(
             output,
-            "contacts      {count}, {occupied} occupied, {reports} reports, {timed} with their time"
+            "sensors       {count}, {occupied} occupied, {reports} reports, {timed} with their time"
         )?;
         let scan = self.scan.as_ms();
-        writeln!(output, "cycle         of contacts taken to be {scan:.0} ms, as set in the station (scan)")?;
+        writeln!(output, "cycle         of sensors taken to be {scan:.0} ms, as set in the station (scan)")?;
         write_noise(self.unread, output)
     }
 }

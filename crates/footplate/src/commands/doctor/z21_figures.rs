@@ -29,7 +29,7 @@ pub(super) struct Z21Figures {
     unread: usize,
 }
 
-/// A kind of request whose answer can be told from other messages.
+/// A kind of request whose answer differs from all other messages.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     SerialNumber,

@@ -90,11 +90,12 @@ impl Arguments {
         if let Some(plot) = &self.plot {
             plot.write(&measured_stops(&layout, &store, train, stopped.from())?)?;
         }
-        let told = Told { arguments: &self, layout: &layout, stopped: &stopped, key, before, after };
+        let measured =
+            MeasuredStop { arguments: &self, layout: &layout, stopped: &stopped, key, before, after };
         if self.json {
-            writeln!(output, "{}", told.value())?;
+            writeln!(output, "{}", measured.value())?;
         } else {
-            told.write(output)?;
+            measured.write(output)?;
         }
         Ok(Outcome::Done)
     }
@@ -143,7 +144,7 @@ fn last_event(store: &Store, stopped: &StoppedRun) -> anyhow::Result<EventKey> {
 }
 
 /// What was done, for people and programs.
-struct Told<'a> {
+struct MeasuredStop<'a> {
     arguments: &'a Arguments,
     layout: &'a Layout,
     stopped: &'a StoppedRun,
@@ -152,7 +153,7 @@ struct Told<'a> {
     after: Option<Known>,
 }
 
-impl Told<'_> {
+impl MeasuredStop<'_> {
     fn write(&self, output: &mut dyn Write) -> std::io::Result<()> {
         let Self { arguments: Arguments { train, at, .. }, stopped, key, .. } = self;
         let (run, recording, from) = (stopped.run.id, stopped.recording.key, stopped.from());

@@ -11,7 +11,7 @@ use footplate_store::{RecordingKey, Run, Store, StoredRecording, StoredRun};
 use crate::clock::now;
 
 /// A person who reads a tape does so at least this long after the train was commanded to stop; a reading without a watch
-/// is dated so late that nobody takes its date for the time of the stop.
+/// is dated so late that its date is not taken for the time of the stop.
 const TAPE_LATER: TimeSpan = TimeSpan::from_ms(60_000);
 /// The layout is surveyed to the centimetre: a train may stand this far beyond the next contact by the survey before it
 /// has closed it.
@@ -21,7 +21,7 @@ const SURVEY: Length = Length::from_m(0.03);
 pub(super) struct StoppedRun {
     pub(super) recording: StoredRecording,
     pub(super) run: StoredRun,
-    /// When the train was told, and the step it was stopped from.
+    /// When the train was commanded, and the step it was stopped from.
     commanded: Timestamp,
     from: SpeedStep,
 }
@@ -38,7 +38,7 @@ impl StoppedRun {
         }
         for recording in recordings.into_iter().rev().filter(|one| of.is_none_or(|key| one.key == key)) {
             for run in store.runs(recording.key, at)?.into_iter().rev() {
-                if let Some((commanded, from)) = last_told(&run.accepted(), train)? {
+                if let Some((commanded, from)) = last_command(&run.accepted(), train)? {
                     return Ok(Self { recording, run, commanded, from });
                 }
             }
@@ -63,7 +63,7 @@ impl StoppedRun {
         at: Landmark,
         took: Option<TimeSpan>,
     ) -> anyhow::Result<Event> {
-        let landmark = contact_of(layout, at)?;
+        let landmark = sensor_of(layout, at)?;
         let event =
             Event { time: self.time(took), kind: EventKind::Stopped { train, landmark, offset: at.offset } };
         self.object(layout, train, at, event)?;
@@ -112,16 +112,16 @@ impl StoppedRun {
 }
 
 /// When a run's train was commanded to stop last and from which step; an error if it has been commanded to go on since.
-fn last_told(run: &Run, train: TrainId) -> anyhow::Result<Option<(Timestamp, SpeedStep)>> {
+fn last_command(run: &Run, train: TrainId) -> anyhow::Result<Option<(Timestamp, SpeedStep)>> {
     let starts = run.trains.iter().find(|at_start| at_start.train == train);
     let mut step = starts.map_or(SpeedStep::STAND, |at_start| at_start.step);
     let mut stopped = None;
-    let mut told = false;
+    let mut commanded = false;
     for raw in &run.events {
         if let EventKind::Speed { train: of, step: to } = raw.event.kind
             && of == train
         {
-            told = true;
+            commanded = true;
             if to != SpeedStep::STAND {
                 stopped = None;
             } else if step != SpeedStep::STAND {
@@ -130,7 +130,7 @@ fn last_told(run: &Run, train: TrainId) -> anyhow::Result<Option<(Timestamp, Spe
             step = to;
         }
     }
-    if told && stopped.is_none() {
+    if commanded && stopped.is_none() {
         bail!(
             "train {train} was last commanded to step {step}, in run {}: measure a stop while the train \
              is at rest, before the next command",
@@ -140,7 +140,7 @@ fn last_told(run: &Run, train: TrainId) -> anyhow::Result<Option<(Timestamp, Spe
     Ok(stopped)
 }
 
-fn contact_of(layout: &Layout, at: Landmark) -> anyhow::Result<SensorId> {
+fn sensor_of(layout: &Layout, at: Landmark) -> anyhow::Result<SensorId> {
     let name = layout.node_name(at.node);
     let sensor = layout.sensors().find(|(_, node)| *node == at.node);
     let Some((sensor, _)) = sensor else {

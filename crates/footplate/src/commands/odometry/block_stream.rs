@@ -33,7 +33,7 @@ pub(super) fn each_block(
     })
 }
 
-/// Fills blocks until the recording ends, something is wrong with it, or nobody wants them any more.
+/// Fills blocks until the recording ends, something is wrong with it, or its reader has gone.
 fn fill(
     mut reader: TachometerReader,
     to_fill: &Receiver<TachometerBlock>,

@@ -44,7 +44,7 @@ struct RunForm {
     series: SeriesForm,
 }
 
-/// Writes the page; whoever looks finds the old one or the new one.
+/// Writes the page: a reader finds the old one or the new one.
 ///
 /// # Errors
 /// What the system said.
@@ -70,7 +70,7 @@ pub(super) fn page(walked: &Walked) -> serde_json::Result<String> {
     let form = PageForm { runs: of_recordings.collect() };
     let title = match walked.recordings.as_slice() {
         [only] => {
-            // Where it was is no more than a nuisance to whoever gets the page.
+            // Where it was is no more than a nuisance to the reader of the page.
             let name = Path::new(&only.file).file_name();
             let of = walked.language.pick("Odometry of", "Odometrie von");
             format!("{of} {}", name.map_or(only.file.as_str().into(), OsStr::to_string_lossy))

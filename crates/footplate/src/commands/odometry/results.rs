@@ -34,7 +34,7 @@ impl<'o> Results<'o> {
         }
     }
 
-    /// After the estimates of all rows that are there: whoever reads along wants them now.
+    /// After the estimates of all rows that are there: a program that reads along needs them now.
     pub(super) fn end_block(&mut self) -> io::Result<()> {
         match self {
             Self::Output(result) => result.flush(),

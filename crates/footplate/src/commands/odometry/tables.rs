@@ -47,11 +47,11 @@ pub(super) fn write(output: &mut dyn Write, walked: &Walked) -> io::Result<()> {
 fn run_row(output: &mut dyn Write, run: &WalkedRun) -> io::Result<()> {
     let summary = run.odometry.summary();
     let RunSummary { modes, top_speed, .. } = summary;
-    let ways =
+    let distances =
         summary.last.map(|last| [last.distance, last.guaranteed.distance_low, last.guaranteed.distance_high]);
-    let [distance, low, high] = ways.map_or_else(
+    let [distance, low, high] = distances.map_or_else(
         || [(); 3].map(|()| "–".to_owned()),
-        |ways| ways.map(|way| format!("{:.2}", way.as_m())),
+        |distances| distances.map(|distance| format!("{:.2}", distance.as_m())),
     );
     let shares = [modes.normal, modes.one_slip, modes.correction, modes.ambiguous, modes.degraded]
         .map(|periods| format!("{:.1} %", 100.0 * periods as f64 / summary.periods.max(1) as f64));

@@ -67,7 +67,7 @@ impl Walked {
             || !self.warnings(Language::English).is_empty()
     }
 
-    /// What makes every figure doubtful: no vehicle file, or claims of it that a run contradicts.
+    /// What makes every figure uncertain: no vehicle file, or claims of it that a run contradicts.
     pub(super) fn warnings(&self, language: Language) -> Vec<String> {
         let mut warnings = Vec::new();
         if !self.has_vehicle {

@@ -39,7 +39,7 @@ pub(crate) struct SlideOpening {
     duration_s: f64,
 }
 
-/// One period. Speeds in m/s, ways in m.
+/// One period. Speeds in m/s, distances in m.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct SlideRow {
     t_s: f64,
@@ -133,7 +133,7 @@ fn row(
     gone: Option<Length>,
     wheels: [f64; 2],
 ) -> SlideRow {
-    let beyond = |way: Length| gone.map(|gone| thousandths((way - gone).as_m()));
+    let beyond = |distance: Length| gone.map(|gone| thousandths((distance - gone).as_m()));
     SlideRow {
         t_s: thousandths(since.as_s()),
         speed: thousandths(estimate.speed.as_m_per_s()),

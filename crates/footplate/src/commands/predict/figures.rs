@@ -55,7 +55,7 @@ pub(super) fn one_decimal(figure: Option<f64>) -> String {
     figure.map_or_else(|| "–".to_owned(), |figure| format!("{:.1}", (figure * 10.0).round() / 10.0 + 0.0))
 }
 
-/// A ratio with two decimals, or a dash; nobody is told how many hundred times worse something is.
+/// A ratio with two decimals; a dash for what is some hundred times worse.
 pub(super) fn ratio(figure: Option<f64>) -> String {
     match figure {
         None => "–".to_owned(),

@@ -142,7 +142,7 @@ impl Walked {
         Ok(())
     }
 
-    /// Tells a machine what it was told then, and looks at it between.
+    /// Gives a machine its recorded inputs, and shows it between them.
     fn tell<M: Listener>(
         &mut self,
         machine: &mut M,
@@ -152,8 +152,8 @@ impl Walked {
         mut look: impl FnMut(&M, &mut Painter, Timestamp),
         shown: impl Fn(M::Notice) -> Option<Shown>,
     ) {
-        let told = || trace.iter().filter(|row| row.side == Side::Input);
-        let (Some(first), Some(last)) = (told().next(), told().next_back()) else { return };
+        let inputs = || trace.iter().filter(|row| row.side == Side::Input);
+        let (Some(first), Some(last)) = (inputs().next(), inputs().next_back()) else { return };
         let even = TimeSpan::from_ns((last.time - first.time).as_ns() / MOST_PICTURES);
         let between = BETWEEN.max(even);
         let board = Board::new(0);
@@ -163,7 +163,7 @@ impl Walked {
             look(machine, painter, now);
         };
         let mut next = first.time;
-        for row in told() {
+        for row in inputs() {
             // A row that this program cannot read ends what can be looked at.
             let Ok(input) = Input::read(&row.kind, &row.text) else { break };
             while next < row.time {

@@ -1,4 +1,4 @@
-//! The machine of a session made again, and told what it was told.
+//! The machine of a session made again, with its recorded inputs.
 
 use anyhow::{Context, bail};
 use footplate_store::{StoredMachine, Traced};

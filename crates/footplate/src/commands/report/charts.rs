@@ -4,7 +4,7 @@ use footplate_core::model::report::Transient;
 use footplate_core::{Approach, SpeedStep, TimeSpan};
 use footplate_store::{Batch, BatchTrain, TrainFindings};
 
-use super::data::{ChangeChart, ContactPoint};
+use super::data::{ChangeChart, DetectionPoint};
 
 /// Changes shown for each direction, spread over the steps there are.
 const SHOWN: usize = 4;
@@ -33,21 +33,21 @@ fn chart(batch: &Batch, train: &BatchTrain, change: &Transient) -> Option<Change
         .collect();
     let fit = |times: &[TimeSpan]| train.review.fitted_change(train.replay.fit.model(), change, times);
     let fitted = fit(&times)?;
-    let at_contacts: Vec<TimeSpan> =
+    let at_sensors: Vec<TimeSpan> =
         change.points.iter().map(|point| TimeSpan::from_s(point.since_command)).collect();
-    let there = fit(&at_contacts)?;
+    let there = fit(&at_sensors)?;
     let run = batch.runs.get(change.run)?;
     let mut before: Option<(f64, f64)> = None;
     let mut contacts = Vec::with_capacity(change.points.len());
     for ((point, residual), state) in change.points.iter().zip(&fitted.residuals).zip(&there.states) {
         let way_mm = 1e3 * point.distance;
-        let mean_speed = before.and_then(|(time, way)| {
+        let mean_speed = before.and_then(|(time, distance_mm)| {
             let took = point.since_command - time;
-            (took > 0.0).then(|| [f64::midpoint(time, point.since_command), (way_mm - way) / took])
+            (took > 0.0).then(|| [f64::midpoint(time, point.since_command), (way_mm - distance_mm) / took])
         });
         before = Some((point.since_command, way_mm));
         let speed = state.speed.as_m_per_s();
-        contacts.push(ContactPoint {
+        contacts.push(DetectionPoint {
             time_s: point.since_command,
             doubt_s: point.variance.sqrt(),
             way_mm,

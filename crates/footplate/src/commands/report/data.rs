@@ -87,12 +87,12 @@ pub(super) struct ChangeChart {
     pub(super) way_mm: Vec<f64>,
     pub(super) speed_mm_s: Vec<f64>,
     pub(super) acceleration_mm_s2: Vec<f64>,
-    pub(super) contacts: Vec<ContactPoint>,
+    pub(super) contacts: Vec<DetectionPoint>,
 }
 
 /// A contact measured during a change of speed.
 #[derive(Debug, Serialize)]
-pub(super) struct ContactPoint {
+pub(super) struct DetectionPoint {
     pub(super) time_s: f64,
     /// One standard deviation of it, from the poll.
     pub(super) doubt_s: f64,

@@ -15,7 +15,7 @@ const WORSE: [f64; 2] = [1.5, 2.0];
 const MISSES: [f64; 2] = [0.05, 0.15];
 /// Part of runs that may stay without a report: low steps stall.
 const SILENT: [f64; 2] = [0.2, 0.5];
-/// How far below 90 % the interval's share may lie before it is wrong and not only doubtful.
+/// How far below 90 % the interval's share may lie before it is wrong and not only uncertain.
 const COVERAGE_WRONG: f64 = 0.8;
 
 pub(super) fn of(train: &TrainFindings, points: &[ForecastPoint], language: Language) -> Health {

@@ -159,8 +159,8 @@ pub(super) fn suspicious(train: &TrainFindings, language: Language) -> String {
         return format!("<p>{none}</p>\n");
     }
     let columns = match language {
-        Language::English => ["where", "run", "contact", "late", "in way", "chance"],
-        Language::German => ["wo", "Fahrt", "Kontakt", "später", "als Weg", "Zufall"],
+        Language::English => ["where", "run", "sensor", "late", "distance", "chance"],
+        Language::German => ["wo", "Fahrt", "Rückmelder", "später", "als Weg", "Zufall"],
     };
     let numbers = &[false, true, false, true, true, true];
     let caption = language.pick(

@@ -21,7 +21,7 @@ pub(super) struct Arguments {
     /// Events by their number, or from one to another as in 20-29; `footplate store show` lists them.
     #[arg(required = true, value_parser = events)]
     events: Vec<RangeInclusive<i64>>,
-    /// Why, for whoever asks later.
+    /// Why, for later readers.
     #[arg(long)]
     reason: String,
     /// Report as JSON.

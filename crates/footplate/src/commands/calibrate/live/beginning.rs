@@ -49,5 +49,5 @@ impl CalibrationBeginning {
     }
 }
 
-/// Nobody speaks to it.
+/// No person speaks to it.
 impl Listener for Calibrator<'_> {}

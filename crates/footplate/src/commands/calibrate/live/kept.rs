@@ -1,4 +1,4 @@
-//! The session on its way into the store: what is not written down is not measured.
+//! The session, written into the store as it runs: what is not written down is not measured.
 
 use std::path::Path;
 

@@ -7,13 +7,13 @@ use footplate_wire::{BlockReports, CommandError, LinkNotice};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::figures::minutes;
-use super::told;
+use super::printed;
 use crate::dashboard::{Alarm, ReadOnlyDashboard};
 use crate::layout_check::layout_with;
 use crate::recorded::Recorded;
 use crate::runtime::{Attendant, Wish};
 
-/// What a browser is told that wants to drive.
+/// The answer to a browser that wants to drive.
 const DRIVES_ITSELF: &str = "a calibration runs by itself: use `footplate serve` to command trains";
 
 /// Tells people how it goes, on standard error.
@@ -72,14 +72,14 @@ impl<'l> Watcher<'l> {
 
 impl<'l> Attendant<Recorded<Calibrator<'l>>> for Watcher<'_> {
     fn hear(&mut self, now: Timestamp, notice: CalibrationNotice) {
-        let line = told::line(self.layout, &notice);
+        let line = printed::line(self.layout, &notice);
         if let Some(showing) = &mut self.showing {
             showing.hear(now, self.train, &notice, line.as_deref().unwrap_or_default());
         }
         if let CalibrationNotice::Progress(progress) = &notice {
             self.began = self.began.or(Some(now + (TimeSpan::ZERO - progress.elapsed)));
             self.bar.set_position(progress.elapsed.as_s().min(self.budget.as_s()) as u64);
-            self.bar.set_message(told::state(progress));
+            self.bar.set_message(printed::state(progress));
         }
         if let CalibrationNotice::Mishap(mishap) = &notice {
             self.mishaps += 1;

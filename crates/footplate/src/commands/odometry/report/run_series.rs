@@ -107,7 +107,7 @@ impl RunSeries {
         self.last = period.time;
         let wheels = self.wheels.see(period);
         let gone = truth.distance.map(|distance| distance - *self.origin.get_or_insert(distance));
-        let beyond = |way: Length| gone.map_or(f64::NAN, |gone| (way - gone).as_m());
+        let beyond = |distance: Length| gone.map_or(f64::NAN, |gone| (distance - gone).as_m());
         let [first, second, _] = estimate.shares;
         let (confidence, guaranteed) = (&estimate.confidence, &estimate.guaranteed);
         let columns = [

@@ -31,7 +31,7 @@ const CHARTS: [Chart; 5] = [
         heading: ["Wheels", "Räder"],
         caption: [
             "How fast each wheel turned by its pulses, as the mean of five periods, beside the estimate. Shaded: where a \
-             wheelset is said to slip, to slide or not to be believed, the first in the upper half, the second in the lower.",
+             wheelset is said to slip, to slide or not to be trusted, the first in the upper half, the second in the lower.",
             "Wie schnell sich jedes Rad nach seinen Impulsen drehte, als Mittel von fünf Perioden, neben der Schätzung. \
              Getönt: wo ein Radsatz schleudern oder gleiten soll oder nicht geglaubt wird, der erste in der oberen Hälfte, der \
              zweite in der unteren.",
@@ -134,9 +134,9 @@ fn verdict(score: &OdometryScore) -> String {
         ));
     }
     if let Some(end) = score.distance_end_m {
-        let way = if end < 0.0 { "short" } else { "long" };
+        let sense = if end < 0.0 { "short" } else { "long" };
         let part = score.distance_end_pct.map_or_else(String::new, |pct| format!(" ({:.2} %)", pct.abs()));
-        words.push(format!("At the end the distance was {:.2} m{part} too {way}.", end.abs()));
+        words.push(format!("At the end the distance was {:.2} m{part} too {sense}.", end.abs()));
     }
     if let (Some(inside), Some(width)) = (score.distance_inside_pct, score.distance_width_end_m) {
         words.push(format!(
@@ -167,9 +167,9 @@ fn german_verdict(score: &OdometryScore) -> String {
         ));
     }
     if let Some(end) = score.distance_end_m {
-        let way = if end < 0.0 { "kurz" } else { "lang" };
+        let sense = if end < 0.0 { "kurz" } else { "lang" };
         let part = score.distance_end_pct.map_or_else(String::new, |pct| format!(" ({:.2} %)", pct.abs()));
-        words.push(format!("Am Ende war der Weg {:.2} m{part} zu {way}.", end.abs()));
+        words.push(format!("Am Ende war der Weg {:.2} m{part} zu {sense}.", end.abs()));
     }
     if let (Some(inside), Some(width)) = (score.distance_inside_pct, score.distance_width_end_m) {
         words.push(format!(
@@ -285,12 +285,12 @@ fn runs_table(walked: &Walked) -> String {
     for (name, run) in each_run(walked) {
         let summary = run.odometry.summary();
         let RunSummary { modes, top_speed, .. } = summary;
-        let ways = summary
+        let distances = summary
             .last
             .map(|last| [last.distance, last.guaranteed.distance_low, last.guaranteed.distance_high]);
         let mut cells = vec![name, format!("{:.2}", summary.duration().as_s())];
-        match ways {
-            Some(ways) => cells.extend(ways.map(|way| decimals(Some(way.as_m()), 2))),
+        match distances {
+            Some(distances) => cells.extend(distances.map(|distance| decimals(Some(distance.as_m()), 2))),
             None => cells.extend([(); 3].map(|()| "–".to_owned())),
         }
         cells.push(decimals(Some(top_speed.as_m_per_s()), 2));

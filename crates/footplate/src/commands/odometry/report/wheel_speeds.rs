@@ -2,7 +2,7 @@
 
 use footplate_core::odometry::wheels::{Count, Period, Vehicle};
 use footplate_core::{Length, TimeSpan};
-use footplate_store::odometry::WayCounter;
+use footplate_store::odometry::DistanceCounter;
 
 /// Periods that a speed is the mean of (chosen: a pulse more or less is then a fifth of what it is in one).
 const PERIODS: usize = 5;
@@ -10,14 +10,14 @@ const PERIODS: usize = 5;
 /// How fast both wheels turned, period by period.
 #[derive(Debug, Clone)]
 pub(in crate::commands::odometry) struct WheelSpeeds {
-    counter: WayCounter,
-    wheels: [RecentWay; 2],
+    counter: DistanceCounter,
+    wheels: [RecentDistances; 2],
 }
 
 /// How far a wheel has rolled in the last periods.
 #[derive(Debug, Clone, Default)]
-struct RecentWay {
-    ways: [Option<(Length, TimeSpan)>; PERIODS],
+struct RecentDistances {
+    distances: [Option<(Length, TimeSpan)>; PERIODS],
     next: usize,
     /// For how long it has not been read.
     unread: TimeSpan,
@@ -25,7 +25,7 @@ struct RecentWay {
 
 impl WheelSpeeds {
     pub(in crate::commands::odometry) fn new(vehicle: &Vehicle) -> Self {
-        Self { counter: WayCounter::new(vehicle), wheels: Default::default() }
+        Self { counter: DistanceCounter::new(vehicle), wheels: Default::default() }
     }
 
     /// The mean speed of each wheel over this period and those before it (m/s); NaN where it was not counted.
@@ -33,37 +33,37 @@ impl WheelSpeeds {
         let counted = self.counter.count(period);
         let Some(span) = counted.span else { return [f64::NAN; 2] };
         let mut speeds = [f64::NAN; 2];
-        let wheels = self.wheels.iter_mut().zip(counted.ways).zip(period.wheels);
-        for (speed, ((recent, way), reading)) in speeds.iter_mut().zip(wheels) {
-            *speed = recent.see(way, span, matches!(reading.count, Count::Counter(_)));
+        let wheels = self.wheels.iter_mut().zip(counted.distances).zip(period.wheels);
+        for (speed, ((recent, distance), reading)) in speeds.iter_mut().zip(wheels) {
+            *speed = recent.see(distance, span, matches!(reading.count, Count::Counter(_)));
         }
         speeds
     }
 }
 
-impl RecentWay {
-    fn see(&mut self, way: Option<Length>, span: TimeSpan, is_running: bool) -> f64 {
+impl RecentDistances {
+    fn see(&mut self, distance: Option<Length>, span: TimeSpan, is_running: bool) -> f64 {
         // A running counter also tells of the periods in which it was not read; pulses of those are lost.
         let unread = std::mem::take(&mut self.unread);
-        let rolled = match way {
-            Some(way) if is_running => Some((way, span + unread)),
-            Some(way) => Some((way, span)),
+        let rolled = match distance {
+            Some(distance) if is_running => Some((distance, span + unread)),
+            Some(distance) => Some((distance, span)),
             None => {
                 self.unread = unread + span;
                 None
             }
         };
-        if let Some(slot) = self.ways.get_mut(self.next) {
+        if let Some(slot) = self.distances.get_mut(self.next) {
             *slot = rolled;
         }
         self.next = (self.next + 1) % PERIODS;
         if rolled.is_none() {
             return f64::NAN;
         }
-        let known = || self.ways.iter().flatten();
-        let way: f64 = known().map(|(way, _)| way.as_m()).sum();
+        let known = || self.distances.iter().flatten();
+        let distance: f64 = known().map(|(distance, _)| distance.as_m()).sum();
         let time: f64 = known().map(|(_, span)| span.as_s()).sum();
-        way / time
+        distance / time
     }
 }
 

@@ -8,23 +8,23 @@ const COUNTER_BITS: [u32; 4] = [8, 16, 24, 32];
 
 /// What the counts of one period say.
 #[derive(Debug, Clone, Copy)]
-pub struct CountedWay {
+pub struct CountedDistances {
     /// How far each wheel has rolled; absent without a count.
-    pub ways: [Option<Length>; 2],
+    pub distances: [Option<Length>; 2],
     /// How long that took; absent for the first period and where time does not go on.
     pub span: Option<TimeSpan>,
 }
 
-/// Turns counts into ways, period by period.
+/// Turns counts into distances, period by period.
 #[derive(Debug, Clone)]
-pub struct WayCounter {
+pub struct DistanceCounter {
     pitches: [Length; 2],
     counters: [Option<i64>; 2],
     last: Option<Timestamp>,
 }
 
-impl WayCounter {
-    /// Begins with nothing counted; the ways follow from the diameters that the wheels are believed to have.
+impl DistanceCounter {
+    /// Begins with nothing counted; the distances follow from the diameters that the vehicle file states.
     #[must_use]
     pub fn new(vehicle: &Vehicle) -> Self {
         let pitches = vehicle.wheelsets.map(|wheelset| wheelset.pulse_pitch());
@@ -36,14 +36,14 @@ impl WayCounter {
     }
 
     /// Takes in a period.
-    pub fn count(&mut self, period: &Period) -> CountedWay {
+    pub fn count(&mut self, period: &Period) -> CountedDistances {
         let span = self.last.map(|last| period.time - last).filter(|span| *span > TimeSpan::ZERO);
         self.last = Some(period.time);
         let [first, second] = &mut self.counters;
         let [one, other] = period.wheels;
         let pulses = [pulses(first, one), pulses(second, other)];
-        let way = |wheel: usize| pulses[wheel].map(|pulses| self.pitches[wheel] * pulses as f64);
-        CountedWay { ways: [way(0), way(1)], span }
+        let distance = |wheel: usize| pulses[wheel].map(|pulses| self.pitches[wheel] * pulses as f64);
+        CountedDistances { distances: [distance(0), distance(1)], span }
     }
 }
 
@@ -60,7 +60,7 @@ fn pulses(last: &mut Option<i64>, wheel: WheelReading) -> Option<i64> {
     }
 }
 
-/// By how much a counter went on, if it wraps at the narrowest width that holds both readings and the shorter way
+/// By how much a counter went on, if it wraps at the narrowest width that holds both readings and the shorter direction
 /// round is the right one.
 fn difference(before: i64, after: i64) -> i64 {
     let plain = after.saturating_sub(before);

@@ -58,8 +58,8 @@ fn a_lost_byte_of_a_command_is_noticed_and_the_command_said_again() {
         let request_was_sent = 1;
         bench.say(speed(24, 9));
         bench.run_for(0);
-        let on_its_way = usize::from(bench.written.last().is_some_and(|(_, byte)| *byte == 25));
-        bench.lose_to_station(&[place + request_was_sent - 1 - on_its_way.min(place)]);
+        let in_transit = usize::from(bench.written.last().is_some_and(|(_, byte)| *byte == 25));
+        bench.lose_to_station(&[place + request_was_sent - 1 - in_transit.min(place)]);
         bench.run_for(2_000);
         // then the train is told in the end.
         assert_eq!(bench.station.steps.get(&TrainId(24)), Some(&9), "byte {place}: {:?}", bench.notices);
@@ -86,10 +86,10 @@ fn a_short_reply_is_dropped_and_the_interval_grows() {
     let mut bench = Bench::with_cts();
     bench.run_until(ms(300));
     bench.lose_to_host(&[13]);
-    bench.station.contact(3, true);
+    bench.station.input(3, true);
     bench.run_for(25);
     let closed = bench.now;
-    bench.station.contact(50, true);
+    bench.station.input(50, true);
     bench.run_for(1_000);
     assert!(bench.notices.iter().any(|n| matches!(n, LinkNotice::ReplyLost { expected: 10, found: 9 })));
     let [(read, interval)] = bench.reports(50)[..] else { panic!("{:?}", bench.events) };
@@ -101,7 +101,7 @@ fn a_short_reply_is_dropped_and_the_interval_grows() {
 fn bytes_that_nobody_asked_for_make_no_report_and_are_said() {
     let mut bench = Bench::with_cts();
     bench.run_until(ms(300));
-    // Given a byte of noise at every phase of the poll, and contacts that are all open,
+    // Given a byte of noise at every phase of the poll, and inputs that are all open,
     for phase in 0..60 {
         bench.station.babble(bench.now + TimeSpan::from_ms(phase), &[0x10]);
         bench.run_for(700);
@@ -111,7 +111,7 @@ fn bytes_that_nobody_asked_for_make_no_report_and_are_said() {
         |n: &LinkNotice| matches!(n, LinkNotice::UnexpectedBytes { .. } | LinkNotice::ReplyLost { .. });
     assert!(bench.notices.iter().filter(|n| noticed(n)).count() >= 60, "{:?}", bench.notices.len());
     assert_eq!(bench.events, []);
-    bench.station.contact(5, true);
+    bench.station.input(5, true);
     bench.run_for(200);
     assert_eq!(bench.reports(5).len(), 1);
 }
@@ -232,7 +232,7 @@ struct Witness {
     /// The first byte of a message that waits for its second.
     first: Vec<u8>,
     heard_since_request: usize,
-    /// The request that is on its way or being answered: until when at most, and how many bytes answer it.
+    /// The request that is in transit or being answered: until when at most, and how many bytes answer it.
     asked: Option<(Timestamp, usize)>,
 }
 
