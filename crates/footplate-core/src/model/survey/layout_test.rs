@@ -76,7 +76,7 @@ impl LayoutTest {
 
     fn pass(&mut self, layout: &Layout, sections: &SectionIndex, node: NodeId, time: Timestamp) {
         if self.sequence.in_motion(time) > 1 {
-            // Nobody knows whose times these are.
+            // Which train these times belong to is unknown.
             self.running.clear();
             self.last = None;
             return;

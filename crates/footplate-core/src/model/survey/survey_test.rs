@@ -62,32 +62,16 @@ impl SurveyTest {
         if known.len() < FEWEST {
             return fits;
         }
-        let everything: Vec<&Compared> = known.iter().collect();
-        let Some(mut usual) = Usual::of(&everything) else { return fits };
-        // Wrong lengths make the right ones look off: the few that are farthest off count once the others agree with them.
-        let mut near = everything;
-        near.sort_by(|one, other| usual.z(one).total_cmp(&usual.z(other)));
-        near.truncate(known.len() - known.len() / PARTS);
-        for _ in 0..ROUNDS {
-            let Some(of_near) = Usual::of(&near) else { return fits };
-            usual = of_near;
-            let before = near.len();
-            near = known.iter().filter(|one| usual.z(one) <= ODD * usual.factor).collect();
-            if near.len() == before {
-                break;
-            }
-        }
-        let (off, z) = (|one: &Compared| usual.off(one), |one: &Compared| usual.z(one));
-        let ratio = usual.ratio;
-        let limit = ODD * usual.factor;
+        let Some(usual) = Usual::agreed(&known) else { return fits };
         let factor = if usual.factor > DOUBTED { usual.factor } else { 1.0 };
-        let part = PER_MEDIAN * median(known.iter().map(|one| off(one).abs() / one.surveyed)).unwrap_or(0.0);
-        let mut odd: Vec<&Compared> = known.iter().filter(|one| z(one) > limit).collect();
-        odd.sort_by(|one, other| z(other).total_cmp(&z(one)));
+        let part =
+            PER_MEDIAN * median(known.iter().map(|one| usual.off(one).abs() / one.surveyed)).unwrap_or(0.0);
+        let mut odd: Vec<&Compared> = known.iter().filter(|one| !usual.agrees(one)).collect();
+        odd.sort_by(|one, other| usual.z(other).total_cmp(&usual.z(one)));
         let odd = odd.into_iter().map(|one| OddSection {
             section: one.section,
             surveyed: one.surveyed,
-            path_length: one.path_length / ratio,
+            path_length: one.path_length / usual.ratio,
         });
         Self { odd: odd.collect(), factor, scale: if factor > 1.0 { part } else { 0.0 } }
     }
@@ -123,6 +107,29 @@ impl Usual {
         let mut usual = Self { ratio, factor: 1.0 };
         usual.factor = (PER_MEDIAN * median(sections.iter().map(|one| usual.z(one)))?).max(1.0);
         Some(usual)
+    }
+
+    /// Of those sections that agree with each other. Wrong lengths make the right ones look off: the few that are farthest off
+    /// count only once the others agree with them.
+    fn agreed(known: &[Compared]) -> Option<Self> {
+        let mut near: Vec<&Compared> = known.iter().collect();
+        let mut usual = Self::of(&near)?;
+        near.sort_by(|one, other| usual.z(one).total_cmp(&usual.z(other)));
+        near.truncate(known.len() - known.len() / PARTS);
+        for _ in 0..ROUNDS {
+            usual = Self::of(&near)?;
+            let before = near.len();
+            near = known.iter().filter(|one| usual.agrees(one)).collect();
+            if near.len() == before {
+                break;
+            }
+        }
+        Some(usual)
+    }
+
+    /// Whether chance explains by how much a section is off.
+    fn agrees(&self, one: &Compared) -> bool {
+        self.z(one) <= ODD * self.factor
     }
 
     /// By how much a section is longer than surveyed (m).
