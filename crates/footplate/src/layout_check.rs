@@ -28,8 +28,10 @@ const FEWEST_SPEEDS: usize = 4;
 /// short recordings of simulated trains on their own layout five are off by 2 times, by its curves and its survey, none by 3).
 const ANOTHER_LAYOUT: f64 = 3.0;
 
-/// Lengths are compared each time a session has as many more reports of sensors (chosen: a lap of two trains).
-const COMPARED_EVERY: usize = 24;
+/// Lengths are compared first when a session has so many reports of sensors (chosen: a lap of two trains).
+const COMPARED_FIRST: usize = 24;
+/// ... and again when it has this part more, so that a long session does not compare all of its reports the more often.
+const COMPARED_AGAIN: usize = 8;
 
 /// More contradictions than these tell a person nothing new.
 const MOST_SAID: usize = 4;
@@ -137,8 +139,9 @@ pub(crate) struct LayoutWatch<'l> {
     layout: &'l Layout,
     sections: SectionIndex,
     test: LayoutTest,
-    /// Reports since lengths were last compared.
     reports: usize,
+    /// The reports with which lengths are compared next.
+    compares_at: usize,
     warning: LiveWarning,
     /// Who writes the entries down, before they are judged.
     recorder: Option<&'l mut dyn Recorder>,
@@ -150,7 +153,8 @@ impl<'l> LayoutWatch<'l> {
         let mut test = LayoutTest::default();
         test.begin_run_at_rest(trains);
         let sections = SectionIndex::of(layout);
-        Self { layout, sections, test, reports: 0, warning: LiveWarning::default(), recorder }
+        let (reports, compares_at) = (0, COMPARED_FIRST);
+        Self { layout, sections, test, reports, compares_at, warning: LiveWarning::default(), recorder }
     }
 
     /// Where a serious warning will be.
@@ -159,7 +163,7 @@ impl<'l> LayoutWatch<'l> {
     }
 
     fn compare_lengths(&mut self) {
-        self.reports = 0;
+        self.compares_at = self.reports + COMPARED_FIRST.max(self.reports / COMPARED_AGAIN);
         if self.warning.get().is_none()
             && let Some(warning) = self.lengths_doubted().filter(|warning| warning.is_serious)
         {
@@ -182,7 +186,7 @@ impl Recorder for LayoutWatch<'_> {
             self.test.take(self.layout, &self.sections, event);
             self.reports += usize::from(matches!(event.kind, EventKind::Sensor(_)));
         }
-        if self.reports >= COMPARED_EVERY {
+        if self.reports >= self.compares_at {
             self.compare_lengths();
         }
         match order_contradicts(self.layout, &self.test.sequence()) {
