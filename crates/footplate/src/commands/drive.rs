@@ -30,7 +30,7 @@ use footplate_store::{Schedule, Store, layout_named, parse_layout};
 use footplate_wire::Session as _;
 
 pub(crate) use self::beginning::DriveBeginning;
-use self::console::{Console, ended, lines_of_stdin};
+use self::console::{Console, lines_of_stdin};
 pub(super) use self::formatter::NoticeFormatter;
 pub(crate) use self::fuzzed_session::FuzzedSession;
 use self::instruction::HELP;
@@ -371,11 +371,7 @@ impl Arguments {
         let ending = loop {
             let ending = runtime.run(&mut script_runner, &mut console)?;
             for message in std::mem::take(&mut console.for_scoring) {
-                if let SessionMessage::Begun(train) = message {
-                    start_odometers.note(runtime.link(), train);
-                }
-                if let Some(ended) = ended(&message) {
-                    let truth = start_odometers.error(runtime.link(), layout, ended);
+                if let Some((ended, truth)) = start_odometers.score(runtime.link(), layout, &message) {
                     let result = ResultLine::of(layout, ended, truth);
                     if let Some(dashboard) = dashboard {
                         dashboard.board.publish("ended", &result);

@@ -1,6 +1,7 @@
 //! Connects a script runner to its operators: lines of standard input and requests of browsers go in, messages come
 //! out.
 
+use std::cell::OnceCell;
 use std::io::{BufRead, IsTerminal, Read, Write};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
@@ -12,7 +13,7 @@ use footplate_core::{Command, Timestamp, TrainId};
 use footplate_wire::{BlockReports, CommandError, LinkNotice, ReportedFunctions};
 
 use super::script_runner::ScriptRunner;
-use super::session_message::{Ended, SessionMessage};
+use super::session_message::SessionMessage;
 use crate::clock::Stopwatch;
 use crate::dashboard::{Alarm, Answer, Board, Painter, PendingRequest, Request};
 use crate::layout_check::LiveWarning;
@@ -199,9 +200,8 @@ impl Console {
     }
 
     fn warn_of_lengths(&mut self, now: Timestamp) {
-        let is_said = self.lengths.as_ref().is_some_and(|lengths| lengths.get().is_some());
-        let Some(lengths) = self.lengths.take_if(|_| is_said) else { return };
-        let Some(warning) = lengths.get() else { return };
+        let lengths = self.lengths.take_if(|lengths| lengths.get().is_some());
+        let Some(warning) = lengths.as_deref().and_then(OnceCell::get) else { return };
         self.screen.say(&warning.english, "");
         self.alarm(now, &Alarm::lengths_differ(&warning.english, &warning.differences));
     }
@@ -284,13 +284,5 @@ impl Attendant<Recorded<ScriptRunner>> for Console {
         }
         let leaves_loop = self.is_over || !self.for_scoring.is_empty() || !self.for_truth.is_empty();
         if leaves_loop { Wish::Finish } else { Wish::GoOn }
-    }
-}
-
-/// The ended order in a message, if it is one.
-pub(super) fn ended(message: &SessionMessage) -> Option<&Ended> {
-    match message {
-        SessionMessage::Ended(ended) => Some(ended),
-        _ => None,
     }
 }

@@ -21,7 +21,6 @@ use footplate_wire::marklin_serial::{Interface, Settings};
 use footplate_wire::{CommandError, LinkNotice};
 
 use super::beginning::DriveBeginning;
-use super::console::ended;
 use super::script_runner::ScriptRunner;
 use super::session_message::SessionMessage;
 use super::trains::{KnownTrains, Sources};
@@ -147,11 +146,10 @@ impl<'l> LongDrive<'l> {
             ensure!(matches!(ending, Ended::Finished), "the session ended: {ending}");
             let now = runtime.link().now();
             for message in std::mem::take(&mut operator.for_scoring) {
-                if let SessionMessage::Begun(train) = message {
-                    start_odometers.note(&**runtime.link(), train);
-                }
-                let Some(order) = ended(&message) else { continue };
-                match start_odometers.error(&**runtime.link(), layout, order) {
+                let Some((order, error)) = start_odometers.score(&**runtime.link(), layout, &message) else {
+                    continue;
+                };
+                match error {
                     Some(error) if order.refused.is_none() => {
                         let is_kept = order
                             .promise

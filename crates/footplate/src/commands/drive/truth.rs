@@ -7,7 +7,7 @@ use footplate_core::track::{Landmark, Layout, Position};
 use footplate_core::{EdgeId, Length, TrainId};
 use serde::Serialize;
 
-use super::session_message::{Ended, Target};
+use super::session_message::{Ended, SessionMessage, Target};
 use crate::link::{Link, ObservedLink, SimulatedLink};
 
 /// The most edges between a train and the sensor that its place is named after: more than any layout has in a row.
@@ -138,14 +138,26 @@ impl GroundTruth for Box<dyn Link + '_> {
 pub(super) struct StartOdometers(BTreeMap<TrainId, Length>);
 
 impl StartOdometers {
-    pub(super) fn note(&mut self, truth: &dyn GroundTruth, train: TrainId) {
-        if let Some(odometer) = truth.odometer(train) {
-            self.0.insert(train, odometer);
+    /// Takes a message that is scored before time moves on: an order that has ended is returned, with how far beyond its target that
+    /// really was.
+    pub(super) fn score<'m>(
+        &mut self,
+        truth: &dyn GroundTruth,
+        layout: &Layout,
+        message: &'m SessionMessage,
+    ) -> Option<(&'m Ended, Option<Length>)> {
+        match message {
+            SessionMessage::Begun(train) => {
+                self.0.extend(truth.odometer(*train).map(|odometer| (*train, odometer)));
+                None
+            }
+            SessionMessage::Ended(ended) => Some((ended, self.error(truth, layout, ended))),
+            _ => None,
         }
     }
 
     /// How far beyond its target an order really ended.
-    pub(super) fn error(&self, truth: &dyn GroundTruth, layout: &Layout, ended: &Ended) -> Option<Length> {
+    fn error(&self, truth: &dyn GroundTruth, layout: &Layout, ended: &Ended) -> Option<Length> {
         ended.error?;
         let train = ended.train?;
         match ended.target_on_arrival.map_or(ended.target, Target::Place) {
