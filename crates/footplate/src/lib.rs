@@ -72,7 +72,7 @@ fn failed(error: &anyhow::Error) -> ExitCode {
     ExitCode::from(BAD_INPUT)
 }
 
-/// Whoever drives over a real line is watched by a guardian: this process becomes it and starts the program again, which
+/// A program that drives over a real line is watched by a guardian: this process becomes it and starts the program again, which
 /// finds its guardian here.
 ///
 /// # Errors

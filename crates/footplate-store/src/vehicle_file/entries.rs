@@ -1,4 +1,4 @@
-//! The entries of one TOML table, taken out one by one, so that what is left over is what nobody knows.
+//! The entries of one TOML table, taken out one by one, so that what is left over is unknown.
 
 use std::ops::Range;
 
@@ -44,7 +44,7 @@ impl<'t, 'i> Entries<'t, 'i> {
         if let Some(value) = self.take(key) {
             return Ok(value);
         }
-        // Whoever misspelt it thinks it is there.
+        // A person who misspelt it thinks it is there.
         match self.table.keys().find(|written| is_near(key, written.get_ref())) {
             Some(written) => Err(self.unknown(written, Some(key))),
             None => Err((self.begin, VehicleProblem::MissingKey { key, table: self.called })),

@@ -1,4 +1,4 @@
-// Signals that nobody has to wire: at each end of a block and at each turnout, what the reservation of a train allows it.
+// Signals without wires: at each end of a block and at each turnout, what the reservation of a train allows it.
 
 import { svg } from "./dom.js";
 

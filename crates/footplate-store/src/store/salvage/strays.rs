@@ -11,7 +11,7 @@ use crate::store::file::Store;
 /// All rows of a file by its pages, and an empty store to try them in.
 pub(super) struct Strays<'a> {
     pages: Pages<'a>,
-    /// Has the tables of a store, no rows, and asks nobody for parents.
+    /// Has the tables of a store, no rows, and checks no parents.
     trial: Connection,
     /// The columns of each of `TABLES`.
     columns: Vec<Vec<String>>,
