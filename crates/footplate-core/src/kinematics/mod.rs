@@ -31,6 +31,7 @@ pub use integer_stop::{IntegerStop, IntegerStopError, UnusableConstants};
 pub use limits::{Limits, ProfileError};
 pub use minimum_jerk::MinimumJerk;
 pub use motion::{Motion, MotionState, Running, Stretch};
+pub(crate) use ramped_lag::ChangeAt;
 pub use ramped_lag::RampedLag;
 pub use s_curve::{Playback, SCurve};
 pub use short_move::{ShortMove, ShortMoveError};

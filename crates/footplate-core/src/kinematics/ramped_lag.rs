@@ -36,13 +36,19 @@ impl RampedLag {
     /// `r`, the share of the change that is done at a time (s), from 0 to 1.
     #[must_use]
     pub fn share(&self, time: f64) -> f64 {
-        (self.once(time) - self.once(time - self.ramp)) / self.ramp
+        self.at(time).share()
     }
 
     /// `R`, the integral of [`share`](Self::share) over time (s).
     #[must_use]
     pub fn area(&self, time: f64) -> f64 {
-        (self.twice(time) - self.twice(time - self.ramp)) / self.ramp
+        self.at(time).area()
+    }
+
+    /// All that follows from one time (s), with each exponential computed once.
+    pub(crate) fn at(&self, time: f64) -> ChangeAt {
+        let lagging = |since: f64| Lagging::new(since, self.lag);
+        ChangeAt { shape: *self, since_begin: lagging(time), since_ramp: lagging(time - self.ramp) }
     }
 
     /// The share of the change that the set speed, without the lag, has made at a time (s).
@@ -74,16 +80,59 @@ impl RampedLag {
     pub fn settled(&self, left: f64) -> f64 {
         self.ramp + self.lag * libm::log(1.0 / left.clamp(1e-9, 1.0))
     }
+}
 
-    fn once(&self, time: f64) -> f64 {
-        if time <= 0.0 { 0.0 } else { time + self.lag * libm::expm1(-time / self.lag) }
+/// A change at one moment.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ChangeAt {
+    shape: RampedLag,
+    since_begin: Lagging,
+    /// Since the set speed is there.
+    since_ramp: Lagging,
+}
+
+impl ChangeAt {
+    /// See [`RampedLag::share`].
+    pub(crate) fn share(&self) -> f64 {
+        let RampedLag { ramp, lag } = self.shape;
+        (self.since_begin.once(lag) - self.since_ramp.once(lag)) / ramp
     }
 
-    fn twice(&self, time: f64) -> f64 {
+    /// See [`RampedLag::area`].
+    pub(crate) fn area(&self) -> f64 {
+        let RampedLag { ramp, lag } = self.shape;
+        (self.since_begin.twice(lag) - self.since_ramp.twice(lag)) / ramp
+    }
+
+    /// The set speed is there for so long (s); and `1 − e^(−τ/θ)` of that time.
+    pub(crate) fn since_ramp(&self) -> (f64, f64) {
+        (self.since_ramp.time, -self.since_ramp.decay)
+    }
+}
+
+/// A time `τ` (s) since a ramp began to grow or ended, zero before, with `e^(−τ/θ) − 1`.
+#[derive(Debug, Clone, Copy)]
+struct Lagging {
+    time: f64,
+    decay: f64,
+}
+
+impl Lagging {
+    fn new(time: f64, lag: f64) -> Self {
         if time <= 0.0 {
-            return 0.0;
+            return Self { time: 0.0, decay: 0.0 };
         }
-        0.5 * time * time - self.lag * time - self.lag * self.lag * libm::expm1(-time / self.lag)
+        Self { time, decay: libm::expm1(-time / lag) }
+    }
+
+    /// `h`.
+    fn once(&self, lag: f64) -> f64 {
+        self.time + lag * self.decay
+    }
+
+    /// `H`.
+    fn twice(&self, lag: f64) -> f64 {
+        0.5 * self.time * self.time - lag * self.time - lag * lag * self.decay
     }
 }
 

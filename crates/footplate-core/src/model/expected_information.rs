@@ -3,7 +3,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::motion_model::MotionModel;
+use super::motion_model::{MotionModel, distance_and_time_to_rest, stop_from};
 use super::parameters::Answers;
 use super::priors::{LATE_START, TRIP_DEVIATION};
 use super::segment::{Pace, Segment, SpeedCommand};
@@ -42,13 +42,7 @@ pub(super) struct Seen {
 
 /// The stopping distance (m), from the command on.
 pub(super) fn stop_distance(answers: &Answers<'_>, step: u8, above: bool) -> f64 {
-    let speed = answers.speed(usize::from(step), above);
-    let segment = stop_from(answers, step, speed);
-    speed * segment.begins + segment.distance_to_rest()
-}
-
-fn stop_from(answers: &Answers<'_>, step: u8, speed: f64) -> Segment {
-    Segment::of(&SpeedCommand { sent: 0.0, from: step, to: 0, at_rest: false }, answers, Pace::steady(speed))
+    distance_and_time_to_rest(answers, step, above).0
 }
 
 pub(super) fn start_to(answers: &Answers<'_>, step: u8) -> Segment {

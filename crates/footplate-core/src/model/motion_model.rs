@@ -316,18 +316,14 @@ impl MotionModel {
     #[must_use]
     pub fn stop(&self, step: SpeedStep, approach: Approach) -> StopForecast {
         let above = approach == Approach::Above;
-        let commanded = SpeedCommand { sent: 0.0, from: step.get(), to: 0, at_rest: false };
-        let stop = |answers: &Answers<'_>| {
-            let speed = answers.speed(usize::from(step.get()), above);
-            let segment = Segment::of(&commanded, answers, Pace::steady(speed));
-            (speed * segment.begins + segment.distance_to_rest(), segment.settled())
-        };
-        let (distance, time) = stop(&self.answers());
         let speed = self.answers().speed(usize::from(step.get()), above);
+        let (distance, time) = distance_and_time_to_rest(&self.answers(), step.get(), above);
+        let doubt =
+            self.deviation_with_scale(|answers| distance_and_time_to_rest(answers, step.get(), above).0);
         StopForecast {
             distance: Length::from_m(distance.max(0.0)),
             doubt: Length::from_m(libm::hypot(
-                self.with_interpolation(step, self.deviation_with_scale(|answers| stop(answers).0), distance),
+                self.with_interpolation(step, doubt, distance),
                 end_of_stop(speed),
             )),
             scatter: Length::from_m(libm::hypot(
@@ -337,6 +333,18 @@ impl MotionModel {
             time: TimeSpan::from_s(time.max(LEAST_STOP_S)),
             count: self.counts_at(step, approach).stops,
         }
+    }
+
+    /// The most likely distance to rest, without the uncertainty.
+    pub(crate) fn stop_distance(&self, step: SpeedStep, approach: Approach) -> Length {
+        let above = approach == Approach::Above;
+        Length::from_m(distance_and_time_to_rest(&self.answers(), step.get(), above).0.max(0.0))
+    }
+
+    /// The most likely time to rest, without the uncertainty.
+    pub(crate) fn stop_time(&self, step: SpeedStep, approach: Approach) -> TimeSpan {
+        let above = approach == Approach::Above;
+        TimeSpan::from_s(distance_and_time_to_rest(&self.answers(), step.get(), above).1.max(LEAST_STOP_S))
     }
 
     /// One standard deviation (m) of stops from a speed (m/s).
@@ -416,4 +424,16 @@ impl MotionModel {
         let (mean, deviation) = speed_prior(usize::from(step.get()).max(1), usize::from(highest.get()));
         Speed::from_m_per_s(libm::exp(mean + deviation))
     }
+}
+
+/// The stopping distance (m), from the command on, and the time to rest (s).
+pub(super) fn distance_and_time_to_rest(answers: &Answers<'_>, step: u8, above: bool) -> (f64, f64) {
+    let speed = answers.speed(usize::from(step), above);
+    let segment = stop_from(answers, step, speed);
+    (speed * segment.begins + segment.distance_to_rest(), segment.settled())
+}
+
+/// A stop from a steady speed (m/s) at a step, commanded at time zero.
+pub(super) fn stop_from(answers: &Answers<'_>, step: u8, speed: f64) -> Segment {
+    Segment::of(&SpeedCommand { sent: 0.0, from: step, to: 0, at_rest: false }, answers, Pace::steady(speed))
 }

@@ -5,6 +5,7 @@
 //! is faster.
 
 use alloc::vec::Vec;
+use core::cell::Cell;
 
 /// Places of the single numbers.
 pub(super) const HYSTERESIS: usize = 0;
@@ -186,6 +187,9 @@ pub(super) fn nodes_about(speed: f64) -> [(usize, f64); 2] {
     [(low, 1.0 - part), (low + 1, part)]
 }
 
+/// Two speeds whose logarithms differ by more are not equal by rounding: thousands of times what exp and log may be off by.
+const LN_ROUNDING: f64 = 1e-9;
+
 /// Least friction (m/s²): a tenth of that of a wheel on a level rail.
 const LEAST_FRICTION: f64 = 1e-3;
 
@@ -194,14 +198,47 @@ const LEAST_FRICTION: f64 = 1e-3;
 pub(crate) struct Answers<'v> {
     values: &'v [f64],
     highest: usize,
+    /// Notes the places of the numbers that are read, if someone asks.
+    read: Option<&'v Read>,
+}
+
+/// The places of numbers that were read. What was not read cannot have changed the result, so that its slope is zero.
+#[derive(Debug)]
+pub(super) struct Read(Cell<u128>);
+
+impl Read {
+    pub(super) const fn nothing() -> Self {
+        Self(Cell::new(0))
+    }
+
+    fn note(&self, place: usize) {
+        self.0.set(self.0.get() | Self::bit(place));
+    }
+
+    /// Whether a number may have been read: places beyond the last bit share it.
+    pub(super) fn contains(&self, place: usize) -> bool {
+        self.0.get() & Self::bit(place) != 0
+    }
+
+    fn bit(place: usize) -> u128 {
+        1 << place.min(127)
+    }
 }
 
 impl<'v> Answers<'v> {
     pub(super) const fn new(values: &'v [f64], highest: usize) -> Self {
-        Self { values, highest }
+        Self { values, highest, read: None }
+    }
+
+    /// The same, noting what is read.
+    pub(super) const fn noting(values: &'v [f64], highest: usize, read: &'v Read) -> Self {
+        Self { values, highest, read: Some(read) }
     }
 
     fn at(&self, place: usize) -> f64 {
+        if let Some(read) = self.read {
+            read.note(place);
+        }
         self.values.get(place).copied().unwrap_or(0.0)
     }
 
@@ -211,10 +248,17 @@ impl<'v> Answers<'v> {
         if step == 0 {
             return 0.0;
         }
-        let below = libm::exp(self.ln_speed(step).clamp(-12.0, 3.0));
-        if !above {
-            return below;
-        }
+        let below = libm::exp(self.bounded_ln_speed(step));
+        if above { self.from_above(step, below) } else { below }
+    }
+
+    /// ln of the steady speed from below, where exponentials have meaning.
+    fn bounded_ln_speed(&self, step: usize) -> f64 {
+        self.ln_speed(step).clamp(-12.0, 3.0)
+    }
+
+    /// Steady speed from above at a step with this speed from below.
+    fn from_above(&self, step: usize, below: f64) -> f64 {
         let [low, high] = knots_about(step, self.highest)
             .map(|(knot, weight)| weight * self.at(hysteresis_at(knot, self.highest)));
         let full = self.at(HYSTERESIS) + (low + high);
@@ -238,19 +282,24 @@ impl<'v> Answers<'v> {
     /// speeds from below, as a ramp passes them.
     pub(super) fn step_at(&self, near: usize, set: f64) -> f64 {
         let near = near.min(self.highest);
-        let settled = [self.speed(near, false), self.speed(near, true)];
-        if (settled[0]..=settled[1]).contains(&set) {
+        let below = self.speed(near, false);
+        let above = if near == 0 { 0.0 } else { self.from_above(near, below) };
+        if (below..=above).contains(&set) {
             return near as f64;
         }
-        let mut low = (0, 0.0);
         let stride = stride(self.highest);
+        // Logarithms tell most steps apart without an exponential, which costs more than all else here.
+        let surely_slower = libm::log(set) - LN_ROUNDING;
         for step in (1..=knots(self.highest)).map(|knot| knot * stride) {
+            if self.bounded_ln_speed(step) < surely_slower {
+                continue;
+            }
             let speed = self.speed(step, false);
             if speed >= set {
-                let part = ((set - low.1) / (speed - low.1).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-                return low.0 as f64 + stride as f64 * part;
+                let low = self.speed(step - stride, false);
+                let part = ((set - low) / (speed - low).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+                return (step - stride) as f64 + stride as f64 * part;
             }
-            low = (step, speed);
         }
         self.highest as f64
     }

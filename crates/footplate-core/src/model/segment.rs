@@ -2,7 +2,7 @@
 
 use super::parameters::{Answers, SHAPES};
 use super::priors::SHAPE_ERROR;
-use crate::kinematics::RampedLag;
+use crate::kinematics::{ChangeAt, RampedLag};
 
 /// A command, with the state of the train that receives it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,10 +88,9 @@ struct Rolling {
 }
 
 impl Rolling {
-    /// By how much friction has reduced speed and distance, so long after the stop took effect.
-    fn taken(&self, since: f64, lag: f64) -> (f64, f64) {
-        let time = (since - self.begins).clamp(0.0, self.lasts);
-        let gone = -libm::expm1(-time / lag);
+    /// By how much friction has reduced speed and distance before the train rests.
+    fn taken(&self, at: &ChangeAt, lag: f64) -> (f64, f64) {
+        let (time, gone) = at.since_ramp();
         (self.friction * lag * gone, self.friction * lag * (time - lag * gone))
     }
 
@@ -186,7 +185,8 @@ impl Segment {
 
     /// The remaining part of the initial difference to the set speed.
     fn behind(&self, since: f64) -> f64 {
-        libm::exp(-since / self.shape.lag())
+        // Most changes begin where the one before was complete: the commonest exponential is one that nothing asks for.
+        if self.from.speed == self.from.set { 0.0 } else { libm::exp(-since / self.shape.lag()) }
     }
 
     /// Distance (m) run since it took effect; before that, at the speed before.
@@ -199,14 +199,14 @@ impl Segment {
         if let Some(rolling) = self.braking.filter(|rolling| since >= rolling.ends()) {
             return self.distance_of_stop(rolling);
         }
-        let caught_up = (speed - set) * self.shape.lag() * (1.0 - self.behind(since));
-        let taken = self.braking.map_or(0.0, |rolling| rolling.taken(since, self.shape.lag()).1);
-        let done = self.done(since);
-        set * since
-            + (self.to - set) * self.shape.area(since)
-            + caught_up
-            + self.residual * done
-            + self.ahead_of_law(done)
+        if self.is_steady() {
+            return speed * since;
+        }
+        let (at, lag) = (self.shape.at(since), self.shape.lag());
+        let caught_up = (speed - set) * lag * (1.0 - self.behind(since));
+        let taken = self.braking.map_or(0.0, |rolling| rolling.taken(&at, lag).1);
+        let done = self.done(&at);
+        set * since + (self.to - set) * at.area() + caught_up + self.residual * done + self.ahead_of_law(done)
             - taken
     }
 
@@ -223,13 +223,15 @@ impl Segment {
         if since <= 0.0 {
             return speed;
         }
-        let taken = match self.braking {
-            Some(rolling) if since >= rolling.ends() => return 0.0,
-            Some(rolling) => rolling.taken(since, self.shape.lag()).0,
-            None => 0.0,
-        };
-        (set + (self.to - set) * self.shape.share(since) + (speed - set) * self.behind(since) - taken)
-            .max(0.0)
+        if self.braking.is_some_and(|rolling| since >= rolling.ends()) {
+            return 0.0;
+        }
+        if self.is_steady() {
+            return speed;
+        }
+        let at = self.shape.at(since);
+        let taken = self.braking.map_or(0.0, |rolling| rolling.taken(&at, self.shape.lag()).0);
+        (set + (self.to - set) * at.share() + (speed - set) * self.behind(since) - taken).max(0.0)
     }
 
     /// Speed and set speed.
@@ -245,16 +247,17 @@ impl Segment {
 
     /// The share of the change that is done.
     pub(crate) fn share(&self, time: f64) -> f64 {
-        self.done(time - self.begins)
+        let since = time - self.begins;
+        if self.braking.is_some_and(|rolling| since >= rolling.ends()) {
+            return 1.0;
+        }
+        self.done(&self.shape.at(since))
     }
 
-    /// A stop is done at rest, which comes earlier with friction than with the lag alone.
-    fn done(&self, since: f64) -> f64 {
-        match self.braking {
-            Some(rolling) if since >= rolling.ends() => 1.0,
-            Some(rolling) => (self.shape.share(since) / self.shape.share(rolling.ends())).min(1.0),
-            None => self.shape.share(since),
-        }
+    /// The same before the train rests. A stop is done at rest, which comes earlier with friction than with the lag alone.
+    fn done(&self, at: &ChangeAt) -> f64 {
+        let Some(rolling) = self.braking else { return at.share() };
+        (at.share() / self.shape.share(rolling.ends())).min(1.0)
     }
 
     /// When the change is done but for the rest that does not count (s, on the clock of the run).

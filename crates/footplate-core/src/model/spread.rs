@@ -5,7 +5,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::parameters::{
-    Answers, HYSTERESIS_SPREAD, NODES, PRIOR, SHAPE_DEVIATION, SHAPES, START_NODES, STOP_NODES, count,
+    Answers, HYSTERESIS_SPREAD, NODES, PRIOR, Read, SHAPE_DEVIATION, SHAPES, START_NODES, STOP_NODES, count,
     hysteresis_at, knots, node_covariance, shape_at, speed_at, speed_prior,
 };
 use super::variation::Variation;
@@ -115,10 +115,11 @@ impl Spread {
         highest: usize,
         of: impl Fn(&Answers<'_>) -> f64,
     ) -> Vec<(usize, f64)> {
+        let read = Read::nothing();
+        let here = of(&Answers::noting(values, highest, &read));
         let mut moved = values.to_vec();
-        let here = of(&Answers::new(&moved, highest));
         let mut slopes = Vec::new();
-        for place in 0..self.side.min(values.len()) {
+        for place in (0..self.side.min(values.len())).filter(|place| read.contains(*place)) {
             moved[place] += STEP;
             let slope = (of(&Answers::new(&moved, highest)) - here) / STEP;
             moved[place] = values[place];

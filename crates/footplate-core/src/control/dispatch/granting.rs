@@ -349,11 +349,11 @@ impl Dispatcher {
         is_certain: impl Fn(Length) -> bool,
     ) -> Option<SpeedStep> {
         let model = self.watchdog.driver().model(id)?;
-        let speed = |step: SpeedStep| model.speed(step, Approach::Below).value;
+        let speed = |step: SpeedStep| model.steady_speed(step, Approach::Below);
         let usable = || steps(model).filter(|step| speed(*step) >= CREEP && speed(*step) <= FASTEST);
         let spread = |step: SpeedStep| model.stop(step, Approach::Below).deviation();
         let fits = |step: SpeedStep| {
-            let stop = model.stop(step, Approach::Below).distance;
+            let stop = model.stop_distance(step, Approach::Below);
             let starts = speed(step) * model.settles_within(SpeedStep::STAND, step);
             starts + stop + PLACE <= distance
         };
@@ -368,11 +368,12 @@ impl Dispatcher {
         // Stops are most precise from medium steps.
         let usable: Vec<SpeedStep> = steps(model).collect();
         let step = usable.get(usable.len() * 2 / 3).copied().unwrap_or(model.highest());
-        let cruise = model.speed(step, Approach::Below).value;
+        let cruise = model.steady_speed(step, Approach::Below);
         let cruise = if cruise > SLOWEST { cruise } else { SLOWEST };
-        let stop = model.stop(step, Approach::Below);
+        let (distance, time) =
+            (model.stop_distance(step, Approach::Below), model.stop_time(step, Approach::Below));
         let start_s = 0.5 * model.settles_within(SpeedStep::STAND, step).as_s();
-        let stop_s = (stop.time.as_s() - (stop.distance / cruise).as_s()).max(0.0);
+        let stop_s = (time.as_s() - (distance / cruise).as_s()).max(0.0);
         Pace { cruise, start_s, stop_s, reversal_s: REVERSAL_S }
     }
 }

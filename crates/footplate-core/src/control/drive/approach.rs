@@ -44,7 +44,7 @@ impl DrivenTrain {
     pub(super) fn finding_step(&self) -> SpeedStep {
         let steps = self.usable_steps();
         let fast_enough =
-            steps.iter().find(|step| self.model.speed(**step, Approach::Below).value >= FINDING_SPEED);
+            steps.iter().find(|step| self.model.steady_speed(**step, Approach::Below) >= FINDING_SPEED);
         fast_enough.or(steps.last()).copied().unwrap_or(self.model.highest())
     }
 
@@ -77,7 +77,7 @@ impl DrivenTrain {
         if let Some(most_precise) = least_spread {
             let good_spread = (most_precise * SPREAD_RATIO).max(GOOD_SPREAD);
             let is_fast_enough =
-                |step: SpeedStep| self.model.speed(step, Approach::Below).value >= FINDING_SPEED;
+                |step: SpeedStep| self.model.steady_speed(step, Approach::Below) >= FINDING_SPEED;
             let precise = || settled.iter().filter(|(_, spread)| *spread <= good_spread);
             let fastest = precise().next_back().filter(|(step, _)| is_fast_enough(*step));
             // A train does not creep over the whole distance for a few millimetres; it might also stall.
@@ -150,7 +150,7 @@ impl DrivenTrain {
         at: PathPoint,
         step: SpeedStep,
     ) -> bool {
-        let speed = self.model.speed(step, Approach::Below).value;
+        let speed = self.model.steady_speed(step, Approach::Below);
         let stop = self.model.stop(step, Approach::Below);
         // A start never runs faster than its final speed.
         let settled = located.at.distance + speed * self.model.settles_within(SpeedStep::STAND, step);

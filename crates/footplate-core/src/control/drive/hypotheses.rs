@@ -132,7 +132,7 @@ fn may_have_moved(
 /// ln of the density (1/s) with which a train of unknown position reaches one sensor: its speed over the length of
 /// all track, both directions.
 fn log_density_if_lost(train: &DrivenTrain, context: TrackContext<'_>) -> f64 {
-    let speed = train.model.speed(train.commanded, Approach::Below).value.as_m_per_s();
+    let speed = train.model.steady_speed(train.commanded, Approach::Below).as_m_per_s();
     let track: f64 = context.layout.edges().map(|(_, edge)| edge.length.as_m()).sum();
     let track = if track > 0.0 { track } else { UNKNOWN_TRACK_M };
     libm::log(speed.max(f64::MIN_POSITIVE) / track)

@@ -66,7 +66,7 @@ impl Calibrator<'_> {
                 // Without a prediction: the time that the hop takes from rest at half the speed.
                 let hop = self.tracker.last().and_then(|node| self.context().hop_from(node));
                 let length = hop.map_or(super::experiment::TYPICAL_HOP, |hop| self.longest(&hop));
-                let speed = self.model().speed(self.throttle.step, Approach::Below).value;
+                let speed = self.model().steady_speed(self.throttle.step, Approach::Below);
                 let slowest = (0.5 * speed).max(Speed::from_mm_per_s(20.0));
                 self.steady_at.max(since) + length / slowest + LATE
             }

@@ -104,7 +104,7 @@ impl Calibrator<'_> {
     fn finding_step(&self) -> SpeedStep {
         let model = self.model();
         let usable = usable_steps(model);
-        let slow = |step: &&SpeedStep| model.speed(**step, Approach::Below).value <= FINDING_SPEED;
+        let slow = |step: &&SpeedStep| model.steady_speed(**step, Approach::Below) <= FINDING_SPEED;
         let known = usable.iter().rev().find(slow).or(usable.first()).copied();
         let stride = model.stride();
         let first = stride * libm::ceil(FINDING_STEP * f64::from(model.highest().get() / stride)) as u8;

@@ -158,7 +158,7 @@ impl Planner {
                     continue;
                 }
                 all.push(Experiment::Stop { step: *step, approach, is_past: false });
-                if past_by(model, *step, approach) <= MOST_PAST * model.stop(*step, approach).distance {
+                if past_by(model, *step, approach) <= MOST_PAST * model.stop_distance(*step, approach) {
                     all.push(Experiment::Stop { step: *step, approach, is_past: true });
                 }
                 if model.speed(*step, approach).count < ENOUGH_DETECTIONS
@@ -168,7 +168,7 @@ impl Planner {
                 }
             }
         }
-        let slow = |step: &&SpeedStep| model.speed(**step, Approach::Below).value <= FASTEST_MOVE;
+        let slow = |step: &&SpeedStep| model.steady_speed(**step, Approach::Below) <= FASTEST_MOVE;
         for step in usable.iter().filter(slow).skip(1).step_by(2) {
             all.extend(MOVES.map(|run| Experiment::Move { step: *step, run: TimeSpan::from_s(run) }));
         }
@@ -180,7 +180,7 @@ impl Planner {
 }
 
 fn is_worth_trying(model: &MotionModel, step: SpeedStep, approach: Approach) -> bool {
-    model.uses(step) != StepUse::Unreliable && model.speed(step, approach).value >= SLOWEST_WORTH_TRYING
+    model.uses(step) != StepUse::Unreliable && model.steady_speed(step, approach) >= SLOWEST_WORTH_TRYING
 }
 
 /// The highest step that does not move the train reliably: the staircase begins above it.
@@ -192,7 +192,7 @@ fn lowest_start(model: &MotionModel) -> SpeedStep {
 /// The slowest step that reliably reaches a sensor.
 pub(super) fn creep_step(model: &MotionModel) -> Option<SpeedStep> {
     let usable = usable_steps(model);
-    let fast_enough = |step: &&SpeedStep| model.speed(**step, Approach::Below).value >= SLOWEST_CREEP;
+    let fast_enough = |step: &&SpeedStep| model.steady_speed(**step, Approach::Below) >= SLOWEST_CREEP;
     usable.iter().find(fast_enough).or(usable.last()).copied()
 }
 
@@ -222,14 +222,14 @@ pub(super) fn cost(model: &MotionModel, throttle: Throttle, experiment: &Experim
             reaching(model, throttle, step, approach) + hop_time(model, step, approach, 1.5)
         }
         Experiment::Stop { step, approach, is_past } => {
-            let stop = model.stop(step, approach).time + PAUSE;
+            let stop = model.stop_time(step, approach) + PAUSE;
             let on = if is_past { LONG_CREEP } else { creep(model, 0.2) };
             reaching(model, throttle, step, approach) + hop_time(model, step, approach, 1.0) + stop + on
         }
         Experiment::Move { step, run } => {
             let slow = creep_step(model).unwrap_or(step);
-            let brake = model.stop(slow, Approach::Below).time + PAUSE;
-            let brake_again = model.stop(step, Approach::Below).time + PAUSE;
+            let brake = model.stop_time(slow, Approach::Below) + PAUSE;
+            let brake_again = model.stop_time(step, Approach::Below) + PAUSE;
             let first_detection = hop_time(model, slow, Approach::Below, 0.5);
             reaching(model, throttle, slow, throttle.approach)
                 + first_detection
@@ -254,7 +254,7 @@ fn reaching(model: &MotionModel, throttle: Throttle, step: SpeedStep, approach: 
 
 /// The time for a number of typical hops.
 fn hop_time(model: &MotionModel, step: SpeedStep, approach: Approach, hops: f64) -> TimeSpan {
-    let speed = model.speed(step, approach).value.max(Speed::from_mm_per_s(10.0));
+    let speed = model.steady_speed(step, approach).max(Speed::from_mm_per_s(10.0));
     hops * TYPICAL_HOP / speed
 }
 

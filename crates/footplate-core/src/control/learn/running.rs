@@ -91,7 +91,7 @@ impl Calibrator<'_> {
         let Some(trial) = self.trial() else { return };
         let sensors = match trial.experiment {
             Experiment::Speed { step, approach } => {
-                let speed = self.model().speed(step, approach).value.max(Speed::from_mm_per_s(1.0));
+                let speed = self.model().steady_speed(step, approach).max(Speed::from_mm_per_s(1.0));
                 if TYPICAL_HOP / speed > LONG_HOP { 1 } else { 2 }
             }
             Experiment::Stop { .. } | Experiment::Move { .. } => 1,
@@ -250,7 +250,7 @@ impl Calibrator<'_> {
     pub(super) fn stops_within(&self) -> TimeSpan {
         let step = self.requested.map_or(self.throttle.step, |(step, _)| step).max(self.throttle.step);
         let step = if step == SpeedStep::STAND { self.model().highest() } else { step };
-        self.model().stop(step, Approach::Above).time + AFTER_REST + AFTER_REST
+        self.model().stop_time(step, Approach::Above) + AFTER_REST + AFTER_REST
     }
 
     /// Does what is due by the clock.
@@ -310,7 +310,7 @@ impl Calibrator<'_> {
         let Some(distance) = self.distance_to_next_sensor(now) else { return creep };
         let wanted = distance / CREEP_TIME;
         let usable = usable_steps(model);
-        let fit = usable.iter().rev().find(|step| model.speed(**step, Approach::Below).value <= wanted);
+        let fit = usable.iter().rev().find(|step| model.steady_speed(**step, Approach::Below) <= wanted);
         fit.copied().unwrap_or(creep).max(creep)
     }
 

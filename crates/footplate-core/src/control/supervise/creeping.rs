@@ -120,7 +120,7 @@ impl Watchdog {
         // A station that is silent may not have received it.
         let step = if self.is_silent() { step.max(known.step) } else { step };
         let stops = step == SpeedStep::STAND && known.step > SpeedStep::STAND;
-        let stop = if stops { model.stop(known.step, Approach::Above).distance } else { Length::ZERO };
+        let stop = if stops { model.stop_distance(known.step, Approach::Above) } else { Length::ZERO };
         let run = known.run + stop;
         self.unheard.insert(train, Unheard { run, step, since: sent, before: known.step });
     }
@@ -140,8 +140,8 @@ impl Watchdog {
         let (Some(located), Some(model), false) = (located, model, self.is_in_danger(train)) else {
             return left + REST_UNKNOWN;
         };
-        let stop = model.stop(located.step, Approach::Above);
-        left + TimeSpan::from_s(stop.time.as_s() * REST_PART) + REST_MORE
+        let time = model.stop_time(located.step, Approach::Above);
+        left + TimeSpan::from_s(time.as_s() * REST_PART) + REST_MORE
     }
 
     /// A train was detected or placed.

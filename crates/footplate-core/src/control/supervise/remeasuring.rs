@@ -89,7 +89,7 @@ impl Watchdog {
         let Some(recovery) = self.dangers.get(&train) else { return };
         let step = recovery.steps.middle;
         let target = self.target_short_of_sensor(now, train);
-        let distance = self.driver.model(train).map(|model| model.stop(step, Approach::Below).distance);
+        let distance = self.driver.model(train).map(|model| model.stop_distance(step, Approach::Below));
         let ordered = target.zip(distance).and_then(|(target, distance)| {
             let stop = StopOrder { step: Some(step), ..StopOrder::at(train, target) };
             Some((self.issue(now, Order::Stop(stop))?, distance))

@@ -49,7 +49,7 @@ pub(super) struct Steps {
 impl Steps {
     pub(super) fn of(model: &MotionModel) -> Self {
         let all = || (1..=model.highest().get()).filter_map(SpeedStep::new);
-        let speed = |step: SpeedStep| model.speed(step, Approach::Below).value;
+        let speed = |step: SpeedStep| model.steady_speed(step, Approach::Below);
         let mut usable: Vec<SpeedStep> = all().filter(|step| model.uses(*step) == StepUse::Moves).collect();
         if usable.is_empty() {
             usable = all().filter(|step| model.uses(*step) != StepUse::Unreliable).collect();
@@ -121,7 +121,7 @@ impl SpeedTrial {
     pub(super) fn ratio(&self, model: &MotionModel) -> Option<MeasuredRatio> {
         let (first, (_, last)) = (self.first?, self.last?);
         let took = (last.middle() - first.middle()).as_s();
-        let known = model.speed(self.step, self.approach).value.as_m_per_s();
+        let known = model.steady_speed(self.step, self.approach).as_m_per_s();
         if self.hops == 0 || took <= 0.0 || known <= 0.0 {
             return None;
         }

@@ -23,7 +23,7 @@ impl Unheard {
         if self.step == SpeedStep::STAND {
             return self;
         }
-        let speed = model.speed(self.step, Approach::Below).value;
+        let speed = model.steady_speed(self.step, Approach::Below);
         let span = (now - self.since).max(TimeSpan::ZERO);
         Self { run: self.run + speed * span, since: now.max(self.since), ..self }
     }
