@@ -248,6 +248,9 @@ impl Segment {
     /// The share of the change that is done.
     pub(crate) fn share(&self, time: f64) -> f64 {
         let since = time - self.begins;
+        if since <= 0.0 {
+            return 0.0;
+        }
         if self.braking.is_some_and(|rolling| since >= rolling.ends()) {
             return 1.0;
         }

@@ -7,6 +7,7 @@
 #[cfg(feature = "serde")]
 mod bits;
 mod chain;
+mod course;
 mod foreseen;
 mod hindsight;
 mod learn;

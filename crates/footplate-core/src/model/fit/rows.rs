@@ -4,11 +4,12 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
+use super::course::{Course, Outcome, Passage};
 use super::robust::RobustWeight;
-use super::trip::{Own, Trip, Walk};
+use super::trip::{Own, Trip};
 use super::unknowns::Columns;
 use crate::model::parameters::{
-    Answers, NODES, SHAPES, START_NODES, STOP_NODES, count, hysteresis_at, knots_about, nodes_about,
+    Answers, NODES, Read, SHAPES, START_NODES, STOP_NODES, count, hysteresis_at, knots_about, nodes_about,
     shape_at, speed_at,
 };
 use crate::model::priors::SHAPE_ERROR;
@@ -83,17 +84,9 @@ impl Linear {
 /// Step of the numerical derivatives, in the unit of each number: small against its uncertainty.
 const STEP: f64 = 1e-4;
 
-/// A trip simulated with some numbers: distance (m) at each sensor, and at rest.
-struct Outcome {
-    at: Vec<f64>,
-    rest: f64,
-}
-
 fn outcome(trip: &Trip, answers: &Answers<'_>, own: &Own, segments: &mut Vec<Segment>) -> Outcome {
     trip.segments(answers, own, segments);
-    let mut walk = Walk::new(trip, own, segments);
-    let at = trip.detections.iter().map(|detection| walk.distance(detection.time)).collect();
-    Outcome { at, rest: walk.distance_to_rest() }
+    Course::new(trip, segments).outcome(own)
 }
 
 /// The point of a fit about which its trips are linearised.
@@ -158,9 +151,10 @@ impl Point<'_> {
         let TripAt { trip, own, .. } = at;
         let detection = trip.detections.first()?;
         let mut segments = Vec::new();
-        let outcome = outcome(trip, &Answers::new(self.lasting, self.highest), own, &mut segments);
-        let Error { speed, law, .. } = *errors(trip, own, &segments, self.stop_shape_error).first()?;
-        let run = outcome.at.first()? * TRIP_DEVIATION;
+        trip.segments(&Answers::new(self.lasting, self.highest), own, &mut segments);
+        let course = Course::new(trip, &segments);
+        let Error { speed, law, .. } = self.error(trip, &course.passages(own).next()?);
+        let run = course.outcome(own).at.first()? * TRIP_DEVIATION;
         let timing = speed * speed * detection.variance + self.sensors.of(detection.sensor);
         Some(FirstSensor { speed, variance: timing + law * law + run * run })
     }
@@ -170,13 +164,15 @@ impl Point<'_> {
         let TripAt { trip, own, next_place } = at;
         let columns = self.columns;
         let mut rows = self.usual(trip, own);
-        let mut segments = Vec::new();
-        let here = outcome(trip, &Answers::new(self.lasting, self.highest), own, &mut segments);
-        let errors = errors(trip, own, &segments, self.stop_shape_error);
+        let (mut segments, read) = (Vec::new(), Read::nothing());
+        trip.segments(&Answers::noting(self.lasting, self.highest, &read), own, &mut segments);
+        let course = Course::new(trip, &segments);
+        let here = course.outcome(own);
+        let errors: Vec<Error> = course.passages(own).map(|passage| self.error(trip, &passage)).collect();
         let stop_speed = segments.last().map_or(0.0, |segment| segment.from.speed);
         let stop_distance = segments.last().map_or(0.0, Segment::distance_to_rest);
         let stop_step = trip.step_of(segments.len().saturating_sub(1));
-        let slopes = if with_slopes { self.slopes(trip, own, &segments) } else { Vec::new() };
+        let slopes = if with_slopes { self.slopes(trip, own, &course, &read) } else { Vec::new() };
         let terms_of = |of: &dyn Fn(&Outcome) -> f64| {
             let mut terms = vec![(columns.place(), 1.0)];
             terms.extend(
@@ -308,28 +304,38 @@ impl Point<'_> {
         rows
     }
 
+    /// The uncertainty of the place of a trip's train at a sensor.
+    fn error(&self, trip: &Trip, at: &Passage<'_>) -> Error {
+        let shape_error = if at.segment.is_stop() { self.stop_shape_error } else { SHAPE_ERROR };
+        let law = shape_error * at.in_change() * at.segment.displacement().abs();
+        // The common errors of starts and of stops are learnt: see `Answers::shape`.
+        let change = at.nth.checked_sub(1).and_then(|place| trip.commanded.get(place));
+        let is_end = change.is_some_and(|change| change.to == 0 || change.at_rest);
+        let systematic = if is_end { 1.0 } else { SYSTEMATIC };
+        Error { speed: at.speed(), law, systematic, step: trip.step_of(at.nth) }
+    }
+
     /// The trip simulated with each number on which it can depend changed by one step.
-    fn slopes(&self, trip: &Trip, own: &Own, segments: &[Segment]) -> Vec<(usize, Outcome)> {
+    fn slopes(&self, trip: &Trip, own: &Own, course: &Course<'_>, read: &Read) -> Vec<(usize, Outcome)> {
         let columns = self.columns;
         let mut slopes: Vec<(usize, Outcome)> = Vec::new();
         let mut moved_segments = Vec::new();
         let mut numbers = self.lasting.to_vec();
-        for column in involved(trip, segments, self.highest) {
+        let involved = involved(trip, course.segments(), self.highest);
+        for column in involved.into_iter().filter(|column| read.contains(*column)) {
             numbers[column] += STEP;
             let answers = Answers::new(&numbers, self.highest);
             slopes.push((column, outcome(trip, &answers, own, &mut moved_segments)));
             numbers[column] = self.lasting[column];
         }
-        let answers = Answers::new(self.lasting, self.highest);
         let mut moved = own.clone();
-        let mut add = |moved: &Own, column| {
-            slopes.push((column, outcome(trip, &answers, moved, &mut moved_segments)));
-        };
         if trip.commanded.first().is_some_and(|commanded| commanded.at_rest) {
+            let answers = Answers::new(self.lasting, self.highest);
             moved.late_start += STEP;
-            add(&moved, columns.late_start());
+            slopes.push((columns.late_start(), outcome(trip, &answers, &moved, &mut moved_segments)));
             moved.late_start = own.late_start;
         }
+        let mut add = |moved: &Own, column| slopes.push((column, course.outcome(moved)));
         for piece in 0..own.deviations.len() {
             moved.deviations[piece] += STEP;
             add(&moved, columns.deviation(piece));
@@ -367,24 +373,6 @@ struct Error {
     systematic: f64,
     /// The step of that speed.
     step: u8,
-}
-
-fn errors(trip: &Trip, own: &Own, segments: &[Segment], stop_shape_error: f64) -> Vec<Error> {
-    let mut walk = Walk::new(trip, own, segments);
-    trip.detections
-        .iter()
-        .map(|detection| {
-            walk.distance(detection.time);
-            let (middle, displacement) = walk.in_change(detection.time);
-            let shape_error = if walk.is_stopping() { stop_shape_error } else { SHAPE_ERROR };
-            let law = shape_error * middle * displacement.abs();
-            // The common errors of starts and of stops are learnt: see `Answers::shape`.
-            let change = walk.segment().checked_sub(1).and_then(|place| trip.commanded.get(place));
-            let is_end = change.is_some_and(|change| change.to == 0 || change.at_rest);
-            let systematic = if is_end { 1.0 } else { SYSTEMATIC };
-            Error { speed: walk.speed(detection.time), law, systematic, step: trip.step_of(walk.segment()) }
-        })
-        .collect()
 }
 
 /// The columns of the train's own numbers on which a trip can depend.

@@ -2,6 +2,7 @@
 
 use alloc::vec::Vec;
 
+use super::course::Course;
 use crate::ids::{NodeId, SensorId};
 use crate::model::parameters::Answers;
 use crate::model::segment::{Segment, SpeedCommand};
@@ -200,9 +201,8 @@ impl Trip {
         self.segments(answers, &own, &mut segments);
         let last = segments.last().filter(|last| last.is_stop())?;
         let effect = StopEffect { speed: last.from.speed, distance: last.distance_to_rest() };
-        let mut walk = Walk::new(self, &own, &segments);
-        let passed = self.detections.last().map_or(-own.place, |detection| walk.distance(detection.time));
-        Some((walk.distance_to_rest() - passed, effect))
+        let outcome = Course::new(self, &segments).outcome(&own);
+        Some((outcome.rest - outcome.at.last().copied().unwrap_or(-own.place), effect))
     }
 
     fn last_segment(&self, answers: &Answers<'_>) -> Option<Segment> {
@@ -228,97 +228,5 @@ impl Trip {
             segments.push(next);
             last = next;
         }
-    }
-}
-
-/// The distance run in a trip as a function of time, for rising times.
-#[derive(Debug)]
-pub(super) struct Walk<'t> {
-    trip: &'t Trip,
-    own: &'t Own,
-    segments: &'t [Segment],
-    segment: usize,
-    /// Distance without deviations at the beginning of the segment.
-    base: f64,
-    piece: usize,
-    /// Distance without deviations and with them at the beginning of the piece.
-    piece_base: f64,
-    done: f64,
-}
-
-impl<'t> Walk<'t> {
-    pub(super) const fn new(trip: &'t Trip, own: &'t Own, segments: &'t [Segment]) -> Self {
-        Self { trip, own, segments, segment: 0, base: 0.0, piece: 0, piece_base: 0.0, done: 0.0 }
-    }
-
-    fn deviation(&self) -> f64 {
-        libm::exp(self.own.deviations.get(self.piece).copied().unwrap_or(0.0))
-    }
-
-    /// Way without deviations; moves on to the segment of that time.
-    fn plain(&mut self, time: f64) -> f64 {
-        while let (Some(now), Some(next)) =
-            (self.segments.get(self.segment), self.segments.get(self.segment + 1))
-            && next.begins <= time
-        {
-            self.base += now.distance(next.begins);
-            self.segment += 1;
-        }
-        self.base + self.segments.get(self.segment).map_or(0.0, |segment| segment.distance(time))
-    }
-
-    /// Distance (m) from the beginning of the trip, at a time (s) not before the last one asked for.
-    pub(super) fn distance(&mut self, time: f64) -> f64 {
-        while let Some(next) = self.trip.pieces.get(self.piece + 1).copied()
-            && next <= time
-        {
-            let plain = self.plain(next);
-            self.done += self.deviation() * (plain - self.piece_base);
-            self.piece_base = plain;
-            self.piece += 1;
-        }
-        let plain = self.plain(time);
-        self.done + self.deviation() * (plain - self.piece_base) + self.added(time)
-    }
-
-    /// The additional distance of changes, as far as they are done.
-    fn added(&self, time: f64) -> f64 {
-        let changes = self.segments.iter().skip(1).zip(&self.own.changes);
-        changes.filter(|(_, by)| **by != 0.0).map(|(segment, by)| by * segment.share(time)).sum()
-    }
-
-    /// Distance to standstill, when the last segment is a stop.
-    pub(super) fn distance_to_rest(mut self) -> f64 {
-        let Some(last) = self.segments.last() else { return 0.0 };
-        let begins = last.begins;
-        let start = self.distance(begins);
-        while self.piece + 1 < self.trip.pieces.len() {
-            self.piece += 1;
-        }
-        let added: f64 = self.own.changes.iter().sum::<f64>() - self.added(begins);
-        start + self.deviation() * last.distance_to_rest() + added
-    }
-
-    /// Speed (m/s) at the time last asked for, or later.
-    pub(super) fn speed(&self, time: f64) -> f64 {
-        self.deviation() * self.segments.get(self.segment).map_or(0.0, |segment| segment.speed(time))
-    }
-
-    /// The segment of the time last asked for.
-    pub(super) const fn segment(&self) -> usize {
-        self.segment
-    }
-
-    /// Whether the present change ends at rest.
-    pub(super) fn is_stopping(&self) -> bool {
-        self.segments.get(self.segment).is_some_and(Segment::is_stop)
-    }
-
-    /// How much of the present change is neither begun nor done (0 to 1, most at its middle), and its displacement (m).
-    pub(super) fn in_change(&self, time: f64) -> (f64, f64) {
-        self.segments.get(self.segment).map_or((0.0, 0.0), |segment| {
-            let share = segment.share(time);
-            (4.0 * share * (1.0 - share), segment.displacement())
-        })
     }
 }
