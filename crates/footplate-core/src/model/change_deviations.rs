@@ -99,15 +99,29 @@ impl MotionModel {
     /// The step with the nearest speed; 0 for standstill.
     pub(crate) fn step_near(&self, speed: f64) -> u8 {
         let answers = self.answers();
-        let off = |step: &u8| (answers.speed(usize::from(*step), false) - speed).abs();
         let (knots, stride) = (knots(self.steps()), stride(self.steps()));
         let steps = if stride == 1 {
-            0..=self.highest().get()
+            1..=self.highest().get()
         } else {
             let fast_enough = |knot: &usize| answers.speed(knot * stride, false) >= speed;
             let above = stride * (1..=knots).find(fast_enough).unwrap_or(knots);
-            (above - stride) as u8..=above as u8
+            (above - stride).max(1) as u8..=above as u8
         };
-        steps.min_by(|one, other| off(one).total_cmp(&off(other))).unwrap_or(0)
+        // The nearest is the fastest of the slower ones, the slowest of the faster ones, or standstill: logarithms tell which.
+        let ln = if speed > 0.0 { libm::log(speed) } else { f64::NEG_INFINITY };
+        let (mut slower, mut faster) = ((0, f64::NEG_INFINITY), (0, f64::INFINITY));
+        for step in steps {
+            let at = answers.bounded_ln_speed(usize::from(step));
+            if at <= ln && at > slower.1 {
+                slower = (step, at);
+            } else if at > ln && at < faster.1 {
+                faster = (step, at);
+            }
+        }
+        let off = |step: &u8| (answers.speed(usize::from(*step), false) - speed).abs();
+        let near = [0, slower.0, faster.0].map(|step| (off(&step), step));
+        near.into_iter()
+            .min_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)))
+            .map_or(0, |(_, step)| step)
     }
 }

@@ -253,7 +253,7 @@ impl<'v> Answers<'v> {
     }
 
     /// ln of the steady speed from below, where exponentials have meaning.
-    fn bounded_ln_speed(&self, step: usize) -> f64 {
+    pub(super) fn bounded_ln_speed(&self, step: usize) -> f64 {
         self.ln_speed(step).clamp(-12.0, 3.0)
     }
 
