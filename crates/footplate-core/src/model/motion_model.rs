@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use super::parameters::{Answers, between_knots, knots, prior_means, speed_prior, stride};
 use super::priors::end_of_stop;
 use super::priors::section_variance;
-use super::scatter::Scatter;
+use super::scatter::{MEDIUM_SPEED, Scatter};
 use super::segment::{Pace, Segment, SpeedCommand};
 use super::sensor_scatter::SensorVariances;
 use super::spread::Spread;
@@ -375,10 +375,11 @@ impl MotionModel {
     }
 
     /// One standard deviation of the scatter of stops that the model does not explain, as broken promises show it: loads, wear,
-    /// laws that the model lacks. It is part of every stop's scatter.
+    /// laws that the model lacks, decoders that are late by chance. It is part of every stop's scatter; this is that of a stop from
+    /// a medium speed.
     #[must_use]
-    pub const fn unexplained_scatter(&self) -> Length {
-        Length::from_m(self.scatter.floor)
+    pub fn unexplained_scatter(&self) -> Length {
+        Length::from_m(self.scatter.unexplained(MEDIUM_SPEED))
     }
 
     /// How long it takes, from the command's leaving the line, to be steady at a step coming from another.

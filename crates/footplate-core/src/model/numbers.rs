@@ -39,6 +39,8 @@ pub struct MotionNumbers {
     pub scatter_scale: f64,
     /// What stops scatter by besides, whatever their speed (m): slopes, loads, shapes of laws that are none of ours.
     pub scatter_floor: f64,
+    /// Standard deviation of the time until a stop begins (s).
+    pub stop_delay_scatter: f64,
     /// Standard deviation (m) of where a sensor trips that the train has not passed often, and of each that it has.
     pub usual_sensor_scatter: f64,
     /// See [`usual_sensor_scatter`](Self::usual_sensor_scatter).
@@ -112,6 +114,7 @@ impl MotionModel {
             counts: self.counts.iter().map(|both| both.each_ref().map(counts)).collect(),
             scatter_scale: self.scatter.stops,
             scatter_floor: self.scatter.floor,
+            stop_delay_scatter: self.scatter.delay,
             start_scale: self.scatter.starts,
             usual_sensor_scatter: libm::sqrt(self.sensor_variances.usual),
             sensor_scatter: self.sensor_variances.of_sensor.iter().map(deviation).collect(),
@@ -163,6 +166,7 @@ impl MotionModel {
         let scatters = [
             numbers.scatter_scale,
             numbers.scatter_floor,
+            numbers.stop_delay_scatter,
             numbers.start_scale,
             numbers.stop_offset_deviation,
             numbers.residual_scales[0],
@@ -192,6 +196,7 @@ impl MotionModel {
         model.scatter = Scatter {
             stops: numbers.scatter_scale,
             floor: numbers.scatter_floor,
+            delay: numbers.stop_delay_scatter,
             starts: numbers.start_scale,
         };
         let variance = |(sensor, scatter): &(SensorId, f64)| (*sensor, scatter * scatter);
@@ -218,7 +223,7 @@ mod tests {
         model.stop_offsets.of_edge.insert(5, (-0.02, 1e-5));
         model.stop_offsets.deviation = 0.015;
         model.counts[9][1] = Counts { contacts: 41, stops: 7 };
-        model.scatter = Scatter { stops: 1.25, floor: 0.002, ..Scatter::USUAL };
+        model.scatter = Scatter { stops: 1.25, floor: 0.002, delay: 0.04, ..Scatter::USUAL };
         model.date = Timestamp::from_ns(5);
         model
     }

@@ -28,20 +28,29 @@ pub(crate) struct Scatter {
     /// ... and a standard deviation (m) that does not depend on the speed: slopes, loads, and shapes of laws that the model
     /// lacks.
     pub(super) floor: f64,
+    /// ... and one of the time until they begin (s): decoders that change their speed by a clock of their own, stations that
+    /// repeat commands in turn.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub(super) delay: f64,
     /// Of starts: factor on the usual scatter.
     pub(super) starts: f64,
 }
 
 impl Scatter {
     /// Usual for model trains.
-    pub(super) const USUAL: Self = Self { stops: 1.0, floor: 0.0, starts: 1.0 };
+    pub(super) const USUAL: Self = Self { stops: 1.0, floor: 0.0, delay: 0.0, starts: 1.0 };
 
     /// One standard deviation (m) of stops from a speed (m/s).
     pub(super) fn of_stop(self, speed: f64) -> f64 {
-        libm::hypot(self.of_stop_alone(speed), self.floor)
+        libm::hypot(self.of_stop_alone(speed), self.unexplained(speed))
     }
 
-    /// The same without the floor.
+    /// What only broken promises show.
+    pub(super) fn unexplained(self, speed: f64) -> f64 {
+        libm::hypot(self.floor, self.delay * speed)
+    }
+
+    /// What the residuals of the fit show.
     pub(super) fn of_stop_alone(self, speed: f64) -> f64 {
         self.stops * usual_scatter(speed)
     }
@@ -62,11 +71,13 @@ const WILD: f64 = 9.0;
 const WILD_PROMISE: f64 = 16.0;
 /// Bounds of the factors.
 const SCALES: (f64, f64) = (0.4, 6.0);
-/// A priori stops have no floor; that weighs as much as this many promises that were kept.
-const NO_FLOOR: f64 = 3.0;
-/// Promises are weighted as if the floor were at least this (m), about the uncertainty of the next sensor. With the weights of a
-/// zero floor, no promise would ever outweigh the prior.
-const LEAST_FLOOR: f64 = 0.015;
+/// A priori stops have no unexplained scatter; that weighs as much as this many promises that were kept, ...
+const NOTHING_UNEXPLAINED: f64 = 3.0;
+/// ... for the scatter of their delay from this speed (m/s), the middle of those that trains are driven at.
+pub(super) const MEDIUM_SPEED: f64 = 0.3;
+/// Promises are weighted as if the unexplained scatter were at least this (m), about the uncertainty of the next sensor. With the
+/// weights of none, no promise would ever outweigh the prior.
+const LEAST_UNEXPLAINED: f64 = 0.015;
 
 /// Sum of squared residuals of stops or starts, each divided by the usual variance.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -82,10 +93,12 @@ impl ScatterSum {
         self.add(square.min(WILD), 1.0, MEMORY);
     }
 
-    fn add(&mut self, square: f64, weight: f64, memory: f64) {
+    /// Returns the share of all before that is kept.
+    fn add(&mut self, square: f64, weight: f64, memory: f64) -> f64 {
         let kept = if self.count >= memory { 1.0 - weight / memory } else { 1.0 };
         self.sum = kept * self.sum + weight * square;
         self.count = kept * self.count + weight;
+        kept
     }
 
     /// Standard deviation divided by the usual one.
@@ -102,35 +115,61 @@ pub(crate) struct ScatterSums {
     pub(super) stops: ScatterSum,
     pub(super) starts: ScatterSum,
     promises: ScatterSum,
+    /// The same weights times the square and the fourth power of the speed, and what is left over times its square.
+    #[cfg_attr(feature = "serde", serde(default))]
+    promises_by_speed: [f64; 3],
 }
 
 impl ScatterSums {
-    /// Adds a promise with this squared error (m²). `explained` (m²) is its predicted variance without the floor.
+    /// Adds a promise of a stop from a speed (m/s) with this squared error (m²). `explained` (m²) is its predicted variance without
+    /// what is unexplained.
     ///
-    /// The mean of what they leave over, each weighted by how sharply it determines the floor, is the square of the floor:
-    /// the maximum of the likelihood, approached one promise at a time.
-    pub(super) fn take_promise(&mut self, square: f64, explained: f64) {
-        let floor = self.floor() * self.floor();
-        let left = square.min(WILD_PROMISE * (explained + floor)) - explained;
-        let floor = floor.max(LEAST_FLOOR * LEAST_FLOOR);
-        let weight = floor / (explained + floor);
-        self.promises.add(left, weight * weight, PROMISES_KEPT);
+    /// What they leave over is a straight line over the square of the speed, whose numbers are the squares of the floor and of the
+    /// scatter of the delay: weighted by how sharply each determines them, the maximum of the likelihood, approached one promise at
+    /// a time.
+    pub(super) fn take_promise(&mut self, speed: f64, square: f64, explained: f64) {
+        let unexplained = self.scatter().unexplained(speed);
+        let unexplained = unexplained * unexplained;
+        let left = square.min(WILD_PROMISE * (explained + unexplained)) - explained;
+        let unexplained = unexplained.max(LEAST_UNEXPLAINED * LEAST_UNEXPLAINED);
+        let weight = unexplained / (explained + unexplained);
+        let weight = weight * weight;
+        let kept = self.promises.add(left, weight, PROMISES_KEPT);
+        let squared = speed * speed;
+        let new = [squared, squared * squared, squared * left];
+        for (sum, new) in self.promises_by_speed.iter_mut().zip(new) {
+            *sum = kept * *sum + weight * new;
+        }
     }
 
     /// With the promises of other sums.
     pub(super) const fn with_promises_of(self, other: &Self) -> Self {
-        Self { promises: other.promises, ..self }
+        Self { promises: other.promises, promises_by_speed: other.promises_by_speed, ..self }
     }
 
-    /// The floor by the promises so far (m).
-    fn floor(&self) -> f64 {
-        libm::sqrt((self.promises.sum / (self.promises.count + NO_FLOOR)).max(0.0))
+    /// The floor (m) and the scatter of the delay (s) by the promises so far: both, or the one that explains them without a negative
+    /// other.
+    fn unexplained(&self) -> (f64, f64) {
+        let [squares, fourths, left_by_square] = self.promises_by_speed;
+        let medium = MEDIUM_SPEED * MEDIUM_SPEED;
+        let (count, left) = (self.promises.count + NOTHING_UNEXPLAINED, self.promises.sum);
+        let fourths = fourths + NOTHING_UNEXPLAINED * medium * medium;
+        let determinant = count * fourths - squares * squares;
+        let floor = (left * fourths - left_by_square * squares) / determinant;
+        let delay = (left_by_square * count - left * squares) / determinant;
+        let (floor, delay) = match (floor > 0.0, delay > 0.0) {
+            (true, true) => (floor, delay),
+            (true, false) => (left / count, 0.0),
+            _ => (0.0, left_by_square / fourths),
+        };
+        (libm::sqrt(floor.max(0.0)), libm::sqrt(delay.max(0.0)))
     }
 
     /// The scatter by all sums. Residuals show too little where a fit has many parameters to explain them; broken promises
     /// show the rest.
     pub(super) fn scatter(&self) -> Scatter {
-        Scatter { stops: self.stops.scale(), floor: self.floor(), starts: self.starts.scale() }
+        let (floor, delay) = self.unexplained();
+        Scatter { stops: self.stops.scale(), floor, delay, starts: self.starts.scale() }
     }
 }
 
@@ -138,28 +177,40 @@ impl ScatterSums {
 mod tests {
     use super::*;
 
-    #[test]
-    fn promises_that_are_kept_leave_no_floor_and_broken_ones_find_it() {
-        // Turns of plus and minus one standard deviation.
-        let shown = |scatter: f64| {
-            let mut sums = ScatterSums::default();
-            for nth in 0..60 {
-                let explained = if nth % 2 == 0 { 0.005 } else { 0.02 };
-                sums.take_promise(explained * explained + scatter * scatter, explained * explained);
-            }
-            sums.scatter().floor
-        };
-        assert_eq!(shown(0.0), 0.0);
-        assert!((0.022..=0.03).contains(&shown(0.03)), "{}", shown(0.03));
+    /// What is found of promises whose errors turn between plus and minus one standard deviation, from slow and fast stops.
+    fn shown(scatter: impl Fn(f64) -> f64) -> Scatter {
+        let mut sums = ScatterSums::default();
+        for nth in 0..60 {
+            let explained = if nth % 2 == 0 { 0.005 } else { 0.02 };
+            let speed = if nth % 4 < 2 { 0.1 } else { 0.5 };
+            sums.take_promise(
+                speed,
+                explained * explained + scatter(speed) * scatter(speed),
+                explained * explained,
+            );
+        }
+        sums.scatter()
     }
 
     #[test]
-    fn one_stop_45_mm_off_is_no_floor_to_speak_of() {
+    fn promises_that_are_kept_leave_nothing_and_broken_ones_find_the_floor_or_the_delay() {
+        let kept = shown(|_| 0.0);
+        assert_eq!((kept.floor, kept.delay), (0.0, 0.0));
+        let even = shown(|_| 0.03);
+        assert!((0.024..=0.032).contains(&even.unexplained(0.1)), "{even:?}");
+        assert!((0.024..=0.032).contains(&even.unexplained(0.5)), "{even:?}");
+        let late = shown(|speed| 0.09 * speed);
+        assert!(late.unexplained(0.1) < 0.012, "{late:?}");
+        assert!((0.038..=0.047).contains(&late.unexplained(0.5)), "{late:?}");
+    }
+
+    #[test]
+    fn one_stop_45_mm_off_is_nothing_to_speak_of() {
         let mut sums = ScatterSums::default();
         for _ in 0..20 {
-            sums.take_promise(0.005 * 0.005, 0.005 * 0.005);
+            sums.take_promise(0.2, 0.005 * 0.005, 0.005 * 0.005);
         }
-        sums.take_promise(0.045 * 0.045, 0.005 * 0.005);
-        assert!(sums.scatter().floor < 0.006, "{}", sums.scatter().floor);
+        sums.take_promise(0.2, 0.045 * 0.045, 0.005 * 0.005);
+        assert!(sums.scatter().unexplained(0.2) < 0.006, "{:?}", sums.scatter());
     }
 }

@@ -52,6 +52,9 @@ pub struct ExactForm {
     /// The part of the scatter that does not depend on speed (m).
     #[serde(default)]
     pub scatter_floor: f64,
+    /// The scatter of the time until a stop begins (s).
+    #[serde(default)]
+    pub stop_delay_scatter: f64,
     /// The standard deviation of stop offsets (m).
     #[serde(default)]
     pub stop_offset_deviation: f64,

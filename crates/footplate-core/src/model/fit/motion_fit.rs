@@ -330,9 +330,9 @@ impl MotionFit {
                 before.commanded.iter().rev().nth(1).map_or(0.0, |commanded| point.speed(commanded.to));
             // Residuals of a young fit scatter too little: it has many parameters to explain them.
             let stops = self.model.scatter.stops.max(1.0);
-            let usual = Scatter { stops, floor: 0.0, ..self.model.scatter }.of_stop(stop_speed);
+            let usual = Scatter { stops, ..self.model.scatter }.of_stop_alone(stop_speed);
             let explained = foreseen.variance + usual * usual;
-            scatter.take_promise(foreseen.residual * foreseen.residual, explained);
+            scatter.take_promise(stop_speed, foreseen.residual * foreseen.residual, explained);
         }
         self.prior.scatter = scatter;
     }
