@@ -30,6 +30,8 @@ pub(crate) enum Purpose {
     Living = 7,
     /// Physics outside the usual ranges: see `PhysicsRange`.
     Physics = 8,
+    /// What decoders report of their trains.
+    Decoders = 9,
 }
 
 /// One stream of draws.

@@ -55,8 +55,8 @@ pub use law::{Law, LawFamily};
 pub use living::{
     BoardSwitches, CanSwitches, CanTransport, CoilAlarm, CtsSwitch, Delivery, End, FromStation, HandError,
     Incident, IncidentKind, JmriSwitches, LivingLayout, LivingSwitches, LocoNetSwitches, PassTruth,
-    RestTruth, StationSwitches, TrainTruth, Truth, VirtualBoard, VirtualCentralStation, VirtualJmri,
-    VirtualLocoNet, VirtualStation, VirtualZ21, Z21Switches,
+    RestTruth, SpeedReports, StationSwitches, TrainTruth, Truth, VirtualBoard, VirtualCentralStation,
+    VirtualJmri, VirtualLocoNet, VirtualStation, VirtualZ21, Z21Switches,
 };
 pub use other_law::OtherLaw;
 pub use physics_range::PhysicsRange;

@@ -91,6 +91,8 @@ pub enum Transmit {
     Functions(TrainId, ReportedFunctions),
     /// Whether a train is commanded forward from now on, for [`set_direction`](Session::set_direction) of a later session.
     Direction(TrainId, bool),
+    /// The number that a decoder reports as its train's speed, in a unit that only its owner knows; it may be seconds old.
+    ReportedSpeed(TrainId, u16),
 }
 
 /// What a person should know about the line.
@@ -333,11 +335,7 @@ impl Display for CommandError {
             }
             Self::Unknown => f.write_str("the station has no such command"),
             Self::TooManyWaiting(count) => {
-                write!(
-                    f,
-                    "{count} commands are already waiting for the line; wait until some have been \
-                           sent"
-                )
+                write!(f, "{count} commands already wait for the line; wait until some have been sent")
             }
             Self::Closed => f.write_str("the link is being closed; open it again to command trains"),
         }

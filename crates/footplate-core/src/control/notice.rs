@@ -107,6 +107,11 @@ pub enum Notice {
         /// How late the detection is.
         by: TimeSpan,
     },
+    /// The speeds that a train's decoder reports contradict its sensors: they are ignored from now on.
+    SpeedReportsIgnored {
+        /// The train.
+        train: TrainId,
+    },
     /// The track ends ahead of a train, which was commanded to stop.
     TrackEnds {
         /// The train.

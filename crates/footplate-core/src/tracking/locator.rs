@@ -318,6 +318,17 @@ impl Locator {
         self.timestamp(time + short.moments().0 / speed)
     }
 
+    /// Its decoder reports its speed (ln m/s), at most so much late. Returns whether that changed the estimate.
+    pub(crate) fn take_speed(
+        &mut self,
+        model: &MotionModel,
+        now: Timestamp,
+        latest: TimeSpan,
+        ln_speed: Gaussian,
+    ) -> bool {
+        self.filter.take_speed(model, self.seconds(now), latest.as_s(), ln_speed)
+    }
+
     /// Position and speed at a time not before the last entry; `None` while it is lost.
     #[must_use]
     pub fn locate(&self, context: TrackContext<'_>, model: &MotionModel, at: Timestamp) -> Option<Located> {

@@ -26,6 +26,7 @@ mod reachable_set;
 mod rollout;
 mod route_memory;
 mod shown_length;
+mod speed_measurement;
 #[cfg(feature = "serde")]
 mod square;
 mod track_context;

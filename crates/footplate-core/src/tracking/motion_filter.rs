@@ -25,7 +25,7 @@ const LONG_RUN: f64 = 20.0;
 /// speed, and a line through it would be off by half the square, 2 %.
 const UNSURE_SPEED: f64 = 0.2;
 /// Share of a change from which on the run is steady: what is left is less than a millimetre.
-const STEADY: f64 = 0.995;
+pub(super) const STEADY: f64 = 0.995;
 /// A change that begins during another differs from the sum of both by the speed that was still missing times this time (s): an eased
 /// decoder begins again at rate zero, a counter continues at its own rate.
 pub(crate) const INTERRUPTED: f64 = 0.2;
@@ -279,7 +279,7 @@ impl<const L: usize> MotionFilter<L> {
     }
 
     /// Variance of ln of its speed over what the model says.
-    fn ln_speed_variance(&self) -> f64 {
+    pub(super) fn ln_speed_variance(&self) -> f64 {
         let Some(step) = self.course.speed else { return self.p[E][E] };
         self.p[E][E] + self.p[step][step] + 2.0 * self.p[E][step] + self.local
     }
@@ -326,7 +326,7 @@ impl<const L: usize> MotionFilter<L> {
     }
 
     /// Covariance with each letter of the sum of letters times slopes.
-    fn covariance_along(&self, slope: &[f64; L]) -> [f64; L] {
+    pub(super) fn covariance_along(&self, slope: &[f64; L]) -> [f64; L] {
         let mut with = [0.0; L];
         for (line, slope) in self.p.iter().zip(slope).filter(|(_, slope)| **slope != 0.0) {
             for (sum, covariance) in with.iter_mut().zip(line) {

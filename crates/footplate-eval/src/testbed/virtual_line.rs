@@ -88,7 +88,7 @@ impl<'l> VirtualLine<'l> {
                     Transmit::Message(bytes) => bytes.iter().for_each(|byte| self.station.write(*byte)),
                     Transmit::Event(event) => machine.handle_event(now, &event),
                     Transmit::Notice(notice) => hear(machine, now, &notice),
-                    Transmit::Functions(..) | Transmit::Direction(..) => {}
+                    Transmit::Functions(..) | Transmit::Direction(..) | Transmit::ReportedSpeed(..) => {}
                 }
             }
             match machine.poll_output()? {

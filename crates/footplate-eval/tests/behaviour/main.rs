@@ -1,3 +1,4 @@
 //! What Footplate achieves in simulated worlds, by their truth.
 
 mod blocks;
+mod reported_speeds;

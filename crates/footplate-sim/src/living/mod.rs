@@ -3,6 +3,7 @@
 //! ```text
 //! station  cts             the virtual 6051: bytes in, bytes out, at the pace of its line
 //! board  board_switches    the virtual DCC-EX board: requests in, replies and sensors out, with its delays
+//! speed_reports            what decoders report of the speed of their trains
 //! z21  z21_switches        the virtual Z21: datagrams of many clients in and out, over a network with faults
 //! central_station  can_switches  the virtual Central Station: frames of Märklin's CAN bus over datagrams, a stream or an adapter
 //! jmri                     JMRI and the hardware behind it: lines of JSON in and out
@@ -37,6 +38,7 @@ mod network;
 mod points;
 mod rails;
 mod s88;
+mod speed_reports;
 mod start;
 mod station;
 mod switches;
@@ -56,6 +58,7 @@ pub use incident::{Incident, IncidentKind};
 pub use jmri::{JmriSwitches, VirtualJmri};
 pub use live_train::End;
 pub use loconet::{LocoNetSwitches, VirtualLocoNet};
+pub use speed_reports::SpeedReports;
 pub use station::{CoilAlarm, FromStation, StationSwitches, VirtualStation};
 pub use switches::LivingSwitches;
 pub use truth::{PassTruth, RestTruth, TrainTruth, Truth};

@@ -19,6 +19,7 @@ use crate::draws::{Draws, Purpose};
 use crate::living::due_queue::DueQueue;
 use crate::living::network::{Disturbances, Network};
 use crate::living::s88::Edge;
+use crate::living::speed_reports::Decoders;
 use crate::living::world::LivingLayout;
 use crate::living::z21_switches::Z21Switches;
 
@@ -44,8 +45,6 @@ const MOST_SUBSCRIBED: usize = 16;
 const BOOT: TimeSpan = TimeSpan::from_ms(4_000);
 /// The interval of RailCom reports.
 const RAIL_COM_EVERY: TimeSpan = TimeSpan::from_ms(500);
-/// From mm/s of a model in 1:87 to km/h.
-const SCALE_KM_H: f64 = 87.0 * 3.6e-3;
 
 /// A client, by the number that the network knows it by.
 #[derive(Debug, Clone)]
@@ -85,6 +84,7 @@ pub struct VirtualZ21<'l> {
     phases: Vec<TimeSpan>,
     central: CentralState,
     rail_com_due: Timestamp,
+    decoders: Decoders,
     loses_next_subscription: bool,
     /// The end of its start.
     dark_until: Option<Timestamp>,
@@ -137,6 +137,7 @@ impl<'l> VirtualZ21<'l> {
             phases,
             central: CentralState(CentralState::POWER_OFF),
             rail_com_due: now + RAIL_COM_EVERY,
+            decoders: Decoders::new(switches.speeds, seed),
             loses_next_subscription: switches.loses_first_subscription,
             dark_until: None,
         }
@@ -305,15 +306,15 @@ impl<'l> VirtualZ21<'l> {
         }
     }
 
-    fn rail_com(&self, slot: &Slot) -> RailCom {
+    fn rail_com(&mut self, slot: &Slot) -> RailCom {
         let train = self.world.trains.iter().find(|train| train.id.0 == slot.address);
-        let km_h = train.map_or(0.0, |train| (train.speed.abs() * SCALE_KM_H).round());
+        let speed = train.map_or(0.0, |train| train.speed);
         RailCom {
             address: slot.address,
             received: slot.received,
             errors: 0,
-            options: 0x01,
-            speed: km_h.min(255.0) as u8,
+            options: self.decoders.report_speeds().into(),
+            speed: self.decoders.next(TrainId(slot.address), speed),
             quality: 0,
         }
     }

@@ -3,6 +3,8 @@
 use footplate_core::Ratio;
 use footplate_wire::z21::Feedback;
 
+use crate::living::speed_reports::SpeedReports;
+
 /// The properties of the station and its network.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Z21Switches {
@@ -28,8 +30,10 @@ pub struct Z21Switches {
     pub is_locked: bool,
     /// The bus of its sensors.
     pub feedback: Feedback,
-    /// Whether its decoders report their speed by RailCom.
+    /// Whether its decoders report by RailCom.
     pub rail_com: bool,
+    /// What they report of their speed.
+    pub speeds: SpeedReports,
 }
 
 impl Default for Z21Switches {
@@ -47,6 +51,7 @@ impl Default for Z21Switches {
             is_locked: false,
             feedback: Feedback::RBus,
             rail_com: true,
+            speeds: SpeedReports::None,
         }
     }
 }

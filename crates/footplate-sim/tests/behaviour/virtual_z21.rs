@@ -2,7 +2,9 @@
 
 use footplate_core::track::{Layout, Leg, Position};
 use footplate_core::{DecoderSteps, Length, Ratio, TimeSpan, TrainId, TurnoutId};
-use footplate_sim::{End, LawFamily, LivingLayout, LivingSwitches, Train, VirtualZ21, Z21Switches};
+use footplate_sim::{
+    End, LawFamily, LivingLayout, LivingSwitches, SpeedReports, Train, VirtualZ21, Z21Switches,
+};
 use footplate_wire::z21::{
     Broadcasts, Datasets, Feedback, FunctionSwitch, Reply, Request, Throttle, TurnoutPosition,
 };
@@ -261,5 +263,39 @@ fn each_quirk_does_what_it_says() {
         let mut station = with(switches);
         let answered: usize = (0..400).map(|_| ask(&mut station, &[Request::SerialNumber]).len()).sum();
         assert!((answered as f64 - expected).abs() < 45.0, "{answered}");
+    }
+}
+
+#[test]
+fn decoders_report_whole_numbers_at_a_scale_of_their_own() {
+    let layout = two_loops();
+    for speeds in [SpeedReports::None, SpeedReports::Speed, SpeedReports::Nonsense] {
+        let mut station = station(&layout, End::Nose, Z21Switches { speeds, ..Z21Switches::default() });
+        let all = Request::SetBroadcasts(Broadcasts::ALL_RAIL_COM);
+        write(&mut station, 0, &[all, Request::Power { on: true }, drive(72, true)]);
+        wait(&mut station, 4_000);
+        let before = odometer(&station);
+        let heard = wait(&mut station, 5_000);
+        let km_h = 87.0 * 3.6e-3 * (odometer(&station) - before) / 5.0;
+        let numbers: Vec<Option<u16>> = heard
+            .iter()
+            .filter_map(|(_, reply)| match reply {
+                Reply::RailCom(report) => Some(report.reported_speed()),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(numbers.len(), 10, "{numbers:?}");
+        let ratios = || numbers.iter().flatten().map(|number| f64::from(*number) / km_h);
+        let spread = ratios().fold(0.0, f64::max) - ratios().fold(f64::INFINITY, f64::min);
+        match speeds {
+            SpeedReports::None => assert!(numbers.iter().all(Option::is_none), "{numbers:?}"),
+            SpeedReports::Speed => {
+                assert!(
+                    ratios().all(|ratio| (0.75..1.3).contains(&ratio)) && spread < 0.06,
+                    "{numbers:?}, {km_h}"
+                );
+            }
+            SpeedReports::Nonsense => assert!(spread > 0.5, "{numbers:?}, {km_h}"),
+        }
     }
 }

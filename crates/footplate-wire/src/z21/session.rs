@@ -11,6 +11,7 @@ use footplate_core::{
 };
 
 use super::broadcasts::Broadcasts;
+use super::detectors::RailCom;
 use super::outstanding::Awaited;
 use super::request::{FunctionSwitch, LOCOMOTIVES, Request};
 use super::sensors::Sensors;
@@ -57,6 +58,8 @@ pub struct Client {
     unverified: Vec<TrainId>,
     /// States of locomotives that were reported once and do not fit the commands: an old datagram, or another throttle.
     suspected: Vec<(TrainId, Throttle, bool)>,
+    /// The last speed that each decoder reported and that was passed on, and when.
+    reported: Vec<(Timestamp, RailCom)>,
     identity: Option<String>,
     serial_number: u32,
     polls: u32,
@@ -85,6 +88,7 @@ impl Client {
             asks_broadcasts: false,
             unverified: Vec::new(),
             suspected: Vec::new(),
+            reported: Vec::new(),
             identity: None,
             serial_number: 0,
             polls: 0,

@@ -48,13 +48,15 @@ pub(crate) struct Desk<C, S: Station> {
     pub(crate) functions: BTreeMap<TrainId, ReportedFunctions>,
     /// The directions that a later session has to know.
     pub(crate) directions: Vec<(TrainId, bool)>,
+    /// The speeds that decoders reported.
+    pub(crate) speeds: Vec<(TrainId, u16)>,
 }
 
 impl<C: Session, S: Station> Desk<C, S> {
     pub(crate) fn with(client: C, station: S) -> Self {
         let (coming, written, events, notices) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let (functions, directions) = (BTreeMap::new(), Vec::new());
-        Self { client, now: ms(0), station, coming, written, events, notices, functions, directions }
+        let (functions, directions, speeds) = (BTreeMap::new(), Vec::new(), Vec::new());
+        Self { client, now: ms(0), station, coming, written, events, notices, functions, directions, speeds }
     }
 
     pub(crate) fn run_until(&mut self, end: Timestamp) {
@@ -73,6 +75,7 @@ impl<C: Session, S: Station> Desk<C, S> {
                     Transmit::Functions(train, reported) => {
                         self.functions.insert(train, reported);
                     }
+                    Transmit::ReportedSpeed(train, number) => self.speeds.push((train, number)),
                     Transmit::Direction(train, forward) => self.directions.push((train, forward)),
                     Transmit::Byte(byte) => unreachable!("a lone byte {byte}"),
                 }

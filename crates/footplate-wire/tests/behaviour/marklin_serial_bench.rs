@@ -219,7 +219,10 @@ impl Bench {
     fn take(&mut self) {
         while let Some(output) = self.session.poll_output() {
             match output {
-                Transmit::Message(_) | Transmit::Functions(..) | Transmit::Direction(..) => {
+                Transmit::Message(_)
+                | Transmit::Functions(..)
+                | Transmit::Direction(..)
+                | Transmit::ReportedSpeed(..) => {
                     unreachable!("a 6051: {output:?}")
                 }
                 Transmit::Byte(byte) => {

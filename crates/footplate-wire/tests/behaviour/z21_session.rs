@@ -2,8 +2,8 @@
 
 use footplate_core::{Command, DecoderSteps, EventKind, SensorId, TrainId, TurnoutId};
 use footplate_wire::z21::{
-    Broadcasts, CanDetection, Feedback, FunctionSwitch, Lock, LocoNetDetection, LocomotiveState, Reply,
-    Request, Settings, Throttle, TurnoutPosition,
+    Broadcasts, CanDetection, Feedback, FunctionSwitch, Lock, LocoNetDetection, LocomotiveState, RailCom,
+    Reply, Request, Settings, Throttle, TurnoutPosition,
 };
 use footplate_wire::{CommandError, LinkNotice, ReportedFunctions, Session};
 
@@ -460,4 +460,28 @@ fn functions_are_switched_one_by_one_and_confirmed_by_the_state() {
     let said = desk.notices.iter().filter(|notice| matches!(notice, LinkNotice::OtherFunctions { .. }));
     let said: Vec<String> = said.map(ToString::to_string).collect();
     assert_eq!(said, ["another throttle switched functions of train 24; on now: F2, F28"]);
+}
+
+#[test]
+fn a_speed_that_a_decoder_reports_is_passed_on_while_it_is_fresh() {
+    let mut desk = Desk::opened();
+    let report = |address, received, options, speed| {
+        Reply::RailCom(RailCom { address, received, errors: 0, options, speed, quality: 0 })
+    };
+    desk.hear(report(24, 1, 0x01, 63));
+    desk.command(speed(T24, 8));
+    desk.run_for(300);
+    for (received, options, speed) in
+        [(2, 0x01, 63), (3, 0x01, 63), (4, 0x01, 64), (5, 0x00, 65), (6, 0x02, 3)]
+    {
+        desk.hear(report(24, received, options, speed));
+    }
+    desk.hear(report(58, 7, 0x01, 40));
+    desk.run_for(500);
+    // The last again, which is old, and a new one.
+    desk.hear(report(24, 6, 0x02, 3));
+    desk.hear(report(24, 8, 0x02, 3));
+    desk.run_for(20);
+    // Not before the train is driven, nor at once again, nor what is no speed, nor for a train that is not driven.
+    assert_eq!(desk.speeds, [63, 64, 259, 259].map(|number| (T24, number)));
 }

@@ -9,7 +9,7 @@ const SHOWN = 3;
 const phone = matchMedia("(max-width: 40rem)");
 
 /** Alarms whose train is lost, or may be elsewhere than estimated: the layout page leads to its position. */
-const OF_PLACE = new Set(["lost", "needs-person", "held-as-unknown", "stands-lost", "stands-elsewhere", "stands-untimely", "stands-misses", "mishap-lost", "mishap-moved"]);
+const OF_PLACE = new Set(["lost", "needs-person", "held-as-unknown", "stands-lost", "stands-elsewhere", "stands-untimely", "stands-misses", "stands-stalled", "mishap-lost", "mishap-moved"]);
 /** Alarms of a blocked train: the layout page offers other routes. */
 const OF_ROUTE = new Set(["deadlock", "deadlocked", "track-reserved", "diverged", "diverged-and-others", "track-ends"]);
 /** Alarms of a train whose model is wrong. */

@@ -159,6 +159,8 @@ export const ENGLISH = {
   "alarm-stands-lost": "stopped: position lost",
   "alarm-stands-elsewhere": "stopped: detected where it cannot have run to",
   "alarm-stands-untimely": "stopped: detected at a time at which it cannot have been there",
+  "alarm-stands-stalled": "stopped: its decoder reports that it stands still",
+  "alarm-speed-reports-ignored": "the speeds that its decoder reports contradict the sensors: they are ignored; check its RailCom settings",
   "alarm-stands-misses": "stopped: several sensors in a row did not report it",
   "alarm-stands-silent": "stopped: the station does not answer",
   "alarm-stands-unconfirmed": "the stop command was not confirmed",

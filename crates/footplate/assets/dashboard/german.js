@@ -160,6 +160,8 @@ export const GERMAN = {
   "alarm-stands-lost": "angehalten: Position verloren",
   "alarm-stands-elsewhere": "angehalten: gemeldet, wohin er nicht gefahren sein kann",
   "alarm-stands-untimely": "angehalten: zu einer Zeit gemeldet, zu der er nicht dort sein konnte",
+  "alarm-stands-stalled": "angehalten: sein Decoder meldet, dass er steht",
+  "alarm-speed-reports-ignored": "die Geschwindigkeiten, die sein Decoder meldet, widersprechen den Rückmeldern: sie werden nicht mehr verwendet; RailCom-Einstellungen prüfen",
   "alarm-stands-misses": "angehalten: mehrere Rückmelder hintereinander haben ihn nicht gemeldet",
   "alarm-stands-silent": "angehalten: die Zentrale antwortet nicht",
   "alarm-stands-unconfirmed": "der Haltbefehl wurde nicht bestätigt",

@@ -50,6 +50,8 @@ const LINES = [
   [/^train (\d+) stopped: (.*); also stopped, because they could meet it: (.*)$/, (_, train, why, list) => `Zug ${train} angehalten: ${logInGerman(why)}; auch angehalten, weil sie ihm begegnen könnten: ${trains(list)}`],
   [/^it runs slower than calibrated$/, "er fährt langsamer als kalibriert"], [/^it runs faster than calibrated$/, "er fährt schneller als kalibriert"], [/^its position is lost$/, "seine Position ist verloren"],
   [/^a sensor reported it where it cannot have run to$/, "ein Rückmelder hat ihn gemeldet, wohin er nicht gefahren sein kann"], [/^a sensor reported it at a time when .*$/, "ein Rückmelder hat ihn zu einer Zeit gemeldet, zu der er nicht dort gewesen sein kann"],
+  [/^its decoder reports that it stands still$/, "sein Decoder meldet, dass er steht"],
+  [/^the speeds that the decoder of train (\d+) reports contradict the sensors: .*$/, "die Geschwindigkeiten, die der Decoder von Zug $1 meldet, widersprechen den Rückmeldern: sie werden nicht mehr verwendet; RailCom-Einstellungen prüfen"],
   [/^several sensors in a row did not report it$/, "mehrere Rückmelder nacheinander haben ihn nicht gemeldet"], [/^the stop command could not be sent$/, "der Haltbefehl konnte nicht gesendet werden"],
   [/^it was commanded to stop and sensors still report it$/, "er hat den Haltbefehl, und Rückmelder melden ihn weiter"], [/^its model no longer fits$/, "sein Modell stimmt nicht mehr"],
   [/^train (\d+): position unknown; run it over a sensor first$/, "Zug $1: Position unbekannt; erst über einen Rückmelder fahren"],

@@ -106,7 +106,7 @@ impl Alarm {
             |family| Cause { family, train: None, subject: self.blanks.first().cloned().unwrap_or_default() };
         match self.key() {
             "lost" | "needs-person" | "held-as-unknown" | "overdue" | "stands-lost" | "stands-elsewhere"
-            | "stands-untimely" | "stands-misses" | "moved" => of_train("position"),
+            | "stands-untimely" | "stands-misses" | "stands-stalled" | "moved" => of_train("position"),
             "drifts-slower" | "drifts-faster" | "stands-slower" | "stands-faster" | "stands-distrusted" => {
                 of_train("model")
             }
@@ -144,7 +144,7 @@ impl Alarm {
                 Resolution::Thrown { turnout: TurnoutId(turnout), curved: self.what == "lies-curved" }
             }),
             "lost" | "needs-person" | "held-as-unknown" | "stands-lost" | "stands-elsewhere"
-            | "stands-untimely" | "stands-misses" | "stands-slower" | "stands-faster"
+            | "stands-untimely" | "stands-misses" | "stands-stalled" | "stands-slower" | "stands-faster"
             | "stands-distrusted" | "stands-silent" | "stands-unconfirmed" | "does-not-stop" | "moved"
             | DIRECTION_UNKNOWN => Resolution::Located,
             "diverged"
@@ -311,6 +311,9 @@ impl Alarm {
             Notice::Overdue { train, sensor, by } => {
                 (Grade::Warning, "overdue", Some(*train), vec![name(sensor), format!("{:.1}", by.as_s())])
             }
+            Notice::SpeedReportsIgnored { train } => {
+                (Grade::Warning, "speed-reports-ignored", Some(*train), none)
+            }
             Notice::TrackEnds { train, end } => {
                 (Grade::Warning, "track-ends", Some(*train), vec![layout.node_name(*end).to_owned()])
             }
@@ -377,6 +380,7 @@ const fn stop_reason(why: Noticed) -> &'static str {
         Noticed::Elsewhere(_) => "stands-elsewhere",
         Noticed::Untimely(_) => "stands-untimely",
         Noticed::Misses => "stands-misses",
+        Noticed::Stalled => "stands-stalled",
         Noticed::LinkSilent => "stands-silent",
         Noticed::StopUnconfirmed => "stands-unconfirmed",
         Noticed::DoesNotStop(_) => "does-not-stop",

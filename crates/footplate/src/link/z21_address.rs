@@ -2,7 +2,7 @@
 //! `[?steps=28&feedback=can&first-sensor=17&first-turnout=4&straight=first&sensor-delay=60&speed=20]`.
 
 use footplate_core::{Ratio, TimeSpan};
-use footplate_sim::Z21Switches;
+use footplate_sim::{SpeedReports, Z21Switches};
 use footplate_wire::z21::{Feedback, Settings};
 
 use super::address::{number, times};
@@ -89,7 +89,8 @@ const BAD: Ratio = Ratio::from_percent(5.0);
 pub(super) const QUIRKS: &str = "lossy, twice and overtaken (datagrams are lost, come twice or are overtaken), slow (they take up to 60 ms), unsubscribed (the first \
                                  request for broadcasts is lost), strict (wrong XOR bytes are refused), wrong-xor (its own are wrong), \
                                  short (no functions from F29), first-only (only the first dataset of a datagram is read), locked (a \
-                                 z21start without its code), can and loconet (detectors there in the place of the R-BUS)";
+                                 z21start without its code), can and loconet (detectors there in the place of the R-BUS), railcom and \
+                                 railcom-nonsense (decoders report speeds, or any number)";
 
 /// Sets a quirk of a simulated Z21; returns whether there is one of that name.
 pub(super) fn set_quirk(switches: &mut Z21Switches, name: &str) -> bool {
@@ -106,6 +107,8 @@ pub(super) fn set_quirk(switches: &mut Z21Switches, name: &str) -> bool {
         "locked" => switches.is_locked = true,
         "can" => switches.feedback = Feedback::Can,
         "loconet" => switches.feedback = Feedback::LocoNet,
+        "railcom" => switches.speeds = SpeedReports::Speed,
+        "railcom-nonsense" => switches.speeds = SpeedReports::Nonsense,
         _ => return false,
     }
     true

@@ -7,6 +7,8 @@ use serde::de::DeserializeOwned;
 
 /// Prefix of the train number.
 const REVERSE_IN_DOUBT: &str = "reverse-in-doubt ";
+/// Prefix of a number that a decoder reported, and of its train.
+const REPORTED_SPEED: &str = "reported-speed ";
 
 /// An input of a machine. All decisions follow from the machine's beginning and its inputs, in their order and at their
 /// times.
@@ -70,6 +72,9 @@ impl Input {
             Self::Link(LinkNews::Silent) => ("link", "silent".to_owned()),
             Self::Link(LinkNews::Answers) => ("link", "answers".to_owned()),
             Self::Link(LinkNews::ReverseInDoubt { train }) => ("link", format!("{REVERSE_IN_DOUBT}{train}")),
+            Self::Link(LinkNews::ReportedSpeed { train, number }) => {
+                ("link", format!("{REPORTED_SPEED}{number} {train}"))
+            }
             Self::Timeout => ("timeout", String::new()),
             Self::Line(line) => ("line", line.clone()),
             Self::Schedule(schedule) => ("schedule", serde_json::to_string(schedule).unwrap_or_default()),
@@ -93,12 +98,21 @@ impl Input {
                 "silent" => Self::Link(LinkNews::Silent),
                 "answers" => Self::Link(LinkNews::Answers),
                 _ => {
-                    let train = text.strip_prefix(REVERSE_IN_DOUBT).and_then(|train| train.parse().ok());
-                    let train = train.map(TrainId).ok_or_else(|| {
-                        let why = "it should be `silent`, `answers` or `reverse-in-doubt 24`".to_owned();
-                        InputError::Wrong { kind: kind.to_owned(), text: text.to_owned(), why }
-                    })?;
-                    Self::Link(LinkNews::ReverseInDoubt { train })
+                    let news = text.strip_prefix(REPORTED_SPEED).map_or_else(
+                        || {
+                            let train = text.strip_prefix(REVERSE_IN_DOUBT)?.parse().ok()?;
+                            Some(LinkNews::ReverseInDoubt { train: TrainId(train) })
+                        },
+                        |reported| {
+                            let (number, train) = reported.split_once(' ')?;
+                            let train = TrainId(train.parse().ok()?);
+                            Some(LinkNews::ReportedSpeed { train, number: number.parse().ok()? })
+                        },
+                    );
+                    Self::Link(news.ok_or_else(|| {
+                        let why = "it should be `silent`, `answers`, `reverse-in-doubt 24` or `reported-speed 63 24`";
+                        InputError::Wrong { kind: kind.to_owned(), text: text.to_owned(), why: why.to_owned() }
+                    })?)
                 }
             },
             "timeout" => Self::Timeout,
@@ -169,6 +183,7 @@ mod tests {
             Input::Link(LinkNews::Silent),
             Input::Link(LinkNews::Answers),
             Input::Link(LinkNews::ReverseInDoubt { train }),
+            Input::Link(LinkNews::ReportedSpeed { train, number: 63 }),
             Input::Order(Order::Stop(StopOrder {
                 aim: Aim::NotBeyond(Ratio::from_parts(0.001)),
                 ..StopOrder::at(train, Landmark { node: NodeId(7), offset: Length::from_m(0.1 + 0.2) })

@@ -40,6 +40,9 @@ pub(crate) trait Attendant<M: Machine> {
     /// What the station has reported of a train's functions.
     fn hear_of_functions(&mut self, _train: TrainId, _reported: ReportedFunctions) {}
 
+    /// What a decoder has reported of its train's speed; see [`Transmit::ReportedSpeed`](footplate_wire::Transmit::ReportedSpeed).
+    fn hear_of_speed(&mut self, _train: TrainId, _number: u16) {}
+
     /// A message about the line for people to read.
     fn read(&mut self, words: &str) {
         eprintln!("{words}");

@@ -210,7 +210,8 @@ fn farewell_of(session: &StationSession, began: Timestamp, has_cts: bool) -> Vec
                 Transmit::Event(_)
                 | Transmit::Notice(_)
                 | Transmit::Functions(..)
-                | Transmit::Direction(..) => continue,
+                | Transmit::Direction(..)
+                | Transmit::ReportedSpeed(..) => continue,
             };
             said.push(Bequest { after: now - last, bytes });
             (last, wrote) = (now, true);

@@ -37,6 +37,8 @@ pub(crate) struct Runtime<'r, L: Link> {
     notices: Vec<LinkNotice>,
     /// What the station reported of functions and the attendant has not taken yet.
     functions: Vec<(TrainId, ReportedFunctions)>,
+    /// Speeds that decoders reported and the attendant has not taken yet.
+    speeds: Vec<(TrainId, u16)>,
     will: LastWill,
     /// How often the line was opened again since the station answered last.
     reopened: u32,
@@ -72,6 +74,7 @@ impl<'r, L: Link> Runtime<'r, L> {
             fresh,
             notices,
             functions,
+            speeds: Vec::new(),
             will: LastWill::new(),
             reopened: 0,
             has_answered: false,
@@ -124,6 +127,9 @@ impl<'r, L: Link> Runtime<'r, L> {
             }
             for (train, reported) in self.functions.drain(..) {
                 attendant.hear_of_functions(train, reported);
+            }
+            for (train, number) in self.speeds.drain(..) {
+                attendant.hear_of_speed(train, number);
             }
             if doubt.as_ref().is_some_and(|(until, _)| now >= *until)
                 && let Some((_, why)) = doubt.take()
@@ -239,6 +245,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                     }
                 }
                 Transmit::Functions(train, reported) => self.functions.push((train, reported)),
+                Transmit::ReportedSpeed(train, number) => self.speeds.push((train, number)),
                 Transmit::Direction(train, forward) => {
                     if let Some(recorder) = &mut self.recorder {
                         recorder.record_direction(Direction { train, forward });
@@ -333,6 +340,7 @@ impl<'r, L: Link> Runtime<'r, L> {
             }
             self.notices.clear();
             self.functions.clear();
+            self.speeds.clear();
             let now = self.link.now();
             let waited = self.link.real_time() - since;
             let late = now - began >= WITHIN || waited.as_secs_f64() >= WITHIN.as_s();

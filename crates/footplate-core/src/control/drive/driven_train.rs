@@ -1,7 +1,7 @@
 //! One train: its position, motion model, last command and task.
 
 use crate::event::{Approach, Command, Event, EventKind};
-use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
+use crate::ids::{NodeId, SpeedStep, TrainId};
 use crate::link::TimeModel;
 use crate::model::{MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
@@ -12,8 +12,8 @@ use super::detections::Detections;
 use super::order::OrderId;
 use super::outputs::Outputs;
 use super::pacing::{Pacing, Passages};
-use super::path::sensors_within;
 use super::refusal::Refusal;
+use super::reported_speed::ReportedSpeed;
 use super::task::{Destination, Expectation, Goal, SpeedSupervision, Task, TaskPhase};
 use crate::control::{Achieved, Finished, Notice, Promise};
 
@@ -25,10 +25,6 @@ const REST_MARGIN_PART: f64 = 0.2;
 const REST_UNFORESEEN: TimeSpan = TimeSpan::from_s(8.0);
 /// A command is sent within two polls of a few dozen bytes each. If it takes longer than this, the line is disturbed.
 const UNCONFIRMED: TimeSpan = TimeSpan::from_s(2.0);
-/// A train should have passed a sensor that is this many standard deviations behind its estimate. Stops end that much
-/// shorter once in 44 times, sensors miss one passage in 300, and one start in 1000 stalls on dirt: of the trains
-/// that such a sensor did not report, most have not reached it.
-const SHOULD_HAVE_PASSED: f64 = 2.0;
 /// A lost train reaches a sensor within this time when it creeps: 3 m at 50 mm/s.
 const FIND_LIMIT: TimeSpan = TimeSpan::from_s(60.0);
 
@@ -58,6 +54,8 @@ pub(super) struct DrivenTrain {
     pub(super) expected: Expectation,
     /// How often it was reported, and how often not.
     pub(super) detections: Detections,
+    /// What its decoder reports of its speed.
+    pub(super) reported: ReportedSpeed,
     /// Where its movement authority ends; `None` without a limit.
     pub(super) end_of_authority: Option<PathPoint>,
     /// Its lengths ahead of and behind the leading end of the pickup.
@@ -86,6 +84,7 @@ impl DrivenTrain {
             steady_at: Timestamp::ZERO,
             expected: Expectation::default(),
             detections: Detections::default(),
+            reported: ReportedSpeed::default(),
             end_of_authority: None,
             reach: [TRAIN_REACH; 2],
             speed_supervision: SpeedSupervision::default(),
@@ -332,6 +331,7 @@ impl DrivenTrain {
         self.backward = None;
         let speed = self.speed(context, passed.at);
         self.detections.take(passed.missed, speed, passed.window.width());
+        self.learn_reported_speed(context, node, &passed, out);
         self.note_passage(context, node, passed.at);
         self.recount_end_of_authority(context, node);
         self.expect_next(context, now);
@@ -455,16 +455,6 @@ impl DrivenTrain {
             Goal::RestAt(Destination { at, .. }) => self.finish(context, now, task.order, at, promise, out),
             Goal::Rest | Goal::Run | Goal::Pace => self.finish(context, now, task.order, None, None, out),
         }
-    }
-
-    /// The last sensor that it should have passed without a report.
-    pub(super) fn sensor_missed_before(
-        &self,
-        context: TrackContext<'_>,
-        located: &Located,
-    ) -> Option<SensorId> {
-        let passed = located.at.distance - located.uncertainty * SHOULD_HAVE_PASSED;
-        sensors_within(context, &self.model, located.at.node, passed).last().map(|(sensor, _)| sensor)
     }
 
     /// Reports that an order has been carried out.

@@ -207,9 +207,7 @@ impl Driver {
             _ => {}
         }
         self.orders = self.orders.wrapping_add(1);
-        self.supervise_speed(now);
-        self.pace(now);
-        self.update_line_requests(now);
+        self.update(now);
         Ok(id)
     }
 
@@ -412,6 +410,13 @@ impl Driver {
         self.outputs.notify(Notice::TurnoutMismatch { turnout, curved, train });
     }
 
+    /// Does what follows from new estimates.
+    pub(super) fn update(&mut self, now: Timestamp) {
+        self.supervise_speed(now);
+        self.pace(now);
+        self.update_line_requests(now);
+    }
+
     /// Requests a free line for the next planned command and frequent polls of the sensor that decides it.
     pub(super) fn update_line_requests(&mut self, now: Timestamp) {
         let plans = || {
@@ -455,9 +460,7 @@ impl Machine for Driver {
             EventKind::Freed(report) => self.freed(event.time, report),
             EventKind::Stopped { .. } => {}
         }
-        self.supervise_speed(now);
-        self.pace(now);
-        self.update_line_requests(now);
+        self.update(now);
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
@@ -466,9 +469,7 @@ impl Machine for Driver {
         for train in self.trains.values_mut() {
             train.handle_timeout(context, now, &mut self.outputs);
         }
-        self.supervise_speed(now);
-        self.pace(now);
-        self.update_line_requests(now);
+        self.update(now);
     }
 
     fn poll_output(&mut self) -> Option<Output<Notice>> {

@@ -38,6 +38,8 @@ pub enum Alarm {
     Elsewhere(SensorId),
     /// A sensor reported the train so early or so late that an operator or a fault must have moved or stopped it.
     Untimely(SensorId),
+    /// Its decoder reports that it stands, and it should be running.
+    Stalled,
     /// Several sensors in a row did not report the train.
     Misses,
     /// The station does not answer.
@@ -58,6 +60,7 @@ impl fmt::Display for Alarm {
             Self::Lost => "its position is lost",
             Self::Elsewhere(_) => "a sensor reported it where it cannot have run to",
             Self::Untimely(_) => "a sensor reported it at a time when it cannot have been there",
+            Self::Stalled => "its decoder reports that it stands still",
             Self::Misses => "several sensors in a row did not report it",
             Self::LinkSilent => "the station does not answer",
             Self::StopUnconfirmed => "the stop command could not be sent",

@@ -17,6 +17,13 @@ pub enum LinkNews {
     Silent,
     /// The station answers, for the first time or again.
     Answers,
+    /// A decoder has reported the speed of its train, in a unit that only its owner knows.
+    ReportedSpeed {
+        /// The train.
+        train: TrainId,
+        /// The number.
+        number: u16,
+    },
     /// It is unknown whether a train has received a command to reverse: its direction is unknown.
     ReverseInDoubt {
         /// The train.
@@ -31,6 +38,13 @@ impl Watchdog {
             LinkNews::ReverseInDoubt { train } => {
                 self.undirected.insert(train);
                 self.lose(now, train);
+            }
+            LinkNews::ReportedSpeed { train, number } => {
+                let has_stalled = self.driver.take_reported_speed(now, train, number);
+                if has_stalled && self.is_watching() && !self.dangers.contains_key(&train) {
+                    self.driver.lose(now, train);
+                    self.lost(now, train, Alarm::Stalled);
+                }
             }
             _ if !self.is_watching() => {}
             LinkNews::Silent if self.silent.is_none() => {

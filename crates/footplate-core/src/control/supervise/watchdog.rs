@@ -166,16 +166,16 @@ impl Watchdog {
     /// Gives up the position of a train that was found to be wrong. A monitored train is stopped and located again.
     pub fn lose(&mut self, now: Timestamp, train: TrainId) {
         self.driver.lose(now, train);
-        self.lost(now, train);
+        self.lost(now, train, Alarm::Lost);
         self.drain(now);
     }
 
-    fn lost(&mut self, now: Timestamp, train: TrainId) {
+    pub(super) fn lost(&mut self, now: Timestamp, train: TrainId, why: Alarm) {
         self.monitors.entry(train).or_default().lose();
         if self.dangers.get(&train).is_some_and(Recovery::is_active) {
             self.recovery_lost(now, train);
         } else {
-            self.raise(now, train, Alarm::Lost);
+            self.raise(now, train, why);
         }
     }
 
@@ -346,7 +346,7 @@ impl Watchdog {
             Notice::Lost { train } => {
                 let train = *train;
                 self.notify(notice);
-                return self.lost(now, train);
+                return self.lost(now, train, Alarm::Lost);
             }
             Notice::Unexplained { sensor, time } if self.is_watching => {
                 let stray = |train: &TrainId| {

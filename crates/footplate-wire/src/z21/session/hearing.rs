@@ -3,10 +3,11 @@
 use alloc::format;
 use alloc::vec::Vec;
 
-use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId};
+use footplate_core::{EventKind, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::super::broadcasts::Broadcasts;
 use super::super::dataset::Datasets;
+use super::super::detectors::RailCom;
 use super::super::outstanding::Awaited;
 use super::super::reply::{Malformed, Reply};
 use super::super::request::Request;
@@ -17,7 +18,11 @@ use super::{Client, DETECTORS_WITHIN};
 use crate::dialogue::Opening;
 use crate::locomotives::ReportedFunctions;
 use crate::outstanding::{Awaited as _, Outstanding};
-use crate::session::LinkNotice;
+use crate::session::{LinkNotice, Transmit};
+
+/// A speed that a decoder reports again is passed on after this time: stations report many times a second (chosen: a few numbers
+/// between two sensors are enough).
+const SAME_SPEED_EVERY: TimeSpan = TimeSpan::from_ms(400);
 
 impl Client {
     /// Takes in one datagram.
@@ -70,6 +75,7 @@ impl Client {
                     self.hear_of_sensor(now, number, is_occupied, was_missed);
                 }
             }
+            Reply::RailCom(report) => self.hear_of_speed(now, report),
             _ => {}
         }
         if self.dialogue.end_if_confirmed() {
@@ -193,6 +199,22 @@ impl Client {
         self.suspected.retain(|(other, ..)| *other != train);
         self.dialogue.stop_at_end(train);
         self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed: state.forward != forward });
+    }
+
+    /// Passes on the speed of a train of this client. A report is old if the station has received no further message of the decoder.
+    fn hear_of_speed(&mut self, now: Timestamp, report: RailCom) {
+        let train = TrainId(report.address);
+        let Some(number) = report.reported_speed() else { return };
+        if !self.dialogue.locomotives.get(train).is_some_and(|locomotive| locomotive.is_driven) {
+            return;
+        }
+        match self.reported.iter_mut().find(|(_, last)| last.address == report.address) {
+            Some((_, last)) if last.received == report.received => return,
+            Some((at, last)) if last.speed == report.speed && now - *at < SAME_SPEED_EVERY => return,
+            Some(last) => *last = (now, report),
+            None => self.reported.push((now, report)),
+        }
+        self.dialogue.output.push_back(Transmit::ReportedSpeed(train, number));
     }
 
     fn hear_of_turnout(&mut self, now: Timestamp, address: u16, second: bool, was_asked: bool) {

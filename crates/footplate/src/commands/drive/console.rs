@@ -257,6 +257,10 @@ impl Attendant<Recorded<ScriptRunner>> for Console {
         }
     }
 
+    fn hear_of_speed(&mut self, train: TrainId, number: u16) {
+        self.news.push(LinkNews::ReportedSpeed { train, number });
+    }
+
     fn hear_of_refusal(&mut self, now: Timestamp, command: Command, error: CommandError) {
         let why = format!("{command}: {error}");
         self.screen.say(&format!("not sent: {why}"), "");

@@ -128,6 +128,10 @@ impl NoticeFormatter<'_> {
                 self.sensor(*sensor),
                 by.as_s()
             ),
+            Notice::SpeedReportsIgnored { train } => format!(
+                "the speeds that the decoder of train {train} reports contradict the sensors: they are ignored from now on; check its \
+                 RailCom settings"
+            ),
             Notice::TrackEnds { train, end } => {
                 let end = self.driver.layout().node_name(*end);
                 format!("train {train} stopped: the track ends at {end}")

@@ -62,7 +62,7 @@ pub(super) struct Arguments {
     #[arg(long, value_parser = decoder_of, default_value = "14", requires = "station")]
     steps: DecoderSteps,
     /// How a station behaves, with commas between: chatter, merged, split, lossy, silent (DCC-EX); lossy, twice, overtaken,
-    /// unsubscribed, strict, wrong-xor, short, first-only, locked, can, loconet (Z21); refused, no-echo, no-version, one-slot, merged,
+    /// unsubscribed, strict, wrong-xor, short, first-only, locked, can, loconet, railcom, railcom-nonsense (Z21); refused, no-echo, no-version, one-slot, merged,
     /// split (LocoNet); no-prefix, no-power, polled, one-throttle (JMRI).
     #[arg(long, value_parser = quirks, requires = "station")]
     quirks: Option<Quirks>,
