@@ -318,12 +318,12 @@ impl MotionModel {
         let above = approach == Approach::Above;
         let speed = self.answers().speed(usize::from(step.get()), above);
         let (distance, time) = distance_and_time_to_rest(&self.answers(), step.get(), above);
-        let doubt =
+        let by_numbers =
             self.deviation_with_scale(|answers| distance_and_time_to_rest(answers, step.get(), above).0);
         StopForecast {
             distance: Length::from_m(distance.max(0.0)),
             doubt: Length::from_m(libm::hypot(
-                self.with_interpolation(step, doubt, distance),
+                self.with_interpolation(step, by_numbers, distance),
                 end_of_stop(speed),
             )),
             scatter: Length::from_m(libm::hypot(

@@ -249,7 +249,7 @@ impl<'v> Answers<'v> {
             return 0.0;
         }
         let below = libm::exp(self.bounded_ln_speed(step));
-        if above { self.from_above(step, below) } else { below }
+        if above { self.speed_above(step, below) } else { below }
     }
 
     /// ln of the steady speed from below, where exponentials have meaning.
@@ -258,7 +258,7 @@ impl<'v> Answers<'v> {
     }
 
     /// Steady speed from above at a step with this speed from below.
-    fn from_above(&self, step: usize, below: f64) -> f64 {
+    fn speed_above(&self, step: usize, below: f64) -> f64 {
         let [low, high] = knots_about(step, self.highest)
             .map(|(knot, weight)| weight * self.at(hysteresis_at(knot, self.highest)));
         let full = self.at(HYSTERESIS) + (low + high);
@@ -283,7 +283,7 @@ impl<'v> Answers<'v> {
     pub(super) fn step_at(&self, near: usize, set: f64) -> f64 {
         let near = near.min(self.highest);
         let below = self.speed(near, false);
-        let above = if near == 0 { 0.0 } else { self.from_above(near, below) };
+        let above = if near == 0 { 0.0 } else { self.speed_above(near, below) };
         if (below..=above).contains(&set) {
             return near as f64;
         }
