@@ -146,7 +146,7 @@ each_table() {
   "$1" cross-check compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv --markdown
   "$1" running-times example running_times
   "$1" driving simulate driving --seeds 1..5 --markdown
-  "$1" worlds simulate worlds --seeds fresh:5@bd82baa8ebbdc565e773d75c3c7463582c922466 --markdown
+  "$1" worlds simulate worlds --seeds fresh:5@47a926139a2f6ccac5be5662c8eede4a92d2720f --markdown
   "$1" disasters simulate disasters --seeds 1..8 --markdown
   "$1" pacing simulate pacing --seeds 1..3 --markdown
   "$1" zones simulate zones --seeds 21..26 --markdown

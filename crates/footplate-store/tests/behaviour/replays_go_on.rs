@@ -117,7 +117,7 @@ fn the_version_of_the_model_is_raised_with_its_formulas() {
         import_new(store, STOP, minute(2));
     });
     // Printed by this test when it fails: whoever changed the numbers raises MOTION_MODEL_VERSION, and writes down both here.
-    let known = [("8", "c17a5493f06db4d5d3a17aef30248207be7668ee2c50eacc44d948863e5eacd4")];
+    let known = [("9", "58c862d69240639e65f4c6c96783f7ef8c9e8d3a2e58f188fbb8d751a599524f")];
     let found = ContentHash::of(said.as_bytes()).to_string();
     assert_eq!(known.last(), Some(&(MOTION_MODEL_VERSION, found.as_str())));
 }
