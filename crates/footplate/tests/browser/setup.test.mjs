@@ -203,8 +203,11 @@ test("a page that loaded only in part reloads itself", async () => {
   for (const part of [/setup_page\.js/, /\.(js|css)/]) {
     const page = await browser.newPage();
     let failed = 0;
-    const began = Date.now();
-    await page.route(part, (route) => (Date.now() - began < 1000 && ++failed ? route.abort() : route.continue()));
+    let began;
+    await page.route(part, (route) => {
+      began ??= Date.now();
+      return Date.now() - began < 1000 && ++failed ? route.abort() : route.continue();
+    });
     await page.goto(program.url);
     await isShown(page, "#use-simulated");
     assert.ok(failed > 0, String(part));
