@@ -1,5 +1,6 @@
 //! Known turnout positions, and the positions that a path needs.
 
+use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
 use core::fmt;
 
@@ -59,17 +60,23 @@ pub struct TurnoutNeed {
 pub struct TurnoutStates {
     /// By the turnout's number; turnouts beyond the end are unknown.
     legs: Vec<Option<Leg>>,
+    /// Those that a train has faced and passed as they lie since they were set: they did move when they were commanded.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    proven: BTreeSet<TurnoutId>,
 }
 
 impl TurnoutStates {
     /// No position is known: every path is open.
     #[must_use]
     pub const fn unknown() -> Self {
-        Self { legs: Vec::new() }
+        Self { legs: Vec::new(), proven: BTreeSet::new() }
     }
 
     /// Sets the position of a turnout. Allocates if its number is the highest so far.
     pub fn set(&mut self, turnout: TurnoutId, leg: Leg) {
+        if self.get(turnout) != Some(leg) {
+            self.proven.remove(&turnout);
+        }
         let slot = usize::from(turnout.0);
         if self.legs.len() <= slot {
             self.legs.resize(slot + 1, None);
@@ -81,6 +88,7 @@ impl TurnoutStates {
 
     /// Forgets the position of a turnout, because its command was lost or a train ran through it.
     pub fn forget(&mut self, turnout: TurnoutId) {
+        self.proven.remove(&turnout);
         if let Some(known) = self.legs.get_mut(usize::from(turnout.0)) {
             *known = None;
         }
@@ -91,6 +99,17 @@ impl TurnoutStates {
     #[must_use]
     pub fn get(&self, turnout: TurnoutId) -> Option<Leg> {
         self.legs.get(usize::from(turnout.0)).copied().flatten()
+    }
+
+    /// A train was detected where the present position of a turnout that it faced had led it.
+    pub fn prove(&mut self, turnout: TurnoutId) {
+        self.proven.insert(turnout);
+    }
+
+    /// Whether a train has shown the position of a turnout since it was set.
+    #[must_use]
+    pub fn is_proven(&self, turnout: TurnoutId) -> bool {
+        self.proven.contains(&turnout)
     }
 
     /// Whether a train can pass the turnout as `need` requires: always if it trails the turnout; if it faces it, only
@@ -126,6 +145,12 @@ mod tests {
         assert!(!states.allow(need(Leg::Straight, true)));
         assert!(states.allow(need(Leg::Curved, true)));
         assert!(states.allow(need(Leg::Straight, false)), "a train that trails the turnout moves the points");
+
+        states.prove(TurnoutId(6));
+        states.set(TurnoutId(6), Leg::Curved);
+        assert!(states.is_proven(TurnoutId(6)), "it lay there already");
+        states.set(TurnoutId(6), Leg::Straight);
+        assert!(!states.is_proven(TurnoutId(6)), "it may not have moved");
 
         states.forget(TurnoutId(6));
         assert_eq!(states.get(TurnoutId(6)), None);

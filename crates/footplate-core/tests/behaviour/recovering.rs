@@ -85,6 +85,24 @@ fn a_train_that_a_person_places_is_searched_no_more() {
 }
 
 #[test]
+fn a_train_that_reversed_to_be_located_faces_as_before() {
+    // Given a lost train that creeps back over the track that it came from,
+    let mut watched = Watched::asking();
+    watched.dog.lose(watched.world.now, FIRST);
+    watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
+    // when it is measured and back in service,
+    let is_recovered = |watched: &Watched| {
+        watched.notices.iter().any(|notice| matches!(notice, Notice::Recovered { train: FIRST, .. }))
+    };
+    assert!(watched.run_until(200.0, is_recovered), "{:#?}", watched.notices);
+    // then it has reversed twice, and an order that waited for it goes on in its direction.
+    let reversed = watched.commanded.iter().filter(|(_, command)| matches!(command, Command::Reverse { .. }));
+    assert_eq!(reversed.count(), 2);
+    assert!(watched.dog.driver().locate(FIRST, watched.world.now).is_some());
+    assert!(watched.world.trains[0].speed_mm_per_s < 1.0);
+}
+
+#[test]
 fn a_turnout_that_was_to_move_while_the_station_was_silent_is_unknown() {
     for (silent_after_s, leg) in [(10.0, Some(Leg::Curved)), (1.5, None)] {
         let mut watched = Watched::one();

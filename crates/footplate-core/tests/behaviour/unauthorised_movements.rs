@@ -25,7 +25,7 @@ fn what_no_session_drives_stops_trains_until_an_operator_says_that_the_track_is_
     assert!(watched.world.trains.iter().all(|train| train.speed_mm_per_s < 1.0));
     let order = Order::Speed { train: FIRST, step: step(5) };
     let refused = watched.dog.order(watched.world.now, order);
-    assert_eq!(refused, Err(Refusal::InDanger { train: FIRST }));
+    assert_eq!(refused, Err(Refusal::TrackNotClear));
     watched.run(60.0);
     assert!(watched.dog.has_danger());
     watched.dog.switch_power(watched.world.now, true);

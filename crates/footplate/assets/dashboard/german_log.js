@@ -86,6 +86,7 @@ const LINES = [
   [/^schedule `(.*)` ended: train (\d+) was commanded by hand$/, "Fahrplan `$1` beendet: Zug $2 erhielt einen Befehl von Hand"],
   [/^refused `(.*)`: (.*)$/, (_, line, why) => `abgelehnt: \`${line}\`: ${logInGerman(why)}`],
   // Reasons of refused commands.
+  [/^something moved that Footplate does not drive: check the track, then enter `power on`, or `place` the train that it is$/, "etwas hat sich bewegt, das Footplate nicht fährt: die Gleise prüfen, dann `power on` eingeben, oder mit `place` sagen, welcher Zug es war"],
   [/^train (\d+) is stopped for safety until the incident is resolved$/, "Zug $1 steht zur Sicherheit, bis der Vorfall geklärt ist"],
   [/^the station does not answer$/, "die Zentrale antwortet nicht"], [/^track power is off: enter `power on`$/, "der Fahrstrom ist aus: `power on` eingeben"],
   [/^step (\d+) does not move this train reliably: use a higher step$/, "Stufe $1 bewegt diesen Zug nicht sicher: eine höhere Stufe nehmen"],

@@ -42,6 +42,7 @@ mod simulate;
 mod simulate_driving;
 mod simulate_line;
 mod simulate_pacing;
+mod simulate_worlds;
 mod simulate_zones;
 mod simulated;
 mod station;

@@ -3,7 +3,7 @@
 use crate::control::Notice;
 use crate::control::drive::AT_TARGET;
 use crate::control::drive::{Aim, Order, Refusal, StopOrder};
-use crate::ids::TrainId;
+use crate::ids::{SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Position, TurnoutNeed};
 use crate::units::Length;
@@ -68,11 +68,12 @@ impl Dispatcher {
         }
     }
 
-    /// Whether a train is lost and no recovery searches for it.
+    /// Whether a train is lost, and neither a recovery searches for it nor an operator runs it over a sensor.
     fn is_unattended(&self, now: Timestamp, id: TrainId) -> bool {
         self.watchdog.is_watching()
             && !self.watchdog.is_in_danger(id)
             && self.watchdog.driver().locate(id, now).is_none()
+            && self.watchdog.driver().commanded(id) == SpeedStep::STAND
     }
 
     /// Gives up the position of a train that a sensor did not report, if no path leads to a sensor: the watchdog
@@ -130,7 +131,7 @@ impl Dispatcher {
             if let Some(need) = self.missing_for_reversal(now, id) {
                 return self.need_more(now, id, need);
             }
-            let turn = Order::Reverse { train: id, then: crate::ids::SpeedStep::STAND };
+            let turn = Order::Reverse { train: id, then: SpeedStep::STAND };
             match self.watchdog.order(now, turn) {
                 Ok(order) => {
                     self.set_state(id, State::Reversing { order });

@@ -46,6 +46,12 @@ impl DrivenTrain {
 }
 
 impl Driver {
+    /// Whether the position of a train at rest would still be known if it reversed.
+    pub(in crate::control) fn stays_located_reversed(&self, train: TrainId, now: Timestamp) -> bool {
+        let back = self.trains.get(&train).and_then(|train| train.back_at_rest(self.track.context(), now));
+        back.is_some()
+    }
+
     /// The train that runs backward, if a report that was not explained shows one.
     pub(in crate::control) fn runs_backward(
         &self,
@@ -56,7 +62,7 @@ impl Driver {
         let window = self.detection(time, Report { sensor, poll_interval: None }).window;
         let context = self.track.context();
         let claim = |train: &DrivenTrain| {
-            let missed = train.detections.missed_share(train.speed(context, time));
+            let missed = train.missed_share(context, time);
             train.backward.as_ref()?.claim(context, &train.model, sensor, window, missed)
         };
         let claims = self.trains.values().filter_map(|train| Some((train.id(), claim(train)?)));

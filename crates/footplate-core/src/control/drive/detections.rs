@@ -45,12 +45,12 @@ impl Default for Detections {
 }
 
 impl Detections {
-    /// A sensor reported the train within a poll, after so many that did not, all at a speed.
-    pub(super) fn take(&mut self, missed: usize, speed: Speed, poll: TimeSpan) {
+    /// A sensor reported the train at a speed within a poll, after so many that did not, at a speed of up to another.
+    pub(super) fn take(&mut self, (missed, missed_at): (usize, Speed), speed: Speed, poll: TimeSpan) {
         self.poll = poll;
         for (log, closed) in self.log_probability.iter_mut().zip(CLOSED_MM) {
-            let seen = seen(closed, speed, poll);
-            *log += libm::log(seen) + missed as f64 * libm::log(1.0 - seen);
+            let silent = libm::log(1.0 - seen(closed, missed_at, poll));
+            *log += libm::log(seen(closed, speed, poll)) + missed as f64 * silent;
         }
         let likeliest = self.log_probability.into_iter().fold(f64::NEG_INFINITY, f64::max);
         self.log_probability.iter_mut().for_each(|log| *log -= likeliest);
@@ -96,7 +96,7 @@ mod tests {
         let mut detections = Detections::default();
         assert_eq!(detections.lost_after(FAST), 2);
         for nth in 0..200 {
-            detections.take(usize::from(nth == 90), FAST, POLL);
+            detections.take((usize::from(nth == 90), FAST), FAST, POLL);
         }
         assert_eq!(detections.lost_after(FAST), 2, "one of 200");
         assert!(detections.missed_share(FAST) < 0.01, "{}", detections.missed_share(FAST));
@@ -107,11 +107,11 @@ mod tests {
         let mut detections = Detections::default();
         // Closed for 35 mm, and run over 64 mm within a poll: 45 of 100 are missed.
         for nth in 0..20 {
-            detections.take(usize::from(nth % 5 < 4), FAST, POLL);
+            detections.take((usize::from(nth % 5 < 4), FAST), FAST, POLL);
         }
         let share = detections.missed_share(FAST);
         assert!((share - 0.44).abs() < 0.1, "{share}");
-        assert_eq!(detections.lost_after(FAST), 4);
+        assert_eq!(detections.lost_after(FAST), 9);
         assert!(detections.missed_share(SLOW) < 0.01, "{}", detections.missed_share(SLOW));
         assert_eq!(detections.lost_after(SLOW), 2);
     }
@@ -120,7 +120,7 @@ mod tests {
     fn one_silent_sensor_of_a_circuit_does_not_make_an_interface_that_does_not_latch() {
         let mut detections = Detections::default();
         for nth in 0..60 {
-            detections.take(usize::from(nth % 12 == 0), SLOW, POLL);
+            detections.take((usize::from(nth % 12 == 0), SLOW), SLOW, POLL);
         }
         assert_eq!(detections.lost_after(SLOW), 2);
     }

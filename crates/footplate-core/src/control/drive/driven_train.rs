@@ -327,10 +327,11 @@ impl DrivenTrain {
         passed: PassedSensor,
         out: &mut Outputs,
     ) {
+        let missed_at = self.missed_at(context, passed.at);
         self.clear_missed();
         self.backward = None;
         let speed = self.speed(context, passed.at);
-        self.detections.take(passed.missed, speed, passed.window.width());
+        self.detections.take((passed.missed, missed_at), speed, passed.window.width());
         self.learn_reported_speed(context, node, &passed, out);
         self.note_passage(context, node, passed.at);
         self.recount_end_of_authority(context, node);

@@ -360,6 +360,8 @@ impl Driver {
     fn passed(&mut self, now: Timestamp, detection: Detection, explanation: Explanation) {
         if let Explanation::Turnout { train, turnout, leg } = explanation {
             self.adopt_leg(train, turnout, leg);
+        } else if let Explanation::Train(train) = explanation {
+            self.prove_turnouts(now, train, detection.sensor);
         }
         let context = self.track.context();
         if let (Some(train), Some(node)) =

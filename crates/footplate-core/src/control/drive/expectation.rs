@@ -3,7 +3,7 @@
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{Located, PathPoint, TrackContext};
-use crate::units::{Length, Ratio};
+use crate::units::{Length, Ratio, Speed};
 
 use super::command_time::{CommandTime, command_time};
 use super::driven_train::DrivenTrain;
@@ -72,6 +72,16 @@ impl DrivenTrain {
         sensors_within(context, &self.model, located.at.node, passed).last().map(|(sensor, _)| sensor)
     }
 
+    /// The highest speed at which a sensor may have missed it since its last detection.
+    pub(super) fn missed_at(&self, context: TrackContext<'_>, now: Timestamp) -> Speed {
+        self.speed(context, now).max(self.expected.fastest)
+    }
+
+    /// The share of detections that sensors missed of it since its last one.
+    pub(super) fn missed_share(&self, context: TrackContext<'_>, now: Timestamp) -> f64 {
+        self.detections.missed_share(self.missed_at(context, now))
+    }
+
     /// Whether at most one detection was missed and the next is not late.
     pub(super) fn missed_just_one(&self, now: Timestamp) -> bool {
         let Expectation { due, overdue_reported, missed_in_a_row, .. } = self.expected;
@@ -102,6 +112,7 @@ impl DrivenTrain {
             overdue_reported: false,
             track_end_stop,
             authority_stop,
+            fastest: self.missed_at(context, now),
             ..self.expected
         };
     }
@@ -139,6 +150,7 @@ impl DrivenTrain {
         self.expected.missed_sensor = None;
         self.expected.missed_in_a_row = 0;
         self.expected.lost_by = None;
+        self.expected.fastest = Speed::ZERO;
     }
 
     /// When the next detection is overdue, or the train is lost.
@@ -168,7 +180,7 @@ impl DrivenTrain {
                 self.expected.lost_by.get_or_insert(now + LOST.max(travel + travel));
                 self.expected.missed_sensor.get_or_insert(due.sensor);
                 self.expected.missed_in_a_row = self.expected.missed_in_a_row.saturating_add(1);
-                if self.expected.missed_in_a_row >= self.detections.lost_after(self.speed(context, now)) {
+                if self.expected.missed_in_a_row >= self.detections.lost_after(self.missed_at(context, now)) {
                     return self.lose(now, out);
                 }
                 let next = self.locator.next_sensor(context, &self.model, now);

@@ -17,6 +17,9 @@ use super::driven_train::DrivenTrain;
 const HOPS_AHEAD: usize = 2;
 /// ln of the probability that a turnout does not move when commanded, 0.3 % (chosen as that of a missed detection is).
 const LOG_TURNOUT_FAILS: f64 = -5.809;
+/// ln of the probability that a turnout over which a train has passed since it was set lies otherwise, one in 100 000 (chosen: a hand
+/// or a magnet without a command throws one in a season).
+const LOG_TURNOUT_MOVED: f64 = -11.513;
 /// Turnout failures are considered only if the density (ln 1/s) with the known positions is below this: an
 /// uncertainty of about half a second.
 const LIKELY: f64 = 0.0;
@@ -86,7 +89,7 @@ pub(super) fn hypotheses(
             continue;
         }
         let is_missed = train.missed_sensor().is_some();
-        let missed_share = train.detections.missed_share(train.speed(context, detection.window.middle()));
+        let missed_share = train.missed_share(context, detection.window.middle());
         // The missed sensor has already happened under every hypothesis: condition on it.
         let happened = missed_share + CHANGED + STRAYED;
         let conditioned = if is_missed { -libm::log(happened) } else { 0.0 };
@@ -103,9 +106,11 @@ pub(super) fn hypotheses(
             for (turnout, leg) in other_legs(train, context, now) {
                 let mut turnouts: TurnoutStates = context.turnouts.clone();
                 turnouts.set(turnout, leg);
+                let is_proven = context.turnouts.is_proven(turnout);
+                let log_other = if is_proven { LOG_TURNOUT_MOVED } else { LOG_TURNOUT_FAILS };
                 if let Some(log_density) = claim(TrackContext { turnouts: &turnouts, ..context }) {
                     let explanation = Explanation::Turnout { train: id, turnout, leg };
-                    add(explanation, log_density + LOG_TURNOUT_FAILS);
+                    add(explanation, log_density + log_other);
                 }
             }
         }

@@ -9,7 +9,6 @@ use crate::track::Position;
 use crate::tracking::{PassedSensor, PathPoint, Rest, TrackContext, distance_to, place_of};
 use crate::units::Length;
 
-use super::driven_train::DrivenTrain;
 use super::driver::Driver;
 use super::order::OrderId;
 use super::path::{circuit_length, reversed_on_current_path, reversed_position, trailing_position};
@@ -68,8 +67,7 @@ impl Driver {
     /// The share of detections that sensors miss of a train at its speed, as learnt in this session.
     #[must_use]
     pub fn missed_share(&self, train: TrainId, now: Timestamp) -> f64 {
-        let speed = |train: &DrivenTrain| train.speed(self.track.context(), now);
-        self.trains.get(&train).map_or(0.0, |train| train.detections.missed_share(speed(train)))
+        self.trains.get(&train).map_or(0.0, |train| train.missed_share(self.track.context(), now))
     }
 
     /// Whether the position of a train depends on an ambiguous detection.

@@ -90,6 +90,8 @@ pub enum Refusal {
         /// The train that was ordered to move.
         train: TrainId,
     },
+    /// Something moved that this session does not drive, where the train could meet it.
+    TrackNotClear,
     /// The station does not answer: no command can be sent.
     NoAnswer,
     /// Track power is off.
@@ -215,6 +217,9 @@ impl fmt::Display for Refusal {
             Self::InDanger { train } => {
                 write!(f, "train {train} is stopped for safety until the incident is resolved")
             }
+            Self::TrackNotClear => f.write_str(
+                "something moved that Footplate does not drive: check the track, then enter `power on`, or `place` the train that it is",
+            ),
             Self::NoAnswer => f.write_str("the station does not answer"),
             Self::NoPower => f.write_str("track power is off: enter `power on`"),
             Self::UnknownTrain { train } => write!(f, "train {train} is not part of this session"),

@@ -9,6 +9,7 @@ use crate::tracking::{DueSensor, PathPoint};
 
 use super::order::{Aim, OrderId};
 use crate::control::Promise;
+use crate::units::Speed;
 
 /// An order that is being carried out.
 #[derive(Debug, Clone, Copy)]
@@ -87,6 +88,8 @@ pub(super) struct Expectation {
     pub(super) missed_in_a_row: u8,
     /// A sensor that should have reported it, if none has reported it since.
     pub(super) missed_sensor: Option<SensorId>,
+    /// The highest speed at which it was predicted since its last detection.
+    pub(super) fastest: Speed,
     /// When it counts as lost unless it is reported before; set once a detection is overdue.
     pub(super) lost_by: Option<Timestamp>,
     /// When a stop has to be commanded before the end of the track, and which end that is.

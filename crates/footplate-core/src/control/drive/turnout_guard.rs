@@ -3,13 +3,14 @@
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 
-use crate::ids::{NodeId, TrainId, TurnoutId};
+use crate::ids::{NodeId, SensorId, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{NodeKind, Position};
+use crate::track::{MAX_MISSED, NodeKind, Position, TurnoutNeed};
 use crate::tracking::{TrackContext, place_of};
 use crate::units::Length;
 
 use super::driven_train::DrivenTrain;
+use super::driver::Driver;
 use super::path::nodes_of_turnout;
 
 /// Bound on the error of a train's estimated position, in standard deviations: exceeded once in 15 000 times.
@@ -44,6 +45,28 @@ pub(super) fn turnouts_under(
         _ => None,
     };
     nodes_under(context, train, now).into_iter().filter_map(|(node, _)| turnout_at(node)).collect()
+}
+
+impl Driver {
+    /// A train reached a sensor: the turnouts that it faced since its last detection lie as they are known.
+    pub(super) fn prove_turnouts(&mut self, now: Timestamp, train: TrainId, sensor: SensorId) {
+        let context = self.track.context();
+        let from = self.trains.get(&train).and_then(|train| train.located(context, now));
+        let (Some(from), Some(to)) = (from, context.node_of(sensor)) else { return };
+        let mut faced: Vec<TurnoutId> = Vec::new();
+        let mut is_reached = false;
+        for hop in context.hops_ahead(from.at.node).take(MAX_MISSED + 1) {
+            let is_faced = |need: &&TurnoutNeed| need.facing && context.turnouts.get(need.turnout).is_some();
+            faced.extend(hop.needs.iter().filter(is_faced).map(|need| need.turnout));
+            is_reached = hop.to == to;
+            if is_reached {
+                break;
+            }
+        }
+        if is_reached {
+            faced.into_iter().for_each(|turnout| self.track.turnouts.prove(turnout));
+        }
+    }
 }
 
 /// The nodes that a train is on or will reach soon, in both directions: it may come from the toe or from a leg.

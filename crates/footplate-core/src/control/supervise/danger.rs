@@ -224,7 +224,7 @@ impl Watchdog {
     fn only_train_elsewhere(&self, now: Timestamp) -> Option<TrainId> {
         let mut trains = self.driver.trains();
         let train = trains.next().filter(|_| trains.next().is_none())?;
-        let runs = self.driver.commanded(train) > SpeedStep::STAND;
+        let runs = self.driver.commanded(train) > SpeedStep::STAND || !self.driver.is_at_rest(train, now);
         let is_silent = self.intruder.in_a_row > 1 || self.driver.missed_sensor(train, now).is_some();
         (runs && is_silent).then_some(train)
     }

@@ -49,7 +49,7 @@ pub(super) struct Recovery {
     /// The model from before the alarm.
     pub(super) base: MotionModel,
     pub(super) steps: Steps,
-    fit: MotionFit,
+    pub(super) fit: MotionFit,
     pub(super) ratios: Vec<MeasuredRatio>,
     pub(super) change: Rescaling,
     pub(super) lessons_taken: usize,
@@ -83,8 +83,10 @@ pub(super) enum Phase {
     LearningStop { until: Timestamp },
     /// ... and creeps to a sensor that measures where that was.
     LearningRest,
-    /// The recovery is complete, and it comes to rest.
+    /// The recovery is complete: it comes to rest ...
     Ending { outcome: Outcome },
+    /// ... and is turned to the direction in which it was before, if it reversed an odd number of times and remains located.
+    Turning { outcome: Outcome },
     /// An operator is needed.
     GivenUp,
 }
@@ -183,7 +185,13 @@ impl Watchdog {
                 Phase::Ending { outcome }
                     if self.stops.at_rest(train).is_some_and(|at_rest| at_rest <= now) =>
                 {
-                    self.recovered(now, train, outcome);
+                    let is_turned = !recovery.reversals.is_multiple_of(2);
+                    if !is_turned || !self.driver.stays_located_reversed(train, now) {
+                        self.recovered(now, train, outcome);
+                    } else {
+                        self.set_phase(train, Phase::Turning { outcome }, now + STOPPED_WITHIN);
+                        self.issue(now, Order::Reverse { train, then: SpeedStep::STAND });
+                    }
                 }
                 Phase::Measuring { trial, .. } if recovery.by <= now => self.skip(now, train, trial.step),
                 Phase::GivenUp => {}
@@ -222,17 +230,25 @@ impl Watchdog {
             Some(located) => self.driver.place(now, train, located.at, ABOUT.max(located.uncertainty)),
             None => {
                 self.driver.lose(now, train);
-                // Other trains are near, and the track may end ahead. Behind the train is track that it ran over.
-                if !self.permits_all {
-                    return match self.sensor_behind(now, train) {
-                        seen @ Some(_) => self.creep_back(now, train, seen),
-                        None if self.is_clear_ahead(now, train) => self.creep_ahead(now, train),
-                        None => self.need_operator(now, train),
-                    };
-                }
+                return self.search(now, train);
             }
         }
         self.creep_ahead(now, train);
+    }
+
+    /// Creeps to locate a lost train. Other trains may be near, and the track may end ahead; behind the train is track that it ran
+    /// over.
+    fn search(&mut self, now: Timestamp, train: TrainId) {
+        let Some(recovery) = self.dangers.get(&train) else { return };
+        let may_reverse = recovery.reversals < MAX_REVERSALS;
+        if self.permits_all {
+            return self.creep_ahead(now, train);
+        }
+        match self.sensor_behind(now, train) {
+            seen @ Some(_) if may_reverse => self.creep_back(now, train, seen),
+            _ if self.is_clear_ahead(now, train) => self.creep_ahead(now, train),
+            _ => self.need_operator(now, train),
+        }
     }
 
     /// Creeps ahead to the next sensor.
@@ -274,6 +290,8 @@ impl Watchdog {
             recovery.phase = Phase::Locating { step, pushed: now, seen };
             recovery.by = now + LOCATED_WITHIN;
             self.keep_clear(now, train);
+        } else if let (EventKind::Reverse { .. }, Phase::Turning { outcome }) = (event.kind, recovery.phase) {
+            self.recovered(now, train, outcome);
         } else if let EventKind::Speed { step, .. } = event.kind
             && let Phase::Measuring { trial, from } | Phase::LearningSpeed { trial, from } =
                 &mut recovery.phase
@@ -382,17 +400,8 @@ impl Watchdog {
         if recovery.lost >= MAX_LOST {
             return self.need_operator(now, train);
         }
-        let (creep, reversals) = (recovery.steps.creep, recovery.reversals);
         recovery.ratios.clear();
-        recovery.by = now + LOCATED_WITHIN;
-        if self.permits_all {
-            return self.creep(now, train, creep, None);
-        }
-        // Track ahead may end or be reserved for others; the train ran over the track behind it.
-        match self.sensor_behind(now, train) {
-            seen @ Some(_) if reversals < MAX_REVERSALS => self.creep_back(now, train, seen),
-            _ => self.need_operator(now, train),
-        }
+        self.search(now, train);
     }
 
     fn reverse_or_conclude(&mut self, now: Timestamp, train: TrainId) {
@@ -416,22 +425,6 @@ impl Watchdog {
             return self.need_operator(now, train);
         }
         self.creep_back(now, train, seen);
-    }
-
-    /// Concludes the recovery: sets the model and stops the train.
-    pub(super) fn end(&mut self, now: Timestamp, train: TrainId, outcome: Outcome) {
-        let Some(recovery) = self.dangers.get_mut(&train) else { return };
-        let model = match outcome {
-            Outcome::AsBefore => recovery.base.clone(),
-            Outcome::Rescaled { .. } => recovery.base.rescaled(&recovery.change),
-            Outcome::LearntAnew => {
-                self.driver.refit(&mut recovery.fit);
-                recovery.fit.model().clone()
-            }
-        };
-        self.driver.set_model(model);
-        self.set_phase(train, Phase::Ending { outcome }, now + STOPPED_WITHIN);
-        self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 
     /// The train is at rest and its recovery complete.
@@ -482,7 +475,9 @@ impl Watchdog {
     pub(super) fn need_operator(&mut self, now: Timestamp, train: TrainId) {
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let while_it = match recovery.phase {
-            Phase::Stopping | Phase::Waiting { .. } | Phase::Ending { .. } => "while it was being stopped",
+            Phase::Stopping | Phase::Waiting { .. } | Phase::Ending { .. } | Phase::Turning { .. } => {
+                "while it was being stopped"
+            }
             Phase::Locating { .. } | Phase::Reversing { .. } => "while it crept to a sensor",
             Phase::GivenUp => return,
             _ => "while it was measured again",

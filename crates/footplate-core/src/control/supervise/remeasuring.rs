@@ -12,7 +12,7 @@ use crate::tracking::PassedSensor;
 use crate::units::Length;
 
 use super::alarm::Alarm;
-use super::recovery::{MEASURED_WITHIN, Phase, Recovery};
+use super::recovery::{MEASURED_WITHIN, Phase, Recovery, STOPPED_WITHIN};
 use super::trials::{SpeedTrial, Steps, is_same};
 use super::watchdog::Watchdog;
 use crate::control::{Notice, Outcome};
@@ -27,6 +27,22 @@ const SHORT_OF: Length = Length::from_mm(120.0);
 const HOPS_TO_STOP: usize = 8;
 
 impl Watchdog {
+    /// Concludes the recovery: sets the model and stops the train.
+    pub(super) fn end(&mut self, now: Timestamp, train: TrainId, outcome: Outcome) {
+        let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        let model = match outcome {
+            Outcome::AsBefore => recovery.base.clone(),
+            Outcome::Rescaled { .. } => recovery.base.rescaled(&recovery.change),
+            Outcome::LearntAnew => {
+                self.driver.refit(&mut recovery.fit);
+                recovery.fit.model().clone()
+            }
+        };
+        self.driver.set_model(model);
+        self.set_phase(train, Phase::Ending { outcome }, now + STOPPED_WITHIN);
+        self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
+    }
+
     /// Begins to measure the next speed, or concludes from the measured ones.
     pub(super) fn measure(&mut self, now: Timestamp, train: TrainId) {
         let commanded = self.driver.commanded(train);

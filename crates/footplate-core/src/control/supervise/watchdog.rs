@@ -241,7 +241,8 @@ impl Watchdog {
                 self.trust_again(train);
             }
             if !stops && (self.is_held(train) || self.could_meet(now, train)) {
-                return Err(Refusal::InDanger { train });
+                let is_moved = self.dangers.is_empty() && self.has_intruder();
+                return Err(if is_moved { Refusal::TrackNotClear } else { Refusal::InDanger { train } });
             }
             if !stops && self.is_silent() {
                 return Err(Refusal::NoAnswer);

@@ -136,7 +136,7 @@ impl Driven<'_, '_> {
         learnt: (Vec<MotionModel>, Vec<MotionFit>),
     ) -> anyhow::Result<(Vec<MotionModel>, Vec<MotionFit>)> {
         self.line.station.world_mut().begin_session(PAUSE);
-        let mut machine = Timed::new(self.begin(learnt)?);
+        let mut machine = Timed::new(self.begin(learnt.clone())?);
         self.is_stuck = false;
         self.seek(&mut machine);
         let early_at = (self.scored.name == WorldName::EarlyStart && session == 1).then_some(stops / 2);
@@ -152,7 +152,9 @@ impl Driven<'_, '_> {
         }
         self.scored.taken += machine.taken;
         self.scored.longest = self.scored.longest.max(machine.longest);
-        Ok(machine.script_runner.handed_over())
+        // What a train in a recovery knew before the session is what a store keeps of it.
+        let handed_over = machine.script_runner.handed_over();
+        Ok(if handed_over.0.is_empty() { learnt } else { handed_over })
     }
 
     /// The script runner of a session; what it knows goes through the text that is kept of it.
@@ -203,7 +205,17 @@ impl Driven<'_, '_> {
                         self.scored.stops.push(ScoredStop { session, step, target, error, promised });
                     }
                     (refused, ..) => {
-                        self.failed(&order, refused.as_deref().unwrap_or("no promise"));
+                        let why = refused.as_deref().unwrap_or("no promise");
+                        self.failed(&order, why);
+                        if why.contains("enter `power on`") {
+                            self.say(machine, "power on");
+                        }
+                        let unknown = why
+                            .split_once("position of turnout ")
+                            .and_then(|(_, rest)| rest.split_once(" is unknown"));
+                        if let Some((turnout, _)) = unknown {
+                            self.say(machine, &format!("turnout {turnout} straight"));
+                        }
                         self.seek(machine);
                     }
                 }
@@ -215,7 +227,7 @@ impl Driven<'_, '_> {
         }
     }
 
-    /// Does what the program asks an operator to do: stops the train, and then runs it over a sensor.
+    /// Does what the program asks an operator to do who does not know where a train is: stops it, and then runs it over a sensor.
     fn seek(&mut self, machine: &mut Timed) {
         self.say(machine, &format!("speed {TRAIN} 0"));
         self.until_at_rest(machine);
