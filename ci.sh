@@ -14,13 +14,15 @@
 #   stations     programs of others drive trains behind our virtual stations
 #   fuzz         random bytes against every decoder, session, reader, order and HTTP body, a minute in all; ./ci.sh fuzz --seconds 3600 an hour each
 #
-# And three that are never part of "every step". `fresh` drives every scorer on seeds that nobody chose, drawn from the hash of
+# And four that are never part of "every step". `fresh` drives every scorer on seeds that nobody chose, drawn from the hash of
 # the commit, prints how often happened what must not, with 95 % intervals, and fails on grief: trains that touched,
 # derailed or ran off the track. It takes hours; FRESH_SEEDS=4 makes it short.
 #
 #   chaos        the whole program in one process under seeds, while the line, the disk and processes fail;
 #                ./ci.sh chaos --seeds 1..1000000 (docs/trust.md lists seeds that fail)
 #   fresh        every scorer on FRESH_SEEDS (64 unless set) fresh seeds
+#   mutants      a share of all small changes to the core's formulas and rules, each of which a test of the core should notice:
+#                MUTANTS=0/200 is every 200th from the first on, two hours (docs/trust.md lists what was not noticed)
 #
 # The other changes files:
 #
@@ -146,7 +148,7 @@ each_table() {
   "$1" cross-check compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv --markdown
   "$1" running-times example running_times
   "$1" driving simulate driving --seeds 1..5 --markdown
-  "$1" worlds simulate worlds --seeds fresh:5@47a926139a2f6ccac5be5662c8eede4a92d2720f --markdown
+  "$1" worlds simulate worlds --seeds fresh:5@14fa20526f0dd1ca0d675b57b4c3d5fb9a997707 --markdown
   "$1" disasters simulate disasters --seeds 1..8 --markdown
   "$1" pacing simulate pacing --seeds 1..3 --markdown
   "$1" zones simulate zones --seeds 21..26 --markdown
@@ -252,6 +254,19 @@ step_chaos() {
   "$TARGET/debug/footplate" simulate chaos --seeds "$CHAOS_SEEDS"
 }
 
+# Tests that take minutes without optimisation are left out, so what is missed here may be noticed by them or by other crates.
+readonly SLOW_UNOPTIMISED='/many_seeds|every_train_stays_on|no_follower_touches|stops_downhill|command_budget|other_laws|three_hundred/'
+
+step_mutants() {
+  need_nextest
+  command -v cargo-mutants >/dev/null || cargo install cargo-mutants --locked
+  local part
+  local -a files=()
+  for part in model tracking odometry control; do files+=(--file "crates/footplate-core/src/$part/**"); done
+  PROPTEST_CASES=16 cargo mutants --package footplate-core "${files[@]}" --sharding round-robin --shard "${MUTANTS:-0/200}" \
+    --test-tool nextest --profile mutants --timeout 300 --output "$TARGET" -- --lib --test behaviour -E "not test($SLOW_UNOPTIMISED)"
+}
+
 step_fuzz() {
   need_nextest
   cargo build --quiet --workspace --bins --profile test
@@ -354,7 +369,7 @@ if [[ ${#steps[@]} -eq 0 || ${steps[*]} == all ]]; then
 fi
 for step in "${steps[@]}"; do
   if ! declare -F "step_$step" >/dev/null; then
-    echo "ci.sh: no step is called '$step'; there are: all ${ALL_STEPS[*]} expected fresh chaos" >&2
+    echo "ci.sh: no step is called '$step'; there are: all ${ALL_STEPS[*]} expected fresh chaos mutants" >&2
     exit 2
   fi
 done

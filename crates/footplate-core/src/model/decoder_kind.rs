@@ -140,3 +140,50 @@ impl MotionModel {
         DecoderKind::ALL.map(|kind| (kind, Supposed::of(self, kind)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// ln of a normal density.
+    fn log_normal(off: f64, variance: f64) -> f64 {
+        -0.5 * (off * off / variance + (core::f64::consts::TAU * variance).ln())
+    }
+
+    #[test]
+    fn a_prior_that_is_exchanged_is_as_if_it_had_been_there_from_the_start() {
+        // A number, measured as 0.9 ± 0.8 where 0.2 ± 1 was thought of it, and another that is half of it and 0.3 more.
+        let (measured, seen, before, known) = (0.9, 0.8_f64.powi(2), (0.2, 1.0), (0.5, 0.3));
+        let after = |(mean, deviation): (f64, f64)| {
+            let variance = 1.0 / (1.0 / seen + 1.0 / (deviation * deviation));
+            (variance * (measured / seen + mean / (deviation * deviation)), variance)
+        };
+        let (mean, variance) = after(before);
+        let mut values = alloc::vec![0.0; SPEEDS];
+        let mut covariance = alloc::vec![0.0; SPEEDS * SPEEDS];
+        let [one, other] = [LAG, RHO];
+        values[one] = mean;
+        values[other] = 0.5 * mean + 0.3;
+        for [row, column, slope] in [[one, one, 4], [one, other, 2], [other, one, 2], [other, other, 1]] {
+            covariance[row * SPEEDS + column] = 0.25 * slope as f64 * variance;
+        }
+        let mut supposed = Supposed { values, covariance, evidence: 0.0 };
+        supposed.exchange(&[(one, 1.0)], before, known);
+
+        let (mean, variance) = after(known);
+        let found = |row: usize, column: usize| supposed.covariance[row * SPEEDS + column];
+        for (found, exact) in [
+            (supposed.values[one], mean),
+            (supposed.values[other], 0.5 * mean + 0.3),
+            (found(one, one), variance),
+            (found(one, other), 0.5 * variance),
+            (found(other, other), 0.25 * variance),
+        ] {
+            assert!((found - exact).abs() < 1e-12, "{found} is {exact}");
+        }
+        let likely =
+            |(mean, deviation): (f64, f64)| log_normal(measured - mean, seen + deviation * deviation);
+        let exact = likely(known) - likely(before);
+        assert!((supposed.evidence - exact).abs() < 1e-12, "{} is {exact}", supposed.evidence);
+    }
+}
