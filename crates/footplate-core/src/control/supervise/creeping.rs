@@ -8,7 +8,7 @@ use crate::event::Approach;
 use crate::ids::{EdgeId, NodeId, SpeedStep, TrainId};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Layout, Position, TurnoutStates};
+use crate::track::{Layout, Position, TurnoutNeed, TurnoutStates};
 use crate::units::Length;
 
 use super::danger::{BODY, CERTAIN, CLEAR, LOST_REACH, rails_within};
@@ -87,11 +87,19 @@ impl Watchdog {
 
     /// The sensor to which a lost train may creep back, in its new direction: the one that reported it last. `None` if
     /// it could reach the end of the track, or track that is closed to it, before a sensor reports it, wherever it
-    /// may be and however turnouts are set, and if its direction is unknown.
+    /// may be and however turnouts are set, if its direction is unknown, and if it may have come over a leg for which a turnout does not
+    /// lie.
     pub(super) fn sensor_behind(&self, now: Timestamp, train: TrainId) -> Option<NodeId> {
         let layout = self.driver.layout();
         let behind = *self.behind.get(&train).filter(|_| !self.undirected.contains(&train))?;
         let reach = edges_within(layout, behind, self.unheard_run(now, train) + BODY);
+        // It may stand on points that it pushed over: back over them its wheels would take two ways.
+        let lies_otherwise = |need: TurnoutNeed| {
+            !need.facing && self.driver.turnouts().get(need.turnout).is_some_and(|leg| leg != need.leg)
+        };
+        if reach.keys().any(|edge| layout.needs_of(*edge).any(lies_otherwise)) {
+            return None;
+        }
         let length = |edge| layout.edge(edge).map_or(Length::ZERO, |edge| edge.length);
         let from = |(edge, left): (EdgeId, Length)| (edge.twin(), (length(edge) - left).max(Length::ZERO));
         let begins = reach.into_iter().map(from).collect();
