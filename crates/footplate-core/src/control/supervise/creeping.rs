@@ -93,7 +93,7 @@ impl Watchdog {
         let layout = self.driver.layout();
         let behind = *self.behind.get(&train).filter(|_| !self.undirected.contains(&train))?;
         let reach = edges_within(layout, behind, self.unheard_run(now, train) + BODY);
-        // It may stand on points that it pushed over: back over them its wheels would take two ways.
+        // It may stand on points that it pushed over: back over them it would derail.
         let lies_otherwise = |need: TurnoutNeed| {
             !need.facing && self.driver.turnouts().get(need.turnout).is_some_and(|leg| leg != need.leg)
         };
