@@ -235,17 +235,6 @@ impl<A: Awaited> Dialogue<A> {
         })
     }
 
-    /// Notes the commanded step of a train, reversed or not; returns whether it then runs forward.
-    pub(crate) fn commanded(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> bool {
-        self.locomotives.know(train);
-        let Some(locomotive) = self.locomotives.get_mut(train) else { return true };
-        if reverses {
-            locomotive.forward = Some(!locomotive.forward.unwrap_or(true));
-        }
-        (locomotive.step, locomotive.is_driven, locomotive.is_stopped) = (step, true, false);
-        locomotive.forward.unwrap_or(true)
-    }
-
     /// Notes that a request was written; adds its command to the recording and returns the entry.
     pub(crate) fn sent(&mut self, now: Timestamp, outgoing: Outgoing<A>) -> Option<EventKind> {
         let Outgoing { request, awaited, command, tries } = outgoing;
@@ -451,6 +440,7 @@ impl<A: Awaited> Dialogue<A> {
             }
             self.waiting.clear();
             self.outstanding.clear();
+            self.locomotives.withdraw_reversals();
             self.stop_driven();
         }
         begins

@@ -1,10 +1,14 @@
 //! The commanded state of each locomotive, and what the station has confirmed.
 
+use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
 use footplate_core::{Command, FunctionNumber, SpeedStep, TrainId};
 
+use crate::dialogue::Dialogue;
+use crate::outstanding::Awaited;
 use crate::queue::Queue;
+use crate::session::Transmit;
 
 /// What the station has reported of a locomotive's functions. Sets have F0 in the lowest bit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -53,22 +57,26 @@ pub(crate) struct Locomotive {
 
 /// All locomotives that were commanded or asked for.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Locomotives(Vec<Locomotive>);
+pub(crate) struct Locomotives {
+    known: Vec<Locomotive>,
+    /// Whether each ran forward when it was commanded or reported last, in this session or an earlier one.
+    directions: BTreeMap<TrainId, bool>,
+}
 
 impl Locomotives {
     pub(crate) fn get(&self, train: TrainId) -> Option<&Locomotive> {
-        self.0.iter().find(|locomotive| locomotive.train == train)
+        self.known.iter().find(|locomotive| locomotive.train == train)
     }
 
     pub(crate) fn get_mut(&mut self, train: TrainId) -> Option<&mut Locomotive> {
-        self.0.iter_mut().find(|locomotive| locomotive.train == train)
+        self.known.iter_mut().find(|locomotive| locomotive.train == train)
     }
 
     /// Adds a locomotive that will be commanded.
     pub(crate) fn know(&mut self, train: TrainId) {
         if self.get(train).is_none() {
             let step = SpeedStep::STAND;
-            self.0.push(Locomotive {
+            self.known.push(Locomotive {
                 train,
                 forward: None,
                 step,
@@ -79,17 +87,42 @@ impl Locomotives {
         }
     }
 
+    /// Notes whether a train runs forward; returns whether it did before, as far as is known.
+    pub(crate) fn keep_direction(&mut self, train: TrainId, forward: bool) -> Option<bool> {
+        self.directions.insert(train, forward)
+    }
+
+    /// Whether a train ran forward last, as far as is known.
+    pub(crate) fn last_direction(&self, train: TrainId) -> Option<bool> {
+        self.directions.get(&train).copied()
+    }
+
+    /// Whether a train runs forward whose station says so (`reported`) and has not been asked before. Stations that were restarted
+    /// have forgotten, and say *forward* of every locomotive, at rest and without functions (`is_blank`). A decoder does what it
+    /// is commanded next, so it is commanded on in the direction in which its train is known to have run last.
+    pub(crate) fn first_direction(&self, train: TrainId, reported: bool, is_blank: bool) -> bool {
+        self.last_direction(train).filter(|_| reported && is_blank).unwrap_or(reported)
+    }
+
+    /// Takes back reversals that no station has confirmed: stops contain a direction, and would reverse a train that the next
+    /// session believes to face as before.
+    pub(crate) fn withdraw_reversals(&mut self) {
+        for locomotive in &mut self.known {
+            locomotive.forward = self.directions.get(&locomotive.train).copied().or(locomotive.forward);
+        }
+    }
+
     /// Whether the direction of a train is known.
     pub(crate) fn has_direction(&self, train: TrainId) -> bool {
         self.get(train).is_some_and(|locomotive| locomotive.forward.is_some())
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Locomotive> {
-        self.0.iter()
+        self.known.iter()
     }
 
     pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = &mut Locomotive> {
-        self.0.iter_mut()
+        self.known.iter_mut()
     }
 
     /// Adds a train that must be stopped, no matter which throttle drove it.
@@ -102,7 +135,7 @@ impl Locomotives {
 
     /// Stops every train that was driven.
     pub(crate) fn stop_driven(&mut self, waiting: &mut Queue) {
-        for locomotive in self.0.iter_mut().filter(|locomotive| locomotive.is_driven) {
+        for locomotive in self.known.iter_mut().filter(|locomotive| locomotive.is_driven) {
             locomotive.is_stopped = false;
             // Stops are always taken.
             let _ = waiting.push(Command::Speed { train: locomotive.train, step: SpeedStep::STAND });
@@ -112,7 +145,45 @@ impl Locomotives {
     /// Returns the driven trains that have stopped, or those that have not.
     pub(crate) fn driven(&self, stopped: bool) -> Vec<TrainId> {
         let driven =
-            self.0.iter().filter(|locomotive| locomotive.is_driven && locomotive.is_stopped == stopped);
+            self.known.iter().filter(|locomotive| locomotive.is_driven && locomotive.is_stopped == stopped);
         driven.map(|locomotive| locomotive.train).collect()
+    }
+}
+
+/// Speed and direction of the locomotives of a session.
+impl<A: Awaited> Dialogue<A> {
+    /// Notes the commanded step of a train, reversed or not; returns whether it then runs forward.
+    pub(crate) fn commanded(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> bool {
+        self.locomotives.know(train);
+        let Some(locomotive) = self.locomotives.get_mut(train) else { return true };
+        if reverses {
+            locomotive.forward = Some(!locomotive.forward.unwrap_or(true));
+        }
+        (locomotive.step, locomotive.is_driven, locomotive.is_stopped) = (step, true, false);
+        locomotive.forward.unwrap_or(true)
+    }
+
+    /// The station has confirmed the last command to a train. A reversal that it never confirms was hardly obeyed, so its
+    /// direction is kept only now.
+    pub(crate) fn obeyed(&mut self, train: TrainId) {
+        let Some(locomotive) = self.locomotives.get_mut(train) else { return };
+        locomotive.is_stopped = locomotive.step == SpeedStep::STAND;
+        if let Some(forward) = locomotive.forward {
+            self.keep_direction(train, forward);
+        }
+    }
+
+    /// A train runs forward or backward next, as its station has reported.
+    pub(crate) fn faces(&mut self, train: TrainId, forward: bool) {
+        if let Some(locomotive) = self.locomotives.get_mut(train) {
+            locomotive.forward = Some(forward);
+        }
+        self.keep_direction(train, forward);
+    }
+
+    fn keep_direction(&mut self, train: TrainId, forward: bool) {
+        if self.locomotives.keep_direction(train, forward) != Some(forward) {
+            self.output.push_back(Transmit::Direction(train, forward));
+        }
     }
 }

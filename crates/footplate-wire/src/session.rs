@@ -35,7 +35,8 @@ pub trait Session {
     /// When the station has no such address, or cannot command decoders with so many steps.
     fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError>;
 
-    /// Sets whether an earlier session commanded a train forward last, for a station that may have forgotten it; no effect on others.
+    /// Sets whether a train ran forward last in an earlier session, which its station may have forgotten; no effect on stations that
+    /// know no direction.
     fn set_direction(&mut self, _train: TrainId, _forward: bool) {}
 
     /// Sends a command as soon as the line is free.

@@ -51,8 +51,8 @@ pub struct Client {
     sensors: Sensors,
     /// Locomotives whose state must be read again.
     unverified: Vec<TrainId>,
-    /// Whether each locomotive ran forward when its direction was last reported, or when an earlier session commanded it.
-    directions: BTreeMap<TrainId, bool>,
+    /// Whether each locomotive ran forward by a report that no other has confirmed yet.
+    reported_once: BTreeMap<TrainId, bool>,
     /// Since when the station was silent, until its states have been read again.
     blind_since: Option<Timestamp>,
 }
@@ -68,7 +68,7 @@ impl Client {
             opening: Opening::begin(now, &settings),
             sensors: Sensors::default(),
             unverified: Vec::new(),
-            directions: BTreeMap::new(),
+            reported_once: BTreeMap::new(),
             blind_since: None,
         };
         client.go_on(now);
@@ -180,11 +180,7 @@ impl Client {
     }
 
     fn drive(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> (Request, Option<Awaited>) {
-        let is_first = self.dialogue.locomotives.get(train).is_none_or(|known| !known.is_driven);
         let forward = self.dialogue.commanded(train, step, reverses);
-        if is_first || reverses {
-            self.dialogue.output.push_back(Transmit::Direction(train, forward));
-        }
         let throttle = self.throttle(train, step);
         (Request::Drive { cab: train.0, throttle, forward }, Some(Awaited::Driven(train, throttle, forward)))
     }
@@ -244,7 +240,7 @@ impl Session for Client {
     }
 
     fn set_direction(&mut self, train: TrainId, forward: bool) {
-        self.directions.insert(train, forward);
+        self.dialogue.locomotives.keep_direction(train, forward);
     }
 
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {

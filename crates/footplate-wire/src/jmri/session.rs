@@ -2,7 +2,6 @@
 
 mod hearing;
 
-use alloc::collections::BTreeMap;
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -49,8 +48,6 @@ pub struct Client {
     sensors: Sensors,
     /// Trains whose throttles have to be asked for their state.
     unverified: Vec<TrainId>,
-    /// The directions of trains that were driven over an earlier connection.
-    commanded: BTreeMap<TrainId, bool>,
     identity: Option<String>,
     /// The last reason for which JMRI refused a request.
     refusal: Option<String>,
@@ -70,7 +67,6 @@ impl Client {
             system: System::default(),
             sensors: Sensors::default(),
             unverified: Vec::new(),
-            commanded: BTreeMap::new(),
             identity: None,
             refusal: None,
             blind_since: None,
@@ -255,6 +251,10 @@ impl Session for Client {
 
     fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
         self.dialogue.set_decoder(train, &LOCOMOTIVES, steps)
+    }
+
+    fn set_direction(&mut self, train: TrainId, forward: bool) {
+        self.dialogue.locomotives.keep_direction(train, forward);
     }
 
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {

@@ -350,6 +350,10 @@ impl Session for Client {
         self.dialogue.set_decoder(train, &LOCOMOTIVES, steps)
     }
 
+    fn set_direction(&mut self, train: TrainId, forward: bool) {
+        self.dialogue.locomotives.keep_direction(train, forward);
+    }
+
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
         self.dialogue.accept(command, &LOCOMOTIVES, &self.settings.turnouts())?;
         self.go_on(now);

@@ -126,8 +126,6 @@ pub(super) struct DrivenSlot {
     /// Direction and functions, by the station's own message; functions beyond those of slots as they were commanded.
     pub(super) forward: bool,
     pub(super) functions: u32,
-    /// The direction that was commanded before the station lost the slot.
-    pub(super) commanded: Option<bool>,
     /// When its speed was written last.
     pub(super) refreshed: footplate_core::Timestamp,
 }
@@ -159,14 +157,7 @@ impl DrivenSlots {
                 (slot.number, slot.forward, slot.functions) = (number, forward, functions | beyond);
             }
             None => {
-                self.0.push(DrivenSlot {
-                    train,
-                    number,
-                    forward,
-                    functions,
-                    commanded: None,
-                    refreshed: now,
-                });
+                self.0.push(DrivenSlot { train, number, forward, functions, refreshed: now });
             }
         }
     }

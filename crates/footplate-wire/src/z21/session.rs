@@ -292,6 +292,10 @@ impl Session for Client {
         self.dialogue.set_decoder(train, &LOCOMOTIVES, steps)
     }
 
+    fn set_direction(&mut self, train: TrainId, forward: bool) {
+        self.dialogue.locomotives.keep_direction(train, forward);
+    }
+
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
         self.dialogue.check_step(&command)?;
         match command {

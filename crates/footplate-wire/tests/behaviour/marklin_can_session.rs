@@ -174,6 +174,38 @@ fn a_station_that_answers_no_questions_is_commanded_a_direction() {
 }
 
 #[test]
+fn a_station_that_tells_no_direction_is_commanded_the_one_of_the_session_before() {
+    let mut desk = Desk::opened();
+    desk.station.ignores = |message| matches!(message, Message::Direction { .. });
+    desk.client.set_direction(T58, false);
+    desk.command(speed(T58, 8));
+    desk.run_for(2_500);
+    let directions = |desk: &Desk| {
+        let commanded = desk.messages().into_iter().filter_map(|message| match message {
+            Message::Direction { uid: Uid(58), direction } => direction,
+            _ => None,
+        });
+        commanded.collect::<Vec<_>>()
+    };
+    assert_eq!(directions(&desk).first(), Some(&Direction::Backward));
+}
+
+#[test]
+fn a_station_that_is_off_is_asked_for_a_direction_until_it_answers() {
+    let mut desk = Desk::opened();
+    desk.station.ignores = |_| true;
+    desk.command(speed(T24, 8));
+    desk.run_for(5_000);
+    let commands = |message: &Message| matches!(message, Message::Direction { direction: Some(_), .. });
+    assert!(!desk.messages().iter().any(commands), "{:?}", desk.written);
+    desk.station.ignores = |message| matches!(message, Message::File(_));
+    desk.run_for(3_000);
+    // It ran backwards, as the station says now.
+    assert_eq!(desk.directions, [(T24, false)]);
+    assert!(desk.messages().contains(&drives(24, 571)) && !desk.messages().iter().any(commands));
+}
+
+#[test]
 fn what_is_not_confirmed_is_repeated_and_given_up_if_it_stops_nothing() {
     let mut desk = Desk::opened();
     desk.command(speed(T24, 8));

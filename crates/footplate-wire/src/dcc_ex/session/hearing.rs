@@ -14,7 +14,7 @@ use super::Client;
 use crate::locomotives::ReportedFunctions;
 use crate::outstanding::Awaited as _;
 use crate::sensors::Change;
-use crate::session::{LinkNotice, Transmit};
+use crate::session::LinkNotice;
 
 impl Client {
     pub(super) fn hear(&mut self, now: Timestamp, byte: u8) {
@@ -115,18 +115,19 @@ impl Client {
         let wanted = self.throttle(train, step);
         let Some(locomotive) = self.dialogue.locomotive(train) else { return };
         if is_confirmed {
-            locomotive.is_stopped = locomotive.step == SpeedStep::STAND;
-            return;
+            return self.dialogue.obeyed(train);
         }
         let Some(forward) = locomotive.forward else {
             // A board says `forward` of a locomotive that it does not drive. Its decoder goes on as it ran last.
-            if let Some(before) = self.directions.get(&train).filter(|_| driven.register < 0) {
-                locomotive.forward = Some(*before);
-                return;
+            let last = self.dialogue.locomotives.last_direction(train);
+            if let Some(last) = last.filter(|_| driven.register < 0) {
+                return self.dialogue.faces(train, last);
             }
             // Messages have no checksum, and `128`, forward, without its first digit is a speed backward: two have to agree.
-            let before = self.directions.insert(train, driven.forward);
-            locomotive.forward = before.filter(|forward| *forward == driven.forward);
+            let before = self.reported_once.insert(train, driven.forward).or(last);
+            if before == Some(driven.forward) {
+                self.dialogue.faces(train, driven.forward);
+            }
             return;
         };
         let is_as_commanded = driven.throttle == wanted && driven.forward == forward;
@@ -136,7 +137,7 @@ impl Client {
         if !locomotive.is_driven {
             // It is asked for again before it is used.
             locomotive.forward = None;
-            self.directions.insert(train, driven.forward);
+            self.reported_once.insert(train, driven.forward);
             return;
         }
         if driven.register < 0 {
@@ -145,12 +146,9 @@ impl Client {
             return self.verify();
         }
         let reversed = driven.forward != forward;
-        locomotive.forward = Some(driven.forward);
         locomotive.is_stopped = false;
+        self.dialogue.faces(train, driven.forward);
         self.dialogue.stop_at_end(train);
-        if reversed {
-            self.dialogue.output.push_back(Transmit::Direction(train, driven.forward));
-        }
         self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed });
     }
 

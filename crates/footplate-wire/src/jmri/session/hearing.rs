@@ -176,27 +176,26 @@ impl Client {
         let is_outstanding = self.dialogue.outstanding.blocks(train, false).is_some();
         let step = self.dialogue.locomotives.get(train).map_or(SpeedStep::STAND, |known| known.step);
         let wanted = self.throttle(train, step);
-        let commanded = self.commanded.get(&train).copied();
         let Some(locomotive) = self.dialogue.locomotive(train) else { return };
         if matches!(answered, Some(Awaited::Driven(..))) {
-            locomotive.is_stopped = locomotive.step == SpeedStep::STAND;
-            return;
+            return self.dialogue.obeyed(train);
         }
         let (throttle, faces) = driven;
         let Some(forward) = locomotive.forward else {
             // JMRI may have been restarted and not know: the direction is written with the next speed.
-            locomotive.forward = Some(commanded.unwrap_or(faces));
-            self.commanded.remove(&train);
-            return;
+            let forward =
+                self.dialogue.locomotives.first_direction(train, faces, throttle == Throttle::Speed(0));
+            return self.dialogue.faces(train, forward);
         };
         if is_outstanding || (throttle == wanted && faces == forward) {
             return;
         }
-        locomotive.forward = Some(faces);
-        if !locomotive.is_driven {
+        let is_driven = locomotive.is_driven;
+        locomotive.is_stopped &= !is_driven;
+        self.dialogue.faces(train, faces);
+        if !is_driven {
             return;
         }
-        locomotive.is_stopped = false;
         self.dialogue.stop_at_end(train);
         self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed: faces != forward });
     }
@@ -204,9 +203,7 @@ impl Client {
     /// JMRI has stopped a train and given up its throttle, which must be asked for again.
     pub(super) fn lost_throttle(&mut self, train: TrainId) {
         let Some(locomotive) = self.dialogue.locomotives.get_mut(train) else { return };
-        if let Some(forward) = locomotive.forward.take() {
-            self.commanded.insert(train, forward);
-        }
+        locomotive.forward = None;
         locomotive.step = SpeedStep::STAND;
         if locomotive.is_driven {
             self.dialogue.stop(train);

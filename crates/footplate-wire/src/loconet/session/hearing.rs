@@ -2,7 +2,7 @@
 
 use alloc::string::String;
 
-use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId};
+use footplate_core::{EventKind, SensorId, Timestamp, TrainId};
 
 use super::super::line::{Line, SentReport};
 use super::super::message::{Malformed, Message};
@@ -129,7 +129,6 @@ impl Client {
         }
         let reported = ReportedFunctions { known: SlotData::FUNCTIONS, on: data.functions };
         self.dialogue.hear_of_functions(train, reported, answered.as_ref().map(|answered| &answered.awaited));
-        let commanded = self.slots.of(train).and_then(|slot| slot.commanded);
         // The answer to an older request does not undo what a newer one switched.
         let is_switching = self.dialogue.outstanding.any(|awaited| awaited.switched() == Some(train));
         let switched = self.slots.of(train).map(|slot| slot.functions);
@@ -144,12 +143,13 @@ impl Client {
         let decoder = self.dialogue.decoder(train);
         let Some(locomotive) = self.dialogue.locomotive(train) else { return };
         if matches!(answered, Some(answered) if matches!(answered.awaited, Awaited::Driven(..))) {
-            locomotive.is_stopped = locomotive.step == SpeedStep::STAND;
-            return;
+            return self.dialogue.obeyed(train);
         }
         let Some(forward) = locomotive.forward else {
             if data.slot_use() == SlotUse::InUse {
-                locomotive.forward = Some(commanded.unwrap_or(data.forward));
+                let is_blank = data.speed == 0 && data.functions == 0;
+                let forward = self.dialogue.locomotives.first_direction(train, data.forward, is_blank);
+                self.dialogue.faces(train, forward);
             }
             return;
         };
@@ -158,20 +158,20 @@ impl Client {
         if is_outstanding || is_as_commanded {
             return;
         }
-        locomotive.forward = Some(data.forward);
-        if !locomotive.is_driven {
+        let is_driven = locomotive.is_driven;
+        locomotive.is_stopped &= !is_driven;
+        self.dialogue.faces(train, data.forward);
+        if !is_driven {
             return;
         }
-        locomotive.is_stopped = false;
         self.dialogue.stop_at_end(train);
         self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed: data.forward != forward });
     }
 
     /// The station has given a slot to others or has forgotten it: trains have stopped, and all slots are asked for again.
     fn restarted(&mut self) {
-        let forward = |train| self.dialogue.locomotives.get(train).and_then(|known| known.forward);
         for slot in self.slots.iter_mut() {
-            (slot.number, slot.commanded) = (None, forward(slot.train).or(slot.commanded));
+            slot.number = None;
         }
         self.dialogue.restarted();
         self.unused.clear();

@@ -1,11 +1,11 @@
 //! Sends requests and commands as frames, and handles missing answers.
 
-use footplate_core::{Command, EventKind, SpeedStep, Timestamp, TrainId};
+use footplate_core::{Command, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::super::frame::Frame;
 use super::super::message::{Direction, Message};
 use super::super::opening::Question;
-use super::super::outstanding::Awaited;
+use super::super::outstanding::{Awaited, REPEATED_AFTER};
 use super::super::roster::LOCOMOTIVES_FILE;
 use super::super::settings::Transport;
 use super::super::solenoid::Solenoid;
@@ -13,7 +13,7 @@ use super::super::speed::speed_of;
 use super::super::uid::Uid;
 use super::{Client, Query, position_of};
 use crate::dialogue::Repeat;
-use crate::outstanding::Outgoing;
+use crate::outstanding::{Outgoing, Outstanding};
 
 impl Client {
     pub(super) fn asking(&mut self, now: Timestamp, question: Question) -> Outgoing<Awaited> {
@@ -70,7 +70,7 @@ impl Client {
             match self.dialogue.next_repeat(now, only_urgent)? {
                 Repeat::Again(outgoing) => return Some(outgoing),
                 Repeat::GivenUp(given_up) => {
-                    if let Some(instead) = self.instead_of(given_up.awaited) {
+                    if let Some(instead) = self.instead_of(given_up) {
                         return Some(instead);
                     }
                 }
@@ -79,17 +79,20 @@ impl Client {
     }
 
     /// Handles a request that the station does not answer; returns a request to send instead.
-    fn instead_of(&mut self, awaited: Awaited) -> Option<Outgoing<Awaited>> {
-        match awaited {
+    fn instead_of(&mut self, given_up: Outstanding<Awaited>) -> Option<Outgoing<Awaited>> {
+        let asked_for = REPEATED_AFTER.as_ns() * i64::from(given_up.tries.saturating_sub(1));
+        let asked = given_up.sent - TimeSpan::from_ns(asked_for);
+        match given_up.awaited {
             Awaited::Modules => self.has_modules = false,
-            Awaited::AnyDirection(train, uid) => {
-                // The direction cannot be read: it is commanded, so that it is known.
+            // A station that has answered nothing at all since it was asked is asked again. From one that answers other questions
+            // the direction cannot be read: it is commanded, so that it is known.
+            Awaited::AnyDirection(train, uid) if self.dialogue.heard >= asked => {
                 self.dialogue.locomotives.know(train);
-                let locomotive = self.dialogue.locomotives.get_mut(train)?;
-                if locomotive.forward.is_none() {
-                    locomotive.forward = Some(true);
-                    let message = Message::Direction { uid, direction: Some(Direction::Forward) };
-                    return Some(Outgoing::asks(message, Awaited::Direction(train, uid, true)));
+                if !self.dialogue.locomotives.has_direction(train) {
+                    let forward = self.dialogue.locomotives.last_direction(train).unwrap_or(true);
+                    self.dialogue.faces(train, forward);
+                    let message = Message::Direction { uid, direction: Some(Direction::of(forward)) };
+                    return Some(Outgoing::asks(message, Awaited::Direction(train, uid, forward)));
                 }
             }
             _ => {}

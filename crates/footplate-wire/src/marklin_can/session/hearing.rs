@@ -215,20 +215,19 @@ impl Client {
         let Some(locomotive) = self.dialogue.locomotives.get_mut(train) else { return };
         if matches!(answered, Some(Awaited::Direction(..))) {
             // A station sets the speed to 0 with it.
-            locomotive.is_stopped |= locomotive.step == SpeedStep::STAND;
-            return;
+            return self.dialogue.obeyed(train);
         }
         if is_outstanding || locomotive.forward == Some(forward) {
             return;
         }
         if locomotive.forward.is_none() || !locomotive.is_driven {
-            locomotive.forward = Some(forward);
-            return;
+            return self.dialogue.faces(train, forward);
         }
         if answered.is_none() {
             return self.suspect(train, Query::Direction);
         }
-        (locomotive.forward, locomotive.step) = (Some(forward), SpeedStep::STAND);
+        locomotive.step = SpeedStep::STAND;
+        self.dialogue.faces(train, forward);
         self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed: true });
     }
 

@@ -12,6 +12,7 @@ use super::super::outstanding::Awaited;
 use super::super::reply::{Malformed, Reply};
 use super::super::request::Request;
 use super::super::sensors::Change;
+use super::super::speed::Throttle;
 use super::super::states::{Firmware, Lock, LocomotiveState, TurnoutPosition};
 use super::super::time_model::occupied;
 use super::{Client, DETECTORS_WITHIN};
@@ -168,20 +169,20 @@ impl Client {
         let (steps, wanted) = self.throttle(train, step);
         let Some(locomotive) = self.dialogue.locomotive(train) else { return };
         if is_confirmed {
-            locomotive.is_stopped = locomotive.step == SpeedStep::STAND;
+            self.dialogue.obeyed(train);
             return self.suspected.retain(|(other, ..)| *other != train);
         }
         let Some(forward) = locomotive.forward else {
-            locomotive.forward = Some(state.forward);
-            return;
+            let is_blank = !state.busy && state.throttle == Throttle::Stop && state.functions == 0;
+            let forward = self.dialogue.locomotives.first_direction(train, state.forward, is_blank);
+            return self.dialogue.faces(train, forward);
         };
         let as_fast = state.throttle.is_like(state.steps, wanted, steps);
         if is_outstanding || as_fast && state.forward == forward {
             return self.suspected.retain(|(other, ..)| *other != train);
         }
         if !locomotive.is_driven {
-            locomotive.forward = Some(state.forward);
-            return;
+            return self.dialogue.faces(train, state.forward);
         }
         // It may be an old datagram: it counts when the station repeats it in answer to a question.
         let said = (train, state.throttle, state.forward);
@@ -194,8 +195,8 @@ impl Client {
             }
             return;
         }
-        locomotive.forward = Some(state.forward);
         locomotive.is_stopped = false;
+        self.dialogue.faces(train, state.forward);
         self.suspected.retain(|(other, ..)| *other != train);
         self.dialogue.stop_at_end(train);
         self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed: state.forward != forward });
