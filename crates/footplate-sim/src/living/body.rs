@@ -343,6 +343,17 @@ impl Body {
         })
     }
 
+    /// The turnouts whose toes are under the train, each with the leg that it is on.
+    pub(crate) fn straddled(&self, rails: &Rails<'_>) -> Vec<(TurnoutId, Leg)> {
+        let is_under = |toe: f64| self.rear() < toe && toe < self.front();
+        let of = |under: &Under| {
+            let rail = rails.rail(under.edge)?;
+            let left = rail.leaves.filter(|_| is_under(under.begins));
+            left.or(rail.enters.filter(|_| is_under(under.ends)))
+        };
+        self.path.iter().filter_map(of).collect()
+    }
+
     /// How far the nearest part of the train on a leg is from the toe of its turnout; infinite if none is on it.
     fn distance_from_toe(&self, rails: &Rails<'_>, under: &Under, turnout: TurnoutId) -> f64 {
         let (from, to) = (self.rear().max(under.begins), self.front().min(under.ends));

@@ -22,9 +22,7 @@ impl LivingLayout<'_> {
 
     /// Sends direction and speed to a locomotive over the track.
     pub(crate) fn carry(&mut self, train: TrainId, forward: bool, speed: DecoderSpeed, at: Timestamp) {
-        if self.runs_forward(train) == Some(!forward) {
-            self.reverse(train, at);
-        }
+        self.face(train, forward, at);
         match speed {
             DecoderSpeed::Step { step, highest } => {
                 let own = self.decoder(train).highest().get();

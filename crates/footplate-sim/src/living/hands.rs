@@ -124,6 +124,21 @@ impl LivingLayout<'_> {
         }
     }
 
+    /// Lays every turnout that a train stands across for that train; returns those that lay otherwise.
+    pub fn lay_under_trains(&mut self) -> Vec<TurnoutId> {
+        let bodies = self.trains.iter().filter_map(|train| train.body.as_ref());
+        let needed: Vec<_> = bodies.flat_map(|body| body.straddled(&self.rails)).collect();
+        let wrong = needed.into_iter().filter(|(turnout, leg)| self.points.lies(*turnout) != Some(*leg));
+        let wrong: Vec<_> = wrong.collect();
+        wrong.iter().for_each(|(turnout, leg)| self.points.lay(*turnout, *leg));
+        wrong.into_iter().map(|(turnout, _)| turnout).collect()
+    }
+
+    /// Replaces burnt coils; returns their turnouts.
+    pub fn replace_coils(&mut self) -> Vec<TurnoutId> {
+        self.points.replace_coils()
+    }
+
     fn take_up(&mut self, place: usize) {
         let now = self.now();
         let train: &mut LiveTrain = &mut self.trains[place];

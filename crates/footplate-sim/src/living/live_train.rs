@@ -50,7 +50,10 @@ impl End {
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Order {
     Step(SpeedStep),
+    /// Reverse.
     Turn,
+    /// Reverse, from a station that repeats the direction.
+    Face,
     /// Stop at once, in the same direction.
     Halt,
 }
@@ -159,13 +162,13 @@ impl LiveTrain {
 
     /// Whether its front end leads once it has received all commands that were sent.
     pub(crate) fn runs_forward(&self) -> bool {
-        let turns = self.orders.iter().filter(|(_, order)| matches!(order, Order::Turn)).count();
+        let turns = self.orders.iter().filter(|(_, order)| matches!(order, Order::Turn | Order::Face)).count();
         (self.leads == End::Nose) == turns.is_multiple_of(2)
     }
 
     /// Its decoder loses power and forgets everything.
     pub(crate) fn lose_power(&mut self) {
-        self.orders.clear();
+        self.orders.retain(|(_, order)| matches!(order, Order::Face));
         self.heard = SpeedStep::STAND;
         self.halt(POWERLESS_MM_PER_S2);
     }
@@ -320,12 +323,12 @@ impl LiveTrain {
                 self.halt(TURNED_MM_PER_S2);
                 false
             }
-            Order::Turn => {
+            Order::Turn | Order::Face => {
                 self.heard = SpeedStep::STAND;
                 self.halt(TURNED_MM_PER_S2);
                 if self.halting.is_some() {
                     // It reverses at rest.
-                    self.orders.push_front((Timestamp::ZERO, Order::Turn));
+                    self.orders.push_front((Timestamp::ZERO, order));
                     return false;
                 }
                 self.leads = self.leads.other();

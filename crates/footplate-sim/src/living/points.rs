@@ -89,6 +89,18 @@ impl Points {
         self.look_ahead();
     }
 
+    /// Replaces burnt solenoids; returns their turnouts.
+    pub(crate) fn replace_coils(&mut self) -> Vec<TurnoutId> {
+        let mut replaced = Vec::new();
+        for (number, turnout) in self.by_number.iter_mut().enumerate() {
+            if let Some(found) = turnout.as_mut().filter(|found| found.is_burnt) {
+                found.is_burnt = false;
+                replaced.push(TurnoutId(number as u16));
+            }
+        }
+        replaced
+    }
+
     /// The time at which the next points arrive.
     pub(crate) const fn next(&self) -> Option<Timestamp> {
         self.next

@@ -150,11 +150,22 @@ impl<'l> LivingLayout<'l> {
         }
     }
 
-    /// The station commands a train to reverse, which sets its step to 0.
+    /// The station commands a train to reverse, once, which sets its step to 0.
     pub(crate) fn reverse(&mut self, train: TrainId, sent: Timestamp) {
+        self.turn(train, Order::Turn, sent);
+    }
+
+    /// The station commands a direction, and goes on sending it: a decoder without power hears it when it has power again.
+    pub(crate) fn face(&mut self, train: TrainId, forward: bool, sent: Timestamp) {
+        if self.runs_forward(train) == Some(!forward) {
+            self.turn(train, Order::Face, sent);
+        }
+    }
+
+    fn turn(&mut self, train: TrainId, order: Order, sent: Timestamp) {
         if let Some(place) = self.trains.iter().position(|found| found.id == train) {
             self.commanded[place] = SpeedStep::STAND;
-            self.send(place, Order::Turn, sent);
+            self.send(place, order, sent);
         }
     }
 
@@ -178,7 +189,8 @@ impl<'l> LivingLayout<'l> {
 
     fn send(&mut self, place: usize, order: Order, sent: Timestamp) {
         let train = &mut self.trains[place];
-        if self.is_powered && train.body.is_some() && !train.is_wrecked {
+        let is_heard = self.is_powered || matches!(order, Order::Face);
+        if is_heard && train.body.is_some() && !train.is_wrecked {
             train.send(order, sent);
         }
     }

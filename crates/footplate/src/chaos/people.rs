@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use footplate_core::control::{Dispatcher, Journey, LinkNews, Notice, Reservation};
 use footplate_core::track::{Landmark, Layout};
-use footplate_core::{Command, Length, NodeId, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Command, Length, NodeId, TimeSpan, Timestamp, TrainId, TurnoutId};
 use footplate_eval::seeds::Choice;
 use footplate_eval::traffic::{HAND, is_on_reserved_track, place_by_hand};
 use footplate_store::Direction;
@@ -24,6 +24,8 @@ const HELP_AFTER: TimeSpan = TimeSpan::from_ms(15_000);
 /// The program is stuck if all trains are at rest for this long, one has a journey, and no alarm is active. Twice the time
 /// that the dispatcher takes to resolve a deadlock.
 const STUCK_AFTER: TimeSpan = TimeSpan::from_ms(120_000);
+/// A turnout that was commanded lies as commanded after this time.
+const MOVES_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
 const TRIES: usize = 100;
 
 /// Violations and counts.
@@ -50,6 +52,8 @@ pub(super) struct People<'p, 'l> {
     pub(super) ends: Timestamp,
     pub(super) seen: Seen,
     is_inside: BTreeMap<TrainId, bool>,
+    /// Turnouts that lie otherwise than the program believes, since when, and whether that was told.
+    misjudged: BTreeMap<TurnoutId, (Timestamp, bool)>,
     moves: BTreeMap<TrainId, bool>,
     /// Trains with an active alarm, and since when.
     troubled: BTreeMap<TrainId, Timestamp>,
@@ -85,6 +89,7 @@ impl<'p, 'l> People<'p, 'l> {
             ends: now + lasts,
             seen: Seen::default(),
             is_inside: BTreeMap::new(),
+            misjudged: BTreeMap::new(),
             moves: BTreeMap::new(),
             troubled: BTreeMap::new(),
             without_power: None,
@@ -125,6 +130,17 @@ impl<'p, 'l> People<'p, 'l> {
         let station = Rc::clone(&self.station);
         let station = station.borrow();
         let world = station.world();
+        for (turnout, _) in self.layout.turnouts() {
+            let (lies, believed) = (world.lies(turnout), dispatcher.driver().turnouts().get(turnout));
+            if believed.is_none() || lies == believed {
+                self.misjudged.remove(&turnout);
+                continue;
+            }
+            let (since, is_told) = self.misjudged.entry(turnout).or_insert((now, false));
+            if now - *since >= MOVES_WITHIN && !std::mem::replace(is_told, true) {
+                self.tell(now, format!("turnout {turnout} lies {lies:?}, and the program believes {believed:?}"));
+            }
+        }
         for train in self.trains {
             let is_inside = is_on_reserved_track(self.layout, world, dispatcher, *train);
             if self.is_inside.insert(*train, is_inside) == Some(true) && !is_inside {

@@ -253,6 +253,7 @@ impl<'l> Teller<'_, 'l> {
     fn live(&mut self, planned: &PlannedLife) -> anyhow::Result<()> {
         self.stop_left_running()?;
         self.await_rest();
+        self.check_turnouts();
         let incidents = self.station.borrow().world().incidents().len();
         self.fate.lives += 1;
         let life = Rc::new(Life::new(planned.ends));
@@ -408,6 +409,20 @@ impl<'l> Teller<'_, 'l> {
             None => self.fail(format!("trains were not stopped after a death (said: {is_said})")),
         }
         Ok(())
+    }
+
+    /// The operator looks after the turnouts, as the program asks after a crash.
+    fn check_turnouts(&mut self) {
+        let mut station = self.station.borrow_mut();
+        let laid = station.world_mut().lay_under_trains();
+        let replaced = station.world_mut().replace_coils();
+        drop(station);
+        for turnout in laid {
+            self.note(format!("a person lays turnout {turnout} for the train that stands across it"));
+        }
+        for turnout in replaced {
+            self.note(format!("a person replaces the burnt coil of turnout {turnout}"));
+        }
     }
 
     /// The operator waits for standstill before the next life begins.

@@ -30,8 +30,14 @@ pub(crate) fn stop_left_running<'l>(
     let mut session = open_session(address, &link, layout)?;
     recall_directions(&mut session, store)?;
     eprintln!("{}", stop_all(&mut link, session, unfinished.trains));
+    eprintln!("{CHECK_TURNOUTS}");
     Ok(Some(link))
 }
+
+/// What only a person can see: a computer that lost its power releases no coil, and a train that ran on went over turnouts from
+/// the side.
+const CHECK_TURNOUTS: &str = "before trains run again, check the turnouts: a train may stand across one that lies for the \
+     other track, and a coil that stayed under power may have burnt";
 
 /// Tells a session in which direction the trains of a store were commanded last. Not for a simulated railway, which is new each
 /// time.

@@ -64,10 +64,13 @@ impl LastWill {
             EventKind::Speed { train, .. } => {
                 self.running.insert(train);
             }
-            // A stop may name a direction.
-            EventKind::Reverse { .. } => self.is_stale = true,
             _ => {}
         }
+    }
+
+    /// The station has confirmed a direction, which a stop may name.
+    pub(super) fn directed(&mut self) {
+        self.is_stale = true;
     }
 
     /// Tells the guardian what has changed. Call it before bytes leave, so that the guardian can stop a train before the train

@@ -247,6 +247,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                 Transmit::Functions(train, reported) => self.functions.push((train, reported)),
                 Transmit::ReportedSpeed(train, number) => self.speeds.push((train, number)),
                 Transmit::Direction(train, forward) => {
+                    self.will.directed();
                     if let Some(recorder) = &mut self.recorder {
                         recorder.record_direction(Direction { train, forward });
                     }

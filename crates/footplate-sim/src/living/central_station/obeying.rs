@@ -157,9 +157,7 @@ impl VirtualCentralStation<'_> {
     /// The track carries a locomotive's speed and direction.
     fn command(&mut self, slot: Slot) {
         let Some(train) = self.train(slot.uid) else { return };
-        if self.world.runs_forward(train) == Some(!slot.forward) {
-            self.world.reverse(train, self.now);
-        }
+        self.world.face(train, slot.forward, self.now);
         let step = step_of(slot.speed, self.world.decoder(train));
         self.world.command(train, step, self.now);
     }
