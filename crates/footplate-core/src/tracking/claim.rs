@@ -6,7 +6,6 @@
 //! change.
 
 use super::locator::{LEAST_SPEED_M_PER_S, Locator, log_density};
-use super::path_length::path_reaches;
 use super::track_context::TrackContext;
 use crate::ids::SensorId;
 use crate::linalg::Gaussian;
@@ -33,11 +32,11 @@ impl Locator {
         window: DetectionWindow,
         missed_share: f64,
     ) -> Option<f64> {
-        let (node, place, speed) = self.motion_at(model, window.middle())?;
+        let (_, place, speed) = self.motion_at(model, window.middle())?;
         let speed = speed.max(LEAST_SPEED_M_PER_S);
         let noise = model.sensor_variance(Some(sensor)) + speed * speed * window.variance_s2();
         let off = CHANGED_PART * place.mean;
-        let density = path_reaches(context, model, node, sensor).map(|reach| {
+        let density = self.reaches(context, model, sensor).map(|reach| {
             let variance = place.variance + reach.length.variance + noise;
             let short = Gaussian { mean: reach.length.mean - place.mean, variance };
             let changed = Gaussian { variance: variance + off * off, ..short };

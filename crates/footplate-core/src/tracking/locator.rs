@@ -115,6 +115,9 @@ pub struct Locator {
     epoch: Timestamp,
     /// The sensor from which distances count; `None` while the train is lost.
     node: Option<NodeId>,
+    /// Whether no detection gave that sensor: a train that was placed or has reversed near it may still be about to pass it.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "core::ops::Not::not"))]
+    is_unpassed: bool,
     #[cfg_attr(feature = "serde", serde(rename = "following"))]
     filter: MotionFilter,
 }
@@ -124,7 +127,8 @@ impl Locator {
     #[must_use]
     pub fn new(train: TrainId) -> Self {
         let nowhere = Gaussian { mean: 0.0, variance: ANYWHERE_M * ANYWHERE_M };
-        Self { train, epoch: Timestamp::ZERO, node: None, filter: MotionFilter::at_rest(0.0, nowhere) }
+        let filter = MotionFilter::at_rest(0.0, nowhere);
+        Self { train, epoch: Timestamp::ZERO, node: None, is_unpassed: false, filter }
     }
 
     /// The train.
@@ -152,8 +156,14 @@ impl Locator {
         self.epoch + TimeSpan::from_s(seconds)
     }
 
-    /// The train is at rest here, within one standard deviation: placed by hand or measured with a tape.
+    /// The train is at rest here, within one standard deviation: placed by hand, measured with a tape, or reversed.
     pub fn place(&mut self, now: Timestamp, at: PathPoint, uncertainty: Length) {
+        self.settle(now, at, uncertainty);
+        self.is_unpassed = true;
+    }
+
+    /// From now on the train is at rest where it is estimated, even if a better model would predict another place.
+    pub fn settle(&mut self, now: Timestamp, at: PathPoint, uncertainty: Length) {
         let sd = uncertainty.as_m();
         let place = Gaussian { mean: at.distance.as_m(), variance: sd * sd };
         self.filter = MotionFilter::at_rest(self.seconds(now), place);
@@ -197,6 +207,19 @@ impl Locator {
         Some((self.node?, self.filter.place(model, time), self.filter.speed(model, time).mean))
     }
 
+    /// Every path to a sensor that is open by the known turnouts.
+    pub(super) fn reaches<'g>(
+        &self,
+        context: TrackContext<'g>,
+        model: &'g MotionModel,
+        sensor: SensorId,
+    ) -> impl Iterator<Item = PathReach> + 'g {
+        let from = self.node;
+        let own = from.filter(|node| self.is_unpassed && context.layout.sensor_at(*node) == Some(sensor));
+        let paths = from.into_iter().flat_map(move |from| path_reaches(context, model, from, sensor));
+        own.map(|_| PathReach::NONE).into_iter().chain(paths)
+    }
+
     /// The most likely path to a sensor, how far the train was short of it when it reported, and the log-likelihood.
     pub(super) fn best_reach(
         &self,
@@ -213,7 +236,7 @@ impl Locator {
             mean: reach.length.mean - place.mean,
             variance: place.variance + reach.length.variance + noise,
         };
-        path_reaches(context, model, self.node?, sensor)
+        self.reaches(context, model, sensor)
             .map(|reach| {
                 let short = short(&reach);
                 (reach, short, log_density(short) + libm::log(speed) + reach.log_chance())
@@ -256,7 +279,7 @@ impl Locator {
             self.filter.shift(-self.filter.place(model, time).mean, 0.0);
             let here = Gaussian { mean: 0.0, variance: scatter };
             self.filter.pass(model, time, window.variance_s2(), here);
-            self.node = Some(node);
+            (self.node, self.is_unpassed) = (Some(node), false);
             return known;
         };
         let speed = self.filter.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
@@ -265,12 +288,7 @@ impl Locator {
         let mut at = window.middle();
         if !contradicts {
             at = self.fuse(model, [reach.length, here], window, time + short.mean / speed);
-        } else if self.filter.widen_change(model, time, short.mean) {
-            // The innovation exceeds its predicted variance, and a change of speed that is not complete will continue to deviate. The
-            // sensor gives the position, however uncertain the path to it is.
-            self.filter.shift(-reach.length.mean, reach.length.variance);
-            self.filter.pass(model, time, window.variance_s2(), here);
-        } else {
+        } else if !self.blame_change(model, time, window, [reach.length, here], short.mean) {
             // Model and report contradict each other. An error of the path is not attributed to the train's speed, so that
             // the next sensors still show it.
             let place = Gaussian { variance: reach.length.variance + scatter, ..reach.length };
@@ -280,7 +298,7 @@ impl Locator {
             self.filter.widen_place(short.mean * short.mean);
             self.filter.pass(model, time, window.variance_s2(), here);
         }
-        self.node = Some(node);
+        (self.node, self.is_unpassed) = (Some(node), false);
         let late = [-short.mean / speed, libm::sqrt(short.variance) / speed].map(TimeSpan::from_s);
         PassedSensor {
             at,
@@ -289,6 +307,33 @@ impl Locator {
             missed: reach.missed,
             ..known
         }
+    }
+
+    /// Updates with a report that contradicts the prediction while the speed changes: a change that is not complete will continue to
+    /// deviate, and the sensor gives the position, however uncertain the path to it is. Returns `false`, and leaves the estimate as it
+    /// was, if no change explains the report: a train that stalled before it was to start comes later than any start.
+    fn blame_change(
+        &mut self,
+        model: &MotionModel,
+        time: f64,
+        window: DetectionWindow,
+        [length, sensor]: [Gaussian; 2],
+        short: f64,
+    ) -> bool {
+        let before = self.filter;
+        if !self.filter.widen_change(model, time, short) {
+            return false;
+        }
+        self.filter.shift(-length.mean, length.variance);
+        self.filter.pass(model, time, window.variance_s2(), sensor);
+        let left = self.filter.place(model, time);
+        let speed = self.filter.speed(model, time).mean.max(LEAST_SPEED_M_PER_S);
+        let variance = left.variance + sensor.variance + speed * speed * window.variance_s2();
+        let explains = left.mean * left.mean <= GATE * GATE * variance;
+        if !explains {
+            self.filter = before;
+        }
+        explains
     }
 
     /// Updates with a report that agrees with the prediction, by which the train was due at a time (s). The train reached the

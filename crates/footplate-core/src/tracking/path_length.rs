@@ -27,6 +27,9 @@ pub(super) struct PathReach {
 }
 
 impl PathReach {
+    /// To the sensor from which distances count.
+    pub(super) const NONE: Self = Self { length: Gaussian { mean: 0.0, variance: 0.0 }, missed: 0 };
+
     /// ln of the chance that these detections were missed.
     pub(super) fn log_chance(&self) -> f64 {
         LOG_MISSED * self.missed as f64

@@ -444,9 +444,8 @@ impl DrivenTrain {
         promise: Option<Promise>,
         out: &mut Outputs,
     ) {
-        // From now on it is at rest here, even if a better model would predict another distance for this stop.
         if let Some(located) = self.located(context, now) {
-            self.locator.place(now, located.at, located.uncertainty);
+            self.locator.settle(now, located.at, located.uncertainty);
         }
         match task.goal {
             Goal::Reverse(_) => {

@@ -18,10 +18,12 @@ use super::watchdog::Watchdog;
 
 /// A lost train needs this many sensors ahead, one of them beyond all places where it may be: one may stay silent.
 const SENSORS_AHEAD: usize = 2;
+/// A train that has run less than this since a sensor reported it may still be on it: a pickup shoe is 50 to 80 mm long.
+const HOLDS: Length = Length::from_mm(100.0);
 /// A train runs no faster than its model, times this.
 const FASTER: f64 = 1.2;
 /// Commands that were sent this long before the station was found silent may be lost: it is silent for 1.5 s by then.
-const SILENT_FOR: TimeSpan = TimeSpan::from_ms(2_000);
+pub(super) const SILENT_FOR: TimeSpan = TimeSpan::from_ms(2_000);
 /// A train should be at rest after its predicted time multiplied by this, ...
 const REST_PART: f64 = 1.3;
 /// ... plus this.
@@ -92,7 +94,8 @@ impl Watchdog {
     pub(super) fn sensor_behind(&self, now: Timestamp, train: TrainId) -> Option<NodeId> {
         let layout = self.driver.layout();
         let behind = *self.behind.get(&train).filter(|_| !self.undirected.contains(&train))?;
-        let reach = edges_within(layout, behind, self.unheard_run(now, train) + BODY);
+        let run = self.unheard_run(now, train);
+        let reach = edges_within(layout, behind, run + BODY);
         // It may stand on points that it pushed over: back over them it would derail.
         let lies_otherwise = |need: TurnoutNeed| {
             !need.facing && self.driver.turnouts().get(need.turnout).is_some_and(|leg| leg != need.leg)
@@ -103,7 +106,8 @@ impl Watchdog {
         let length = |edge| layout.edge(edge).map_or(Length::ZERO, |edge| edge.length);
         let from = |(edge, left): (EdgeId, Length)| (edge.twin(), (length(edge) - left).max(Length::ZERO));
         let begins = reach.into_iter().map(from).collect();
-        let back = Ahead { run: Length::ZERO, sensors: 1 };
+        // It may still be on that sensor, which does not report it again then.
+        let back = Ahead { run: Length::ZERO, sensors: if run < HOLDS { 2 } else { 1 } };
         // The train may have run over either leg of a turnout that was thrown since.
         let set = TurnoutStates::unknown();
         reports_before(layout, &set, begins, back, &self.closed_to(now, train)).then(|| behind.reverse())
@@ -124,13 +128,20 @@ impl Watchdog {
     /// A command to a train was sent: until then it ran at the step before.
     pub(super) fn note_command(&mut self, train: TrainId, sent: Timestamp, step: SpeedStep) {
         let Some(model) = self.base_model(train) else { return };
-        let known = self.unheard.get(&train).copied().unwrap_or_default().after(sent, model);
+        let known = self.unheard.get(&train).copied().unwrap_or_default();
         // A station that is silent may not have received it.
         let step = if self.is_silent() { step.max(known.step) } else { step };
+        // Stops are repeated: the first one counts.
+        if step == known.step {
+            return;
+        }
+        let is_recent = sent - known.since <= SILENT_FOR;
+        let before = if is_recent { known.step.max(known.before) } else { known.step };
+        let known = known.after(sent, model);
         let stops = step == SpeedStep::STAND && known.step > SpeedStep::STAND;
         let stop = if stops { model.stop_distance(known.step, Approach::Above) } else { Length::ZERO };
         let run = known.run + stop;
-        self.unheard.insert(train, Unheard { run, step, since: sent, before: known.step });
+        self.unheard.insert(train, Unheard { run, step, since: sent, before });
     }
 
     /// The station has been silent for a while: it may not have received the last command of any train or turnout.

@@ -8,6 +8,7 @@ use crate::ids::{FunctionNumber, SpeedStep, TrainId};
 use crate::time::Timestamp;
 
 use super::alarm::Alarm;
+use super::creeping::SILENT_FOR;
 use super::watchdog::{Power, Watchdog};
 
 /// News of the link to the command station.
@@ -52,8 +53,9 @@ impl Watchdog {
                 self.distrust_last_commands(now);
                 let trains: Vec<TrainId> = self.driver.trains().collect();
                 for train in trains {
-                    if self.driver.commanded(train) > SpeedStep::STAND || !self.driver.is_at_rest(train, now)
-                    {
+                    // A station that went off took the power with it: a train that was braking stands short of its stop.
+                    let rested = self.driver.is_at_rest(train, now - SILENT_FOR);
+                    if self.driver.commanded(train) > SpeedStep::STAND || !rested {
                         self.raise(now, train, Alarm::LinkSilent);
                     }
                 }

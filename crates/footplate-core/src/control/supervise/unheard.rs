@@ -13,7 +13,7 @@ pub(super) struct Unheard {
     /// The step of its last command, and when that was sent.
     pub(super) step: SpeedStep,
     pub(super) since: Timestamp,
-    /// The step before that.
+    /// The fastest step before that, of those that it had shortly before.
     pub(super) before: SpeedStep,
 }
 
