@@ -11,9 +11,11 @@ impl LinkNotice {
     pub const fn news(&self) -> Option<LinkNews> {
         match self {
             // After a reset, too, it is not known what of the last commands was heard; it answers when it has been asked everything.
-            Self::Silent { .. } | Self::NotReady { .. } | Self::Restarted | Self::Reopened => {
-                Some(LinkNews::Silent)
-            }
+            Self::Silent { .. }
+            | Self::Garbled
+            | Self::NotReady { .. }
+            | Self::Restarted
+            | Self::Reopened => Some(LinkNews::Silent),
             Self::Answers => Some(LinkNews::Answers),
             Self::ReverseInDoubt { train } | Self::OtherThrottle { train, reversed: true } => {
                 Some(LinkNews::ReverseInDoubt { train: *train })

@@ -35,8 +35,7 @@ pub trait Session {
     /// When the station has no such address, or cannot command decoders with so many steps.
     fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError>;
 
-    /// Sets whether a train ran forward last in an earlier session, which its station may have forgotten; no effect on stations that
-    /// know no direction.
+    /// Sets whether a train ran forward last in an earlier session, which its station may have forgotten. Not all know directions.
     fn set_direction(&mut self, _train: TrainId, _forward: bool) {}
 
     /// Sends a command as soon as the line is free.
@@ -130,6 +129,8 @@ pub enum LinkNotice {
         /// What a person should check on this kind of link.
         check: &'static str,
     },
+    /// Many replies came garbled: nothing that is sent or heard can be relied on until the line is clean.
+    Garbled,
     /// The line was lost and is open again: what was sent and reported meanwhile is unknown.
     Reopened,
     /// The station has identified itself.
@@ -367,6 +368,7 @@ impl Display for LinkNotice {
             Self::Unreadable { bytes, check } => {
                 write!(f, "{bytes} bytes came that could not be read; {check}")
             }
+            Self::Garbled => f.write_str("the line garbles data: trains stop until it is clean; check its cable"),
             Self::Reopened => f.write_str("the line is open again; trains are stopped, and the station is asked for all states"),
             Self::Identified { identity } => write!(f, "the station is {identity}"),
             Self::Restarted => f.write_str(

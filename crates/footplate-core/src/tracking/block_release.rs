@@ -1,6 +1,7 @@
 //! Where a train was when the block behind it became free.
 
-use super::locator::{Locator, PathPoint};
+use super::location::PathPoint;
+use super::locator::Locator;
 use super::track_context::TrackContext;
 use crate::ids::SensorId;
 use crate::link::DetectionWindow;

@@ -17,6 +17,7 @@ mod claim;
 mod drift_test;
 mod filter_state;
 mod forecast;
+mod location;
 mod locator;
 mod motion_filter;
 mod path_length;
@@ -34,7 +35,8 @@ mod train_forecaster;
 
 pub use drift_test::{Drift, DriftTest};
 pub use forecast::{Forecast, Phase};
-pub use locator::{DueSensor, Located, Locator, PassedSensor, PathPoint, Rest};
+pub use location::{DueSensor, Located, PassedSensor, PathPoint, Rest};
+pub use locator::Locator;
 pub(crate) use motion_filter::INTERRUPTED;
 pub use path_length::{distance_to, distance_to_landmark, landmark_of, place_of};
 pub use predictor::{Hit, Predictor, Verdict};

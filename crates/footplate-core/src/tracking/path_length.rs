@@ -1,6 +1,6 @@
 //! Path lengths: from sensor to sensor, to a place on the layout, and back.
 
-use super::locator::PathPoint;
+use super::location::PathPoint;
 use super::track_context::TrackContext;
 use crate::ids::{NodeId, SensorId};
 use crate::linalg::Gaussian;

@@ -162,7 +162,8 @@ impl LiveTrain {
 
     /// Whether its front end leads once it has received all commands that were sent.
     pub(crate) fn runs_forward(&self) -> bool {
-        let turns = self.orders.iter().filter(|(_, order)| matches!(order, Order::Turn | Order::Face)).count();
+        let turns =
+            self.orders.iter().filter(|(_, order)| matches!(order, Order::Turn | Order::Face)).count();
         (self.leads == End::Nose) == turns.is_multiple_of(2)
     }
 

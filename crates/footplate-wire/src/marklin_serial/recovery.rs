@@ -2,9 +2,10 @@
 //!
 //! An interface that waits for the second byte of a message takes any next byte for it. One power message is therefore enough to
 //! synchronise it: it is swallowed or obeyed, and harmless either way. After the first lost reply nothing else is sent before the next
-//! read, so that sensors are read again soon; a solenoid that the swallowed message may have powered is released after the reply. If
-//! that read is lost, too, or the line has just been opened, the station may have been restarted: then power and reset mode are set
-//! as well.
+//! read, so that sensors are read again soon; a solenoid that the swallowed message may have powered is released after the reply, and
+//! the reset mode is set, without which every sensor reports once and never again. If that read is lost, too, or the line has just been
+//! opened, the station may have been restarted: then power and reset mode are set as well, and again after the first answer, as a
+//! station that is switched on hears nothing before that.
 
 use alloc::collections::VecDeque;
 
@@ -14,8 +15,8 @@ use super::codec::Message;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Recovery {
     words: VecDeque<Message>,
-    /// The solenoids are to be released once a whole reply has come.
-    releases_later: bool,
+    /// What is to be sent once a whole reply has come.
+    later: Option<Message>,
     /// Nothing was answered since the last recovery began.
     is_unanswered: bool,
     /// The interface may take the next byte for the second one of a message.
@@ -28,11 +29,13 @@ impl Recovery {
     /// After a disturbance: as little as brings it into step, unless that was tried and not answered.
     pub(super) fn begin(&mut self, power: Message) {
         if self.is_unanswered {
-            return self.begin_anew(power);
+            self.begin_anew(power);
+            self.later = Some(power);
+            return;
         }
         self.words.clear();
         self.words.push_back(power);
-        (self.releases_later, self.is_unanswered, self.is_out_of_step) = (true, true, true);
+        (self.later, self.is_unanswered, self.is_out_of_step) = (Some(Message::SolenoidOff), true, true);
     }
 
     /// All messages that an interface in an unknown state needs.
@@ -40,7 +43,7 @@ impl Recovery {
         self.words.clear();
         // The first may be swallowed.
         self.words.extend([power, power, Message::SolenoidOff, Message::ResetMode { on: true }]);
-        (self.releases_later, self.is_unanswered, self.is_out_of_step) = (false, true, true);
+        (self.later, self.is_unanswered, self.is_out_of_step) = (None, true, true);
     }
 
     /// The next message. A release is left out while a solenoid is powered on purpose.
@@ -58,8 +61,8 @@ impl Recovery {
     /// A whole reply has come.
     pub(super) fn answered(&mut self) {
         self.is_unanswered = false;
-        if core::mem::take(&mut self.releases_later) {
-            self.words.push_back(Message::SolenoidOff);
+        if let Some(later) = self.later.take() {
+            self.words.extend([later, Message::ResetMode { on: true }]);
         }
     }
 

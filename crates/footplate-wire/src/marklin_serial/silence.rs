@@ -1,4 +1,4 @@
-//! Whether the station answers at all, and since when it does not.
+//! Whether the station answers at all, and whether the line garbles what it answers.
 
 use footplate_core::{TimeSpan, Timestamp};
 
@@ -11,6 +11,13 @@ const SILENT_AFTER: TimeSpan = TimeSpan::from_ms(1_500);
 /// Fewer lost polls than this are no silence, however far apart they were.
 const LOST_AT_LEAST: u32 = 3;
 
+/// A line without checksums may turn one command into another. So many replies with bytes too few or too many ...
+const GARBLED: usize = 3;
+/// ... within this time are no chance.
+const GARBLED_WITHIN: TimeSpan = TimeSpan::from_ms(5_000);
+/// A line is clean again when none has come for this time.
+const CLEAN_FOR: TimeSpan = TimeSpan::from_ms(3_000);
+
 /// The watch over the station's answers.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Silence {
@@ -18,6 +25,8 @@ pub(super) struct Silence {
     since: Option<Timestamp>,
     lost: u32,
     bytes: usize,
+    /// When replies last came garbled, the newest last.
+    garbled: [Option<Timestamp>; GARBLED],
     /// What was said of it last.
     said: Option<Said>,
 }
@@ -26,6 +35,7 @@ pub(super) struct Silence {
 enum Said {
     Answers,
     Silent,
+    Garbled,
 }
 
 impl Silence {
@@ -37,9 +47,27 @@ impl Silence {
         self.bytes = self.bytes.saturating_add(bytes);
     }
 
+    /// A reply came garbled; says so when it is one of many.
+    pub(super) fn garbled(&mut self, now: Timestamp) -> Option<LinkNotice> {
+        self.garbled.rotate_left(1);
+        if let Some(newest) = self.garbled.last_mut() {
+            *newest = Some(now);
+        }
+        let oldest = self.garbled.first().copied().flatten();
+        let is_news = self.said == Some(Said::Answers) && oldest.is_some_and(|at| now - at <= GARBLED_WITHIN);
+        if is_news {
+            self.said = Some(Said::Garbled);
+        }
+        is_news.then_some(LinkNotice::Garbled)
+    }
+
     /// A whole reply has come; says so when that is news.
-    pub(super) fn answered(&mut self) -> Option<LinkNotice> {
+    pub(super) fn answered(&mut self, now: Timestamp) -> Option<LinkNotice> {
         (self.since, self.lost, self.bytes) = (None, 0, 0);
+        let newest = self.garbled.last().copied().flatten();
+        if self.said == Some(Said::Garbled) && newest.is_some_and(|at| now - at < CLEAN_FOR) {
+            return None;
+        }
         let news = self.said != Some(Said::Answers);
         self.said = Some(Said::Answers);
         news.then_some(LinkNotice::Answers)

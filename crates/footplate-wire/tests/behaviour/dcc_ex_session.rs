@@ -3,70 +3,11 @@
 use footplate_core::{
     Command, DecoderSteps, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, TrainId, TurnoutId,
 };
-use footplate_wire::dcc_ex::{Client, Settings, TurnoutRequests};
+use footplate_wire::dcc_ex::{Settings, TurnoutRequests};
 use footplate_wire::{CommandError, LinkNotice, ReportedFunctions, Session};
 
-use crate::desk::{Station, T24, T58, function, ms, speed};
-
-/// A board that answers what a table says, and nothing else.
-struct Board {
-    answers: Vec<(&'static str, &'static str)>,
-}
-
-impl Station for Board {
-    type Written = String;
-    /// The median that was measured.
-    const ANSWER: TimeSpan = TimeSpan::from_us(3_400);
-
-    fn hear(&mut self, bytes: Vec<u8>) -> (Vec<String>, Vec<Vec<u8>>) {
-        let text = String::from_utf8(bytes).unwrap();
-        let answer = self.answers.iter().find(|(request, _)| *request == text);
-        let answer = answer.map(|(_, answer)| answer.as_bytes().to_vec());
-        (vec![text], answer.into_iter().collect())
-    }
-}
-
-type Desk = crate::desk::Desk<Client, Board>;
-
-/// As the firmware answers when one locomotive is known to run backwards.
-const ANSWERS: [(&str, &str); 15] = [
-    ("<s>", "<iDCC-EX V-5.6.0 / MEGA / STANDARD_MOTOR_SHIELD G-x>\n<p0 A>\n<p0 B>\n<p0>\n"),
-    ("<Q>", "<q 0>\n<Q 3>\n<q 5>\n"),
-    ("<T>", "<H 7 0>\n<H 9 1>\n"),
-    ("<1 MAIN>", "<p1 A>\n<p0 B>\n<p1 MAIN>\n"),
-    ("<0>", "<p0 A>\n<p0 B>\n<p0>\n"),
-    ("<#>", "<# 50>\n"),
-    ("<t 24>", "<l 24 0 0 0>\n"),
-    ("<t 58>", "<l 58 -1 128 0>\n"),
-    ("<t 24 72 0>", "<l 24 0 73 0>\n"),
-    ("<t 24 0 0>", "<l 24 0 0 0>\n"),
-    ("<t 24 0 1>", "<l 24 0 128 0>\n"),
-    ("<t 24 72 1>", "<l 24 0 201 0>\n"),
-    ("<t 58 81 1>", "<l 58 1 210 0>\n"),
-    ("<t 58 81 0>", "<l 58 1 82 0>\n"),
-    ("<t 58 0 1>", "<l 58 1 128 0>\n"),
-];
-
-impl Desk {
-    fn new(settings: Settings) -> Self {
-        Self::with(Client::new(ms(0), settings), Board { answers: ANSWERS.to_vec() })
-    }
-
-    fn opened() -> Self {
-        let mut desk = Self::new(Settings::default());
-        desk.run_until(ms(1_000));
-        desk.written.clear();
-        desk
-    }
-
-    fn hear(&mut self, text: &str) {
-        self.client.handle_bytes(self.now, text.as_bytes());
-    }
-
-    fn texts(&self) -> Vec<&str> {
-        self.written.iter().map(|(_, text)| text.as_str()).collect()
-    }
-}
+use crate::dcc_ex_desk::Desk;
+use crate::desk::{T24, T58, function, ms, speed};
 
 #[test]
 fn a_network_board_is_asked_what_it_is_then_for_its_states() {
@@ -343,25 +284,6 @@ fn the_end_is_confirmed_by_the_board() {
 }
 
 #[test]
-fn a_reversal_that_nobody_has_confirmed_is_taken_back_at_the_end() {
-    let mut desk = Desk::opened();
-    desk.command(speed(T24, 8));
-    desk.run_for(300);
-    desk.command(speed(T24, 0));
-    desk.run_for(300);
-    desk.station.answers.clear();
-    desk.written.clear();
-    desk.command(Command::Reverse { train: T24 });
-    desk.run_for(300);
-    desk.client.close(desk.now);
-    desk.run_for(300);
-    let (reverses, stops) = ("<t 24 0 1>", "<t 24 0 0>");
-    let stops_at = desk.texts().iter().position(|text| text.contains(stops)).expect("a stop");
-    assert!(desk.texts()[..stops_at].contains(&reverses), "{:?}", desk.texts());
-    assert!(!desk.texts()[stops_at..].contains(&reverses), "{:?}", desk.texts());
-}
-
-#[test]
 fn a_train_that_was_never_driven_here_is_stopped_at_the_end_if_that_was_commanded() {
     let mut desk = Desk::new(Settings::default());
     desk.command(speed(T24, 0));
@@ -487,24 +409,4 @@ fn a_function_whose_answer_was_lost_is_asked_for() {
     desk.run_for(1_000);
     assert_eq!(desk.texts().into_iter().filter(|text| text.starts_with("<F 24 28 1>")).count(), 1);
     assert!(!desk.notices.iter().any(|notice| matches!(notice, LinkNotice::Unconfirmed { .. })));
-}
-
-#[test]
-fn a_locomotive_that_the_board_forgot_goes_on_in_the_direction_of_the_session_before() {
-    let mut desk = Desk::opened();
-    for (train, forward) in [(T58, false), (T24, true)] {
-        desk.client.set_direction(train, forward);
-        desk.command(speed(train, if forward { 8 } else { 9 }));
-        desk.run_for(300);
-    }
-    // The board knows train 24 (its register is not -1): another throttle may have reversed it since, and it says so twice.
-    assert_eq!(desk.texts(), ["<t 58>", "<t 58 81 0>", "<t 24>", "<t 24>", "<t 24 72 0>"]);
-    for command in [speed(T24, 0), Command::Reverse { train: T24 }, speed(T24, 8)] {
-        desk.command(command);
-        desk.run_for(300);
-    }
-    desk.hear("<l 24 0 73 0>\n");
-    desk.run_for(1);
-    // The next session has to know of every reversal: the last one is another throttle's.
-    assert_eq!(desk.directions, [(T24, false), (T24, true), (T24, false)]);
 }

@@ -6,10 +6,12 @@
     reason = "a test may stop at the first surprise"
 )]
 
+mod dcc_ex_desk;
 mod dcc_ex_round_trip;
 mod dcc_ex_session;
 mod dcc_ex_vectors;
 mod desk;
+mod directions;
 mod floods;
 mod jmri_codec;
 mod jmri_session;

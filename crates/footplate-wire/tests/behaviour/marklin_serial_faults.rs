@@ -117,6 +117,42 @@ fn bytes_that_nobody_asked_for_make_no_report_and_are_said() {
 }
 
 #[test]
+fn a_line_that_garbles_many_replies_is_not_relied_on_until_it_is_clean() {
+    let mut bench = Bench::with_cts();
+    bench.run_until(ms(300));
+    // Given one stray byte, and then three within five seconds,
+    bench.station.babble(bench.now, &[0x10]);
+    bench.run_for(6_000);
+    assert_eq!(bench.notices.iter().filter(|n| **n == LinkNotice::Garbled).count(), 0);
+    for _ in 0..3 {
+        bench.station.babble(bench.now, &[0x10]);
+        bench.run_for(1_000);
+    }
+    let since = bench.notices.iter().position(|n| *n == LinkNotice::Garbled).expect("said");
+    // then the station answers again, for control, once the line was clean for three seconds.
+    assert!(!bench.notices[since..].contains(&LinkNotice::Answers), "{:?}", bench.notices);
+    bench.run_for(2_500);
+    assert!(bench.notices[since..].contains(&LinkNotice::Answers), "{:?}", bench.notices);
+}
+
+#[test]
+fn a_station_that_was_off_is_told_again_to_forget_what_it_has_read() {
+    let mut bench = Bench::with_cts();
+    bench.run_until(ms(300));
+    bench.station.cable.cut = true;
+    bench.run_for(3_000);
+    bench.station.cable.cut = false;
+    let before = bench.station.messages.len();
+    bench.run_for(1_000);
+    assert_eq!(bench.notices.last(), Some(&LinkNotice::Answers));
+    let messages: Vec<Message> =
+        bench.station.messages[before..].iter().map(|(_, message)| *message).collect();
+    let is_read = |message: &Message| message.modules_read().next().is_some();
+    let answered = messages.iter().position(is_read).expect("a read");
+    assert!(messages[answered..].contains(&Message::ResetMode { on: true }), "{messages:?}");
+}
+
+#[test]
 fn a_station_that_says_nothing_is_said_to_be_silent_and_greeted_when_it_is_back() {
     for settings in [Settings::with_cts(5), Settings::timed(5, Pace::CAREFUL), Settings::with_cts(31)] {
         let mut bench = Bench::new(settings);

@@ -88,30 +88,6 @@ fn the_direction_is_read_back_and_then_absolute() {
 }
 
 #[test]
-fn a_station_that_has_forgotten_a_direction_is_told_the_one_of_the_session_before() {
-    let mut desk = Desk::opened();
-    // Both ran backwards last. The station says `forward` of both, and of 24 that its light is on: somebody drives it.
-    desk.station.locomotives.insert(58, state(58, Throttle::Stop, true));
-    desk.station.locomotives.insert(24, LocomotiveState { functions: 1, ..state(24, Throttle::Stop, true) });
-    for train in [T24, T58] {
-        desk.client.set_direction(train, false);
-        desk.command(speed(train, 8));
-    }
-    desk.run_for(300);
-    let expected = [drive(24, Throttle::Step(72), true), drive(58, Throttle::Step(72), false)];
-    assert_eq!(desk.commands(), expected);
-    assert_eq!(desk.directions, [(T24, true)], "of 58 the next session knows already");
-    // A reversal counts once the station has confirmed it.
-    desk.station.answers = false;
-    desk.command(Command::Reverse { train: T24 });
-    desk.run_for(500);
-    assert_eq!(desk.directions, [(T24, true)]);
-    desk.station.answers = true;
-    desk.run_for(2_000);
-    assert_eq!(desk.directions.last(), Some(&(T24, false)));
-}
-
-#[test]
 fn a_decoder_of_other_steps_is_driven_in_its_own() {
     for (steps, step) in [(DecoderSteps::TwentyEight, 17), (DecoderSteps::All, 63)] {
         let mut desk = Desk::new(Settings { steps: DecoderSteps::Fourteen, ..Settings::default() });

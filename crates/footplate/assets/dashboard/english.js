@@ -126,6 +126,7 @@ export const ENGLISH = {
   "alarm-not-sent": "not sent: {0}",
   "alarm-line-answers": "the station answers again",
   "alarm-line-silent": "the station has not answered for {0} s: check its power, the cable and the port",
+  "alarm-line-garbled": "the line garbles data: trains stop until it is clean; check its cable",
   "alarm-line-not-ready": "the station has not been ready for {0} s: check its power and the cable",
   "alarm-line-reply-lost": "a reply from the station was incomplete; the request is repeated",
   "alarm-line-unexpected": "{0} unexpected bytes received from the station",

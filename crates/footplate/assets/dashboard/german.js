@@ -127,6 +127,7 @@ export const GERMAN = {
   "alarm-not-sent": "nicht gesendet: {0}",
   "alarm-line-answers": "die Zentrale antwortet wieder",
   "alarm-line-silent": "die Zentrale antwortet seit {0} s nicht: Strom, Kabel und Anschluss prüfen",
+  "alarm-line-garbled": "die Leitung verstümmelt Daten: die Züge stehen, bis sie sauber ist; Kabel prüfen",
   "alarm-line-not-ready": "die Zentrale ist seit {0} s nicht bereit: Strom und Kabel prüfen",
   "alarm-line-reply-lost": "eine Antwort der Zentrale war unvollständig; die Anfrage wird wiederholt",
   "alarm-line-unexpected": "{0} unerwartete Bytes von der Zentrale empfangen",

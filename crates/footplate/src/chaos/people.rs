@@ -138,7 +138,10 @@ impl<'p, 'l> People<'p, 'l> {
             }
             let (since, is_told) = self.misjudged.entry(turnout).or_insert((now, false));
             if now - *since >= MOVES_WITHIN && !std::mem::replace(is_told, true) {
-                self.tell(now, format!("turnout {turnout} lies {lies:?}, and the program believes {believed:?}"));
+                self.tell(
+                    now,
+                    format!("turnout {turnout} lies {lies:?}, and the program believes {believed:?}"),
+                );
             }
         }
         for train in self.trains {

@@ -86,7 +86,7 @@ impl Alarm {
     /// A greater number is more severe. Within a cause, what needs the operator ranks above the danger that led to it.
     pub(super) fn severity(&self) -> u8 {
         match (self.what, self.grade) {
-            ("needs-person" | "line-silent" | "line-not-ready", _) => 3,
+            ("needs-person" | "line-silent" | "line-garbled" | "line-not-ready", _) => 3,
             (_, Grade::Danger) => 2,
             (_, Grade::Warning) => 1,
             (_, Grade::Over) => 0,
@@ -120,7 +120,7 @@ impl Alarm {
             | "track-reserved"
             | "overshoots" => of_train("route"),
             "stands-unconfirmed" | "does-not-stop" => of_train("stopping"),
-            "line-silent" | "line-not-ready" | "stands-silent" => of_link("link"),
+            "line-silent" | "line-garbled" | "line-not-ready" | "stands-silent" => of_link("link"),
             "line-reply-lost" | "line-unexpected" | "line-repeated" => of_link("line noise"),
             "power-off" | "line-power-lost" | "line-restarted" => of_link("power"),
             "lies-curved" | "lies-straight" => about("turnout"),
@@ -260,6 +260,7 @@ impl Alarm {
             LinkNotice::Silent { since, .. } => {
                 (Grade::Danger, "line-silent", None, vec![format!("{:.1}", since.as_s())])
             }
+            LinkNotice::Garbled => (Grade::Danger, "line-garbled", None, Vec::new()),
             LinkNotice::NotReady { since } => {
                 (Grade::Danger, "line-not-ready", None, vec![format!("{:.1}", since.as_s())])
             }

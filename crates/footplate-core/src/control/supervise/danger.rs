@@ -18,6 +18,8 @@ use crate::control::Notice;
 
 /// Trains are at rest this long after the power went off; they take a third of a second from top speed.
 const AT_REST_WITHOUT_POWER: TimeSpan = TimeSpan::from_s(2.0);
+/// From the command to when the points of a turnout lie (solenoids are powered for 0.2 s).
+const POINTS_MOVE_WITHIN: TimeSpan = TimeSpan::from_ms(500);
 /// The median stopping distance without power (decoders do not control it, and worm gears do not roll).
 const STOP_WITHOUT_POWER: Length = Length::from_mm(40.0);
 /// See [`STOP_WITHOUT_POWER`]: one standard deviation.
@@ -133,6 +135,7 @@ impl Watchdog {
 
     /// Switches the power off, and holds all moving trains.
     pub(super) fn cut_power(&mut self, now: Timestamp) {
+        self.forget_powerless_turnouts(now);
         self.power = Power::Off { since: now };
         self.command(Command::PowerOff);
         // Decoders forget their step without power: they receive these commands when it is back.
@@ -156,11 +159,19 @@ impl Watchdog {
         }
     }
 
+    /// No turnout moves without power: those that were commanded meanwhile lie one way or the other.
+    fn forget_powerless_turnouts(&mut self, now: Timestamp) {
+        if let Power::Off { since } = self.power {
+            self.driver.forget_turnouts_changed(now, since - POINTS_MOVE_WITHIN);
+        }
+    }
+
     /// Switches the power on again once all trains are at rest and their stop commands were sent.
     pub(super) fn power_on_again(&mut self, now: Timestamp) {
         let Power::Off { since } = self.power else { return };
         let commanded = self.driver.trains().all(|train| !self.stops.is_pending(train));
         if now - since >= AT_REST_WITHOUT_POWER && commanded && !self.is_silent() && !self.is_switched_off {
+            self.forget_powerless_turnouts(now);
             self.power = Power::On;
             self.command(Command::PowerOn);
             self.notify(Notice::PowerOn);

@@ -140,6 +140,11 @@ impl Recovery {
         }
     }
 
+    /// Whether it creeps to be located.
+    pub(super) const fn creeps(&self) -> bool {
+        matches!(self.phase, Phase::Locating { .. })
+    }
+
     /// When its phase has to be checked.
     pub(super) fn next_timeout(&self) -> Option<Timestamp> {
         match self.phase {

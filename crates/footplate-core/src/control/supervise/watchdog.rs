@@ -364,8 +364,14 @@ impl Watchdog {
                     return self.note_unexplained(now, sensor, time);
                 }
             }
-            Notice::Ambiguous { sensor, time, .. } => {
+            Notice::Ambiguous { sensor, time, likeliest, or } => {
+                let (train, is_spurious) = (*likeliest, or.is_none());
                 self.note_backward(now, *sensor, *time);
+                // A train that creeps to be located has only so many sensors ahead before the track ends.
+                if is_spurious && !self.permits_all && self.dangers.get(&train).is_some_and(Recovery::creeps)
+                {
+                    self.need_operator(now, train);
+                }
             }
             Notice::Done(finished) => {
                 if self.own.remove(&finished.order).is_some() {

@@ -18,6 +18,9 @@ impl Interface {
         self.polls.lost(awaited.request, found);
         let silent = self.silence.lost(now);
         self.output.extend(silent.map(Transmit::Notice));
+        if found > 0 {
+            self.garbled(now);
+        }
         self.distrust(now, awaited.heard);
         if let Exchange::Quiet(quiet) = &mut self.exchange {
             quiet.lost = Some(awaited);
@@ -82,7 +85,7 @@ impl Interface {
         if let Some(reads @ ModuleReads::AllOnly) = self.polls.answered(awaited.request) {
             self.notify(LinkNotice::Reads(reads));
         }
-        let answers = self.silence.answered();
+        let answers = self.silence.answered(self.now);
         self.output.extend(answers.map(Transmit::Notice));
         self.unanswered.clear();
         self.recovery.answered();
@@ -99,7 +102,7 @@ impl Interface {
         let interrupted = !quiet.is_uncertain && (self.farewell.begun || command_may_go || release_is_due);
         let overtakes = quiet.is_uncertain && self.waiting.has_urgent() && now >= quiet.stops_may_go();
         if is_over {
-            self.complain();
+            self.complain(now);
             if quiet.is_uncertain {
                 self.say_again();
             }
@@ -118,11 +121,17 @@ impl Interface {
         goes_on
     }
 
-    fn complain(&mut self) {
+    fn complain(&mut self, now: Timestamp) {
         if self.stray > 0 {
             self.notify(LinkNotice::UnexpectedBytes { count: self.stray });
             self.stray = 0;
+            self.garbled(now);
         }
+    }
+
+    fn garbled(&mut self, now: Timestamp) {
+        let notice = self.silence.garbled(now);
+        self.output.extend(notice.map(Transmit::Notice));
     }
 
     pub(super) fn hear(&mut self, now: Timestamp, byte: u8) {
@@ -138,6 +147,7 @@ impl Interface {
             Exchange::Settling(awaited) => {
                 let expected = reply_bytes(awaited.request);
                 self.notify(LinkNotice::ReplyLost { expected, found: expected + 1 });
+                self.garbled(now);
                 self.exchange = Exchange::Quiet(Quiet::begin(now, now, false));
                 self.recovery.begin(self.power_word());
             }

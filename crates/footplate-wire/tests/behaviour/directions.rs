@@ -1,0 +1,76 @@
+//! In which direction a train runs next, whatever its station has forgotten.
+
+use footplate_core::{Command, DecoderSteps};
+use footplate_wire::Session;
+use footplate_wire::z21::{LocomotiveState, Request, Throttle};
+
+use crate::desk::{T24, T58, speed};
+use crate::z21_desk::state;
+use crate::{dcc_ex_desk, z21_desk};
+
+fn z21_drive(address: u16, throttle: Throttle, forward: bool) -> Request {
+    Request::Drive { address, steps: DecoderSteps::All, throttle, forward }
+}
+
+#[test]
+fn a_reversal_that_nobody_has_confirmed_is_taken_back_at_the_end() {
+    let mut desk = dcc_ex_desk::Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(300);
+    desk.command(speed(T24, 0));
+    desk.run_for(300);
+    desk.station.answers.clear();
+    desk.written.clear();
+    desk.command(Command::Reverse { train: T24 });
+    desk.run_for(300);
+    desk.client.close(desk.now);
+    desk.run_for(300);
+    let (reverses, stops) = ("<t 24 0 1>", "<t 24 0 0>");
+    let stops_at = desk.texts().iter().position(|text| text.contains(stops)).expect("a stop");
+    assert!(desk.texts()[..stops_at].contains(&reverses), "{:?}", desk.texts());
+    assert!(!desk.texts()[stops_at..].contains(&reverses), "{:?}", desk.texts());
+}
+
+#[test]
+fn a_locomotive_that_the_board_forgot_goes_on_in_the_direction_of_the_session_before() {
+    let mut desk = dcc_ex_desk::Desk::opened();
+    for (train, forward) in [(T58, false), (T24, true)] {
+        desk.client.set_direction(train, forward);
+        desk.command(speed(train, if forward { 8 } else { 9 }));
+        desk.run_for(300);
+    }
+    // The board knows train 24 (its register is not -1): another throttle may have reversed it since, and it says so twice.
+    assert_eq!(desk.texts(), ["<t 58>", "<t 58 81 0>", "<t 24>", "<t 24>", "<t 24 72 0>"]);
+    for command in [speed(T24, 0), Command::Reverse { train: T24 }, speed(T24, 8)] {
+        desk.command(command);
+        desk.run_for(300);
+    }
+    desk.hear("<l 24 0 73 0>\n");
+    desk.run_for(1);
+    // The next session has to know of every reversal: the last one is another throttle's.
+    assert_eq!(desk.directions, [(T24, false), (T24, true), (T24, false)]);
+}
+
+#[test]
+fn a_station_that_has_forgotten_a_direction_is_told_the_one_of_the_session_before() {
+    let mut desk = z21_desk::Desk::opened();
+    // Both ran backwards last. The station says `forward` of both, and of 24 that its light is on: somebody drives it.
+    desk.station.locomotives.insert(58, state(58, Throttle::Stop, true));
+    desk.station.locomotives.insert(24, LocomotiveState { functions: 1, ..state(24, Throttle::Stop, true) });
+    for train in [T24, T58] {
+        desk.client.set_direction(train, false);
+        desk.command(speed(train, 8));
+    }
+    desk.run_for(300);
+    let expected = [z21_drive(24, Throttle::Step(72), true), z21_drive(58, Throttle::Step(72), false)];
+    assert_eq!(desk.commands(), expected);
+    assert_eq!(desk.directions, [(T24, true)], "of 58 the next session knows already");
+    // A reversal counts once the station has confirmed it.
+    desk.station.answers = false;
+    desk.command(Command::Reverse { train: T24 });
+    desk.run_for(500);
+    assert_eq!(desk.directions, [(T24, true)]);
+    desk.station.answers = true;
+    desk.run_for(2_000);
+    assert_eq!(desk.directions.last(), Some(&(T24, false)));
+}
