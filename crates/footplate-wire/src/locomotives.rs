@@ -107,7 +107,7 @@ impl Locomotives {
     /// Takes back reversals that no station has confirmed: stops contain a direction, and would reverse a train that the next
     /// session believes to face as before.
     pub(crate) fn withdraw_reversals(&mut self) {
-        for locomotive in &mut self.known {
+        for locomotive in self.known.iter_mut().filter(|locomotive| locomotive.forward.is_some()) {
             locomotive.forward = self.directions.get(&locomotive.train).copied().or(locomotive.forward);
         }
     }

@@ -365,9 +365,7 @@ impl Display for LinkNotice {
             Self::Silent { since, bytes, check } => {
                 write!(f, "no whole reply for {:.1} s, only {bytes} stray bytes; {check}", since.as_s())
             }
-            Self::Unreadable { bytes, check } => {
-                write!(f, "{bytes} bytes came that could not be read; {check}")
-            }
+            Self::Unreadable { bytes, check } => write!(f, "{bytes} bytes came that could not be read; {check}"),
             Self::Garbled => f.write_str("the line garbles data: trains stop until it is clean; check its cable"),
             Self::Reopened => f.write_str("the line is open again; trains are stopped, and the station is asked for all states"),
             Self::Identified { identity } => write!(f, "the station is {identity}"),

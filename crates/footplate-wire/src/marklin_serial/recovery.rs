@@ -62,7 +62,8 @@ impl Recovery {
     pub(super) fn answered(&mut self) {
         self.is_unanswered = false;
         if let Some(later) = self.later.take() {
-            self.words.extend([later, Message::ResetMode { on: true }]);
+            // A byte that is swallowed as the address of a turnout powers a solenoid: the release comes last.
+            self.words.extend([later, Message::ResetMode { on: true }, Message::SolenoidOff]);
         }
     }
 
