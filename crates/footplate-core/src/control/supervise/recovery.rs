@@ -426,7 +426,7 @@ impl Watchdog {
             _ => None,
         };
         let most = if matches!(recovery.phase, Phase::Measuring { .. }) { MAX_REVERSALS } else { 1 };
-        if recovery.reversals >= most {
+        if recovery.reversals >= most || self.has_pushed_over_points(now, train) {
             return self.need_operator(now, train);
         }
         self.creep_back(now, train, seen);
