@@ -81,4 +81,6 @@ pub struct PassedSensor {
     pub short: Option<Length>,
     /// Sensors between the one passed before and this one that did not report.
     pub missed: usize,
+    /// Whether distances counted from it already: the train had been placed, or had reversed, near it.
+    pub is_origin: bool,
 }

@@ -193,7 +193,8 @@ impl Locator {
         window: DetectionWindow,
     ) -> PassedSensor {
         let time = self.seconds(window.middle());
-        let known = PassedSensor { sensor, window, at: window.middle(), late: None, short: None, missed: 0 };
+        let (at, is_origin) = (window.middle(), false);
+        let known = PassedSensor { sensor, window, at, late: None, short: None, missed: 0, is_origin };
         let Some(node) = context.node_of(sensor) else { return known };
         let scatter = model.sensor_variance(Some(sensor));
         let Some((reach, short, _)) = self.best_reach(context, model, sensor, window) else {
@@ -228,6 +229,7 @@ impl Locator {
             late: Some(late),
             short: Some(Length::from_m(short.mean)),
             missed: reach.missed,
+            is_origin: reach.is_none(),
             ..known
         }
     }

@@ -30,6 +30,11 @@ impl PathReach {
     /// To the sensor from which distances count.
     pub(super) const NONE: Self = Self { length: Gaussian { mean: 0.0, variance: 0.0 }, missed: 0 };
 
+    /// Whether it leads to the sensor from which distances count.
+    pub(super) fn is_none(&self) -> bool {
+        self.length.mean == 0.0
+    }
+
     /// ln of the chance that these detections were missed.
     pub(super) fn log_chance(&self) -> f64 {
         LOG_MISSED * self.missed as f64

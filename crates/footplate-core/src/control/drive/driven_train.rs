@@ -334,7 +334,9 @@ impl DrivenTrain {
         self.detections.take((passed.missed, missed_at), speed, passed.window.width());
         self.learn_reported_speed(context, node, &passed, out);
         self.note_passage(context, node, passed.at);
-        self.recount_end_of_authority(context, node);
+        if !passed.is_origin {
+            self.recount_end_of_authority(context, node);
+        }
         self.expect_next(context, now);
         out.notify(Notice::Passed { train: self.id(), passed, next: self.expected.due });
         self.pacing_passed(context, now, node, out);
@@ -344,15 +346,17 @@ impl DrivenTrain {
             (TaskPhase::Locating { .. }, _) => {
                 self.resume_to_target(context, now, task.order, destination, out);
             }
-            (_, Some(at)) => match self.recount_target(context, at, node, &destination) {
-                Some(at) => {
-                    let goal = Goal::RestAt(Destination { at: Some(at), ..destination });
-                    self.task = Some(Task { goal, ..task });
-                    self.plan(context, now, out);
-                    self.keep_time(context, now, out);
-                }
-                None => self.give_up(now, self.no_path(context, node, &destination), out),
-            },
+            (_, Some(at)) => {
+                let counted = self.recount_target(context, at, node, &destination);
+                let Some(at) = counted.filter(|_| !passed.is_origin).or(passed.is_origin.then_some(at))
+                else {
+                    return self.give_up(now, self.no_path(context, node, &destination), out);
+                };
+                let goal = Goal::RestAt(Destination { at: Some(at), ..destination });
+                self.task = Some(Task { goal, ..task });
+                self.plan(context, now, out);
+                self.keep_time(context, now, out);
+            }
             _ => {}
         }
     }
