@@ -13,7 +13,7 @@ fn z21_drive(address: u16, throttle: Throttle, forward: bool) -> Request {
 }
 
 #[test]
-fn a_reversal_that_nobody_has_confirmed_is_taken_back_at_the_end() {
+fn an_unconfirmed_reversal_is_taken_back_at_the_end() {
     let mut desk = dcc_ex_desk::Desk::opened();
     desk.command(speed(T24, 8));
     desk.run_for(300);
@@ -52,7 +52,7 @@ fn a_locomotive_that_the_board_forgot_goes_on_in_the_direction_of_the_session_be
 }
 
 #[test]
-fn a_station_that_has_forgotten_a_direction_is_told_the_one_of_the_session_before() {
+fn a_station_that_has_forgotten_a_direction_is_commanded_the_one_of_the_session_before() {
     let mut desk = z21_desk::Desk::opened();
     // Both ran backwards last. The station says `forward` of both, and of 24 that its light is on: somebody drives it.
     desk.station.locomotives.insert(58, state(58, Throttle::Stop, true));

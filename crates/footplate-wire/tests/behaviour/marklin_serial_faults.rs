@@ -136,7 +136,7 @@ fn a_line_that_garbles_many_replies_is_not_relied_on_until_it_is_clean() {
 }
 
 #[test]
-fn a_station_that_was_off_is_told_again_to_forget_what_it_has_read() {
+fn a_station_that_was_off_receives_its_reset_mode_again() {
     let mut bench = Bench::with_cts();
     bench.run_until(ms(300));
     bench.station.cable.cut = true;

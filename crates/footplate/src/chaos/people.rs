@@ -52,7 +52,7 @@ pub(super) struct People<'p, 'l> {
     pub(super) ends: Timestamp,
     pub(super) seen: Seen,
     is_inside: BTreeMap<TrainId, bool>,
-    /// Turnouts that lie otherwise than the program believes, since when, and whether that was told.
+    /// Turnouts that lie otherwise than the program assumes, since when, and whether that was noted.
     misjudged: BTreeMap<TurnoutId, (Timestamp, bool)>,
     moves: BTreeMap<TrainId, bool>,
     /// Trains with an active alarm, and since when.
@@ -131,16 +131,16 @@ impl<'p, 'l> People<'p, 'l> {
         let station = station.borrow();
         let world = station.world();
         for (turnout, _) in self.layout.turnouts() {
-            let (lies, believed) = (world.lies(turnout), dispatcher.driver().turnouts().get(turnout));
-            if believed.is_none() || lies == believed {
+            let (lies, assumed) = (world.lies(turnout), dispatcher.driver().turnouts().get(turnout));
+            if assumed.is_none() || lies == assumed {
                 self.misjudged.remove(&turnout);
                 continue;
             }
-            let (since, is_told) = self.misjudged.entry(turnout).or_insert((now, false));
-            if now - *since >= MOVES_WITHIN && !std::mem::replace(is_told, true) {
+            let (since, is_noted) = self.misjudged.entry(turnout).or_insert((now, false));
+            if now - *since >= MOVES_WITHIN && !std::mem::replace(is_noted, true) {
                 self.tell(
                     now,
-                    format!("turnout {turnout} lies {lies:?}, and the program believes {believed:?}"),
+                    format!("turnout {turnout} lies {lies:?}, and the program assumes {assumed:?}"),
                 );
             }
         }

@@ -159,7 +159,7 @@ impl Watchdog {
         }
     }
 
-    /// No turnout moves without power: those that were commanded meanwhile lie one way or the other.
+    /// No turnout moves without power: those that were commanded meanwhile may lie as before.
     fn forget_powerless_turnouts(&mut self, now: Timestamp) {
         if let Power::Off { since } = self.power {
             self.driver.forget_turnouts_changed(now, since - POINTS_MOVE_WITHIN);

@@ -133,6 +133,11 @@ impl Chain {
             .filter(|_| self.unbroken)
             .and_then(|from| reach_of(layout, turnouts, from, report.sensor));
         let begins_anew = !self.unbroken || (self.at.is_some() && path.is_none());
+        if begins_anew && self.step == 0 {
+            // What is left of a stop would say how long all of it is: an error of its law moved the stops from all steps by 50 mm.
+            self.lose_place();
+            return false;
+        }
         if begins_anew {
             // The earlier path is unknown: distances count from here. A train that has moved as commanded since it was at rest
             // may still be accelerating; any other counts as running steadily.
