@@ -136,6 +136,8 @@ impl Dispatcher {
         let others = self.trains.values().filter(|other| other.id != id && other.reservation.meets(&taken));
         let meets: Vec<TrainId> = others.map(|other| other.id).collect();
         let mut reservation = taken;
+        // Part of it may still be on track that it came over and that the turnouts no longer lead to.
+        reservation.add(layout, &train.kept);
         self.reserve_anchors(now, id, place, &mut reservation);
         if let Some(train) = self.trains.get_mut(&id) {
             train.reservation = reservation.clone();
