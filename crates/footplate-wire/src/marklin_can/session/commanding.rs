@@ -70,7 +70,7 @@ impl Client {
             match self.dialogue.next_repeat(now, only_urgent)? {
                 Repeat::Again(outgoing) => return Some(outgoing),
                 Repeat::GivenUp(given_up) => {
-                    if let Some(instead) = self.instead_of(given_up) {
+                    if let Some(instead) = self.instead_of(&given_up) {
                         return Some(instead);
                     }
                 }
@@ -79,7 +79,7 @@ impl Client {
     }
 
     /// Handles a request that the station does not answer; returns a request to send instead.
-    fn instead_of(&mut self, given_up: Outstanding<Awaited>) -> Option<Outgoing<Awaited>> {
+    fn instead_of(&mut self, given_up: &Outstanding<Awaited>) -> Option<Outgoing<Awaited>> {
         let asked_for = REPEATED_AFTER.as_ns() * i64::from(given_up.tries.saturating_sub(1));
         let asked = given_up.sent - TimeSpan::from_ns(asked_for);
         match given_up.awaited {
