@@ -347,9 +347,11 @@ impl DrivenTrain {
                 self.resume_to_target(context, now, task.order, destination, out);
             }
             (_, Some(at)) => {
-                let counted = self.recount_target(context, at, node, &destination);
-                let Some(at) = counted.filter(|_| !passed.is_origin).or(passed.is_origin.then_some(at))
-                else {
+                let counted = match passed.is_origin {
+                    true => Some(at),
+                    false => self.recount_target(context, at, node, &destination),
+                };
+                let Some(at) = counted else {
                     return self.give_up(now, self.no_path(context, node, &destination), out);
                 };
                 let goal = Goal::RestAt(Destination { at: Some(at), ..destination });

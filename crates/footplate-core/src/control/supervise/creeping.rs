@@ -94,11 +94,11 @@ impl Watchdog {
     pub(super) fn sensor_behind(&self, now: Timestamp, train: TrainId) -> Option<NodeId> {
         let layout = self.driver.layout();
         let behind = *self.behind.get(&train).filter(|_| !self.undirected.contains(&train))?;
-        if self.has_pushed_over_points(now, train) {
-            return None;
-        }
         let run = self.unheard_run(now, train);
         let reach = edges_within(layout, behind, run + BODY);
+        if self.lies_otherwise(&reach) {
+            return None;
+        }
         let length = |edge| layout.edge(edge).map_or(Length::ZERO, |edge| edge.length);
         let from = |(edge, left): (EdgeId, Length)| (edge.twin(), (length(edge) - left).max(Length::ZERO));
         let begins = reach.into_iter().map(from).collect();
@@ -111,13 +111,17 @@ impl Watchdog {
 
     /// Whether a train may stand on points that it pushed over since a sensor reported it: back over them it would derail.
     pub(super) fn has_pushed_over_points(&self, now: Timestamp, train: TrainId) -> bool {
-        let layout = self.driver.layout();
         let Some(behind) = self.behind.get(&train) else { return false };
-        let lies_otherwise = |need: TurnoutNeed| {
+        let run = self.unheard_run(now, train);
+        self.lies_otherwise(&edges_within(self.driver.layout(), *behind, run + BODY))
+    }
+
+    /// Whether a turnout that is trailed on one of these edges lies for the other leg.
+    fn lies_otherwise(&self, edges: &BTreeMap<EdgeId, Length>) -> bool {
+        let is_other = |need: TurnoutNeed| {
             !need.facing && self.driver.turnouts().get(need.turnout).is_some_and(|leg| leg != need.leg)
         };
-        let reach = edges_within(layout, *behind, self.unheard_run(now, train) + BODY);
-        reach.keys().any(|edge| layout.needs_of(*edge).any(lies_otherwise))
+        edges.keys().any(|edge| self.driver.layout().needs_of(*edge).any(is_other))
     }
 
     /// The longest distance that a train can have run since its last detection.

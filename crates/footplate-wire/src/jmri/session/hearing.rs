@@ -190,12 +190,11 @@ impl Client {
         if is_outstanding || (throttle == wanted && faces == forward) {
             return;
         }
-        let is_driven = locomotive.is_driven;
-        locomotive.is_stopped &= !is_driven;
-        self.dialogue.faces(train, faces);
-        if !is_driven {
-            return;
+        if !locomotive.is_driven {
+            return self.dialogue.faces(train, faces);
         }
+        locomotive.is_stopped = false;
+        self.dialogue.faces(train, faces);
         self.dialogue.stop_at_end(train);
         self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed: faces != forward });
     }

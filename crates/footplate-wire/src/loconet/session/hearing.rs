@@ -158,12 +158,11 @@ impl Client {
         if is_outstanding || is_as_commanded {
             return;
         }
-        let is_driven = locomotive.is_driven;
-        locomotive.is_stopped &= !is_driven;
-        self.dialogue.faces(train, data.forward);
-        if !is_driven {
-            return;
+        if !locomotive.is_driven {
+            return self.dialogue.faces(train, data.forward);
         }
+        locomotive.is_stopped = false;
+        self.dialogue.faces(train, data.forward);
         self.dialogue.stop_at_end(train);
         self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed: data.forward != forward });
     }
