@@ -80,13 +80,11 @@ test("each cause has one alarm, which stays on all pages until it is resolved or
   const first = await openQuietly(browser, program.url);
   const second = await openQuietly(browser, `${program.url}#/health`, { viewport: { width: 390, height: 800 }, locale: "de-DE", colorScheme: "dark" });
   await say(program, "turnout all straight");
-  await say(program, "speed 24 8");
-  await picture(program, ({ trains: [own] }) => own.at);
-  await say(program, "stop 24");
-  await picture(program, ({ trains: [own] }) => own.at_rest);
+  // A train that starts on a sensor is reported by two at once, which is another alarm: something moves that is not driven.
+  await say(program, "stop 24 at C13+120mm");
+  await picture(program, ({ trains: [own] }) => own.at && own.at_rest);
   assert.deepEqual((await picture(program)).alarms, []);
-  const elsewhere = (await picture(program)).trains[0].at.startsWith("E") ? "A13" : "E14";
-  await say(program, `place 24 at ${elsewhere}`);
+  await say(program, "place 24 at E14");
   await say(program, "speed 24 8");
   // The alarm links to the page on which the operator enters the position.
   await first.page.locator("#alarmed .danger a.button", { hasText: /^Say where train 24 is$/ }).click({ timeout: PATIENCE });
