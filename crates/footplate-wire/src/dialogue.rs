@@ -5,7 +5,6 @@
 
 use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec::Vec;
-use core::ops::RangeInclusive;
 
 use footplate_core::{
     Command, DecoderSteps, Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId,
@@ -154,6 +153,11 @@ impl<A: Awaited> Dialogue<A> {
         !self.farewell.is_over() && now >= self.pacing.urgent_at()
     }
 
+    /// Stops all locomotives next, whatever is known of them.
+    pub(crate) const fn stop_all_next(&mut self) {
+        self.stops_all = true;
+    }
+
     /// Whether to stop all locomotives now; true once.
     pub(crate) fn take_stop_of_all(&mut self) -> bool {
         core::mem::take(&mut self.stops_all)
@@ -204,10 +208,10 @@ impl<A: Awaited> Dialogue<A> {
 
     /// Returns, at the end, a train to stop whose direction is unknown and not asked for yet.
     pub(crate) fn undirected_at_end(&self) -> Option<TrainId> {
+        let waits = matches!(self.farewell, Farewell::Stopping { .. });
         let is_unasked = |train: &TrainId| {
             !self.locomotives.has_direction(*train) && self.outstanding.blocks(*train, false).is_none()
         };
-        let waits = matches!(self.farewell, Farewell::Stopping { .. });
         self.locomotives.driven(false).into_iter().filter(|_| waits).find(is_unasked)
     }
 
@@ -248,24 +252,6 @@ impl<A: Awaited> Dialogue<A> {
         Some(kind)
     }
 
-    /// Puts a command in the queue if its train, its turnout and its step exist here.
-    pub(crate) fn accept(
-        &mut self,
-        command: Command,
-        trains: &RangeInclusive<u16>,
-        turnouts: &RangeInclusive<u16>,
-    ) -> Result<(), CommandError> {
-        self.check_step(&command)?;
-        match command {
-            Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. } => {
-                CommandError::check_train(train, trains)?;
-            }
-            Command::Turnout { turnout, .. } => CommandError::check_turnout(turnout, turnouts)?,
-            _ => {}
-        }
-        self.push(command)
-    }
-
     /// Puts a command in the queue.
     pub(crate) fn push(&mut self, command: Command) -> Result<(), CommandError> {
         if self.farewell.has_begun() {
@@ -304,6 +290,15 @@ impl<A: Awaited> Dialogue<A> {
         times.into_iter().flatten().filter(|at| *at > self.now).min()
     }
 
+    /// Returns when to continue at the latest while the line takes nothing; `written`: when it does again.
+    pub(crate) fn next_timeout_of_line(&self, written: Timestamp) -> Option<Timestamp> {
+        if self.farewell.is_over() {
+            return None;
+        }
+        let times = [Some(written), self.silence.due(), self.farewell.due()];
+        times.into_iter().flatten().filter(|at| *at > self.now).min()
+    }
+
     // What the station says.
 
     /// The steps of a train's decoder.
@@ -311,16 +306,9 @@ impl<A: Awaited> Dialogue<A> {
         self.decoders.get(&train).copied().unwrap_or(DecoderSteps::Fourteen)
     }
 
-    /// Notes the steps of a train's decoder, if the station has its address.
-    pub(crate) fn set_decoder(
-        &mut self,
-        train: TrainId,
-        addresses: &RangeInclusive<u16>,
-        steps: DecoderSteps,
-    ) -> Result<(), CommandError> {
-        CommandError::check_train(train, addresses)?;
+    /// Notes the steps of a train's decoder.
+    pub(crate) fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) {
         self.decoders.insert(train, steps);
-        Ok(())
     }
 
     /// Refuses a step that the train's decoder does not have.

@@ -19,6 +19,7 @@ pub mod marklin_serial;
 mod news;
 mod outstanding;
 mod pacing;
+mod protocol;
 mod queue;
 mod sensors;
 mod session;

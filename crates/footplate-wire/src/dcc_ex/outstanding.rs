@@ -13,7 +13,7 @@ pub(super) const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(250);
 
 /// What an answer to a request looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Awaited {
+pub(crate) enum Awaited {
     Identity,
     Slots,
     /// The state of a train, whatever it is.

@@ -5,10 +5,9 @@ mod hearing;
 use alloc::collections::BTreeMap;
 use alloc::string::ToString;
 use alloc::vec::Vec;
+use core::ops::{ControlFlow, RangeInclusive};
 
-use footplate_core::{
-    Command, DecoderSteps, FunctionNumber, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
-};
+use footplate_core::{Command, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use super::framing::Framing;
 use super::opening::Opening;
@@ -18,8 +17,8 @@ use super::settings::{Settings, TurnoutRequests};
 use crate::dialogue::Dialogue;
 use crate::outstanding::Outgoing;
 use crate::pacing::Pacing;
+use crate::protocol::Protocol;
 use crate::sensors::Sensors;
-use crate::session::{Closing, CommandError, Session, Transmit};
 use crate::silence::Checks;
 
 /// The board is polled when no message has arrived for this time.
@@ -75,110 +74,6 @@ impl Client {
         client
     }
 
-    /// Sends what is due.
-    fn go_on(&mut self, now: Timestamp) {
-        if self.dialogue.watch(now) {
-            self.blind_since.get_or_insert(self.dialogue.heard);
-        }
-        if matches!(self.opening, Opening::Banner { until } if now >= until) {
-            self.opening = Opening::Identity;
-        }
-        while let Some(next) = self.next(now) {
-            let request = match next.request {
-                // The first request may have been obeyed and its answer lost: a second one changes nothing then, and has none.
-                Request::Function { cab, .. } if next.tries % 2 == 0 => Request::Locomotive { cab },
-                request => request,
-            };
-            let is_unconfirmed = matches!(request, Request::Accessory { .. });
-            let times = if is_unconfirmed && self.dialogue.is_noisy() { TIMES_IN_NOISE } else { 1 };
-            let mut text = request.to_string().repeat(times);
-            // A train of unknown direction has to stop now: the stop of all may have been lost as well.
-            if matches!(request, Request::Locomotive { .. })
-                && next.tries > 1
-                && self.dialogue.farewell.has_begun()
-            {
-                text.insert_str(0, &Request::StopAll.to_string());
-            }
-            self.dialogue.write(text.into_bytes());
-            self.dialogue.sent(now, next);
-        }
-    }
-
-    /// Returns the next request, if one may be written now.
-    fn next(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
-        let is_closing = self.dialogue.farewell.has_begun();
-        if !self.dialogue.may_write(now) || self.opening.awaits_banner() && !is_closing {
-            return None;
-        }
-        if self.dialogue.take_stop_of_all() {
-            return Some(Outgoing::says(Request::StopAll));
-        }
-        if let Some(command) = self.dialogue.next_stop(now, true) {
-            return Some(self.outgoing(command));
-        }
-        // At the end the stop of a train waits for the answer in which direction it runs.
-        if let Some(repeat) = self.dialogue.next_again(now, !is_closing) {
-            return Some(repeat);
-        }
-        if let Some(train) = self.dialogue.undirected_at_end() {
-            return Some(query(train));
-        }
-        if self.dialogue.switch_off_is_due(now) {
-            return Some(self.outgoing(Command::PowerOff));
-        }
-        if now < self.dialogue.pacing.usual_at() || is_closing {
-            return None;
-        }
-        self.dialogue.next_again(now, false).or_else(|| self.next_usual(now))
-    }
-
-    fn next_usual(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
-        let outstanding = &self.dialogue.outstanding;
-        match &mut self.opening {
-            Opening::Banner { .. } => return None,
-            Opening::Identity if outstanding.has(&Awaited::Identity) => return None,
-            Opening::Identity => return Some(Outgoing::asks(Request::Status, Awaited::Identity)),
-            Opening::States(requests) => {
-                let request = requests.pop_front()?;
-                return Some(match request {
-                    Request::Slots => Outgoing::asks(request, Awaited::Slots),
-                    Request::Power { on, .. } => Outgoing::asks(request, Awaited::Power(on)),
-                    _ => Outgoing::says(request),
-                });
-            }
-            Opening::Open { .. } => {}
-        }
-        if let Some(train) = self.unverified.pop() {
-            return Some(query(train));
-        }
-        let is_asked = |train| outstanding.blocks(train, false).is_some();
-        if let Some(train) = self.dialogue.undirected(is_asked) {
-            return Some(query(train));
-        }
-        if let Some(command) = self.dialogue.next_command(true) {
-            return Some(self.outgoing(command));
-        }
-        let lives = now - self.dialogue.heard < KEEP_ALIVE || self.dialogue.outstanding.has(&Awaited::Slots);
-        (!lives).then_some(Outgoing::asks(Request::Slots, Awaited::Slots))
-    }
-
-    /// Returns the request for a command, and notes what it commands.
-    fn outgoing(&mut self, command: Command) -> Outgoing<Awaited> {
-        let (request, awaited) = match command {
-            Command::Speed { train, step } => self.drive(train, step, false),
-            Command::Reverse { train } => self.drive(train, SpeedStep::STAND, true),
-            Command::Turnout { turnout, curved } => self.throw(turnout, curved),
-            Command::Function { train, function, on } => self.switch(train, function, on),
-            Command::PowerOff | Command::PowerOn => {
-                let on = command == Command::PowerOn;
-                self.dialogue.power = on;
-                let tracks = if on { Power::Main } else { Power::All };
-                (Request::Power { on, tracks }, Some(Awaited::Power(on)))
-            }
-        };
-        Outgoing::commands(command, request, awaited)
-    }
-
     fn drive(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> (Request, Option<Awaited>) {
         let forward = self.dialogue.commanded(train, step, reverses);
         let throttle = self.throttle(train, step);
@@ -211,77 +106,133 @@ impl Client {
     }
 }
 
-const fn query(train: TrainId) -> Outgoing<Awaited> {
-    Outgoing::asks(Request::Locomotive { cab: train.0 }, Awaited::Locomotive(train))
-}
+impl Protocol for Client {
+    type Awaited = Awaited;
 
-impl Session for Client {
-    fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]) {
-        self.dialogue.now = now;
-        if self.dialogue.farewell.is_over() {
-            return;
-        }
-        for byte in bytes {
-            self.hear(now, *byte);
-        }
-        self.go_on(now);
+    fn dialogue(&self) -> &Dialogue<Awaited> {
+        &self.dialogue
     }
 
-    fn handle_reopened(&mut self, now: Timestamp) {
+    fn dialogue_mut(&mut self) -> &mut Dialogue<Awaited> {
+        &mut self.dialogue
+    }
+
+    fn hear(&mut self, now: Timestamp, bytes: &[u8]) {
+        for byte in bytes {
+            self.hear_byte(now, *byte);
+        }
+    }
+
+    fn advance(&mut self, now: Timestamp, is_silent: bool) {
+        if is_silent {
+            self.blind_since.get_or_insert(self.dialogue.heard);
+        }
+        if matches!(self.opening, Opening::Banner { until } if now >= until) {
+            self.opening = Opening::Identity;
+        }
+    }
+
+    fn begin_again(&mut self, now: Timestamp) {
         self.framing = Framing::default();
         self.blind_since.get_or_insert(self.dialogue.heard);
         self.opening = Opening::begin(now, &self.settings);
-        self.dialogue.reopened();
-        self.go_on(now);
     }
 
-    fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
-        self.dialogue.set_decoder(train, &CABS, steps)
+    fn send(&mut self, now: Timestamp, next: Outgoing<Awaited>) {
+        let request = match next.request {
+            // The first request may have been obeyed and its answer lost: a second one changes nothing then, and has none.
+            Request::Function { cab, .. } if next.tries.is_multiple_of(2) => Request::Locomotive { cab },
+            request => request,
+        };
+        let is_unconfirmed = matches!(request, Request::Accessory { .. });
+        let times = if is_unconfirmed && self.dialogue.is_noisy() { TIMES_IN_NOISE } else { 1 };
+        let mut text = request.to_string().repeat(times);
+        let is_ending = self.dialogue.farewell.has_begun();
+        // A train of unknown direction has to stop now: the stop of all may have been lost as well.
+        if matches!(request, Request::Locomotive { .. }) && next.tries > 1 && is_ending {
+            text.insert_str(0, &Request::StopAll.to_string());
+        }
+        self.dialogue.write(text.into_bytes());
+        self.dialogue.sent(now, next);
     }
 
-    fn set_direction(&mut self, train: TrainId, forward: bool) {
-        self.dialogue.locomotives.keep_direction(train, forward);
+    fn may_write(&self, now: Timestamp) -> bool {
+        let is_ending = self.dialogue.farewell.has_begun();
+        self.dialogue.may_write(now) && (is_ending || !self.opening.awaits_banner())
     }
 
-    fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
-        self.dialogue.accept(command, &CABS, &self.settings.turnouts.numbers())?;
-        self.go_on(now);
-        Ok(())
+    fn addresses(&self, _train: TrainId) -> RangeInclusive<u16> {
+        CABS
     }
 
-    fn report_releases(&mut self, of: &[SensorId]) {
-        self.dialogue.released = of.to_vec();
+    fn turnouts(&self) -> RangeInclusive<u16> {
+        self.settings.turnouts.numbers()
     }
 
-    fn expect_delays(&mut self, excess: TimeSpan) {
-        self.dialogue.excess = excess;
+    fn stop_of_all(&self) -> Request {
+        Request::StopAll
     }
 
-    fn handle_timeout(&mut self, now: Timestamp) {
-        self.go_on(now);
+    fn outgoing(&mut self, _now: Timestamp, command: Command) -> Outgoing<Awaited> {
+        let (request, awaited) = match command {
+            Command::Speed { train, step } => self.drive(train, step, false),
+            Command::Reverse { train } => self.drive(train, SpeedStep::STAND, true),
+            Command::Turnout { turnout, curved } => self.throw(turnout, curved),
+            Command::Function { train, function, on } => self.switch(train, function, on),
+            Command::PowerOff | Command::PowerOn => {
+                let on = command == Command::PowerOn;
+                self.dialogue.power = on;
+                let tracks = if on { Power::Main } else { Power::All };
+                (Request::Power { on, tracks }, Some(Awaited::Power(on)))
+            }
+        };
+        Outgoing::commands(command, request, awaited)
     }
 
-    fn poll_output(&mut self) -> Option<Transmit> {
-        self.dialogue.output.pop_front()
+    /// At the end the stop of a train waits for the answer in which direction it runs.
+    fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
+        let is_ending = self.dialogue.farewell.has_begun();
+        self.dialogue.next_again(now, only_urgent && !is_ending)
     }
 
-    fn next_timeout(&self) -> Option<Timestamp> {
+    fn query(&self, train: TrainId) -> Outgoing<Awaited> {
+        Outgoing::asks(Request::Locomotive { cab: train.0 }, Awaited::Locomotive(train))
+    }
+
+    fn next_question(&mut self, _now: Timestamp) -> ControlFlow<Option<Outgoing<Awaited>>> {
+        let question = match &mut self.opening {
+            Opening::Banner { .. } => None,
+            Opening::Identity if self.dialogue.outstanding.has(&Awaited::Identity) => None,
+            Opening::Identity => Some(Outgoing::asks(Request::Status, Awaited::Identity)),
+            Opening::States(requests) => requests.pop_front().map(|request| match request {
+                Request::Slots => Outgoing::asks(request, Awaited::Slots),
+                Request::Power { on, .. } => Outgoing::asks(request, Awaited::Power(on)),
+                _ => Outgoing::says(request),
+            }),
+            Opening::Open { .. } => match self.unverified.pop() {
+                Some(train) => Some(self.query(train)),
+                None => return ControlFlow::Continue(()),
+            },
+        };
+        ControlFlow::Break(question)
+    }
+
+    fn has_questions(&self) -> bool {
+        !self.unverified.is_empty()
+    }
+
+    fn next_poll(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
+        let lives = now - self.dialogue.heard < KEEP_ALIVE || self.dialogue.outstanding.has(&Awaited::Slots);
+        (!lives).then_some(Outgoing::asks(Request::Slots, Awaited::Slots))
+    }
+
+    fn asks_at(&self) -> Option<Timestamp> {
         let paced = self.dialogue.pacing.usual_at();
-        let usual = match &self.opening {
+        match &self.opening {
             Opening::Banner { until } => Some(*until),
             Opening::Identity => Some(paced),
             Opening::States(requests) => (!requests.is_empty()).then_some(paced),
             Opening::Open { .. } => Some((self.dialogue.heard + KEEP_ALIVE).max(paced)),
-        };
-        self.dialogue.next_timeout(usual, None, !self.unverified.is_empty())
-    }
-
-    fn close(&mut self, now: Timestamp) {
-        self.dialogue.close(now, true);
-        self.go_on(now);
-    }
-
-    fn closing(&self) -> Closing {
-        self.dialogue.closing()
+        }
     }
 }

@@ -12,7 +12,7 @@ pub(super) const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(500);
 
 /// What JMRI says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Answer {
+pub(crate) enum Answer {
     Pong,
     Powers,
     Sensors,
@@ -30,7 +30,7 @@ pub(super) enum Answer {
 
 /// What an answer to a request looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Awaited {
+pub(crate) enum Awaited {
     Pong,
     Powers,
     Sensors,

@@ -5,10 +5,9 @@ mod hearing;
 use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
+use core::ops::{ControlFlow, RangeInclusive};
 
-use footplate_core::{
-    Command, DecoderSteps, FunctionNumber, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
-};
+use footplate_core::{Command, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use super::json::Lines;
 use super::outstanding::Awaited;
@@ -20,8 +19,8 @@ use crate::dialogue::{Dialogue, Opening};
 use crate::locomotives::ReportedFunctions;
 use crate::outstanding::Outgoing;
 use crate::pacing::Pacing;
+use crate::protocol::Protocol;
 use crate::sensors::Sensors;
-use crate::session::{Closing, CommandError, Session, Transmit};
 use crate::silence::Checks;
 
 /// JMRI reads as fast as it is written to. What it passes on waits for its hardware, of which 100 requests a second ask enough.
@@ -87,91 +86,8 @@ impl Client {
         &self.system
     }
 
-    /// Sends what is due.
-    fn go_on(&mut self, now: Timestamp) {
-        if self.dialogue.watch(now) {
-            self.blind_since.get_or_insert(self.dialogue.heard);
-        }
-        while let Some(next) = self.next(now) {
-            self.dialogue.write(next.request.text().into_bytes());
-            self.dialogue.sent(now, next);
-        }
-    }
-
-    /// Returns the next request, if one may be written now.
-    fn next(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
-        if !self.dialogue.may_write(now) {
-            return None;
-        }
-        if self.dialogue.take_stop_of_all() {
-            // JMRI has no other request that stops a train without its throttle.
-            return Some(Outgoing::says(self.power(false)));
-        }
-        if let Some(command) = self.dialogue.next_stop(now, true) {
-            return Some(self.outgoing(command));
-        }
-        if let Some(again) = self.dialogue.next_again(now, true) {
-            return Some(again);
-        }
-        if let Some(train) = self.dialogue.undirected_at_end() {
-            return Some(query(train));
-        }
-        if self.dialogue.switch_off_is_due(now) {
-            return Some(self.outgoing(Command::PowerOff));
-        }
-        if now < self.dialogue.pacing.usual_at() {
-            return None;
-        }
-        let again = self.dialogue.next_again(now, false);
-        if self.dialogue.farewell.has_begun() { again } else { again.or_else(|| self.next_usual(now)) }
-    }
-
-    fn next_usual(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
-        if let Opening::Asking(requests) = &mut self.opening {
-            if self.dialogue.outstanding.any(Awaited::is_question) {
-                return None;
-            }
-            let request = requests.pop_front()?;
-            return Some(match request {
-                Request::Ping => Outgoing::asks(request, Awaited::Pong),
-                Request::Powers => Outgoing::asks(request, Awaited::Powers),
-                Request::Power { on, .. } => Outgoing::asks(request, Awaited::Power(on)),
-                Request::Sensors => Outgoing::asks(request, Awaited::Sensors),
-                _ => Outgoing::says(request),
-            });
-        }
-        if let Some(train) = self.unverified.pop() {
-            return Some(query(train));
-        }
-        let outstanding = &self.dialogue.outstanding;
-        if let Some(train) = self.dialogue.undirected(|train| outstanding.blocks(train, false).is_some()) {
-            return Some(query(train));
-        }
-        if let Some(command) = self.dialogue.next_command(true) {
-            return Some(self.outgoing(command));
-        }
-        let is_pinged = self.dialogue.outstanding.has(&Awaited::Pong);
-        (now >= self.ping_due() && !is_pinged).then(|| Outgoing::asks(Request::Ping, Awaited::Pong))
-    }
-
     fn ping_due(&self) -> Timestamp {
         self.dialogue.heard + PING_AFTER
-    }
-
-    /// Returns the request for a command, and notes what it commands.
-    fn outgoing(&mut self, command: Command) -> Outgoing<Awaited> {
-        let (request, awaited) = match command {
-            Command::Speed { train, step } => self.drive(train, step, false),
-            Command::Reverse { train } => self.drive(train, SpeedStep::STAND, true),
-            Command::Turnout { turnout, curved } => self.throw(turnout, curved),
-            Command::Function { train, function, on } => switch(train, function, on),
-            Command::PowerOff | Command::PowerOn => {
-                let on = command == Command::PowerOn;
-                self.dialogue.power = on;
-                (self.power(on), Awaited::Power(on))
-            }
-        };
-        Outgoing::commands(command, request, Some(awaited))
     }
 
     fn drive(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> (Request, Awaited) {
@@ -210,11 +126,6 @@ fn switch(train: TrainId, function: FunctionNumber, on: bool) -> (Request, Await
     (Request::Throttle(message), Awaited::Function(train, function, on))
 }
 
-/// Asks for a train's throttle, and how it is driven.
-fn query(train: TrainId) -> Outgoing<Awaited> {
-    Outgoing::asks(Request::Throttle(asked_of(train)), Awaited::Locomotive(train))
-}
-
 /// A message to a train's throttle that asks for its state. The throttle is called by the address.
 fn asked_of(train: TrainId) -> ThrottleMessage {
     ThrottleMessage {
@@ -225,19 +136,30 @@ fn asked_of(train: TrainId) -> ThrottleMessage {
     }
 }
 
-impl Session for Client {
-    fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]) {
-        self.dialogue.now = now;
-        if self.dialogue.farewell.is_over() {
-            return;
-        }
-        for byte in bytes {
-            self.hear(now, *byte);
-        }
-        self.go_on(now);
+impl Protocol for Client {
+    type Awaited = Awaited;
+
+    fn dialogue(&self) -> &Dialogue<Awaited> {
+        &self.dialogue
     }
 
-    fn handle_reopened(&mut self, now: Timestamp) {
+    fn dialogue_mut(&mut self) -> &mut Dialogue<Awaited> {
+        &mut self.dialogue
+    }
+
+    fn hear(&mut self, now: Timestamp, bytes: &[u8]) {
+        for byte in bytes {
+            self.hear_byte(now, *byte);
+        }
+    }
+
+    fn advance(&mut self, _now: Timestamp, is_silent: bool) {
+        if is_silent {
+            self.blind_since.get_or_insert(self.dialogue.heard);
+        }
+    }
+
+    fn begin_again(&mut self, _now: Timestamp) {
         self.lines = Lines::default();
         self.blind_since.get_or_insert(self.dialogue.heard);
         self.verify();
@@ -245,57 +167,76 @@ impl Session for Client {
         for train in self.dialogue.directed() {
             self.lost_throttle(train);
         }
-        self.dialogue.reopened();
-        self.go_on(now);
     }
 
-    fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
-        self.dialogue.set_decoder(train, &LOCOMOTIVES, steps)
+    fn send(&mut self, now: Timestamp, next: Outgoing<Awaited>) {
+        self.dialogue.write(next.request.text().into_bytes());
+        self.dialogue.sent(now, next);
     }
 
-    fn set_direction(&mut self, train: TrainId, forward: bool) {
-        self.dialogue.locomotives.keep_direction(train, forward);
+    fn addresses(&self, _train: TrainId) -> RangeInclusive<u16> {
+        LOCOMOTIVES
     }
 
-    fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
-        self.dialogue.accept(command, &LOCOMOTIVES, &self.settings.turnouts())?;
-        self.go_on(now);
-        Ok(())
+    fn turnouts(&self) -> RangeInclusive<u16> {
+        self.settings.turnouts()
     }
 
-    fn report_releases(&mut self, of: &[SensorId]) {
-        self.dialogue.released = of.to_vec();
+    /// JMRI has no other request that stops a train without its throttle.
+    fn stop_of_all(&self) -> Request {
+        self.power(false)
     }
 
-    fn expect_delays(&mut self, excess: TimeSpan) {
-        self.dialogue.excess = excess;
-    }
-
-    fn handle_timeout(&mut self, now: Timestamp) {
-        self.go_on(now);
-    }
-
-    fn poll_output(&mut self) -> Option<Transmit> {
-        self.dialogue.output.pop_front()
-    }
-
-    fn next_timeout(&self) -> Option<Timestamp> {
-        let paced = self.dialogue.pacing.usual_at();
-        let usual = match &self.opening {
-            _ if self.dialogue.farewell.has_begun() => Some(self.dialogue.pacing.urgent_at()),
-            Opening::Asking(_) if self.dialogue.outstanding.any(Awaited::is_question) => None,
-            Opening::Asking(_) => Some(paced),
-            Opening::Open => Some(self.ping_due().max(paced)),
+    fn outgoing(&mut self, _now: Timestamp, command: Command) -> Outgoing<Awaited> {
+        let (request, awaited) = match command {
+            Command::Speed { train, step } => self.drive(train, step, false),
+            Command::Reverse { train } => self.drive(train, SpeedStep::STAND, true),
+            Command::Turnout { turnout, curved } => self.throw(turnout, curved),
+            Command::Function { train, function, on } => switch(train, function, on),
+            Command::PowerOff | Command::PowerOn => {
+                let on = command == Command::PowerOn;
+                self.dialogue.power = on;
+                (self.power(on), Awaited::Power(on))
+            }
         };
-        self.dialogue.next_timeout(usual, None, !self.unverified.is_empty())
+        Outgoing::commands(command, request, Some(awaited))
     }
 
-    fn close(&mut self, now: Timestamp) {
-        self.dialogue.close(now, true);
-        self.go_on(now);
+    fn query(&self, train: TrainId) -> Outgoing<Awaited> {
+        Outgoing::asks(Request::Throttle(asked_of(train)), Awaited::Locomotive(train))
     }
 
-    fn closing(&self) -> Closing {
-        self.dialogue.closing()
+    fn next_question(&mut self, _now: Timestamp) -> ControlFlow<Option<Outgoing<Awaited>>> {
+        if let Opening::Asking(requests) = &mut self.opening {
+            if self.dialogue.outstanding.any(Awaited::is_question) {
+                return ControlFlow::Break(None);
+            }
+            return ControlFlow::Break(requests.pop_front().map(|request| match request {
+                Request::Ping => Outgoing::asks(request, Awaited::Pong),
+                Request::Powers => Outgoing::asks(request, Awaited::Powers),
+                Request::Power { on, .. } => Outgoing::asks(request, Awaited::Power(on)),
+                Request::Sensors => Outgoing::asks(request, Awaited::Sensors),
+                _ => Outgoing::says(request),
+            }));
+        }
+        let unverified = self.unverified.pop();
+        unverified.map_or(ControlFlow::Continue(()), |train| ControlFlow::Break(Some(self.query(train))))
+    }
+
+    fn has_questions(&self) -> bool {
+        !self.unverified.is_empty()
+    }
+
+    fn next_poll(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
+        let is_pinged = self.dialogue.outstanding.has(&Awaited::Pong);
+        (now >= self.ping_due() && !is_pinged).then(|| Outgoing::asks(Request::Ping, Awaited::Pong))
+    }
+
+    fn asks_at(&self) -> Option<Timestamp> {
+        let paced = self.dialogue.pacing.usual_at();
+        match &self.opening {
+            Opening::Asking(_) => (!self.dialogue.outstanding.any(Awaited::is_question)).then_some(paced),
+            Opening::Open => Some(self.ping_due().max(paced)),
+        }
     }
 }

@@ -14,7 +14,7 @@ pub(super) const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(300);
 
 /// What the station or the server says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Answer {
+pub(crate) enum Answer {
     /// A slot.
     Slot(SlotData),
     /// A message of this client was put on the bus.
@@ -25,7 +25,7 @@ pub(super) enum Answer {
 
 /// What an answer to a request looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Awaited {
+pub(crate) enum Awaited {
     /// Any state of the station itself.
     Status,
     Power(bool),

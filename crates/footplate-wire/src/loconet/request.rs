@@ -37,7 +37,7 @@ pub fn speed_of(step: SpeedStep, decoder: DecoderSteps) -> Option<u8> {
 
 /// What is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Request {
+pub(crate) enum Request {
     Power {
         on: bool,
     },

@@ -4,10 +4,10 @@ mod hearing;
 
 use alloc::string::String;
 use alloc::vec::Vec;
+use core::ops::{ControlFlow, RangeInclusive};
 
 use footplate_core::{
-    Command, DecoderSteps, EventKind, FunctionNumber, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId,
-    TurnoutId,
+    Command, EventKind, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
 };
 
 use super::functions::FunctionGroup;
@@ -21,8 +21,9 @@ use super::slot::DrivenSlots;
 use crate::dialogue::{Dialogue, Opening};
 use crate::outstanding::Outgoing;
 use crate::pacing::Pacing;
+use crate::protocol::Protocol;
 use crate::sensors::Sensors;
-use crate::session::{Closing, CommandError, LinkNotice, Session, Transmit};
+use crate::session::LinkNotice;
 use crate::silence::Checks;
 
 /// A request is up to three messages of some 5 ms on the bus, which has other users: 30 requests a second leave them half of it.
@@ -106,18 +107,6 @@ impl Client {
         &self.settings
     }
 
-    /// Sends what is due.
-    fn go_on(&mut self, now: Timestamp) {
-        if self.dialogue.watch(now) {
-            self.blind_since.get_or_insert(self.dialogue.heard);
-        }
-        self.write_waiting(now);
-        // A request waits until the messages of the one before are on the bus: so a stop waits for one request at most.
-        while let Some(next) = self.next(now) {
-            self.send(now, next);
-        }
-    }
-
     /// Writes the message that waits, if the server may be given one.
     fn write_waiting(&mut self, now: Timestamp) {
         if !self.dialogue.farewell.is_over()
@@ -130,64 +119,6 @@ impl Client {
     /// How long the server's word on a message is waited for.
     fn sent_within(&self) -> TimeSpan {
         if self.dialogue.farewell.has_begun() { SENT_WITHIN_AT_END } else { SENT_WITHIN }
-    }
-
-    /// Returns the next request, if one may be written now.
-    fn next(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
-        if !self.dialogue.may_write(now) || !self.outbox.is_empty() {
-            return None;
-        }
-        if self.dialogue.take_stop_of_all() {
-            return Some(Outgoing::says(Request::StopAll));
-        }
-        if let Some((train, slot)) = self.unused.pop() {
-            return Some(Outgoing::asks(Request::Use(slot), Awaited::Locomotive(train)));
-        }
-        if let Some(command) = self.dialogue.next_stop(now, true) {
-            return Some(self.outgoing(now, command));
-        }
-        if let Some(repeat) = self.dialogue.next_again(now, true) {
-            return Some(repeat);
-        }
-        if let Some((address, closed, _)) = self.pulse.take_if(|(.., until)| now >= *until) {
-            return Some(Outgoing::says(Request::Switch { address, closed, on: false }));
-        }
-        if let Some(train) = self.dialogue.undirected_at_end() {
-            return Some(acquire(train));
-        }
-        if self.dialogue.switch_off_is_due(now) {
-            return Some(self.outgoing(now, Command::PowerOff));
-        }
-        if now < self.dialogue.pacing.usual_at() {
-            return None;
-        }
-        // At the end, too: a train whose slot is asked for can be stopped only when that is answered.
-        let repeat = self.dialogue.next_again(now, false);
-        if self.dialogue.farewell.has_begun() { repeat } else { repeat.or_else(|| self.next_usual(now)) }
-    }
-
-    fn next_usual(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
-        if let Opening::Asking(requests) = &mut self.opening {
-            if self.dialogue.outstanding.any(Awaited::is_question) || now < self.next_interrogation {
-                return None;
-            }
-            match requests.pop_front() {
-                Some(request) => return Some(self.question(now, request)),
-                None => self.opened(),
-            }
-        }
-        if let Some(train) = self.unverified.pop() {
-            return Some(self.query(train));
-        }
-        let outstanding = &self.dialogue.outstanding;
-        if let Some(train) = self.dialogue.undirected(|train| outstanding.blocks(train, false).is_some()) {
-            return Some(acquire(train));
-        }
-        if let Some(command) = self.dialogue.next_command(self.pulse.is_none()) {
-            return Some(self.outgoing(now, command));
-        }
-        let is_polled = self.dialogue.outstanding.has(&Awaited::Status);
-        (now >= self.poll_due() && !is_polled).then(|| self.poll(now))
     }
 
     fn poll_due(&self) -> Timestamp {
@@ -226,36 +157,6 @@ impl Client {
         Outgoing::asks(request, awaited)
     }
 
-    /// Asks how a train is driven.
-    fn query(&self, train: TrainId) -> Outgoing<Awaited> {
-        match self.slots.of(train).and_then(|slot| slot.number) {
-            Some(slot) => Outgoing::asks(Request::Slot(slot), Awaited::Locomotive(train)),
-            None => acquire(train),
-        }
-    }
-
-    /// Returns the request for a command, and notes what it commands.
-    fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
-        let (request, awaited) = match command {
-            Command::Speed { train, step } => {
-                self.dialogue.commanded(train, step, false);
-                self.drive(now, train, step)
-            }
-            Command::Reverse { train } => {
-                self.dialogue.commanded(train, SpeedStep::STAND, true);
-                self.drive(now, train, SpeedStep::STAND)
-            }
-            Command::Turnout { turnout, curved } => self.throw(now, turnout, curved),
-            Command::Function { train, function, on } => self.switch(train, function, on),
-            Command::PowerOff | Command::PowerOn => {
-                let on = command == Command::PowerOn;
-                self.dialogue.power = on;
-                (Request::Power { on }, Some(Awaited::Power(on)))
-            }
-        };
-        Outgoing::commands(command, request, awaited)
-    }
-
     fn drive(&mut self, now: Timestamp, train: TrainId, step: SpeedStep) -> (Request, Option<Awaited>) {
         let forward = self.dialogue.locomotives.get(train).and_then(|known| known.forward).unwrap_or(true);
         let speed = speed_of(step, self.dialogue.decoder(train)).unwrap_or_default();
@@ -290,16 +191,6 @@ impl Client {
         (Request::Switch { address, closed, on: true }, Some(Awaited::Turnout(turnout, message)))
     }
 
-    fn send(&mut self, now: Timestamp, outgoing: Outgoing<Awaited>) {
-        let request = outgoing.request;
-        self.outbox.push(request.messages());
-        self.write_waiting(now);
-        let entry = self.dialogue.sent(now, outgoing);
-        if let (Some(EventKind::Turnout { .. }), Request::Switch { address, closed, .. }) = (entry, request) {
-            self.pulse = Some((address, closed, now + PULSE));
-        }
-    }
-
     /// Ends the opening: trains may run.
     fn opened(&mut self) {
         self.opening = Opening::Open;
@@ -324,87 +215,145 @@ const fn acquire(train: TrainId) -> Outgoing<Awaited> {
     Outgoing::asks(Request::Locomotive(train.0), Awaited::Locomotive(train))
 }
 
-impl Session for Client {
-    fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]) {
-        self.dialogue.now = now;
-        if self.dialogue.farewell.is_over() {
-            return;
-        }
-        for byte in bytes {
-            self.hear(now, *byte);
-        }
-        self.go_on(now);
+impl Protocol for Client {
+    type Awaited = Awaited;
+
+    fn dialogue(&self) -> &Dialogue<Awaited> {
+        &self.dialogue
     }
 
-    fn handle_reopened(&mut self, now: Timestamp) {
+    fn dialogue_mut(&mut self) -> &mut Dialogue<Awaited> {
+        &mut self.dialogue
+    }
+
+    fn hear(&mut self, now: Timestamp, bytes: &[u8]) {
+        for byte in bytes {
+            self.hear_byte(now, *byte);
+        }
+    }
+
+    fn advance(&mut self, now: Timestamp, is_silent: bool) {
+        if is_silent {
+            self.blind_since.get_or_insert(self.dialogue.heard);
+        }
+        self.write_waiting(now);
+    }
+
+    fn begin_again(&mut self, _now: Timestamp) {
         self.lines = Lines::default();
         self.outbox.clear();
         self.unused.clear();
         self.blind_since.get_or_insert(self.dialogue.heard);
         self.verify();
-        self.dialogue.reopened();
-        self.go_on(now);
     }
 
-    fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
-        self.dialogue.set_decoder(train, &LOCOMOTIVES, steps)
-    }
-
-    fn set_direction(&mut self, train: TrainId, forward: bool) {
-        self.dialogue.locomotives.keep_direction(train, forward);
-    }
-
-    fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
-        self.dialogue.accept(command, &LOCOMOTIVES, &self.settings.turnouts())?;
-        self.go_on(now);
-        Ok(())
-    }
-
-    fn report_releases(&mut self, of: &[SensorId]) {
-        self.dialogue.released = of.to_vec();
-    }
-
-    fn expect_delays(&mut self, excess: TimeSpan) {
-        self.dialogue.excess = excess;
-    }
-
-    fn handle_timeout(&mut self, now: Timestamp) {
-        self.go_on(now);
-    }
-
-    fn poll_output(&mut self) -> Option<Transmit> {
-        self.dialogue.output.pop_front()
-    }
-
-    fn next_timeout(&self) -> Option<Timestamp> {
-        if !self.outbox.is_empty() && !self.dialogue.farewell.is_over() {
-            // Nothing is written before the server has said what became of the last message.
-            let times = [
-                self.outbox.due(self.sent_within()),
-                self.dialogue.silence.due(),
-                self.dialogue.farewell.due(),
-            ];
-            return times.into_iter().flatten().filter(|at| *at > self.dialogue.now).min();
+    fn send(&mut self, now: Timestamp, next: Outgoing<Awaited>) {
+        let request = next.request;
+        self.outbox.push(request.messages());
+        self.write_waiting(now);
+        let entry = self.dialogue.sent(now, next);
+        if let (Some(EventKind::Turnout { .. }), Request::Switch { address, closed, .. }) = (entry, request) {
+            self.pulse = Some((address, closed, now + PULSE));
         }
+    }
+
+    /// A request waits until the messages of the one before are on the bus: so a stop waits for one request at most.
+    fn may_write(&self, now: Timestamp) -> bool {
+        self.dialogue.may_write(now) && self.outbox.is_empty()
+    }
+
+    fn addresses(&self, _train: TrainId) -> RangeInclusive<u16> {
+        LOCOMOTIVES
+    }
+
+    fn turnouts(&self) -> RangeInclusive<u16> {
+        self.settings.turnouts()
+    }
+
+    fn stop_of_all(&self) -> Request {
+        Request::StopAll
+    }
+
+    fn before_stops(&mut self) -> Option<Outgoing<Awaited>> {
+        let (train, slot) = self.unused.pop()?;
+        Some(Outgoing::asks(Request::Use(slot), Awaited::Locomotive(train)))
+    }
+
+    fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
+        let (request, awaited) = match command {
+            Command::Speed { train, step } => {
+                self.dialogue.commanded(train, step, false);
+                self.drive(now, train, step)
+            }
+            Command::Reverse { train } => {
+                self.dialogue.commanded(train, SpeedStep::STAND, true);
+                self.drive(now, train, SpeedStep::STAND)
+            }
+            Command::Turnout { turnout, curved } => self.throw(now, turnout, curved),
+            Command::Function { train, function, on } => self.switch(train, function, on),
+            Command::PowerOff | Command::PowerOn => {
+                let on = command == Command::PowerOn;
+                self.dialogue.power = on;
+                (Request::Power { on }, Some(Awaited::Power(on)))
+            }
+        };
+        Outgoing::commands(command, request, awaited)
+    }
+
+    fn next_release(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
+        let (address, closed, _) = self.pulse.take_if(|(.., until)| now >= *until)?;
+        Some(Outgoing::says(Request::Switch { address, closed, on: false }))
+    }
+
+    fn release_at(&self) -> Option<Timestamp> {
+        self.pulse.map(|(.., until)| until)
+    }
+
+    fn query(&self, train: TrainId) -> Outgoing<Awaited> {
+        match self.slots.of(train).and_then(|slot| slot.number) {
+            Some(slot) => Outgoing::asks(Request::Slot(slot), Awaited::Locomotive(train)),
+            None => acquire(train),
+        }
+    }
+
+    fn next_question(&mut self, now: Timestamp) -> ControlFlow<Option<Outgoing<Awaited>>> {
+        if let Opening::Asking(requests) = &mut self.opening {
+            if self.dialogue.outstanding.any(Awaited::is_question) || now < self.next_interrogation {
+                return ControlFlow::Break(None);
+            }
+            match requests.pop_front() {
+                Some(request) => return ControlFlow::Break(Some(self.question(now, request))),
+                None => self.opened(),
+            }
+        }
+        let unverified = self.unverified.pop();
+        unverified.map_or(ControlFlow::Continue(()), |train| ControlFlow::Break(Some(self.query(train))))
+    }
+
+    fn has_questions(&self) -> bool {
+        !self.unverified.is_empty() || !self.unused.is_empty()
+    }
+
+    fn next_poll(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
+        let is_polled = self.dialogue.outstanding.has(&Awaited::Status);
+        (now >= self.poll_due() && !is_polled).then(|| self.poll(now))
+    }
+
+    fn asks_at(&self) -> Option<Timestamp> {
         let paced = self.dialogue.pacing.usual_at();
-        let usual = match &self.opening {
-            _ if self.dialogue.farewell.has_begun() => Some(self.dialogue.pacing.urgent_at()),
+        match &self.opening {
             Opening::Asking(_) if self.dialogue.outstanding.any(Awaited::is_question) => None,
             Opening::Asking(_) => Some(self.next_interrogation.max(paced)),
             Opening::Open => Some(self.poll_due().max(paced)),
-        };
-        let release = self.pulse.map(|(.., until)| until);
-        self.dialogue.next_timeout(usual, release, !self.unverified.is_empty() || !self.unused.is_empty())
-    }
-
-    fn close(&mut self, now: Timestamp) {
-        if self.dialogue.close(now, true) {
-            self.pulse.iter_mut().for_each(|(.., until)| *until = now);
         }
-        self.go_on(now);
     }
 
-    fn closing(&self) -> Closing {
-        self.dialogue.closing()
+    fn end_begins(&mut self, now: Timestamp) {
+        self.pulse.iter_mut().for_each(|(.., until)| *until = now);
+    }
+
+    /// Nothing is written before the server has said what became of the last message.
+    fn written_at(&self) -> Option<Timestamp> {
+        self.outbox.due(self.sent_within())
     }
 }

@@ -21,7 +21,7 @@ const LIST_TRIES: u8 = 16;
 
 /// What an answer to a request looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Awaited {
+pub(crate) enum Awaited {
     /// Any participant.
     Participant,
     /// Any module.

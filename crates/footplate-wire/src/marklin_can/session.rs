@@ -4,8 +4,9 @@ mod commanding;
 mod hearing;
 
 use alloc::vec::Vec;
+use core::ops::{ControlFlow, RangeInclusive};
 
-use footplate_core::{Command, DecoderSteps, SensorId, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Command, EventKind, TimeSpan, Timestamp, TrainId};
 
 use super::frame::hash_of;
 use super::framing::Framing;
@@ -17,10 +18,11 @@ use super::roster::{ListedLocomotive, Roster};
 use super::settings::{Settings, Transport};
 use super::solenoid::Solenoid;
 use super::uid::Uid;
-use crate::dialogue::{Dialogue, Opening};
+use crate::dialogue::{Dialogue, Opening, Repeat};
 use crate::outstanding::Outgoing;
 use crate::pacing::Pacing;
-use crate::session::{Closing, CommandError, Session, Transmit};
+use crate::protocol::Protocol;
+use crate::session::CommandError;
 use crate::silence::Checks;
 
 /// A frame takes half a millisecond on the bus, and datagrams in quick succession get lost: 100 a second, four at once, and a stop
@@ -59,8 +61,6 @@ pub struct Client {
     dialogue: Dialogue<Awaited>,
     framing: Framing,
     opening: Opening<Question>,
-    /// Whether to halt all locomotives next, whatever their numbers.
-    halts_all: bool,
     roster: Roster,
     inputs: Inputs,
     /// Participants that have identified themselves.
@@ -99,7 +99,6 @@ impl Client {
             dialogue: Dialogue::new(now, PACING, checks),
             framing: Framing::new(settings.transport),
             opening: Opening::asking(Question::ALL),
-            halts_all: false,
             roster: Roster::default(),
             inputs: Inputs::default(),
             participants: Vec::new(),
@@ -136,67 +135,6 @@ impl Client {
         }
     }
 
-    /// Sends what is due.
-    fn go_on(&mut self, now: Timestamp) {
-        self.is_blind |= self.dialogue.watch(now);
-        while let Some(next) = self.next(now) {
-            self.send(now, next);
-        }
-    }
-
-    /// Returns the next request, if one may be written now.
-    fn next(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
-        if !self.dialogue.may_write(now) {
-            return None;
-        }
-        if core::mem::take(&mut self.halts_all) {
-            return Some(Outgoing::says(Message::Halt(Uid::ALL)));
-        }
-        // A speed contains no direction, so a train can be stopped before its direction is known.
-        if let Some(command) = self.dialogue.next_stop(now, false) {
-            return Some(self.outgoing(now, command));
-        }
-        if let Some(repeat) = self.next_repeat(now, true) {
-            return Some(repeat);
-        }
-        if let Some(release) = self.next_release(now) {
-            return Some(release);
-        }
-        if self.dialogue.switch_off_is_due(now) {
-            return Some(self.outgoing(now, Command::PowerOff));
-        }
-        if now < self.dialogue.pacing.usual_at() || self.dialogue.farewell.has_begun() {
-            return None;
-        }
-        self.next_repeat(now, false).or_else(|| self.next_usual(now))
-    }
-
-    fn next_usual(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
-        let has_question = self.dialogue.outstanding.any(Awaited::is_question);
-        if let Opening::Asking(questions) = &mut self.opening {
-            if has_question {
-                return None;
-            }
-            match questions.pop_front() {
-                Some(question) => return Some(self.asking(now, question)),
-                None => self.opened(),
-            }
-        }
-        if let Some((train, query)) = self.unverified.pop() {
-            return Some(self.query(train, query));
-        }
-        let outstanding = &self.dialogue.outstanding;
-        let is_asked = |train| outstanding.has(&Awaited::AnyDirection(train, Uid::ALL));
-        if let Some(train) = self.dialogue.undirected(is_asked) {
-            return Some(self.query(train, Query::Direction));
-        }
-        if let Some(command) = self.dialogue.next_command(self.solenoid.is_none()) {
-            return Some(self.outgoing(now, command));
-        }
-        let question = if self.has_modules { Question::Modules } else { Question::Ping };
-        (now >= self.poll_due() && !has_question).then(|| self.asking(now, question))
-    }
-
     fn poll_due(&self) -> Timestamp {
         self.polled + POLL_EVERY
     }
@@ -207,95 +145,141 @@ const fn position_of(curved: bool) -> u8 {
     if curved { 0 } else { 1 }
 }
 
-impl Session for Client {
-    fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]) {
-        self.dialogue.now = now;
-        if self.dialogue.farewell.is_over() {
-            return;
-        }
+impl Protocol for Client {
+    type Awaited = Awaited;
+
+    /// A speed contains no direction, so a train can be stopped before its direction is known.
+    const STOPS_SET_DIRECTIONS: bool = false;
+
+    fn dialogue(&self) -> &Dialogue<Awaited> {
+        &self.dialogue
+    }
+
+    fn dialogue_mut(&mut self) -> &mut Dialogue<Awaited> {
+        &mut self.dialogue
+    }
+
+    fn hear(&mut self, now: Timestamp, bytes: &[u8]) {
         if now - self.arrived > FRAME_WITHIN {
             self.framing.give_up();
         }
         self.arrived = now;
         for byte in bytes {
-            self.hear(now, *byte);
+            self.hear_byte(now, *byte);
         }
-        self.go_on(now);
     }
 
-    fn handle_reopened(&mut self, now: Timestamp) {
+    fn advance(&mut self, _now: Timestamp, is_silent: bool) {
+        self.is_blind |= is_silent;
+    }
+
+    fn begin_again(&mut self, _now: Timestamp) {
         self.framing = Framing::new(self.settings.transport);
         self.is_blind = true;
         self.open_adapter();
         self.verify();
-        self.dialogue.reopened();
-        self.go_on(now);
     }
 
-    fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
-        // A train may be in the station's list, which comes later: its commands are checked then.
-        self.dialogue.set_decoder(train, &(0..=u16::MAX), steps)
-    }
-
-    fn set_direction(&mut self, train: TrainId, forward: bool) {
-        self.dialogue.locomotives.keep_direction(train, forward);
-    }
-
-    fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
-        self.dialogue.check_step(&command)?;
-        match command {
-            Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. }
-                if self.roster.uid(train).is_none() =>
-            {
-                CommandError::check_train(train, &self.settings.locomotives.addresses())?;
-            }
-            Command::Turnout { turnout, .. } => {
-                CommandError::check_turnout(turnout, &self.settings.turnouts.addresses())?;
-            }
-            _ => {}
+    fn send(&mut self, now: Timestamp, next: Outgoing<Awaited>) {
+        self.write(next.request, false);
+        if let Some(EventKind::Turnout { turnout, curved }) = self.dialogue.sent(now, next) {
+            self.solenoid = Some(Solenoid::powered(turnout, curved, now));
         }
-        self.dialogue.push(command)?;
-        self.go_on(now);
+    }
+
+    fn addresses(&self, train: TrainId) -> RangeInclusive<u16> {
+        let is_listed = self.roster.uid(train).is_some();
+        if is_listed { 0..=u16::MAX } else { self.settings.locomotives.addresses() }
+    }
+
+    /// A train may be in the station's list, which comes later.
+    fn check_decoder(&self, _train: TrainId) -> Result<(), CommandError> {
         Ok(())
     }
 
-    fn report_releases(&mut self, of: &[SensorId]) {
-        self.dialogue.released = of.to_vec();
+    fn turnouts(&self) -> RangeInclusive<u16> {
+        self.settings.turnouts.addresses()
     }
 
-    fn expect_delays(&mut self, excess: TimeSpan) {
-        self.dialogue.excess = excess;
+    fn stop_of_all(&self) -> Message {
+        Message::Halt(Uid::ALL)
     }
 
-    fn handle_timeout(&mut self, now: Timestamp) {
-        self.go_on(now);
+    fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
+        self.commanding(now, command)
     }
 
-    fn poll_output(&mut self) -> Option<Transmit> {
-        self.dialogue.output.pop_front()
+    fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
+        loop {
+            match self.dialogue.next_repeat(now, only_urgent)? {
+                Repeat::Again(outgoing) => return Some(outgoing),
+                Repeat::GivenUp(given_up) => {
+                    if let Some(instead) = self.instead_of(&given_up) {
+                        return Some(instead);
+                    }
+                }
+            }
+        }
     }
 
-    fn next_timeout(&self) -> Option<Timestamp> {
+    fn next_release(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
+        let Solenoid { turnout, curved, .. } = self.solenoid.take_if(|powered| now >= powered.release_at)?;
+        let (uid, position) = (self.settings.turnout(turnout), position_of(curved));
+        let message = Message::Accessory { uid, position, current: 0, time: None };
+        Some(Outgoing::asks(message, Awaited::Accessory(turnout, uid, position, 0)))
+    }
+
+    fn release_at(&self) -> Option<Timestamp> {
+        self.solenoid.map(|powered| powered.release_at)
+    }
+
+    fn query(&self, train: TrainId) -> Outgoing<Awaited> {
+        self.querying(train, Query::Direction)
+    }
+
+    fn is_asked(&self, train: TrainId) -> bool {
+        self.dialogue.outstanding.has(&Awaited::AnyDirection(train, Uid::ALL))
+    }
+
+    fn next_question(&mut self, now: Timestamp) -> ControlFlow<Option<Outgoing<Awaited>>> {
+        if let Opening::Asking(questions) = &mut self.opening {
+            if self.dialogue.outstanding.any(Awaited::is_question) {
+                return ControlFlow::Break(None);
+            }
+            match questions.pop_front() {
+                Some(question) => return ControlFlow::Break(Some(self.asking(now, question))),
+                None => self.opened(),
+            }
+        }
+        match self.unverified.pop() {
+            Some((train, query)) => ControlFlow::Break(Some(self.querying(train, query))),
+            None => ControlFlow::Continue(()),
+        }
+    }
+
+    fn has_questions(&self) -> bool {
+        !self.unverified.is_empty()
+    }
+
+    fn next_poll(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
+        let question = if self.has_modules { Question::Modules } else { Question::Ping };
+        let is_asked = self.dialogue.outstanding.any(Awaited::is_question);
+        (now >= self.poll_due() && !is_asked).then(|| self.asking(now, question))
+    }
+
+    fn asks_at(&self) -> Option<Timestamp> {
         let paced = self.dialogue.pacing.usual_at();
-        let usual = match &self.opening {
-            _ if self.dialogue.farewell.has_begun() => None,
+        match &self.opening {
             Opening::Asking(_) => (!self.dialogue.outstanding.any(Awaited::is_question)).then_some(paced),
             Opening::Open => Some(self.poll_due().max(paced)),
-        };
-        let release = self.solenoid.map(|powered| powered.release_at);
-        self.dialogue.next_timeout(usual, release, !self.unverified.is_empty())
-    }
-
-    fn close(&mut self, now: Timestamp) {
-        if self.dialogue.close(now, false) {
-            // Before the station's list is read, the number of a locomotive is only supposed: a stop may reach none.
-            self.halts_all = matches!(self.opening, Opening::Asking(_));
-            self.solenoid.iter_mut().for_each(|powered| powered.release_at = now);
         }
-        self.go_on(now);
     }
 
-    fn closing(&self) -> Closing {
-        self.dialogue.closing()
+    fn end_begins(&mut self, now: Timestamp) {
+        // Before the station's list is read, the number of a locomotive is only supposed: a stop may reach none.
+        if matches!(self.opening, Opening::Asking(_)) {
+            self.dialogue.stop_all_next();
+        }
+        self.solenoid.iter_mut().for_each(|powered| powered.release_at = now);
     }
 }

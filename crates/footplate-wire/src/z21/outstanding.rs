@@ -15,7 +15,7 @@ pub(super) const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(100);
 
 /// What an answer to a request looks like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Awaited {
+pub(crate) enum Awaited {
     SerialNumber,
     Hardware,
     LockCode,

@@ -5,10 +5,9 @@ mod hearing;
 
 use alloc::string::String;
 use alloc::vec::Vec;
+use core::ops::{ControlFlow, RangeInclusive};
 
-use footplate_core::{
-    Command, DecoderSteps, EventKind, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
-};
+use footplate_core::{Command, DecoderSteps, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use super::broadcasts::Broadcasts;
 use super::detectors::RailCom;
@@ -21,7 +20,7 @@ use super::turnouts::Outputs;
 use crate::dialogue::{Dialogue, Opening, Repeat};
 use crate::outstanding::Outgoing;
 use crate::pacing::Pacing;
-use crate::session::{Closing, CommandError, Session, Transmit};
+use crate::protocol::Protocol;
 use crate::silence::Checks;
 
 /// Many quick datagrams from a computer are lost now and then; some milliseconds between them are asked for.
@@ -106,108 +105,6 @@ impl Client {
         &self.settings
     }
 
-    /// Sends what is due.
-    fn go_on(&mut self, now: Timestamp) {
-        self.is_blind |= self.dialogue.watch(now);
-        while let Some(next) = self.next(now) {
-            self.send(now, next);
-        }
-    }
-
-    /// Returns the next request, if one may be written now.
-    fn next(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
-        if !self.dialogue.may_write(now) {
-            return None;
-        }
-        if self.dialogue.take_stop_of_all() {
-            return Some(Outgoing::says(Request::StopAll));
-        }
-        if let Some(command) = self.dialogue.next_stop(now, true) {
-            return Some(self.outgoing(now, command));
-        }
-        if let Some(repeat) = self.next_repeat(now, true) {
-            return Some(repeat);
-        }
-        if let Some(release) = self.outputs.take_release(now) {
-            return Some(Outgoing::says(release));
-        }
-        if let Some(train) = self.dialogue.undirected_at_end() {
-            return Some(query(train));
-        }
-        if self.dialogue.switch_off_is_due(now) {
-            return Some(self.outgoing(now, Command::PowerOff));
-        }
-        if now < self.dialogue.pacing.usual_at() {
-            return None;
-        }
-        // At the end, too: a train can be stopped only when its direction is known.
-        let repeat = self.next_repeat(now, false);
-        if self.dialogue.farewell.has_begun() { repeat } else { repeat.or_else(|| self.next_usual(now)) }
-    }
-
-    fn next_usual(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
-        if let Opening::Asking(requests) = &mut self.opening {
-            if self.dialogue.outstanding.any(Awaited::is_question) {
-                return None;
-            }
-            match requests.pop_front() {
-                Some(request) => return Some(self.question(request)),
-                None => self.opened(),
-            }
-        }
-        if core::mem::take(&mut self.asks_status) {
-            return Some(self.question(Request::Status));
-        }
-        if core::mem::take(&mut self.asks_broadcasts) {
-            return Some(self.question(Request::Broadcasts));
-        }
-        if let Some(train) = self.unverified.pop() {
-            return Some(query(train));
-        }
-        let outstanding = &self.dialogue.outstanding;
-        if let Some(train) = self.dialogue.undirected(|train| outstanding.blocks(train, false).is_some()) {
-            return Some(query(train));
-        }
-        if let Some(command) = self.dialogue.next_command(self.outputs.are_free()) {
-            return Some(self.outgoing(now, command));
-        }
-        (now >= self.poll_due()).then(|| self.poll(now))
-    }
-
-    fn next_repeat(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
-        loop {
-            match self.dialogue.next_repeat(now, only_urgent)? {
-                // Inputs are polled anyway.
-                Repeat::Again(outgoing)
-                    if !(self.opening.is_open() && matches!(outgoing.request, Request::Feedback { .. })) =>
-                {
-                    return Some(outgoing);
-                }
-                _ => {}
-            }
-        }
-    }
-
-    /// Returns the request for a command, and notes what it commands.
-    fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
-        let (request, awaited) = match command {
-            Command::Speed { train, step } => self.drive(train, step, false),
-            Command::Reverse { train } => self.drive(train, SpeedStep::STAND, true),
-            Command::Turnout { turnout, curved } => self.throw(now, turnout, curved),
-            Command::Function { train, function, on } => {
-                let switch = if on { FunctionSwitch::On } else { FunctionSwitch::Off };
-                let request = Request::Function { address: train.0, function: function.get(), switch };
-                (request, Awaited::Function(train, function, on))
-            }
-            Command::PowerOff | Command::PowerOn => {
-                let on = command == Command::PowerOn;
-                self.dialogue.power = on;
-                (Request::Power { on }, Awaited::Power(on))
-            }
-        };
-        Outgoing::commands(command, request, Some(awaited))
-    }
-
     fn drive(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> (Request, Awaited) {
         self.suspected.retain(|(other, ..)| *other != train);
         let forward = self.dialogue.commanded(train, step, reverses);
@@ -230,29 +127,6 @@ impl Client {
         let request = Request::SetTurnout { address, second, activate: true, queue: false };
         (request, Awaited::Turnout(turnout, address, second))
     }
-
-    fn send(&mut self, now: Timestamp, outgoing: Outgoing<Awaited>) {
-        let Outgoing { request, tries, .. } = outgoing;
-        if request == Request::ALL_CAN {
-            self.asked_detectors = Some(now);
-        }
-        let mut bytes = Vec::new();
-        request.write(&mut bytes);
-        if let Some(question) = question_with(request) {
-            // Some clones read only the first dataset of a datagram: a repeat uses two datagrams.
-            if tries > 1 {
-                self.dialogue.write(core::mem::take(&mut bytes));
-            }
-            question.write(&mut bytes);
-        }
-        self.dialogue.write(bytes);
-        let entry = self.dialogue.sent(now, outgoing);
-        if let (Some(EventKind::Turnout { .. }), Request::SetTurnout { address, second, .. }) =
-            (entry, request)
-        {
-            self.outputs.powered(address, second, now);
-        }
-    }
 }
 
 /// The question in the same datagram, whose answer confirms a request even without a broadcast.
@@ -267,84 +141,145 @@ const fn question_with(request: Request) -> Option<Request> {
     }
 }
 
-const fn query(train: TrainId) -> Outgoing<Awaited> {
-    Outgoing::asks(Request::Locomotive { address: train.0 }, Awaited::Locomotive(train))
-}
+impl Protocol for Client {
+    type Awaited = Awaited;
 
-impl Session for Client {
-    fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]) {
-        self.dialogue.now = now;
-        if self.dialogue.farewell.is_over() {
-            return;
-        }
-        self.hear(now, bytes);
-        self.go_on(now);
+    fn dialogue(&self) -> &Dialogue<Awaited> {
+        &self.dialogue
     }
 
-    fn handle_reopened(&mut self, now: Timestamp) {
+    fn dialogue_mut(&mut self) -> &mut Dialogue<Awaited> {
+        &mut self.dialogue
+    }
+
+    fn hear(&mut self, now: Timestamp, bytes: &[u8]) {
+        self.hear_datagram(now, bytes);
+    }
+
+    fn advance(&mut self, _now: Timestamp, is_silent: bool) {
+        self.is_blind |= is_silent;
+    }
+
+    fn begin_again(&mut self, _now: Timestamp) {
         self.is_blind = true;
         self.verify();
-        self.dialogue.reopened();
-        self.go_on(now);
     }
 
-    fn set_decoder(&mut self, train: TrainId, steps: DecoderSteps) -> Result<(), CommandError> {
-        self.dialogue.set_decoder(train, &LOCOMOTIVES, steps)
-    }
-
-    fn set_direction(&mut self, train: TrainId, forward: bool) {
-        self.dialogue.locomotives.keep_direction(train, forward);
-    }
-
-    fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
-        self.dialogue.check_step(&command)?;
-        match command {
-            Command::Speed { train, .. } | Command::Reverse { train } | Command::Function { train, .. } => {
-                CommandError::check_train(train, &LOCOMOTIVES)?;
-            }
-            Command::Turnout { turnout, .. } => {
-                CommandError::check_turnout(turnout, &self.settings.turnouts())?;
-            }
-            _ => {}
+    fn send(&mut self, now: Timestamp, next: Outgoing<Awaited>) {
+        let Outgoing { request, tries, .. } = next;
+        if request == Request::ALL_CAN {
+            self.asked_detectors = Some(now);
         }
-        self.dialogue.push(command)?;
-        self.go_on(now);
-        Ok(())
+        let mut bytes = Vec::new();
+        request.write(&mut bytes);
+        if let Some(question) = question_with(request) {
+            // Some clones read only the first dataset of a datagram: a repeat uses two datagrams.
+            if tries > 1 {
+                self.dialogue.write(core::mem::take(&mut bytes));
+            }
+            question.write(&mut bytes);
+        }
+        self.dialogue.write(bytes);
+        let entry = self.dialogue.sent(now, next);
+        if let (Some(EventKind::Turnout { .. }), Request::SetTurnout { address, second, .. }) =
+            (entry, request)
+        {
+            self.outputs.powered(address, second, now);
+        }
     }
 
-    fn report_releases(&mut self, of: &[SensorId]) {
-        self.dialogue.released = of.to_vec();
+    fn addresses(&self, _train: TrainId) -> RangeInclusive<u16> {
+        LOCOMOTIVES
     }
 
-    fn expect_delays(&mut self, excess: TimeSpan) {
-        self.dialogue.excess = excess;
+    fn turnouts(&self) -> RangeInclusive<u16> {
+        self.settings.turnouts()
     }
 
-    fn handle_timeout(&mut self, now: Timestamp) {
-        self.go_on(now);
+    fn stop_of_all(&self) -> Request {
+        Request::StopAll
     }
 
-    fn poll_output(&mut self) -> Option<Transmit> {
-        self.dialogue.output.pop_front()
+    fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
+        let (request, awaited) = match command {
+            Command::Speed { train, step } => self.drive(train, step, false),
+            Command::Reverse { train } => self.drive(train, SpeedStep::STAND, true),
+            Command::Turnout { turnout, curved } => self.throw(now, turnout, curved),
+            Command::Function { train, function, on } => {
+                let switch = if on { FunctionSwitch::On } else { FunctionSwitch::Off };
+                let request = Request::Function { address: train.0, function: function.get(), switch };
+                (request, Awaited::Function(train, function, on))
+            }
+            Command::PowerOff | Command::PowerOn => {
+                let on = command == Command::PowerOn;
+                self.dialogue.power = on;
+                (Request::Power { on }, Awaited::Power(on))
+            }
+        };
+        Outgoing::commands(command, request, Some(awaited))
     }
 
-    fn next_timeout(&self) -> Option<Timestamp> {
-        let (urgent, paced) = (self.dialogue.pacing.urgent_at(), self.dialogue.pacing.usual_at());
-        let usual = match &self.opening {
-            _ if self.dialogue.farewell.has_begun() => Some(urgent),
+    fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
+        loop {
+            match self.dialogue.next_repeat(now, only_urgent)? {
+                // Inputs are polled anyway.
+                Repeat::Again(outgoing)
+                    if !(self.opening.is_open() && matches!(outgoing.request, Request::Feedback { .. })) =>
+                {
+                    return Some(outgoing);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    fn next_release(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
+        self.outputs.take_release(now).map(Outgoing::says)
+    }
+
+    fn release_at(&self) -> Option<Timestamp> {
+        self.outputs.release_due()
+    }
+
+    fn query(&self, train: TrainId) -> Outgoing<Awaited> {
+        Outgoing::asks(Request::Locomotive { address: train.0 }, Awaited::Locomotive(train))
+    }
+
+    fn next_question(&mut self, _now: Timestamp) -> ControlFlow<Option<Outgoing<Awaited>>> {
+        if let Opening::Asking(requests) = &mut self.opening {
+            if self.dialogue.outstanding.any(Awaited::is_question) {
+                return ControlFlow::Break(None);
+            }
+            match requests.pop_front() {
+                Some(request) => return ControlFlow::Break(Some(self.question(request))),
+                None => self.opened(),
+            }
+        }
+        let question = if core::mem::take(&mut self.asks_status) {
+            self.question(Request::Status)
+        } else if core::mem::take(&mut self.asks_broadcasts) {
+            self.question(Request::Broadcasts)
+        } else if let Some(train) = self.unverified.pop() {
+            self.query(train)
+        } else {
+            return ControlFlow::Continue(());
+        };
+        ControlFlow::Break(Some(question))
+    }
+
+    fn has_questions(&self) -> bool {
+        !self.unverified.is_empty() || self.asks_status || self.asks_broadcasts
+    }
+
+    fn next_poll(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
+        (now >= self.poll_due()).then(|| self.poll(now))
+    }
+
+    fn asks_at(&self) -> Option<Timestamp> {
+        let paced = self.dialogue.pacing.usual_at();
+        match &self.opening {
             Opening::Asking(_) => (!self.dialogue.outstanding.any(Awaited::is_question)).then_some(paced),
             Opening::Open => Some(self.poll_due().max(paced)),
-        };
-        let asks = !self.unverified.is_empty() || self.asks_status || self.asks_broadcasts;
-        self.dialogue.next_timeout(usual, self.outputs.release_due(), asks)
-    }
-
-    fn close(&mut self, now: Timestamp) {
-        self.dialogue.close(now, true);
-        self.go_on(now);
-    }
-
-    fn closing(&self) -> Closing {
-        self.dialogue.closing()
+        }
     }
 }

@@ -36,11 +36,6 @@ impl Outputs {
         self.pulse = Some(Pulse { address, second, release_at: now + PULSE, releases: RELEASES });
     }
 
-    /// Whether no output is powered.
-    pub(super) const fn are_free(&self) -> bool {
-        self.pulse.is_none()
-    }
-
     /// Returns when to release an output.
     pub(super) fn release_due(&self) -> Option<Timestamp> {
         self.pulse.map(|pulse| pulse.release_at)

@@ -17,7 +17,7 @@ use crate::sensors::Change;
 use crate::session::LinkNotice;
 
 impl Client {
-    pub(super) fn hear(&mut self, now: Timestamp, byte: u8) {
+    pub(super) fn hear_byte(&mut self, now: Timestamp, byte: u8) {
         let message = self.framing.push(byte).map(|text| (text.len(), Reply::read(text)));
         let unread = self.framing.take_unread();
         self.dialogue.hear_noise(unread);

@@ -23,7 +23,7 @@ use crate::session::LinkNotice;
 const NOT_FOUND: u16 = 404;
 
 impl Client {
-    pub(super) fn hear(&mut self, now: Timestamp, byte: u8) {
+    pub(super) fn hear_byte(&mut self, now: Timestamp, byte: u8) {
         let line = self.lines.push(byte).map(|text| (text.len(), Reply::read(text)));
         let unread = self.lines.take_unread();
         self.dialogue.hear_noise(unread);

@@ -23,7 +23,7 @@ const PACKET: u8 = 0x6D;
 const PACKET_AS_WRITTEN: u8 = 0x7D;
 
 impl Client {
-    pub(super) fn hear(&mut self, now: Timestamp, byte: u8) {
+    pub(super) fn hear_byte(&mut self, now: Timestamp, byte: u8) {
         let line = self.lines.push(byte).map(|text| (text.len(), Line::read(text)));
         let unread = self.lines.take_unread();
         self.dialogue.hear_noise(unread);

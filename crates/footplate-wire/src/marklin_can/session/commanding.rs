@@ -1,6 +1,6 @@
 //! Sends requests and commands as frames, and handles missing answers.
 
-use footplate_core::{Command, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::super::frame::Frame;
 use super::super::message::{Direction, Message};
@@ -12,7 +12,6 @@ use super::super::solenoid::Solenoid;
 use super::super::speed::speed_of;
 use super::super::uid::Uid;
 use super::{Client, Query, position_of};
-use crate::dialogue::Repeat;
 use crate::outstanding::{Outgoing, Outstanding};
 
 impl Client {
@@ -39,7 +38,7 @@ impl Client {
         }
     }
 
-    pub(super) fn query(&self, train: TrainId, query: Query) -> Outgoing<Awaited> {
+    pub(super) fn querying(&self, train: TrainId, query: Query) -> Outgoing<Awaited> {
         let uid = self.uid(train);
         match query {
             Query::Speed => {
@@ -56,30 +55,8 @@ impl Client {
         self.roster.uid(train).unwrap_or_else(|| self.settings.locomotives.uid(train.0))
     }
 
-    /// Releases the coil that was powered for long enough.
-    pub(super) fn next_release(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
-        let Solenoid { turnout, curved, .. } = self.solenoid.take_if(|powered| now >= powered.release_at)?;
-        let (uid, position) = (self.settings.turnout(turnout), position_of(curved));
-        let message = Message::Accessory { uid, position, current: 0, time: None };
-        Some(Outgoing::asks(message, Awaited::Accessory(turnout, uid, position, 0)))
-    }
-
-    /// Returns a request whose answer is overdue, unless it was repeated often enough.
-    pub(super) fn next_repeat(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
-        loop {
-            match self.dialogue.next_repeat(now, only_urgent)? {
-                Repeat::Again(outgoing) => return Some(outgoing),
-                Repeat::GivenUp(given_up) => {
-                    if let Some(instead) = self.instead_of(&given_up) {
-                        return Some(instead);
-                    }
-                }
-            }
-        }
-    }
-
     /// Handles a request that the station does not answer; returns a request to send instead.
-    fn instead_of(&mut self, given_up: &Outstanding<Awaited>) -> Option<Outgoing<Awaited>> {
+    pub(super) fn instead_of(&mut self, given_up: &Outstanding<Awaited>) -> Option<Outgoing<Awaited>> {
         let asked_for = REPEATED_AFTER.as_ns() * i64::from(given_up.tries.saturating_sub(1));
         let asked = given_up.sent - TimeSpan::from_ns(asked_for);
         match given_up.awaited {
@@ -101,7 +78,7 @@ impl Client {
     }
 
     /// Returns the request for a command, and notes what it commands.
-    pub(super) fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
+    pub(super) fn commanding(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
         let (message, awaited) = match command {
             Command::Speed { train, step } => {
                 let uid = self.uid(train);
@@ -154,12 +131,5 @@ impl Client {
             }
         };
         self.dialogue.write(bytes);
-    }
-
-    pub(super) fn send(&mut self, now: Timestamp, outgoing: Outgoing<Awaited>) {
-        self.write(outgoing.request, false);
-        if let Some(EventKind::Turnout { turnout, curved }) = self.dialogue.sent(now, outgoing) {
-            self.solenoid = Some(Solenoid::powered(turnout, curved, now));
-        }
     }
 }

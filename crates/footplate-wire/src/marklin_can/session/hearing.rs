@@ -24,7 +24,7 @@ const VERSION: (u8, u8) = (2, 0);
 const KIND: u16 = 0xFFE0;
 
 impl Client {
-    pub(super) fn hear(&mut self, now: Timestamp, byte: u8) {
+    pub(super) fn hear_byte(&mut self, now: Timestamp, byte: u8) {
         let frame = self.framing.push(byte);
         let unread = self.framing.take_unread() + self.framing.take_refused();
         self.dialogue.hear_noise(unread);

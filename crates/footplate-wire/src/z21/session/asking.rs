@@ -5,8 +5,9 @@ use footplate_core::{TimeSpan, Timestamp};
 use super::super::detectors::Feedback;
 use super::super::outstanding::Awaited;
 use super::super::request::Request;
-use super::{Client, query};
+use super::Client;
 use crate::outstanding::Outgoing;
+use crate::protocol::Protocol as _;
 
 /// The interval between polls. They find changes whose datagrams were lost, and keep the station from forgetting this client, which
 /// it does after a minute.
@@ -31,7 +32,7 @@ impl Client {
             self.polls.is_multiple_of(POLLS_A_LOCOMOTIVE)
                 && self.dialogue.outstanding.blocks(locomotive.train, false).is_none()
         }) {
-            return query(locomotive.train);
+            return self.query(locomotive.train);
         } else {
             match self.settings.feedback {
                 Feedback::RBus => {

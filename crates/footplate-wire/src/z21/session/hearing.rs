@@ -27,7 +27,7 @@ const SAME_SPEED_EVERY: TimeSpan = TimeSpan::from_ms(400);
 
 impl Client {
     /// Takes in one datagram.
-    pub(super) fn hear(&mut self, now: Timestamp, datagram: &[u8]) {
+    pub(super) fn hear_datagram(&mut self, now: Timestamp, datagram: &[u8]) {
         let mut datasets = Datasets::of(datagram);
         for dataset in datasets.by_ref() {
             match Reply::read(&dataset) {
