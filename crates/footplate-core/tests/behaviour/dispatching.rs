@@ -9,7 +9,7 @@ use footplate_core::control::{
 use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg, Position, TurnoutStates};
 use footplate_core::tracking::PathPoint;
-use footplate_core::{Command, EdgeId, Length, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{Command, EdgeId, Length, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 use proptest::collection::vec;
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 
@@ -366,4 +366,66 @@ fn a_journey_is_refused_while_a_train_may_be_on_a_turnout_of_unknown_position() 
     let journey = Journey::to(traffic.world.layout.landmark("C1").expect("a place"));
     let refused = traffic.dispatcher.go(traffic.world.now, TRAINS[0], journey);
     assert_eq!(refused, Err(Refusal::TurnoutUnknown { turnout: TurnoutId(1), train: TRAINS[1] }));
+}
+
+#[test]
+fn an_order_that_is_refused_ends_no_journey() {
+    let mut traffic = Traffic::watched();
+    traffic.go(TRAINS[0], "C1+150mm");
+    traffic.run(2.5);
+    let step = SpeedStep::new(99).expect("a step");
+    let refused = traffic.dispatcher.order(traffic.world.now, Order::Speed { train: TRAINS[0], step });
+    assert!(matches!(refused, Err(Refusal::StepTooHigh { .. })), "{refused:?}");
+    traffic.run(60.0);
+    assert!(traffic.wrongs.is_empty(), "{:?}", traffic.wrongs);
+    assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
+}
+
+#[test]
+fn a_journey_ordered_without_power_waits_for_it() {
+    let mut traffic = Traffic::watched();
+    traffic.dispatcher.switch_power(traffic.world.now, false);
+    traffic.go(TRAINS[0], "C1+150mm");
+    traffic.run(60.0);
+    // No turnout is thrown, and the journey is not given up.
+    assert!(
+        !traffic
+            .notices
+            .iter()
+            .any(|notice| matches!(notice, Notice::GivenUp { .. } | Notice::Withdrawn { .. }))
+    );
+    traffic.dispatcher.switch_power(traffic.world.now, true);
+    traffic.run(60.0);
+    assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
+}
+
+#[test]
+fn a_train_before_points_that_are_set_against_it_is_not_reversed_by_hand() {
+    // Given a train before turnout 2, which it would trail, and which is set for its other leg,
+    let (train, turnout) = (TRAINS[1], TurnoutId(2));
+    let with_turnout = |leg: Leg| {
+        let set = |now, driver: Driver| {
+            let mut turnouts = straight();
+            turnouts.set(turnout, leg);
+            let mut other = Driver::new(driver.layout().clone(), turnouts);
+            for train in TRAINS {
+                let located = driver.locate(train, now).expect("placed");
+                other.add_train(model(train));
+                other.place(now, train, located.at, located.uncertainty);
+            }
+            Dispatcher::watched(now, other)
+        };
+        Traffic::with(set, STARTS)
+    };
+    let reverse = |traffic: &mut Traffic| {
+        traffic.dispatcher.order(traffic.world.now, Order::Reverse { train, then: SpeedStep::STAND })
+    };
+    // then it is not reversed: no path would lead to it from the sensor that is then behind it.
+    let mut traffic = with_turnout(Leg::Curved);
+    assert_eq!(reverse(&mut traffic), Err(Refusal::PositionLost { train, turnout, curved: false }));
+    // Set as the answer says, it is, and its position stays known.
+    let mut traffic = with_turnout(Leg::Straight);
+    reverse(&mut traffic).expect("set as was asked");
+    traffic.run(2.0);
+    assert!(traffic.dispatcher.driver().locate(train, traffic.world.now).is_some());
 }

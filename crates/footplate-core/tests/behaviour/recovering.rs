@@ -118,3 +118,72 @@ fn a_turnout_that_was_to_move_while_the_station_was_silent_is_unknown() {
         assert_eq!(watched.dog.driver().turnouts().get(TurnoutId(1)), Some(Leg::Curved));
     }
 }
+
+/// A train that creeps to be located, and how many commands there were by then.
+fn creeping() -> (Watched, usize) {
+    let mut watched = Watched::asking();
+    watched.dog.lose(watched.world.now, FIRST);
+    watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
+    let creeps = |watched: &Watched| watched.world.trains[0].speed_mm_per_s > 20.0;
+    assert!(watched.run_until(60.0, creeps), "{:#?}", watched.notices);
+    let so_far = watched.commanded.len();
+    (watched, so_far)
+}
+
+/// Nothing has made the train move since, and a person is asked to help.
+fn stays_at_rest(watched: &Watched, since: usize) {
+    let moves = |command: &Command| match command {
+        Command::Speed { step, .. } => *step > SpeedStep::STAND,
+        Command::Reverse { .. } => true,
+        _ => false,
+    };
+    let moved = watched.commanded.iter().skip(since).find(|(_, command)| moves(command));
+    assert_eq!(moved, None, "{:#?}", watched.notices);
+    let asks = |notice: &&Notice| matches!(notice, Notice::NeedsOperator { train: FIRST, .. });
+    assert_eq!(watched.notices.iter().filter(asks).count(), 1);
+    assert!(watched.world.trains[0].speed_mm_per_s < 1.0);
+}
+
+#[test]
+fn no_recovery_goes_on_by_itself_after_an_emergency_stop() {
+    let (mut watched, since) = creeping();
+    watched.dog.switch_power(watched.world.now, false);
+    // Longer than it waits before it raises its step.
+    watched.run(20.0);
+    watched.dog.switch_power(watched.world.now, true);
+    watched.run(60.0);
+    stays_at_rest(&watched, since);
+}
+
+#[test]
+fn a_recovery_that_an_operator_stops_does_not_go_on_by_itself() {
+    let (mut watched, since) = creeping();
+    let stop = Order::Speed { train: FIRST, step: SpeedStep::STAND };
+    watched.dog.order(watched.world.now, stop).expect("a stop is always taken");
+    watched.run(80.0);
+    stays_at_rest(&watched, since);
+}
+
+#[test]
+fn a_permission_to_creep_ends_with_the_danger_that_it_was_for() {
+    // Given a lost train that asked to creep, and was placed before it was permitted to,
+    let mut watched = Watched::one();
+    watched.dog.ask_before_creeping();
+    watched.go(FIRST, 8);
+    watched.run(6.0);
+    watched.dog.lose(watched.world.now, FIRST);
+    watched.run(8.0);
+    let node = watched.world.layout.node_named("D1").expect("a node");
+    let at = PathPoint { node, distance: Length::from_mm(100.0) };
+    watched.dog.place(watched.world.now, FIRST, at, Length::from_mm(3.0));
+    watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
+    // when it is lost again,
+    watched.dog.lose(watched.world.now, FIRST);
+    let since = watched.commanded.len();
+    watched.run(30.0);
+    // then it asks again, and does not creep before that is answered.
+    let asked = watched.notices.iter().filter(|notice| matches!(notice, Notice::AsksToCreep { .. })).count();
+    assert_eq!(asked, 2, "{:#?}", watched.notices);
+    let creeps = |(_, command): &(_, Command)| matches!(command, Command::Speed { step, .. } if *step > SpeedStep::STAND);
+    assert!(!watched.commanded.iter().skip(since).any(creeps));
+}

@@ -24,8 +24,12 @@ impl Dispatcher {
     pub(super) fn take_by_hand(&mut self, now: Timestamp, id: TrainId) -> Result<(), Refusal> {
         let train = self.trains.get_mut(&id).ok_or(Refusal::UnknownTrain { train: id })?;
         train.assigned = None;
+        if train.state == State::InDanger {
+            // It keeps the track in which its recovery may creep.
+            return Ok(());
+        }
         train.authorities.clear();
-        if !matches!(train.state, State::ByHand | State::Lost | State::InDanger) {
+        if !matches!(train.state, State::ByHand | State::Lost) {
             train.kept = train.reservation.clone();
             train.state = State::ByHand;
         }

@@ -7,7 +7,7 @@ use crate::control::drive::{Driver, Order, OrderId, Refusal};
 use crate::control::supervise::{LinkNews, Watchdog};
 use crate::control::{Machine, Output};
 use crate::event::Event;
-use crate::ids::{FunctionNumber, SpeedStep, TrainId, TurnoutId};
+use crate::ids::{FunctionNumber, TrainId, TurnoutId};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Position;
@@ -177,6 +177,7 @@ impl Dispatcher {
     /// Sets the position of a train, as an operator entered it.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: PathPoint, uncertainty: Length) {
         self.watchdog.place(now, train, at, uncertainty);
+        self.awaiting_creep.remove(&train);
         if let Some(known) = self.trains.get_mut(&train) {
             known.state = State::Resting;
             known.detected_since_reversal = false;
@@ -262,6 +263,8 @@ impl Dispatcher {
             return Err(Refusal::TurnoutOccupied { turnout, train: holder.id });
         }
         if let Some(train) = order.train() {
+            // A refused order ends no journey.
+            self.watchdog.check(now, &order)?;
             self.take_by_hand(now, train)?;
         }
         let taken = self.watchdog.order(now, order);
@@ -403,14 +406,19 @@ impl Dispatcher {
 
     /// Commands a train to stop at once.
     pub(super) fn halt(&mut self, now: Timestamp, id: TrainId) {
-        let _ = self.watchdog.order(now, Order::Speed { train: id, step: SpeedStep::STAND });
-        self.set_halting(id);
+        self.watchdog.halt(now, id);
+        self.set_halting(now, id);
     }
 
     /// After a stop command: the train keeps its reservation until it is at rest.
-    pub(super) fn set_halting(&mut self, id: TrainId) {
+    pub(super) fn set_halting(&mut self, now: Timestamp, id: TrainId) {
+        let is_seen = self.watchdog.driver().missed_sensor(id, now).is_none();
         if let Some(train) = self.trains.get_mut(&id) {
-            let confirmed = matches!(train.state, State::Running { confirmed: true, .. });
+            let confirmed = match train.state {
+                State::Running { confirmed, .. } | State::Halting { confirmed, .. } => confirmed,
+                State::ByHand => is_seen,
+                _ => false,
+            };
             train.authorities.clear();
             train.kept = train.reservation.clone();
             train.state = State::Halting { confirmed, strayed: false };

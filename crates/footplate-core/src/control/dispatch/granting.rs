@@ -67,7 +67,9 @@ impl Dispatcher {
     /// Examines all trains at rest with a journey, the longest waiting first. A train for which others have stepped
     /// aside several times without success goes to the end of the queue.
     pub(super) fn dispatch_waiting(&mut self, now: Timestamp) {
-        if self.has_unplaced_train(now) {
+        // No turnout moves without power, and a station that does not answer starts no train.
+        let runs = self.watchdog.is_powered() && !self.watchdog.is_silent();
+        if !runs || self.has_unplaced_train(now) {
             return;
         }
         let mut waiting: Vec<(Timestamp, Timestamp, TrainId)> = self

@@ -62,7 +62,7 @@ impl Dispatcher {
                     State::Running { order: running, .. } if running == *order => {
                         self.run_given_up(now, *train, why);
                     }
-                    State::Reversing { order: turning } if turning == *order => self.set_halting(*train),
+                    State::Reversing { order: turning } if turning == *order => self.set_halting(now, *train),
                     _ => {}
                 }
             }
@@ -71,12 +71,12 @@ impl Dispatcher {
                 Some(State::Running { order: running, .. } | State::Reversing { order: running })
                     if running == *order =>
                 {
-                    self.set_halting(*train);
+                    self.set_halting(now, *train);
                 }
                 _ => {}
             },
             Notice::Lost { train } => {
-                self.set_halting(*train);
+                self.set_halting(now, *train);
                 self.set_state(*train, State::Lost);
                 self.notify(Notice::ReservedAsUnknown { train: *train });
             }
@@ -93,7 +93,7 @@ impl Dispatcher {
         if let Some(train) = self.trains.get_mut(&id).filter(|_| matches!(why, Refusal::AtLimit { .. })) {
             train.caution = (train.caution * CAUTION_FACTOR).min(MAX_CAUTION);
         }
-        self.set_halting(id);
+        self.set_halting(now, id);
     }
 
     /// Keeps the last run, to check at rest whether the train is near its destination.
@@ -171,13 +171,13 @@ impl Dispatcher {
                     self.distrust_turnouts();
                 }
                 for stopped in stopped {
-                    self.set_halting(*stopped);
+                    self.set_halting(now, *stopped);
                 }
-                self.set_halting(*train);
+                self.set_halting(now, *train);
                 self.set_state(*train, State::InDanger);
             }
             Notice::UnauthorisedMovement { stopped, .. } => {
-                stopped.iter().for_each(|train| self.set_halting(*train));
+                stopped.iter().for_each(|train| self.set_halting(now, *train));
             }
             Notice::AsksToCreep { train } => {
                 self.awaiting_creep.insert(*train);
@@ -216,10 +216,12 @@ impl Dispatcher {
         self.commanded.values_mut().for_each(|commanded| commanded.times = 0);
     }
 
-    /// Permits a train in danger to creep once all others are at rest; from then on no other moves. Returns whether
+    /// Permits a train in danger to creep once all others are at rest, one at a time; from then on no other moves. Returns whether
     /// one was permitted.
     pub(super) fn permit_creeping(&mut self, now: Timestamp) -> bool {
-        let mut has_permitted = false;
+        if self.watchdog.recovers() {
+            return false;
+        }
         let awaiting_creep: Vec<TrainId> = self.awaiting_creep.iter().copied().collect();
         for id in awaiting_creep {
             let others = self.trains.keys().filter(|other| **other != id);
@@ -245,10 +247,10 @@ impl Dispatcher {
                     }
                 }
                 self.watchdog.permit(now, id, others);
-                has_permitted = true;
+                return true;
             }
         }
-        has_permitted
+        false
     }
 
     /// All track that no other train has reserved: a creeping train may enter any of it, and no other starts.

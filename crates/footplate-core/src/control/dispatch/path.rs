@@ -202,7 +202,12 @@ impl OccupiedPath {
         if last == place.edge {
             return;
         }
-        if let Some(reversed) = self.edges.iter().rposition(|edge| edge.twin() == place.edge) {
+        // A train that has run round a loop comes back over the edges on which it came, and has not reversed.
+        let runs_on = layout
+            .edge(last)
+            .is_some_and(|known| layout.outgoing(known.to).edges().any(|next| next == place.edge));
+        let reversed = self.edges.iter().rposition(|edge| edge.twin() == place.edge);
+        if let Some(reversed) = reversed.filter(|_| !runs_on) {
             let behind = self.edges.iter().skip(reversed).rev().map(|edge| edge.twin());
             self.edges = behind.collect();
             return;

@@ -128,7 +128,7 @@ impl Dispatcher {
     fn depart(&mut self, now: Timestamp, id: TrainId) {
         let Some(run) = self.trains.get(&id).and_then(|train| train.authorities.front()) else { return };
         if run.reverses {
-            if let Some(need) = self.missing_for_reversal(now, id) {
+            if let Some(need) = self.watchdog.driver().missing_for_reversal(now, id) {
                 return self.need_more(now, id, need);
             }
             let turn = Order::Reverse { train: id, then: SpeedStep::STAND };
@@ -142,15 +142,6 @@ impl Dispatcher {
         } else {
             self.run(now, id);
         }
-    }
-
-    /// The turnout position behind a train that is missing for its position to be measured from there once it has
-    /// reversed. The train may be on another edge than planned.
-    fn missing_for_reversal(&self, now: Timestamp, id: TrainId) -> Option<TurnoutNeed> {
-        let reversed = self.watchdog.driver().reversed_position(id, now)?;
-        let is_set =
-            |need: &TurnoutNeed| self.watchdog.driver().turnouts().get(need.turnout) == Some(need.leg);
-        self.watchdog.driver().layout().needs_of(reversed.edge).find(|need| need.facing && !is_set(need))
     }
 
     /// Adds a turnout to a run, unless another train has reserved it.
@@ -327,7 +318,14 @@ impl Dispatcher {
             train.authorities.clear();
             train.state = State::Resting;
             train.purpose = Purpose::Journey;
-            train.withdrawn = train.withdrawn.saturating_add(1);
+            // What holds all trains for a while says nothing against its path.
+            let is_held = matches!(
+                why,
+                Some(
+                    Refusal::NoPower | Refusal::NoAnswer | Refusal::InDanger { .. } | Refusal::TrackNotClear
+                )
+            );
+            train.withdrawn = train.withdrawn.saturating_add(u8::from(!is_held));
             train.not_before = now + if blocks_itself { ACT_EVERY } else { PAUSE };
         }
         self.watchdog.set_end_of_authority(now, id, None);

@@ -6,6 +6,7 @@
 use crate::event::{Event, Report};
 use crate::ids::{SensorId, SpeedStep, TrainId};
 use crate::time::Timestamp;
+use crate::track::TurnoutNeed;
 use crate::tracking::{Locator, PathPoint, TrackContext};
 use crate::units::Length;
 
@@ -50,6 +51,17 @@ impl Driver {
     pub(in crate::control) fn stays_located_reversed(&self, train: TrainId, now: Timestamp) -> bool {
         let back = self.trains.get(&train).and_then(|train| train.back_at_rest(self.track.context(), now));
         back.is_some()
+    }
+
+    /// A turnout behind a train that has to be set before it reverses, for its position to remain known.
+    pub(in crate::control) fn missing_for_reversal(
+        &self,
+        now: Timestamp,
+        train: TrainId,
+    ) -> Option<TurnoutNeed> {
+        let reversed = self.reversed_position(train, now)?;
+        let is_set = |need: &TurnoutNeed| self.turnouts().get(need.turnout) == Some(need.leg);
+        self.layout().needs_of(reversed.edge).find(|need| need.facing && !is_set(need))
     }
 
     /// The train that runs backward, if a report that was not explained shows one.

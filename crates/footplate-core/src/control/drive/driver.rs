@@ -212,7 +212,7 @@ impl Driver {
     }
 
     /// Checks the values of an order, whatever the state of the railway.
-    fn check(&self, order: &Order) -> Result<(), Refusal> {
+    pub(in crate::control) fn check(&self, order: &Order) -> Result<(), Refusal> {
         let Some(id) = order.train() else { return Ok(()) };
         let train = self.trains.get(&id).ok_or(Refusal::UnknownTrain { train: id })?;
         let highest = train.model.highest();

@@ -101,6 +101,15 @@ pub enum Refusal {
         /// The train.
         train: TrainId,
     },
+    /// Where the train is could not be said if it reversed here, because a turnout behind it is set for another leg.
+    PositionLost {
+        /// The train.
+        train: TrainId,
+        /// The turnout behind it, ...
+        turnout: TurnoutId,
+        /// ... and how it has to be set.
+        curved: bool,
+    },
     /// The position of another train is unknown: no train can be kept clear of it.
     OtherNowhere {
         /// The train that was ordered to move.
@@ -277,6 +286,13 @@ impl fmt::Display for Refusal {
                 "the position of train {train} is unknown: run it over a sensor, for example with \
                  `speed {train} 6`"
             ),
+            Self::PositionLost { train, turnout, curved } => {
+                let leg = if *curved { "curved" } else { "straight" };
+                write!(
+                    f,
+                    "the position of train {train} would be lost if it reversed here: set `turnout {turnout} {leg}` first"
+                )
+            }
             Self::OtherNowhere { train, other } => write!(
                 f,
                 "train {train} cannot be kept clear of train {other}, whose position is unknown: run \

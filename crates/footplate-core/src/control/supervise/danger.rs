@@ -12,7 +12,7 @@ use crate::track::{Layout, Position};
 use crate::units::Length;
 
 use super::alarm::Alarm;
-use super::recovery::{Recovery, UNKNOWN_RATIO};
+use super::recovery::{Phase, Recovery, STOPPED_WITHIN, UNKNOWN_RATIO};
 use super::watchdog::{Power, Watchdog};
 use crate::control::Notice;
 
@@ -138,6 +138,7 @@ impl Watchdog {
         self.forget_powerless_turnouts(now);
         self.power = Power::Off { since: now };
         self.command(Command::PowerOff);
+        self.interrupt_recoveries(now);
         // Decoders forget their step without power: they receive these commands when it is back.
         let trains: Vec<TrainId> = self.driver.trains().collect();
         for train in trains {
@@ -184,6 +185,67 @@ impl Watchdog {
         match self.power {
             Power::Off { since } if !self.is_switched_off => Some(since + AT_REST_WITHOUT_POWER),
             Power::Off { .. } | Power::On => None,
+        }
+    }
+
+    /// An operator says where a train is: it is not searched any more, and trusted again if that was all that was wrong.
+    pub(super) fn end_search(&mut self, now: Timestamp, train: TrainId) {
+        if let Some(recovery) = self.dangers.get_mut(&train).filter(|recovery| recovery.is_searched()) {
+            recovery.phase = Phase::GivenUp;
+            if let Some((_, order)) = recovery.interrupted.take() {
+                self.notify(Notice::Cancelled { train, order });
+            }
+            self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
+        }
+        self.trust_again(train);
+    }
+
+    /// The recovery has failed: an operator is needed.
+    pub(super) fn need_operator(&mut self, now: Timestamp, train: TrainId) {
+        let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        let while_it = match recovery.phase {
+            Phase::Stopping | Phase::Waiting { .. } | Phase::Ending { .. } | Phase::Turning { .. } => {
+                "while it was being stopped"
+            }
+            Phase::Locating { .. } | Phase::Reversing { .. } => "while it crept to a sensor",
+            Phase::GivenUp => return,
+            _ => "while it was measured again",
+        };
+        recovery.phase = Phase::GivenUp;
+        let order = recovery.interrupted.take();
+        self.notify(Notice::NeedsOperator { train, while_it });
+        if let Some((_, order)) = order {
+            self.notify(Notice::Cancelled { train, order });
+        }
+        self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
+    }
+
+    /// All trains were commanded to stop: each recovery that moves a train begins again when it is at rest, and is permitted anew.
+    pub(super) fn interrupt_recoveries(&mut self, now: Timestamp) {
+        self.permitted.clear();
+        for recovery in self.dangers.values_mut() {
+            if let Phase::Waiting { has_asked } = &mut recovery.phase {
+                *has_asked = false;
+            } else if recovery.is_active() {
+                recovery.phase = Phase::Stopping;
+                recovery.by = now + STOPPED_WITHIN;
+            }
+        }
+    }
+
+    /// Gives up the position of a train that was found to be wrong. A monitored train is stopped and located again.
+    pub fn lose(&mut self, now: Timestamp, train: TrainId) {
+        self.driver.lose(now, train);
+        self.lost(now, train, Alarm::Lost);
+        self.drain(now);
+    }
+
+    pub(super) fn lost(&mut self, now: Timestamp, train: TrainId, why: Alarm) {
+        self.monitors.entry(train).or_default().lose();
+        if self.dangers.get(&train).is_some_and(Recovery::is_active) {
+            self.recovery_lost(now, train);
+        } else {
+            self.raise(now, train, why);
         }
     }
 

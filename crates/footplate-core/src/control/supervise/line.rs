@@ -64,6 +64,7 @@ impl Watchdog {
             LinkNews::Answers => {
                 if let Some(since) = self.silent.take() {
                     self.driver.forget_turnouts_changed(now, since);
+                    self.interrupt_recoveries(now);
                     // Stop commands may have been lost: stop each train again.
                     let trains: Vec<TrainId> = self.driver.trains().collect();
                     for train in trains {
@@ -76,20 +77,23 @@ impl Watchdog {
     }
 
     /// Switches the track power off or on for an operator. It then stays off until an operator switches it on. An
-    /// operator who switches it on has seen that nothing else moves on the track.
+    /// operator who switches it on has seen that nothing else moves on the track. No train starts by itself then, not even one that is
+    /// recovered.
     pub fn switch_power(&mut self, now: Timestamp, on: bool) {
         if on {
             self.is_switched_off = false;
             self.clear_intruder();
             if self.is_powered() {
                 self.release_held();
-            }
-            if self.is_powered() {
                 self.command(Command::PowerOn);
             }
         } else {
             self.is_switched_off = true;
             self.cut_power(now);
+            let recovered: Vec<TrainId> = self.dangers.keys().copied().collect();
+            for train in recovered {
+                self.need_operator(now, train);
+            }
         }
         self.act(now);
     }
@@ -105,7 +109,7 @@ impl Watchdog {
         self.power == Power::On
     }
 
-    pub(super) const fn is_silent(&self) -> bool {
+    pub(in crate::control) const fn is_silent(&self) -> bool {
         self.silent.is_some()
     }
 }

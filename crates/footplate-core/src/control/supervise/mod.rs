@@ -14,7 +14,7 @@
 //! danger  stops        trains that are stopped and held; stops that have to be confirmed
 //! creeping  unheard    where a train in recovery may go; how far it can have run
 //! intruder             movements that no session drives
-//! line                 the link and the track power
+//! line  orders         the link and the track power; which orders are carried out now
 //! recovery             the recovery of one train
 //! remeasuring  trials  its measurements, and the conclusions from them
 //! ```
@@ -24,6 +24,7 @@ mod creeping;
 mod danger;
 mod intruder;
 mod line;
+mod orders;
 mod recovery;
 mod remeasuring;
 mod stops;

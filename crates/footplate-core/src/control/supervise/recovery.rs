@@ -132,7 +132,7 @@ impl Recovery {
     }
 
     /// Whether it is searched, or will be once it is at rest.
-    const fn is_searched(&self) -> bool {
+    pub(super) const fn is_searched(&self) -> bool {
         match self.phase {
             Phase::Locating { .. } | Phase::Reversing { .. } => true,
             Phase::Stopping | Phase::Waiting { .. } => !self.is_roughly_located(),
@@ -462,37 +462,5 @@ impl Watchdog {
             Some(order) => self.notify(Notice::Resumed { train, interrupted: Some(id), order }),
             None => self.notify(Notice::Cancelled { train, order }),
         }
-    }
-
-    /// An operator says where a train is: it is not searched any more, and trusted again if that was all that was wrong.
-    pub(super) fn end_search(&mut self, now: Timestamp, train: TrainId) {
-        if let Some(recovery) = self.dangers.get_mut(&train).filter(|recovery| recovery.is_searched()) {
-            recovery.phase = Phase::GivenUp;
-            if let Some((_, order)) = recovery.interrupted.take() {
-                self.notify(Notice::Cancelled { train, order });
-            }
-            self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
-        }
-        self.trust_again(train);
-    }
-
-    /// The recovery has failed: an operator is needed.
-    pub(super) fn need_operator(&mut self, now: Timestamp, train: TrainId) {
-        let Some(recovery) = self.dangers.get_mut(&train) else { return };
-        let while_it = match recovery.phase {
-            Phase::Stopping | Phase::Waiting { .. } | Phase::Ending { .. } | Phase::Turning { .. } => {
-                "while it was being stopped"
-            }
-            Phase::Locating { .. } | Phase::Reversing { .. } => "while it crept to a sensor",
-            Phase::GivenUp => return,
-            _ => "while it was measured again",
-        };
-        recovery.phase = Phase::GivenUp;
-        let order = recovery.interrupted.take();
-        self.notify(Notice::NeedsOperator { train, while_it });
-        if let Some((_, order)) = order {
-            self.notify(Notice::Cancelled { train, order });
-        }
-        self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 }

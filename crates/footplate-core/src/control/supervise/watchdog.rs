@@ -53,7 +53,7 @@ pub struct Watchdog {
     /// How far each train may have run since its last detection.
     pub(super) unheard: BTreeMap<TrainId, Unheard>,
     /// The orders of recoveries.
-    own: BTreeMap<OrderId, TrainId>,
+    pub(super) own: BTreeMap<OrderId, TrainId>,
     /// Whether no dispatcher keeps trains apart and repeats orders.
     pub(super) permits_all: bool,
     /// Whether it monitors; otherwise it only passes everything on.
@@ -163,22 +163,6 @@ impl Watchdog {
         self.drain(now);
     }
 
-    /// Gives up the position of a train that was found to be wrong. A monitored train is stopped and located again.
-    pub fn lose(&mut self, now: Timestamp, train: TrainId) {
-        self.driver.lose(now, train);
-        self.lost(now, train, Alarm::Lost);
-        self.drain(now);
-    }
-
-    pub(super) fn lost(&mut self, now: Timestamp, train: TrainId, why: Alarm) {
-        self.monitors.entry(train).or_default().lose();
-        if self.dangers.get(&train).is_some_and(Recovery::is_active) {
-            self.recovery_lost(now, train);
-        } else {
-            self.raise(now, train, why);
-        }
-    }
-
     /// See [`Driver::count_from_behind`].
     pub(in crate::control) fn count_from_behind(&mut self, now: Timestamp, train: TrainId) {
         self.driver.count_from_behind(now, train);
@@ -203,6 +187,11 @@ impl Watchdog {
         self.dangers.contains_key(&train)
     }
 
+    /// Whether a train moves, or is permitted to, to be recovered.
+    pub(in crate::control) fn recovers(&self) -> bool {
+        !self.permitted.is_empty() || self.dangers.values().any(Recovery::is_active)
+    }
+
     /// Whether orders to a train are rejected for a temporary reason: a recovery or a silent station.
     #[must_use]
     pub fn is_interrupted(&self, now: Timestamp, train: TrainId) -> bool {
@@ -219,7 +208,10 @@ impl Watchdog {
     /// Permits a train that asked to creep and to be measured, outside the track that is
     /// reserved for others.
     pub fn permit(&mut self, now: Timestamp, train: TrainId, closed: Reservation) {
-        self.permitted.insert(train, closed);
+        // It may have been placed, or power may have gone, since it asked.
+        if self.is_in_danger(train) {
+            self.permitted.insert(train, closed);
+        }
         self.act(now);
     }
 
@@ -227,61 +219,6 @@ impl Watchdog {
     pub fn distrust(&mut self, now: Timestamp, train: TrainId) {
         self.raise(now, train, Alarm::Distrusted);
         self.act(now);
-    }
-
-    /// Carries out an order; see [`Driver::order`].
-    ///
-    /// # Errors
-    /// As [`Driver::order`], and if the train is held, the station silent or the power off.
-    pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
-        if let Some(train) = order.train() {
-            let stops = matches!(order, Order::Speed { step: SpeedStep::STAND, .. });
-            if !stops && matches!(order, Order::Speed { .. }) && self.driver.trains().count() == 1 {
-                // The only train: the operator runs it over a sensor, which locates it.
-                self.trust_again(train);
-            }
-            if !stops && (self.is_held(train) || self.could_meet(now, train)) {
-                let is_moved = self.dangers.is_empty() && self.has_intruder();
-                return Err(if is_moved { Refusal::TrackNotClear } else { Refusal::InDanger { train } });
-            }
-            if !stops && self.is_silent() {
-                return Err(Refusal::NoAnswer);
-            }
-            if !stops && !self.is_powered() {
-                return Err(Refusal::NoPower);
-            }
-        }
-        let id = self.driver.order(now, order)?;
-        if let Some(train) = order.train() {
-            if matches!(order, Order::Speed { step: SpeedStep::STAND, .. }) {
-                self.unfinished.remove(&train);
-                if let Some(held) = self.held.get_mut(&train) {
-                    *held = None;
-                }
-            } else {
-                self.unfinished.insert(train, (id, order));
-            }
-        }
-        self.act(now);
-        Ok(id)
-    }
-
-    /// Restores the earlier model of a train that could not be recovered, after an operator has checked it.
-    pub(super) fn trust_again(&mut self, train: TrainId) {
-        let given_up = self.dangers.get(&train).filter(|danger| danger.phase == Phase::GivenUp);
-        if let Some(base) = given_up.map(|danger| danger.base().clone()) {
-            self.driver.set_model(base);
-            self.forget(train);
-        }
-    }
-
-    /// Gives an order of a recovery.
-    pub(super) fn issue(&mut self, now: Timestamp, order: Order) -> Option<OrderId> {
-        let id = self.driver.order(now, order).ok()?;
-        if let Some(train) = order.train() {
-            self.own.insert(id, train);
-        }
-        Some(id)
     }
 
     pub(super) fn notify(&mut self, notice: Notice) {
@@ -292,8 +229,9 @@ impl Watchdog {
         self.queue.push_back(Output::Command(command));
     }
 
-    fn forget(&mut self, train: TrainId) {
+    pub(super) fn forget(&mut self, train: TrainId) {
         self.dangers.remove(&train);
+        self.permitted.remove(&train);
         self.held.remove(&train);
         self.unfinished.remove(&train);
         self.stops.forget(train);
@@ -322,7 +260,7 @@ impl Watchdog {
     }
 
     /// Passes on the outputs of the driver, and monitors them.
-    fn drain(&mut self, now: Timestamp) {
+    pub(super) fn drain(&mut self, now: Timestamp) {
         while let Some(output) = self.driver.poll_output() {
             match output {
                 Output::Command(command) => {

@@ -1,0 +1,95 @@
+//! Orders: which are carried out now, and those of recoveries.
+
+use crate::control::Refusal;
+use crate::control::drive::{Order, OrderId};
+use crate::ids::{SpeedStep, TrainId};
+use crate::time::Timestamp;
+
+use super::recovery::{Phase, Recovery};
+use super::watchdog::Watchdog;
+
+impl Watchdog {
+    /// Carries out an order; see [`Driver::order`].
+    ///
+    /// # Errors
+    /// As [`Driver::order`], and if the train is held, the station silent or the power off.
+    pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
+        self.check(now, &order)?;
+        if let Order::Speed { train, step: SpeedStep::STAND } = order
+            && self.dangers.get(&train).is_some_and(Recovery::is_active)
+        {
+            // What an operator has stopped stays at rest until an operator moves it.
+            self.need_operator(now, train);
+        }
+        self.carry_out(now, order)
+    }
+
+    /// Refuses an order that is not carried out now. The only train is trusted again first: an operator who runs it over a sensor
+    /// locates it.
+    pub(in crate::control) fn check(&mut self, now: Timestamp, order: &Order) -> Result<(), Refusal> {
+        self.driver.check(order)?;
+        if let Some(train) = order.train() {
+            let stops = matches!(order, Order::Speed { step: SpeedStep::STAND, .. });
+            if !stops && matches!(order, Order::Speed { .. }) && self.driver.trains().count() == 1 {
+                self.trust_again(train);
+            }
+            if !stops && (self.is_held(train) || self.could_meet(now, train)) {
+                let is_moved = self.dangers.is_empty() && self.has_intruder();
+                return Err(if is_moved { Refusal::TrackNotClear } else { Refusal::InDanger { train } });
+            }
+            if !stops && self.is_silent() {
+                return Err(Refusal::NoAnswer);
+            }
+            if !stops && !self.is_powered() {
+                return Err(Refusal::NoPower);
+            }
+            if matches!(order, Order::Reverse { .. })
+                && self.driver.is_at_rest(train, now)
+                && let Some(need) = self.driver.missing_for_reversal(now, train)
+            {
+                let (turnout, curved) = (need.turnout, need.leg.is_curved());
+                return Err(Refusal::PositionLost { train, turnout, curved });
+            }
+        }
+        Ok(())
+    }
+
+    /// Stops a train, as a dispatcher: its recovery goes on.
+    pub(in crate::control) fn halt(&mut self, now: Timestamp, train: TrainId) {
+        let _ = self.carry_out(now, Order::Speed { train, step: SpeedStep::STAND });
+    }
+
+    fn carry_out(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
+        let id = self.driver.order(now, order)?;
+        if let Some(train) = order.train() {
+            if matches!(order, Order::Speed { step: SpeedStep::STAND, .. }) {
+                self.unfinished.remove(&train);
+                if let Some(held) = self.held.get_mut(&train) {
+                    *held = None;
+                }
+            } else {
+                self.unfinished.insert(train, (id, order));
+            }
+        }
+        self.act(now);
+        Ok(id)
+    }
+
+    /// Restores the earlier model of a train that could not be recovered, after an operator has checked it.
+    pub(super) fn trust_again(&mut self, train: TrainId) {
+        let given_up = self.dangers.get(&train).filter(|danger| danger.phase == Phase::GivenUp);
+        if let Some(base) = given_up.map(|danger| danger.base().clone()) {
+            self.driver.set_model(base);
+            self.forget(train);
+        }
+    }
+
+    /// Gives an order of a recovery.
+    pub(super) fn issue(&mut self, now: Timestamp, order: Order) -> Option<OrderId> {
+        let id = self.driver.order(now, order).ok()?;
+        if let Some(train) = order.train() {
+            self.own.insert(id, train);
+        }
+        Some(id)
+    }
+}
