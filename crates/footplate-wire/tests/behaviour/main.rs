@@ -17,6 +17,7 @@ mod jmri_codec;
 mod jmri_session;
 mod loconet_codec;
 mod loconet_session;
+mod marklin_can_roster;
 mod marklin_can_round_trip;
 mod marklin_can_session;
 mod marklin_can_vectors;

@@ -23,6 +23,9 @@ use crate::session::LinkNotice;
 const VERSION: (u8, u8) = (2, 0);
 const KIND: u16 = 0xFFE0;
 
+/// The list of locomotives, once its stream comes.
+const ROSTER: Awaited = Awaited::Roster { has_begun: true };
+
 impl Client {
     pub(super) fn hear_byte(&mut self, now: Timestamp, byte: u8) {
         let frame = self.framing.push(byte);
@@ -50,14 +53,16 @@ impl Client {
                     Message::Participant { uid: self.settings.uid, version: VERSION, kind: KIND };
                 self.write(participant, true);
             }
+            // Other programs on the bus ask for files, too, and their streams say not of what.
+            (Message::StreamBegins { .. } | Message::StreamGoesOn(_), _) if !self.awaits_roster() => {}
             (Message::StreamBegins { length, .. }, _) => {
-                self.dialogue.outstanding.goes_on(Awaited::Roster { has_begun: true }, now);
+                self.dialogue.outstanding.goes_on(ROSTER, now);
                 self.roster.begins(length);
             }
             (Message::StreamGoesOn(bytes), _) => {
-                self.dialogue.outstanding.goes_on(Awaited::Roster { has_begun: true }, now);
+                self.dialogue.outstanding.goes_on(ROSTER, now);
                 if self.roster.goes_on(bytes) == Some(true) {
-                    self.dialogue.outstanding.take(&Awaited::Roster { has_begun: true });
+                    self.dialogue.outstanding.take(&ROSTER);
                 }
             }
             (Message::Overload { .. }, _) => self.hear_power(false),
@@ -65,6 +70,10 @@ impl Client {
             // Requests of other programs count only when the station confirms them.
             _ => {}
         }
+    }
+
+    fn awaits_roster(&self) -> bool {
+        self.dialogue.outstanding.has(&ROSTER)
     }
 
     /// The station confirms or reports something.
