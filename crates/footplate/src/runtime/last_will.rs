@@ -139,11 +139,11 @@ pub(crate) trait WillLine {
     fn say(&self, words: &str);
 }
 
-/// Sends a last will. Starts again each time the line has to be reopened, until all of it is sent or a person gives up.
-/// Returns whether it was sent.
+/// Sends a last will. Starts again each time the line has to be reopened, until all of it is sent or a person gives up; it is tried at
+/// least once. Returns whether it was sent.
 pub(crate) fn carry_out(line: &mut impl WillLine, will: &[u8]) -> bool {
     let mut was_gone = false;
-    while !line.gives_up() {
+    loop {
         let said = if line.is_open() { Ok(()) } else { line.open() };
         if said.is_ok() && std::mem::take(&mut was_gone) {
             line.say("the line is open again");
@@ -155,8 +155,10 @@ pub(crate) fn carry_out(line: &mut impl WillLine, will: &[u8]) -> bool {
         was_gone = true;
         line.close();
         line.pause(REOPEN_EVERY);
+        if line.gives_up() {
+            return false;
+        }
     }
-    false
 }
 
 fn try_to_carry_out(line: &mut impl WillLine, will: &[u8]) -> Result<(), Lost> {
@@ -266,6 +268,50 @@ mod tests {
             session.handle_timeout(at);
         }
         session
+    }
+
+    /// A line that is open from its nth attempt on, and a person who does not wait.
+    struct Impatient {
+        opens_after: usize,
+        attempts: usize,
+        written: Vec<u8>,
+    }
+
+    impl WillLine for Impatient {
+        fn is_open(&self) -> bool {
+            self.attempts > self.opens_after
+        }
+        fn open(&mut self) -> Result<(), Lost> {
+            self.attempts += 1;
+            if self.is_open() { Ok(()) } else { Err(Lost("it is gone".to_owned())) }
+        }
+        fn close(&mut self) {}
+        fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+            self.written.extend(bytes);
+            Ok(())
+        }
+        fn cts(&self) -> Option<bool> {
+            None
+        }
+        fn pause(&mut self, _: Duration) {}
+        fn has_answered(&self) -> bool {
+            true
+        }
+        fn expect_answer(&mut self) {}
+        fn gives_up(&self) -> bool {
+            true
+        }
+        fn say(&self, _: &str) {}
+    }
+
+    #[test]
+    fn a_will_is_tried_once_whoever_gives_up() {
+        let will = written(&[Bequest { after: TimeSpan::ZERO, bytes: b"stop".to_vec() }], 1.0);
+        for (opens_after, sent) in [(0, true), (1, false)] {
+            let mut line = Impatient { opens_after, attempts: 0, written: Vec::new() };
+            assert_eq!(carry_out(&mut line, &will), sent);
+            assert_eq!((line.attempts, line.written == b"stop"), (1, sent));
+        }
     }
 
     #[test]
