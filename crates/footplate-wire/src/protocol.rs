@@ -67,9 +67,10 @@ pub(crate) trait Protocol {
     /// Returns the request for a command, and notes what it commands.
     fn outgoing(&mut self, now: Timestamp, command: Command) -> Next<Self>;
 
-    /// Returns the next request to write again.
+    /// Returns the next request to write again. A turnout is not thrown again while a coil is powered: its pulse would not end.
     fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Next<Self>> {
-        self.dialogue_mut().next_again(now, only_urgent)
+        let may_throw = self.release_at().is_none();
+        self.dialogue_mut().next_again(now, only_urgent, may_throw)
     }
 
     /// Switches off the coil that was powered for long enough.

@@ -192,7 +192,7 @@ impl Protocol for Client {
     /// At the end the stop of a train waits for the answer in which direction it runs.
     fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
         let is_ending = self.dialogue.farewell.has_begun();
-        self.dialogue.next_again(now, only_urgent && !is_ending)
+        self.dialogue.next_again(now, only_urgent && !is_ending, true)
     }
 
     fn query(&self, train: TrainId) -> Outgoing<Awaited> {
@@ -209,7 +209,7 @@ impl Protocol for Client {
                 Request::Power { on, .. } => Outgoing::asks(request, Awaited::Power(on)),
                 _ => Outgoing::says(request),
             }),
-            Opening::Open { .. } => match self.unverified.pop() {
+            Opening::Open { .. } => match self.dialogue.take_unblocked(&mut self.unverified) {
                 Some(train) => Some(self.query(train)),
                 None => return ControlFlow::Continue(()),
             },

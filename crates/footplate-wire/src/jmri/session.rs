@@ -219,7 +219,7 @@ impl Protocol for Client {
                 _ => Outgoing::says(request),
             }));
         }
-        let unverified = self.unverified.pop();
+        let unverified = self.dialogue.take_unblocked(&mut self.unverified);
         unverified.map_or(ControlFlow::Continue(()), |train| ControlFlow::Break(Some(self.query(train))))
     }
 

@@ -276,6 +276,11 @@ impl Protocol for Client {
 
     fn before_stops(&mut self) -> Option<Outgoing<Awaited>> {
         let (train, slot) = self.unused.pop()?;
+        let drives = |awaited: &Awaited| matches!(awaited, Awaited::Driven(of, ..) if *of == train);
+        if self.dialogue.outstanding.any(drives) {
+            // Its repeats show whether the slot is in use, and a question would end them.
+            return Some(Outgoing::says(Request::Use(slot)));
+        }
         Some(Outgoing::asks(Request::Use(slot), Awaited::Locomotive(train)))
     }
 
@@ -302,7 +307,12 @@ impl Protocol for Client {
 
     fn next_release(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
         let (address, closed, _) = self.pulse.take_if(|(.., until)| now >= *until)?;
-        Some(Outgoing::says(Request::Switch { address, closed, on: false }))
+        let request = Request::Switch { address, closed, on: false };
+        let message = Message::Switch { address, closed, on: false };
+        let turnout = self.settings.turnout_at(address);
+        Some(turnout.map_or(Outgoing::says(request), |turnout| {
+            Outgoing::asks(request, Awaited::Release(turnout, message))
+        }))
     }
 
     fn release_at(&self) -> Option<Timestamp> {
@@ -326,7 +336,7 @@ impl Protocol for Client {
                 None => self.opened(),
             }
         }
-        let unverified = self.unverified.pop();
+        let unverified = self.dialogue.take_unblocked(&mut self.unverified);
         unverified.map_or(ControlFlow::Continue(()), |train| ControlFlow::Break(Some(self.query(train))))
     }
 

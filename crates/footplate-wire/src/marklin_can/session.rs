@@ -210,8 +210,9 @@ impl Protocol for Client {
     }
 
     fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
+        let may_throw = self.release_at().is_none();
         loop {
-            match self.dialogue.next_repeat(now, only_urgent)? {
+            match self.dialogue.next_repeat(now, only_urgent, may_throw)? {
                 Repeat::Again(outgoing) => return Some(outgoing),
                 Repeat::GivenUp(given_up) => {
                     if let Some(instead) = self.instead_of(&given_up) {

@@ -372,6 +372,8 @@ impl Session for Interface {
             self.farewell.will_command(train, step);
         }
         self.waiting.push(command).map_err(CommandError::TooManyWaiting)?;
+        // What brings it into step from now on must not switch the power on again.
+        self.power &= command != Command::PowerOff;
         self.go_on(now);
         Ok(())
     }

@@ -220,8 +220,9 @@ impl Protocol for Client {
     }
 
     fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
+        let may_throw = self.release_at().is_none();
         loop {
-            match self.dialogue.next_repeat(now, only_urgent)? {
+            match self.dialogue.next_repeat(now, only_urgent, may_throw)? {
                 // Inputs are polled anyway.
                 Repeat::Again(outgoing)
                     if !(self.opening.is_open() && matches!(outgoing.request, Request::Feedback { .. })) =>
@@ -259,7 +260,7 @@ impl Protocol for Client {
             self.question(Request::Status)
         } else if core::mem::take(&mut self.asks_broadcasts) {
             self.question(Request::Broadcasts)
-        } else if let Some(train) = self.unverified.pop() {
+        } else if let Some(train) = self.dialogue.take_unblocked(&mut self.unverified) {
             self.query(train)
         } else {
             return ControlFlow::Continue(());

@@ -6,6 +6,7 @@
     reason = "a test may stop at the first surprise"
 )]
 
+mod confirmations;
 mod dcc_ex_desk;
 mod dcc_ex_round_trip;
 mod dcc_ex_session;

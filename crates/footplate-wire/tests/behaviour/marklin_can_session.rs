@@ -16,7 +16,7 @@ pub(crate) struct Central {
     /// What was written that is no frame.
     texts: Vec<String>,
     /// Whether the station leaves a request without an answer.
-    ignores: fn(&Message) -> bool,
+    pub(crate) ignores: fn(&Message) -> bool,
 }
 
 impl Central {
@@ -78,7 +78,7 @@ impl Desk {
         Self::with(Client::new(ms(0), settings), station)
     }
 
-    fn opened() -> Self {
+    pub(crate) fn opened() -> Self {
         let mut desk = Self::new(Settings { modules: 2, ..Settings::default() });
         desk.run_until(ms(2_000));
         desk.written.clear();

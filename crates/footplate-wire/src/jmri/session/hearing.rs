@@ -147,6 +147,7 @@ impl Client {
         let ThrottleMessage { throttle, forward, functions, .. } = *message;
         if message.is_released {
             self.lost_throttle(train);
+            self.dialogue.outstanding.take_first(|outstanding| outstanding.awaited.train() == Some(train));
             return self.unverified.push(train);
         }
         let whole = throttle.zip(forward).filter(|_| message.address.is_some());

@@ -15,6 +15,7 @@ use super::super::uid::Uid;
 use super::{Client, Query};
 use crate::dialogue::Opening;
 use crate::locomotives::ReportedFunctions;
+use crate::outstanding::Awaited as _;
 use crate::queue::train_of;
 use crate::session::LinkNotice;
 
@@ -242,7 +243,7 @@ impl Client {
 
     fn hear_of_turnout(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool, was_asked: bool) {
         let before = self.dialogue.hear_of_turnout(turnout, curved);
-        let is_own = was_asked || self.dialogue.outstanding.has(&Awaited::Accessory(turnout, Uid::ALL, 0, 0));
+        let is_own = was_asked || self.dialogue.outstanding.any(|awaited| awaited.turnout() == Some(turnout));
         if !is_own && before != Some(curved) {
             // Another throttle has thrown it.
             self.dialogue.enter(now, EventKind::Turnout { turnout, curved });
