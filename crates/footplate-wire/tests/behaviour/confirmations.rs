@@ -73,7 +73,7 @@ fn a_question_does_not_end_the_repeats_of_a_stop() {
     desk.run_for(2_000);
     desk.station.is_deaf_to = |_| false;
     desk.run_for(500);
-    // then the stop is repeated until it does, and nobody else is blamed.
+    // then the stop is repeated until it does, and no other throttle is blamed.
     assert_eq!(desk.station.locomotive(24).throttle, Throttle::Stop, "{:?}", desk.written);
     let blames = |notice: &LinkNotice| matches!(notice, LinkNotice::OtherThrottle { .. });
     assert!(!desk.notices.iter().any(blames), "{:?}", desk.notices);

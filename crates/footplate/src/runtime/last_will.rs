@@ -19,6 +19,9 @@ const HAND_SHAKE: TimeSpan = TimeSpan::from_ms(5);
 /// Upper bound: many times what stops every train of a station.
 const MOST_PARTS: usize = 2_000;
 
+/// A power command leaves within this time, other commands before it included; until then a last will begins without power, which is safe.
+const POWER_LEAVES_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
+
 /// Between two attempts to open a line again.
 const REOPEN_EVERY: Duration = Duration::from_millis(250);
 /// How long a byte waits for the handshake. After that it is sent all the same.
@@ -38,6 +41,8 @@ pub(super) struct LastWill {
     was_running: bool,
     /// Whether the last will must be computed again.
     is_stale: bool,
+    /// When a power command that was accepted has left the session.
+    power_leaves: Option<Timestamp>,
 }
 
 impl LastWill {
@@ -46,7 +51,11 @@ impl LastWill {
     }
 
     /// A command was accepted; its bytes have not left.
-    pub(super) fn accepted(&mut self, command: Command) {
+    pub(super) fn accepted(&mut self, now: Timestamp, command: Command) {
+        if let Command::PowerOff | Command::PowerOn = command {
+            // A last will may begin with the power as it should be.
+            (self.is_stale, self.power_leaves) = (true, Some(now + POWER_LEAVES_WITHIN));
+        }
         if let Command::Speed { train, step } = command
             && step != SpeedStep::STAND
         {
@@ -84,6 +93,7 @@ impl LastWill {
                 self.is_stale |= self.expected.remove(train);
             }
         }
+        self.is_stale |= self.power_leaves.take_if(|leaves| now >= *leaves).is_some();
         if std::mem::take(&mut self.is_stale) {
             guardian.bequeath(&farewell_of(session, now, has_cts))?;
         }
@@ -335,6 +345,24 @@ mod tests {
                 let stop = Message::Stop.encode().expect("bytes");
                 assert_eq!((off, &[*last][..]), (stop.as_bytes(), stop.as_bytes()));
             }
+        }
+    }
+
+    #[test]
+    fn no_will_switches_the_power_on_after_an_emergency_stop() {
+        for until in (0..1_000).step_by(7) {
+            let session: StationSession =
+                Interface::new(Timestamp::ZERO, Settings::with_cts(5)).expect("modules").into();
+            let now = Timestamp::ZERO + TimeSpan::from_ms(until);
+            let mut session = driven(session, now);
+            // The commands of an emergency stop are accepted; none has left yet.
+            let mut will = LastWill::default();
+            session.handle_command(now, Command::PowerOff).expect("always");
+            will.accepted(now, Command::PowerOff);
+            assert!(will.is_stale, "the guardian gets a new one");
+            let said = farewell_of(&session, now, true);
+            let go = Message::Go.encode().expect("bytes");
+            assert!(said.iter().all(|part| part.bytes != go.as_bytes()), "after {until} ms: {said:?}");
         }
     }
 
