@@ -70,7 +70,7 @@ pub(crate) enum Request {
 }
 
 impl Request {
-    /// Whether it is carried out although nobody waits for the answer any more: it stops trains, or only tells what has changed.
+    /// Whether it is carried out although its client does not wait for the answer any more: it stops trains, or only tells what has changed.
     fn is_done_late(&self) -> bool {
         match self {
             Self::EmergencyStop | Self::SavedSchedules(_) => true,

@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn a_will_is_tried_once_whoever_gives_up() {
+    fn a_will_is_tried_once_even_if_a_person_gives_up() {
         let will = written(&[Bequest { after: TimeSpan::ZERO, bytes: b"stop".to_vec() }], 1.0);
         for (opens_after, sent) in [(0, true), (1, false)] {
             let mut line = Impatient { opens_after, attempts: 0, written: Vec::new() };
