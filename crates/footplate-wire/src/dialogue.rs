@@ -174,10 +174,15 @@ impl<A: Awaited> Dialogue<A> {
         })
     }
 
-    /// Returns a request whose answer is overdue, unless a newer command replaces it.
-    pub(crate) fn next_repeat(&mut self, now: Timestamp, only_urgent: bool) -> Option<Repeat<A>> {
+    /// Returns a request whose answer is overdue, unless a newer command replaces it. `may_throw`: whether a turnout may be thrown now.
+    pub(crate) fn next_repeat(
+        &mut self,
+        now: Timestamp,
+        only_urgent: bool,
+        may_throw: bool,
+    ) -> Option<Repeat<A>> {
         loop {
-            let due = self.outstanding.take_due(now, only_urgent)?;
+            let due = self.outstanding.take_due(now, only_urgent, may_throw)?;
             let (command, tries) = (due.command, due.tries);
             if command.is_some_and(|command| self.waiting.outdates(command)) {
                 continue;
@@ -198,9 +203,14 @@ impl<A: Awaited> Dialogue<A> {
     }
 
     /// Returns the next request to write again; those that were given up are dropped.
-    pub(crate) fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<A>> {
+    pub(crate) fn next_again(
+        &mut self,
+        now: Timestamp,
+        only_urgent: bool,
+        may_throw: bool,
+    ) -> Option<Outgoing<A>> {
         loop {
-            if let Repeat::Again(outgoing) = self.next_repeat(now, only_urgent)? {
+            if let Repeat::Again(outgoing) = self.next_repeat(now, only_urgent, may_throw)? {
                 return Some(outgoing);
             }
         }
@@ -224,6 +234,13 @@ impl<A: Awaited> Dialogue<A> {
     pub(crate) fn undirected(&self, is_asked: impl Fn(TrainId) -> bool) -> Option<TrainId> {
         let asks = |train: &TrainId| !self.locomotives.has_direction(*train) && !is_asked(*train);
         self.waiting.iter().filter_map(train_of).find(asks)
+    }
+
+    /// Removes and returns a train whose state may be asked for. A question would replace the request of a train that is not confirmed
+    /// yet, which would not be repeated then.
+    pub(crate) fn take_unblocked(&self, trains: &mut Vec<TrainId>) -> Option<TrainId> {
+        let at = trains.iter().rposition(|train| self.outstanding.blocks(*train, false).is_none())?;
+        Some(trains.remove(at))
     }
 
     /// Returns the next command that is not urgent; `may_throw`: whether a turnout may be thrown now.
@@ -382,6 +399,14 @@ impl<A: Awaited> Dialogue<A> {
         if !on {
             self.farewell.power_went_off();
         }
+    }
+
+    /// Notes that all locomotives are stopped while the track has power.
+    pub(crate) fn hear_of_stop(&mut self, is_lost: bool) {
+        if is_lost {
+            self.notify(LinkNotice::PowerLost);
+        }
+        self.is_powered = false;
     }
 
     /// Handles a station that was reset: trains have stopped, and their directions are written again.

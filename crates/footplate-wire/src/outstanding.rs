@@ -182,9 +182,17 @@ impl<A: Awaited> AllOutstanding<A> {
         }
     }
 
-    /// Removes and returns a request whose answer is overdue.
-    pub(crate) fn take_due(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outstanding<A>> {
-        self.take_first(|outstanding| now >= outstanding.due() && (!only_urgent || outstanding.is_urgent()))
+    /// Removes and returns a request whose answer is overdue. `may_throw`: whether a turnout may be thrown now.
+    pub(crate) fn take_due(
+        &mut self,
+        now: Timestamp,
+        only_urgent: bool,
+        may_throw: bool,
+    ) -> Option<Outstanding<A>> {
+        self.take_first(|outstanding| {
+            let may_go = may_throw || !matches!(outstanding.command, Some(Command::Turnout { .. }));
+            now >= outstanding.due() && may_go && (!only_urgent || outstanding.is_urgent())
+        })
     }
 
     /// Returns when the next request is overdue, of those that stop something or of the rest.

@@ -2,7 +2,9 @@
 
 use core::ops::{ControlFlow, RangeInclusive};
 
-use footplate_core::{Command, DecoderSteps, SensorId, TimeSpan, Timestamp, TrainId};
+use footplate_core::{
+    Command, DecoderSteps, FunctionNumber, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+};
 
 use crate::dialogue::Dialogue;
 use crate::outstanding::{Awaited, Outgoing};
@@ -10,6 +12,9 @@ use crate::session::{Closing, CommandError, Session, Transmit};
 
 /// A request of a protocol, and the answer that it awaits.
 type Next<P> = Outgoing<<P as Protocol>::Awaited>;
+
+/// A request of a protocol, and the answer that confirms it, if one does.
+type Confirmed<P> = (<<P as Protocol>::Awaited as Awaited>::Request, Option<<P as Protocol>::Awaited>);
 
 /// The protocol of a station that confirms what it does.
 pub(crate) trait Protocol {
@@ -64,12 +69,22 @@ pub(crate) trait Protocol {
         None
     }
 
-    /// Returns the request for a command, and notes what it commands.
-    fn outgoing(&mut self, now: Timestamp, command: Command) -> Next<Self>;
+    /// Returns the request that drives a train at a step, reversed or not, and notes what it commands.
+    fn drive(&mut self, now: Timestamp, train: TrainId, step: SpeedStep, reverses: bool) -> Confirmed<Self>;
 
-    /// Returns the next request to write again.
+    /// Returns the request that throws a turnout, and notes what it powers.
+    fn throw(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) -> Confirmed<Self>;
+
+    /// Returns the request that switches a function of a train.
+    fn switch(&mut self, train: TrainId, function: FunctionNumber, on: bool) -> Confirmed<Self>;
+
+    /// Returns the request that switches the power of the track.
+    fn switch_power(&self, on: bool) -> Confirmed<Self>;
+
+    /// Returns the next request to write again. A turnout is not thrown again while a coil is powered: its pulse would not end.
     fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Next<Self>> {
-        self.dialogue_mut().next_again(now, only_urgent)
+        let may_throw = self.release_at().is_none();
+        self.dialogue_mut().next_again(now, only_urgent, may_throw)
     }
 
     /// Switches off the coil that was powered for long enough.
@@ -111,6 +126,22 @@ pub(crate) trait Protocol {
     fn end_begins(&mut self, _now: Timestamp) {}
 
     // What follows from the above.
+
+    /// Returns the request for a command, and notes what it commands.
+    fn outgoing(&mut self, now: Timestamp, command: Command) -> Next<Self> {
+        let (request, awaited) = match command {
+            Command::Speed { train, step } => self.drive(now, train, step, false),
+            Command::Reverse { train } => self.drive(now, train, SpeedStep::STAND, true),
+            Command::Turnout { turnout, curved } => self.throw(now, turnout, curved),
+            Command::Function { train, function, on } => self.switch(train, function, on),
+            Command::PowerOff | Command::PowerOn => {
+                let on = command == Command::PowerOn;
+                self.dialogue_mut().power = on;
+                self.switch_power(on)
+            }
+        };
+        Outgoing::commands(command, request, awaited)
+    }
 
     /// When to continue.
     fn continues_at(&self) -> Option<Timestamp> {

@@ -149,7 +149,7 @@ pub(crate) const fn entry_of(command: &Command, nth: u8) -> Option<EventKind> {
 }
 
 /// Whether both switch the same function of the same train.
-fn switches_same(command: &Command, other: &Command) -> bool {
+pub(crate) fn switches_same(command: &Command, other: &Command) -> bool {
     let switched = |command: &Command| match *command {
         Command::Function { train, function, .. } => Some((train, function)),
         _ => None,

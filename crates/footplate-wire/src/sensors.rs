@@ -2,6 +2,12 @@
 
 use alloc::vec::Vec;
 
+use footplate_core::{SensorId, TimeSpan, Timestamp};
+
+use crate::dialogue::Dialogue;
+use crate::outstanding::Awaited;
+use crate::session::LinkNotice;
+
 /// The sensors that the station has reported, in the order of their numbers there.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Sensors(Vec<(u16, bool)>);
@@ -34,6 +40,28 @@ impl Sensors {
             (None | Some(false), true) => Change::Occupied,
             (Some(true), false) => Change::Freed,
             _ => Change::None,
+        }
+    }
+}
+
+impl<A: Awaited> Dialogue<A> {
+    /// Reports what has changed at a sensor within a span that ends at `latest`; `blind_since`: since when the line was silent, until the
+    /// states have been read again. It may have become occupied at any time since.
+    pub(crate) fn hear_of_change(
+        &mut self,
+        sensor: SensorId,
+        change: Change,
+        (latest, width): (Timestamp, TimeSpan),
+        blind_since: Option<Timestamp>,
+    ) {
+        match change {
+            Change::Occupied => {
+                let width = blind_since.map_or(width, |since| width.max(latest - since));
+                self.report(sensor, latest, width);
+            }
+            Change::Freed => self.report_free(sensor, latest, width),
+            Change::HeldFromStart => self.notify(LinkNotice::HeldClosed { sensor }),
+            Change::None => {}
         }
     }
 }

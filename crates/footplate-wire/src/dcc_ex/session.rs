@@ -7,7 +7,7 @@ use alloc::string::ToString;
 use alloc::vec::Vec;
 use core::ops::{ControlFlow, RangeInclusive};
 
-use footplate_core::{Command, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use super::framing::Framing;
 use super::opening::Opening;
@@ -74,35 +74,9 @@ impl Client {
         client
     }
 
-    fn drive(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> (Request, Option<Awaited>) {
-        let forward = self.dialogue.commanded(train, step, reverses);
-        let throttle = self.throttle(train, step);
-        (Request::Drive { cab: train.0, throttle, forward }, Some(Awaited::Driven(train, throttle, forward)))
-    }
-
     /// The board's speed for a step of a train.
     fn throttle(&self, train: TrainId, step: SpeedStep) -> Throttle {
         Throttle::Speed(speed_of(step, self.dialogue.decoder(train)).unwrap_or_default())
-    }
-
-    /// The board answers only when the state changes.
-    fn switch(&self, train: TrainId, function: FunctionNumber, on: bool) -> (Request, Option<Awaited>) {
-        let known = self.dialogue.locomotives.get(train).and_then(|known| known.functions.is_on(function));
-        let changes = known != Some(on);
-        let request = Request::Function { cab: train.0, function: function.get(), on };
-        (request, changes.then_some(Awaited::Function(train, function, on)))
-    }
-
-    fn throw(&self, turnout: TurnoutId, curved: bool) -> (Request, Option<Awaited>) {
-        match self.settings.turnouts {
-            TurnoutRequests::Accessory => (Request::Accessory { address: turnout.0, on: curved }, None),
-            TurnoutRequests::Defined => {
-                // The board answers only when the state changes.
-                let changes = !self.dialogue.lies(turnout, curved);
-                let awaited = changes.then_some(Awaited::Turnout(turnout, curved));
-                (Request::Turnout { id: turnout.0, thrown: curved }, awaited)
-            }
-        }
     }
 }
 
@@ -173,26 +147,47 @@ impl Protocol for Client {
         Request::StopAll
     }
 
-    fn outgoing(&mut self, _now: Timestamp, command: Command) -> Outgoing<Awaited> {
-        let (request, awaited) = match command {
-            Command::Speed { train, step } => self.drive(train, step, false),
-            Command::Reverse { train } => self.drive(train, SpeedStep::STAND, true),
-            Command::Turnout { turnout, curved } => self.throw(turnout, curved),
-            Command::Function { train, function, on } => self.switch(train, function, on),
-            Command::PowerOff | Command::PowerOn => {
-                let on = command == Command::PowerOn;
-                self.dialogue.power = on;
-                let tracks = if on { Power::Main } else { Power::All };
-                (Request::Power { on, tracks }, Some(Awaited::Power(on)))
+    fn drive(
+        &mut self,
+        _now: Timestamp,
+        train: TrainId,
+        step: SpeedStep,
+        reverses: bool,
+    ) -> (Request, Option<Awaited>) {
+        let forward = self.dialogue.commanded(train, step, reverses);
+        let throttle = self.throttle(train, step);
+        (Request::Drive { cab: train.0, throttle, forward }, Some(Awaited::Driven(train, throttle, forward)))
+    }
+
+    fn throw(&mut self, _now: Timestamp, turnout: TurnoutId, curved: bool) -> (Request, Option<Awaited>) {
+        match self.settings.turnouts {
+            TurnoutRequests::Accessory => (Request::Accessory { address: turnout.0, on: curved }, None),
+            TurnoutRequests::Defined => {
+                // The board answers only when the state changes.
+                let changes = !self.dialogue.lies(turnout, curved);
+                let awaited = changes.then_some(Awaited::Turnout(turnout, curved));
+                (Request::Turnout { id: turnout.0, thrown: curved }, awaited)
             }
-        };
-        Outgoing::commands(command, request, awaited)
+        }
+    }
+
+    /// The board answers only when the state changes.
+    fn switch(&mut self, train: TrainId, function: FunctionNumber, on: bool) -> (Request, Option<Awaited>) {
+        let known = self.dialogue.locomotives.get(train).and_then(|known| known.functions.is_on(function));
+        let changes = known != Some(on);
+        let request = Request::Function { cab: train.0, function: function.get(), on };
+        (request, changes.then_some(Awaited::Function(train, function, on)))
+    }
+
+    fn switch_power(&self, on: bool) -> (Request, Option<Awaited>) {
+        let tracks = if on { Power::Main } else { Power::All };
+        (Request::Power { on, tracks }, Some(Awaited::Power(on)))
     }
 
     /// At the end the stop of a train waits for the answer in which direction it runs.
     fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
         let is_ending = self.dialogue.farewell.has_begun();
-        self.dialogue.next_again(now, only_urgent && !is_ending)
+        self.dialogue.next_again(now, only_urgent && !is_ending, true)
     }
 
     fn query(&self, train: TrainId) -> Outgoing<Awaited> {
@@ -209,7 +204,7 @@ impl Protocol for Client {
                 Request::Power { on, .. } => Outgoing::asks(request, Awaited::Power(on)),
                 _ => Outgoing::says(request),
             }),
-            Opening::Open { .. } => match self.unverified.pop() {
+            Opening::Open { .. } => match self.dialogue.take_unblocked(&mut self.unverified) {
                 Some(train) => Some(self.query(train)),
                 None => return ControlFlow::Continue(()),
             },

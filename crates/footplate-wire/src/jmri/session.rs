@@ -7,7 +7,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::ops::{ControlFlow, RangeInclusive};
 
-use footplate_core::{Command, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use super::json::Lines;
 use super::outstanding::Awaited;
@@ -90,22 +90,9 @@ impl Client {
         self.dialogue.heard + PING_AFTER
     }
 
-    fn drive(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> (Request, Awaited) {
-        let forward = self.dialogue.commanded(train, step, reverses);
-        let throttle = self.throttle(train, step);
-        let message = ThrottleMessage { throttle: Some(throttle), forward: Some(forward), ..asked_of(train) };
-        (Request::Throttle(message), Awaited::Driven(train, throttle, forward))
-    }
-
     /// JMRI's speed for a step of a train's decoder.
     fn throttle(&self, train: TrainId, step: SpeedStep) -> Throttle {
         Throttle::Speed(speed_of(step, self.dialogue.decoder(train)).unwrap_or_default())
-    }
-
-    fn throw(&self, turnout: TurnoutId, curved: bool) -> (Request, Awaited) {
-        let name = self.system.turnout(self.settings.number_of(turnout));
-        let thrown = curved == self.settings.closed_is_straight;
-        (Request::Turnout { name, thrown }, Awaited::Turnout(turnout, curved))
     }
 
     fn power(&self, on: bool) -> Request {
@@ -117,13 +104,6 @@ impl Client {
         self.opening = Opening::asking([Request::Powers]);
         self.unverified = self.dialogue.directed();
     }
-}
-
-fn switch(train: TrainId, function: FunctionNumber, on: bool) -> (Request, Awaited) {
-    let on_bits = if on { function.bit() } else { 0 };
-    let functions = ReportedFunctions { known: function.bit(), on: on_bits };
-    let message = ThrottleMessage { functions, ..asked_of(train) };
-    (Request::Throttle(message), Awaited::Function(train, function, on))
 }
 
 /// A message to a train's throttle that asks for its state. The throttle is called by the address.
@@ -187,19 +167,34 @@ impl Protocol for Client {
         self.power(false)
     }
 
-    fn outgoing(&mut self, _now: Timestamp, command: Command) -> Outgoing<Awaited> {
-        let (request, awaited) = match command {
-            Command::Speed { train, step } => self.drive(train, step, false),
-            Command::Reverse { train } => self.drive(train, SpeedStep::STAND, true),
-            Command::Turnout { turnout, curved } => self.throw(turnout, curved),
-            Command::Function { train, function, on } => switch(train, function, on),
-            Command::PowerOff | Command::PowerOn => {
-                let on = command == Command::PowerOn;
-                self.dialogue.power = on;
-                (self.power(on), Awaited::Power(on))
-            }
-        };
-        Outgoing::commands(command, request, Some(awaited))
+    fn drive(
+        &mut self,
+        _now: Timestamp,
+        train: TrainId,
+        step: SpeedStep,
+        reverses: bool,
+    ) -> (Request, Option<Awaited>) {
+        let forward = self.dialogue.commanded(train, step, reverses);
+        let throttle = self.throttle(train, step);
+        let message = ThrottleMessage { throttle: Some(throttle), forward: Some(forward), ..asked_of(train) };
+        (Request::Throttle(message), Some(Awaited::Driven(train, throttle, forward)))
+    }
+
+    fn throw(&mut self, _now: Timestamp, turnout: TurnoutId, curved: bool) -> (Request, Option<Awaited>) {
+        let name = self.system.turnout(self.settings.number_of(turnout));
+        let thrown = curved == self.settings.closed_is_straight;
+        (Request::Turnout { name, thrown }, Some(Awaited::Turnout(turnout, curved)))
+    }
+
+    fn switch(&mut self, train: TrainId, function: FunctionNumber, on: bool) -> (Request, Option<Awaited>) {
+        let on_bits = if on { function.bit() } else { 0 };
+        let functions = ReportedFunctions { known: function.bit(), on: on_bits };
+        let message = ThrottleMessage { functions, ..asked_of(train) };
+        (Request::Throttle(message), Some(Awaited::Function(train, function, on)))
+    }
+
+    fn switch_power(&self, on: bool) -> (Request, Option<Awaited>) {
+        (self.power(on), Some(Awaited::Power(on)))
     }
 
     fn query(&self, train: TrainId) -> Outgoing<Awaited> {
@@ -219,7 +214,7 @@ impl Protocol for Client {
                 _ => Outgoing::says(request),
             }));
         }
-        let unverified = self.unverified.pop();
+        let unverified = self.dialogue.take_unblocked(&mut self.unverified);
         unverified.map_or(ControlFlow::Continue(()), |train| ControlFlow::Break(Some(self.query(train))))
     }
 

@@ -39,6 +39,8 @@ pub(crate) enum Awaited {
     Functions(TrainId, FunctionGroup, u32),
     /// That a turnout's output was commanded on the bus: nothing else confirms it.
     Turnout(TurnoutId, Message),
+    /// That the release of a turnout's output was put on the bus.
+    Release(TurnoutId, Message),
 }
 
 impl Awaited {
@@ -76,14 +78,16 @@ impl AwaitedAnswer for Awaited {
             (Self::Interrogation(nth), Answer::Sent(message)) => {
                 Request::Interrogate(nth).messages().contains(message)
             }
-            (Self::Turnout(_, awaited), Answer::Sent(message)) => awaited == *message,
+            (Self::Turnout(_, awaited) | Self::Release(_, awaited), Answer::Sent(message)) => {
+                awaited == *message
+            }
             _ => false,
         }
     }
 
     fn subject(&self) -> Subject {
         match *self {
-            Self::Status | Self::Interrogation(_) => Subject::Other,
+            Self::Status | Self::Interrogation(_) | Self::Release(..) => Subject::Other,
             Self::Locomotive(train) | Self::Driven(train, ..) => Subject::Train(train),
             Self::Functions(train, group, _) => Subject::Function(train, group as u8),
             Self::Power(_) => Subject::Power,
@@ -91,7 +95,15 @@ impl AwaitedAnswer for Awaited {
         }
     }
 
+    /// A turnout is not thrown again before its output is released.
+    fn turnout(&self) -> Option<TurnoutId> {
+        match *self {
+            Self::Turnout(turnout, _) | Self::Release(turnout, _) => Some(turnout),
+            _ => None,
+        }
+    }
+
     fn may_be_given_up(&self, is_command: bool) -> bool {
-        is_command || matches!(self, Self::Interrogation(_))
+        is_command || matches!(self, Self::Interrogation(_) | Self::Release(..))
     }
 }

@@ -6,9 +6,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::ops::{ControlFlow, RangeInclusive};
 
-use footplate_core::{
-    Command, EventKind, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
-};
+use footplate_core::{EventKind, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use super::functions::FunctionGroup;
 use super::line::{Line, Lines};
@@ -133,7 +131,7 @@ impl Client {
             self.slots.iter().find(|slot| now - slot.refreshed > REFRESHED_EVERY && free(&slot.train));
         let stale = stale.and_then(|slot| self.dialogue.locomotives.get(slot.train));
         if let Some((train, step)) = stale.map(|known| (known.train, known.step)) {
-            let (request, awaited) = self.drive(now, train, step);
+            let (request, awaited) = self.driving(now, train, step);
             return Outgoing { request, awaited, command: None, tries: 1 };
         }
         let driven: Vec<TrainId> = self.slots.iter().map(|slot| slot.train).filter(free).collect();
@@ -157,7 +155,8 @@ impl Client {
         Outgoing::asks(request, awaited)
     }
 
-    fn drive(&mut self, now: Timestamp, train: TrainId, step: SpeedStep) -> (Request, Option<Awaited>) {
+    /// The request that drives a train as it is commanded to run.
+    fn driving(&mut self, now: Timestamp, train: TrainId, step: SpeedStep) -> (Request, Option<Awaited>) {
         let forward = self.dialogue.locomotives.get(train).and_then(|known| known.forward).unwrap_or(true);
         let speed = speed_of(step, self.dialogue.decoder(train)).unwrap_or_default();
         let awaited = Some(Awaited::Driven(train, speed, forward));
@@ -168,27 +167,6 @@ impl Client {
             Some(slot) => (Request::Drive { slot, speed, direction }, awaited),
             None => (Request::Locomotive(train.0), awaited),
         }
-    }
-
-    /// One message sets all functions of a group: a newer request includes what an earlier one switched.
-    fn switch(&mut self, train: TrainId, function: FunctionNumber, on: bool) -> (Request, Option<Awaited>) {
-        let Some(slot) = self.slots.of_mut(train) else { return (Request::Locomotive(train.0), None) };
-        let bit = function.bit();
-        slot.functions = if on { slot.functions | bit } else { slot.functions & !bit };
-        let (forward, functions, group) = (slot.forward, slot.functions, FunctionGroup::of(function));
-        let request = match slot.number {
-            Some(slot) => Request::Functions { slot, address: train.0, forward, group, functions },
-            None => Request::Locomotive(train.0),
-        };
-        (request, Some(Awaited::Functions(train, group, functions)))
-    }
-
-    fn throw(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) -> (Request, Option<Awaited>) {
-        let address = self.settings.address_of(turnout);
-        let closed = curved != self.settings.closed_is_straight;
-        self.pulse = Some((address, closed, now + PULSE));
-        let message = Message::Switch { address, closed, on: true };
-        (Request::Switch { address, closed, on: true }, Some(Awaited::Turnout(turnout, message)))
     }
 
     /// Ends the opening: trains may run.
@@ -276,33 +254,58 @@ impl Protocol for Client {
 
     fn before_stops(&mut self) -> Option<Outgoing<Awaited>> {
         let (train, slot) = self.unused.pop()?;
+        let drives = |awaited: &Awaited| matches!(awaited, Awaited::Driven(of, ..) if *of == train);
+        if self.dialogue.outstanding.any(drives) {
+            // Its repeats show whether the slot is in use, and a question would end them.
+            return Some(Outgoing::says(Request::Use(slot)));
+        }
         Some(Outgoing::asks(Request::Use(slot), Awaited::Locomotive(train)))
     }
 
-    fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
-        let (request, awaited) = match command {
-            Command::Speed { train, step } => {
-                self.dialogue.commanded(train, step, false);
-                self.drive(now, train, step)
-            }
-            Command::Reverse { train } => {
-                self.dialogue.commanded(train, SpeedStep::STAND, true);
-                self.drive(now, train, SpeedStep::STAND)
-            }
-            Command::Turnout { turnout, curved } => self.throw(now, turnout, curved),
-            Command::Function { train, function, on } => self.switch(train, function, on),
-            Command::PowerOff | Command::PowerOn => {
-                let on = command == Command::PowerOn;
-                self.dialogue.power = on;
-                (Request::Power { on }, Some(Awaited::Power(on)))
-            }
+    fn drive(
+        &mut self,
+        now: Timestamp,
+        train: TrainId,
+        step: SpeedStep,
+        reverses: bool,
+    ) -> (Request, Option<Awaited>) {
+        self.dialogue.commanded(train, step, reverses);
+        self.driving(now, train, step)
+    }
+
+    fn throw(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) -> (Request, Option<Awaited>) {
+        let address = self.settings.address_of(turnout);
+        let closed = curved != self.settings.closed_is_straight;
+        self.pulse = Some((address, closed, now + PULSE));
+        let message = Message::Switch { address, closed, on: true };
+        (Request::Switch { address, closed, on: true }, Some(Awaited::Turnout(turnout, message)))
+    }
+
+    /// One message sets all functions of a group: a newer request includes what an earlier one switched.
+    fn switch(&mut self, train: TrainId, function: FunctionNumber, on: bool) -> (Request, Option<Awaited>) {
+        let Some(slot) = self.slots.of_mut(train) else { return (Request::Locomotive(train.0), None) };
+        let bit = function.bit();
+        slot.functions = if on { slot.functions | bit } else { slot.functions & !bit };
+        let (forward, functions, group) = (slot.forward, slot.functions, FunctionGroup::of(function));
+        let request = match slot.number {
+            Some(slot) => Request::Functions { slot, address: train.0, forward, group, functions },
+            None => Request::Locomotive(train.0),
         };
-        Outgoing::commands(command, request, awaited)
+        (request, Some(Awaited::Functions(train, group, functions)))
+    }
+
+    fn switch_power(&self, on: bool) -> (Request, Option<Awaited>) {
+        (Request::Power { on }, Some(Awaited::Power(on)))
     }
 
     fn next_release(&mut self, now: Timestamp) -> Option<Outgoing<Awaited>> {
         let (address, closed, _) = self.pulse.take_if(|(.., until)| now >= *until)?;
-        Some(Outgoing::says(Request::Switch { address, closed, on: false }))
+        let request = Request::Switch { address, closed, on: false };
+        let message = Message::Switch { address, closed, on: false };
+        let turnout = self.settings.turnout_at(address);
+        Some(turnout.map_or(Outgoing::says(request), |turnout| {
+            Outgoing::asks(request, Awaited::Release(turnout, message))
+        }))
     }
 
     fn release_at(&self) -> Option<Timestamp> {
@@ -326,7 +329,7 @@ impl Protocol for Client {
                 None => self.opened(),
             }
         }
-        let unverified = self.unverified.pop();
+        let unverified = self.dialogue.take_unblocked(&mut self.unverified);
         unverified.map_or(ControlFlow::Continue(()), |train| ControlFlow::Break(Some(self.query(train))))
     }
 

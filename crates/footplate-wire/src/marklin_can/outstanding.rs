@@ -104,6 +104,10 @@ impl AwaitedAnswer for Awaited {
         match (self, other) {
             (Self::AnySpeed(one, _), Self::AnySpeed(other, _))
             | (Self::AnyDirection(one, _), Self::AnyDirection(other, _)) => one == other,
+            // The release of a coil does not end the repeats of the throw.
+            (Self::Accessory(one, .., current), Self::Accessory(other, .., of_other)) => {
+                (one, current) == (other, of_other)
+            }
             _ => discriminant(self) == discriminant(other) && self.subject() == other.subject(),
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! stream      length of the text (4, big endian), then the text compressed by zlib; padded with zeros to whole frames
-//! text        a line `lokomotive` begins each, lines ` .uid=0x4005`, ` .adresse=0x5`, ` .name=BR 03` follow
+//! text        `[lokomotive]` is its first line; a line `lokomotive` begins each, lines ` .uid=0x4005`, ` .adresse=0x5`, ` .name=BR 03` follow
 //! ```
 //!
 //! The check sum in the stream's first frame is not looked at: zlib has one of its own over the text, and programs differ in whether the
@@ -19,6 +19,9 @@ use super::uid::Uid;
 
 /// The name under which the list is asked for.
 pub const LOCOMOTIVES_FILE: [u8; MOST_DATA] = *b"loks\0\0\0\0";
+
+/// The first line of the list's text; other files begin with `[magnetartikel]`, `[fahrstrassen]` and the like.
+const HEADING: &str = "[lokomotive]";
 
 /// The longest stream and the longest text that are read: a hundred times what a station with a hundred locomotives sends.
 const LONGEST_STREAM: usize = 256 * 1024;
@@ -58,7 +61,8 @@ impl Roster {
         self.length = usize::try_from(length).ok().filter(|length| (1..=LONGEST_STREAM).contains(length));
     }
 
-    /// Takes more of the stream; returns once whether it is complete and could be read.
+    /// Takes more of the stream; returns once whether it is complete and could be read. A list that could not be read leaves the
+    /// earlier one as it is.
     pub(super) fn goes_on(&mut self, bytes: [u8; MOST_DATA]) -> Option<bool> {
         let length = self.length?;
         self.stream.extend(bytes);
@@ -69,7 +73,7 @@ impl Roster {
         let list = self.stream.get(..length).and_then(read_list);
         self.stream = Vec::new();
         let is_read = list.is_some();
-        self.list = list.unwrap_or_default();
+        self.list = list.unwrap_or_else(|| core::mem::take(&mut self.list));
         Some(is_read)
     }
 
@@ -84,12 +88,15 @@ impl Roster {
     }
 }
 
-/// Reads the list from a whole stream without its padding; `None` if it is damaged.
+/// Reads the list from a whole stream without its padding; `None` if it is damaged, or another of the station's files.
 #[must_use]
 pub fn read_list(stream: &[u8]) -> Option<Vec<ListedLocomotive>> {
     let (_, compressed) = stream.split_first_chunk::<4>()?;
     let text = decompress_to_vec_zlib_with_limit(compressed, LONGEST_TEXT).ok()?;
     let text = String::from_utf8_lossy(&text);
+    if text.lines().next()?.trim_end() != HEADING {
+        return None;
+    }
     let mut list = Vec::new();
     let (mut uid, mut address, mut name) = (None, None, String::new());
     for line in text.lines().chain(["lokomotive"]) {

@@ -6,17 +6,18 @@ mod hearing;
 use alloc::vec::Vec;
 use core::ops::{ControlFlow, RangeInclusive};
 
-use footplate_core::{Command, EventKind, TimeSpan, Timestamp, TrainId};
+use footplate_core::{EventKind, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
 use super::frame::hash_of;
 use super::framing::Framing;
 use super::inputs::Inputs;
-use super::message::Message;
+use super::message::{Direction, Message};
 use super::opening::Question;
 use super::outstanding::Awaited;
 use super::roster::{ListedLocomotive, Roster};
 use super::settings::{Settings, Transport};
 use super::solenoid::Solenoid;
+use super::speed::speed_of;
 use super::uid::Uid;
 use crate::dialogue::{Dialogue, Opening, Repeat};
 use crate::outstanding::Outgoing;
@@ -205,13 +206,46 @@ impl Protocol for Client {
         Message::Halt(Uid::ALL)
     }
 
-    fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
-        self.commanding(now, command)
+    fn drive(
+        &mut self,
+        _now: Timestamp,
+        train: TrainId,
+        step: SpeedStep,
+        reverses: bool,
+    ) -> (Message, Option<Awaited>) {
+        let uid = self.uid(train);
+        let forward = self.commanded(train, step, reverses);
+        if reverses {
+            let direction = Some(Direction::of(forward));
+            return (Message::Direction { uid, direction }, Some(Awaited::Direction(train, uid, forward)));
+        }
+        let decoder = self.dialogue.decoder(train);
+        let speed = Some(speed_of(step, decoder).unwrap_or_default());
+        (Message::Speed { uid, speed }, Some(Awaited::Speed(train, uid, step, decoder)))
+    }
+
+    fn throw(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) -> (Message, Option<Awaited>) {
+        self.solenoid = Some(Solenoid::powered(turnout, curved, now));
+        let (uid, position) = (self.settings.turnout(turnout), position_of(curved));
+        let message = Message::Accessory { uid, position, current: 1, time: None };
+        (message, Some(Awaited::Accessory(turnout, uid, position, 1)))
+    }
+
+    fn switch(&mut self, train: TrainId, function: FunctionNumber, on: bool) -> (Message, Option<Awaited>) {
+        let uid = self.uid(train);
+        let message = Message::Function { uid, function: function.get(), value: Some(u8::from(on)) };
+        (message, Some(Awaited::Function(train, uid, function, on)))
+    }
+
+    fn switch_power(&self, on: bool) -> (Message, Option<Awaited>) {
+        let message = if on { Message::Go(Uid::ALL) } else { Message::Stop(Uid::ALL) };
+        (message, Some(Awaited::Power(on)))
     }
 
     fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
+        let may_throw = self.release_at().is_none();
         loop {
-            match self.dialogue.next_repeat(now, only_urgent)? {
+            match self.dialogue.next_repeat(now, only_urgent, may_throw)? {
                 Repeat::Again(outgoing) => return Some(outgoing),
                 Repeat::GivenUp(given_up) => {
                     if let Some(instead) = self.instead_of(&given_up) {

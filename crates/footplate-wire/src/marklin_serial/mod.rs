@@ -22,6 +22,7 @@ mod session;
 mod settings;
 mod silence;
 mod solenoid;
+mod unanswered;
 
 pub use codec::{EncodeError, Frame, Message, TRAINS};
 pub use line::{

@@ -20,14 +20,12 @@ use super::reply_time::ReplyTime;
 use super::settings::Settings;
 use super::silence::Silence;
 use super::solenoid::Solenoid;
+use super::unanswered::Unanswered;
 use crate::queue::Queue;
 use crate::session::{Closing, CommandError, LinkNotice, Session, Transmit};
 
 /// CTS down for longer than this is reported: no message and no reply takes so long.
 const NOT_READY_AFTER: TimeSpan = TimeSpan::from_ms(1_500);
-
-/// The number of commands since the last reply that are repeated if the next is lost; older ones were obeyed long ago.
-const SAID_AGAIN: usize = 16;
 
 /// The client's session with a 6050 or 6051.
 ///
@@ -52,8 +50,7 @@ pub struct Interface {
     decoders: Decoders,
     /// A stop is said before the line has fallen silent; it goes on to wait for that afterwards.
     is_overtaken: bool,
-    /// Commands since the last complete reply.
-    unanswered: Vec<Command>,
+    unanswered: Unanswered,
     farewell: Farewell,
     /// Whether the track should have power.
     power: bool,
@@ -91,13 +88,14 @@ impl Interface {
             recovery: Recovery::default(),
             decoders: Decoders::new(settings.light),
             is_overtaken: false,
-            unanswered: Vec::new(),
+            unanswered: Unanswered::default(),
             farewell: Farewell::default(),
             power: true,
             stray: 0,
             disturbed: false,
             said_not_ready: false,
-            nudged: false,
+            // Without a hand-shake line nothing else begins the first word.
+            nudged: true,
             output: VecDeque::new(),
         };
         interface.recovery.begin_anew(interface.power_word());
@@ -300,9 +298,6 @@ impl Interface {
                 None
             }
         };
-        if self.unanswered.len() >= SAID_AGAIN {
-            self.unanswered.remove(0);
-        }
         self.unanswered.push(command);
         self.output.extend(kind.map(|kind| Transmit::Event(Event { time: at, kind })));
     }
@@ -377,6 +372,8 @@ impl Session for Interface {
             self.farewell.will_command(train, step);
         }
         self.waiting.push(command).map_err(CommandError::TooManyWaiting)?;
+        // What brings it into step from now on must not switch the power on again.
+        self.power &= command != Command::PowerOff;
         self.go_on(now);
         Ok(())
     }

@@ -374,7 +374,8 @@ impl Phone {
                 let step = known.step(part);
                 // A slider that is moved sends many speeds, most of which are the same step.
                 let own = (now < shown.speed_settled).then(|| known.step(shown.part));
-                let is_new = own.or(state.map(|state| state.step)) != Some(step);
+                // A train that is at rest for a moment may be about to run again: a stop is always ordered.
+                let is_new = step == SpeedStep::STAND || own.or(state.map(|state| state.step)) != Some(step);
                 shown.part = part;
                 if is_new {
                     shown.speed_settled = now + CARRIED_OUT_WITHIN;

@@ -70,7 +70,7 @@ impl AwaitedAnswer for Awaited {
             (Self::Function(train, function, on), Reply::Locomotive(state)) => {
                 train.0 == state.address && function.is_in(state.functions) == on
             }
-            (Self::Power(on), reply) => reply.power() == Some(on),
+            (Self::Power(on), reply) => reply.confirms_power(on),
             (Self::Turnout(_, address, second), Reply::Turnout { address: of, position }) => {
                 address == *of && *position == TurnoutPosition::Output { second }
             }

@@ -157,6 +157,18 @@ impl Reply {
         }
     }
 
+    /// Whether it says that the power of the track is so. Locomotives that are stopped while the track has power are neither.
+    #[must_use]
+    pub const fn confirms_power(&self, on: bool) -> bool {
+        match self {
+            Self::Stopped => false,
+            Self::Status(state) | Self::SystemState(SystemState { central: state, .. }) if !on => {
+                state.is_off()
+            }
+            _ => matches!(self.power(), Some(reported) if reported == on),
+        }
+    }
+
     /// Its bytes, behind those that are there; a locomotive's with the functions from F29 on, as from firmware 1.42.
     pub fn write(&self, bytes: &mut Vec<u8>) {
         self.write_as(true, bytes);

@@ -7,7 +7,9 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::ops::{ControlFlow, RangeInclusive};
 
-use footplate_core::{Command, DecoderSteps, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{
+    DecoderSteps, EventKind, FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+};
 
 use super::broadcasts::Broadcasts;
 use super::detectors::RailCom;
@@ -105,27 +107,11 @@ impl Client {
         &self.settings
     }
 
-    fn drive(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> (Request, Awaited) {
-        self.suspected.retain(|(other, ..)| *other != train);
-        let forward = self.dialogue.commanded(train, step, reverses);
-        let (steps, throttle) = self.throttle(train, step);
-        let request = Request::Drive { address: train.0, steps, throttle, forward };
-        (request, Awaited::Driven(train, steps, throttle, forward))
-    }
-
     /// How a train is commanded to run at a step, and in which steps.
     fn throttle(&self, train: TrainId, step: SpeedStep) -> (DecoderSteps, Throttle) {
         let decoder = self.dialogue.decoder(train);
         let steps = if decoder == DecoderSteps::Fourteen { self.settings.steps } else { decoder };
         (steps, Throttle::of(step, decoder, steps).unwrap_or(Throttle::Stop))
-    }
-
-    fn throw(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) -> (Request, Awaited) {
-        let address = self.settings.address_of(turnout);
-        let second = curved != self.settings.second_is_straight;
-        self.outputs.powered(address, second, now);
-        let request = Request::SetTurnout { address, second, activate: true, queue: false };
-        (request, Awaited::Turnout(turnout, address, second))
     }
 }
 
@@ -200,28 +186,42 @@ impl Protocol for Client {
         Request::StopAll
     }
 
-    fn outgoing(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
-        let (request, awaited) = match command {
-            Command::Speed { train, step } => self.drive(train, step, false),
-            Command::Reverse { train } => self.drive(train, SpeedStep::STAND, true),
-            Command::Turnout { turnout, curved } => self.throw(now, turnout, curved),
-            Command::Function { train, function, on } => {
-                let switch = if on { FunctionSwitch::On } else { FunctionSwitch::Off };
-                let request = Request::Function { address: train.0, function: function.get(), switch };
-                (request, Awaited::Function(train, function, on))
-            }
-            Command::PowerOff | Command::PowerOn => {
-                let on = command == Command::PowerOn;
-                self.dialogue.power = on;
-                (Request::Power { on }, Awaited::Power(on))
-            }
-        };
-        Outgoing::commands(command, request, Some(awaited))
+    fn drive(
+        &mut self,
+        _now: Timestamp,
+        train: TrainId,
+        step: SpeedStep,
+        reverses: bool,
+    ) -> (Request, Option<Awaited>) {
+        self.suspected.retain(|(other, ..)| *other != train);
+        let forward = self.dialogue.commanded(train, step, reverses);
+        let (steps, throttle) = self.throttle(train, step);
+        let request = Request::Drive { address: train.0, steps, throttle, forward };
+        (request, Some(Awaited::Driven(train, steps, throttle, forward)))
+    }
+
+    fn throw(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool) -> (Request, Option<Awaited>) {
+        let address = self.settings.address_of(turnout);
+        let second = curved != self.settings.second_is_straight;
+        self.outputs.powered(address, second, now);
+        let request = Request::SetTurnout { address, second, activate: true, queue: false };
+        (request, Some(Awaited::Turnout(turnout, address, second)))
+    }
+
+    fn switch(&mut self, train: TrainId, function: FunctionNumber, on: bool) -> (Request, Option<Awaited>) {
+        let switch = if on { FunctionSwitch::On } else { FunctionSwitch::Off };
+        let request = Request::Function { address: train.0, function: function.get(), switch };
+        (request, Some(Awaited::Function(train, function, on)))
+    }
+
+    fn switch_power(&self, on: bool) -> (Request, Option<Awaited>) {
+        (Request::Power { on }, Some(Awaited::Power(on)))
     }
 
     fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
+        let may_throw = self.release_at().is_none();
         loop {
-            match self.dialogue.next_repeat(now, only_urgent)? {
+            match self.dialogue.next_repeat(now, only_urgent, may_throw)? {
                 // Inputs are polled anyway.
                 Repeat::Again(outgoing)
                     if !(self.opening.is_open() && matches!(outgoing.request, Request::Feedback { .. })) =>
@@ -259,7 +259,7 @@ impl Protocol for Client {
             self.question(Request::Status)
         } else if core::mem::take(&mut self.asks_broadcasts) {
             self.question(Request::Broadcasts)
-        } else if let Some(train) = self.unverified.pop() {
+        } else if let Some(train) = self.dialogue.take_unblocked(&mut self.unverified) {
             self.query(train)
         } else {
             return ControlFlow::Continue(());

@@ -70,6 +70,12 @@ impl CentralState {
     /// Decoders are programmed.
     pub const PROGRAMMING: u8 = 0x20;
 
+    /// Whether the track has no power. A stop of all locomotives leaves it on.
+    #[must_use]
+    pub const fn is_off(self) -> bool {
+        self.0 & (Self::POWER_OFF | Self::SHORT_CIRCUIT) != 0
+    }
+
     /// Whether trains can run.
     #[must_use]
     pub const fn is_powered(self) -> bool {

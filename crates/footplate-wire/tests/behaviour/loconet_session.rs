@@ -267,6 +267,19 @@ fn a_server_without_echoes_and_one_that_fails_now_and_then_are_worked_with() {
 }
 
 #[test]
+fn a_release_that_the_server_could_not_send_is_repeated() {
+    let mut desk = Desk::opened();
+    desk.command(Command::Turnout { turnout: TurnoutId(7), curved: true });
+    desk.run_for(100);
+    desk.station.loses = |_| true;
+    desk.run_for(100);
+    desk.station.loses = |_| false;
+    desk.run_for(1_000);
+    let thrown = |on| Message::Switch { address: 7, closed: false, on };
+    assert_eq!(desk.commands(), [thrown(true), thrown(false), thrown(false)]);
+}
+
+#[test]
 fn turnouts_of_others_are_entered_and_own_ones_once() {
     let mut desk = Desk::opened();
     desk.command(Command::Turnout { turnout: TurnoutId(7), curved: true });

@@ -6,6 +6,7 @@
     reason = "a test may stop at the first surprise"
 )]
 
+mod confirmations;
 mod dcc_ex_desk;
 mod dcc_ex_round_trip;
 mod dcc_ex_session;
@@ -17,6 +18,7 @@ mod jmri_codec;
 mod jmri_session;
 mod loconet_codec;
 mod loconet_session;
+mod marklin_can_roster;
 mod marklin_can_round_trip;
 mod marklin_can_session;
 mod marklin_can_vectors;

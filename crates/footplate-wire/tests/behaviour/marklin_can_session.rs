@@ -11,12 +11,12 @@ use crate::desk::{Station, T24, T58, function, ms, speed};
 /// The hash of a real track box, which the published formula does not yield.
 const FOREIGN: u16 = 0x9346;
 /// A station that answers as real ones do.
-struct Central {
+pub(crate) struct Central {
     transport: Transport,
     /// What was written that is no frame.
     texts: Vec<String>,
     /// Whether the station leaves a request without an answer.
-    ignores: fn(&Message) -> bool,
+    pub(crate) ignores: fn(&Message) -> bool,
 }
 
 impl Central {
@@ -49,7 +49,7 @@ impl Station for Central {
     }
 }
 
-type Desk = crate::desk::Desk<Client, Central>;
+pub(crate) type Desk = crate::desk::Desk<Client, Central>;
 
 /// As a station answers on which one locomotive runs backwards and input 4 is occupied.
 fn answers(message: Message) -> Vec<Message> {
@@ -73,25 +73,25 @@ fn answers(message: Message) -> Vec<Message> {
 }
 
 impl Desk {
-    fn new(settings: Settings) -> Self {
+    pub(crate) fn new(settings: Settings) -> Self {
         let station = Central { transport: settings.transport, texts: Vec::new(), ignores: |_| false };
         Self::with(Client::new(ms(0), settings), station)
     }
 
-    fn opened() -> Self {
+    pub(crate) fn opened() -> Self {
         let mut desk = Self::new(Settings { modules: 2, ..Settings::default() });
         desk.run_until(ms(2_000));
         desk.written.clear();
         desk
     }
 
-    fn hear(&mut self, message: Message, is_response: bool) {
+    pub(crate) fn hear(&mut self, message: Message, is_response: bool) {
         let bytes = self.station.encoded(message, is_response);
         self.client.handle_bytes(self.now, &bytes);
     }
 
     /// What was written but for polls.
-    fn messages(&self) -> Vec<Message> {
+    pub(crate) fn messages(&self) -> Vec<Message> {
         let messages = self.written.iter().map(|(_, message)| *message);
         messages.filter(|message| !matches!(message, Message::ModulePoll { .. })).collect()
     }
@@ -103,7 +103,7 @@ impl Desk {
     }
 }
 
-fn drives(address: u32, speed: u16) -> Message {
+pub(crate) fn drives(address: u32, speed: u16) -> Message {
     Message::Speed { uid: Uid(address), speed: Some(speed) }
 }
 

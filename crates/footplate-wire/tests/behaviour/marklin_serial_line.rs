@@ -253,3 +253,17 @@ fn functions_keep_the_speed_and_speeds_keep_the_light() {
     let refused = bench.session.handle_command(bench.now, switch(5, true)).unwrap_err();
     assert_eq!(refused.to_string(), "F5 cannot be switched over this link; functions are F0 to F4");
 }
+
+#[test]
+fn a_line_without_a_hand_shake_begins_by_itself_and_one_with_it_waits() {
+    for (pace, begins) in [(Pace::CAREFUL, true), (Pace::FAST, true), (Pace::Cts, false)] {
+        let mut session = Interface::new(ms(0), Settings::timed(5, pace)).unwrap();
+        for _ in 0..10 {
+            let Some(at) = session.next_timeout().filter(|at| *at < ms(1_000)) else { break };
+            session.handle_timeout(at);
+        }
+        assert_eq!(session.poll_output().is_some(), begins, "{pace:?}");
+        session.handle_cts(ms(1_000), true);
+        assert!(begins || session.poll_output().is_some(), "{pace:?}");
+    }
+}

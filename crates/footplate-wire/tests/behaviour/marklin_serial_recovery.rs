@@ -1,7 +1,7 @@
 //! A lost reply costs little: sensors are read again within 300 ms, stops do not wait for that, and an interface that
 //! does not answer reads of single modules, or answers late, is found out.
 
-use footplate_core::{SensorId, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Command, SensorId, TimeSpan, Timestamp, TrainId};
 use footplate_wire::marklin_serial::{Message, ModuleReads, Pace, Settings};
 use footplate_wire::{LinkNotice, Session};
 
@@ -148,4 +148,41 @@ fn an_interface_that_becomes_late_is_followed() {
     bench.run_until(ms(6_000));
     assert_eq!(bench.notices.len(), lost, "{:?}", bench.notices);
     assert!(bench.session.reply_lateness().unwrap() > TimeSpan::from_ms(60));
+}
+
+#[test]
+fn a_lost_reply_never_repeats_a_step_over_a_newer_stop() {
+    for pace in PACES {
+        for place in 0..10 {
+            for before in [0, 30, 60, 90] {
+                // Given a step and soon after it a stop, both before the next whole reply,
+                let mut bench = losing(pace, &[]);
+                bench.say(speed(24, 8));
+                bench.run_for(before);
+                bench.lose_to_host(&[place]);
+                bench.say(speed(24, 0));
+                // when one byte of the next reply is lost,
+                bench.run_for(1_500);
+                // then the stop is what counts.
+                assert_eq!(bench.station.steps[&TrainId(24)], 0, "{pace:?}, byte {place}, {before} ms");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_lost_reply_never_repeats_power_off_over_a_newer_power_on() {
+    for (first, then, power) in
+        [(Command::PowerOff, Command::PowerOn, true), (Command::PowerOn, Command::PowerOff, false)]
+    {
+        for before in [0, 30, 60, 90] {
+            let mut bench = losing(Pace::Cts, &[]);
+            bench.say(first);
+            bench.run_for(before);
+            bench.lose_to_host(&[3]);
+            bench.say(then);
+            bench.run_for(1_500);
+            assert_eq!(bench.station.power, power, "{first:?}, {before} ms");
+        }
+    }
 }

@@ -91,6 +91,18 @@ fn half_of_the_slider_is_half_of_the_speed() {
 }
 
 #[test]
+fn a_stop_is_ordered_even_if_the_train_is_at_rest_for_a_moment() {
+    let mut phone = driving();
+    phone.handle_line(at(1.0), "MTAS24<;>V63");
+    assert_eq!(outputs(&mut phone), ["> speed 24 6"]);
+    // It stands within the command: it reverses, or waits for track.
+    phone.handle_railway(at(9.0), railway(0, true));
+    outputs(&mut phone);
+    phone.handle_line(at(9.1), "MTAS24<;>V0");
+    assert_eq!(outputs(&mut phone), ["> speed 24 0"]);
+}
+
+#[test]
 fn the_phone_shows_what_the_train_does_by_itself() {
     let mut phone = driving();
     phone.handle_line(at(1.0), "MTAS24<;>V126");

@@ -30,6 +30,8 @@ pub(crate) struct Station {
     pub(crate) answers: bool,
     pub(crate) loses: fn(usize) -> bool,
     pub(crate) count: usize,
+    /// Requests that it does not hear.
+    pub(crate) is_deaf_to: fn(&Request) -> bool,
 }
 
 impl Station {
@@ -38,7 +40,9 @@ impl Station {
         if !self.answers || (self.loses)(self.count) {
             return Vec::new();
         }
-        let replies = Datasets::of(datagram).filter_map(|dataset| self.obey(Request::read(&dataset)?));
+        let heard = Datasets::of(datagram).filter_map(|dataset| Request::read(&dataset));
+        let is_deaf_to = self.is_deaf_to;
+        let replies = heard.filter(|request| !is_deaf_to(request)).filter_map(|request| self.obey(request));
         replies.map(bytes).collect()
     }
 
@@ -126,6 +130,7 @@ impl Desk {
             answers: true,
             loses: |_| false,
             count: 0,
+            is_deaf_to: |_| false,
         };
         Self::with(Client::new(ms(0), settings), station)
     }

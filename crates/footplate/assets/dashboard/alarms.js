@@ -2,7 +2,7 @@
 
 import { make, put } from "./dom.js";
 import { ask, order } from "./server.js";
-import { say } from "./words.js";
+import { logged, say } from "./words.js";
 
 /** The most alarms shown in the frame, and on a phone; the health page has all of them. */
 const SHOWN = 3;
@@ -15,11 +15,14 @@ const OF_ROUTE = new Set(["deadlock", "deadlocked", "track-reserved", "diverged"
 /** Alarms of a train whose model is wrong. */
 const OF_MODEL = new Set(["promises-broken", "drifts-slower", "drifts-faster", "stands-slower", "stands-faster", "stands-distrusted"]);
 
-/** Whether the pages have a sentence for an alarm; otherwise its English text is shown. */
+/** Alarms whose values are sentences of the server, or commands. */
+const OF_SENTENCES = new Set(["line-says", "not-sent", "unconfirmed"]);
+
+/** Whether the pages have a sentence for an alarm; otherwise its text is shown as in the log. */
 const sentence = ({ what, blanks, text }) => {
   const word = `alarm-${what}`;
-  const said = say(word, ...blanks);
-  return said === word ? text : said;
+  const said = say(word, ...(OF_SENTENCES.has(what) ? blanks.map(logged) : blanks));
+  return said === word ? logged(text) : said;
 };
 
 /** An alarm as a sentence that begins with its train. */

@@ -95,7 +95,7 @@ function written({ t_s, written_until_s }) {
   $("written").textContent = behind < LATE_ON_DISK_S ? "" : say("written-until", behind.toFixed(0));
 }
 
-/** Opens the pages again once another program serves them: the set-up, a calibration or a driving session. */
+/** Opens the pages again once another program serves them: the set-up, a calibration, or another session with its own layout. */
 async function followMode() {
   const { instance } = await get("/api/setup").catch(() => ({}));
   if (instance && instance !== live.setUp.instance) location.reload();
@@ -107,7 +107,7 @@ async function begin() {
   live.setUp = await get("/api/setup");
   const { mode } = live.setUp;
   $("setup-link").hidden = mode === "fixed";
-  if (mode !== "fixed") setTimeout(followMode, MODE_MS[1]);
+  setTimeout(followMode, MODE_MS[1]);
   if (mode === "setting-up") {
     document.body.classList.add("setting-up");
     $("connection").hidden = true;

@@ -2,6 +2,7 @@
 
 import { ERRORS } from "./german_errors.js";
 import { helpInGerman } from "./german_help.js";
+import { LINE } from "./german_line.js";
 import { ODOMETRY_ERRORS, ofRecording } from "./german_odometry.js";
 import { CALIBRATION } from "./german_report.js";
 
@@ -118,7 +119,7 @@ const LINES = [
   [/^the position of turnout (\d+), (\S+) mm before the end of the path, is unknown: .*$/, "die Stellung von Weiche $1, $2 mm vor dem Ende des Weges, ist unbekannt: erst stellen"], [/^the track ends at `(.*)`, (\S+) mm before the end of the path$/, "das Gleis endet bei `$1`, $2 mm vor dem Ende des Weges"],
   // The names of recorded sessions.
   [/^calibration of train (\d+), (\d.*)$/, "Kalibrierung von Zug $1, $2"], [/^drive (\d.*)$/, "Fahrt $1"], [/^demo (\d.*)$/, "Vorführung $1"],
-  ...CALIBRATION, ...ODOMETRY_ERRORS, ...ERRORS,
+  ...CALIBRATION, ...ODOMETRY_ERRORS, ...ERRORS, ...LINE,
 ];
 
 const tailed = (text) => TAILS.reduce((line, [english, german]) => line.replace(english, german), text);

@@ -28,6 +28,13 @@ export async function halt() {
   setTimeout(look, LOOKED_EVERY_MS / 2);
 }
 
+/** How certain it is that the track has no power: most stations report it, a 6051 only answers. */
+function wordOf({ has_answered: hasAnswered, reports_power: reportsPower, reported }) {
+  if (!reportsPower) return hasAnswered ? "halt-heard" : "halt-told";
+  if (reported === true) return "halt-still-on";
+  return reported === false ? "halt-confirmed" : "halt-told";
+}
+
 /** While the track power is off, every page shows it and how certain that is, whatever switched it off. */
 async function look() {
   let power;
@@ -37,10 +44,15 @@ async function look() {
     // The state of the connection shows the failure; the banner keeps its text.
     return;
   }
-  powerOn.hidden = !power || power.is_on;
-  if (power && !power.is_on) {
+  const isOff = power && !power.is_on;
+  const wentOff = power?.is_on && power.reported === false;
+  powerOn.hidden = !isOff && !wentOff;
+  if (isOff) {
     asked = false;
-    tell(power.has_answered ? "halt-heard" : "halt-told");
+    tell(wordOf(power));
+  } else if (wentOff) {
+    asked = false;
+    tell("halt-went-off");
   } else if (!asked) {
     banner.hidden = true;
   }

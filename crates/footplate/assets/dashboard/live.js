@@ -6,6 +6,9 @@ import { say } from "./words.js";
 /** The most lines, detections and orders kept: as many as the server keeps. */
 const KEPT = 4000;
 
+/** Interval between attempts to listen again after the server refused (ms). */
+const AGAIN_MS = 3000;
+
 /** Appends to a list of limited length. */
 function keep(list, item) {
   list.push(item);
@@ -55,7 +58,11 @@ export class Live extends EventTarget {
   #listen() {
     const events = new EventSource(withToken("/api/events"));
     events.addEventListener("open", () => this.#stands("connected"));
-    events.addEventListener("error", () => this.#stands("lost"));
+    events.addEventListener("error", () => {
+      this.#stands("lost");
+      // A browser connects again after a broken connection, but not after an answer with a status.
+      if (events.readyState === EventSource.CLOSED) setTimeout(() => this.#listen(), AGAIN_MS);
+    });
     events.addEventListener("picture", (event) => {
       this.picture = JSON.parse(event.data);
       // One drawing per frame, of the newest picture.

@@ -83,7 +83,7 @@ class Walked {
 export function recordingsPage(root, live, number) {
   const $ = (selector) => root.querySelector(selector);
   const shownSessions = new Map();
-  let charts = [], playing, list = [];
+  let charts = [], playing, list = [], opened = 0;
   const slider = $("#time");
   const speed = $("#played");
   speed.append(...SPEEDS.map((times) => new Option(`${times} ×`, String(times))));
@@ -150,6 +150,9 @@ export function recordingsPage(root, live, number) {
 
   async function open() {
     stop();
+    // Two ticks in quick succession open twice: only the last one counts.
+    opened += 1;
+    const own = opened;
     const wanted = [...root.querySelectorAll("#recordings input:checked")].map(({ value }) => Number(value));
     put($("#answer"), say("walking"));
     shownSessions.clear();
@@ -158,12 +161,14 @@ export function recordingsPage(root, live, number) {
       for (const recording of wanted) {
         const { name } = list.find((one) => one.recording === recording);
         const walked = await get(`/api/recordings/${recording}/pictures`);
+        if (own !== opened) return;
         const place = make("article", { class: "session" });
         $("#sessions").append(place);
         shownSessions.set(logged(name), new Walked(place, logged(name), walked));
       }
       put($("#answer"), "");
     } catch (error) {
+      if (own !== opened) return;
       put($("#answer"), error.message);
     }
     slider.max = String(Number(Math.max(0, ...[...shownSessions.values()].map((walked) => walked.lasts)).toFixed(1)));
@@ -217,6 +222,7 @@ export function recordingsPage(root, live, number) {
   begin();
   return {
     close() {
+      opened += 1;
       stop();
       charts.forEach((chart) => chart.close());
     },

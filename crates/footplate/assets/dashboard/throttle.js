@@ -14,7 +14,7 @@ const LAST_OF_ALL = 4;
 export class Throttle {
   /** Whether the slider is being moved. */
   isDragged = false;
-  #slider; #shown; #train; #lock; #give; #functions; #note; #step = 0; #asked; #askedAt = 0;
+  #slider; #shown; #train; #lock; #give; #functions; #note; #asked; #askedAt = 0;
 
   /** `give` sends a command and shows its result beside the throttle. */
   constructor(root, train, give) {
@@ -65,13 +65,12 @@ export class Throttle {
     put(this.#lock, say(isLocked ? "unlock" : "lock"));
   }
 
-  /** A locked throttle that is hidden stops its train. */
+  /** A locked throttle that is hidden stops its train, also one that is at rest for a moment within a command. */
   #left = () => {
-    if (document.hidden && this.isLocked && this.#step > 0) orderAtOnce(`stop ${this.#train}`);
+    if (document.hidden && this.isLocked) orderAtOnce(`stop ${this.#train}`);
   };
 
   show({ step, functions, functions_reported: reported }, highest) {
-    this.#step = step;
     FUNCTIONS.forEach((number) => this.#functions[number].setAttribute("aria-pressed", String(functions.includes(number))));
     const isUnreported = functions.some((number) => !reported.includes(number));
     put(this.#note, isUnreported ? say("functions-unreported") : "");

@@ -79,6 +79,10 @@ export class TrainCharts {
 
   passed(passed) {
     this.#passed.push(passed);
+    // What is older than the history is not shown any more.
+    const [begins] = this.#history.t_s;
+    const kept = this.#passed.findIndex(({ t_s: at }) => at >= begins);
+    if (kept > 0) this.#passed.splice(0, kept);
     this.#fresh = true;
     this.#knows();
   }

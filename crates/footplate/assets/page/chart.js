@@ -6,8 +6,8 @@ const HEIGHT = 280;
 const STRIP = 190;
 /** Pixels between two ticks of a vertical axis, in a strip and in a chart. */
 const [TIGHT, ROOMY] = [18, 30];
-/** The charts drawn so far, by figure, to be removed when colours change. */
-const drawn = new Map();
+/** The charts drawn so far, by figure, to be removed when colours change. Figures of closed pages are not kept. */
+const drawn = new WeakMap();
 
 /** The text in the page's language. */
 const pick = (english, german) => (document.documentElement.lang === "de" ? german : english);
@@ -171,7 +171,8 @@ function chart(figure, {
   u.over.setAttribute("role", "application");
   u.over.setAttribute("aria-label", `${name}. ${keys}`);
   u.over.addEventListener("keydown", (event) => onKey(u, event, zooms));
-  drawn.set(figure, [...(drawn.get(figure) ?? []), u]);
+  // Charts that were destroyed are not kept.
+  drawn.set(figure, [...(drawn.get(figure) ?? []).filter(({ root }) => root.isConnected), u]);
   return u;
 }
 

@@ -2,6 +2,7 @@
 
 mod answer_queue;
 mod archive;
+mod clerk_process;
 mod drawn_layout;
 mod fuzzed_body;
 mod odometry_pages;

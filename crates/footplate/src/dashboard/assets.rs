@@ -41,7 +41,7 @@ pub(super) fn asset(path: &str) -> Option<Asset> {
         ),
         _ => files! { path:
             "index.html" "dashboard.css" "dashboard.js" "alarms.js" "guide.js" "schedules_page.js" "route_buttons.js" "server.js" "live.js" "halt.js" "dom.js" "words.js" "english.js"
-            "german.js" "german_report.js" "german_log.js" "german_errors.js" "german_help.js" "german_odometry.js" "charts.js" "time_window.js" "portrait.js" "signals.js" "layout_page.js" "pick_track.js" "track.js" "view.js" "train_page.js"
+            "german.js" "german_report.js" "german_log.js" "german_line.js" "german_errors.js" "german_help.js" "german_odometry.js" "charts.js" "time_window.js" "portrait.js" "signals.js" "layout_page.js" "pick_track.js" "track.js" "view.js" "train_page.js"
             "train_charts.js" "places.js" "plan.js" "plan_curve.js" "plan_without_points.js" "scale.js" "throttle.js" "doing_now.js" "pieces.js" "draft.js" "draft_file.js" "editor_page.js" "setup_page.js" "worker.js" "icon.svg" "manifest.webmanifest" "calibration_page.js" "health_page.js" "recordings_page.js" "odometry_page.js" "slide_view.js"
         },
     };

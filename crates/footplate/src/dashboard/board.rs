@@ -69,6 +69,20 @@ pub(crate) enum Request {
     EndSchedule(String),
 }
 
+impl Request {
+    /// Whether it is carried out although its client does not wait for the answer any more: it stops trains, or only tells what has changed.
+    fn is_done_late(&self) -> bool {
+        match self {
+            Self::EmergencyStop | Self::SavedSchedules(_) => true,
+            Self::Line(line) => {
+                let words: Vec<&str> = line.split_whitespace().collect();
+                matches!(words[..], ["stop", ..] | ["speed", _, "0"] | ["power", "off"])
+            }
+            _ => false,
+        }
+    }
+}
+
 /// A request that waits for the loop.
 #[derive(Debug)]
 pub(crate) struct PendingRequest {
@@ -216,9 +230,16 @@ impl Board {
         lock(&self.models).get(&train).cloned()
     }
 
-    /// The next request, until `None`.
+    /// The next request, until `None`. A client that has waited too long was answered that nothing was done, and its order is not carried
+    /// out later; what stops trains is.
     pub(crate) fn next_request(&self) -> Option<PendingRequest> {
-        lock(&self.waiting).pop_front()
+        let mut waiting = lock(&self.waiting);
+        loop {
+            let next = waiting.pop_front()?;
+            if !next.answer.is_closed() || next.request.is_done_late() {
+                return Some(next);
+            }
+        }
     }
 
     /// Adds a request.
@@ -342,14 +363,28 @@ mod tests {
     #[test]
     fn an_emergency_stop_precedes_all_waiting_requests() {
         let board = Board::new(7);
-        for _ in 0..MAX_WAITING {
-            drop(board.ask(Request::Line("where".into())).expect("room"));
-        }
+        let ask = || board.ask(Request::Line("where".into())).expect("room");
+        let _waiting: Vec<_> = (0..MAX_WAITING).map(|_| ask()).collect();
         assert!(board.ask(Request::Line("where".into())).is_err());
         let mut answered = board.ask(Request::EmergencyStop).expect("always");
         let first = board.next_request().expect("one waits");
         assert_eq!(first.request, Request::EmergencyStop);
         first.answer(Answer::Taken);
         assert_eq!(answered.try_recv(), Ok(Answer::Taken));
+    }
+
+    #[test]
+    fn what_was_answered_with_a_timeout_is_not_carried_out_later_unless_it_stops_trains() {
+        let board = Board::new(7);
+        let lines = ["speed 24 8", "reverse 24", "stop 24", "speed 24 0", "power off", "power on"];
+        for line in lines {
+            drop(board.ask(Request::Line(line.into())).expect("room"));
+        }
+        let _waits = board.ask(Request::Line("speed 58 8".into())).expect("room");
+        drop(board.ask(Request::EmergencyStop).expect("always"));
+        let carried_out = std::iter::from_fn(|| board.next_request()).map(|pending| pending.request);
+        let expected =
+            ["stop 24", "speed 24 0", "power off", "speed 58 8"].map(|line| Request::Line(line.into()));
+        assert!(carried_out.eq([Request::EmergencyStop].into_iter().chain(expected)));
     }
 }

@@ -78,10 +78,12 @@ impl Guard {
         if self.token.is_none() && !self.is_own(host) {
             return Err(Denied::Host);
         }
-        if let Some(origin) = text(header::ORIGIN)
-            && origin.strip_prefix("http://") != Some(host)
-        {
-            return Err(Denied::Origin);
+        if let Some(origin) = text(header::ORIGIN) {
+            // Behind a TLS proxy the page has another scheme than this server; that is for other machines, which need the token.
+            let over_tls = self.token.as_ref().and(origin.strip_prefix("https://"));
+            if origin.strip_prefix("http://").or(over_tls) != Some(host) {
+                return Err(Denied::Origin);
+            }
         }
         // A link on a foreign page may open a page of the dashboard. Programs do not send this header.
         let site = text(FETCH_SITE);
@@ -170,5 +172,28 @@ mod tests {
         assert_eq!(get("Bearer 0123456789abcdef"), Ok(()));
         assert_eq!(get("Bearer 0123456789abcde"), Err(Denied::Token));
         assert_eq!(get(""), Err(Denied::Token));
+    }
+
+    #[test]
+    fn pages_behind_a_tls_proxy_may_ask_with_the_token() {
+        let token = Token::chosen("0123456789abcdef").expect("16 characters");
+        let bound = "127.0.0.1:8417".parse().expect("an address");
+        let post = |guard: &Guard, origin, bearer| {
+            let of = [
+                (header::HOST, "club.example"),
+                (header::ORIGIN, origin),
+                (header::AUTHORIZATION, bearer),
+                (header::CONTENT_TYPE, "application/json"),
+            ];
+            check(guard, &Method::POST, &of)
+        };
+        let (guard, good) = (Guard::new(bound, Some(token)), "Bearer 0123456789abcdef");
+        assert_eq!(post(&guard, "https://club.example", good), Ok(()));
+        assert_eq!(post(&guard, "http://club.example", good), Ok(()));
+        assert_eq!(post(&guard, "https://club.example", "Bearer 0123456789abcde0"), Err(Denied::Token));
+        assert_eq!(post(&guard, "https://evil.example", good), Err(Denied::Origin));
+        assert_eq!(post(&guard, "ftp://club.example", good), Err(Denied::Origin));
+        let open = [(header::HOST, "localhost:8417"), (header::ORIGIN, "https://localhost:8417")];
+        assert_eq!(check(&Guard::new(bound, None), &Method::GET, &open), Err(Denied::Origin));
     }
 }

@@ -63,6 +63,9 @@ pub(crate) fn keep(cable: Cable, restarts: bool) -> anyhow::Result<ExitCode> {
         (watched.has_will, watched.runs) = (false, false);
         let (mut child, stream) = start().context("cannot start the program that drives")?;
         signals.pass_on_to(Some(child.id()));
+        if signals.gives_up() {
+            signals.pass_on_late();
+        }
         let mut frames = FrameReader::new(stream.try_clone()?);
         *ear.lock().unwrap_or_else(PoisonError::into_inner) = Some(FrameWriter::new(stream));
         let left = watch(&mut frames, &mut line, &ear, &mut watched);
@@ -100,6 +103,10 @@ pub(crate) fn keep(cable: Cable, restarts: bool) -> anyhow::Result<ExitCode> {
         }
         say("the program is started again");
         std::thread::sleep(RESTART_AFTER);
+        if signals.gives_up() {
+            say("a signal asked it to end: it is not started again");
+            return Ok(exit_code(ended));
+        }
     }
 }
 

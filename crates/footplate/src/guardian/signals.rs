@@ -55,6 +55,13 @@ impl Signals {
         self.child.store(child, Ordering::Release);
     }
 
+    /// Ends the child because of a signal that came before it was there.
+    pub(super) fn pass_on_late(&self) {
+        if let Some(child) = Pid::from_raw(self.child.load(Ordering::Acquire)) {
+            let _ = kill_process(child, Signal::TERM);
+        }
+    }
+
     /// Whether a signal asked not to wait any longer.
     pub(super) fn gives_up(&self) -> bool {
         self.gives_up.load(Ordering::Acquire)

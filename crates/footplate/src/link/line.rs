@@ -1,5 +1,6 @@
 //! What every link can do, and what is heard of it.
 
+use std::ops::DerefMut;
 use std::time::Duration;
 
 use footplate_core::{TimeSpan, Timestamp};
@@ -97,40 +98,8 @@ impl std::fmt::Display for Lost {
 
 impl std::error::Error for Lost {}
 
-impl<L: Link + ?Sized> Link for Box<L> {
-    fn now(&self) -> Timestamp {
-        (**self).now()
-    }
-    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
-        (**self).write(bytes)
-    }
-    fn wait(&mut self, until: Timestamp) -> Heard {
-        (**self).wait(until)
-    }
-    fn cts(&self) -> Option<bool> {
-        (**self).cts()
-    }
-    fn patience(&self) -> TimeSpan {
-        (**self).patience()
-    }
-    fn reopen(&mut self) -> Result<(), Lost> {
-        (**self).reopen()
-    }
-    fn may_be_half_open(&self) -> bool {
-        (**self).may_be_half_open()
-    }
-    fn real_time(&self) -> Duration {
-        (**self).real_time()
-    }
-    fn pause(&mut self, span: Duration) {
-        (**self).pause(span);
-    }
-    fn guardian(&mut self) -> Option<&mut dyn Guardian> {
-        (**self).guardian()
-    }
-}
-
-impl<L: Link + ?Sized> Link for &mut L {
+/// A link that is owned or borrowed elsewhere.
+impl<L: DerefMut<Target: Link>> Link for L {
     fn now(&self) -> Timestamp {
         (**self).now()
     }

@@ -26,13 +26,17 @@ pub(crate) struct Rhythm {
     messages: Option<jmri::Lines>,
 }
 
-/// What the station was commanded last of the power, and whether anything was heard of it since.
+/// What the station was commanded last of the power, and what was heard of it since.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(crate) struct PowerCommand {
     /// On, or off.
     is_on: bool,
-    /// Whether the station has answered a poll since; a 6051 never confirms the command itself.
+    /// Whether the station has confirmed it since; of one that does not report the power: whether it has answered a poll since.
     has_answered: bool,
+    /// Whether a station of this kind reports the power; a 6051 does not.
+    reports_power: bool,
+    /// Whether the track has power, as the station reported last since the command.
+    reported: Option<bool>,
 }
 
 impl PowerCommand {
@@ -55,7 +59,7 @@ impl Rhythm {
         let (message, _) = Message::decode(&self.said)?;
         let is_request = !message.modules_read().is_empty();
         if let Message::Stop | Message::Go = message {
-            self.power = Some(PowerCommand { is_on: message == Message::Go, has_answered: false });
+            self.commanded(message == Message::Go, false);
             self.asked_since = false;
         }
         self.said.clear();
@@ -75,7 +79,7 @@ impl Rhythm {
         let mut framing = Framing::default();
         let request = text.iter().find_map(|byte| framing.push(*byte).and_then(dcc_ex::Request::read));
         if let Some(dcc_ex::Request::Power { on, .. }) = request {
-            self.power = Some(PowerCommand { is_on: on, has_answered: false });
+            self.commanded(on, true);
         }
     }
 
@@ -88,7 +92,7 @@ impl Rhythm {
         let mut framing = marklin_can::Framing::new(transport);
         let frame = bytes.iter().find_map(|byte| framing.push(*byte)).filter(|frame| !frame.is_response);
         if let Some(is_on) = frame.and_then(|frame| power_of(&frame)) {
-            self.power = Some(PowerCommand { is_on, has_answered: false });
+            self.commanded(is_on, true);
         }
     }
 
@@ -97,16 +101,14 @@ impl Rhythm {
         let frame =
             self.frames.as_mut().and_then(|framing| framing.push(byte)).filter(|frame| frame.is_response);
         let confirmed = frame.and_then(|frame| power_of(&frame));
-        if let Some(power) = self.power.as_mut().filter(|power| confirmed == Some(power.is_on)) {
-            power.has_answered = true;
-        }
+        self.reported(confirmed);
     }
 
     /// A datagram to a Z21 was written.
     pub(crate) fn wrote_datagram(&mut self, datagram: &[u8]) {
         for dataset in z21::Datasets::of(datagram) {
             if let Some(z21::Request::Power { on }) = z21::Request::read(&dataset) {
-                self.power = Some(PowerCommand { is_on: on, has_answered: false });
+                self.commanded(on, true);
             }
         }
     }
@@ -114,10 +116,9 @@ impl Rhythm {
     /// A datagram was heard; if a Z21 confirms the power with it, that counts.
     pub(crate) fn heard_datagram(&mut self, datagram: &[u8]) {
         for dataset in z21::Datasets::of(datagram) {
-            let confirmed = z21::Reply::read(&dataset).ok().flatten().and_then(|reply| reply.power());
-            if let Some(power) = self.power.as_mut().filter(|power| confirmed == Some(power.is_on)) {
-                power.has_answered = true;
-            }
+            let reply = z21::Reply::read(&dataset).ok().flatten();
+            let says = |on| reply.is_some_and(|reply| reply.confirms_power(on));
+            self.reported([false, true].into_iter().find(|on| says(*on)));
         }
     }
 
@@ -125,9 +126,7 @@ impl Rhythm {
     pub(crate) fn heard_of_board(&mut self, byte: u8) {
         let Some(text) = self.replies.as_mut().and_then(|framing| framing.push(byte)) else { return };
         let confirmed = Reply::read(text).ok().flatten().and_then(|reply| reply.main_power());
-        if let Some(power) = self.power.as_mut().filter(|power| confirmed == Some(power.is_on)) {
-            power.has_answered = true;
-        }
+        self.reported(confirmed);
     }
 
     /// A line was written to a LocoNet server.
@@ -140,16 +139,14 @@ impl Rhythm {
             Some(Ok(loconet::Line::Send(loconet::Message::PowerOff))) => false,
             _ => return,
         };
-        self.power = Some(PowerCommand { is_on, has_answered: false });
+        self.commanded(is_on, true);
     }
 
     /// A byte was heard; if a command station on LocoNet says in a slot that the power is as commanded, that counts.
     pub(crate) fn heard_of_server(&mut self, byte: u8) {
         let line = self.lines.as_mut().and_then(|lines| lines.push(byte)).map(loconet::Line::read);
-        if let Some(Ok(loconet::Line::Receive(loconet::Message::Slot(slot)))) = line
-            && let Some(power) = self.power.as_mut().filter(|power| slot.is_powered() == power.is_on)
-        {
-            power.has_answered = true;
+        if let Some(Ok(loconet::Line::Receive(loconet::Message::Slot(slot)))) = line {
+            self.reported(Some(slot.is_powered()));
         }
     }
 
@@ -159,17 +156,28 @@ impl Rhythm {
         let request =
             std::str::from_utf8(text).ok().and_then(|text| jmri::Request::read(text).ok().flatten());
         if let Some(jmri::Request::Power { on, .. }) = request {
-            self.power = Some(PowerCommand { is_on: on, has_answered: false });
+            self.commanded(on, true);
         }
     }
 
     /// A byte was heard; if JMRI confirms the power with it, that counts.
     pub(crate) fn heard_of_jmri(&mut self, byte: u8) {
         let reply = self.messages.as_mut().and_then(|messages| messages.push(byte)).map(jmri::Reply::read);
-        if let Some(Ok(Some(jmri::Reply::Power { on: Some(on), .. }))) = reply
-            && let Some(power) = self.power.as_mut().filter(|power| on == power.is_on)
-        {
-            power.has_answered = true;
+        if let Some(Ok(Some(jmri::Reply::Power { on, .. }))) = reply {
+            self.reported(on);
+        }
+    }
+
+    /// The station was commanded to switch the power.
+    fn commanded(&mut self, is_on: bool, reports_power: bool) {
+        self.power = Some(PowerCommand { is_on, has_answered: false, reports_power, reported: None });
+    }
+
+    /// The station has reported whether the track has power.
+    fn reported(&mut self, on: Option<bool>) {
+        if let Some((power, on)) = self.power.as_mut().zip(on) {
+            power.reported = Some(on);
+            power.has_answered |= on == power.is_on;
         }
     }
 
@@ -203,29 +211,34 @@ fn power_of(frame: &marklin_can::Frame) -> Option<bool> {
 mod tests {
     use super::*;
 
+    /// The power as it was commanded, whether it is confirmed, and whether the station reports it at all.
+    fn seen(rhythm: &Rhythm) -> Option<(bool, bool, bool)> {
+        rhythm.power().map(|power| (power.is_on, power.has_answered, power.reports_power))
+    }
+
     #[test]
     fn a_board_confirms_the_power_itself() {
         let mut rhythm = Rhythm::default();
         rhythm.wrote_message(b"<1 MAIN>");
-        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
+        assert_eq!(seen(&rhythm), Some((true, false, true)));
         b"<# 50><p0 B>".iter().for_each(|byte| rhythm.heard_of_board(*byte));
-        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
+        assert_eq!(seen(&rhythm), Some((true, false, true)));
         b"<p1 MAIN>".iter().for_each(|byte| rhythm.heard_of_board(*byte));
-        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: true }));
+        assert_eq!(seen(&rhythm), Some((true, true, true)));
     }
 
     #[test]
     fn a_command_station_on_loconet_confirms_the_power_in_a_slot() {
         let mut rhythm = Rhythm::default();
         rhythm.wrote_line(b"SEND 83 7C\r\n");
-        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
+        assert_eq!(seen(&rhythm), Some((true, false, true)));
         for (line, has_answered) in [
             (&b"RECEIVE 83 7C\r\n"[..], false),
             (b"RECEIVE E7 0E 05 13 06 00 20 06 00 18 00 00 00 38\r\n", false),
             (b"RECEIVE E7 0E 05 33 18 3F 10 07 00 00 00 00 00 10\r\n", true),
         ] {
             line.iter().for_each(|byte| rhythm.heard_of_server(*byte));
-            assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered }));
+            assert_eq!(seen(&rhythm), Some((true, has_answered, true)));
         }
     }
 
@@ -233,12 +246,12 @@ mod tests {
     fn jmri_confirms_the_power_when_its_hardware_has_switched_it() {
         let mut rhythm = Rhythm::default();
         rhythm.wrote_request(b"{\"type\":\"power\",\"method\":\"post\",\"data\":{\"state\":2}}\n");
-        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
+        assert_eq!(seen(&rhythm), Some((true, false, true)));
         for (state, has_answered) in [(0, false), (2, true)] {
             let power =
                 format!("{{\"type\":\"power\",\"data\":{{\"name\":\"LocoNet\",\"state\":{state}}}}}\n");
             power.bytes().for_each(|byte| rhythm.heard_of_jmri(byte));
-            assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered }));
+            assert_eq!(seen(&rhythm), Some((true, has_answered, true)));
         }
     }
 
@@ -246,13 +259,13 @@ mod tests {
     fn a_central_station_confirms_the_power_itself() {
         let mut rhythm = Rhythm::default();
         rhythm.wrote_frame(&[0, 0, 3, 0, 5, 0, 0, 0, 0, 1, 0, 0, 0]);
-        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
+        assert_eq!(seen(&rhythm), Some((true, false, true)));
         // Its own echo says nothing; the response bit does.
         for (response, has_answered) in [(0, false), (1, true)] {
             [0, response, 3, 0, 5, 0, 0, 0, 0, 1, 0, 0, 0]
                 .into_iter()
                 .for_each(|byte| rhythm.heard_of_bus(byte));
-            assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered }));
+            assert_eq!(seen(&rhythm), Some((true, has_answered, true)));
         }
     }
 
@@ -260,11 +273,16 @@ mod tests {
     fn a_z21_confirms_the_power_itself() {
         let mut rhythm = Rhythm::default();
         rhythm.wrote_datagram(&[0x07, 0x00, 0x40, 0x00, 0x21, 0x81, 0xa0]);
-        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
+        assert_eq!(seen(&rhythm), Some((true, false, true)));
         rhythm.heard_datagram(&[0x07, 0x00, 0x40, 0x00, 0x61, 0x00, 0x61]);
-        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
+        assert_eq!(seen(&rhythm), Some((true, false, true)));
+        assert_eq!(rhythm.power().and_then(|power| power.reported), Some(false));
         rhythm.heard_datagram(&[0x07, 0x00, 0x40, 0x00, 0x61, 0x01, 0x60]);
-        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: true }));
+        assert_eq!(seen(&rhythm), Some((true, true, true)));
+        // Power off, and the answer that all locomotives are stopped, which leaves the power on.
+        rhythm.wrote_datagram(&[0x07, 0x00, 0x40, 0x00, 0x21, 0x80, 0xa1]);
+        rhythm.heard_datagram(&[0x07, 0x00, 0x40, 0x00, 0x81, 0x00, 0x81]);
+        assert_eq!(seen(&rhythm), Some((false, false, true)));
     }
 
     #[test]
@@ -274,16 +292,16 @@ mod tests {
         // 128 + 5 asks five modules, 97 takes the power, 96 gives it (6051 manual).
         assert_eq!(rhythm.written(at(0), 133), Some(Request { after: None }));
         assert_eq!(rhythm.written(at(5), 97), None);
-        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: false, has_answered: false }));
+        assert_eq!(seen(&rhythm), Some((false, false, false)));
         // The reply to an earlier poll confirms nothing.
         assert!(rhythm.heard(at(12)).is_some());
-        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: false, has_answered: false }));
+        assert_eq!(seen(&rhythm), Some((false, false, false)));
         let request = rhythm.written(at(70), 133).expect("a request");
         assert_eq!(request.after, Some((TimeSpan::from_ms(70), 1)));
         assert_eq!(rhythm.heard(at(80)), Some(at(80) - (at(70) + BYTE_TIME)));
         assert_eq!(rhythm.heard(at(84)), None, "only the first byte of an answer");
-        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: false, has_answered: true }));
+        assert_eq!(seen(&rhythm), Some((false, true, false)));
         rhythm.written(at(90), 96);
-        assert_eq!(rhythm.power(), Some(PowerCommand { is_on: true, has_answered: false }));
+        assert_eq!(seen(&rhythm), Some((true, false, false)));
     }
 }

@@ -19,6 +19,9 @@ const HAND_SHAKE: TimeSpan = TimeSpan::from_ms(5);
 /// Upper bound: many times what stops every train of a station.
 const MOST_PARTS: usize = 2_000;
 
+/// A power command leaves within this time, other commands before it included; until then a last will begins without power, which is safe.
+const POWER_LEAVES_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
+
 /// Between two attempts to open a line again.
 const REOPEN_EVERY: Duration = Duration::from_millis(250);
 /// How long a byte waits for the handshake. After that it is sent all the same.
@@ -38,6 +41,8 @@ pub(super) struct LastWill {
     was_running: bool,
     /// Whether the last will must be computed again.
     is_stale: bool,
+    /// When a power command that was accepted has left the session.
+    power_leaves: Option<Timestamp>,
 }
 
 impl LastWill {
@@ -46,7 +51,11 @@ impl LastWill {
     }
 
     /// A command was accepted; its bytes have not left.
-    pub(super) fn accepted(&mut self, command: Command) {
+    pub(super) fn accepted(&mut self, now: Timestamp, command: Command) {
+        if let Command::PowerOff | Command::PowerOn = command {
+            // A last will may begin with the power as it should be.
+            (self.is_stale, self.power_leaves) = (true, Some(now + POWER_LEAVES_WITHIN));
+        }
         if let Command::Speed { train, step } = command
             && step != SpeedStep::STAND
         {
@@ -84,6 +93,7 @@ impl LastWill {
                 self.is_stale |= self.expected.remove(train);
             }
         }
+        self.is_stale |= self.power_leaves.take_if(|leaves| now >= *leaves).is_some();
         if std::mem::take(&mut self.is_stale) {
             guardian.bequeath(&farewell_of(session, now, has_cts))?;
         }
@@ -139,11 +149,11 @@ pub(crate) trait WillLine {
     fn say(&self, words: &str);
 }
 
-/// Sends a last will. Starts again each time the line has to be reopened, until all of it is sent or a person gives up.
-/// Returns whether it was sent.
+/// Sends a last will. Starts again each time the line has to be reopened, until all of it is sent or a person gives up; it is tried at
+/// least once. Returns whether it was sent.
 pub(crate) fn carry_out(line: &mut impl WillLine, will: &[u8]) -> bool {
     let mut was_gone = false;
-    while !line.gives_up() {
+    loop {
         let said = if line.is_open() { Ok(()) } else { line.open() };
         if said.is_ok() && std::mem::take(&mut was_gone) {
             line.say("the line is open again");
@@ -155,8 +165,10 @@ pub(crate) fn carry_out(line: &mut impl WillLine, will: &[u8]) -> bool {
         was_gone = true;
         line.close();
         line.pause(REOPEN_EVERY);
+        if line.gives_up() {
+            return false;
+        }
     }
-    false
 }
 
 fn try_to_carry_out(line: &mut impl WillLine, will: &[u8]) -> Result<(), Lost> {
@@ -268,6 +280,50 @@ mod tests {
         session
     }
 
+    /// A line that is open from its nth attempt on, and a person who does not wait.
+    struct Impatient {
+        opens_after: usize,
+        attempts: usize,
+        written: Vec<u8>,
+    }
+
+    impl WillLine for Impatient {
+        fn is_open(&self) -> bool {
+            self.attempts > self.opens_after
+        }
+        fn open(&mut self) -> Result<(), Lost> {
+            self.attempts += 1;
+            if self.is_open() { Ok(()) } else { Err(Lost("it is gone".to_owned())) }
+        }
+        fn close(&mut self) {}
+        fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+            self.written.extend(bytes);
+            Ok(())
+        }
+        fn cts(&self) -> Option<bool> {
+            None
+        }
+        fn pause(&mut self, _: Duration) {}
+        fn has_answered(&self) -> bool {
+            true
+        }
+        fn expect_answer(&mut self) {}
+        fn gives_up(&self) -> bool {
+            true
+        }
+        fn say(&self, _: &str) {}
+    }
+
+    #[test]
+    fn a_will_is_tried_once_even_if_a_person_gives_up() {
+        let will = written(&[Bequest { after: TimeSpan::ZERO, bytes: b"stop".to_vec() }], 1.0);
+        for (opens_after, sent) in [(0, true), (1, false)] {
+            let mut line = Impatient { opens_after, attempts: 0, written: Vec::new() };
+            assert_eq!(carry_out(&mut line, &will), sent);
+            assert_eq!((line.attempts, line.written == b"stop"), (1, sent));
+        }
+    }
+
     #[test]
     fn the_will_of_an_interface_stops_its_trains_at_once_from_any_moment_on() {
         for (pace, has_cts) in [(Pace::CAREFUL, false), (Pace::FAST, false), (Pace::Cts, true)] {
@@ -289,6 +345,24 @@ mod tests {
                 let stop = Message::Stop.encode().expect("bytes");
                 assert_eq!((off, &[*last][..]), (stop.as_bytes(), stop.as_bytes()));
             }
+        }
+    }
+
+    #[test]
+    fn no_will_switches_the_power_on_after_an_emergency_stop() {
+        for until in (0..1_000).step_by(7) {
+            let session: StationSession =
+                Interface::new(Timestamp::ZERO, Settings::with_cts(5)).expect("modules").into();
+            let now = Timestamp::ZERO + TimeSpan::from_ms(until);
+            let mut session = driven(session, now);
+            // The commands of an emergency stop are accepted; none has left yet.
+            let mut will = LastWill::default();
+            session.handle_command(now, Command::PowerOff).expect("always");
+            will.accepted(now, Command::PowerOff);
+            assert!(will.is_stale, "the guardian gets a new one");
+            let said = farewell_of(&session, now, true);
+            let go = Message::Go.encode().expect("bytes");
+            assert!(said.iter().all(|part| part.bytes != go.as_bytes()), "after {until} ms: {said:?}");
         }
     }
 

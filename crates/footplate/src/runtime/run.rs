@@ -263,7 +263,7 @@ impl<'r, L: Link> Runtime<'r, L> {
         while let Some(output) = machine.poll_output() {
             match output {
                 Output::Command(command) => match self.session.handle_command(now, command) {
-                    Ok(()) => self.will.accepted(command),
+                    Ok(()) => self.will.accepted(now, command),
                     Err(error) => attendant.hear_of_refusal(now, command, error),
                 },
                 Output::HoldLine(until) => self.session.hold_line(until),

@@ -412,6 +412,23 @@ fn a_program_that_dies_is_started_again_if_that_is_wanted() {
 }
 
 #[test]
+fn a_signal_in_the_pause_before_a_restart_ends_the_guardian() {
+    let began = Instant::now();
+    let (_board, line, mut driven) = over_a_board("guardian-restart-ended", &["--restart"]);
+    driven.order("speed 24 8");
+    line.await_words(b"<t 24 72", began);
+    sleep(Duration::from_secs(11).saturating_sub(began.elapsed()));
+    let since = Instant::now();
+    signal("KILL", driven.child());
+    stopped(&line, since, "killed, and ended in the pause");
+    driven.await_errors("the program is started again");
+    signal("TERM", driven.guardian.id());
+    assert_eq!(driven.status(), Some(128 + 9), "{}", driven.errors());
+    assert_eq!(driven.errors().matches("the dashboard is at").count(), 1, "{}", driven.errors());
+    driven.await_errors("it is not started again");
+}
+
+#[test]
 fn an_endless_line_on_standard_input_ends_nothing_and_takes_no_memory() {
     let folder = calibrated("guardian-input", 7);
     let board = Standing::with("tcp:127.0.0.1:0", "1", &["--protocol", "dcc-ex", "--seed", "7"]);

@@ -142,9 +142,13 @@ test("the dashboard fits a phone, in the dark and in German, and reconnects to a
   assert.equal(wide, 390);
   await page.screenshot({ path: join(AT, "dashboard-phone.png") });
   const { port } = running;
+  await page.evaluate(() => { window.isOfFirst = true; });
   await end(running);
   await page.waitForSelector("#connection.red", { timeout: PATIENCE });
   running = await serve(store, port);
+  await page.waitForSelector("#connection.green", { timeout: PATIENCE });
+  // It is another session, perhaps with another layout: the page is loaded again.
+  await page.waitForFunction(() => window.isOfFirst === undefined, null, { timeout: PATIENCE });
   await page.waitForSelector("#connection.green", { timeout: PATIENCE });
   await page.close();
 });

@@ -70,6 +70,52 @@ test("every message of the server is known in German", () => {
   assert.deepEqual(unknown, []);
 });
 
+/** What the link and the server say, as pages show it: in the log, in alarms, and as the reason of a refusal. */
+const OF_LINE = [
+  "the station answers", "a sensor reply had 3 bytes instead of 4; it was dropped and the read repeated", "7 unexpected bytes were dropped; the line is being synchronised again",
+  "the line garbles data: trains stop until it is clean; check its cable", "the line is open again; trains are stopped, and the station is asked for all states", "the station is z21, firmware 1.42, serial number 82850",
+  "the station was reset; trains stopped when the power went and stay so until they are commanded anew", "the station did not confirm: train 24 step 8; check that it has not stopped",
+  "the station is locked: it ignores driving over the network until its unlock code is entered in its app",
+  "the station does not report everything it was asked to (broadcast flags 0x00000104): check its firmware, and what its sensors are connected to (feedback=r-bus, can or loconet)",
+  "the station has no turnout 5: define it there (<T 5 DCC address sub>), or leave out `turnouts=defined`", "the station refused a request: 42",
+  "the station has no free slot for train 24: release a locomotive at a throttle that drives none, or restart the station", "another throttle switched functions of train 24; on now: none", "another throttle switched functions of train 24; on now: F0, F1",
+  "another throttle reversed train 24; drive it from one place only", "another throttle drives train 24; drive it from one place only",
+  "the track has lost its power: a short circuit, or another program switched it off; clear it, then switch the power on",
+  "the station has not been ready for 2.0 s (CTS is down); check its power and the cable, or try the timed mode if the adapter has no CTS",
+  "repeated, because a reply was lost after it: turnout 5 curved", "repeated, because a reply was lost after it: train 24 F0 off", "train 24 was commanded to reverse just before a reply was lost; it may face either direction",
+  "sensor 3 is occupied from the start: a train is on it, or it is stuck", "the interface answers reads of single sensor modules",
+  "the interface answers reads of all sensor modules only: every read takes as long as all of them, and a sensor that is occupied for less may be missed", "turnout 5 was powered for 700 ms; check that its coil is not hot",
+  "commanded to stop: 24, 58; NOT commanded to stop and possibly running: 71; solenoids released, track power switched off; the station accepted the bytes; this line gives no further confirmation",
+  "solenoids not released, track power not switched off; this line gives no confirmation: check that the trains are at rest", "commanded to stop: 24; track power switched off; the station has confirmed it",
+  "track power not switched off; the station did not confirm the rest: check that the trains are at rest, and switch the track power off by hand",
+  "not sent: step 8 for train 24: step 8 is beyond the decoder; steps are 0 to 7", "step 8 for train 24: train 24 has no address here; addresses are 1 to 80", "turnout 400 curved: turnout 400 has no address here; addresses are 1 to 256",
+  "not sent: F9 on for train 24: F9 cannot be switched over this link; functions are F0 to F4", "train 24 has 126 speed steps, and this station commands 14: leave out its steps, or use another station",
+  "turn around, train 24: the station has no such command", "power on: 256 commands already wait for the line; wait until some have been sent", "power off: the link is being closed; open it again to command trains", "train 24 reverse", "turnout 5 straight",
+  "alarm 3 is over already", "`x` is not the number of an alarm; /api/picture lists them",
+];
+
+test("what the link reports and the server denies is known in German", () => {
+  const source = (path) => readFileSync(join(CRATES, path), "utf8").split("#[cfg(test)]")[0];
+  const texts = (path) => [...source(path).matchAll(/"((?:[^"\\]|\\[^])*)"/g)].map(([, text]) => text.replace(/\\\n\s*/g, "").replaceAll('\\"', '"'));
+  const [, denied] = source("footplate/src/dashboard/guard.rs").split("fn says(self)");
+  const reasons = [...denied.split("impl Guard")[0].matchAll(/"([^"]*)"/g)].map(([, text]) => text);
+  assert.equal(reasons.length, 4);
+  const checks = ["dcc_ex", "jmri", "loconet", "marklin_can", "z21"].flatMap((name) => texts(`footplate-wire/src/${name}/session.rs`)).filter((text) => text.startsWith("check "));
+  assert.ok(checks.length > 12, "the texts were found");
+  const silent = checks.flatMap((check) => [`the station has answered nothing for 1.5 s; ${check}`, `no whole reply for 1.5 s, only 3 stray bytes; ${check}`, `40 bytes came that could not be read; ${check}`]);
+  for (const text of [...OF_LINE, ...reasons, ...silent]) {
+    const german = logInGerman(text);
+    assert.notEqual(german, text);
+    assert.doesNotMatch(german, /\b(the|station|is|not|train|turnout|step|check|and|was|to|power|has|for|of|off|sent)\b/, `${text} → ${german}`);
+  }
+  // Every text of the link is one of those: its longest part without blanks is in one of them.
+  const shown = source("footplate-wire/src/session.rs").split("impl Display for CommandError")[1];
+  const own = [...shown.matchAll(/"((?:[^"\\]|\\[^])*)"/g)].map(([, text]) => text.replace(/\\\n\s*/g, "")).filter((text) => / \w+ /.test(text));
+  assert.ok(own.length > 25, "the texts were found");
+  const longest = (text) => text.split(/\{[^}]*\}/).sort((one, other) => other.length - one.length)[0].trim();
+  assert.deepEqual(own.filter((text) => ![...OF_LINE, ...silent].some((sample) => sample.includes(longest(text)))), []);
+});
+
 test("every word of the pages is in both languages, with the same blanks", () => {
   const blanks = (text) => [...text.matchAll(/\{\d\}/g)].map(String).sort();
   assert.deepEqual(Object.keys(GERMAN).sort(), Object.keys(ENGLISH).sort());

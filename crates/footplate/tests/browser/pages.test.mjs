@@ -121,6 +121,13 @@ test("sessions are replayed with a slider and at a speed, and two are compared",
   const [picture] = await Promise.all([page.waitForEvent("download"), page.locator("#walked .csv", { hasText: "PNG" }).first().click()]);
   assert.match(picture.suggestedFilename(), /\.png$/);
   await page.screenshot({ path: join(AT, "recordings.png"), fullPage: true });
+  // Two quick ticks open both sessions once.
+  const ticked = () => page.evaluate(() => [...document.querySelectorAll("#recordings input:checked")].forEach((box) => box.click()));
+  await ticked();
+  await until(page, () => document.querySelectorAll(".session").length === 0);
+  await boxes.evaluateAll((all) => [all[0], all.at(-1)].forEach((box) => box.click()));
+  await until(page, () => document.querySelectorAll("#figures tr").length === 2 && document.querySelector("#answer").textContent === "");
+  assert.equal(await page.locator(".session").count(), 2);
   assert.deepEqual(complaints, []);
   await page.close();
 });

@@ -148,6 +148,14 @@ test("a throttle is locked to its train on a phone, and the train stops when the
   await until(page, () => document.querySelector("#functions button").getAttribute("aria-pressed") === "true");
   await light.click();
   await until(page, () => document.querySelector("#functions button").getAttribute("aria-pressed") === "false");
+  // A train that is at rest for a moment may be about to run again: it gets its stop, too.
+  const stop = page.waitForRequest((request) => request.url().endsWith("/api/orders") && request.postData()?.includes("stop 24"));
+  await page.evaluate(() => {
+    Object.defineProperty(document, "hidden", { value: true, configurable: true });
+    document.dispatchEvent(new Event("visibilitychange"));
+    delete document.hidden;
+  });
+  await stop;
   for (let step = 0; step < 6; step++) await page.click("#faster");
   await until(page, () => /^Runs at \d+ mm\/s \(\d+ km\/h\), step 6\.$/.test(document.querySelector("#now").textContent));
   assert.deepEqual(await findings(page), []);

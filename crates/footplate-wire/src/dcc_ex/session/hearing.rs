@@ -13,7 +13,6 @@ use super::super::time_model::occupied;
 use super::Client;
 use crate::locomotives::ReportedFunctions;
 use crate::outstanding::Awaited as _;
-use crate::sensors::Change;
 use crate::session::LinkNotice;
 
 impl Client {
@@ -164,20 +163,9 @@ impl Client {
     fn hear_of_sensor(&mut self, now: Timestamp, id: u16, active: bool) {
         let Some(number) = id.checked_sub(self.settings.first_sensor) else { return };
         let sensor = SensorId(number);
-        match self.sensors.heard(id, active, self.opening.is_listing()) {
-            Change::Occupied => {
-                let (latest, width) = occupied(now, self.dialogue.last_entry);
-                // It may have become occupied at any time since the line was silent.
-                let width = self.blind_since.map_or(width, |since| width.max(latest - since));
-                self.dialogue.report(sensor, latest, width);
-            }
-            Change::Freed => {
-                let (latest, width) = occupied(now, self.dialogue.last_entry);
-                self.dialogue.report_free(sensor, latest, width);
-            }
-            Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
-            Change::None => {}
-        }
+        let change = self.sensors.heard(id, active, self.opening.is_listing());
+        let span = occupied(now, self.dialogue.last_entry);
+        self.dialogue.hear_of_change(sensor, change, span, self.blind_since);
     }
 }
 

@@ -16,7 +16,6 @@ use super::Client;
 use crate::dcc_ex::Throttle;
 use crate::dialogue::Opening;
 use crate::outstanding::Awaited as _;
-use crate::sensors::Change;
 use crate::session::LinkNotice;
 
 /// JMRI's code for an object that is not in its tables; of those that are asked for here, only turnouts may be missing.
@@ -115,8 +114,7 @@ impl Client {
         let is_wanted = |one: &&Reply| match one {
             Reply::Power { prefix, is_default, .. } => match wanted {
                 Some(_) if prefix.is_some() => prefix.as_ref() == wanted,
-                Some(_) => *is_default,
-                None => *is_default,
+                _ => *is_default,
             },
             _ => false,
         };
@@ -147,6 +145,7 @@ impl Client {
         let ThrottleMessage { throttle, forward, functions, .. } = *message;
         if message.is_released {
             self.lost_throttle(train);
+            self.dialogue.outstanding.take_first(|outstanding| outstanding.awaited.train() == Some(train));
             return self.unverified.push(train);
         }
         let whole = throttle.zip(forward).filter(|_| message.address.is_some());
@@ -232,19 +231,8 @@ impl Client {
 
     fn hear_of_sensor(&mut self, now: Timestamp, name: &str, active: Option<bool>) {
         let Some(((number, sensor), active)) = self.sensor_named(name).zip(active) else { return };
-        match self.sensors.heard(number, active, !self.opening.is_open()) {
-            Change::Occupied => {
-                let (latest, width) = occupied(now, self.dialogue.last_entry, self.settings.sensor_delay);
-                // It may have become occupied at any time since the line was silent.
-                let width = self.blind_since.map_or(width, |since| width.max(latest - since));
-                self.dialogue.report(sensor, latest, width);
-            }
-            Change::Freed => {
-                let (latest, width) = occupied(now, self.dialogue.last_entry, self.settings.sensor_delay);
-                self.dialogue.report_free(sensor, latest, width);
-            }
-            Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
-            Change::None => {}
-        }
+        let change = self.sensors.heard(number, active, !self.opening.is_open());
+        let span = occupied(now, self.dialogue.last_entry, self.settings.sensor_delay);
+        self.dialogue.hear_of_change(sensor, change, span, self.blind_since);
     }
 }

@@ -13,7 +13,6 @@ use super::super::time_model::occupied;
 use super::Client;
 use crate::locomotives::ReportedFunctions;
 use crate::outstanding::Awaited as _;
-use crate::sensors::Change;
 use crate::session::LinkNotice;
 
 /// The opcode of a request for a slot, as the station's refusal of it names it.
@@ -193,19 +192,8 @@ impl Client {
     fn hear_of_sensor(&mut self, now: Timestamp, number: u16, is_occupied: bool) {
         let Some(index) = number.checked_sub(self.settings.first_sensor) else { return };
         let sensor = SensorId(index);
-        match self.sensors.heard(number, is_occupied, !self.opening.is_open()) {
-            Change::Occupied => {
-                let (latest, width) = occupied(now, self.dialogue.last_entry, self.settings.sensor_delay);
-                // It may have become occupied at any time since the line was silent.
-                let width = self.blind_since.map_or(width, |since| width.max(latest - since));
-                self.dialogue.report(sensor, latest, width);
-            }
-            Change::Freed => {
-                let (latest, width) = occupied(now, self.dialogue.last_entry, self.settings.sensor_delay);
-                self.dialogue.report_free(sensor, latest, width);
-            }
-            Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
-            Change::None => {}
-        }
+        let change = self.sensors.heard(number, is_occupied, !self.opening.is_open());
+        let span = occupied(now, self.dialogue.last_entry, self.settings.sensor_delay);
+        self.dialogue.hear_of_change(sensor, change, span, self.blind_since);
     }
 }

@@ -1,6 +1,6 @@
 //! Sends requests and commands as frames, and handles missing answers.
 
-use footplate_core::{Command, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::super::frame::Frame;
 use super::super::message::{Direction, Message};
@@ -8,10 +8,8 @@ use super::super::opening::Question;
 use super::super::outstanding::{Awaited, REPEATED_AFTER};
 use super::super::roster::LOCOMOTIVES_FILE;
 use super::super::settings::Transport;
-use super::super::solenoid::Solenoid;
-use super::super::speed::speed_of;
 use super::super::uid::Uid;
-use super::{Client, Query, position_of};
+use super::{Client, Query};
 use crate::outstanding::{Outgoing, Outstanding};
 
 impl Client {
@@ -77,45 +75,8 @@ impl Client {
         None
     }
 
-    /// Returns the request for a command, and notes what it commands.
-    pub(super) fn commanding(&mut self, now: Timestamp, command: Command) -> Outgoing<Awaited> {
-        let (message, awaited) = match command {
-            Command::Speed { train, step } => {
-                let uid = self.uid(train);
-                self.commanded(train, step, false);
-                let decoder = self.dialogue.decoder(train);
-                let speed = Some(speed_of(step, decoder).unwrap_or_default());
-                (Message::Speed { uid, speed }, Awaited::Speed(train, uid, step, decoder))
-            }
-            Command::Reverse { train } => {
-                let uid = self.uid(train);
-                let forward = self.commanded(train, SpeedStep::STAND, true);
-                let direction = Some(Direction::of(forward));
-                (Message::Direction { uid, direction }, Awaited::Direction(train, uid, forward))
-            }
-            Command::Turnout { turnout, curved } => {
-                self.solenoid = Some(Solenoid::powered(turnout, curved, now));
-                let (uid, position) = (self.settings.turnout(turnout), position_of(curved));
-                let message = Message::Accessory { uid, position, current: 1, time: None };
-                (message, Awaited::Accessory(turnout, uid, position, 1))
-            }
-            Command::Function { train, function, on } => {
-                let uid = self.uid(train);
-                let message = Message::Function { uid, function: function.get(), value: Some(u8::from(on)) };
-                (message, Awaited::Function(train, uid, function, on))
-            }
-            Command::PowerOff | Command::PowerOn => {
-                let on = command == Command::PowerOn;
-                self.dialogue.power = on;
-                let message = if on { Message::Go(Uid::ALL) } else { Message::Stop(Uid::ALL) };
-                (message, Awaited::Power(on))
-            }
-        };
-        Outgoing::commands(command, message, Some(awaited))
-    }
-
     /// Notes the commanded step of a train, reversed or not; returns whether it then runs forward.
-    fn commanded(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> bool {
+    pub(super) fn commanded(&mut self, train: TrainId, step: SpeedStep, reverses: bool) -> bool {
         self.suspected.retain(|other| *other != train);
         self.dialogue.commanded(train, step, reverses)
     }

@@ -15,6 +15,7 @@ use super::super::uid::Uid;
 use super::{Client, Query};
 use crate::dialogue::Opening;
 use crate::locomotives::ReportedFunctions;
+use crate::outstanding::Awaited as _;
 use crate::queue::train_of;
 use crate::session::LinkNotice;
 
@@ -22,6 +23,9 @@ use crate::session::LinkNotice;
 /// own on the bus.
 const VERSION: (u8, u8) = (2, 0);
 const KIND: u16 = 0xFFE0;
+
+/// The list of locomotives, once its stream comes.
+const ROSTER: Awaited = Awaited::Roster { has_begun: true };
 
 impl Client {
     pub(super) fn hear_byte(&mut self, now: Timestamp, byte: u8) {
@@ -50,14 +54,16 @@ impl Client {
                     Message::Participant { uid: self.settings.uid, version: VERSION, kind: KIND };
                 self.write(participant, true);
             }
+            // Other programs on the bus ask for files, too, and their streams say not of what.
+            (Message::StreamBegins { .. } | Message::StreamGoesOn(_), _) if !self.awaits_roster() => {}
             (Message::StreamBegins { length, .. }, _) => {
-                self.dialogue.outstanding.goes_on(Awaited::Roster { has_begun: true }, now);
+                self.dialogue.outstanding.goes_on(ROSTER, now);
                 self.roster.begins(length);
             }
             (Message::StreamGoesOn(bytes), _) => {
-                self.dialogue.outstanding.goes_on(Awaited::Roster { has_begun: true }, now);
+                self.dialogue.outstanding.goes_on(ROSTER, now);
                 if self.roster.goes_on(bytes) == Some(true) {
-                    self.dialogue.outstanding.take(&Awaited::Roster { has_begun: true });
+                    self.dialogue.outstanding.take(&ROSTER);
                 }
             }
             (Message::Overload { .. }, _) => self.hear_power(false),
@@ -65,6 +71,10 @@ impl Client {
             // Requests of other programs count only when the station confirms them.
             _ => {}
         }
+    }
+
+    fn awaits_roster(&self) -> bool {
+        self.dialogue.outstanding.has(&ROSTER)
     }
 
     /// The station confirms or reports something.
@@ -233,7 +243,7 @@ impl Client {
 
     fn hear_of_turnout(&mut self, now: Timestamp, turnout: TurnoutId, curved: bool, was_asked: bool) {
         let before = self.dialogue.hear_of_turnout(turnout, curved);
-        let is_own = was_asked || self.dialogue.outstanding.has(&Awaited::Accessory(turnout, Uid::ALL, 0, 0));
+        let is_own = was_asked || self.dialogue.outstanding.any(|awaited| awaited.turnout() == Some(turnout));
         if !is_own && before != Some(curved) {
             // Another throttle has thrown it.
             self.dialogue.enter(now, EventKind::Turnout { turnout, curved });

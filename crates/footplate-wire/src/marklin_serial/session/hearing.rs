@@ -49,7 +49,7 @@ impl Interface {
 
     /// What the interface may have missed before the lost reply.
     fn say_again(&mut self) {
-        for command in core::mem::take(&mut self.unanswered) {
+        for command in self.unanswered.take() {
             match command {
                 Command::Reverse { train } => self.notify(LinkNotice::ReverseInDoubt { train }),
                 // The power goes off as its last word.

@@ -49,7 +49,7 @@ impl Client {
     fn take(&mut self, now: Timestamp, reply: &Reply) {
         let answered = self.dialogue.outstanding.answered(reply);
         if let Some(on) = reply.power() {
-            self.hear_power(on);
+            self.hear_power(on, reply.confirms_power(false));
         }
         match *reply {
             Reply::SerialNumber(number) => self.serial_number = number,
@@ -151,14 +151,19 @@ impl Client {
         self.dialogue.notify(LinkNotice::BroadcastsRefused { missing });
     }
 
-    fn hear_power(&mut self, on: bool) {
+    /// Whether trains can run, and whether that is because the track has no power.
+    fn hear_power(&mut self, on: bool, is_off: bool) {
         let is_unexpected = self.dialogue.is_power_lost(on, &Awaited::Power(false));
         if is_unexpected && !self.power_is_suspect {
             (self.power_is_suspect, self.asks_status) = (true, true);
             return;
         }
         self.power_is_suspect = false;
-        self.dialogue.hear_power(on, is_unexpected);
+        if on || is_off {
+            self.dialogue.hear_power(on, is_unexpected);
+        } else {
+            self.dialogue.hear_of_stop(is_unexpected);
+        }
     }
 
     /// Compares a train's state with the commanded one.

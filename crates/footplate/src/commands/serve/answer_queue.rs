@@ -2,7 +2,7 @@
 //! (`commands/clerk.rs`), one at a time, so that no file and no store can slow down the process that drives trains.
 
 use std::io::{Read, Write};
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -17,6 +17,7 @@ use serde_json::json;
 use tokio::sync::{Semaphore, mpsc};
 use tokio::time::timeout;
 
+use super::clerk_process::{ClerkProcess, UntilDropped};
 use crate::commands::clerk::{CLERK, LONGEST_ANSWER, Question, limit_that_ended};
 use crate::commands::odometry::PassingFolder;
 use crate::commands::web_page::Language;
@@ -78,10 +79,18 @@ impl AnswerQueue {
             let why = "too many requests are being computed: try again in a moment".to_owned();
             Rejection(StatusCode::TOO_MANY_REQUESTS, why)
         };
-        let _permit = self.permits.try_acquire().map_err(|_| too_many())?;
-        let _turn = self.turn.acquire().await.map_err(|_| too_many())?;
+        let permit = Arc::clone(&self.permits).try_acquire_owned().map_err(|_| too_many())?;
+        let turn = Arc::clone(&self.turn).acquire_owned().await.map_err(|_| too_many())?;
         let (parts, passed) = mpsc::channel(BUFFERED_PARTS);
-        let clerk = tokio::task::spawn_blocking(move || answered(&question, passed));
+        let process = ClerkProcess::default();
+        // If the client leaves, this future is dropped, and the child process ends. The next request waits until it has.
+        let _client = UntilDropped::of(&process);
+        let clerk = tokio::task::spawn_blocking(move || {
+            let answer = answered(&process, &question, passed);
+            process.end();
+            drop((permit, turn));
+            answer
+        });
         let sent = timeout(UPLOAD_TIMEOUT, forward_body(body, most, &parts)).await.unwrap_or_else(|_| {
             let why = format!("the recording did not arrive within {} s", UPLOAD_TIMEOUT.as_secs());
             Err(Rejection(StatusCode::REQUEST_TIMEOUT, why))
@@ -121,24 +130,16 @@ async fn forward_body(body: Body, most: usize, parts: &mpsc::Sender<BodyPart>) -
     Ok(())
 }
 
-/// The child process; it is killed when its request is dropped.
-struct Clerk(Child);
-
-impl Drop for Clerk {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 /// Starts a child process, passes it the request and its body, and reads the answer.
 fn answered(
+    process: &ClerkProcess,
     question: &Question,
     mut passed: mpsc::Receiver<BodyPart>,
 ) -> anyhow::Result<Result<String, Rejection>> {
     // Files of a killed child are removed with the folder.
     let folder = PassingFolder::make().context("making room for an answer")?;
-    let clerk = Command::new(std::env::current_exe()?)
+    let mut clerk = Command::new(std::env::current_exe()?);
+    clerk
         .arg(CLERK)
         .env("TMPDIR", folder.path())
         // The child gets no guardian and none of this process's secrets.
@@ -146,14 +147,8 @@ fn answered(
         .env_remove("FOOTPLATE_TOKEN")
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .context("cannot start a process to compute the answer")?;
-    let mut clerk = Clerk(clerk);
-    let pipes = (clerk.0.stdin.take(), clerk.0.stdout.take(), clerk.0.stderr.take());
-    let (Some(mut input), Some(output), Some(errors)) = pipes else {
-        return Err(anyhow!("a pipe is missing"));
-    };
+        .stderr(Stdio::piped());
+    let (mut input, output, errors) = process.start(&mut clerk)?;
     let output = std::thread::spawn(move || text_of(output, LONGEST_ANSWER));
     let errors = std::thread::spawn(move || text_of(errors, MAX_ERROR_TEXT));
     // A child that stops reading says why by its status, which is checked below.
@@ -161,13 +156,13 @@ fn answered(
     while let Some(part) = passed.blocking_recv().filter(|_| is_reading) {
         match part {
             BodyPart::Bytes(bytes) => is_reading = input.write_all(&bytes).is_ok(),
-            BodyPart::Ended => drop(clerk.0.kill()),
+            BodyPart::Ended => process.kill(),
         }
     }
     drop((input, passed));
     let output = output.join().unwrap_or_default();
     let errors = errors.join().unwrap_or_default();
-    let status = clerk.0.wait()?;
+    let status = process.wait()?;
     Ok(match limit_that_ended(status, &errors) {
         Some(limit) => Err(Rejection(StatusCode::PAYLOAD_TOO_LARGE, limit)),
         None if status.success() => Ok(output),
