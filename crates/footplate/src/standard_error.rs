@@ -1,6 +1,6 @@
 //! Lines for people on standard error.
 
-/// Writes a line to standard error, as `eprintln!` does, and goes on where nobody reads it any more.
+/// Writes a line to standard error, as `eprintln!` does, and goes on where its reader has gone.
 ///
 /// `eprintln!` panics there: with `2>&1 | head` a session would die in the middle of a drive.
 macro_rules! say {

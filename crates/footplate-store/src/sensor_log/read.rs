@@ -19,7 +19,7 @@ use crate::whole_file::open_file;
 pub struct LogContext<'a> {
     /// What the sensors of its railway are called.
     pub sensors: &'a dyn SensorNames,
-    /// The train of rows that name none, in a file whose name names none either.
+    /// The train of rows that name none, unless the name of the file says another one.
     pub train: Option<TrainId>,
 }
 
@@ -82,11 +82,11 @@ pub fn parse_sensor_log(
     let file = path.display().to_string();
     let name = path.file_stem().map_or_else(|| file.clone(), |stem| stem.to_string_lossy().into_owned());
     let table = Table::open(&file, input)?;
-    // A log that names its train is of no other, whichever is asked for.
-    let context = LogContext { train: train_in(&name).or(context.train), ..context };
+    // A log whose name says its train is of no other, whichever is asked for.
+    let named = train_in(&name);
     // The most demanding form first: no other has all its columns.
     if let Some(columns) = table.columns_named(SinceCommandLog::COLUMNS) {
-        let Some(train) = context.train else {
+        let Some(train) = named.or(context.train) else {
             return Err(RecordingError::WhichTrain { file });
         };
         let log = SinceCommandLog::new(&table, columns, context.sensors, train);
@@ -96,6 +96,7 @@ pub fn parse_sensor_log(
         return read_rows(&file, name, table, LightGateLog::new(columns, context.sensors));
     }
     if let Some(columns) = table.columns_named(OwnLog::COLUMNS) {
+        let context = LogContext { train: context.train.map(|asked| named.unwrap_or(asked)), ..context };
         let log = OwnLog::new(&table, columns, context);
         return read_rows(&file, name, table, log);
     }

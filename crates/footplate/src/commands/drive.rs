@@ -378,7 +378,7 @@ impl Arguments {
                     if let Some(dashboard) = dashboard {
                         dashboard.board.publish("ended", &result);
                     }
-                    // Trains go on where nobody reads results any more, and what was learnt is kept.
+                    // Trains go on when the reader of results has gone, and what was learnt is kept.
                     if self.json && unwritten.is_none() {
                         let line = serde_json::to_string(&result)?;
                         unwritten = writeln!(output, "{line}").and_then(|()| output.flush()).err();

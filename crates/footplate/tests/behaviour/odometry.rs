@@ -238,7 +238,7 @@ fn labels_say_the_probability_that_was_asked_for() {
 }
 
 #[test]
-fn runs_of_one_name_in_two_files_are_told_apart() {
+fn runs_of_one_name_in_two_files_are_named_by_file() {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("odometry-same-runs");
     std::fs::create_dir_all(&folder).unwrap();
     let copy = folder.join("copy.csv");

@@ -179,5 +179,9 @@ fn a_model_of_another_layout_and_a_turnout_that_is_not_there_are_refused() {
         assert!(run.errors.contains(says), "{}", run.errors);
     };
     refused(&["--calibration", &other.display().to_string()], "other.toml: a model made on track-b");
+    let nan = folder.join("nan.toml");
+    std::fs::write(&nan, text.replacen("scatter_scale = 1.0", "scatter_scale = nan", 1))
+        .expect("a test file");
+    refused(&["--calibration", &nan.display().to_string()], "nan.toml: ");
     refused(&["--turnout", "99=straight"], "--turnout: track-a has no turnout 99");
 }
