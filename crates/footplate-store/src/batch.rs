@@ -200,6 +200,7 @@ impl Batch {
         train: Option<TrainId>,
     ) -> Result<Self, BatchError> {
         let (mut runs, mut left_out) = (Vec::new(), Vec::new());
+        let mut known: BTreeSet<TrainId> = BTreeSet::new();
         let all = store.recordings(as_of)?;
         let recordings: Vec<_> = all.iter().filter(|stored| stored.layout == layout.name()).collect();
         if recordings.is_empty() {
@@ -216,6 +217,7 @@ impl Batch {
                     excluded: event.is_excluded(),
                 });
                 let (accepted, is_live) = (stored.accepted(), recording.is_live());
+                known.extend(accepted.trains.iter().map(|at_start| at_start.train));
                 match batch_run(name, is_live, &accepted, events.collect(), train) {
                     // A person who records trains one by one wants to know; a session goes as it goes.
                     Err(BatchError::SeveralTrains { recording: name, run, trains }) if is_live => {
@@ -224,6 +226,9 @@ impl Batch {
                     run => runs.extend(run?),
                 }
             }
+        }
+        if let Some(train) = train.filter(|train| !known.contains(train)) {
+            return Err(BatchError::NoRunOfTrain { train, there: known });
         }
         Self::of_runs(layout, runs, left_out)
     }

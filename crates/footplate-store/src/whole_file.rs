@@ -25,17 +25,18 @@ impl WholeFile {
     /// # Errors
     /// What the system said; `path` is then what it was before.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let path = linked(path)?;
-        let name = path.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
-        if let Ok(about) = fs::metadata(&path)
+        // Asked of the path as it is given: what /dev/stdout leads to has no path of its own.
+        if let Ok(about) = fs::metadata(path)
             && !about.is_file()
         {
             if about.is_dir() {
                 return Err(io::ErrorKind::IsADirectory.into());
             }
-            let file = OpenOptions::new().write(true).open(&path)?;
+            let file = OpenOptions::new().write(true).open(path)?;
             return Ok(Self { file, places: None, is_finished: false });
         }
+        let path = linked(path)?;
+        let name = path.file_name().ok_or(io::ErrorKind::InvalidFilename)?;
         let process = std::process::id();
         let mut number = 0;
         loop {

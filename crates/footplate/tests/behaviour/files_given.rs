@@ -157,6 +157,9 @@ fn a_store_says_how_it_keeps_a_log_that_is_given_otherwise() {
         footplate(&["store", "--store", &store, "import", &train_24("run"), "--layout", layout])
     };
     assert_eq!(import("track-a").status, 0);
+    let other = footplate(&["calibrate", "--store", &store, "--layout", "track-a", "--train", "58"]);
+    assert_eq!(other.status, 2);
+    assert!(other.errors.contains("no run of train 58: the recordings are of train 24"), "{}", other.errors);
     let again = import("track-b");
     assert_eq!(again.status, 1, "{}{}", again.output, again.errors);
     assert!(again.errors.contains("keeps it as recording 1 of layout track-a, train 24"), "{}", again.errors);
@@ -192,6 +195,14 @@ fn no_output_replaces_an_input_or_another_output() {
     let page = folder.join("page.html").display().to_string();
     refused(&["odometry", &log, "--out", &page, "--report", &page], "--out writes this file, too");
     refused(&["convert", &log, "--out", &page], "a sensor log is written as CSV");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_output_may_be_the_standard_one() {
+    let run = footplate(&["convert", &train_24("run"), "--out", "/dev/stdout"]);
+    assert_eq!(run.status, 0, "{}", run.errors);
+    assert!(run.output.starts_with("run,t_s,kind"), "{}", &run.output[..run.output.len().min(100)]);
 }
 
 #[test]
