@@ -10,7 +10,10 @@
 //! testbed                     calibrated trains in a simulated world: the start of every score
 //! seeds                       seeds and random tasks
 //! figures  written_scores     statistics and their output
+//! standard_error              lines for people: the lowest crate that writes any
 //! ```
+
+#![warn(clippy::print_stderr)]
 
 pub mod disasters;
 pub mod driving;
@@ -18,6 +21,7 @@ pub mod figures;
 pub mod line;
 pub mod pacing;
 pub mod seeds;
+mod standard_error;
 pub mod survey;
 pub mod testbed;
 pub mod traffic;

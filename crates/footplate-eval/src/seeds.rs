@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::process::Command;
 
+use crate::say;
 use anyhow::{anyhow, bail};
 
 /// The most seeds: more runs of a scenario add nothing, and a typing error should be rejected.
@@ -119,7 +120,7 @@ fn current_commit() -> anyhow::Result<String> {
     let mut commit = git(&["rev-parse", "HEAD"])?;
     commit.truncate(HASH_DIGITS);
     if !git(&["status", "--porcelain", "--untracked-files=no"])?.trim().is_empty() {
-        eprintln!("the files differ from commit {commit}: these figures are not those of the commit");
+        say!("the files differ from commit {commit}: these figures are not those of the commit");
         commit += CHANGED;
     }
     Ok(commit)

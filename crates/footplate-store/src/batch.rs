@@ -1,5 +1,8 @@
 //! Recordings in, motion models out: gathers the runs of recordings, or of a store at a date, and fits every train.
 
+use core::fmt;
+use std::collections::BTreeSet;
+
 use footplate_core::link::{PollTiming, PollTimingEstimator};
 use footplate_core::model::report::{Review, RunPassages};
 use footplate_core::model::survey::SectionIndex;
@@ -11,12 +14,13 @@ use footplate_core::{
 use crate::motion_replay::{MotionReplay, RunBegin};
 use crate::poll_rhythm::poll_rhythm;
 use crate::recording::{Recording, Run};
+use crate::recording_names::distinct_names;
 use crate::store::{Store, StoreError};
 
 /// A run as a batch keeps it: with the place of every event, so that each number can be traced back.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BatchRun {
-    /// The recording it is of.
+    /// The recording it is of, by a name that no other recording of the batch has.
     pub recording: String,
     /// Whether that is a live session.
     pub is_live: bool,
@@ -122,9 +126,37 @@ pub enum BatchError {
         /// The trains that move in it.
         trains: Vec<TrainId>,
     },
+    /// No run is of the train.
+    #[error(
+        "no run of train {train}: {}",
+        listed(there, "the recordings name no train", "the recordings are of train")
+    )]
+    NoRunOfTrain {
+        /// The train.
+        train: TrainId,
+        /// The trains that the recordings are of.
+        there: BTreeSet<TrainId>,
+    },
+    /// The store has no recording of the layout.
+    #[error(
+        "nothing to calibrate on the layout {layout}: {}",
+        listed(there, "the store has no recordings yet", "the store has recordings of")
+    )]
+    NoRecordings {
+        /// The layout.
+        layout: String,
+        /// The layouts that the store has recordings of.
+        there: BTreeSet<String>,
+    },
     /// The store could not be read.
     #[error(transparent)]
     Store(#[from] StoreError),
+}
+
+/// What there is, as a sentence: `none` if there is nothing.
+fn listed<T: fmt::Display>(found: &BTreeSet<T>, none: &str, some: &str) -> String {
+    let found: Vec<String> = found.iter().map(ToString::to_string).collect();
+    if found.is_empty() { none.to_owned() } else { format!("{some} {}", found.join(", ")) }
 }
 
 impl Batch {
@@ -138,7 +170,8 @@ impl Batch {
         train: Option<TrainId>,
     ) -> Result<Self, BatchError> {
         let mut runs = Vec::new();
-        for recording in recordings {
+        let names = distinct_names(recordings.iter().map(|recording| recording.name.as_str()));
+        for (recording, name) in recordings.iter().zip(&names) {
             for run in &recording.runs {
                 let events = run.events.iter().map(|raw| BatchEvent {
                     event: raw.event,
@@ -146,8 +179,12 @@ impl Batch {
                     stored_as: None,
                     excluded: false,
                 });
-                runs.extend(batch_run(&recording.name, false, run, events.collect(), train)?);
+                runs.extend(batch_run(name, false, run, events.collect(), train)?);
             }
+        }
+        if let Some(train) = train.filter(|_| runs.is_empty()) {
+            let there = recordings.iter().flat_map(Recording::trains).collect();
+            return Err(BatchError::NoRunOfTrain { train, there });
         }
         Self::of_runs(layout, runs, Vec::new())
     }
@@ -163,7 +200,15 @@ impl Batch {
         train: Option<TrainId>,
     ) -> Result<Self, BatchError> {
         let (mut runs, mut left_out) = (Vec::new(), Vec::new());
-        for recording in store.recordings(as_of)?.iter().filter(|stored| stored.layout == layout.name()) {
+        let mut known: BTreeSet<TrainId> = BTreeSet::new();
+        let all = store.recordings(as_of)?;
+        let recordings: Vec<_> = all.iter().filter(|stored| stored.layout == layout.name()).collect();
+        if recordings.is_empty() {
+            let there = all.iter().map(|stored| stored.layout.clone()).collect();
+            return Err(BatchError::NoRecordings { layout: layout.name().to_owned(), there });
+        }
+        let names = distinct_names(recordings.iter().map(|stored| stored.name.as_str()));
+        for (recording, name) in recordings.into_iter().zip(&names) {
             for stored in store.runs(recording.key, as_of)? {
                 let events = stored.events.iter().map(|event| BatchEvent {
                     event: event.raw.event,
@@ -172,7 +217,8 @@ impl Batch {
                     excluded: event.is_excluded(),
                 });
                 let (accepted, is_live) = (stored.accepted(), recording.is_live());
-                match batch_run(&recording.name, is_live, &accepted, events.collect(), train) {
+                known.extend(accepted.trains.iter().map(|at_start| at_start.train));
+                match batch_run(name, is_live, &accepted, events.collect(), train) {
                     // A person who records trains one by one wants to know; a session goes as it goes.
                     Err(BatchError::SeveralTrains { recording: name, run, trains }) if is_live => {
                         left_out.push(LeftOut { recording: name, run, trains });
@@ -180,6 +226,9 @@ impl Batch {
                     run => runs.extend(run?),
                 }
             }
+        }
+        if let Some(train) = train.filter(|train| !known.contains(train)) {
+            return Err(BatchError::NoRunOfTrain { train, there: known });
         }
         Self::of_runs(layout, runs, left_out)
     }

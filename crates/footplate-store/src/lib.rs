@@ -22,6 +22,7 @@ mod published_table;
 mod quantity;
 mod railtoolkit;
 mod recording;
+mod recording_names;
 pub mod score;
 mod sensor_log;
 mod sensor_names;
@@ -88,5 +89,5 @@ pub use vehicle_file::{
     DEFAULT_VEHICLE, LARGEST_VEHICLE, VehicleFile, VehicleFileError, VehicleProblem, default_vehicle,
     parse_vehicle, read_vehicle, write_vehicle,
 };
-pub use whole_file::{WholeFile, read_at_most, write_whole};
+pub use whole_file::{WholeFile, open_file, read_at_most, write_whole};
 pub use written_table::{TableForm, UnknownForm};

@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::poll_rhythm::poll_rhythm;
 use crate::recording::Run;
+use crate::recording_names::distinct_names;
 use crate::speed_profile::SpeedProfile;
 use crate::store::{KeptReplay, Store, StoreError};
 
@@ -126,12 +127,15 @@ impl MotionReplay {
         as_of: Timestamp,
     ) -> Result<Vec<StoredReplayRun>, StoreError> {
         let mut runs: Vec<StoredReplayRun> = Vec::new();
-        for recording in store.recordings(as_of)?.iter().filter(|stored| stored.layout == layout.name()) {
+        let mut recordings = store.recordings(as_of)?;
+        recordings.retain(|stored| stored.layout == layout.name());
+        let names = distinct_names(recordings.iter().map(|stored| stored.name.as_str()));
+        for (recording, name) in recordings.iter().zip(&names) {
             let accepted: Vec<Run> =
                 store.runs(recording.key, as_of)?.iter().map(crate::StoredRun::accepted).collect();
             let rhythm = poll_rhythm(accepted.iter().map(|run| run.events.iter().map(|raw| &raw.event)));
             let of = |run| StoredReplayRun {
-                recording: recording.name.clone(),
+                recording: name.clone(),
                 is_live: recording.is_live(),
                 run,
                 rhythm: rhythm.clone(),

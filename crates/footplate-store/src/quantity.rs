@@ -1,5 +1,7 @@
 //! A number as it travels in files.
 
+use core::fmt;
+
 use footplate_core::{Estimate, Length, Speed, TimeSpan};
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +19,14 @@ pub struct Quantity {
     /// When the newest of them was made, in seconds since the Unix epoch, where the recording tells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub measured_at_s: Option<f64>,
+}
+
+/// As `179 ± 12 mm/s²`: two digits of the uncertainty, at most three behind the point.
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let digits = [10.0, 1.0, 0.1].iter().take_while(|place| self.uncertainty < **place).count();
+        write!(f, "{:.digits$} ± {:.digits$} {}", self.value, self.uncertainty, self.unit)
+    }
 }
 
 impl Quantity {

@@ -5,6 +5,7 @@
 //! single report is a run. What they mean is for the core to decide.
 
 use core::fmt;
+use std::collections::BTreeSet;
 
 use footplate_core::{Event, EventKind, Report, RunId, SpeedStep, Timestamp, TrainId};
 
@@ -30,6 +31,15 @@ pub enum Form {
     SinceCommand,
     /// Reports of a train already running on the host's clock, and passes of light gates on a clock of theirs.
     LightGate,
+}
+
+impl Recording {
+    /// The trains that its runs know, each once.
+    pub fn trains(&self) -> impl Iterator<Item = TrainId> + '_ {
+        let known: BTreeSet<TrainId> =
+            self.runs.iter().flat_map(|run| run.trains.iter().map(|at_start| at_start.train)).collect();
+        known.into_iter()
+    }
 }
 
 impl Form {

@@ -2,6 +2,8 @@
 //!
 //! A library, so that the fuzzer can call what reads orders and HTTP bodies in its own process; `main.rs` only calls [`run`].
 
+#![warn(clippy::print_stderr)]
+
 mod chaos;
 mod clock;
 mod commands;
@@ -21,6 +23,7 @@ mod recorded;
 mod runtime;
 mod session_journal;
 mod spread;
+mod standard_error;
 mod tally;
 
 use std::io::{ErrorKind, Write};
@@ -30,6 +33,7 @@ use clap::Parser;
 
 use commands::{Command, Outcome};
 use error_text::error_text;
+use standard_error::say;
 
 /// Exit status when the usage or the input is wrong; the command line parser ends with it, too.
 const BAD_INPUT: u8 = 2;
@@ -68,7 +72,7 @@ pub fn run() -> ExitCode {
 }
 
 fn failed(error: &anyhow::Error) -> ExitCode {
-    eprintln!("error: {}", error_text(error));
+    say!("error: {}", error_text(error));
     ExitCode::from(BAD_INPUT)
 }
 

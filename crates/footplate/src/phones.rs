@@ -27,6 +27,7 @@ use tokio::time::{interval, sleep, timeout};
 use crate::clock::Stopwatch;
 use crate::dashboard::{Board, Request};
 use crate::link::{PowerCommand, SharedTallies};
+use crate::standard_error::say;
 
 /// JMRI's port, at which phones look first.
 const USUAL_PORT: u16 = 12_090;
@@ -82,13 +83,13 @@ impl Phones {
             runtime.block_on(async move {
                 match TcpListener::from_std(listener) {
                     Ok(listener) => station.accept(listener).await,
-                    Err(error) => eprintln!("phones are not served: {error}"),
+                    Err(error) => say!("phones are not served: {error}"),
                 }
             });
         })?;
         let reach =
             if bound.ip().is_loopback() { "programs on this machine" } else { "everyone on this network" };
-        eprintln!("phones (WiThrottle, Engine Driver) connect to {bound}; {reach} can drive");
+        say!("phones (WiThrottle, Engine Driver) connect to {bound}; {reach} can drive");
         Ok(Self { _announcement: announced(bound) })
     }
 }
@@ -112,7 +113,7 @@ fn announced(bound: SocketAddr) -> Option<ServiceDaemon> {
         Ok(daemon)
     };
     announce()
-        .map_err(|error| eprintln!("the network does not announce it to phones ({error}): type the address"))
+        .map_err(|error| say!("the network does not announce it to phones ({error}): type the address"))
         .ok()
 }
 

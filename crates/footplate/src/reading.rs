@@ -5,6 +5,7 @@ use std::io::{self, Read};
 use std::path::Path;
 use std::time::Duration;
 
+use footplate_store::open_file;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// What ends sooner shows no bar.
@@ -20,12 +21,8 @@ pub(crate) struct ProgressReader {
 impl ProgressReader {
     /// Opens the file at `path`.
     pub(crate) fn open(path: &Path) -> io::Result<Self> {
-        let file = File::open(path)?;
-        let length = file.metadata()?;
-        if length.is_dir() {
-            return Err(io::Error::other("it is a folder"));
-        }
-        let bar = ProgressBar::with_draw_target(Some(length.len()), ProgressDrawTarget::hidden());
+        let (file, about) = open_file(path)?;
+        let bar = ProgressBar::with_draw_target(Some(about.len()), ProgressDrawTarget::hidden());
         if let Ok(style) = ProgressStyle::with_template("{msg} {bar:30} {bytes} of {total_bytes}, {eta} left")
         {
             bar.set_style(style);

@@ -20,6 +20,7 @@ use footplate_store::{Direction, Journal, JournalEntry, TrainAtStart};
 pub(crate) use self::scribe::Scribe;
 use self::writer::Writer;
 use crate::runtime::Recorder;
+use crate::standard_error::say;
 
 /// The version of the program that decides.
 pub(crate) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
@@ -267,7 +268,7 @@ impl Recorder for SessionJournal {
             (Some(trouble), IfUnkept::Stop) => bail!("the session cannot be written down: {trouble}"),
             (Some(trouble), IfUnkept::GoOn) if !self.said => {
                 self.said = true;
-                eprintln!("the session is not written down at present, and goes on as asked: {trouble}");
+                say!("the session is not written down at present, and goes on as asked: {trouble}");
             }
             (Some(_), IfUnkept::GoOn) => {}
         }

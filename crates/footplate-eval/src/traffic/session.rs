@@ -10,6 +10,7 @@ use footplate_core::{Length, NodeId, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{Incident, LivingLayout, LivingSwitches};
 use footplate_wire::LinkNotice;
 
+use crate::say;
 use crate::seeds::Choice;
 use crate::testbed::PreparedTrains;
 
@@ -172,7 +173,7 @@ impl<'l> Session<'l> {
         }
         self.tally.incidents = self.prepared.world().incidents().iter().skip(before).copied().collect();
         for incident in self.tally.incidents.iter().filter(|_| self.talk) {
-            eprintln!("{:9.2} {:?}", incident.at.as_s(), incident.kind);
+            say!("{:9.2} {:?}", incident.at.as_s(), incident.kind);
         }
         self.trains.iter().filter(|_| self.talk).for_each(|train| self.print_truth(*train));
         self.tally
@@ -181,7 +182,7 @@ impl<'l> Session<'l> {
     fn hear(&mut self, notice: &Notice) {
         let now = self.prepared.line.now();
         if self.talk && !matches!(notice, Notice::Planned(_)) {
-            eprintln!("{:9.2} {notice:?}", now.as_s());
+            say!("{:9.2} {notice:?}", now.as_s());
         }
         match notice {
             Notice::Arrived { train, error, took, .. } => {
@@ -263,7 +264,7 @@ impl<'l> Session<'l> {
             {
                 self.tally.intrusions.push((now, train));
                 if self.talk {
-                    eprintln!("{:9.2} train {train} is on track that it does not hold", now.as_s());
+                    say!("{:9.2} train {train} is on track that it does not hold", now.as_s());
                     self.print_truth(train);
                 }
             }
@@ -293,7 +294,7 @@ impl<'l> Session<'l> {
             self.tally.mistaken += 1;
             if self.talk {
                 let (train, mm) = (finished.train, error.as_mm());
-                eprintln!("{:9.2} train {train} is {mm:.0} mm ({sigmas:.1} sd) beyond", finished.time.as_s());
+                say!("{:9.2} train {train} is {mm:.0} mm ({sigmas:.1} sd) beyond", finished.time.as_s());
             }
         }
     }
@@ -312,14 +313,14 @@ impl<'l> Session<'l> {
         let estimated = driver.position(train, self.prepared.line.now()).map(place);
         let journey = self.dispatcher.journey(train).map(|(_, journey)| self.layout.display(journey.target));
         let journey = journey.map(|to| to.to_string());
-        eprintln!("          {train} wants to {journey:?}, is really {really:?}, estimated {estimated:?}");
+        say!("          {train} wants to {journey:?}, is really {really:?}, estimated {estimated:?}");
         let under = driver.turnouts_under(train, self.prepared.line.now()).into_iter();
         let under: Vec<_> = under.map(|turnout| (turnout.0, driver.turnouts().get(turnout))).collect();
-        eprintln!("          on turnouts {under:?}");
+        say!("          on turnouts {under:?}");
         for (turnout, _) in self.layout.turnouts() {
             let (lies, known) = (self.prepared.world().lies(turnout), driver.turnouts().get(turnout));
             if lies != known {
-                eprintln!("          turnout {turnout} lies {lies:?}, known as {known:?}");
+                say!("          turnout {turnout} lies {lies:?}, known as {known:?}");
             }
         }
     }

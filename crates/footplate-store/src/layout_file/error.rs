@@ -65,6 +65,16 @@ pub struct TextPlace {
 }
 
 impl TextPlace {
+    /// Where XML is wrong; at the end of what breaks off, for which its parser names no place.
+    pub(crate) fn of_xml(file: &str, text: &str, error: &roxmltree::Error) -> Self {
+        use roxmltree::Error;
+        if matches!(error, Error::UnclosedRootNode | Error::UnexpectedEndOfStream | Error::NoRootNode) {
+            return Self::of_byte(file, text, text.len());
+        }
+        let at = error.pos();
+        Self { file: file.to_owned(), line: at.row as usize, column: at.col as usize }
+    }
+
     /// The place of a byte of `text`.
     pub(crate) fn of_byte(file: &str, text: &str, byte: usize) -> Self {
         let before = text.get(..byte).unwrap_or(text);

@@ -95,8 +95,7 @@ pub enum PanelError {
 pub fn import_panel(file: &str, text: &str, context: &ImportContext) -> Result<ImportedPanel, PanelError> {
     let options = ParsingOptions { allow_dtd: false, nodes_limit: MOST_NODES, ..ParsingOptions::default() };
     let document = Document::parse_with_options(text, options).map_err(|error| {
-        let at = error.pos();
-        let place = TextPlace { file: file.to_owned(), line: at.row as usize, column: at.col as usize };
+        let place = TextPlace::of_xml(file, text, &error);
         PanelError::Xml { place, problem: error.to_string().chars().take(200).collect() }
     })?;
     let root = document.root_element();

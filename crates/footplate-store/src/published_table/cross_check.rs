@@ -93,6 +93,9 @@ pub struct CrossCheck {
     pub stop_spread_percent: Option<f64>,
     /// The number of published figures, and of those without a counterpart in our calibration.
     pub without_counterpart: [usize; 2],
+    /// Published figures with a counterpart that cannot be judged: no two teams measured the same step of a train, so that the
+    /// spread of that kind of figure is unknown.
+    pub spread_unknown: usize,
 }
 
 /// Why there is nothing to compare.
@@ -139,14 +142,16 @@ impl CrossCheck {
             speed_spread_percent: speed_spread.map(|spread| 100.0 * spread),
             stop_spread_percent: stop_spread.map(|spread| 100.0 * spread),
             without_counterpart: [teams.len(), 0],
+            spread_unknown: 0,
         };
         for (key, values) in &teams {
             let (kind, between) = match key.0 {
                 PublishedQuantity::Speed => (&mut check.speeds, speed_spread),
                 PublishedQuantity::Stop(_) => (&mut check.stops, stop_spread),
             };
-            match between.and_then(|between| checked(report, key, values, between)) {
-                Some(figure) => kind.push(figure),
+            match checked(report, key, values, between.unwrap_or_default()) {
+                Some(figure) if between.is_some() => kind.push(figure),
+                Some(_) => check.spread_unknown += 1,
                 None => check.without_counterpart[1] += 1,
             }
         }
@@ -161,7 +166,11 @@ impl CrossCheck {
             });
         }
         if check.speeds.is_empty() && check.stops.is_empty() {
-            return Err(NothingToCompare::NoCounterpart { figures: figures.len() });
+            let is_judged = |figure: &&PublishedFigure| {
+                if of_speeds(figure.quantity) { speed_spread.is_some() } else { stop_spread.is_some() }
+            };
+            let judged = figures.iter().filter(is_judged).count();
+            return Err(NothingToCompare::NoCounterpart { figures: judged });
         }
         Ok(check)
     }
@@ -349,6 +358,22 @@ mod tests {
         assert_eq!(differing, ["c"]);
         let teams = CrossCheck::by_team(&check.speeds);
         assert_eq!(teams.iter().map(|team| team.agree).collect::<Vec<_>>(), [1, 1, 0, 1, 1, 1]);
+    }
+
+    #[test]
+    fn figures_of_a_kind_that_one_team_measured_are_not_called_missing() {
+        // Given speeds of two teams, a stop of one at a step that the recordings show, and one at a step that they do not,
+        let stop = |step| PublishedFigure {
+            quantity: PublishedQuantity::Stop(CountedFrom::Command),
+            ..speed(step, 480.0, "a")
+        };
+        let figures = [speed(8, 200.0, "a"), speed(8, 220.0, "b"), stop(8), stop(9)];
+        let mut shown = ours(8, 210.0, 2.1);
+        shown.trains[0].steps[0].stop = Quantity::new("mm", 500.0, 5.0, 3);
+        let check = CrossCheck::of(&shown, &figures).unwrap();
+        // then the first cannot be judged, and only the second is one that the recordings do not show.
+        assert_eq!((check.without_counterpart, check.spread_unknown), ([4, 1], 1));
+        assert!(check.stops.is_empty());
     }
 
     #[test]

@@ -94,11 +94,6 @@ impl FormReader for LightGateLog<'_> {
         }
         match entry {
             Entry::Sensor(report) => {
-                if clock < UNIX_TIMES_FROM {
-                    return Err(
-                        row.wrong(self.time, "milliseconds since the Unix epoch, 1000000000000 or more")
-                    );
-                }
                 let origin = *run.began_at.get_or_insert(clock);
                 run.add(row, self.time, Timestamp::ZERO + (clock - origin), EventKind::Sensor(report))
             }

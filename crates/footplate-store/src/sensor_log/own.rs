@@ -1,7 +1,7 @@
 //! The form *sensor-log*, Footplate's own: a row an event.
 //!
 //! Columns: `t_s` and `kind`; and as far as the kinds need them `run`, `name`, `train`, `step`, `leg`,
-//! `landmark`, `offset_mm`, `poll_interval_ms`, `gate_s`. The kinds are the arms of [`OwnLog::entry`].
+//! `landmark`, `offset_mm`, `poll_interval_ms`. The kinds are the arms of [`OwnLog::entry`].
 
 use std::io::BufRead;
 

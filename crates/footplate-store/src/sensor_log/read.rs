@@ -1,7 +1,6 @@
 //! From a file to a recording: which form it has, and what is the same in all of them.
 
-use std::fs::File;
-use std::io::{self, BufRead, BufReader};
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use footplate_core::TrainId;
@@ -13,13 +12,14 @@ use super::since_command::SinceCommandLog;
 use crate::recording::{Form, Note, Oddity, Recording};
 use crate::sensor_names::SensorNames;
 use crate::table::{LastLine, Row, Table, TableError, shown};
+use crate::whole_file::open_file;
 
 /// What a log leaves unsaid.
 #[derive(Clone, Copy)]
 pub struct LogContext<'a> {
     /// What the sensors of its railway are called.
     pub sensors: &'a dyn SensorNames,
-    /// The train of rows that name none.
+    /// The train of rows that name none, unless the name of the file says another one.
     pub train: Option<TrainId>,
 }
 
@@ -67,12 +67,8 @@ pub enum RecordingError {
 
 /// Reads the sensor log at `path`, whatever its form.
 pub fn read_sensor_log(path: &Path, context: LogContext<'_>) -> Result<Recording, RecordingError> {
-    let opened = File::open(path).and_then(|file| {
-        // A folder opens like a file on some systems, and then fails with a number.
-        if file.metadata()?.is_dir() { Err(io::Error::other("it is a folder")) } else { Ok(file) }
-    });
-    match opened {
-        Ok(file) => parse_sensor_log(path, BufReader::new(file), context),
+    match open_file(path) {
+        Ok((file, _)) => parse_sensor_log(path, BufReader::new(file), context),
         Err(source) => Err(TableError::Read { file: path.display().to_string(), source }.into()),
     }
 }
@@ -86,9 +82,11 @@ pub fn parse_sensor_log(
     let file = path.display().to_string();
     let name = path.file_stem().map_or_else(|| file.clone(), |stem| stem.to_string_lossy().into_owned());
     let table = Table::open(&file, input)?;
+    // A log whose name says its train is of no other, whichever is asked for.
+    let named = train_in(&name);
     // The most demanding form first: no other has all its columns.
     if let Some(columns) = table.columns_named(SinceCommandLog::COLUMNS) {
-        let Some(train) = context.train.or_else(|| train_in(&name)) else {
+        let Some(train) = named.or(context.train) else {
             return Err(RecordingError::WhichTrain { file });
         };
         let log = SinceCommandLog::new(&table, columns, context.sensors, train);
@@ -98,6 +96,7 @@ pub fn parse_sensor_log(
         return read_rows(&file, name, table, LightGateLog::new(columns, context.sensors));
     }
     if let Some(columns) = table.columns_named(OwnLog::COLUMNS) {
+        let context = LogContext { train: context.train.map(|asked| named.unwrap_or(asked)), ..context };
         let log = OwnLog::new(&table, columns, context);
         return read_rows(&file, name, table, log);
     }

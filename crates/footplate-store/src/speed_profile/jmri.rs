@@ -50,8 +50,7 @@ impl<'i> RosterEntry<'i> {
         let options =
             ParsingOptions { allow_dtd: false, nodes_limit: MOST_NODES, ..ParsingOptions::default() };
         let document = Document::parse_with_options(text, options).map_err(|error| {
-            let at = error.pos();
-            let place = TextPlace { file: file.to_owned(), line: at.row as usize, column: at.col as usize };
+            let place = TextPlace::of_xml(file, text, &error);
             // Messages repeat what is in the file, which may be long.
             let problem: String = error.to_string().chars().take(200).collect();
             ProfileError::Wrong { place, problem: ProfileProblem::Xml(problem) }

@@ -14,6 +14,7 @@ use super::error::TachometerError;
 use super::mapping::{ColumnMapping, MappedReader};
 use super::parquet::{PARQUET_MAGIC, ParquetReader};
 use crate::table::TableError;
+use crate::whole_file::open_file;
 
 /// A tachometer recording that is being read.
 pub struct TachometerReader {
@@ -34,12 +35,7 @@ impl TachometerReader {
     /// That it cannot be read or is no recording, and what would be right.
     pub fn open(path: &Path) -> Result<Self, TachometerError> {
         let name = path.display().to_string();
-        let opened = File::open(path).and_then(|mut input| {
-            let about = input.metadata()?;
-            // A folder opens like a file on some systems, and then fails with a number.
-            if about.is_dir() {
-                return Err(io::Error::other("it is a folder"));
-            }
+        let opened = open_file(path).and_then(|(mut input, about)| {
             if !about.is_file() {
                 // A pipe cannot be read twice.
                 return Ok((input, None, false));
@@ -84,11 +80,8 @@ impl TachometerReader {
         vehicle: &Vehicle,
     ) -> Result<Self, TachometerError> {
         let file = path.display().to_string();
-        let opened = File::open(path).and_then(|input| {
-            let about = input.metadata()?;
-            if about.is_dir() { Err(io::Error::other("it is a folder")) } else { Ok((input, about)) }
-        });
-        let (input, about) = opened.map_err(|source| TableError::Read { file: file.clone(), source })?;
+        let (input, about) =
+            open_file(path).map_err(|source| TableError::Read { file: file.clone(), source })?;
         let reader = Self::mapped_stream(&file, Box::new(input), mapping, vehicle)?;
         Ok(Self { extent: about.is_file().then_some(about.len()), ..reader })
     }

@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 
-/// Most runs of one file. Each has an odometer of its own; a column that names a run a row is no `run_id`.
-pub(super) const MOST_RUNS: usize = 100_000;
+/// Most runs of one file. Each has an odometer of its own, of 46 kB with a score, and the process that walks an uploaded
+/// recording may have 256 MB; a column that names a run a row is no `run_id`.
+pub(super) const MOST_RUNS: usize = 3_000;
 
 /// Numbers the runs as they come, contiguous or interleaved.
 #[derive(Debug, Default)]

@@ -145,10 +145,13 @@ fn a_log_without_its_train_asks_for_it() {
     assert!(nameless.unwrap_err().to_string().starts_with("log.csv: which train ran?"));
     let given = parse_of_train(log.as_bytes(), 58).unwrap();
     assert_eq!(given.runs[0].only_train().map(|at_start| at_start.train), Some(TrainId(58)));
-    // What the caller says wins over the name of the file.
+    // A log whose name says its train does not become one of the train that is asked for.
     let context = LogContext { sensors: &ModuleLetters, train: Some(TrainId(58)) };
     let named = parse_sensor_log(Path::new("log_train24.csv"), log.as_bytes(), context).unwrap();
-    assert_eq!(named.runs[0].only_train().map(|at_start| at_start.train), Some(TrainId(58)));
+    assert_eq!(named.runs[0].only_train().map(|at_start| at_start.train), Some(TrainId(24)));
+    let own = b"t_s,kind,step\n0.5,speed,14\n";
+    let named = parse_sensor_log(Path::new("log_train24.csv"), &own[..], context).unwrap();
+    assert_eq!(named.runs[0].only_train().map(|at_start| at_start.train), Some(TrainId(24)));
 }
 
 #[test]

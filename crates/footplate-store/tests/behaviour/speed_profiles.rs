@@ -148,7 +148,8 @@ fn errors_name_the_place_the_value_and_what_would_be_right() {
         (speed("500", "0.0"), "no speed was measured in this profile"),
         ("<roster-config/>".to_owned(), "<roster-config> is not the roster entry of a locomotive"),
         ("<locomotive-config/>".to_owned(), "<locomotive-config> lacks <locomotive>"),
-        ("<locomotive-config>".to_owned(), "any.xml, line 1"),
+        ("<locomotive-config>\n<locomotive>\n".to_owned(), "any.xml, line 3, column 1"),
+        ("<locomotive-config>\n<locomotive".to_owned(), "any.xml, line 2, column 12"),
         ("step,speed\n1,2\n".to_owned(), "not a speed profile; give a roster entry of JMRI"),
         (
             "step,forward_mm_s\n15,20\n".to_owned(),

@@ -92,13 +92,15 @@ const known = (values) => (values ?? []).filter((value) => value != null);
 const least = (values) => known(values).reduce((one, other) => Math.min(one, other), Infinity);
 const greatest = (values) => known(values).reduce((one, other) => Math.max(one, other), -Infinity);
 const span = (values, unit, digits) => `${rounded(least(values), digits)} ${pick("to", "bis")} ${rounded(greatest(values), digits)} ${unit}`;
+/** The probability of the intervals, as `--confidence` said, as it stands before "interval". */
+const percent = () => pick(`${run.confidence_pct} %`, `${run.confidence_pct.replace(".", ",")}-%`);
 const bound = (label, unit, digits) => ({ ...line(label, "quiet", unit, digits), width: 1 });
 const dashed = (series) => ({ ...series, dash: [6, 4] });
 
 function speed(figure, lines) {
   const { speed_m_s, confidence_speed_low_m_s, confidence_speed_high_m_s, true_speed_m_s } = lines;
   chart(figure, {
-    name: pick("Speed with its 99.99 % interval (shaded) and its guaranteed bounds (dashed)", "Tempo mit seinem 99,99-%-Intervall (getönt) und seinen garantierten Grenzen (gestrichelt)"), x: time(), y: SPEED, sync: SYNC,
+    name: pick(`Speed with its ${percent()} interval (shaded) and its guaranteed bounds (dashed)`, `Tempo mit seinem ${percent()}-Intervall (getönt) und seinen garantierten Grenzen (gestrichelt)`), x: time(), y: SPEED, sync: SYNC,
     data: [run.time_s, confidence_speed_high_m_s, confidence_speed_low_m_s, speed_m_s, lines.guaranteed_speed_high_m_s, lines.guaranteed_speed_low_m_s, ...(true_speed_m_s ? [true_speed_m_s] : [])],
     series: [
       bound(AT_MOST, "m/s", 2), bound(AT_LEAST, "m/s", 2), line(ESTIMATE, "first", "m/s", 2),
@@ -109,7 +111,7 @@ function speed(figure, lines) {
   });
   const widest = greatest(confidence_speed_high_m_s.map((high, place) => high - confidence_speed_low_m_s[place]));
   const [goes, apart] = [span(speed_m_s, "m/s", 2), rounded(widest, 2)];
-  say(figure, pick(`The estimate ranges from ${goes}; its 99.99 % interval is at most ${apart} m/s wide.`, `Die Schätzung reicht von ${goes}; ihr 99,99-%-Intervall ist höchstens ${apart} m/s breit.`));
+  say(figure, pick(`The estimate ranges from ${goes}; its ${percent()} interval is at most ${apart} m/s wide.`, `Die Schätzung reicht von ${goes}; ihr ${percent()}-Intervall ist höchstens ${apart} m/s breit.`));
 }
 
 function wheels(figure, { speed_m_s, wheel_1_m_s, wheel_2_m_s }) {
@@ -180,7 +182,7 @@ function distance(figure, lines) {
   const { error_m, confidence_error_low_m, confidence_error_high_m, width_m, over_m, under_m } = lines;
   if (error_m) {
     chart(figure, {
-      name: pick("Distance error, with its 99.99 % interval (shaded) and its guaranteed bounds (dashed)", "Fehler des Weges, mit seinem 99,99-%-Intervall (getönt) und seinen garantierten Grenzen (gestrichelt)"), x: time(), y: pick("distance error (m)", "Fehler des Weges (m)"), sync: SYNC, zero: true,
+      name: pick(`Distance error, with its ${percent()} interval (shaded) and its guaranteed bounds (dashed)`, `Fehler des Weges, mit seinem ${percent()}-Intervall (getönt) und seinen garantierten Grenzen (gestrichelt)`), x: time(), y: pick("distance error (m)", "Fehler des Weges (m)"), sync: SYNC, zero: true,
       data: [run.time_s, confidence_error_high_m, confidence_error_low_m, error_m, lines.guaranteed_error_high_m, lines.guaranteed_error_low_m],
       series: [
         bound(AT_MOST, "m", 2), bound(AT_LEAST, "m", 2), line(ESTIMATE, "first", "m", 2),
@@ -189,11 +191,11 @@ function distance(figure, lines) {
       bands: [{ series: [1, 2], fill: colour("band") }],
     });
     const [goes, bounds] = [span(error_m, "m", 2), `${rounded(least(confidence_error_low_m), 2)} ${pick("to", "bis")} ${rounded(greatest(confidence_error_high_m), 2)} m`];
-    say(figure, pick(`The error ranges from ${goes}; its 99.99 % interval from ${bounds}.`, `Der Fehler reicht von ${goes}; sein 99,99-%-Intervall von ${bounds}.`));
+    say(figure, pick(`The error ranges from ${goes}; its ${percent()} interval from ${bounds}.`, `Der Fehler reicht von ${goes}; sein ${percent()}-Intervall von ${bounds}.`));
     return;
   }
   chart(figure, {
-    name: pick("Width of the 99.99 % interval of the distance, and guaranteed amounts of over- and under-reading", "Breite des 99,99-%-Intervalls des Weges, und garantierte Beträge von Über- und Unterlesen"), x: time(), y: pick("distance (m)", "Weg (m)"), sync: SYNC,
+    name: pick(`Width of the ${percent()} interval of the distance, and guaranteed amounts of over- and under-reading`, `Breite des ${percent()}-Intervalls des Weges, und garantierte Beträge von Über- und Unterlesen`), x: time(), y: pick("distance (m)", "Weg (m)"), sync: SYNC,
     data: [run.time_s, width_m, over_m, under_m],
     series: [line(pick("width of the interval", "Breite des Intervalls"), "first", "m", 2), line(pick("over-read by at most", "zu lang um höchstens"), "second", "m", 2), line(pick("under-read by at most", "zu kurz um höchstens"), "third", "m", 2)],
   });

@@ -3,6 +3,7 @@
 
 mod explain;
 mod live;
+mod measured_by_hand;
 mod picture;
 mod series;
 mod short_moves;
@@ -16,18 +17,21 @@ use anyhow::bail;
 use clap::{Args, ValueEnum};
 use footplate_core::track::Layout;
 use footplate_core::{TimeSpan, TrainId};
-use footplate_store::{Batch, Findings, Import, PositionSeries, Recording, Store, TapedMoves, layout_named};
+use footplate_store::{Batch, Findings, Import, Recording, Store, layout_named};
 
 use super::Outcome;
 use super::log_file::LogFile;
+use super::output_files::check_outputs;
 use super::plot::PictureFile;
 use crate::clock::{Moment, now};
 use crate::dashboard::ServedAt;
 use crate::layout_check::{LengthWarning, check_runs};
 use crate::link::{Address, NamedTrain};
+use crate::standard_error::say;
 pub(super) use explain::Question;
 pub(crate) use live::CalibrationBeginning;
 pub(super) use live::calibration_line;
+use measured_by_hand::Given;
 pub(super) use picture::draw_calibration;
 
 /// How a calibration from recordings finds out how trains change their speed.
@@ -71,7 +75,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "URL", conflicts_with_all = ["from", "as_of", "explain"], requires = "train")]
     link: Option<Address>,
     /// Track time that driving may take, such as 5m or 90s.
-    #[arg(long, value_name = "TIME", default_value = "5m", value_parser = live::budget)]
+    #[arg(long, value_name = "TIME", default_value = "5m", value_parser = live::budget, requires = "link")]
     budget: TimeSpan,
     /// Show it live in a browser: at a port of this machine (8417 unless named, 0 for any that is free), or at an address.
     /// Then a simulated layout keeps real time.
@@ -93,10 +97,11 @@ pub(crate) struct Arguments {
     /// What to find in recordings: the motion model, accelerations from pairs of sensors, or short moves.
     #[arg(long, value_enum, default_value_t = Method::Motion, conflicts_with_all = ["link", "plot", "explain"])]
     method: Method,
-    /// Only this train; also the train of logs that name none.
+    /// Only this train; also the train of logs that name none, in their rows or their file name.
     #[arg(long, value_name = "N")]
     train: Option<NamedTrain>,
-    /// Keep recordings and calibration in this store, and calibrate from all that it holds of the layout.
+    /// Keep recordings and calibration in this store, and calibrate from all that it holds of the layout. With --as-of,
+    /// --explain or a --method the calibration itself is not kept: trains are driven by the one that is.
     #[arg(long, value_name = "FILE")]
     store: Option<PathBuf>,
     /// Calibrate as of this date: from what the store held then.
@@ -130,15 +135,23 @@ impl Arguments {
                  LOG --layout LAYOUT`, or what a store keeps with `--store FILE --layout LAYOUT`"
             );
         }
-        if let Some(series) = measured_by_hand(&self.from, "series of positions", PositionSeries::read)? {
-            self.check_measured_by_hand("a series of positions", None)?;
-            series::write(&series, self.json, output)?;
-            return Ok(Outcome::Done);
-        }
-        if let Some(files) = measured_by_hand(&self.from, "short moves", TapedMoves::read)? {
-            self.check_measured_by_hand("a file of short moves", Some(Method::ShortMoves))?;
-            short_moves::write_measured(&files, self.json, output)?;
-            return Ok(Outcome::Done);
+        let inputs = self.from.iter().chain(&self.store).map(PathBuf::as_path);
+        check_outputs(
+            inputs.chain(self.layout.as_deref().map(Path::new)),
+            &[("--out", self.out.as_deref()), ("--plot", self.plot.as_ref().map(PictureFile::path))],
+        )?;
+        match Given::read(&self.from)? {
+            Given::Logs => {}
+            Given::Positions(series) => {
+                self.check_measured_by_hand("a series of positions", None)?;
+                series::write(&series, self.json, output)?;
+                return Ok(Outcome::Done);
+            }
+            Given::ShortMoves(files) => {
+                self.check_measured_by_hand("a file of short moves", Some(Method::ShortMoves))?;
+                short_moves::write_measured(&files, self.json, output)?;
+                return Ok(Outcome::Done);
+            }
         }
         let Some(layout) = &self.layout else {
             bail!(
@@ -167,7 +180,7 @@ impl Arguments {
         let train = self.train.map(|named| named.train);
         let logs = LogFile::read_all(&self.from, &layout, train)?;
         let warning = check_runs(&layout, logs.iter().flat_map(|log| &log.recording.runs))?;
-        let outcome = LengthWarning::outcome(warning.as_ref());
+        let mut outcome = LengthWarning::outcome(warning.as_ref());
         if let Some(warning) = warning.as_ref().filter(|_| !self.json) {
             writeln!(output, "WARNING: {}\n", warning.english)?;
         }
@@ -177,14 +190,18 @@ impl Arguments {
                 (Batch::of_recordings(&layout, &recordings, train)?, None)
             }
             Some(path) => {
-                let mut store = Store::open_or_create(path)?;
+                // Without logs to keep in it, a store that is not there is a mistyped one.
+                let mut store =
+                    if self.from.is_empty() { Store::open(path)? } else { Store::open_or_create(path)? };
                 store.check()?;
-                self.import(&layout, &logs, &mut store)?;
+                if import(&layout, &logs, &mut store)? == Outcome::FallsShort {
+                    outcome = Outcome::FallsShort;
+                }
                 let as_of = self.as_of.map_or_else(now, |moment| moment.0);
                 (Batch::of_store(&layout, &store, as_of, train)?, Some((store, as_of)))
             }
         };
-        if let Some((store, as_of)) = &mut store {
+        if let Some((store, as_of)) = store.as_mut().filter(|_| self.is_kept()) {
             for train in &batch.trains {
                 train.file(&layout).keep(store, *as_of, now())?;
             }
@@ -247,33 +264,26 @@ impl Arguments {
         Ok(())
     }
 
-    fn import(&self, layout: &Layout, logs: &[LogFile], store: &mut Store) -> anyhow::Result<()> {
-        for (path, log) in self.from.iter().zip(logs) {
-            let imported = store.import(&log.recording, log.content, layout.name(), now())?;
-            if let Import::AlreadyThere { .. } = imported {
-                eprintln!("{}: in the store already, not added again", path.display());
-            }
-        }
-        Ok(())
+    /// Whether the models become those that trains are driven by: not if the question is one about the past, or another one
+    /// than how the trains run.
+    fn is_kept(&self) -> bool {
+        self.as_of.is_none() && self.explain.is_none() && self.method == Method::Motion
     }
 }
 
-/// What was measured by hand in these files; `None` if they are sensor logs.
-fn measured_by_hand<M, E: std::error::Error + Send + Sync + 'static>(
-    paths: &[PathBuf],
-    what: &str,
-    read: impl Fn(&Path) -> Result<Option<M>, E>,
-) -> anyhow::Result<Option<Vec<M>>> {
-    let mut found = Vec::new();
-    for (number, path) in paths.iter().enumerate() {
-        let measured = read(path)?;
-        if number > 0 && measured.is_some() == found.is_empty() {
-            bail!(
-                "{}: {what} and sensor logs cannot be calibrated together: run the command for each kind",
-                path.display()
-            );
+/// Imports logs into the store; falls short if the store keeps one otherwise than it was read now.
+fn import(layout: &Layout, logs: &[LogFile], store: &mut Store) -> anyhow::Result<Outcome> {
+    let mut outcome = Outcome::Done;
+    for log in logs {
+        let imported = store.import(&log.recording, log.content, layout.name(), now())?;
+        let Import::AlreadyThere { recording, .. } = imported else { continue };
+        match log.kept_otherwise(store, recording, layout)? {
+            Some(kept) => {
+                say!("{kept}");
+                outcome = Outcome::FallsShort;
+            }
+            None => say!("{}: in the store already, not added again", log.path.display()),
         }
-        found.extend(measured);
     }
-    Ok((!found.is_empty()).then_some(found))
+    Ok(outcome)
 }

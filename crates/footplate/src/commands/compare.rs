@@ -44,7 +44,7 @@ pub(crate) struct Arguments {
     /// Compare with recordings of another session of the same trains instead (CSV).
     #[arg(long, value_name = "LOG", num_args = 1.., conflicts_with_all = ["with", "plot", "markdown"])]
     session: Vec<PathBuf>,
-    /// Only this train; also the train of logs that name none.
+    /// Only this train; also the train of logs that name none, in their rows or their file name.
     #[arg(long, value_name = "N")]
     train: Option<u16>,
     /// Draw the figures of one train to this file, SVG or PNG by its ending.
@@ -82,7 +82,7 @@ impl Arguments {
         if self.json {
             writeln!(output, "{}", serde_json::to_string_pretty(&as_json(&check))?)?;
         } else if self.markdown {
-            markdown::write(&check, output)?;
+            markdown::write(&check, &markdown::Sources { logs: &self.logs, tables: &self.with }, output)?;
         } else {
             table::write(&check, output)?;
         }
@@ -113,6 +113,7 @@ fn as_json(check: &CrossCheck) -> Value {
         "stop_spread_percent": check.stop_spread_percent,
         "published": check.without_counterpart[0],
         "without_counterpart": check.without_counterpart[1],
+        "spread_unknown": check.spread_unknown,
         "speeds_mm_per_s": figures(&check.speeds),
         "stops_mm": figures(&check.stops),
     })
@@ -126,6 +127,22 @@ fn figure(figure: &CheckedFigure) -> Value {
         "theirs": figure.theirs, "readings": figure.readings, "team": figure.team, "term": figure.term,
         "difference_percent": figure.difference_percent(), "sigmas": figure.sigmas(), "agrees": figure.agrees(),
     })
+}
+
+/// What was left out of a comparison, a sentence each.
+fn left_out(check: &CrossCheck) -> Vec<String> {
+    let [all, without] = check.without_counterpart;
+    let mut sentences = vec![format!(
+        "{without} of {all} published figures are of trains or steps that the recordings do not show"
+    )];
+    if check.spread_unknown > 0 {
+        sentences.push(format!(
+            "{} of {all} cannot be judged: no two teams measured the same step of a train in that kind of figure, so that how \
+             far teams differ is unknown",
+            check.spread_unknown
+        ));
+    }
+    sentences
 }
 
 const fn approach(approach: Approach) -> &'static str {

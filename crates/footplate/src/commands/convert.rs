@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Args;
 use footplate_core::TrainId;
 use footplate_store::{
@@ -14,6 +14,7 @@ use serde_json::json;
 
 use super::Outcome;
 use super::log_file::LogFile;
+use super::output_files::check_outputs;
 use crate::counted::counted;
 
 /// Convert a sensor log, a train or a line to Footplate's own format.
@@ -34,8 +35,9 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// The layout of a log's sensors: a built-in layout (track-a, track-b) or a layout file.
-    #[arg(long, default_value = "track-a")]
-    layout: String,
+    /// track-a unless given.
+    #[arg(long, value_name = "LAYOUT")]
+    layout: Option<String>,
     /// The train of a log that names none.
     #[arg(long, value_name = "N")]
     train: Option<u16>,
@@ -49,6 +51,7 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        check_outputs([self.file.as_path()], &[("--out", Some(&self.out))])?;
         let extension = self.file.extension().and_then(|end| end.to_str()).unwrap_or_default();
         if ["json", "yaml", "yml", "toml"].contains(&extension.to_ascii_lowercase().as_str()) {
             self.convert_described(output)
@@ -57,11 +60,30 @@ impl Arguments {
         }
     }
 
+    /// Whether the file to write can hold what is written: a file without an ending says nothing else.
+    fn check_ending(&self, right: &str, why: &str) -> anyhow::Result<()> {
+        match self.out.extension() {
+            Some(ending) if !ending.eq_ignore_ascii_case(right) => {
+                bail!("--out {}: {why}; let the name end with .{right}", self.out.display())
+            }
+            _ => Ok(()),
+        }
+    }
+
     fn write(&self, text: &[u8]) -> anyhow::Result<()> {
         write_whole(&self.out, text).with_context(|| format!("writing {}", self.out.display()))
     }
 
     fn convert_described(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        for (option, is_given) in [("--layout", self.layout.is_some()), ("--train", self.train.is_some())] {
+            if is_given {
+                bail!(
+                    "{option} is for sensor logs, and {} is a train or a line: leave it out",
+                    self.file.display()
+                );
+            }
+        }
+        self.check_ending("toml", "a train or a line is written as TOML")?;
         let (form, kind, name, text) = match read_described(&self.file, self.name.as_deref())? {
             Described::Train(file) => {
                 (file.form.name(), "train", file.train.name.clone(), write_train(&file.train, &file.about))
@@ -80,7 +102,8 @@ impl Arguments {
     }
 
     fn convert_log(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
-        let layout = layout_named(&self.layout)?.layout;
+        self.check_ending("csv", "a sensor log is written as CSV")?;
+        let layout = layout_named(self.layout.as_deref().unwrap_or("track-a"))?.layout;
         let context = LogContext { sensors: &layout, train: self.train.map(TrainId) };
         let recording = LogFile::read(&self.file, context)?.recording;
         let mut text = Vec::new();

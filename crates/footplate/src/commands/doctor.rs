@@ -32,9 +32,12 @@ use super::plot::PictureFile;
 use crate::clock::now;
 use crate::link::{Address, Link, MeasuredLine, Passed, Speed, Station, TappedLink, open, open_session};
 use crate::runtime::{Attendant, Ended, Runtime, StopFlag, Wish};
+use crate::standard_error::say;
 
 /// A command now and then, to see what one costs; as rare as commands are when trains are driven.
 const COMMAND_EVERY: TimeSpan = TimeSpan::from_ms(500);
+/// The shortest and the longest time of listening (s): a poll or two, and a day.
+const SECONDS: [f64; 2] = [1.0, 1e5];
 /// More lost replies than this and the line needs a look.
 const LOST_SHARE: f64 = 0.01;
 
@@ -63,6 +66,7 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 10.0)]
     seconds: f64,
     /// Keep what was measured of the line beside this store, so that `calibrate` and `drive` with the same --store count with it.
+    /// Not for a 6050 or 6051, whose line is as fast on every railway.
     #[arg(long, value_name = "FILE")]
     store: Option<PathBuf>,
     /// Draw how latencies are spread to this file, SVG or PNG by its ending.
@@ -75,8 +79,19 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
-        if !(self.seconds >= 1.0 && self.seconds <= 1e5) {
-            bail!("{} s are too short: use --seconds 10", self.seconds);
+        if !(SECONDS[0]..=SECONDS[1]).contains(&self.seconds) {
+            bail!(
+                "--seconds {}: use a time from {} to {} s, such as 10",
+                self.seconds,
+                SECONDS[0],
+                SECONDS[1]
+            );
+        }
+        if self.store.is_some() && self.link.kind().usual_line().is_none() {
+            bail!(
+                "--store keeps nothing of this station, whose line has no delays that differ from one railway to another: \
+                 leave it out"
+            );
         }
         let layout = self.link.simulated().map_or(&self.layout, |simulated| &simulated.layout);
         let layout = layout_named(layout)?.layout;
@@ -200,7 +215,7 @@ impl Arguments {
                 round_trips,
             };
             let file = line.keep(&self.link, store)?;
-            eprintln!("kept in {}; `calibrate` and `drive` with this --store count with it", file.display());
+            say!("kept in {}; `calibrate` and `drive` with this --store count with it", file.display());
         }
         Ok(answers.lost_share())
     }

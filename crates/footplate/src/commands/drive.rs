@@ -60,6 +60,7 @@ use crate::phones::{Phones, PhonesAt};
 use crate::recorded::Recorded;
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::{SessionJournal, WhenFull};
+use crate::standard_error::say;
 
 /// Drive trains: speeds, turnouts, exact stops, moves, following.
 ///
@@ -246,7 +247,7 @@ impl Arguments {
             turnouts.set(*turnout, *leg);
         }
         for train in &known.unknown {
-            eprintln!(
+            say!(
                 "train {train} is not calibrated, so its stops are uncertain: run `footplate calibrate` \
                  first"
             );
@@ -368,6 +369,7 @@ impl Arguments {
         console.watch_lengths(watch.warning());
         let mut runtime = Runtime::new(link, session, Some(&mut watch), Some(StopFlag::install()));
         let mut start_odometers = StartOdometers::default();
+        let mut unwritten = None;
         let ending = loop {
             let ending = runtime.run(&mut script_runner, &mut console)?;
             for message in std::mem::take(&mut console.for_scoring) {
@@ -376,9 +378,10 @@ impl Arguments {
                     if let Some(dashboard) = dashboard {
                         dashboard.board.publish("ended", &result);
                     }
-                    if self.json {
-                        writeln!(output, "{}", serde_json::to_string(&result)?)?;
-                        output.flush()?;
+                    // Trains go on when the reader of results has gone, and what was learnt is kept.
+                    if self.json && unwritten.is_none() {
+                        let line = serde_json::to_string(&result)?;
+                        unwritten = writeln!(output, "{line}").and_then(|()| output.flush()).err();
                     }
                 }
             }
@@ -398,20 +401,20 @@ impl Arguments {
             }
         };
         if terminal.take().is_some() {
-            eprintln!("stopping all trains and switching the track power off");
+            say!("stopping all trains and switching the track power off");
         }
         let at = runtime.link().now();
         let closing = runtime.close();
         drop(runtime);
         let length_warning = watch.lengths_doubted();
         if let Some(warning) = length_warning.as_ref().filter(|_| watch.warning().get().is_none()) {
-            eprintln!("{}", warning.english);
+            say!("{}", warning.english);
         }
         // A session whose trains may still run has no end: the next one stops them first.
         let mut script_runner =
             if closing.is_complete() { script_runner.end(at) } else { script_runner.into_machine() };
         if !closing.is_complete() {
-            eprintln!("{closing}");
+            say!("{closing}");
         }
         if let Some(store) = &self.railway.store {
             // The journal is written out before the models that were fitted to it.
@@ -420,9 +423,12 @@ impl Arguments {
         }
         match ending {
             Ended::Finished if script_runner.fell_short() => Ok(Outcome::FallsShort),
-            Ended::Finished => Ok(LengthWarning::outcome(length_warning.as_ref())),
+            Ended::Finished => match unwritten {
+                Some(error) => Err(error.into()),
+                None => Ok(LengthWarning::outcome(length_warning.as_ref())),
+            },
             Ended::Interrupted => {
-                eprintln!("interrupted; {closing}");
+                say!("interrupted; {closing}");
                 Ok(Outcome::FallsShort)
             }
             lost => Err(anyhow!("{lost}")),

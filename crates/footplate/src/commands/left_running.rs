@@ -10,6 +10,7 @@ use footplate_wire::{Closing, Session};
 
 use crate::link::{Address, Link, Speed, StationSession, open, open_session};
 use crate::runtime::Runtime;
+use crate::standard_error::say;
 
 /// Opens the link and stops all trains if the newest session of the store has no end. Returns the link for the session that
 /// begins; `None` if there is nothing to stop. A simulated railway is new each time.
@@ -25,12 +26,12 @@ pub(crate) fn stop_left_running<'l>(
     let Some(unfinished) = store.unfinished_session()?.filter(|_| address.simulated().is_none()) else {
         return Ok(None);
     };
-    eprintln!("{}", said(&unfinished));
+    say!("{}", said(&unfinished));
     let mut link = open(address, layout, pace)?;
     let mut session = open_session(address, &link, layout)?;
     recall_directions(&mut session, store)?;
-    eprintln!("{}", stop_all(&mut link, session, unfinished.trains));
-    eprintln!("{CHECK_TURNOUTS}");
+    say!("{}", stop_all(&mut link, session, unfinished.trains));
+    say!("{CHECK_TURNOUTS}");
     Ok(Some(link))
 }
 
@@ -61,7 +62,7 @@ pub(crate) fn stop_all(
         let stop = Command::Speed { train, step: SpeedStep::STAND };
         // Power off stops a train, too, that this station has no address for.
         if let Err(error) = session.handle_command(link.now(), stop) {
-            eprintln!("train {train}: {error}");
+            say!("train {train}: {error}");
         }
     }
     Runtime::new(link, session, None, None).close()

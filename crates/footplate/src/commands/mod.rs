@@ -18,6 +18,7 @@ mod left_running;
 mod log_file;
 mod measure;
 mod odometry;
+mod output_files;
 mod plot;
 mod predict;
 mod profiles;

@@ -20,11 +20,14 @@ use footplate_store::odometry::{Preset, RunContext};
 use footplate_store::{ColumnMapping, default_vehicle, read_vehicle};
 
 use super::Outcome;
+use super::output_files::check_outputs;
 use super::plot::PictureFile;
 use super::web_page::Language;
+use crate::standard_error::say;
 use recording::{Mapped, OpenRecording, WalkedRecording};
 use results::Results;
 pub(super) use uploaded::{PassingFolder, uploaded_page};
+pub(super) use walked::SPEED_INSIDE_PCT;
 use walked::Walked;
 pub(super) use watched_slide::WatchedSlide;
 
@@ -47,7 +50,7 @@ pub(super) use watched_slide::WatchedSlide;
                   vehicle file does not hold, or there is no vehicle file, 2 wrong usage or input."
 )]
 pub(crate) struct Arguments {
-    /// Tachometer recordings, CSV or Parquet; `-` for standard input.
+    /// Tachometer recordings, CSV or Parquet; `-` for standard input, but with --imu.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// What is known of the train (docs/formats/vehicle.md). Without it every figure is that of a train with two powered
@@ -81,7 +84,7 @@ pub(crate) struct Arguments {
     plot: Option<PictureFile>,
     /// The files are recordings of an accelerometer alone: find standstills and the hops between them
     /// (docs/formats/accelerometer-recording.md). With `--score`, beside the stops marked in `x_stops.csv`.
-    #[arg(long, conflicts_with_all = ["vehicle", "map", "map_file", "out", "report", "plot"])]
+    #[arg(long, conflicts_with_all = ["vehicle", "map", "map_file", "out", "report", "plot", "preset", "confidence", "language"])]
     imu: bool,
     /// With --imu --score: print the score as a table for documentation.
     #[arg(long, requires_all = ["imu", "score"], conflicts_with = "json")]
@@ -114,13 +117,16 @@ impl From<PresetName> for Preset {
     }
 }
 
+/// The highest probability of an interval: beyond it a Gaussian says nothing of real trains.
+const MOST_CONFIDENCE: f64 = 0.999_999_999;
+
 /// Reads a probability.
 fn confidence(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
-    if (0.5..1.0).contains(&value) {
+    if (0.5..=MOST_CONFIDENCE).contains(&value) {
         Ok(value)
     } else {
-        Err(format!("{value} should lie between 0.5 and 0.999999999, as 0.9999 for 99.99 %"))
+        Err(format!("{value} should lie between 0.5 and {MOST_CONFIDENCE}, as 0.9999 for 99.99 %"))
     }
 }
 
@@ -130,6 +136,9 @@ const STANDARD: &str = "-";
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         if self.imu {
+            if self.files.iter().any(|file| file.as_os_str() == STANDARD) {
+                bail!("--imu reads files, not standard input: write the recording to a file first");
+            }
             let style = match (self.json, self.markdown) {
                 (true, _) => imu::Style::Json,
                 (_, true) => imu::Style::Markdown,
@@ -137,6 +146,15 @@ impl Arguments {
             };
             return imu::run(&self.files, self.score, style, output);
         }
+        let inputs = self.files.iter().chain(&self.vehicle).chain(&self.map_file).map(PathBuf::as_path);
+        check_outputs(
+            inputs,
+            &[
+                ("--out", self.out.as_deref()),
+                ("--report", self.report.as_deref()),
+                ("--plot", self.plot.as_ref().map(PictureFile::path)),
+            ],
+        )?;
         let to_standard = self.out.as_ref().is_some_and(|out| out.as_os_str() == STANDARD);
         if to_standard && (self.json || self.score) {
             bail!(
@@ -160,6 +178,7 @@ impl Arguments {
             preset,
             recordings,
             has_vehicle: self.vehicle.is_some(),
+            confidence: self.confidence,
             language: self.language,
             is_scored: self.score,
         };
@@ -174,7 +193,7 @@ impl Arguments {
         let outcome = if walked.falls_short() { Outcome::FallsShort } else { Outcome::Done };
         if to_standard {
             for warning in walked.warnings(Language::English) {
-                eprintln!("{warning}");
+                say!("{warning}");
             }
             return Ok(outcome);
         }
@@ -215,7 +234,7 @@ impl Arguments {
         let mut walked = Vec::new();
         for file in &self.files {
             let mapped = mapping.map(|mapping| Mapped { mapping, vehicle: &context.vehicle });
-            let recording = OpenRecording::open(file, self.score, mapped)?;
+            let recording = OpenRecording::open(file, self.score, mapped)?.one_of(self.files.len());
             if let (Some(out), Some(output)) = (&self.out, output.take()) {
                 let with_runs = self.files.len() > 1 || recording.has_run_ids();
                 results = Some(Results::begin(out, output, with_runs)?);

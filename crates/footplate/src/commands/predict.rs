@@ -8,11 +8,12 @@ mod report;
 mod tables;
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-use anyhow::{Context, anyhow};
+use anyhow::{Context, bail};
 use clap::Args;
+use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{TrainId, TurnoutId};
 use footplate_store::score::{Forecasters, ReplayContext, ScoredRecording, score_recording};
@@ -20,9 +21,11 @@ use footplate_store::{MotionFile, Recording, layout_named};
 
 use super::Outcome;
 use super::log_file::LogFile;
+use super::output_files::check_outputs;
 use super::plot::PictureFile;
 use crate::layout_check::{LengthWarning, check_runs};
 use crate::progress::with_progress;
+use crate::standard_error::say;
 
 /// Forecast every next sensor of recorded logs, and score that.
 ///
@@ -43,7 +46,7 @@ pub(crate) struct Arguments {
     /// The layout: the name of a built-in one or a layout file.
     #[arg(long, default_value = "track-a")]
     layout: String,
-    /// Only this train; also the train of logs that name none.
+    /// Only this train; also the train of logs that name none, in their rows or their file name.
     #[arg(long, value_name = "N")]
     train: Option<u16>,
     /// How a turnout lies when runs begin, such as 6=straight; may be repeated.
@@ -71,12 +74,19 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let inputs = self.logs.iter().chain(&self.calibration).map(PathBuf::as_path);
+        check_outputs(inputs, &[("--plot", self.plot.as_ref().map(PictureFile::path))])?;
         let layout = layout_named(&self.layout)?.layout;
-        let recordings = LogFile::recordings(&self.logs, &layout, self.train.map(TrainId))?;
-        let warning = check_runs(&layout, recordings.iter().flat_map(|recording| &recording.runs))?;
+        let logs = LogFile::read_each(&self.logs, &layout, self.train.map(TrainId))?;
+        let warning = check_runs(&layout, logs.iter().flat_map(|log| &log.recording.runs))?;
         let outcome = LengthWarning::outcome(warning.as_ref());
-        let calibration = self.calibration.as_deref().map(MotionFile::read).transpose()?;
-        let scored = self.score(&layout, &recordings, calibration.as_ref())?;
+        for (turnout, _) in &self.turnouts {
+            if layout.branch(*turnout).is_none() {
+                bail!("--turnout: {} has no turnout {turnout}", layout.name());
+            }
+        }
+        let known = self.calibration.as_deref().map(|path| calibration(path, &layout)).transpose()?;
+        let scored = self.score(&layout, &logs, known)?;
         if let Some(plot) = &self.plot {
             let picture = picture::of(&layout, &scored).with_context(|| {
                 format!(
@@ -110,19 +120,19 @@ impl Arguments {
     fn score(
         &self,
         layout: &Layout,
-        recordings: &[Recording],
-        calibration: Option<&MotionFile>,
+        logs: &[LogFile],
+        calibration: Option<MotionModel>,
     ) -> anyhow::Result<Vec<ScoredRecording>> {
         let context = ReplayContext { layout, turnouts: &self.turnouts };
         let events = |recording: &Recording| recording.runs.iter().map(|run| run.events.len()).sum::<usize>();
-        with_progress("scoring", recordings.iter().map(events).sum(), |done| {
+        with_progress("scoring", logs.iter().map(|log| events(&log.recording)).sum(), |done| {
             let mut before = Forecasters::of_layout(layout);
             if let Some(calibration) = calibration {
-                before.predictor.know(calibration.model(layout)?);
+                before.predictor.know(calibration);
             }
             let mut forecasters = before.clone();
-            let mut scored = Vec::new();
-            for (path, recording) in self.logs.iter().zip(recordings) {
+            let (mut scored, mut absent) = (Vec::new(), Vec::new());
+            for LogFile { path, recording, .. } in logs {
                 if !self.carry_on {
                     forecasters = before.clone();
                 }
@@ -130,18 +140,40 @@ impl Arguments {
                 let score = score_recording(context, recording, only, &mut forecasters)
                     .with_context(|| path.display().to_string())?;
                 if score.runs == 0 {
-                    return Err(anyhow!(
+                    absent.push(format!(
                         "{}: no run of train {}",
                         path.display(),
                         self.train.unwrap_or_default()
                     ));
+                } else {
+                    scored.push(score);
                 }
-                scored.push(score);
                 done.fetch_add(events(recording) as u64, Ordering::Relaxed);
+            }
+            if scored.is_empty() {
+                bail!("{}", absent.join("\n       "));
+            }
+            for absent in absent {
+                say!("{absent}, so it is left out");
             }
             Ok(scored)
         })
     }
+}
+
+/// The model of a file, if it was made on the layout.
+fn calibration(path: &Path, layout: &Layout) -> anyhow::Result<MotionModel> {
+    let file = MotionFile::read(path)?;
+    if file.layout != layout.name() {
+        bail!(
+            "{}: a model made on {}, and the recordings are of {}: use a model made on {}",
+            path.display(),
+            file.layout,
+            layout.name(),
+            layout.name()
+        );
+    }
+    file.model(layout).with_context(|| path.display().to_string())
 }
 
 /// Reads `6=straight`.

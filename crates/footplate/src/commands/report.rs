@@ -9,7 +9,7 @@ mod page;
 mod tables;
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
@@ -19,6 +19,7 @@ use footplate_store::{Batch, Findings, Run, Store, layout_named, write_whole};
 
 use super::Outcome;
 use super::log_file::LogFile;
+use super::output_files::check_outputs;
 use super::web_page::Language;
 use crate::layout_check::{LengthWarning, check_runs};
 use data::{ReportData, TrainReport};
@@ -40,7 +41,7 @@ pub(crate) struct Arguments {
     /// A built-in layout (track-a, track-b) or a layout file (TOML).
     #[arg(long, value_name = "LAYOUT")]
     layout: String,
-    /// Only this train; also the train of logs that name none.
+    /// Only this train; also the train of logs that name none, in their rows or their file name.
     #[arg(long, value_name = "N")]
     train: Option<u16>,
     /// Report on all that this store holds of the layout instead, less what was excluded.
@@ -62,6 +63,8 @@ struct Session {
 
 impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let inputs = self.logs.iter().chain(&self.store).map(PathBuf::as_path);
+        check_outputs(inputs.chain([Path::new(&self.layout)]), &[("--out", Some(&self.out))])?;
         let layout = layout_named(&self.layout)?.layout;
         let train = self.train.map(TrainId);
         let (sessions, batch) = match &self.store {

@@ -23,6 +23,7 @@ use super::drive;
 use super::written_layout::WrittenLayout;
 use crate::dashboard::{Board, Dashboard, Routes, ServedAt, Token};
 use crate::link::Address;
+use crate::standard_error::say;
 
 pub(crate) use answer_queue::{AnswerForm, AnswerQueue};
 pub(crate) use archive::StoreQuery;
@@ -81,7 +82,7 @@ pub(super) fn open_dashboard(
     let archive = Archive::new(store, written, &answer_queue);
     let more = |board: &Arc<Board>| session_routes(archive, &answer_queue, board).and(set_up.routes());
     let dashboard = Dashboard::open(at, token, &layout, more)?;
-    eprintln!("the dashboard is at {}", dashboard.url);
+    say!("the dashboard is at {}", dashboard.url);
     Ok(dashboard)
 }
 

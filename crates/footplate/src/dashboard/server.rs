@@ -48,6 +48,7 @@ use super::stream::events;
 use super::token::Token;
 use crate::clock::now;
 use crate::link::{LineTallies, SharedTallies};
+use crate::standard_error::say;
 
 /// The largest request body, in bytes: longer than any command.
 const MAX_BODY: usize = 4 << 10;
@@ -192,7 +193,7 @@ impl ServedPages {
                         () = serve(listener, router(guard, routes), Limits::USUAL) => {}
                         _ = ended => {}
                     },
-                    Err(error) => eprintln!("the dashboard is not served: {error}"),
+                    Err(error) => say!("the dashboard is not served: {error}"),
                 }
             });
             // Work that blocks is given up: no client waits for its answer any more.

@@ -12,6 +12,7 @@ use super::ward::connection;
 use crate::clock::Stopwatch;
 use crate::link::{Bequest, Cable, CableLink, Guardian, Heard, Link, Lost, PERSON_MS};
 use crate::runtime::{StopFlag, written};
+use crate::standard_error::say;
 
 /// Period of the heartbeat: a fifth of what the guardian tolerates.
 const ALIVE_EVERY: Duration = Duration::from_millis(100);
@@ -183,7 +184,7 @@ impl Link for WardLink {
         // No train runs without a guardian: open the line to stop them.
         self.own = Some(CableLink::open(self.cable.clone())?);
         StopFlag::raise();
-        eprintln!("without a guardian all trains are stopped, and the program ends");
+        say!("without a guardian all trains are stopped, and the program ends");
         Ok(())
     }
 

@@ -1,5 +1,6 @@
 //! Interfaces of the runtime: the recorder, and the attendant that passes notices to people and their requests back.
 
+use crate::standard_error::say;
 use footplate_core::control::Machine;
 use footplate_core::{Command, Event, Timestamp, TrainId};
 use footplate_store::Direction;
@@ -45,7 +46,7 @@ pub(crate) trait Attendant<M: Machine> {
 
     /// A message about the line for people to read.
     fn read(&mut self, words: &str) {
-        eprintln!("{words}");
+        say!("{words}");
     }
 
     /// The session rejected a command of the machine.

@@ -12,6 +12,7 @@ use super::ending::{Ended, REOPEN_WITHIN, SECOND_CHANCE, WITHIN};
 use super::last_will::LastWill;
 use super::stop_flag::StopFlag;
 use crate::link::{Heard, Link, Lost, StationSession};
+use crate::standard_error::say;
 
 /// A machine that was woken and still asks for a past time is woken again after this time, so that time always advances:
 /// the duration of a byte on the line.
@@ -313,7 +314,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                 && let Some(guardian) = self.link.guardian()
                 && let Err(lost) = guardian.say_goodbye()
             {
-                eprintln!("{lost}");
+                say!("{lost}");
             }
         }
         self.session.closing()
@@ -335,7 +336,7 @@ impl<'r, L: Link> Runtime<'r, L> {
             // The last commands belong to the record, but a failing record must not keep a train running.
             if !self.fresh.is_empty() {
                 if let Err(error) = self.write_down() {
-                    eprintln!("the last commands were not recorded: {error:#}");
+                    say!("the last commands were not recorded: {error:#}");
                 }
                 self.fresh.clear();
             }
@@ -386,7 +387,7 @@ impl<L: Link> Drop for Runtime<'_, L> {
         if !self.is_closed {
             let closing = self.close();
             if std::thread::panicking() || !closing.is_complete() {
-                eprintln!("{closing}");
+                say!("{closing}");
             }
         }
     }

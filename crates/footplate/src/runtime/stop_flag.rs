@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 #[cfg(unix)]
 use crate::guardian::is_ward;
+use crate::standard_error::say;
 
 /// How often the program was asked to end.
 static ASKED: AtomicU32 = AtomicU32::new(0);
@@ -31,7 +32,7 @@ impl StopFlag {
     pub(crate) fn install_saying(words: &'static str) -> Self {
         INSTALLED.get_or_init(|| {
             let handler = move || match ASKED.fetch_add(1, Ordering::Relaxed) {
-                0 => eprintln!("{words}"),
+                0 => say!("{words}"),
                 1 => {}
                 _ => std::process::exit(INTERRUPTED),
             };

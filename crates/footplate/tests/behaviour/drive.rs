@@ -305,3 +305,14 @@ fn a_limit_of_waiting_is_a_number_of_seconds() {
     assert_eq!(run.status, 2);
     assert!(run.errors.contains("not a number of seconds above 0 and up to 86400"), "{}", run.errors);
 }
+
+#[test]
+fn a_script_of_any_editor_is_read_and_one_that_is_no_text_is_placed() {
+    let run = drive("mark", LINK, "\u{feff}turnout all straight\n", &[]);
+    assert_eq!(run.status, 0, "{}", run.errors);
+    let path = folder("no-text").join("script.txt");
+    std::fs::write(&path, b"turnout all straight\n# \xff\n").expect("a test file");
+    let run = footplate(&["drive", "--link", LINK, "--script", &path.display().to_string()]);
+    assert_eq!(run.status, 2, "{}", run.output);
+    assert!(run.errors.contains("script.txt: line 2, byte 3: not UTF-8"), "{}", run.errors);
+}

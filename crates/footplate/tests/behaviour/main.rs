@@ -12,6 +12,7 @@ mod demo;
 mod drawn_moments;
 mod drive;
 mod emergency_stop;
+mod files_given;
 mod forecasts_hold;
 mod guardian;
 mod guardian_datagrams;

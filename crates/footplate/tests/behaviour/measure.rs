@@ -126,3 +126,13 @@ fn what_cannot_be_is_refused_and_nothing_is_kept() {
     }
     assert_eq!(events(), before);
 }
+
+#[test]
+fn a_picture_that_fails_does_not_invite_to_store_the_stop_twice() {
+    let store = store("measure-plot");
+    let plot = store.with_file_name("missing").join("stops.svg").display().to_string();
+    let run = measure(&store, &["--train", "24", "--at", "E12+260mm", "--plot", &plot]);
+    assert_eq!(run.status, 1, "{run:?}");
+    assert!(run.output.contains(": train 24 at rest at E12+260mm"), "{run:?}");
+    assert!(run.errors.contains("do not add it again; its picture failed"), "{run:?}");
+}

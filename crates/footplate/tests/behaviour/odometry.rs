@@ -220,3 +220,53 @@ fn wrong_input_is_named_and_ends_with_status_2() {
     assert!(run.errors.contains("train.toml, line 1, column 1"), "{}", run.errors);
     wrong(&[PLAIN, "--out", "missing-folder/result.csv"], "writing missing-folder/result.csv");
 }
+
+#[test]
+fn labels_say_the_probability_that_was_asked_for() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("odometry-confidence");
+    std::fs::create_dir_all(&folder).unwrap();
+    let page = folder.join("page.html").display().to_string();
+    let run = odometry(&[PLAIN, "--score", "--confidence", "0.5", "--report", &page]);
+    assert!(run.output.contains(" 50 %") && !run.output.contains("99.99 %"), "{}", run.output);
+    let page = std::fs::read_to_string(&page).unwrap();
+    assert!(page.contains("\"confidence_pct\":\"50\"") && !page.contains("99.99 % interval"));
+    let usual = odometry(&[PLAIN, "--score"]);
+    assert!(usual.output.contains(" 99.99 %"), "{}", usual.output);
+    let run = odometry(&[PLAIN, "--confidence", "0.9999999999"]);
+    assert_eq!(run.status, 2);
+    assert!(run.errors.contains("between 0.5 and 0.999999999,"), "{}", run.errors);
+}
+
+#[test]
+fn runs_of_one_name_in_two_files_are_named_by_file() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("odometry-same-runs");
+    std::fs::create_dir_all(&folder).unwrap();
+    let copy = folder.join("copy.csv");
+    std::fs::copy(RUNS, &copy).unwrap();
+    let (copy, out) = (copy.display().to_string(), folder.join("out.csv"));
+    let run = odometry(&[RUNS, &copy, "--out", &out.display().to_string()]);
+    assert_ne!(run.status, 2, "{}", run.errors);
+    let rows = std::fs::read_to_string(&out).unwrap();
+    let names: std::collections::BTreeSet<&str> =
+        rows.lines().skip(1).filter_map(|row| row.rsplit(',').next()).collect();
+    let of_copy = names.iter().filter(|name| name.starts_with(copy.as_str())).count();
+    assert_eq!(names.len(), 2 * of_copy, "{names:?}");
+    // One file alone names its runs as it did.
+    let run = odometry(&[RUNS, "--out", &out.display().to_string()]);
+    assert_ne!(run.status, 2, "{}", run.errors);
+    assert!(!std::fs::read_to_string(&out).unwrap().contains("runs.csv"));
+}
+
+#[test]
+fn an_accelerometer_alone_has_no_preset_and_comes_from_a_file() {
+    for (arguments, says) in [
+        (&["a.csv", "--imu", "--preset", "paper"][..], "--preset"),
+        (&["a.csv", "--imu", "--confidence", "0.9"], "--confidence"),
+        (&["a.csv", "--imu", "--language", "de"], "--language"),
+        (&["-", "--imu"], "--imu reads files, not standard input"),
+    ] {
+        let run = footplate(&[&["odometry"], arguments].concat());
+        assert_eq!(run.status, 2, "{arguments:?}");
+        assert!(run.errors.contains(says), "{arguments:?}: {}", run.errors);
+    }
+}

@@ -160,3 +160,28 @@ fn a_calibration_makes_the_first_lap_forecast_as_well_as_the_second() {
     assert_eq!(refused.status, 2);
     assert!(refused.errors.contains("line 1"), "{}", refused.errors);
 }
+
+#[test]
+fn a_model_of_another_layout_and_a_turnout_that_is_not_there_are_refused() {
+    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("predict-other-layout");
+    std::fs::create_dir_all(&folder).expect("the test folder can be made");
+    let model = folder.join("model.toml").display().to_string();
+    let log = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/sensor-logs/eadanila_2020_track_a.csv");
+    let made =
+        footplate(&["calibrate", "--from", log, "--layout", "track-a", "--train", "74", "--out", &model]);
+    assert_eq!(made.status, 0, "{}", made.errors);
+    let text = std::fs::read_to_string(&model).expect("a model");
+    let other = folder.join("other.toml");
+    std::fs::write(&other, text.replace("track-a", "track-b")).expect("a test file");
+    let refused = |more: &[&str], says: &str| {
+        let run = footplate(&[&["predict", log, "--train", "74"], more].concat());
+        assert_eq!(run.status, 2, "{}", run.output);
+        assert!(run.errors.contains(says), "{}", run.errors);
+    };
+    refused(&["--calibration", &other.display().to_string()], "other.toml: a model made on track-b");
+    let nan = folder.join("nan.toml");
+    std::fs::write(&nan, text.replacen("scatter_scale = 1.0", "scatter_scale = nan", 1))
+        .expect("a test file");
+    refused(&["--calibration", &nan.display().to_string()], "nan.toml: ");
+    refused(&["--turnout", "99=straight"], "--turnout: track-a has no turnout 99");
+}

@@ -145,6 +145,16 @@ fn a_train_and_a_line_convert_to_the_own_form_and_that_to_itself() {
     }
     let both = format!("{testdata}/lines/trainruns_const.yaml");
     let out = folder.join("none.toml").to_str().unwrap().to_owned();
+    let own = folder.join("own.toml").display().to_string();
+    for (more, says) in [
+        (["--out", "train.json"].as_slice(), "let the name end with .toml"),
+        (&["--out", &own, "--train", "24"], "--train is for sensor logs"),
+        (&["--out", &own, "--layout", "track-a"], "--layout is for sensor logs"),
+    ] {
+        let refused = footplate(&[&["convert", &both], more].concat());
+        assert_eq!(refused.status, 2, "{more:?}");
+        assert!(refused.errors.contains(says), "{}", refused.errors);
+    }
     let failed = footplate(&["convert", &both, "--out", &out, "--name", "other"]);
     assert!(failed.status == 2 && failed.errors.contains("there is no `other` in the file"), "{failed:?}");
     assert!(!folder.join("none.toml").exists());

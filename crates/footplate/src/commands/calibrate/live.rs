@@ -40,6 +40,7 @@ use crate::link::{
 use crate::recorded::Recorded;
 use crate::runtime::{Ended, Recorder, Runtime, StopFlag};
 use crate::session_journal::SessionJournal;
+use crate::standard_error::say;
 
 /// The shortest session that finds a train and learns anything (s) ...
 const SHORTEST_S: f64 = 20.0;
@@ -119,7 +120,7 @@ impl Session<'_> {
                 let mut link = open_simulated(simulated, &real, pace)?;
                 // All circuits of a layout share rails: one train learns, the others are off them meanwhile.
                 for other in simulated.trains.iter().filter(|other| **other != self.train) {
-                    eprintln!("train {other} is taken off the simulated rails meanwhile");
+                    say!("train {other} is taken off the simulated rails meanwhile");
                     link.station_mut().world_mut().lift(*other);
                 }
                 self.drive(&written, link, output)
@@ -189,7 +190,7 @@ impl Session<'_> {
         let calibrator = if closing.is_complete() { calibrator.end(at) } else { calibrator.into_machine() };
         watcher.end();
         if !closing.is_complete() {
-            eprintln!("{closing}");
+            say!("{closing}");
         }
         if let Some(written) = written {
             kept::end(written);
@@ -274,12 +275,13 @@ impl Session<'_> {
         let replay = MotionReplay::of_store(layout, &mut store, self.train, highest, now())?;
         if replay.is_empty() {
             let Some(profile) = replay.profile else { return Ok(nothing) };
-            eprintln!("beginning with the speeds of {profile}; --afresh begins from nothing");
+            say!("beginning with the speeds of {profile}; --afresh begins from nothing");
             return Ok((replay.fit, TurnoutStates::unknown()));
         }
-        eprintln!(
+        say!(
             "going on from {} runs of train {} that the store holds; --afresh begins from nothing",
-            replay.runs, self.train
+            replay.runs,
+            self.train
         );
         let mut fit = replay.fit;
         if let StoredModel::Model(model) = StoredModel::of_store(layout, &store, self.train, now())?

@@ -89,12 +89,18 @@ fn write_fit(name: &str, fit: &ShortMoveFit, output: &mut dyn Write) -> anyhow::
     for (distance, time) in times(fit) {
         writeln!(
             output,
-            "  to move {:>4.0} mm: command the stop after {:.2} s",
+            "  to move {:>4.0} ± {:.0} mm: command the stop after {:.2} s",
             distance.as_mm(),
+            better_error(fit).as_mm(),
             time.as_s()
         )?;
     }
     Ok(())
+}
+
+/// How far moves end from where the times of [`times`] are to bring them, one standard deviation.
+fn better_error(fit: &ShortMoveFit) -> Length {
+    fit.table_error().map_or(fit.law_error(), |table| table.min(fit.law_error()))
 }
 
 /// Times for the distances between the shortest and the longest measured move.
@@ -121,9 +127,13 @@ fn measured_form(file: &str, train: Option<TrainId>, fit: &ShortMoveFit) -> Valu
             "by_table_mm": one.by_table.map(Length::as_mm),
         })
     });
-    let times = times(fit)
-        .into_iter()
-        .map(|(distance, time)| json!({ "distance_mm": distance.as_mm(), "command_time_s": time.as_s() }));
+    let times = times(fit).into_iter().map(|(distance, time)| {
+        json!({
+            "distance_mm": distance.as_mm(),
+            "uncertainty_mm": better_error(fit).as_mm(),
+            "command_time_s": time.as_s(),
+        })
+    });
     json!({
         "file": file,
         "train": train,

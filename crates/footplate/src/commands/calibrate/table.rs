@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use footplate_core::Approach;
 use footplate_core::model::report::Direction;
-use footplate_store::{Findings, MotionStepForm, Quantity, TrainFindings};
+use footplate_store::{Findings, MotionStepForm, TrainFindings};
 
 /// How many other laws are printed beside the best.
 const RUNNERS_UP: usize = 2;
@@ -15,11 +15,7 @@ pub(super) fn write(report: &Findings, output: &mut dyn Write) -> io::Result<()>
             Some(period) => writeln!(
                 output,
                 "{}: polled every {} idle, {:.2} ms after a report, jitter {:.2} ms ({} gaps)",
-                polling.recording,
-                uncertain(period),
-                polling.after_report_ms,
-                polling.jitter_ms,
-                period.measurements
+                polling.recording, period, polling.after_report_ms, polling.jitter_ms, period.measurements
             )?,
             None => writeln!(
                 output,
@@ -88,10 +84,7 @@ fn write_laws(train: &TrainFindings, output: &mut dyn Write) -> io::Result<()> {
         writeln!(
             output,
             "    {}, begins {} after the command; {} changes, held-out error {:.0} mm",
-            uncertain(&law.best.pace),
-            uncertain(&law.best.delay),
-            law.changes,
-            law.best.held_out_mm
+            law.best.pace, law.best.delay, law.changes, law.best.held_out_mm
         )?;
         let others: Vec<String> = law
             .others
@@ -188,10 +181,4 @@ pub(super) fn approach(approach: Approach) -> &'static str {
         Approach::Above => "above",
         Approach::Unknown => "not recorded",
     }
-}
-
-/// `179 ± 12 mm/s²`: two digits of the uncertainty, at most three behind the point.
-fn uncertain(quantity: &Quantity) -> String {
-    let digits = [10.0, 1.0, 0.1].iter().take_while(|place| quantity.uncertainty < **place).count();
-    format!("{:.digits$} ± {:.digits$} {}", quantity.value, quantity.uncertainty, quantity.unit)
 }

@@ -1,24 +1,44 @@
 //! A comparison as a page of the documentation.
 
+use std::collections::BTreeSet;
 use std::io::{self, Write};
+use std::path::PathBuf;
 
 use footplate_store::{CheckedFigure, CrossCheck};
 
-use super::{approach, counted_from, verdict};
+use super::{approach, counted_from, left_out, verdict};
 
-const HEAD: &str = "\
-# Beside what other teams measured
+/// What is compared.
+pub(super) struct Sources<'a> {
+    pub(super) logs: &'a [PathBuf],
+    pub(super) tables: &'a [PathBuf],
+}
 
-Made by `footplate compare --markdown` from the recordings in `testdata/sensor-logs` and the tables in
+/// The folder of the tables whose README says more.
+const OUR_TABLES: &str = "`testdata/published-tables`";
+
+const ABOUT_OUR_TABLES: &str = "\
 [`testdata/published-tables`](../../testdata/published-tables/README.md), which says where the figures come from and what
 the comparison shows. The number of a train stayed on the locomotive for years; the locomotive was serviced, wore and ran
-on rails that were laid anew.
+on rails that were laid anew.";
 
+const HEAD: &str = "
 A difference is in percent of theirs, and in σ: of how far two teams differ anyway, our uncertainty, and the scatter of
 their readings. Up to 2 σ counts as agreement. *n* is the number of readings behind their figure.
 ";
 
-pub(super) fn write(check: &CrossCheck, output: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write(check: &CrossCheck, sources: &Sources<'_>, output: &mut dyn Write) -> io::Result<()> {
+    writeln!(output, "# Beside what other teams measured\n")?;
+    let (logs, tables) = (folders(sources.logs), folders(sources.tables));
+    writeln!(
+        output,
+        "Made by `footplate compare --markdown` from the recordings in {logs} and the tables in"
+    )?;
+    if tables == OUR_TABLES {
+        writeln!(output, "{ABOUT_OUR_TABLES}")?;
+    } else {
+        writeln!(output, "{tables}.")?;
+    }
     writeln!(output, "{HEAD}")?;
     let sections = [
         ("Steady speeds", "mm/s", &check.speeds, check.speed_spread_percent),
@@ -46,11 +66,17 @@ pub(super) fn write(check: &CrossCheck, output: &mut dyn Write) -> io::Result<()
         write_teams(figures, output)?;
         write_figures(figures, unit, output)?;
     }
-    let [all, without] = check.without_counterpart;
-    writeln!(
-        output,
-        "Left out: {without} of {all} published figures are of trains or steps that the recordings do not show."
-    )
+    left_out(check).iter().try_for_each(|sentence| writeln!(output, "Left out: {sentence}."))
+}
+
+/// The folders of files, each once.
+fn folders(files: &[PathBuf]) -> String {
+    let folder = |file: &PathBuf| match file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        Some(folder) => format!("`{}`", folder.display()),
+        None => "this folder".to_owned(),
+    };
+    let distinct: BTreeSet<String> = files.iter().map(folder).collect();
+    distinct.into_iter().collect::<Vec<_>>().join(", ")
 }
 
 fn write_teams(figures: &[CheckedFigure], output: &mut dyn Write) -> io::Result<()> {

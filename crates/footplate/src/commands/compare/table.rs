@@ -4,7 +4,7 @@ use std::io::{self, Write};
 
 use footplate_store::{CheckedFigure, CrossCheck};
 
-use super::{approach, counted_from, verdict};
+use super::{approach, counted_from, left_out, verdict};
 
 pub(super) fn write(check: &CrossCheck, output: &mut dyn Write) -> io::Result<()> {
     for (title, unit, figures, spread) in [
@@ -31,11 +31,7 @@ pub(super) fn write(check: &CrossCheck, output: &mut dyn Write) -> io::Result<()
         }
         writeln!(output)?;
     }
-    let [all, without] = check.without_counterpart;
-    writeln!(
-        output,
-        "{without} of {all} published figures are of trains or steps that the recordings do not show"
-    )
+    left_out(check).iter().try_for_each(|sentence| writeln!(output, "{sentence}"))
 }
 
 fn write_figure(figure: &CheckedFigure, output: &mut dyn Write) -> io::Result<()> {

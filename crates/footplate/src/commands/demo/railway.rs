@@ -14,6 +14,7 @@ use footplate_wire::{CommandError, LinkNotice};
 use crate::link::{Heard, Link, Lost, SimulatedLink, Speed, module_count};
 use crate::runtime::{Attendant, Ended, Recorder, Runtime, StopFlag, Wish};
 use crate::session_journal::SessionJournal;
+use crate::standard_error::say;
 
 /// Counts the events of the runtime, and records them if there is a journal.
 #[derive(Debug, Default)]
@@ -147,7 +148,7 @@ impl<'r, 'l> Railway<'r, 'l> {
     pub(super) fn close(&mut self) {
         let closing = self.runtime.close();
         if !closing.is_complete() {
-            eprintln!("{closing}");
+            say!("{closing}");
         }
     }
 }

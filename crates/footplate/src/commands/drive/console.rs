@@ -19,6 +19,7 @@ use crate::dashboard::{Alarm, Answer, Board, Painter, PendingRequest, Request};
 use crate::layout_check::LiveWarning;
 use crate::recorded::{Input, Recorded};
 use crate::runtime::{Attendant, Wish};
+use crate::standard_error::say;
 
 /// The interval between two pictures of the dashboard: 50 a second.
 const PICTURE_INTERVAL: Duration = Duration::from_millis(20);
@@ -50,7 +51,7 @@ pub(super) fn lines_of_stdin() -> Receiver<String> {
                     return;
                 }
             } else if !was_rest {
-                eprintln!("a line is longer than {LONGEST_LINE} bytes: it is not read");
+                say!("a line is longer than {LONGEST_LINE} bytes: it is not read");
             }
         }
     });

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 
 use super::instruction::Instruction;
 use super::parse::parse;
@@ -46,7 +46,15 @@ pub(super) fn read_script(path: &Path, known: Known<'_>) -> anyhow::Result<Vec<S
     if size > LONGEST {
         bail!("{}: {size} bytes are too many for a script: the limit is {LONGEST}", path.display());
     }
-    let text = std::fs::read_to_string(path).with_context(named)?;
+    let bytes = std::fs::read(path).with_context(named)?;
+    let text = std::str::from_utf8(&bytes).map_err(|error| {
+        let before = &bytes[..error.valid_up_to()];
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        let byte = 1 + before.iter().rev().take_while(|byte| **byte != b'\n').count();
+        anyhow!("{}: line {line}, byte {byte}: not UTF-8; save the script as UTF-8", path.display())
+    })?;
+    // Editors of some systems begin a file with a mark that is not part of its text.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut steps = Vec::new();
     let mut mistakes = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {

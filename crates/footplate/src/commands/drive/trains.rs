@@ -13,6 +13,7 @@ use footplate_store::{MotionFile, MotionReplay, Store, StoredModel};
 
 use crate::clock::now;
 use crate::link::StationKind;
+use crate::standard_error::say;
 
 /// The trains that a session begins with.
 #[derive(Debug, Default)]
@@ -78,7 +79,7 @@ impl KnownTrains {
             sources.station.check(model.train(), decoder).err().map(|why| (model.train(), why))
         });
         for (train, why) in refused.collect::<Vec<_>>() {
-            eprintln!("{why}; it is left out");
+            say!("{why}; it is left out");
             known.models.remove(&train);
             known.fits.retain(|fit| fit.model().train() != train);
         }
@@ -116,7 +117,7 @@ impl KnownTrains {
         let at = now();
         match StoredModel::of_store(layout, store, train, at)? {
             StoredModel::Model(model) => drop(self.models.insert(train, model.for_later_session())),
-            StoredModel::Outdated => eprintln!(
+            StoredModel::Outdated => say!(
                 "the stored model of train {train} is from another version of the formulas; it is \
                  fitted again from the stored events"
             ),
@@ -130,7 +131,7 @@ impl KnownTrains {
         let replay = MotionReplay::of_store(layout, store, train, highest, at)?;
         if replay.is_empty() {
             if let (Some(profile), true) = (&replay.profile, !self.models.contains_key(&train)) {
-                eprintln!("train {train} begins with the speeds of {profile}");
+                say!("train {train} begins with the speeds of {profile}");
                 self.models.insert(train, replay.fit.model().clone());
                 self.fits.push(replay.fit);
                 self.unknown.push(train);

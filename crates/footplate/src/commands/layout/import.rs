@@ -13,6 +13,7 @@ use footplate_store::{
 };
 
 use crate::commands::Outcome;
+use crate::commands::output_files::check_outputs;
 
 /// The default standard deviation of lengths in mm: two hand surveys of one course track differ from a third by 9 and
 /// 11 mm (standard deviation).
@@ -64,6 +65,8 @@ pub(super) struct Arguments {
 
 impl Arguments {
     pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let inputs = [&self.panel, &self.nodes, &self.edges, &self.schematic];
+        check_outputs(inputs.into_iter().flatten().map(PathBuf::as_path), &[("--out", Some(&self.out))])?;
         let stem = || self.out.file_stem().map(OsStr::to_string_lossy).unwrap_or_default().into_owned();
         let context = ImportContext {
             name: self.name.clone().unwrap_or_else(stem),

@@ -1,7 +1,7 @@
 //! `footplate layout show`: describes a layout as text, JSON or a drawing.
 
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
@@ -13,6 +13,7 @@ use footplate_store::{LayoutFile, draw_layout, layout_named, write_whole};
 use serde_json::{Value, json};
 
 use crate::commands::Outcome;
+use crate::commands::output_files::check_outputs;
 
 /// Show what a layout consists of.
 #[derive(Args)]
@@ -33,6 +34,7 @@ pub(super) struct Arguments {
 
 impl Arguments {
     pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        check_outputs([Path::new(&self.layout)], &[("--svg", self.svg.as_deref())])?;
         let file = layout_named(&self.layout)?;
         if let Some(path) = &self.svg {
             let drawing = draw_layout(&file).with_context(|| format!("drawing {}", self.layout))?;

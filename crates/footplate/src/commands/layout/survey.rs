@@ -17,6 +17,7 @@ use serde_json::{Value, json};
 
 use crate::clock::now;
 use crate::commands::Outcome;
+use crate::commands::output_files::check_outputs;
 use crate::counted::counted;
 
 /// Estimate the lengths of a layout from the runs of its trains.
@@ -43,6 +44,7 @@ pub(super) struct Arguments {
 
 impl Arguments {
     pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        check_outputs([Path::new(&self.layout), &self.store], &[("--out", self.out.as_deref())])?;
         let file = layout_named(&self.layout)?;
         let layout = &file.layout;
         let models = models(layout, &self.store)?;

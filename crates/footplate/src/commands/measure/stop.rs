@@ -18,6 +18,8 @@ use super::stops_picture::measured_stops;
 use crate::clock::now;
 use crate::commands::Outcome;
 use crate::commands::plot::PictureFile;
+use crate::error_text::error_text;
+use crate::standard_error::say;
 
 /// Beyond this many standard deviations from what the model expects a reading is pointed out: one in 300 by chance.
 const REMARKABLE: f64 = 3.0;
@@ -87,15 +89,25 @@ impl Arguments {
         store.append(stopped.run.key, &[event], now())?;
         let after = known(&layout, &store, train, stopped.from());
         let key = last_event(&store, &stopped)?;
-        if let Some(plot) = &self.plot {
-            plot.write(&measured_stops(&layout, &store, train, stopped.from())?)?;
-        }
         let measured =
             MeasuredStop { arguments: &self, layout: &layout, stopped: &stopped, key, before, after };
         if self.json {
             writeln!(output, "{}", measured.value())?;
         } else {
             measured.write(output)?;
+        }
+        // The stop is stored by now: an error would invite a second try, which stores it twice.
+        let drawn = self
+            .plot
+            .as_ref()
+            .map_or(Ok(()), |plot| plot.write(&measured_stops(&layout, &store, train, stopped.from())?));
+        if let Err(error) = drawn {
+            say!(
+                "the stop is stored as event {key}, do not add it again; its picture failed: {}; draw it with --plot at the next \
+                 stop",
+                error_text(&error)
+            );
+            return Ok(Outcome::FallsShort);
         }
         Ok(Outcome::Done)
     }

@@ -14,10 +14,13 @@ use super::block_stream::each_block;
 use super::report::{MOST_POINTS, RunSeries};
 use super::results::Results;
 use crate::progress::with_progress;
+use crate::standard_error::say;
 
 /// A recording whose columns are known and whose rows are not read yet.
 pub(super) struct OpenRecording {
     file: String,
+    /// Whether rows of results name the file before the run: runs of other files may have the same `run_id`.
+    names_file: bool,
     reader: TachometerReader,
 }
 
@@ -33,6 +36,8 @@ pub(super) struct Mapped<'m> {
 pub(super) struct WalkedRecording {
     /// What messages call the file.
     pub(super) file: String,
+    /// Whether rows of results name the file before the run.
+    names_file: bool,
     /// Its runs in the order of first appearance.
     pub(super) runs: Vec<WalkedRun>,
     /// What was odd in it.
@@ -67,7 +72,7 @@ impl OpenRecording {
                 TachometerReader::open_mapped(path, mapping, vehicle)?
             }
         };
-        let recording = Self { file, reader };
+        let recording = Self { file, names_file: false, reader };
         if score && !recording.has_truth() {
             bail!(
                 "{}: --score needs the truth, and there is no column true_speed_m_s or true_distance_m",
@@ -75,6 +80,11 @@ impl OpenRecording {
             );
         }
         Ok(recording)
+    }
+
+    /// As one of so many recordings of a call.
+    pub(super) fn one_of(self, recordings: usize) -> Self {
+        Self { names_file: recordings > 1, ..self }
     }
 
     /// Whether its rows say which run they belong to.
@@ -97,9 +107,14 @@ impl OpenRecording {
         charts_left: &mut usize,
     ) -> anyhow::Result<WalkedRecording> {
         let has_run_ids = self.has_run_ids();
-        let Self { file, reader } = self;
-        let mut walked =
-            WalkedRecording { file, runs: Vec::new(), notes: Vec::new(), time_faults: TimeFaults::default() };
+        let Self { file, names_file, reader } = self;
+        let mut walked = WalkedRecording {
+            file,
+            names_file,
+            runs: Vec::new(),
+            notes: Vec::new(),
+            time_faults: TimeFaults::default(),
+        };
         if !has_run_ids {
             walked.add_run(None, context, charts_left)?;
         }
@@ -124,7 +139,11 @@ impl WalkedRecording {
     ) -> anyhow::Result<()> {
         let has_charts = *charts_left > 0;
         *charts_left -= usize::from(has_charts);
-        let name = id.map_or_else(|| self.file.clone(), ToOwned::to_owned);
+        let name = match id {
+            Some(id) if self.names_file => format!("{}: {id}", self.file),
+            Some(id) => id.to_owned(),
+            None => self.file.clone(),
+        };
         self.runs.push(WalkedRun {
             id: id.map(ToOwned::to_owned),
             name,
@@ -145,7 +164,7 @@ impl WalkedRecording {
             self.add_run(Some(id), context, charts_left)?;
         }
         for note in &block.notes {
-            eprintln!("{}, {note}", self.file);
+            say!("{}, {note}", self.file);
         }
         self.notes.extend_from_slice(&block.notes);
         self.time_faults = block.time_faults;

@@ -40,6 +40,8 @@ struct PageForm {
 #[derive(Debug, Serialize)]
 struct RunForm {
     name: String,
+    /// The probability of its intervals in per cent.
+    confidence_pct: String,
     #[serde(flatten)]
     series: SeriesForm,
 }
@@ -64,7 +66,11 @@ pub(super) fn page(walked: &Walked) -> serde_json::Result<String> {
     let of_recordings = walked.recordings.iter().flat_map(|recording| {
         recording.runs.iter().filter_map(move |run| {
             let name = tables::run_name(recording, run, several);
-            Some(RunForm { name, series: run.series.as_ref()?.form(most) })
+            Some(RunForm {
+                name,
+                confidence_pct: walked.confidence_pct(),
+                series: run.series.as_ref()?.form(most),
+            })
         })
     });
     let form = PageForm { runs: of_recordings.collect() };

@@ -70,6 +70,7 @@ fn run_row(output: &mut dyn Write, run: &WalkedRun) -> io::Result<()> {
 fn score_table(output: &mut dyn Write, walked: &Walked, scores: &RunScores) -> io::Result<()> {
     let runs: usize = walked.recordings.iter().map(|recording| recording.runs.len()).sum();
     let own = scores.preset(walked.preset);
+    let confidence = format!("{} %", walked.confidence_pct());
     writeln!(output, "against the truth, {} of {}", counted(own.scored, "period"), counted(runs, "run"))?;
     writeln!(
         output,
@@ -81,8 +82,8 @@ fn score_table(output: &mut dyn Write, walked: &Walked, scores: &RunScores) -> i
         "end",
         "speed in",
         "dist. in",
-        "99.99 %",
-        "99.99 %",
+        confidence,
+        confidence,
         "ETCS v",
         "ETCS s",
         "delay"

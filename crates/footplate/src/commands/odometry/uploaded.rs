@@ -88,6 +88,8 @@ fn walked_page(
     let mut charts_left = MOST_RUNS;
     let recordings = vec![recording.walk(&context, None, &mut charts_left)?];
     let vehicle = vehicle.name;
-    let walked = Walked { vehicle, preset, recordings, has_vehicle, language, is_scored: context.score };
+    let confidence = context.confidence;
+    let is_scored = context.score;
+    let walked = Walked { vehicle, preset, recordings, has_vehicle, confidence, language, is_scored };
     Ok(report::page(&walked)?)
 }

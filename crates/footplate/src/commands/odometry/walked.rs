@@ -8,7 +8,7 @@ use crate::counted::counted;
 
 /// Least share of periods whose true speed has to lie within the interval (per cent): that it holds is promised for
 /// all but one period in ten thousand.
-const SPEED_INSIDE_PCT: f64 = 99.99;
+pub(in crate::commands) const SPEED_INSIDE_PCT: f64 = 99.99;
 
 /// Share of periods in which claims may be contradicted before they do not hold: rows that were read late.
 const CONTRADICTED: f64 = 1e-3;
@@ -38,6 +38,8 @@ pub(super) struct Walked {
     pub(super) recordings: Vec<WalkedRecording>,
     /// Whether a vehicle file says what the train is.
     pub(super) has_vehicle: bool,
+    /// The probability of the confidence intervals.
+    pub(super) confidence: f64,
     /// In which a page says it.
     pub(super) language: Language,
     /// Whether a score was asked for; a page has one wherever the truth is known.
@@ -45,6 +47,12 @@ pub(super) struct Walked {
 }
 
 impl Walked {
+    /// The probability of the confidence intervals in per cent, with no more digits than it has.
+    pub(super) fn confidence_pct(&self) -> String {
+        let digits = format!("{:.7}", 100.0 * self.confidence);
+        digits.trim_end_matches('0').trim_end_matches('.').to_owned()
+    }
+
     /// The scores of all runs together, if that was asked for.
     pub(super) fn scores(&self) -> Option<RunScores> {
         if self.is_scored { self.known_scores() } else { None }

@@ -13,6 +13,7 @@ use footplate_store::{
 use super::stored_model;
 use crate::clock::now;
 use crate::commands::Outcome;
+use crate::commands::output_files::check_outputs;
 use crate::counted::counted;
 
 /// Export the speeds and stops of a train that was calibrated.
@@ -55,6 +56,10 @@ enum Format {
 
 impl Arguments {
     pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        check_outputs(
+            [self.store.as_path()],
+            &[("--out", self.out.as_deref()), ("--into", self.into.as_deref())],
+        )?;
         let train = TrainId(self.train);
         let rows = self.rows(train)?;
         let steps = counted(rows.len(), "step");

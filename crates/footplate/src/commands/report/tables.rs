@@ -2,7 +2,7 @@
 
 use footplate_core::Approach;
 use footplate_core::model::report::Direction;
-use footplate_store::{PollingForm, Quantity, TrainFindings};
+use footplate_store::{PollingForm, TrainFindings};
 
 use super::data::{Check, Health, State};
 use crate::commands::web_page::Language;
@@ -39,9 +39,9 @@ pub(super) fn speeds(train: &TrainFindings, language: Language) -> String {
         table.row(&[
             step.step.to_string(),
             approach(step.approach, language).to_owned(),
-            quantity(&step.speed),
+            step.speed.to_string(),
             step.speed.measurements.to_string(),
-            quantity(&step.stop),
+            step.stop.to_string(),
             format!("{:.0} mm", step.stop_scatter_mm),
             step.stop.measurements.to_string(),
         ]);
@@ -93,8 +93,8 @@ pub(super) fn laws(train: &TrainFindings, language: Language) -> String {
         table.row(&[
             direction.to_owned(),
             law.best.name.clone(),
-            quantity(&law.best.pace),
-            quantity(&law.best.delay),
+            law.best.pace.to_string(),
+            law.best.delay.to_string(),
             law.changes.to_string(),
             format!("{:.0} mm", law.best.held_out_mm),
             verdict.to_owned(),
@@ -195,7 +195,7 @@ pub(super) fn polling(recordings: &[PollingForm], language: Language) -> String 
             polling
                 .period
                 .as_ref()
-                .map_or_else(|| language.pick("no rhythm", "kein Rhythmus").to_owned(), quantity),
+                .map_or_else(|| language.pick("no rhythm", "kein Rhythmus").to_owned(), ToString::to_string),
             format!("{:.2} ms", polling.after_report_ms),
             format!("{:.2} ms", polling.jitter_ms),
         ]);
@@ -209,12 +209,6 @@ const fn approach(approach: Approach, language: Language) -> &'static str {
         Approach::Above => language.pick("above", "oben"),
         Approach::Unknown => language.pick("not recorded", "nicht festgehalten"),
     }
-}
-
-/// `179 ± 12 mm/s²`: two digits of the uncertainty, at most three behind the point.
-fn quantity(quantity: &Quantity) -> String {
-    let digits = [10.0, 1.0, 0.1].iter().take_while(|place| quantity.uncertainty < **place).count();
-    format!("{:.digits$} ± {:.digits$} {}", quantity.value, quantity.uncertainty, quantity.unit)
 }
 
 /// With its sign, a true minus.

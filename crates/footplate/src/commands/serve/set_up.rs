@@ -25,6 +25,7 @@ use self::set_up_file::{SetUp, StepResult, file_beside};
 use crate::commands::Outcome;
 use crate::dashboard::{ServedAt, ServedPages, Token};
 use crate::runtime::StopFlag;
+use crate::standard_error::say;
 
 /// The store of a railway that is set up, unless another one is named.
 pub(super) const USUAL_STORE: &str = "railway.db";
@@ -96,8 +97,8 @@ impl Session {
         let token = self.token.as_deref().map(Token::chosen).transpose()?;
         let served = ServedPages::open(&self.at, token, pages.routes())?;
         if !std::mem::replace(&mut self.is_announced, true) {
-            eprintln!("the dashboard is at {}{shown}", served.url);
-            eprintln!("open it to set up the railway; what you enter is kept in {}", self.file.display());
+            say!("the dashboard is at {}{shown}", served.url);
+            say!("open it to set up the railway; what you enter is kept in {}", self.file.display());
         }
         loop {
             match next.recv_timeout(LOOK) {

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::commands::Outcome;
+use crate::standard_error::say;
 
 /// One run of a scorer that did not do what it must.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,10 +27,10 @@ const MOST_SAID: usize = 20;
 /// `testdata/seeds.txt` that is made of one is driven by every test run from then on.
 pub(super) fn name_failed(failed: &[FailedRun]) -> Outcome {
     for run in failed.iter().take(MOST_SAID) {
-        eprintln!("failed: {run}");
+        say!("failed: {run}");
     }
     if failed.len() > MOST_SAID {
-        eprintln!("and {} more failed", failed.len() - MOST_SAID);
+        say!("and {} more failed", failed.len() - MOST_SAID);
     }
     if failed.is_empty() { Outcome::Done } else { Outcome::FallsShort }
 }

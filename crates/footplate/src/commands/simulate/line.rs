@@ -18,10 +18,9 @@ use footplate_store::TableForm;
 use self::files::WrittenRun;
 use self::world::{LevelName, Scenarios, World};
 use super::super::Outcome;
+use super::super::odometry::SPEED_INSIDE_PCT;
 use crate::spread::each;
 
-/// Least share of periods whose true speed has to lie within the interval (per cent), as `footplate odometry` asks for.
-const SPEED_INSIDE_PCT: f64 = 99.99;
 /// Periods that an odometer takes (s).
 const PERIODS_S: (f64, f64) = (0.001, 1.0);
 

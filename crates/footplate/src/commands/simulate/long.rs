@@ -50,9 +50,13 @@ const PART: TimeSpan = TimeSpan::from_ms(3_600_000);
 const BUDGET: TimeSpan = TimeSpan::from_ms(300_000);
 
 fn hours(text: &str) -> Result<TimeSpan, String> {
+    number_of_hours(text).map(|hours| TimeSpan::from_s(3_600.0 * hours))
+}
+
+/// Reads track time in hours.
+pub(super) fn number_of_hours(text: &str) -> Result<f64, String> {
     let hours = text.parse::<f64>().ok().filter(|hours| (0.05..=10_000.0).contains(hours));
-    let hours = hours.ok_or_else(|| format!("`{text}` is not a number of hours from 0.05 to 10000"))?;
-    Ok(TimeSpan::from_s(3_600.0 * hours))
+    hours.ok_or_else(|| format!("`{text}` is not a number of hours from 0.05 to 10000"))
 }
 
 fn scenario(name: &str) -> Result<LineScenario, String> {

@@ -14,6 +14,7 @@ use crate::link::{
     listen_on, open_pseudo_terminal, station, trains,
 };
 use crate::runtime::StopFlag;
+use crate::standard_error::say;
 
 /// Where a simulated station is put.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -134,7 +135,7 @@ pub(super) fn serve(
     };
     output.flush()?;
     let named: Vec<String> = address.trains.iter().map(ToString::to_string).collect();
-    eprintln!(
+    say!(
         "a simulated {name} with trains {} on {}, seed {}; Ctrl-C ends it",
         named.join(", "),
         wanted.layout,
@@ -167,10 +168,10 @@ fn open(place: &Place, protocol: StationKind) -> anyhow::Result<(String, Receive
 fn say_what_happened(server: &Server<'_>) {
     for incident in server.station().world().incidents() {
         let train = incident.train.map_or_else(String::new, |train| format!("train {train}: "));
-        eprintln!("at {:.1} s {train}{:?}", incident.at.as_s(), incident.kind);
+        say!("at {:.1} s {train}{:?}", incident.at.as_s(), incident.kind);
     }
     for alarm in server.station().alarms() {
         let since = alarm.since.as_s();
-        eprintln!("the solenoid of turnout {} was powered for too long, from {since:.1} s", alarm.turnout);
+        say!("the solenoid of turnout {} was powered for too long, from {since:.1} s", alarm.turnout);
     }
 }

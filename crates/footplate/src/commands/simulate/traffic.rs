@@ -8,6 +8,7 @@ use footplate_eval::traffic::{Asked, LONGEST_NOWHERE_S, Page, Session, Tally};
 
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
+use super::long::number_of_hours;
 use super::score_form::ScoreForm;
 use super::series::Series;
 
@@ -21,7 +22,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u8).range(1..=6))]
     trains: u8,
     /// Track time, in hours.
-    #[arg(long, value_name = "H", default_value_t = 1.0)]
+    #[arg(long, value_name = "H", default_value_t = 1.0, value_parser = number_of_hours)]
     hours: f64,
     /// The same again with the track between sensors reserved as a whole, as block systems do, to compare with.
     #[arg(long)]

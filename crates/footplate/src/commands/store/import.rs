@@ -12,6 +12,7 @@ use crate::clock::{local, now, rfc3339};
 use crate::commands::Outcome;
 use crate::commands::log_file::LogFile;
 use crate::counted::counted;
+use crate::standard_error::say;
 
 /// Import sensor logs of any form. A file that is in the store already is left alone.
 #[derive(Args)]
@@ -35,13 +36,20 @@ impl Arguments {
     pub(super) fn run(self, store: &Path, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let layout = layout_named(&self.layout)?.layout;
         // All are read before the first is stored: a wrong one stops the import before it begins.
-        let logs = LogFile::read_all(&self.logs, &layout, self.train.map(TrainId))?;
+        let logs = LogFile::read_each(&self.logs, &layout, self.train.map(TrainId))?;
         let mut store = Store::open_or_create(store)?;
-        for (path, log) in self.logs.iter().zip(&logs) {
+        let mut ending = Outcome::Done;
+        for log in &logs {
             let outcome = store.import(&log.recording, log.content, layout.name(), now())?;
-            self.report(path, log, outcome, output)?;
+            self.report(&log.path, log, outcome, output)?;
+            if let Import::AlreadyThere { recording, .. } = outcome
+                && let Some(kept) = log.kept_otherwise(&store, recording, &layout)?
+            {
+                say!("{kept}");
+                ending = Outcome::FallsShort;
+            }
         }
-        Ok(Outcome::Done)
+        Ok(ending)
     }
 
     fn report(

@@ -10,6 +10,7 @@ use super::beginning::CalibrationBeginning;
 use crate::clock::{local, now};
 use crate::link::Address;
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
+use crate::standard_error::say;
 
 /// Begins a session of a train in a store; the line's clock stands at `at`.
 ///
@@ -40,6 +41,6 @@ pub(super) fn begin(
 pub(super) fn end(journal: SessionJournal) {
     let (kept, _) = journal.finish();
     if let Some(trouble) = kept.trouble {
-        eprintln!("the end of the session was not recorded: {trouble}");
+        say!("the end of the session was not recorded: {trouble}");
     }
 }

@@ -12,6 +12,7 @@ use crate::dashboard::{Alarm, ReadOnlyDashboard};
 use crate::layout_check::layout_with;
 use crate::recorded::Recorded;
 use crate::runtime::{Attendant, Wish};
+use crate::standard_error::say;
 
 /// The answer to a browser that wants to drive.
 const DRIVES_ITSELF: &str = "a calibration runs by itself: use `footplate serve` to command trains";
@@ -33,7 +34,7 @@ pub(super) struct Watcher<'l> {
 
 impl<'l> Watcher<'l> {
     pub(super) fn new(layout: &'l Layout, train: TrainId, budget: TimeSpan) -> Self {
-        eprintln!("calibrating train {train} on {} within {} of track time", layout.name(), minutes(budget));
+        say!("calibrating train {train} on {} within {} of track time", layout.name(), minutes(budget));
         // Hidden by itself where standard error is no terminal.
         let bar = ProgressBar::new(budget.as_s().max(1.0) as u64);
         let style = ProgressStyle::with_template("{bar:24} {pos:>4} of {len} s  {msg}");
@@ -63,7 +64,7 @@ impl<'l> Watcher<'l> {
 
     fn say(&self, now: Timestamp, text: &str) {
         let at = minutes(self.began.map_or(TimeSpan::ZERO, |began| now - began));
-        self.bar.suspend(|| eprintln!("{at:>5}  {text}"));
+        self.bar.suspend(|| say!("{at:>5}  {text}"));
         if let Some(showing) = &self.showing {
             showing.say(now, text);
         }

@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use super::figures::Figures;
 use super::sessions::ScoredWorld;
 use super::world::WorldName;
+use crate::standard_error::say;
 use footplate_eval::figures::shown;
 use footplate_eval::written_scores::{Rate, WrittenScores};
 
@@ -76,7 +77,7 @@ impl WrittenScores for Page<'_> {
         let taken: f64 = self.worlds.iter().map(|world| world.taken.as_secs_f64()).sum();
         let longest = self.worlds.iter().map(|world| world.longest.as_secs_f64()).fold(0.0, f64::max);
         // Times differ from run to run and from machine to machine: they do not go into a page.
-        eprintln!(
+        say!(
             "computing: {:.1} ms per stop, {:.1} ms at most at once",
             1e3 * taken / stops.max(1) as f64,
             1e3 * longest
