@@ -367,7 +367,7 @@ impl Alarm {
             }
             Fault::Lost { .. } => (Grade::Danger, "mishap-lost", Vec::new()),
             Fault::OtherSpeeds { ratio } => {
-                (Grade::Warning, "mishap-other-train", vec![format!("{:.0}", 100.0 * ratio)])
+                (Grade::Warning, "other-train", vec![format!("{:.0}", 100.0 * ratio)])
             }
             Fault::LengthsDiffer { hops } => (Grade::Warning, "mishap-lengths", vec![hops.len().to_string()]),
         };

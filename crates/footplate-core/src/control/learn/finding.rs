@@ -318,10 +318,11 @@ impl Calibrator<'_> {
     ) -> Option<BTreeMap<TurnoutId, Option<Leg>>> {
         let located = self.locator.locate(self.context(), self.model(), now)?;
         let is_here = located.at.node == node && located.speed <= Speed::ZERO;
-        let doubt = 2.0 * located.uncertainty;
-        let behind = self.settings.train_length + doubt - located.at.distance;
-        is_here
-            .then(|| self.locked_within(node, located.at.distance + doubt + MARGIN, behind.max(Length::ZERO)))
+        let margin = 2.0 * located.uncertainty;
+        let behind = self.settings.train_length + margin - located.at.distance;
+        is_here.then(|| {
+            self.locked_within(node, located.at.distance + margin + MARGIN, behind.max(Length::ZERO))
+        })
     }
 
     fn locked_within(&self, node: NodeId, ahead: Length, behind: Length) -> BTreeMap<TurnoutId, Option<Leg>> {

@@ -3,8 +3,6 @@
 use alloc::vec::Vec;
 
 use super::accuracy::steps;
-use super::calibrator::Calibrator;
-use super::notice::Fault;
 use super::planner::KNOWN_FROM;
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep};
@@ -19,12 +17,15 @@ const SAME_TRAIN: f64 = 0.10;
 /// The number of hops that are compared.
 const COMPARED: usize = 6;
 
+/// A passage of a sensor: its node, its time, and the step.
+pub(super) type Passage = (NodeId, Timestamp, SpeedStep);
+
 /// The speeds of earlier sessions, and the ratios to them in this one.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Identity {
     before: Vec<(SpeedStep, Speed)>,
     ratios: Vec<f64>,
-    at: Option<(NodeId, Timestamp, SpeedStep)>,
+    at: Option<Passage>,
 }
 
 impl Identity {
@@ -43,31 +44,22 @@ impl Identity {
         sorted.sort_by(f64::total_cmp);
         (sorted.len() >= COMPARED).then(|| sorted.get(sorted.len() / 2).copied())?
     }
-}
 
-impl Calibrator<'_> {
-    /// The train passed a sensor: compares its mean speed since the last one, if it was steady, with that of before.
-    pub(super) fn compare_speed(&mut self, now: Timestamp, missed: usize, at: Timestamp) {
-        if self.identity.before.is_empty() {
-            return;
-        }
-        let step = self.throttle.step;
-        let is_steady = now >= self.steady_at && self.requested.is_none();
-        let here = self.tracker.last().filter(|_| is_steady).map(|node| (node, at, step));
-        let before = core::mem::replace(&mut self.identity.at, here);
-        let (Some((from, since, earlier)), Some((to, ..))) = (before, here) else { return };
-        let known = self.identity.before.iter().find(|(known, _)| *known == step).map(|(_, speed)| *speed);
-        let (Some(known), Some(hop), true) = (known, self.only_hop(from, to), earlier == step && missed == 0)
-        else {
-            return;
-        };
-        let speed = self.model().length(&self.sections, &hop)[0] / (at - since);
-        self.identity.ratios.push(speed / known);
-        if let Some(ratio) = self.identity.ratio() {
-            self.identity = Identity::default();
-            if (ratio - 1.0).abs() > SAME_TRAIN {
-                self.report_fault(Fault::OtherSpeeds { ratio });
-            }
-        }
+    /// Takes in a passage at a steady speed, `None` for any other. Returns the node and time of the passage before, and the known
+    /// speed, if the step was the same.
+    pub(super) fn advance(&mut self, here: Option<Passage>) -> Option<(NodeId, Timestamp, Speed)> {
+        let before = core::mem::replace(&mut self.at, here);
+        let ((from, since, earlier), (_, _, step)) = (before?, here?);
+        let (_, known) = self.before.iter().find(|(known, _)| *known == step)?;
+        (earlier == step).then_some((from, since, *known))
+    }
+
+    /// Takes in the speed of a hop divided by the known one. Returns the median of the ratios if it is another train's; then
+    /// nothing more is compared.
+    pub(super) fn compare(&mut self, ratio: f64) -> Option<f64> {
+        self.ratios.push(ratio);
+        let ratio = self.ratio()?;
+        *self = Self::default();
+        ((ratio - 1.0).abs() > SAME_TRAIN).then_some(ratio)
     }
 }

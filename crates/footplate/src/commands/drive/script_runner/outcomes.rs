@@ -75,7 +75,8 @@ impl ScriptRunner {
 
     /// Reports a notice and acts on it.
     pub(super) fn handle_notice(&mut self, now: Timestamp, notice: &Notice) {
-        if let Some(mut line) = self.formatter().line(notice) {
+        let line = self.formatter().line(notice).filter(|line| !self.is_repeated(notice, line));
+        if let Some(mut line) = line {
             if let Notice::AuthorityEnds { train } = notice {
                 let holders = self.dispatcher.holders_beyond(*train, now);
                 if !holders.is_empty() {
@@ -143,6 +144,20 @@ impl ScriptRunner {
             Notice::NeedsOperator { .. } => self.fell_short = true,
             Notice::Arrived { order, train, error, .. } => self.arrived(now, *order, *train, *error),
             _ => {}
+        }
+    }
+
+    /// Whether the same was said of this deadlock before, and the train has not arrived since.
+    fn is_repeated(&mut self, notice: &Notice, line: &str) -> bool {
+        match notice {
+            Notice::Deadlock { train, .. } | Notice::Deadlocked { train } => {
+                self.deadlocks.insert(*train, line.to_owned()).is_some_and(|before| before == line)
+            }
+            Notice::Arrived { train, .. } => {
+                self.deadlocks.remove(train);
+                false
+            }
+            _ => false,
         }
     }
 
