@@ -15,6 +15,7 @@ mod emergency_stop;
 mod forecasts_hold;
 mod guardian;
 mod guardian_datagrams;
+mod guides;
 mod imported_profile;
 mod inertial_slides;
 mod jmri;
