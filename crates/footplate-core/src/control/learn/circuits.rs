@@ -106,7 +106,7 @@ impl<'l> Calibrator<'l> {
     /// The same for a train at rest within an experiment. Turnouts that a moving train is always too near to, because the
     /// lengths before them are unknown, can be thrown then. Returns how many were commanded; `None` if nothing changes.
     pub(super) fn change_circuit_at_rest(&mut self, now: Timestamp) -> Option<usize> {
-        if !self.surveys() {
+        if self.layout.is_measured() {
             return None;
         }
         let node = self.tracker.last()?;

@@ -233,7 +233,7 @@ impl Calibrator<'_> {
         let since = *self.joins_since.get_or_insert(now);
         if now - since >= LONGEST_JOIN {
             self.end(now, Ending::TurnoutsUnset);
-        } else if now - since >= SLOWED_AFTER && self.requested.is_none() {
+        } else if now - since >= SLOWED_AFTER && self.requested.is_none() && !self.layout.is_measured() {
             let stride = self.model().stride();
             let slower = self.throttle.step.get().saturating_sub(stride).max(stride * SLOWEST_STEP);
             if let Some(slower) = SpeedStep::new(slower).filter(|slower| *slower < self.throttle.step) {

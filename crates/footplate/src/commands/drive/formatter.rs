@@ -203,11 +203,10 @@ impl NoticeFormatter<'_> {
                         others.push(*mover);
                     }
                 }
-                let own = if moves.contains(train) { ", and it moves itself in between" } else { "" };
                 match others.as_slice() {
                     [] => format!("train {train} is in a deadlock: it moves elsewhere first"),
-                    [_] => format!("train {train} is in a deadlock: {} makes room{own}", trains(&others)),
-                    _ => format!("train {train} is in a deadlock: {} make room{own}", trains(&others)),
+                    [_] => format!("train {train} is in a deadlock: {} makes room", trains(&others)),
+                    _ => format!("train {train} is in a deadlock: {} make room", trains(&others)),
                 }
             }
             Notice::StepsAside { train, makes_room_for, to } => {

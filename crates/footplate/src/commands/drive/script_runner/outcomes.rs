@@ -75,8 +75,7 @@ impl ScriptRunner {
 
     /// Reports a notice and acts on it.
     pub(super) fn handle_notice(&mut self, now: Timestamp, notice: &Notice) {
-        let line = self.formatter().line(notice).filter(|line| !self.is_repeated(notice, line));
-        if let Some(mut line) = line {
+        if let Some(mut line) = self.formatter().line(notice) {
             if let Notice::AuthorityEnds { train } = notice {
                 let holders = self.dispatcher.holders_beyond(*train, now);
                 if !holders.is_empty() {
@@ -91,7 +90,9 @@ impl ScriptRunner {
             if let Some(alarm) = Alarm::of_notice(self.driver().layout(), notice) {
                 self.outputs.push_back(Output::Notice(SessionMessage::Alarm(alarm.said(&line))));
             }
-            self.say(line);
+            if !self.is_repeated(notice, &line) {
+                self.say(line);
+            }
         }
         match notice {
             Notice::Planned(plan) => {
