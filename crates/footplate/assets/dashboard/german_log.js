@@ -130,7 +130,7 @@ const LINES = [
 const tailed = (text) => TAILS.reduce((line, [english, german]) => line.replace(english, german), text);
 
 /** Numbers before a unit with a decimal comma. */
-const withCommas = (text) => text.replace(/(\d)\.(\d+)(?= (?:s|ms|mm|m|mm\/s|%)(?![\w]))/g, "$1,$2");
+const withCommas = (text) => text.replace(/(\d)\.(\d+)(?= (?:s|ms|mm|m|mm\/s|%|±)(?![\w]))/g, "$1,$2");
 
 /** A line of the log, or an error of the server, in German; several lines one by one. */
 export function logInGerman(text) {
