@@ -140,12 +140,12 @@ fn draw_track(frame: &mut Frame<'_>, area: Rect, model: &TerminalModel) {
 }
 
 /// The sensors whose names have room: a name that would cover another is left out.
-fn readable<'m>(
-    sensors: &'m [Sensor],
+fn readable(
+    sensors: &[Sensor],
     [left, right]: [f64; 2],
     [top, foot]: [f64; 2],
     area: Rect,
-) -> impl Iterator<Item = &'m Sensor> {
+) -> impl Iterator<Item = &Sensor> {
     let mut taken: Vec<(i64, i64, i64)> = Vec::new();
     let cell = |value: f64, from: f64, to: f64, cells: u16| {
         ((value - from) / (to - from).max(1.0) * f64::from(cells.saturating_sub(3))) as i64
