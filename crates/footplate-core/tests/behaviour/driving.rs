@@ -299,7 +299,8 @@ fn invalid_orders_are_rejected_and_change_nothing() {
         ),
         (
             Order::Stop(stop_at(&driver, "E1")),
-            "no path from `D1` to `E1` with the turnouts in their present positions",
+            "no path from `D1` to `E1` with the turnouts in their present positions: throw turnouts, for example `turnout all \
+             straight`, or let `go` throw them",
         ),
         (
             Order::Stop(stop_at(&driver, "F1+2000mm")),

@@ -135,16 +135,16 @@ export function calibrationPage(root, live, number) {
       put($("#why-answer"), error.message);
       return;
     }
-    $("#listings").replaceChildren(...listings.map(({ number: title, measurements }) => {
-      const columns = Object.keys(measurements[0] ?? {});
+    $("#listings").replaceChildren(...listings.map(({ number: named, columns, measurements }) => {
+      const title = logged(named);
       const rows = measurements.map((measurement) => {
         const event = /^event (\d+)/.exec(measurement.told_by ?? "")?.[1];
         const button = event && make("button", { type: "button", "aria-label": say("exclude-event", event) }, say("exclude"));
         button?.addEventListener("click", () => mark([Number(event)], "excluded", () => why(of)));
         return make("tr", {}, ...columns.map((column) => make("td", { class: typeof measurement[column] === "number" ? "number" : "" },
-          measurement[column] == null ? "–" : typeof measurement[column] === "number" ? String(rounded(measurement[column], 4)).replace(/\.?0+$/, "") : measurement[column])), make("td", {}, button ?? ""));
+          measurement[column] == null ? "–" : typeof measurement[column] === "number" ? rounded(measurement[column], 4).replace(/[.,]?0+$/, "") : column === "use" ? say(`use-${measurement[column]}`) : measurement[column])), make("td", {}, button ?? ""));
       });
-      const head = make("tr", {}, ...columns.map((column) => make("th", { scope: "col" }, column.replaceAll("_", " "))), make("th", { scope: "col" }, say("thinks")));
+      const head = make("tr", {}, ...columns.map((column) => make("th", { scope: "col" }, say(`column-${column}`))), make("th", { scope: "col" }, say("thinks")));
       return make("div", { class: "wide", tabIndex: 0, role: "region", "aria-label": title }, make("table", {}, make("caption", {}, title), make("thead", {}, head), make("tbody", {}, ...rows)));
     }));
     place.scrollIntoView({ block: "nearest" });

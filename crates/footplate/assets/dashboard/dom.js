@@ -1,5 +1,7 @@
 // Short functions that build pages.
 
+import { rounded } from "./chart.js";
+
 /** An element with its properties and children. */
 export function make(name, properties = {}, ...inside) {
   const made = document.createElement(name);
@@ -27,7 +29,7 @@ export function put(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-/** A number with a true minus. */
-export const shown = (value, digits = 0) => value.toFixed(digits).replace("-", "−").replace(/^−(0(\.0*)?)$/, "$1");
+/** A number in the reader's language, with a true minus. */
+export const shown = (value, digits = 0) => rounded(value, digits);
 /** The same with a sign. */
 export const signed = (value, digits = 0) => (value > 0 ? "+" : "") + shown(value, digits);

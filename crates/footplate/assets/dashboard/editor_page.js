@@ -1,6 +1,6 @@
 // The editor: draws a layout from the pieces of a track system, and saves it as a layout file.
 
-import { make, put, svg } from "./dom.js";
+import { make, put, shown, svg } from "./dom.js";
 import { Draft } from "./draft.js";
 import { arcOf, LIBRARIES } from "./pieces.js";
 import { written } from "./plan_curve.js";
@@ -163,7 +163,7 @@ export function editorPage(root, live) {
   function list() {
     const size = ({ mm, radius, angle }) => [radius && `${radius} mm`, angle && `${angle}°`, mm && `${mm} mm`].filter(Boolean).join(", ");
     const button = (piece) => {
-      const made = make("button", { type: "button", title: piece.radius ? say("draft-arc", arcOf(piece).toFixed(1)) : "" }, make("b", {}, piece.name), make("small", {}, size(piece)));
+      const made = make("button", { type: "button", title: piece.radius ? say("draft-arc", shown(arcOf(piece), 1)) : "" }, make("b", {}, piece.name), make("small", {}, size(piece)));
       made.addEventListener("click", () => lay(piece));
       return made;
     };

@@ -69,7 +69,9 @@ const LINES = [
   [/^( *[\d.]+ s {2})(\S+) reported, but no train can have been there$/, "$1$2 hat gemeldet, aber dort kann kein Zug gewesen sein"],
   [/^route set for train (\d+): about (\d+) s(.*)$/, (_, train, time, more) => `Fahrstraße für Zug ${train} gestellt: etwa ${time} s${tailed(more)}`],
   [/^train (\d+) waits for track that is reserved for (.*)$/, (_, train, on) => `Zug ${train} wartet auf Gleis, das für ${trains(on)} reserviert ist`],
+  [/^train (\d+) is in a deadlock: it moves elsewhere first$/, "Zug $1 ist blockiert: er fährt zuerst anderswohin"],
   [/^train (\d+) is in a deadlock: (.*) makes room$/, (_, train, others) => `Zug ${train} ist blockiert: ${trains(others)} macht Platz`],
+  [/^train (\d+) is in a deadlock: (.*) make room$/, (_, train, others) => `Zug ${train} ist blockiert: ${trains(others)} machen Platz`],
   [/^train (\d+) moves to (\S+) to make room for train (\d+)$/, "Zug $1 fährt nach $2, um Zug $3 Platz zu machen"],
   [/^train (\d+) has arrived after ([\d.]+) s$/, "Zug $1 ist nach $2 s angekommen"],
   [/^no train is sent onto track where train (\d+) may be$/, "kein Zug wird auf Gleis geschickt, auf dem Zug $1 sein kann"],
@@ -93,7 +95,7 @@ const LINES = [
   [/^the station does not answer$/, "die Zentrale antwortet nicht"], [/^track power is off: enter `power on`$/, "der Fahrstrom ist aus: `power on` eingeben"],
   [/^step (\d+) does not move this train reliably: use a higher step$/, "Stufe $1 bewegt diesen Zug nicht sicher: eine höhere Stufe nehmen"],
   [/^no known path from `(.*)` to `(.*)`: the position of turnout (\d+) is unknown; throw it first$/, "kein bekannter Weg von `$1` nach `$2`: die Stellung von Weiche $3 ist unbekannt; erst stellen"],
-  [/^no path from `(.*)` to `(.*)` with the turnouts in their present positions$/, "kein Weg von `$1` nach `$2`, wie die Weichen jetzt liegen"],
+  [/^no path from `(.*)` to `(.*)` with the turnouts in their present positions: .*$/, "kein Weg von `$1` nach `$2`, wie die Weichen jetzt liegen: Weichen stellen, zum Beispiel `turnout all straight`, oder mit `go` stellen lassen"],
   [/^no path takes train (\d+) to `(.*)` with any turnout positions and reversals: .*$/, "kein Weg bringt Zug $1 nach `$2`, wie die Weichen auch liegen: vielleicht fehlt Platz zum Halten oder Wenden"],
   [/^`(.*)` is too close to stop at: the nearest possible place is `(.*)`, (\S+) mm beyond it(?:; the train passes it again after (\S+) m)?$/,
     (_, target, nearest, mm, round) => `\`${target}\` ist zu nah zum Anhalten: die nächste mögliche Stelle ist \`${nearest}\`, ${mm} mm dahinter${round ? `; der Zug kommt nach ${round} m wieder vorbei` : ""}`],
@@ -117,6 +119,11 @@ const LINES = [
   [/^(\S+) mm\/s cannot be held: use (\S+) to (\S+) mm\/s$/, "$1 mm/s lassen sich nicht halten: $2 bis $3 mm/s"], [/^no sensor reported train (\d+) within (\S+) s: .*$/, "kein Rückmelder hat Zug $1 in $2 s gemeldet: prüfen, ob er fährt und auf dieser Anlage ist"],
   [/^the position is not on this layout$/, "die Stelle ist nicht auf dieser Anlage"], [/^a distance should be a finite number$/, "eine Strecke sollte eine endliche Zahl sein"],
   [/^the position of turnout (\d+), (\S+) mm before the end of the path, is unknown: .*$/, "die Stellung von Weiche $1, $2 mm vor dem Ende des Weges, ist unbekannt: erst stellen"], [/^the track ends at `(.*)`, (\S+) mm before the end of the path$/, "das Gleis endet bei `$1`, $2 mm vor dem Ende des Weges"],
+  // The titles of the measurements behind a figure.
+  [/^Train (\d+), step (\d+), reached from (\w+): (.*) mm\/s, from (\d+) reports?; .*$/, (_, train, step, side, speed, reports) => `Zug ${train}, Stufe ${step}, erreicht von ${{ below: "unten", above: "oben" }[side] ?? "unbekannt"}: ${speed} mm/s, aus ${reports} Meldungen; aufgeführt sind die, zwischen denen er gleichmäßig fuhr`],
+  [/^Train (\d+), stops from step (\d+): (.*) mm; .*$/, "Zug $1, Halte aus Stufe $2: $3 mm; mit dem Bandmaß gemessen, ab dem Befehl"],
+  [/^Train (\d+): (\d+) changes behind its law$/, "Zug $1: $2 Änderungen hinter seinem Gesetz"],
+  [/^Train (\d+), (\S+) to (\S+): (.*) mm to add to (\d+) mm$/, "Zug $1, $2 bis $3: $4 mm zu $5 mm dazu"],
   // The names of recorded sessions.
   [/^calibration of train (\d+), (\d.*)$/, "Kalibrierung von Zug $1, $2"], [/^drive (\d.*)$/, "Fahrt $1"], [/^demo (\d.*)$/, "Vorführung $1"],
   ...CALIBRATION, ...ODOMETRY_ERRORS, ...ERRORS, ...LINE,
@@ -124,10 +131,13 @@ const LINES = [
 
 const tailed = (text) => TAILS.reduce((line, [english, german]) => line.replace(english, german), text);
 
+/** Numbers before a unit with a decimal comma. */
+const withCommas = (text) => text.replace(/(\d)\.(\d+)(?= (?:s|ms|mm|m|mm\/s|%|±)(?![\w]))/g, "$1,$2");
+
 /** A line of the log, or an error of the server, in German; several lines one by one. */
 export function logInGerman(text) {
   return text.split("\n").map((line) => {
     const known = LINES.find(([is]) => is.test(line));
-    return ofRecording(line) ?? helpInGerman(line) ?? (known ? line.replace(...known) : line);
+    return ofRecording(line) ?? helpInGerman(line) ?? (known ? withCommas(line.replace(...known)) : line);
   }).join("\n");
 }

@@ -28,7 +28,7 @@ const drawn = (drawing, layout) => drawing.setAttribute("viewBox", new Track(dra
 
 /** The steps that are done. */
 function done({ mode, link, layout, trains = [], line }) {
-  const isCalibrated = mode === "driving" || trains.some(({ is_calibrated: is }) => is);
+  const isCalibrated = mode === "driving" || trains.length > 0 && trains.every(({ is_calibrated: is }) => is);
   return mode === "setting-up"
     ? { station: link, layout, trains: trains.length > 0, link: line?.status === 0, calibrate: isCalibrated }
     : { station: true, layout: true, trains: true, link: true, calibrate: isCalibrated };
@@ -182,7 +182,7 @@ export function setupPage(root, live, wanted) {
     calibrate() {
       if (!isSettingUp) {
         return [make("p", { id: "calibrates", class: "now", role: "status" }, say("phase-finding")), make("progress", { id: "calibrated", max: 1, value: 0, "aria-label": say("time-used") }),
-          make("p", { id: "reached", class: "quiet" }), make("p", { class: "quiet" }, say("setup-calibrating-about")), make("ol", { id: "told", class: "plain", tabIndex: 0, "aria-label": say("said") })];
+          make("p", { id: "time-left", class: "quiet" }), make("p", { id: "reached", class: "quiet" }), make("p", { class: "quiet" }, say("setup-calibrating-about")), make("ol", { id: "told", class: "plain", tabIndex: 0, "aria-label": say("said") })];
       }
       const clear = make("input", { type: "checkbox", id: "turnouts-clear" });
       const one = (train) => make("li", { class: "card" }, make("h3", {}, say("train", named(train))),
@@ -265,6 +265,7 @@ export function setupPage(root, live, wanted) {
         const { elapsed_s: elapsed, left_s: left, expected } = picture.calibration;
         put($("#calibrates"), aboutCalibration(picture.calibration));
         $("#calibrated").value = elapsed / Math.max(1, elapsed + left);
+        put($("#time-left"), say("setup-time-left", `${Math.floor(left / 60)}:${String(Math.floor(left % 60)).padStart(2, "0")}`));
         put($("#reached"), expected ? say("setup-reached", expected.step, shown(expected.stop_within_mm), shown(expected.speed_within_percent, 1)) : "");
       }
       if (step === "stop" && !isSettingUp) {

@@ -28,8 +28,10 @@ export class SlideView {
     const range = { x: { range: () => [0, this.#train?.duration_s ?? 30] } };
     const bound = (label, unit) => ({ ...line(label, "quiet", unit, 2), width: 1 });
     const column = (of) => this.#rows.map(of);
+    // Scaled to the speeds: a bound that is wide at first would flatten all else.
+    const fastest = () => 1.3 * Math.max(1, ...this.#rows.flatMap(({ speed, true_speed: truth, wheels: [one, other] }) => [speed, truth ?? 0, one ?? 0, other ?? 0]));
     this.#add("slide-speed", () => ({
-      name: say("chart-slide-speed"), x, y: say("axis-run-speed"), height: 340, range, zooms: false, below: [this.#strips()],
+      name: say("chart-slide-speed"), x, y: say("axis-run-speed"), height: 340, range: { ...range, y: { range: () => [0, fastest()] } }, zooms: false, below: [this.#strips()],
       series: [
         bound(say("at-most"), "m/s"), bound(say("at-least"), "m/s"), line(say("wheel-1"), "second", "m/s", 2), line(say("wheel-2"), "third", "m/s", 2),
         line(say("estimated"), "first", "m/s", 2), { ...line(say("in-truth"), "text", "m/s", 2), dash: [6, 4] },

@@ -8,7 +8,7 @@ import { Signals, showsSignals } from "./signals.js";
 import { say } from "./words.js";
 
 /** Width of a letter in a name, in units of the drawing. */
-const LETTER = 1.12;
+const LETTER = 1.25;
 /** The reach of a click (units of the drawing), and the drawn length of a turnout's blade. */
 const REACH = 8;
 const TOUCH = 2.6;
@@ -149,7 +149,7 @@ export class Track {
   /** The place for a name of this width: above its point, or where it covers no other name. */
   #room(x, y, half, taken) {
     const aside = half + this.#unit * 1.2;
-    const places = [[0, -1.4], [0, 2.7], [aside, 0.6], [-aside, 0.6], [0, -3.2], [0, 4.5]]
+    const places = [[0, -1.4], [0, 2.7], [aside, 0.6], [-aside, 0.6], [0, -3.6], [0, 4.9], [aside, -1.6], [-aside, -1.6], [aside, 2.9], [-aside, 2.9], [0, -5.8], [0, 7.1]]
       .map(([dx, dy]) => [dx, dy * this.#unit]);
     const isFree = ([dx, dy]) => taken.every(([left, right, foot]) =>
       x + dx + half < left || x + dx - half > right || Math.abs(y + dy - foot) > this.#unit * 2);

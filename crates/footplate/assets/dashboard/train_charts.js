@@ -15,6 +15,8 @@ const HOLE_S = 1;
 /** Interval between two drawings of a chart (ms). */
 const DRAWN_EVERY_MS = 200;
 const STRIP = 180;
+/** Commands nearer to each other than this (pixels) are marked once, by the last of them. */
+const CLOSE = 34;
 
 const COLUMNS = ["t_s", "step", "speed_mm_per_s", "speed_half_mm_per_s", "way_mm", "half_mm"];
 
@@ -35,12 +37,12 @@ function steps(history) {
     for (let i = times.length - 1; i > 0; i--) {
       if (step[i] === step[i - 1]) continue;
       const x = Math.round(u.valToPos(times[i], "x", true));
+      // A train that holds a speed gets a command a second: lines that follow closely would cover the chart.
+      if (x + CLOSE * devicePixelRatio > taken) continue;
       ctx.beginPath();
       ctx.moveTo(x, bbox.top);
       ctx.lineTo(x, bbox.top + bbox.height);
       ctx.stroke();
-      // Where steps follow closely, only the last number is shown.
-      if (x + 34 * devicePixelRatio > taken) continue;
       ctx.fillText(`→ ${step[i]}`, x + 3 * devicePixelRatio, bbox.top + 12 * devicePixelRatio);
       taken = x;
     }
@@ -136,8 +138,8 @@ export class TrainCharts {
     const selects = (from, to) => this.#window.select(from, to);
     const sync = `train-${this.#train}`;
     const band = (label, unit, digits) => [
-      { ...line(label, "band", unit, digits), width: 1 },
-      { ...line(label, "band", unit, digits), width: 1, class: "unlisted" },
+      { ...line(label, "band-edge", unit, digits), width: 1 },
+      { ...line(label, "band-edge", unit, digits), width: 1, class: "unlisted" },
     ];
     const shade = () => [{ series: [1, 2], fill: colour("band") }];
     const marks = [steps(this.#history)];

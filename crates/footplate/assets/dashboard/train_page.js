@@ -83,7 +83,7 @@ export function trainPage(root, live, number) {
     const own = live.passed.filter((passed) => passed.train === train);
     const rows = own.slice(-LISTED).reverse().map((passed) => make("tr", {},
       make("th", { scope: "row" }, passed.contact),
-      make("td", { class: "number" }, passed.t_s.toFixed(2)),
+      make("td", { class: "number" }, shown(passed.t_s, 2)),
       make("td", { class: "number" }, passed.late_ms == null ? say("found") : `${signed(passed.late_ms)} ± ${shown(passed.late_half_ms)}`),
       make("td", { class: "number" }, passed.short_mm == null ? "–" : signed(-passed.short_mm, 1)),
       make("td", { class: "number" }, passed.mean == null ? "–" : shown(passed.mean[1])),

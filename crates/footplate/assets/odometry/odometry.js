@@ -108,10 +108,12 @@ function speed(figure, lines) {
       ...(true_speed_m_s ? [dashed(line(pick("true", "wahr"), "truth", "m/s", 2))] : []),
     ],
     bands: [{ series: [1, 2], fill: colour("band") }],
+    // Scaled to the speeds: bounds that are wide for a moment, as in the first period, would flatten all else.
+    range: { y: { range: [Math.min(0, 1.3 * least(speed_m_s)), 1.3 * Math.max(1, greatest(speed_m_s), greatest(true_speed_m_s))] } },
   });
-  const widest = greatest(confidence_speed_high_m_s.map((high, place) => high - confidence_speed_low_m_s[place]));
-  const [goes, apart] = [span(speed_m_s, "m/s", 2), rounded(widest, 2)];
-  say(figure, pick(`The estimate ranges from ${goes}; its ${percent()} interval is at most ${apart} m/s wide.`, `Die Schätzung reicht von ${goes}; ihr ${percent()}-Intervall ist höchstens ${apart} m/s breit.`));
+  const widths = known(confidence_speed_high_m_s.map((high, place) => (high == null ? null : high - confidence_speed_low_m_s[place]))).sort((one, other) => one - other);
+  const [goes, apart] = [span(speed_m_s, "m/s", 2), rounded(widths[Math.floor(widths.length / 2)] ?? 0, 2)];
+  say(figure, pick(`The estimate ranges from ${goes}; its ${percent()} interval is ${apart} m/s wide in the median.`, `Die Schätzung reicht von ${goes}; ihr ${percent()}-Intervall ist im Median ${apart} m/s breit.`));
 }
 
 function wheels(figure, { speed_m_s, wheel_1_m_s, wheel_2_m_s }) {

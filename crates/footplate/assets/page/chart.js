@@ -12,7 +12,10 @@ const drawn = new WeakMap();
 /** The text in the page's language. */
 const pick = (english, german) => (document.documentElement.lang === "de" ? german : english);
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
-const rounded = (value, digits) => value.toFixed(digits).replace("-", "−").replace(/^−(0(\.0*)?)$/, "$1");
+/** The decimal sign of the page's language in a number that is written with a point. */
+const localised = (text) => (document.documentElement.lang === "de" ? text.replace(".", ",") : text);
+/** A number in the page's language, with a true minus. */
+const rounded = (value, digits) => localised(value.toFixed(digits).replace("-", "−").replace(/^−(0(\.0*)?)$/, "$1"));
 const withUnit = (unit, digits) => (_, value) => (value == null ? "–" : `${rounded(value, digits)} ${unit}`);
 
 /** Error bars on both axes: { x, y, dx, dy }, one standard deviation each. */
@@ -91,7 +94,7 @@ function axis(label, more) {
   return {
     label, stroke: colour("text"), font, labelFont: font, labelSize: 22, size: more?.vertical ? 58 : 40,
     grid: { stroke: colour("line"), width: 1 }, ticks: { stroke: colour("line"), width: 1 },
-    values: (_, splits) => splits.map((value) => (value == null ? "" : String(value).replace("-", "−"))),
+    values: (_, splits) => splits.map((value) => (value == null ? "" : localised(String(value).replace("-", "−")))),
     ...more,
   };
 }
@@ -163,7 +166,8 @@ function chart(figure, {
     legend: { live: true },
     scales: { x: { time: false, ...range?.x }, y: { ...range?.y } },
     axes: [axis(x.label, { incrs: ticks }), axis(y, { vertical: true, space: height < HEIGHT ? TIGHT : ROOMY })],
-    series: [{ label: x.label.split(" (")[0], value: x.value ?? withUnit(x.unit, x.digits) }, ...series],
+    // The x axis is no series: its value stands in the legend only while the cursor is in the chart.
+    series: [{ label: x.label.split(" (")[0], class: "of-axis", value: (u, value, ...more) => (value == null ? "" : (x.value ?? withUnit(x.unit, x.digits))(u, value, ...more)) }, ...series],
     bands,
     hooks: { drawAxes: [...below, ...(zero ? [zeroLine] : [])], draw, setSelect: selects ? [(u) => selected(u, selects)] : [] },
   }, data, figure);

@@ -91,7 +91,7 @@ pub(crate) struct Arguments {
     /// be standing on a turnout.
     #[arg(long, requires = "link")]
     set_turnouts: bool,
-    /// A built-in layout (track-a, track-b) or a layout file (TOML).
+    /// A built-in layout (track-a, track-b, oval-blocks) or a layout file (TOML).
     #[arg(long, value_name = "LAYOUT")]
     layout: Option<String>,
     /// What to find in recordings: the motion model, accelerations from pairs of sensors, or short moves.
@@ -155,7 +155,7 @@ impl Arguments {
         }
         let Some(layout) = &self.layout else {
             bail!(
-                "which layout are the sensors on? Add `--layout`: a built-in one (track-a, track-b) or a layout file"
+                "which layout are the sensors on? Add `--layout`: a built-in one (track-a, track-b, oval-blocks) or a layout file"
             );
         };
         if let (Some(link), Some(train)) = (&self.link, self.train) {

@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
     /// Sensor logs (CSV), in any of the forms of docs/formats/sensor-log.md.
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
-    /// A built-in layout (track-a, track-b) or a layout file (TOML).
+    /// A built-in layout (track-a, track-b, oval-blocks) or a layout file (TOML).
     #[arg(long, value_name = "LAYOUT")]
     layout: String,
     /// Tables of published speeds or stops (CSV), as testdata/published-tables describes them.

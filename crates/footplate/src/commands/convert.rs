@@ -34,7 +34,7 @@ pub(crate) struct Arguments {
     /// The file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// The layout of a log's sensors: a built-in layout (track-a, track-b) or a layout file.
+    /// The layout of a log's sensors: a built-in layout (track-a, track-b, oval-blocks) or a layout file.
     /// track-a unless given.
     #[arg(long, value_name = "LAYOUT")]
     layout: Option<String>,

@@ -360,7 +360,7 @@ impl Arguments {
         let scribe = journal.as_ref().and_then(SessionJournal::scribe);
         let trains = beginning.models.len();
         let script_runner = beginning.script_runner()?;
-        if script_runner.is_interactive() && !self.json {
+        if script_runner.is_interactive() && !self.json && !self.is_headless() {
             console.say(HELP, "");
         }
         let mut script_runner = Recorded::new(script_runner, scribe);

@@ -38,7 +38,7 @@ pub(crate) struct Arguments {
     /// Sensor logs (CSV), in any of the forms of docs/formats/sensor-log.md.
     #[arg(value_name = "LOG", required_unless_present = "store", conflicts_with = "store")]
     logs: Vec<PathBuf>,
-    /// A built-in layout (track-a, track-b) or a layout file (TOML).
+    /// A built-in layout (track-a, track-b, oval-blocks) or a layout file (TOML).
     #[arg(long, value_name = "LAYOUT")]
     layout: String,
     /// Only this train; also the train of logs that name none, in their rows or their file name.

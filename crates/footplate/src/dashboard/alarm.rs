@@ -366,6 +366,9 @@ impl Alarm {
                 (Grade::Danger, "mishap-moved", vec![layout.node_name(*to).to_owned()])
             }
             Fault::Lost { .. } => (Grade::Danger, "mishap-lost", Vec::new()),
+            Fault::OtherSpeeds { ratio } => {
+                (Grade::Warning, "other-train", vec![format!("{:.0}", 100.0 * ratio)])
+            }
             Fault::LengthsDiffer { hops } => (Grade::Warning, "mishap-lengths", vec![hops.len().to_string()]),
         };
         Self::new(grade, what, train, blanks)

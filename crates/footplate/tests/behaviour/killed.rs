@@ -95,6 +95,6 @@ fn a_calibration_that_is_killed_leaves_the_beginning_of_the_one_that_is_not() {
     if let Some(path) = path {
         let store = path.to_str().expect("a plain name");
         let next = footplate(&[&CALIBRATE[..], &["--budget", "60s", "--store", store]].concat());
-        assert!(next.status < 2 && next.errors.contains("going on from 1 runs"), "{}", next.errors);
+        assert!(next.status < 2 && next.errors.contains("going on from 1 run "), "{}", next.errors);
     }
 }

@@ -16,6 +16,7 @@ mod files_given;
 mod forecasts_hold;
 mod guardian;
 mod guardian_datagrams;
+mod guides;
 mod imported_profile;
 mod inertial_slides;
 mod jmri;

@@ -100,7 +100,7 @@ test("another change can be selected", async () => {
 
 test("a name with markup is shown as text", async () => {
   const { page, complaints } = await open({}, "hostile.html");
-  assert.equal(await page.title(), "Trains 74 on track-a");
+  assert.equal(await page.title(), "Train 74 on track-a");
   assert.equal(await page.locator("img").count(), 0);
   assert.deepEqual(complaints, []);
   await page.close();

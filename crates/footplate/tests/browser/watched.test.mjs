@@ -66,8 +66,8 @@ test("a calibration shows its experiment and the reason; its table equals the in
   await until(page, () => /within|: |step/.test(document.querySelector("#about").textContent) && /^\d+ s of 120 s/.test(document.querySelector("#left").textContent));
   await agree(page, () => text(page, "#about"), async () => (await get(program, "api/picture")).calibration.experiment);
   await agree(page, async () => Number((await text(page, "#left")).split(" ")[0]), async () => Math.round((await get(program, "api/picture")).calibration.left_s));
-  // The page shows why the next experiment was selected: its expected information and its duration.
-  await until(page, () => /most informative experiment per second \(expected information [\d.]+ in \d+ s\)/.test(document.querySelector("#because").textContent));
+  // The page shows why the next experiment was selected: its duration and its expected information.
+  await until(page, () => /most informative experiment per second; it takes \d+ s \(value [\d.]+, in variances of one stop\)/.test(document.querySelector("#because").textContent));
   await until(page, () => /at step \d+: stops within \d+ mm, speed within [\d.]+ %/.test(document.querySelector("#expected").textContent));
   await until(page, () => document.querySelectorAll("#steps tr").length > 8);
   // While it runs, the table of steps equals the model of the interface.

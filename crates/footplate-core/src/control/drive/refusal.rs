@@ -255,7 +255,7 @@ impl fmt::Display for Refusal {
                 write!(
                     f,
                     "no path from `{from}` to `{target}` with the turnouts in their present \
-                           positions"
+                     positions: throw turnouts, for example `turnout all straight`, or let `go` throw them"
                 )
             }
             Self::Unreachable { train, target } => write!(

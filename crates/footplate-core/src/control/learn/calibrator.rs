@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use super::accuracy::{StepAccuracy, steps, usable_steps};
 use super::activity::Activity;
 use super::circuits::Passes;
+use super::identity::Identity;
 use super::notice::{CalibrationNotice, Ending, Fault, Progress};
 use super::planner::{KNOWN_FROM, Planner, Throttle};
 use super::settings::CalibratorSettings;
@@ -60,6 +61,10 @@ pub struct Calibrator<'l> {
     pub(super) pushed_from: Option<SpeedStep>,
     /// How often it reversed without a detection.
     pub(super) reversals: u8,
+    /// Since when it runs to a circuit whose turnouts are not set.
+    pub(super) joins_since: Option<Timestamp>,
+    /// The speeds of earlier sessions, and those of this one beside them.
+    pub(super) identity: Identity,
     pub(super) started: Option<Timestamp>,
     pub(super) finished: Option<Ending>,
     pub(super) ending: Option<Ending>,
@@ -76,6 +81,7 @@ impl<'l> Calibrator<'l> {
     pub fn new(layout: &'l Layout, settings: CalibratorSettings, mut fit: MotionFit) -> Self {
         let train = fit.model().train();
         note_moving_steps(&mut fit);
+        let identity = Identity::of(fit.model());
         Self {
             layout,
             surveyed: SectionIndex::of(layout),
@@ -101,6 +107,8 @@ impl<'l> Calibrator<'l> {
             pushes: 0,
             pushed_from: None,
             reversals: 0,
+            joins_since: None,
+            identity,
             started: None,
             finished: None,
             ending: None,
@@ -317,6 +325,7 @@ impl<'l> Calibrator<'l> {
             TrackContext { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts };
         let passed = self.locator.pass(context, self.fit.model(), sensor, window);
         self.note_pushes(&passed);
+        self.compare_speed(now, passed.missed, window.until);
         self.fit.take(self.layout, &self.turnouts, event);
         self.note_that_it_moves(now);
         if passed.missed > 0 {

@@ -102,6 +102,24 @@ impl<'l> Calibrator<'l> {
         self.go_on_if_set(now, node);
         true
     }
+
+    /// The same for a train at rest within an experiment. Turnouts that a moving train is always too near to, because the
+    /// lengths before them are unknown, can be thrown then. Returns how many were commanded; `None` if nothing changes.
+    pub(super) fn change_circuit_at_rest(&mut self, now: Timestamp) -> Option<usize> {
+        if self.layout.is_measured() {
+            return None;
+        }
+        let node = self.tracker.last()?;
+        let locked = self.locked_at_rest(now, node)?;
+        let wanted = self.wanted_on(self.circuit.as_ref()?);
+        let other = self.best_circuit(node, &locked)?;
+        if self.wanted_on(&other) < wanted + WORTH_CHANGING {
+            return None;
+        }
+        self.notify(CalibrationNotice::Circuit(other.clone()));
+        self.circuit = Some(other);
+        Some(self.throw_unlocked(now, node, &locked))
+    }
 }
 
 /// The turnouts within a distance ahead of a node, on any branch.

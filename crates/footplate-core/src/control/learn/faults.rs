@@ -144,6 +144,19 @@ impl Calibrator<'_> {
         }
     }
 
+    /// The train passed a sensor: compares its mean speed since the last one, if it was steady, with that of earlier sessions.
+    pub(super) fn compare_speed(&mut self, now: Timestamp, missed: usize, at: Timestamp) {
+        let is_steady = now >= self.steady_at && self.requested.is_none();
+        let here = self.tracker.last().filter(|_| is_steady).map(|node| (node, at, self.throttle.step));
+        let Some((from, since, known)) = self.identity.advance(here) else { return };
+        let hop = here.and_then(|(to, ..)| self.only_hop(from, to)).filter(|_| missed == 0 && at > since);
+        let Some(hop) = hop else { return };
+        let speed = self.model().length(&self.sections, &hop)[0] / (at - since);
+        if let Some(ratio) = self.identity.compare(speed / known) {
+            self.report_fault(Fault::OtherSpeeds { ratio });
+        }
+    }
+
     /// A turnout is not in its commanded position.
     pub(super) fn took_other_leg(&mut self, turnout: TurnoutId, leg: Leg) {
         self.turnouts.set(turnout, leg);

@@ -35,13 +35,19 @@ const SLOWEST_STEP: u8 = 3;
 const MAX_REVERSALS: u8 = 3;
 
 /// A turnout has moved within this time, its command and the one before it included.
-const THROWN_WITHIN: TimeSpan = TimeSpan::from_ms(700);
+pub(super) const THROWN_WITHIN: TimeSpan = TimeSpan::from_ms(700);
 
 /// Experiments begin when the turnouts are set over this distance: the longest stop and the hop before it.
 const SET_AHEAD: Length = Length::from_mm(2_500.0);
 
 /// A turnout that was in the wrong position this often counts as jammed and is used as it is.
 const JAMMED_AFTER: u8 = 2;
+
+/// A train that runs this long without its turnouts set is slowed down: a slower train needs less distance to a turnout ...
+const SLOWED_AFTER: TimeSpan = TimeSpan::from_ms(25_000);
+
+/// ... and after this time the calibration ends: more laps change nothing.
+const LONGEST_JOIN: TimeSpan = TimeSpan::from_ms(150_000);
 
 /// Margin added to every distance that must be clear.
 const MARGIN: Length = Length::from_mm(100.0);
@@ -93,6 +99,7 @@ impl Calibrator<'_> {
         self.tracker.lose();
         self.locator.lose();
         self.circuit = None;
+        self.joins_since = None;
         self.pushes = 0;
         self.pushed_from = None;
         let step = self.finding_step();
@@ -217,6 +224,24 @@ impl Calibrator<'_> {
         }
     }
 
+    /// The train passed a sensor and its turnouts are not set yet: it runs slower after a while, because one that is slow can
+    /// be nearer to a turnout that is thrown. In the end the calibration is given up.
+    pub(super) fn note_unset(&mut self, now: Timestamp) {
+        if !matches!(self.activity, Activity::Joining) {
+            return;
+        }
+        let since = *self.joins_since.get_or_insert(now);
+        if now - since >= LONGEST_JOIN {
+            self.end(now, Ending::TurnoutsUnset);
+        } else if now - since >= SLOWED_AFTER && self.requested.is_none() && !self.layout.is_measured() {
+            let stride = self.model().stride();
+            let slower = self.throttle.step.get().saturating_sub(stride).max(stride * SLOWEST_STEP);
+            if let Some(slower) = SpeedStep::new(slower).filter(|slower| *slower < self.throttle.step) {
+                self.issue(now, slower);
+            }
+        }
+    }
+
     /// Whether the turnouts on the next metres are set for the circuit; those beyond are thrown later.
     fn is_set_ahead(&self, circuit: &Circuit, node: NodeId) -> bool {
         let mut left = SET_AHEAD;
@@ -241,9 +266,20 @@ impl Calibrator<'_> {
 
     /// Throws turnouts for the circuit that are not locked by the train.
     pub(super) fn throw_turnouts(&mut self, now: Timestamp, node: NodeId) {
-        let Some(circuit) = &self.circuit else { return };
-        let wanted = wanted_legs(self.layout, circuit, node);
         let locked = self.locked(node);
+        self.throw_unlocked(now, node, &locked);
+    }
+
+    /// Throws turnouts for the circuit, but none that is locked. Returns how many were commanded.
+    pub(super) fn throw_unlocked(
+        &mut self,
+        now: Timestamp,
+        node: NodeId,
+        locked: &BTreeMap<TurnoutId, Option<Leg>>,
+    ) -> usize {
+        let Some(circuit) = &self.circuit else { return 0 };
+        let wanted = wanted_legs(self.layout, circuit, node);
+        let mut commanded = 0;
         let mut throws: alloc::vec::Vec<(TurnoutId, Leg)> = alloc::vec::Vec::new();
         for (turnout, leg) in wanted {
             if locked.contains_key(&turnout) || self.turnouts.get(turnout) == Some(leg) {
@@ -262,14 +298,35 @@ impl Calibrator<'_> {
             }
             self.requested_turnouts.insert(turnout, (leg, now));
             self.command(Command::Turnout { turnout, curved: leg.is_curved() });
+            commanded += 1;
         }
+        commanded
     }
 
     /// Turnouts that the train occupies or reaches before they have moved, and jammed ones, with their positions.
     pub(super) fn locked(&self, node: NodeId) -> BTreeMap<TurnoutId, Option<Leg>> {
         let ahead = self.fastest_now() * THROWN_WITHIN + MARGIN;
-        let mut locked =
-            locked_turnouts(self.layout, &self.turnouts, node, ahead, self.settings.train_length);
+        self.locked_within(node, ahead, self.settings.train_length)
+    }
+
+    /// The same for a train at rest beyond a node: turnouts under it, within the uncertainty of its position. `None` if that is
+    /// unknown.
+    pub(super) fn locked_at_rest(
+        &self,
+        now: Timestamp,
+        node: NodeId,
+    ) -> Option<BTreeMap<TurnoutId, Option<Leg>>> {
+        let located = self.locator.locate(self.context(), self.model(), now)?;
+        let is_here = located.at.node == node && located.speed <= Speed::ZERO;
+        let margin = 2.0 * located.uncertainty;
+        let behind = self.settings.train_length + margin - located.at.distance;
+        is_here.then(|| {
+            self.locked_within(node, located.at.distance + margin + MARGIN, behind.max(Length::ZERO))
+        })
+    }
+
+    fn locked_within(&self, node: NodeId, ahead: Length, behind: Length) -> BTreeMap<TurnoutId, Option<Leg>> {
+        let mut locked = locked_turnouts(self.layout, &self.turnouts, node, ahead, behind);
         let jammed = self.failures.iter().filter(|(_, failures)| **failures >= JAMMED_AFTER);
         locked.extend(jammed.map(|(turnout, _)| (*turnout, self.turnouts.get(*turnout))));
         locked

@@ -15,6 +15,7 @@ mod circuits;
 mod experiment;
 mod faults;
 mod finding;
+mod identity;
 mod notice;
 mod planner;
 #[cfg(test)]

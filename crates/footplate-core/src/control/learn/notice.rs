@@ -130,6 +130,11 @@ pub enum Fault {
         /// Where it was detected last.
         last: Option<NodeId>,
     },
+    /// The train runs otherwise than in earlier sessions: it may be another engine.
+    OtherSpeeds {
+        /// Its speeds divided by those of before (median).
+        ratio: f64,
+    },
     /// Running times contradict the surveyed lengths of hops: dirty rails, or another layout.
     LengthsDiffer {
         /// The hops, with surveyed length and path length.
@@ -150,6 +155,8 @@ pub enum Ending {
     NotFound,
     /// No circuit can be reached from where the train is, in either direction.
     NoCircuit,
+    /// Turnouts of the circuit could not be set: the train is always too near to them.
+    TurnoutsUnset,
     /// The reports contradict this layout: it is another one.
     WrongLayout {
         /// The sensors that reported, in order.

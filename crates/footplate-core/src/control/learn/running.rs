@@ -4,6 +4,7 @@ use super::accuracy::usable_steps;
 use super::activity::{Activity, Stage, Trial};
 use super::calibrator::Calibrator;
 use super::experiment::{Experiment, TYPICAL_HOP, past_by};
+use super::finding::THROWN_WITHIN;
 use super::notice::{CalibrationNotice, Done, Ending};
 use super::planner::{creep_step, needs_run_up, run_up_step};
 use crate::event::Approach;
@@ -51,6 +52,7 @@ const LONG_HOP: TimeSpan = TimeSpan::from_ms(3_500);
 impl Calibrator<'_> {
     /// Chooses the next experiment and begins it, or ends the session.
     pub(super) fn begin_next(&mut self, now: Timestamp) {
+        self.joins_since = None;
         let started = self.started.unwrap_or(now);
         let left = started + self.settings.budget - now - RESERVE;
         let Some(choice) = self.planner.choose(self.fit.model(), self.throttle, left) else {
@@ -155,11 +157,16 @@ impl Calibrator<'_> {
             return;
         }
         if matches!(self.activity, Activity::Joining) && self.is_on_circuit(node) {
+            if !self.layout.is_measured() {
+                // The speed bounds the distance in which turnouts are too near: as soon as it is known, more can be thrown.
+                self.refit();
+            }
             self.throw_turnouts(now, node);
             self.go_on_if_set(now, node);
         } else {
             self.join(now, node);
         }
+        self.note_unset(now);
     }
 
     fn on_trial_passage(&mut self, now: Timestamp) {
@@ -295,6 +302,11 @@ impl Calibrator<'_> {
             }
             (Stage::Braking { until } | Stage::BrakingAgain { until }, _) if now >= *until => {
                 self.refit();
+                if let Some(thrown) = self.change_circuit_at_rest(now).filter(|thrown| *thrown > 0) {
+                    let takes = TimeSpan::from_ns(THROWN_WITHIN.as_ns() * (thrown as i64));
+                    self.set_stage(Stage::BrakingAgain { until: now + takes });
+                    return;
+                }
                 self.set_stage(Stage::Creeping);
                 let step = self.step_to_next_sensor(now);
                 self.issue(now, step);

@@ -11,6 +11,7 @@ use footplate_store::{Batch, BatchTrain};
 use serde_json::{Value, json};
 
 use super::table::approach;
+use crate::counted::counted;
 
 /// Which number is asked about.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -80,7 +81,7 @@ impl Question {
                         .iter()
                         .map(|row| listing.columns.iter().copied().zip(row.iter().cloned()).collect())
                         .collect();
-                    json!({ "number": listing.title, "measurements": rows })
+                    json!({ "number": listing.title, "columns": listing.columns, "measurements": rows })
                 })
                 .collect();
             writeln!(output, "{}", serde_json::to_string_pretty(&all)?)?;
@@ -196,9 +197,11 @@ fn speeds(layout: &Layout, batch: &Batch, step: SpeedStep) -> Vec<Listing> {
         let (value, uncertainty) = (speed.value.as_mm_per_s(), speed.uncertainty.as_mm_per_s());
         (!rows.is_empty()).then(|| Listing {
             title: format!(
-                "Train {}, step {step}, reached from {}: {value:.1} ± {uncertainty:.1} mm/s",
+                "Train {}, step {step}, reached from {}: {value:.1} ± {uncertainty:.1} mm/s, from {}; listed are those \
+                 between which it ran steadily",
                 model.train(),
-                approach(side)
+                approach(side),
+                counted(speed.count, "report")
             ),
             columns: HOP_COLUMNS.to_vec(),
             rows,

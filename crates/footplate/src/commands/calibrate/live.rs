@@ -33,6 +33,7 @@ use crate::commands::left_running::stop_left_running;
 use crate::commands::plot::PictureFile;
 use crate::commands::serve::{SetUpMode, SetUpRoute, open_dashboard};
 use crate::commands::written_layout::WrittenLayout;
+use crate::counted::counted;
 use crate::dashboard::{ReadOnlyDashboard, ServedAt};
 use crate::link::{
     Address, Link, MeasuredLine, NamedTrain, ObservedLink, Speed, open, open_session, open_simulated,
@@ -279,8 +280,8 @@ impl Session<'_> {
             return Ok((replay.fit, TurnoutStates::unknown()));
         }
         say!(
-            "going on from {} runs of train {} that the store holds; --afresh begins from nothing",
-            replay.runs,
+            "going on from {} of train {} that the store holds; --afresh begins from nothing",
+            counted(replay.runs, "run"),
             self.train
         );
         let mut fit = replay.fit;

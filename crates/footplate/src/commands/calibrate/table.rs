@@ -6,6 +6,8 @@ use footplate_core::Approach;
 use footplate_core::model::report::Direction;
 use footplate_store::{Findings, MotionStepForm, TrainFindings};
 
+use crate::counted::counted;
+
 /// How many other laws are printed beside the best.
 const RUNNERS_UP: usize = 2;
 
@@ -37,7 +39,13 @@ pub(super) fn write(report: &Findings, output: &mut dyn Write) -> io::Result<()>
 }
 
 fn write_train(train: &TrainFindings, output: &mut dyn Write) -> io::Result<()> {
-    write!(output, "Train {}: {} runs, {} sensor reports", train.train, train.runs, train.contacts)?;
+    write!(
+        output,
+        "Train {}: {}, {}",
+        train.train,
+        counted(train.runs, "run"),
+        counted(train.contacts, "sensor report")
+    )?;
     if train.silent_runs > 0 {
         write!(output, ", {} runs without a timed one (stalled, or too slow)", train.silent_runs)?;
     }

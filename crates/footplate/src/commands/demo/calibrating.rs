@@ -171,6 +171,9 @@ fn what_happened(layout: &Layout, fault: &Fault) -> String {
         }
         Fault::Moved { to, .. } => format!("is at {}, where it cannot have run to", layout.node_name(*to)),
         Fault::Lost { .. } => "lost its position; it stops and is located again".to_owned(),
+        Fault::OtherSpeeds { ratio } => {
+            format!("runs at {:.0} % of the speeds of before: it may be another engine", 100.0 * ratio)
+        }
         Fault::LengthsDiffer { hops } => {
             format!("takes times over {} hops that their lengths do not explain", hops.len())
         }

@@ -197,7 +197,17 @@ impl NoticeFormatter<'_> {
                 )
             }
             Notice::Deadlock { train, moves } => {
-                format!("train {train} is in a deadlock: {} makes room", trains(moves))
+                let mut others: Vec<TrainId> = Vec::new();
+                for mover in moves.iter().filter(|mover| **mover != *train) {
+                    if !others.contains(mover) {
+                        others.push(*mover);
+                    }
+                }
+                match others.as_slice() {
+                    [] => format!("train {train} is in a deadlock: it moves elsewhere first"),
+                    [_] => format!("train {train} is in a deadlock: {} makes room", trains(&others)),
+                    _ => format!("train {train} is in a deadlock: {} make room", trains(&others)),
+                }
             }
             Notice::StepsAside { train, makes_room_for, to } => {
                 format!("train {train} moves to {} to make room for train {makes_room_for}", self.place(*to))

@@ -78,6 +78,10 @@ pub(crate) struct ScriptRunner {
     functions: BTreeMap<TrainId, u32>,
     /// The last stop of each train.
     rests: BTreeMap<TrainId, Finished>,
+    /// Trains that were located because another one is to be sent.
+    sought: BTreeSet<TrainId>,
+    /// What was last said of each train in a deadlock.
+    deadlocks: BTreeMap<TrainId, String>,
     outputs: VecDeque<Output<SessionMessage>>,
     began: Option<Timestamp>,
     /// The time of the last event or timeout.
@@ -108,6 +112,8 @@ impl ScriptRunner {
             journeys: BTreeMap::new(),
             functions: BTreeMap::new(),
             rests: BTreeMap::new(),
+            sought: BTreeSet::new(),
+            deadlocks: BTreeMap::new(),
             outputs: VecDeque::new(),
             began: None,
             last_event: Timestamp::ZERO,
@@ -333,12 +339,15 @@ impl ScriptRunner {
                 if let Some((before, _)) = before {
                     self.pending.remove(&before);
                 }
+                self.sought.clear();
                 self.journeys.insert(id, now);
                 self.outputs.push_back(Output::Notice(SessionMessage::Begun(train)));
                 self.pending.insert(id, step);
             }
-            Err(Refusal::Lost { train } | Refusal::OtherNowhere { other: train, .. }) if !step.is_retry => {
-                self.locate_first(train, &step);
+            Err(Refusal::Lost { train }) if !step.is_retry => self.locate_first(train, &step),
+            // One after the other: each train that could be in the path is located once.
+            Err(Refusal::OtherNowhere { other, .. }) if self.sought.insert(other) => {
+                self.locate_first(other, &step);
             }
             Err(why) => self.refuse(now, &step, &why),
         }

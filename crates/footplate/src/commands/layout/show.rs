@@ -19,7 +19,7 @@ use crate::commands::output_files::check_outputs;
 #[derive(Args)]
 #[command(after_help = "Example: footplate layout show track-a --svg track-a.svg")]
 pub(super) struct Arguments {
-    /// The layout: the name of a built-in layout (track-a, track-b), or a file.
+    /// The layout: the name of a built-in layout (track-a, track-b, oval-blocks), or a file.
     layout: String,
     /// Also list the hops from sensor to sensor.
     #[arg(long)]

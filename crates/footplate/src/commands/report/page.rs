@@ -17,8 +17,14 @@ const INTRODUCTION: [&str; 2] = [
 pub(super) fn page(data: &ReportData, language: Language) -> serde_json::Result<String> {
     let numbers: Vec<String> = data.trains.iter().map(|train| train.calibration.train.to_string()).collect();
     let title = match language {
-        Language::English => format!("Trains {} on {}", numbers.join(", "), data.layout),
-        Language::German => format!("Züge {} auf {}", numbers.join(", "), data.layout),
+        Language::English => {
+            let word = if numbers.len() == 1 { "Train" } else { "Trains" };
+            format!("{word} {} on {}", numbers.join(", "), data.layout)
+        }
+        Language::German => {
+            let word = if numbers.len() == 1 { "Zug" } else { "Züge" };
+            format!("{word} {} auf {}", numbers.join(", "), data.layout)
+        }
     };
     let mut main = overview(data, language);
     for train in &data.trains {

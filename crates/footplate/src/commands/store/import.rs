@@ -21,7 +21,7 @@ pub(super) struct Arguments {
     /// The logs.
     #[arg(required = true)]
     logs: Vec<PathBuf>,
-    /// Whose sensors the logs name: a built-in layout (track-a, track-b) or a layout file.
+    /// Whose sensors the logs name: a built-in layout (track-a, track-b, oval-blocks) or a layout file.
     #[arg(long, default_value = "track-a")]
     layout: String,
     /// The train of logs that name none.

@@ -39,6 +39,7 @@ impl Why {
             Self::Ended(Ending::Told) | Self::Interrupted => "interrupted",
             Self::Ended(Ending::NotFound) => "not-found",
             Self::Ended(Ending::NoCircuit) => "no-circuit",
+            Self::Ended(Ending::TurnoutsUnset) => "turnouts-unset",
             Self::Ended(Ending::WrongLayout { .. }) | Self::OtherLayout { .. } => "wrong-layout",
             Self::Lost(_) => "link-lost",
             Self::NotRecorded(_) => "not-recorded",
@@ -65,6 +66,10 @@ impl Display for Why {
             Self::Ended(Ending::NoCircuit) => {
                 f.write_str("no circuit can be reached from the train's position: put it on a closed loop")
             }
+            Self::Ended(Ending::TurnoutsUnset) => f.write_str(
+                "incomplete: the turnouts of the circuit could not be set, because the train is always too near to them: \
+                 set them with `--set-turnouts`, or write more lengths into the layout",
+            ),
             Self::Ended(Ending::WrongLayout { .. }) => f.write_str(
                 "the sensors report in an order that is impossible on this layout: check \
                              `--layout`",

@@ -55,7 +55,8 @@ impl Figures<'_> {
         writeln!(
             output,
             "\nvalue ± one standard deviation of the estimate; std dev is the repeatability of a single \
-             stop"
+             stop\nAll figures hold for this session. In a later one the train runs a little otherwise \
+             (warmth, dirt, load), and intervals\nbegin wider until it has run past some sensors"
         )
     }
 

@@ -73,6 +73,11 @@ fn happened(layout: &Layout, mishap: &Fault) -> String {
             "no sensor report for too long after {}: it is stopped and located again",
             last.map_or("?", |last| layout.node_name(last))
         ),
+        Fault::OtherSpeeds { ratio } => format!(
+            "it runs at {:.0} % of the speeds in the store: it is not the train of the store, or its decoder was set \
+             anew; begin again with --afresh, or use another store",
+            100.0 * ratio
+        ),
         Fault::LengthsDiffer { hops } => {
             let each = hops.iter().filter_map(|(hop, surveyed, path_length)| {
                 let hop = layout.hop(*hop)?;

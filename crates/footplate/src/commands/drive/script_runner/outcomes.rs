@@ -90,7 +90,9 @@ impl ScriptRunner {
             if let Some(alarm) = Alarm::of_notice(self.driver().layout(), notice) {
                 self.outputs.push_back(Output::Notice(SessionMessage::Alarm(alarm.said(&line))));
             }
-            self.say(line);
+            if !self.is_repeated(notice, &line) {
+                self.say(line);
+            }
         }
         match notice {
             Notice::Planned(plan) => {
@@ -143,6 +145,20 @@ impl ScriptRunner {
             Notice::NeedsOperator { .. } => self.fell_short = true,
             Notice::Arrived { order, train, error, .. } => self.arrived(now, *order, *train, *error),
             _ => {}
+        }
+    }
+
+    /// Whether the same was said of this deadlock before, and the train has not arrived since.
+    fn is_repeated(&mut self, notice: &Notice, line: &str) -> bool {
+        match notice {
+            Notice::Deadlock { train, .. } | Notice::Deadlocked { train } => {
+                self.deadlocks.insert(*train, line.to_owned()).is_some_and(|before| before == line)
+            }
+            Notice::Arrived { train, .. } => {
+                self.deadlocks.remove(train);
+                false
+            }
+            _ => false,
         }
     }
 

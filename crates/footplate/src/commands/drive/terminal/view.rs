@@ -9,7 +9,7 @@ use ratatui::widgets::canvas::{Canvas, Context, Line as Stroke, Points};
 use ratatui::widgets::{Block, Paragraph, Wrap};
 
 use super::prompt::Prompt;
-use super::view_model::{TerminalModel, Train};
+use super::view_model::{Sensor, TerminalModel, Train};
 
 /// Colours of trains, in their order.
 const TRAIN_COLOURS: [Color; 6] =
@@ -51,9 +51,20 @@ pub(super) fn draw(frame: &mut Frame<'_>, model: &TerminalModel, prompt: &Prompt
         draw_trains(frame, trains, model);
     } else {
         draw_trains(frame, upper, model);
+        let needs = format!("track: from {TRACK_FROM_WIDTH} \u{d7} {TRACK_FROM_HEIGHT} characters");
+        draw_note(frame, upper, &needs);
     }
     draw_messages(frame, messages, model);
     draw_prompt(frame, line, prompt);
+}
+
+/// A note in the upper right corner of a bordered area.
+fn draw_note(frame: &mut Frame<'_>, area: Rect, note: &str) {
+    let width = u16::try_from(note.chars().count()).unwrap_or(u16::MAX);
+    if area.height > 0 && area.width > width.saturating_add(12) {
+        let at = Rect { x: area.right() - width - 2, width, height: 1, ..area };
+        frame.render_widget(Line::from(note).dim(), at);
+    }
 }
 
 fn head_line(frame: &mut Frame<'_>, area: Rect, model: &TerminalModel) {
@@ -109,8 +120,12 @@ fn draw_track(frame: &mut Frame<'_>, area: Rect, model: &TerminalModel) {
             for rail in model.rails.values() {
                 stroke(context, [rail.from, rail.to], Color::DarkGray);
             }
-            let sensors: Vec<(f64, f64)> = model.sensors.iter().map(|(x, y)| (*x, up(*y))).collect();
+            let sensors: Vec<(f64, f64)> =
+                model.sensors.iter().map(|sensor| (sensor.x, up(sensor.y))).collect();
             context.draw(&Points { coords: &sensors, color: Color::Gray });
+            for sensor in readable(&model.sensors, bounds(0), [top, foot], area) {
+                context.print(sensor.x, up(sensor.y), Line::from(sensor.name.clone()).dim());
+            }
             context.layer();
             for (train, color) in model.picture.trains.iter().zip(TRAIN_COLOURS.iter().cycle()) {
                 for ends in train.body.iter().filter_map(|span| model.ends(*span)) {
@@ -122,6 +137,28 @@ fn draw_track(frame: &mut Frame<'_>, area: Rect, model: &TerminalModel) {
             }
         });
     frame.render_widget(canvas, area);
+}
+
+/// The sensors whose names have room: a name that would cover another is left out.
+fn readable(
+    sensors: &[Sensor],
+    [left, right]: [f64; 2],
+    [top, foot]: [f64; 2],
+    area: Rect,
+) -> impl Iterator<Item = &Sensor> {
+    let mut taken: Vec<(i64, i64, i64)> = Vec::new();
+    let cell = |value: f64, from: f64, to: f64, cells: u16| {
+        ((value - from) / (to - from).max(1.0) * f64::from(cells.saturating_sub(3))) as i64
+    };
+    sensors.iter().filter(move |sensor| {
+        let (x, y) = (cell(sensor.x, left, right, area.width), cell(sensor.y, top, foot, area.height));
+        let end = x + i64::try_from(sensor.name.len()).unwrap_or(i64::MAX - x);
+        let is_free = taken.iter().all(|(from, to, row)| *row != y || end < *from || *to < x);
+        if is_free {
+            taken.push((x, end, y));
+        }
+        is_free
+    })
 }
 
 fn draw_trains(frame: &mut Frame<'_>, area: Rect, model: &TerminalModel) {
@@ -159,7 +196,8 @@ fn card(train: &Train, model: &TerminalModel, color: Color) -> Vec<Line<'static>
             _ => format!("{}, found", passed.sensor),
         },
     );
-    let busy = train.doing.clone().map_or_else(String::new, |doing| {
+    let idle = || if train.step == 0 { "nothing: at rest".to_owned() } else { "runs on".to_owned() };
+    let busy = train.doing.clone().map_or_else(idle, |doing| {
         train.promise_mm.map_or_else(
             || doing.clone(),
             |[_, low, high]| format!("{doing}: rests {low:+.0} … {high:+.0} mm"),

@@ -14,7 +14,7 @@ pub(super) struct TerminalModel {
     pub(super) layout: String,
     /// Drawn edges by their number.
     pub(super) rails: BTreeMap<u16, Rail>,
-    pub(super) sensors: Vec<(f64, f64)>,
+    pub(super) sensors: Vec<Sensor>,
     pub(super) picture: Picture,
     /// The last detection of each train.
     pub(super) passed: BTreeMap<u16, Passed>,
@@ -23,6 +23,13 @@ pub(super) struct TerminalModel {
     pub(super) back: usize,
     /// The number of the next happening to read.
     next: u64,
+}
+
+/// A drawn sensor.
+pub(super) struct Sensor {
+    pub(super) name: String,
+    pub(super) x: f64,
+    pub(super) y: f64,
 }
 
 /// A drawn edge.
@@ -108,6 +115,7 @@ struct Drawn {
 #[derive(Deserialize)]
 struct Node {
     id: u16,
+    name: String,
     kind: String,
     point: Option<[f64; 2]>,
 }
@@ -131,11 +139,12 @@ impl TerminalModel {
             let (from, to) = (*points.get(&edge.from)?, *points.get(&edge.to)?);
             Some((edge.id, Rail { from, to, length_mm: edge.length_mm }))
         };
-        let sensors = nodes.iter().filter(|node| node.kind == "contact").filter_map(|node| node.point);
+        let sensors = nodes.iter().filter(|node| node.kind == "contact");
+        let sensor = |node: &Node| node.point.map(|[x, y]| Sensor { name: node.name.clone(), x, y });
         Ok(Self {
             layout: name,
             rails: edges.iter().filter_map(rail).collect(),
-            sensors: sensors.map(|[x, y]| (x, y)).collect(),
+            sensors: sensors.filter_map(sensor).collect(),
             picture: Picture::default(),
             passed: BTreeMap::new(),
             lines: VecDeque::new(),

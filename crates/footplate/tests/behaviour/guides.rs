@@ -1,0 +1,169 @@
+//! The commands that the guides print, run as they are printed: a guide whose commands fail does not stay unnoticed.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+fn guide(name: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/guides").join(name);
+    fs::read_to_string(path).expect("the guide is there")
+}
+
+fn scratch(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).expect("the test folder can be made");
+    folder
+}
+
+/// The fenced blocks of a language in a guide, from a heading on.
+fn blocks<'g>(guide: &'g str, heading: &str, language: &str) -> Vec<&'g str> {
+    let from = guide.find(heading).expect("the heading is in the guide");
+    let parts = guide[from..].split("```").collect::<Vec<_>>();
+    let inside = parts.iter().skip(1).step_by(2);
+    inside
+        .filter_map(|block| block.split_once('\n'))
+        .filter(|(of, _)| *of == language)
+        .map(|(_, text)| text)
+        .collect()
+}
+
+/// A command line as a shell splits it: words, and quoted words.
+fn words(line: &str) -> Vec<String> {
+    let mut words = Vec::new();
+    let (mut word, mut quote) = (String::new(), None);
+    for c in line.chars() {
+        match (c, quote) {
+            (c, Some(open)) if c == open => quote = None,
+            ('\'' | '"', None) => quote = Some(c),
+            (' ', None) => words.extend(Some(std::mem::take(&mut word)).filter(|word| !word.is_empty())),
+            (c, _) => word.push(c),
+        }
+    }
+    words.extend(Some(word).filter(|word| !word.is_empty()));
+    words
+}
+
+fn run(folder: &Path, line: &str) -> Output {
+    let words = words(line);
+    assert_eq!(words.first().map(String::as_str), Some("footplate"), "{line}");
+    Command::new(env!("CARGO_BIN_EXE_footplate"))
+        .args(&words[1..])
+        .current_dir(folder)
+        .stdin(Stdio::null())
+        .output()
+        .expect("the program starts")
+}
+
+/// Writes the files that `$ cat` shows, runs the commands behind `$`, and returns what all of them printed.
+fn at_the_prompt(folder: &Path, block: &str) -> String {
+    let mut printed = String::new();
+    for part in format!("\n{block}").split("\n$ ").skip(1) {
+        let (line, shown) = part.split_once('\n').unwrap_or((part, ""));
+        if let Some(file) = line.strip_prefix("cat ") {
+            fs::write(folder.join(file), format!("{shown}\n")).expect("a file of the test");
+            continue;
+        }
+        let ran = run(folder, line);
+        let said = String::from_utf8_lossy(&ran.stderr).into_owned() + &String::from_utf8_lossy(&ran.stdout);
+        assert_eq!(ran.status.code(), Some(0), "{line}\n{said}");
+        printed += &said;
+    }
+    printed
+}
+
+#[test]
+fn a_layout_without_lengths_is_measured_as_the_guide_says() {
+    let folder = scratch("guide-no-tape-measure");
+    let text = guide("no-tape-measure.md");
+    let layout = blocks(&text, "## Write the layout", "toml");
+    fs::write(folder.join("attic.toml"), layout[0]).expect("a file of the test");
+    // In the simulated attic every edge without a length is as long as its expected length.
+    let drive = blocks(&text, "## Drive", "sh")[0].lines().next().expect("a command");
+    let drive = drive.replace("marklin-serial:/dev/ttyUSB0", "sim:attic.toml?seed=7");
+    let ran = run(&folder, &drive);
+    let said = String::from_utf8_lossy(&ran.stderr).into_owned();
+    assert_eq!(ran.status.code(), Some(0), "{said}");
+    let survey = blocks(&text, "## Use the lengths", "sh")[0].trim();
+    let printed = String::from_utf8(run(&folder, survey).stdout).expect("text");
+    let found: Vec<(f64, f64)> = printed
+        .lines()
+        .filter_map(|line| {
+            let (length, within) = line.trim().strip_suffix(" mm")?.split_once(" ± ")?;
+            Some((length.split_whitespace().last()?.parse().ok()?, within.parse().ok()?))
+        })
+        .collect();
+    assert_eq!(found.len(), 5, "both legs of both turnouts, and the known edge: {printed}\n{said}");
+    for (length, within) in found {
+        let truth = if length > 1_000.0 { 1_215.0 } else { 700.0 };
+        // Twice the 95 % interval: rails of the simulated attic differ a little from its file.
+        assert!((length - truth).abs() < 2.0 * within, "{length} ± {within} for {truth}: {printed}");
+        assert!(within < 60.0, "{printed}");
+    }
+}
+
+#[test]
+fn turnouts_that_cannot_be_set_end_a_calibration_as_incomplete() {
+    let folder = scratch("guide-unset");
+    let text = guide("no-tape-measure.md");
+    // The known edge is so short that a train which runs there still stands on one turnout and is near the other.
+    let layout = blocks(&text, "## Write the layout", "toml")[0].replace(", mm = 1215", ", mm = 60");
+    fs::write(folder.join("attic.toml"), layout).expect("a file of the test");
+    let ran = run(
+        &folder,
+        "footplate calibrate --link sim:attic.toml?seed=7 --layout attic.toml --train 24 --budget 450s --json",
+    );
+    let result: serde_json::Value = serde_json::from_slice(&ran.stdout).expect("JSON");
+    assert_eq!((ran.status.code(), result["ended"].as_str()), (Some(1), Some("turnouts-unset")), "{result}");
+}
+
+#[test]
+fn two_trains_go_as_the_guide_says() {
+    let folder = scratch("guide-driving");
+    let text = guide("driving.md");
+    let printed = at_the_prompt(&folder, blocks(&text, "## Several trains", "")[0]);
+    assert!(
+        printed.contains("train 24 has arrived") && printed.contains("train 58 has arrived"),
+        "{printed}"
+    );
+    assert!(!printed.contains("refused"), "{printed}");
+}
+
+#[test]
+fn trains_hold_arrive_and_follow_as_the_guide_says() {
+    let folder = scratch("guide-pacing");
+    let text = guide("pacing.md");
+    let printed = at_the_prompt(&folder, blocks(&text, "# Hold a speed", "")[0]);
+    assert!(printed.contains("train 24 holds 250 mm/s from here on"), "{printed}");
+    assert!(!printed.contains("refused"), "{printed}");
+}
+
+#[test]
+fn a_stop_is_measured_as_the_first_steps_say() {
+    let folder = scratch("guide-first-steps");
+    let text = guide("first-steps.md");
+    assert_eq!(run(&folder, "footplate demo --store demo.db --json").status.code(), Some(0));
+    for line in blocks(&text, "## Add a stop measured", "")[0].lines() {
+        let ran = run(&folder, line);
+        assert_eq!(ran.status.code(), Some(0), "{line}: {}", String::from_utf8_lossy(&ran.stderr));
+    }
+}
+
+#[test]
+fn the_last_step_of_each_station_guide_stops_its_train() {
+    let text = guide("z21.md");
+    assert!(text.contains("Enter `turnout all straight`, `speed 24 9`, and `stop 24 at C13+120mm`"));
+    let folder = scratch("guide-stations");
+    let script = "turnout all straight\nspeed 24 9\nstop 24 at C13+120mm\n";
+    fs::write(folder.join("stop.txt"), script).expect("a file of the test");
+    for station in ["z21", "dcc-ex"] {
+        let link = format!("'sim:track-a?station={station}&seed=7&trains=24&faults=none'");
+        let calibrate =
+            format!("footplate calibrate --link {link} --layout track-a --train 24 --store {station}.db");
+        assert_eq!(run(&folder, &calibrate).status.code(), Some(0));
+        let drive = format!("footplate drive --link {link} --store {station}.db --script stop.txt");
+        let ran = run(&folder, &drive);
+        let said = String::from_utf8_lossy(&ran.stderr).into_owned() + &String::from_utf8_lossy(&ran.stdout);
+        assert_eq!(ran.status.code(), Some(0), "{said}");
+    }
+}
