@@ -441,7 +441,7 @@ mod tests {
         first.acceleration = [-0.1, 5.0, -6.0, 0.4][period / 4 % 4];
         second_wheel.acceleration = if period % 40 < 20 { 0.3 } else { -0.5 };
         second_wheel.stuck = second == 12;
-        first.read = period % 17 != 0;
+        first.read = !period.is_multiple_of(17);
         first.late = 0.01;
         scene.inertial = (second % 4 == 3).then_some(-0.4);
         scene.independent = second > 10;

@@ -288,11 +288,11 @@ mod tests {
     #[test]
     fn a_limit_holds_within_its_part_and_nowhere_else() {
         // A change from 0.1 to 0.5 m/s within 4 s, 1.2 m: at 0.3 m/s after 0.4 m, at 0.4 m/s after 0.75 m.
-        let motion = SpeedChange::from(SpeedLaw::ConstantAcceleration.between(
+        let motion = SpeedLaw::ConstantAcceleration.between(
             Speed::from_m_per_s(0.1),
             Speed::from_m_per_s(0.5),
             TimeSpan::from_s(4.0),
-        ));
+        );
         let allows = |from: f64, to: f64, speed: f64| SlowPart { from, to, speed }.allows(&motion);
         assert!(allows(0.0, 1.2, 0.501) && !allows(0.0, 1.2, 0.49));
         assert!(allows(0.0, 0.39, 0.3) && !allows(0.0, 0.42, 0.3));
