@@ -405,7 +405,7 @@ mod tests {
         assert!((predicted.mean - (0.4 + 2.0 * speed.mean)).abs() < 1e-9, "{predicted:?}");
         let with_speed = 2.0 * speed.mean;
         let begin = filter.place(&model, 0.0).variance;
-        // It wanders a little on its way.
+        // It wanders a little meanwhile.
         assert!(
             (predicted.variance / (begin + with_speed * with_speed * e) - 1.0).abs() < 1e-3,
             "{predicted:?}"

@@ -453,7 +453,7 @@ mod tests {
         let best = &found.laws[0];
         assert_eq!(best.kind, LawKind::Family(law));
         assert!(found.fits && found.agreed && found.changes == 5);
-        // with its pace and delay, fifty contacts less seven unknowns, and hardly any error.
+        // with its pace and delay, fifty detections less seven unknowns, and hardly any error.
         assert!((best.pace[0] - 0.2).abs() < 1e-3 && (best.delay[0] - 0.3).abs() < 3e-3, "{best:?}");
         assert_eq!(best.freedom, 50 - 7);
         assert!(best.chi_square < 0.2 && best.held_out_mm < 5.0, "{best:?}");

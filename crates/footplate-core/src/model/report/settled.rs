@@ -256,10 +256,10 @@ mod tests {
     use crate::link::DetectionWindow;
     use crate::time::Timestamp;
 
-    /// A stretch of contacts, each so far (m) behind the one before, with the middle and the width of its window (s).
-    fn stretch(contacts: &[(f64, f64, f64)]) -> Vec<SettledPassage> {
+    /// A stretch of passages, each so far (m) behind the one before, with the middle and the width of its window (s).
+    fn stretch(passages: &[(f64, f64, f64)]) -> Vec<SettledPassage> {
         let step = SpeedStep::new(8).expect("a step");
-        let contacts = contacts.iter().map(|(length, middle, width)| SettledPassage {
+        let passages = passages.iter().map(|(length, middle, width)| SettledPassage {
             run: 0,
             passage: Passage {
                 sensor: SensorId(1),
@@ -278,7 +278,7 @@ mod tests {
             probability: 1.0,
             suspicious: false,
         });
-        contacts.collect()
+        passages.collect()
     }
 
     /// A metre in two seconds, of which 0.4 m should take 0.8 s and took 1.1 s.
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn a_contact_closes_in_proportion_to_the_path() {
+    fn a_passage_closes_in_proportion_to_the_path() {
         let (off, polls, times, speed) = against_neighbours(&late(), 1).expect("it has neighbours");
         assert_near(off, 0.3);
         // Widths over √12; neighbours count by the squares of 0.6 and 0.4.
@@ -363,17 +363,17 @@ mod tests {
     #[test]
     fn the_speed_of_a_stretch_is_the_slope_of_a_line() {
         let even = stretch(&[(0.0, 0.0, 0.12), (0.5, 1.0, 0.12), (0.5, 2.0, 0.12)]);
-        // Each contact has 0.12²/12 s² and 3 mm at 0.5 m/s; places are 0.5 m about their mean.
+        // Each passage has 0.12²/12 s² and 3 mm at 0.5 m/s; places are 0.5 m about their mean.
         let each = 0.0012 + 0.006 * 0.006;
         let (speed, variance) = speed_of(&even, 0.003).expect("a speed");
         assert_near(speed.as_m_per_s(), 0.5);
         assert_near(variance, 0.25 * each / 0.5);
-        // A contact in the middle that is late changes nothing but the beginning of the line; one at the end does: the slope
+        // A passage in the middle that is late changes nothing but the beginning of the line; one at the end does: the slope
         // of (−0.5, 0, 0.5) and (0, 1, 2.4) is 2.4 s/m.
         let slower = stretch(&[(0.0, 0.0, 0.12), (0.5, 1.0, 0.12), (0.5, 2.4, 0.12)]);
         let (speed, _) = speed_of(&slower, 0.0).expect("a speed");
         assert_near(speed.as_m_per_s(), 1.0 / 2.4);
-        // A contact known half as well counts a quarter: weights 1, 1, ¼ at (0, 0), (1, 1), (2, 2.4) have the means 2/3 and
+        // A passage known half as well counts a quarter: weights 1, 1, ¼ at (0, 0), (1, 1), (2, 2.4) have the means 2/3 and
         // 0.711; Σ w x t − Σ w x Σ w t / Σ w = 2.2 − 1.5 · 1.6 / 2.25 over 2 − 1.5² / 2.25.
         let uneven = stretch(&[(0.0, 0.0, 0.12), (1.0, 1.0, 0.12), (1.0, 2.4, 0.24)]);
         let (speed, variance) = speed_of(&uneven, 0.0).expect("a speed");
