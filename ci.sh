@@ -256,6 +256,8 @@ step_chaos() {
 
 # Tests that take minutes without optimisation are left out, so what is missed here may be noticed by them or by other crates.
 readonly SLOW_UNOPTIMISED='/many_seeds|every_train_stays_on|no_follower_touches|stops_downhill|command_budget|other_laws|three_hundred/'
+# Tests of the store that run the core on recordings of real trains, within seconds.
+readonly ON_RECORDINGS='/^(replays_go_on|forecasts_of_real_logs|models_of_logs|running_times|real_logs|surveyed_layouts|scored_loop|tachometer_recordings|metro_trips)/'
 
 step_mutants() {
   need_nextest
@@ -264,7 +266,9 @@ step_mutants() {
   local -a files=()
   for part in model tracking odometry control; do files+=(--file "crates/footplate-core/src/$part/**"); done
   PROPTEST_CASES=16 cargo mutants --package footplate-core "${files[@]}" --sharding round-robin --shard "${MUTANTS:-0/200}" \
-    --test-tool nextest --profile mutants --timeout 300 --output "$TARGET" -- --lib --test behaviour -E "not test($SLOW_UNOPTIMISED)"
+    --test-package footplate-core --test-package footplate-store --test-tool nextest --profile mutants --timeout 300 \
+    --output "$TARGET" -- --lib --test behaviour \
+    -E "(package(footplate-core) and not test($SLOW_UNOPTIMISED)) or (package(footplate-store) and test($ON_RECORDINGS))"
 }
 
 step_fuzz() {

@@ -300,3 +300,173 @@ impl Segment {
         SHAPE_SPEED_ERROR * 4.0 * share * (1.0 - share) * (self.to - self.from.speed).abs()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TIME: f64 = 1e-3;
+
+    /// Speed and distance by Runge and Kutta's method: the set speed goes to `to` evenly within the ramp, the speed follows it with
+    /// a lag, and after the ramp friction acts on a stop. At rest it stays there; gives when.
+    fn integrated(segment: &Segment, until: f64) -> (f64, f64, f64) {
+        let (ramp, lag) = (segment.shape.ramp(), segment.shape.lag());
+        let Pace { speed, set } = segment.from;
+        let slope = |time: f64, speed: f64| {
+            let set = set + (segment.to - set) * (time / ramp).min(1.0);
+            let friction = segment.braking.filter(|_| time >= ramp).map_or(0.0, |braking| braking.friction);
+            (set - speed) / lag - friction
+        };
+        let (mut speed, mut distance, mut rest) = (speed, 0.0, f64::INFINITY);
+        for nth in 0..(until / TIME).round() as u32 {
+            let time = (f64::from(nth) + 1e-9) * TIME;
+            let half = time + 0.5 * TIME;
+            let one = slope(time, speed);
+            let two = slope(half, speed + 0.5 * TIME * one);
+            let three = slope(half, speed + 0.5 * TIME * two);
+            let four = slope(time + TIME - 2e-9 * TIME, speed + TIME * three);
+            let next = speed + TIME / 6.0 * (one + 2.0 * two + 2.0 * three + four);
+            if segment.is_stop() && next <= 0.0 {
+                rest = rest.min(time);
+                return (0.0, distance, rest);
+            }
+            distance += 0.5 * TIME * (speed + next) + TIME * TIME / 12.0 * (one - four);
+            speed = next;
+        }
+        (speed, distance, rest)
+    }
+
+    fn assert_near(found: f64, expected: f64, within: f64) {
+        assert!((found - expected).abs() < within, "{found} {expected}");
+    }
+
+    /// From 0.3 m/s, with the set speed at 0.35, to 0.6 m/s.
+    fn interrupted() -> Segment {
+        let mut segment = Segment::by_law(2.0, [0.35, 0.6], RampedLag::new(1.2, 0.5), None);
+        segment.from.speed = 0.3;
+        segment
+    }
+
+    fn stop() -> Segment {
+        Segment::by_law(2.0, [0.5, 0.0], RampedLag::new(1.0, 0.4), Some(0.05))
+    }
+
+    #[test]
+    fn a_change_is_the_solution_of_its_differential_equation() {
+        for segment in [interrupted(), stop()] {
+            for since in [0.3, 0.9, 1.0, 1.2, 1.5, 2.0, 6.0] {
+                let (speed, distance, _) = integrated(&segment, since);
+                assert_near(segment.speed(2.0 + since), speed, 1e-5);
+                assert_near(segment.distance(2.0 + since), distance, 1e-5);
+            }
+            // Before its effect it runs as before.
+            let speed = segment.from.speed;
+            assert_near(segment.distance(1.0), -speed, 1e-12);
+            assert_eq!(segment.speed(2.0), speed);
+            assert_eq!(segment.share(2.0), 0.0);
+        }
+    }
+
+    #[test]
+    fn a_stop_rests_where_and_when_friction_says() {
+        let stop = stop();
+        let (_, distance, rest) = integrated(&stop, 10.0);
+        assert_near(stop.settled() - 2.0, rest, 2.0 * TIME);
+        assert_near(stop.distance_to_rest(), distance, 1e-5);
+        assert_near(stop.distance(60.0), distance, 1e-5);
+        let after = stop.settled() + 1e-9;
+        assert_eq!((stop.speed(after), stop.share(after), stop.speed(60.0)), (0.0, 1.0, 0.0));
+        assert!(stop.speed(after - 0.01) > 0.0);
+        // Without friction it would run 0.5 (0.4 + 1.0/2) m: the delay at the speed before.
+        assert_near(stop.displacement(), 0.45, 1e-12);
+        assert!(stop.is_stop() && !interrupted().is_stop());
+    }
+
+    #[test]
+    fn the_set_speed_goes_evenly() {
+        let change = interrupted();
+        for (since, set) in [(-1.0, 0.35), (0.6, 0.475), (1.2, 0.6), (3.0, 0.6)] {
+            assert_near(change.pace(2.0 + since).set, set, 1e-12);
+            assert_eq!(change.pace(2.0 + since).speed, change.speed(2.0 + since));
+        }
+    }
+
+    #[test]
+    fn long_after_a_change_the_distance_differs_by_its_displacement() {
+        let mut change = interrupted();
+        assert_near(change.distance(42.0) - 0.6 * 40.0, change.displacement(), 1e-9);
+        // (0.35 − 0.6) (0.5 + 0.6) for the delay, and (0.3 − 0.35) 0.5 for catching up.
+        assert_near(change.displacement(), -0.275 - 0.025, 1e-12);
+        assert_near(change.delay(), 1.1, 1e-12);
+        // What the law leaves over comes with the share that is done, all of it in the end.
+        change.residual = 0.02;
+        let law = interrupted();
+        for time in [2.5, 3.5, 42.0] {
+            assert_near(change.distance(time) - law.distance(time), 0.02 * law.share(time), 1e-12);
+        }
+        assert_near(change.distance_to_rest(), -0.28, 1e-12);
+        assert_near(law.share(42.0), 1.0, 1e-12);
+    }
+
+    #[test]
+    fn the_share_of_a_change_is_that_of_its_speed() {
+        // Of a change from a steady speed the share is that of the speed.
+        let change = Segment::by_law(2.0, [0.35, 0.6], RampedLag::new(1.2, 0.5), None);
+        for time in [2.6, 3.2, 4.0] {
+            let (speed, ..) = integrated(&change, time - 2.0);
+            assert_near(change.share(time), (speed - 0.35) / 0.25, 1e-4);
+        }
+        // It is settled when the lag has left 3 % of what was missing at the end of the ramp: θ/T (1 − e^(−T/θ)).
+        let missing = 0.5 / 1.2 * (1.0 - (-2.4_f64).exp());
+        assert_near(change.share(change.settled()), 1.0 - 0.03 * missing, 1e-9);
+        // A stop is done at rest, with a share as without friction over that at rest.
+        let stop = stop();
+        let free = Segment::by_law(2.0, [0.5, 0.0], RampedLag::new(1.0, 0.4), None);
+        let at_rest = (0.5 - integrated(&free, stop.settled() - 2.0).0) / 0.5;
+        let at_3 = (0.5 - integrated(&free, 1.0).0) / 0.5;
+        assert_near(stop.share(3.0), at_3 / at_rest, 1e-3);
+    }
+
+    #[test]
+    fn a_train_is_ahead_of_its_law_only_within_the_change() {
+        let mut change = interrupted();
+        change.ahead = [0.03, 0.01];
+        let law = interrupted();
+        // 4 s (1 − s) ((1 − s) early + s late).
+        for time in [2.4, 3.0, 4.0, 60.0] {
+            let done = law.share(time);
+            let ahead = 4.0 * done * (1.0 - done) * (0.03 - 0.02 * done);
+            assert_near(change.distance(time) - law.distance(time), ahead, 1e-12);
+        }
+        assert_near(change.ahead_of_law(0.5), 0.02, 1e-12);
+        assert_eq!((change.ahead_of_law(0.0), change.ahead_of_law(1.0)), (0.0, 0.0));
+    }
+
+    #[test]
+    fn the_error_of_a_shape_is_largest_in_the_middle() {
+        let change = interrupted();
+        let half = (0..6000).map(|nth| 2.0 + 1e-3 * f64::from(nth)).find(|time| change.share(*time) >= 0.5);
+        let half = half.expect("it is done in the end");
+        // 0.04 of the displacement, 0.3 m; 0.07 of the change, 0.3 m/s.
+        assert_near(change.shape_error(half), 0.04 * 0.3, 1e-5);
+        assert_near(change.shape_speed_error(half), 0.07 * 0.3, 1e-5);
+        let quarter =
+            (0..6000).map(|nth| 2.0 + 1e-3 * f64::from(nth)).find(|time| change.share(*time) >= 0.25);
+        let quarter = quarter.expect("it is done in the end");
+        assert_near(change.shape_error(quarter), 0.75 * 0.04 * 0.3, 2e-5);
+        assert_near(change.shape_speed_error(quarter), 0.75 * 0.07 * 0.3, 4e-5);
+        assert_eq!((change.shape_error(1.0), change.shape_speed_error(1.0)), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_steady_train_runs_steadily() {
+        let steady = Segment::steady(3.0, 0.25);
+        assert!(steady.is_steady() && !interrupted().is_steady());
+        assert_near(steady.distance(1.0), -0.5, 1e-12);
+        assert_near(steady.distance(5.0), 0.5, 1e-12);
+        assert_eq!((steady.speed(1.0), steady.speed(9.0), steady.displacement()), (0.25, 0.25, 0.0));
+        let faster = Pace { speed: 0.2, set: 0.3 }.faster(core::f64::consts::LN_2);
+        assert_near(faster.speed, 0.4, 1e-12);
+        assert_near(faster.set, 0.6, 1e-12);
+    }
+}

@@ -313,4 +313,155 @@ mod tests {
             [&pushed, &at_once].map(|filter| filter.at(&model, 30.0).speed(&model, 30.0).mean);
         assert!((speed / wanted - 1.0).abs() < 0.01, "{speed} m/s instead of {wanted} m/s");
     }
+
+    fn model() -> MotionModel {
+        MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"))
+    }
+
+    /// Filters in the middle of a start, of a change up and one down, of a stop, and of a steady run, with letters that are not
+    /// zero; repeating or not, and with speeds apart.
+    fn filters() -> alloc::vec::Vec<(MotionFilter, f64)> {
+        let model = model();
+        let mut all = alloc::vec::Vec::new();
+        for variant in 0..3 {
+            for (from, to, seen) in [(0, 8, 1.6), (6, 9, 1.2), (9, 4, 1.2), (9, 0, 1.1), (7, 7, 3.0)] {
+                let place = Gaussian { mean: 0.4, variance: 1e-6 };
+                let mut filter: MotionFilter = if from == 0 {
+                    MotionFilter::at_rest(0.0, place)
+                } else {
+                    MotionFilter::running(&model, 0.0, from, place)
+                };
+                if variant == 1 {
+                    filter.repeat(true);
+                }
+                if variant == 2 {
+                    filter = filter.keep_apart(&model);
+                }
+                filter.command(&model, 0.1, to);
+                let mut filter = filter.at(&model, seen);
+                for letter in 0..N {
+                    // Steps that were not met have no letter.
+                    if letter < STEPS || Some(letter) == filter.course.speed {
+                        filter.course.x[letter] += [0.01, 0.02, 0.015, -0.004, 0.03, -0.02][letter % STEPS];
+                    }
+                }
+                all.push((filter, seen));
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn slopes_are_how_the_place_changes_with_each_letter() {
+        const BY: f64 = 1e-6;
+        for (filter, seen) in filters() {
+            let course = filter.course;
+            let at_rest = if course.step() == 0 { f64::INFINITY } else { seen };
+            for time in [seen, seen + 0.3, at_rest] {
+                let (place, slope) = course.place_and_slope(time);
+                for letter in [B, E, H, Z, LATER, LATER + 1] {
+                    // What was learnt of the speed since depends on η a little, too.
+                    let moved = |by: f64| {
+                        let mut moved = course;
+                        moved.x[letter] += by;
+                        moved.place_and_slope(time).0
+                    };
+                    let numerical = (moved(BY) - moved(-BY)) / (2.0 * BY);
+                    let within = if letter == H { 1e-2 } else { 1e-5 };
+                    assert!(
+                        (numerical - slope[letter]).abs() < within,
+                        "{letter} at {time}: {numerical} {}",
+                        slope[letter]
+                    );
+                }
+                if let Some(letter) = course.speed.filter(|_| course.apart.is_none()) {
+                    assert_eq!(slope[letter], slope[E], "both are ln of the speed");
+                }
+                let Pace { speed: before, .. } = course.segment.from;
+                if time.is_finite() && course.apart.is_none() && before > 0.0 && course.step() > 0 {
+                    assert!((course.place(time) - place).abs() < 1e-12);
+                    let ahead = (course.place(time + BY) - course.place(time - BY)) / (2.0 * BY);
+                    let share =
+                        (course.segment.share(time + BY) - course.segment.share(time - BY)) / (2.0 * BY);
+                    assert!(
+                        (ahead - course.speed(time) - course.displaced() * share).abs() < 1e-5,
+                        "{ahead}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_detection_is_the_update_of_a_kalman_filter() {
+        let model = model();
+        // Steadily, so that one look is as good as two; the place is then counted from there.
+        let start = Gaussian { mean: 0.4, variance: 4e-4 };
+        let mut filter: MotionFilter = MotionFilter::running(&model, 0.0, 7, start);
+        let speed = filter.speed(&model, 2.0);
+        let predicted = filter.place(&model, 2.0);
+        let e = filter.p[E][E];
+        // The place is off by its own variance and by 2 s of the speed's.
+        assert!((predicted.mean - (0.4 + 2.0 * speed.mean)).abs() < 1e-9, "{predicted:?}");
+        let with_speed = 2.0 * speed.mean;
+        let begin = filter.place(&model, 0.0).variance;
+        // It wanders a little meanwhile.
+        assert!(
+            (predicted.variance / (begin + with_speed * with_speed * e) - 1.0).abs() < 1e-3,
+            "{predicted:?}"
+        );
+        let place = Gaussian { mean: predicted.mean + 0.001, variance: 1e-6 };
+        let time_variance = 1e-4;
+        let noise = 1e-6 + speed.mean * speed.mean * time_variance;
+        let short = filter.pass(&model, 2.0, time_variance, place);
+        assert!(
+            (short.mean - 0.001).abs() < 1e-9 && (short.variance - predicted.variance - noise).abs() < 1e-12
+        );
+        let after = filter.place(&model, 2.0);
+        let gain = predicted.variance / (predicted.variance + noise);
+        assert!((after.mean - predicted.mean - gain * 0.001).abs() < 1e-6, "{after:?}");
+        assert!((after.variance - (1.0 - gain) * predicted.variance).abs() < 1e-9, "{after:?}");
+        let faster = with_speed * e / (predicted.variance + noise) * 0.001;
+        assert!((filter.course.x[E] - faster).abs() < 1e-5, "{} {faster}", filter.course.x[E]);
+        let known = e - with_speed * e * with_speed * e / (predicted.variance + noise);
+        assert!((filter.p[E][E] - known).abs() < 1e-2 * known, "{} {known}", filter.p[E][E]);
+    }
+
+    #[test]
+    fn a_place_that_companions_move_is_reached_when_the_place_is() {
+        let model = model();
+        let start = Gaussian { mean: 0.0, variance: 1e-4 };
+        let mut filter: MotionFilter<{ N + 1 }> = MotionFilter::running(&model, 1.0, 7, start);
+        let speed = filter.speed(&model, 1.0);
+        let place = Gaussian { mean: 0.6, variance: 1e-6 };
+        let (time, deviation) = filter.reaches(&model, place, 1.0).expect("it runs");
+        assert!((time - 1.0 - 0.6 / speed.mean).abs() < 1e-6, "{time}");
+        // Over the speed: of the place, of where it began, and 0.6 m of what the speed is off by.
+        let begin = filter.place(&model, 1.0).variance;
+        let off = begin + 1e-6 + 0.36 * filter.p[E][E];
+        assert!((deviation / off.sqrt() * speed.mean - 1.0).abs() < 1e-3, "{deviation}");
+        filter.keep_beside(0, 9e-4);
+        let arrival = filter.arrives(&model, place, &[(0, 2.0)], 1.0).expect("it runs");
+        assert!((arrival.time - time).abs() < 1e-6 && (arrival.speed - speed.mean).abs() < 1e-9);
+        let variance = (off + 4.0 * 9e-4) / (speed.mean * speed.mean);
+        assert!((arrival.variance / variance - 1.0).abs() < 1e-3, "{arrival:?} {variance}");
+        // At a place 0.1 m before that moves with half the companion: where it is is as much farther, and as much less known.
+        filter.shift_beside(0.1, &[(0, 0.5)]);
+        let moved = filter.place(&model, 1.0);
+        assert!((moved.mean - 0.1).abs() < 1e-12 && (moved.variance - begin - 0.25 * 9e-4).abs() < 1e-12);
+        // What was counted from there too is off by as much: 2 less 0.5 of it.
+        let again =
+            filter.arrives(&model, Gaussian { mean: 0.7, ..place }, &[(0, 2.0)], 1.0).expect("it runs");
+        let variance = (off + 2.25 * 9e-4) / (speed.mean * speed.mean);
+        assert!((again.time - time).abs() < 1e-6);
+        assert!((again.variance / variance - 1.0).abs() < 1e-3, "{again:?} {variance}");
+        // A train that stops before does not arrive; one that stops behind it does.
+        filter.command(&model, 1.0, 0);
+        let (rest, _, _) = filter.rest(&model).expect("it stops");
+        let at = |mean: f64| Gaussian { mean, variance: 1e-6 };
+        assert!(filter.reaches(&model, at(rest.mean), 1.0).is_none());
+        assert!(filter.reaches(&model, at(rest.mean - 0.01), 1.0).is_some());
+        assert!(filter.arrives(&model, at(rest.mean + 0.01), &[], 1.0).is_none());
+        assert!(filter.arrives(&model, at(rest.mean - 0.01), &[], 1.0).is_some());
+    }
 }

@@ -301,7 +301,7 @@ impl Driver {
         self.all_turnouts_changed(now);
     }
 
-    /// The station may not have received commands since a time: turnouts that were to move lie one way or the other.
+    /// The station may not have received commands since a time: turnouts that were to move lie in either position.
     pub(in crate::control) fn forget_turnouts_changed(&mut self, now: Timestamp, since: Timestamp) {
         let turnouts = &mut self.track.turnouts;
         self.turnouts_changed.iter().filter(|(_, at)| **at >= since).for_each(|(id, _)| turnouts.forget(*id));

@@ -337,3 +337,136 @@ impl LawKind {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::transient::TransientPoint;
+    use super::*;
+    use crate::ids::{SpeedStep, TrainId};
+    use crate::kinematics::SpeedLaw;
+    use crate::units::Speed;
+
+    fn assert_near(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-9 * expected.abs().max(1.0), "{found} {expected}");
+    }
+
+    /// A change between two speeds (m/s) with points at these times (s) and distances (m).
+    fn change(speeds: [f64; 2], points: &[(f64, f64)], variance: f64, distance_deviation: f64) -> Transient {
+        let points = points.iter().map(|(since_command, distance)| TransientPoint {
+            since_command: *since_command,
+            variance,
+            distance: *distance,
+            entry: 0,
+        });
+        Transient {
+            train: TrainId(24),
+            run: 0,
+            steps: [SpeedStep::STAND, SpeedStep::new(8).expect("a step")],
+            speeds: speeds.map(Speed::from_m_per_s),
+            points: points.collect(),
+            distance_deviation,
+        }
+    }
+
+    #[test]
+    fn a_wild_residual_counts_linearly_and_joins_smoothly() {
+        for (residual, cost, weight) in [
+            (0.0, 0.0, 1.0),
+            (-2.0, 4.0, 1.0),
+            (2.5, 6.25, 1.0),
+            // 2 · 2.5 · 4 − 2.5², and 2.5 / 4.
+            (4.0, 13.75, 0.625),
+            (-4.0, 13.75, 0.625),
+        ] {
+            assert_eq!(huber(residual), (cost, weight));
+        }
+        assert_eq!(total_cost(&[(2.0, 9.0), (-4.0, 9.0)]), 17.75);
+    }
+
+    #[test]
+    fn residuals_are_about_the_place_that_fits_best() {
+        // 0.1 and 0.3 m beyond; at 0.5 and 1 m/s with 0.01 s² and 5 cm they weigh 200 and 80.
+        let change = change([0.0, 1.0], &[(1.0, 1.1), (2.0, 2.3)], 0.01, 0.05);
+        let found = residuals(&[(1.0, 0.5), (2.0, 1.0)], &change);
+        let x0 = (200.0 * 0.1 + 80.0 * 0.3) / 280.0;
+        for ((scaled, off), (expected, weight)) in found.into_iter().zip([(0.1, 200.0_f64), (0.3, 80.0)]) {
+            assert_near(off, expected - x0);
+            assert_near(scaled, (expected - x0) * weight.sqrt());
+        }
+    }
+
+    #[test]
+    fn before_its_effect_a_train_runs_as_before() {
+        let law = LawFamily { law: SpeedLaw::ConstantAcceleration, constant: Constant::Acceleration };
+        let change = change([0.2, 0.6], &[], 0.0, 0.0);
+        let motion = motion(LawKind::Family(law), 0.1, &change, None).expect("a motion");
+        for (since, distance, speed) in [(-0.5, -0.1, 0.2), (0.0, 0.0, 0.2), (2.0, 0.6, 0.4), (4.0, 1.6, 0.6)]
+        {
+            let (found, at_speed) = at(&motion, 0.2, since);
+            assert_near(found, distance);
+            assert_near(at_speed, speed);
+        }
+        assert!(super::motion(LawKind::StepRamp, 0.1, &change, None).is_none());
+    }
+
+    #[test]
+    fn the_inverse_and_the_criterion_are_those_of_the_books() {
+        // The determinant is 2 · 3 − 1 · 1 = 5.
+        assert_eq!(inverse([[2.0, 1.0], [1.0, 3.0]]), Some([[0.6, -0.2], [-0.2, 0.4]]));
+        assert_eq!(inverse([[1.0, 1.0], [1.0, 1.0]]), None);
+        assert_eq!(inverse([[1.0, 2.0], [1.0, 1.0]]), None);
+        // n ln(χ²/n) + 2 k + 2 k (k + 1) / (n − k − 1).
+        assert_near(criterion(20.0, 10, 3), 10.0 * core::f64::consts::LN_2 + 6.0 + 24.0 / 6.0);
+        assert_near(criterion(5.0, 5, 3), 6.0 + 24.0);
+        assert_eq!(criterion(5.0, 4, 3), f64::INFINITY);
+        assert_near(criterion(0.0, 10, 3), 10.0 * 1e-12_f64.ln() + 10.0);
+    }
+
+    #[test]
+    fn an_error_held_out_is_of_the_change_that_was_left_out() {
+        let changes = [0.1, 0.2, 0.3].map(|from| change([from, 1.0], &[], 0.0, 0.0));
+        // Each forecast is off by 3 and 4 mm for each change that it was fitted to.
+        let forecast = |others: &[Transient], left_out: &Transient| {
+            assert!(others.iter().all(|other| other.speeds != left_out.speeds));
+            let count = others.len() as f64;
+            Some(alloc::vec![(9.0, 0.003 * count), (9.0, -0.004 * count)])
+        };
+        assert_near(held_out(&changes, forecast).expect("three of them"), 2.0 * 12.5_f64.sqrt());
+        assert_eq!(held_out(&[], forecast), None);
+    }
+
+    #[test]
+    fn a_law_that_made_the_changes_is_found_with_its_pace_and_delay() {
+        // Given changes by 0.2 m/s² that begin 0.3 s after their commands, from speeds that differ,
+        let law = LawFamily { law: SpeedLaw::ConstantAcceleration, constant: Constant::Acceleration };
+        let made = |from: f64, to: f64| {
+            let family = law.change(0.2, Speed::from_m_per_s(from), Speed::from_m_per_s(to));
+            let times = (1..=10).map(|nth| 0.4 * f64::from(nth));
+            let points: Vec<(f64, f64)> =
+                times.map(|time| (time, 7.0 + at(&family, from, time - 0.3).0)).collect();
+            change([from, to], &points, 1e-6, 1e-3)
+        };
+        let changes = [made(0.1, 0.5), made(0.3, 0.5), made(0.6, 0.2), made(0.5, 0.1), made(0.2, 0.6)];
+        assert!(compare_laws(&changes[..2], None).is_none());
+        let found = compare_laws(&changes, None).expect("five are enough");
+        // then that law fits best, and describes as it forecasts,
+        let best = &found.laws[0];
+        assert_eq!(best.kind, LawKind::Family(law));
+        assert!(found.fits && found.agreed && found.changes == 5);
+        // with its pace and delay, fifty detections less seven unknowns, and hardly any error.
+        assert!((best.pace[0] - 0.2).abs() < 1e-3 && (best.delay[0] - 0.3).abs() < 3e-3, "{best:?}");
+        assert_eq!(best.freedom, 50 - 7);
+        assert!(best.chi_square < 0.2 && best.held_out_mm < 5.0, "{best:?}");
+        assert_near(best.criterion, criterion(best.chi_square, 50, 7));
+        assert!(found.laws.iter().all(|law| law.criterion >= best.criterion));
+        // A thousand times the variance makes its uncertainty larger by the root of a thousand.
+        let mut vague = changes.clone();
+        for change in &mut vague {
+            change.distance_deviation *= 10.0;
+            change.points.iter_mut().for_each(|point| point.variance *= 100.0);
+        }
+        let vague = fitted(LawKind::Family(law), &vague, None).expect("a fit");
+        assert!((vague.pace[1] / best.pace[1] - 10.0).abs() < 0.1, "{vague:?} {best:?}");
+        assert!((vague.delay[1] / best.delay[1] - 10.0).abs() < 0.1, "{vague:?} {best:?}");
+    }
+}

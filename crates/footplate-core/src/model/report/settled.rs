@@ -248,3 +248,142 @@ fn speed_of(stretch: &[SettledPassage], scatter: f64) -> Option<(Speed, f64)> {
     let speed = 1.0 / slowness;
     (squares > 0.0 && slowness > 0.0).then(|| (Speed::from_m_per_s(speed), speed * speed / squares))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::{NodeId, SensorId, SpeedStep};
+    use crate::link::DetectionWindow;
+    use crate::time::Timestamp;
+
+    /// A stretch of passages, each so far (m) behind the one before, with the middle and the width of its window (s).
+    fn stretch(passages: &[(f64, f64, f64)]) -> Vec<SettledPassage> {
+        let step = SpeedStep::new(8).expect("a step");
+        let passages = passages.iter().map(|(length, middle, width)| SettledPassage {
+            run: 0,
+            passage: Passage {
+                sensor: SensorId(1),
+                node: NodeId(1),
+                window: DetectionWindow {
+                    after: Timestamp::from_s(middle - 0.5 * width),
+                    until: Timestamp::from_s(middle + 0.5 * width),
+                },
+                path: None,
+                drive: Drive { step, from: step, commanded: None },
+                entry: 0,
+            },
+            length: Length::from_m(*length),
+            late: TimeSpan::ZERO,
+            late_length: Length::ZERO,
+            probability: 1.0,
+            suspicious: false,
+        });
+        passages.collect()
+    }
+
+    /// A metre in two seconds, of which 0.4 m should take 0.8 s and took 1.1 s.
+    fn late() -> Vec<SettledPassage> {
+        stretch(&[(0.0, 0.0, 0.12), (0.4, 1.1, 0.24), (0.6, 2.0, 0.36)])
+    }
+
+    fn assert_near(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-8, "{found} {expected}");
+    }
+
+    #[test]
+    fn a_passage_closes_in_proportion_to_the_path() {
+        let (off, polls, times, speed) = against_neighbours(&late(), 1).expect("it has neighbours");
+        assert_near(off, 0.3);
+        // Widths over √12; neighbours count by the squares of 0.6 and 0.4.
+        assert_near(polls, 0.0048 + 0.36 * 0.0012 + 0.16 * 0.0108);
+        assert_near(times, 1.0 + 0.36 + 0.16);
+        assert_near(speed, 0.5);
+        assert!([0, 2, 3].into_iter().all(|end| against_neighbours(&late(), end).is_none()));
+        // What is suspicious is no neighbour: the one before and after it is.
+        let mut with_wrong = stretch(&[
+            (0.0, 0.0, 0.12),
+            (0.1, 7.0, 0.1),
+            (0.3, 1.1, 0.24),
+            (0.2, 9.0, 0.1),
+            (0.4, 2.0, 0.36),
+        ]);
+        (with_wrong[1].suspicious, with_wrong[3].suspicious) = (true, true);
+        let (off_again, polls_again, times_again, speed_again) =
+            against_neighbours(&with_wrong, 2).expect("two are left");
+        for (found, expected) in
+            [(off_again, off), (polls_again, polls), (times_again, times), (speed_again, speed)]
+        {
+            assert_near(found, expected);
+        }
+        // Neither a path nor a time is nothing.
+        assert!(
+            against_neighbours(&stretch(&[(0.0, 0.0, 0.1), (0.0, 1.0, 0.1), (0.0, 2.0, 0.1)]), 1).is_none()
+        );
+        assert!(
+            against_neighbours(&stretch(&[(0.0, 2.0, 0.1), (0.5, 2.0, 0.1), (0.5, 2.0, 0.1)]), 1).is_none()
+        );
+    }
+
+    #[test]
+    fn a_passage_is_judged_by_chance() {
+        let mut stretch = late();
+        judge(&mut stretch, 0.003);
+        let variance: f64 = 0.00696 + 1.52 * 0.003 * 0.003 / 0.25;
+        assert_near(stretch[1].late.as_s(), 0.3);
+        assert_near(stretch[1].late_length.as_m(), 0.15);
+        // 3.58 standard deviations: 3.4 in ten thousand, which is chance still.
+        assert_near(stretch[1].probability, libm::erfc(0.3 / (2.0 * variance).sqrt()));
+        assert!(!stretch[1].suspicious && stretch[1].probability > 3e-4 && stretch[1].probability < 4e-4);
+        // Given one of seven that is 0.9 s late, it alone is pointed out.
+        let even = |nth: u32| (0.5, f64::from(nth) + if nth == 3 { 0.9 } else { 0.0 }, 0.1);
+        let mut wrong = super::tests::stretch(&(0..7).map(even).collect::<Vec<_>>());
+        wrong[2].suspicious = true;
+        judge(&mut wrong, 0.003);
+        let suspicious: Vec<usize> = (0..7).filter(|place| wrong[*place].suspicious).collect();
+        assert_eq!(suspicious, [3]);
+        assert_near(wrong[3].late.as_s(), 0.9);
+        assert_near(wrong[2].late.as_s(), 0.0);
+    }
+
+    #[test]
+    fn the_scatter_is_what_polls_leave_over() {
+        // Five passages of 3 mm, and one of 0.3² s² less 0.00696 s² of polls at 0.5 m/s over 1.52.
+        let one = (0.09 - 0.00696) * 0.25 / 1.52;
+        assert_near(scatter_of(&[late()]), ((5.0 * 9e-6 + one) / 6.0_f64).sqrt());
+        assert_near(scatter_of(&[late(), late()]), ((5.0 * 9e-6 + 2.0 * one) / 7.0_f64).sqrt());
+        assert_near(scatter_of(&[]), 0.003);
+        let mut wrong = late();
+        wrong[1].suspicious = true;
+        assert_near(scatter_of(&[wrong]), 0.003);
+        // Polls alone, without any residual, leave no less than a millimetre.
+        let polls = stretch(&[(0.0, 0.0, 0.3), (0.5, 1.0, 0.3), (0.5, 2.0, 0.3)]);
+        assert_near(scatter_of(&[polls]), 0.001);
+    }
+
+    #[test]
+    fn the_speed_of_a_stretch_is_the_slope_of_a_line() {
+        let even = stretch(&[(0.0, 0.0, 0.12), (0.5, 1.0, 0.12), (0.5, 2.0, 0.12)]);
+        // Each passage has 0.12²/12 s² and 3 mm at 0.5 m/s; places are 0.5 m about their mean.
+        let each = 0.0012 + 0.006 * 0.006;
+        let (speed, variance) = speed_of(&even, 0.003).expect("a speed");
+        assert_near(speed.as_m_per_s(), 0.5);
+        assert_near(variance, 0.25 * each / 0.5);
+        // A passage in the middle that is late changes nothing but the beginning of the line; one at the end does: the slope
+        // of (−0.5, 0, 0.5) and (0, 1, 2.4) is 2.4 s/m.
+        let slower = stretch(&[(0.0, 0.0, 0.12), (0.5, 1.0, 0.12), (0.5, 2.4, 0.12)]);
+        let (speed, _) = speed_of(&slower, 0.0).expect("a speed");
+        assert_near(speed.as_m_per_s(), 1.0 / 2.4);
+        // A passage known half as well counts a quarter: weights 1, 1, ¼ at (0, 0), (1, 1), (2, 2.4) have the means 2/3 and
+        // 0.711; Σ w x t − Σ w x Σ w t / Σ w = 2.2 − 1.5 · 1.6 / 2.25 over 2 − 1.5² / 2.25.
+        let uneven = stretch(&[(0.0, 0.0, 0.12), (1.0, 1.0, 0.12), (1.0, 2.4, 0.24)]);
+        let (speed, variance) = speed_of(&uneven, 0.0).expect("a speed");
+        assert_near(speed.as_m_per_s(), 1.0 / (2.2 - 1.5 * 1.6 / 2.25));
+        assert_near(variance, speed.as_m_per_s() * speed.as_m_per_s() * 0.0012);
+        // What is suspicious does not count, but its path does.
+        let mut wrong = stretch(&[(0.0, 0.0, 0.12), (0.25, 7.0, 0.12), (0.25, 1.0, 0.12), (0.5, 2.0, 0.12)]);
+        wrong[1].suspicious = true;
+        assert_near(speed_of(&wrong, 0.003).expect("a speed").0.as_m_per_s(), 0.5);
+        assert!(speed_of(&stretch(&[(0.0, 1.0, 0.1), (0.5, 1.0, 0.1)]), 0.003).is_none());
+        assert!(speed_of(&stretch(&[(0.0, 1.0, 0.1), (0.0, 2.0, 0.1)]), 0.003).is_none());
+    }
+}

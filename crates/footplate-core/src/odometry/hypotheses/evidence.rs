@@ -276,3 +276,6 @@ fn jerks(square: f64) -> f64 {
 fn unusual(square: f64) -> f64 {
     larger(square - USUAL, 0.0)
 }
+
+#[cfg(test)]
+mod tests;

@@ -250,14 +250,179 @@ pub(super) struct Pool {
 mod tests {
     use super::*;
 
+    type Matrix = [[f64; 3]; 3];
+
+    const MEAN: [f64; 3] = [0.3, 12.0, -0.7];
+    /// Positive definite, and no two entries alike.
+    const COVARIANCE: Matrix = [[0.09, 0.031, -0.012], [0.031, 0.25, 0.047], [-0.012, 0.047, 0.16]];
+
+    fn product(a: &Matrix, b: &Matrix) -> Matrix {
+        core::array::from_fn(|i| core::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
+    }
+
+    /// The filter of every hypothesis with this mean and covariance.
+    fn filters() -> Filters {
+        let [[prr, prv, pra], [_, pvv, pva], [_, _, paa]] = COVARIANCE.map(|row| row.map(Lanes::all));
+        let [r, v, a] = MEAN.map(Lanes::all);
+        Filters { r, v, a, prr, prv, pra, pvv, pva, paa }
+    }
+
+    fn assert_is(state: State, mean: [f64; 3], covariance: &Matrix) {
+        let State { r, v, a, prr, prv, pra, pvv, pva, paa } = state;
+        for (found, expected) in [r, v, a].into_iter().zip(mean) {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        }
+        let found = [[prr, prv, pra], [prv, pvv, pva], [pra, pva, paa]];
+        for (found, expected) in found.iter().flatten().zip(covariance.iter().flatten()) {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        }
+    }
+
+    /// The textbook update by a measurement of one element with a variance: mean, covariance, and how far the elements move.
+    fn updated(element: usize, y: f64, variance: f64) -> ([f64; 3], Matrix) {
+        let p = COVARIANCE;
+        let s = p[element][element] + variance;
+        let mean = core::array::from_fn(|i| MEAN[i] + p[i][element] / s * y);
+        let after =
+            core::array::from_fn(|i| core::array::from_fn(|j| p[i][j] - p[i][element] * p[element][j] / s));
+        (mean, after)
+    }
+
+    #[test]
+    fn a_prediction_is_the_transition_matrix_on_both_sides_and_integrated_white_jerk() {
+        let (t, q) = (0.4, 0.3);
+        let mut filters = filters();
+        let ran = filters.run(t, Lanes::all(q));
+        let f = [[1.0, t, t * t / 2.0], [0.0, 1.0, t], [0.0, 0.0, 1.0]];
+        let transposed = core::array::from_fn(|i| core::array::from_fn(|j| f[j][i]));
+        let mut expected = product(&product(&f, &COVARIANCE), &transposed);
+        // ∫ g gᵀ dt with g = (t²/2, t, 1).
+        let powers = [(2, 2.0), (1, 1.0), (0, 1.0)];
+        for (i, (one, under)) in powers.into_iter().enumerate() {
+            for (j, (other, beneath)) in powers.into_iter().enumerate() {
+                let power = one + other + 1;
+                expected[i][j] += q * t.powi(power) / (f64::from(power) * under * beneath);
+            }
+        }
+        // The place is counted from that of the counter, which the caller subtracts.
+        assert_is(filters.state(5), [0.3, 12.0 - 0.7 * 0.4, -0.7], &expected);
+        assert!((ran.0[5] - (12.0 * 0.4 - 0.7 * 0.08)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn corrections_are_those_of_a_kalman_filter() {
+        let variance = 0.04;
+        let mut state = filters().state(2);
+        state.speed(0.5, 1.0 / variance);
+        let (mean, covariance) = updated(1, 0.5, variance);
+        assert_is(state, mean, &covariance);
+
+        let mut state = filters().state(2);
+        state.acceleration(-0.6, 1.0 / variance);
+        let (mean, covariance) = updated(2, -0.6, variance);
+        assert_is(state, mean, &covariance);
+
+        // The counter says r = 0; a hypothesis that does not trust it stays as it is.
+        let mut trusting = filters();
+        let mut trusted = Lanes::all(1.0);
+        trusted.0[3] = 0.0;
+        let (moved, surprise) = trusting.place(Lanes::all(variance), trusted);
+        let (mean, covariance) = updated(0, -0.3, variance);
+        assert_is(trusting.state(2), mean, &covariance);
+        assert!((moved.0[2] - (mean[0] - 0.3)).abs() < 1e-12);
+        assert!((surprise.0[2] - 0.09 / 0.13).abs() < 1e-12);
+        assert_is(trusting.state(3), MEAN, &COVARIANCE);
+        assert_eq!((moved.0[3], surprise.0[3]), (0.0, 0.0));
+    }
+
+    #[test]
+    fn without_information_nothing_changes() {
+        let mut state = filters().state(0);
+        state.speed(5.0, 0.0);
+        state.acceleration(5.0, 0.0);
+        assert_is(state, MEAN, &COVARIANCE);
+    }
+
+    #[test]
+    fn a_mixture_has_the_moments_of_a_mixture() {
+        let pool = Pool { v: 11.0, a: 0.2, pvv: 0.5, pva: -0.1, paa: 0.3, prr: 0.02 };
+        let (share, kept) = (0.3, 0.7);
+        let mut mixed = filters();
+        mixed.mix(&pool, Lanes::all(share));
+        let [_, [_, pvv, pva], [_, _, paa]] = COVARIANCE;
+        let [r, v, a] = MEAN;
+        // E x = Σ w x and E x y = Σ w (cov + x y).
+        let mean = |one: f64, other: f64| kept * one + share * other;
+        let covariance = |own: f64, of_pool: f64, [x, y]: [f64; 2], [of_x, of_y]: [f64; 2]| {
+            mean(own + x * y, of_pool + of_x * of_y) - mean(x, of_x) * mean(y, of_y)
+        };
+        let pvv = covariance(pvv, pool.pvv, [v, v], [pool.v, pool.v]);
+        let pva = covariance(pva, pool.pva, [v, a], [pool.v, pool.a]);
+        let paa = covariance(paa, pool.paa, [a, a], [pool.a, pool.a]);
+        // The place of what begins is 0, and of the variance of the pool; it says nothing of speed and acceleration.
+        let (prr, prv, pra) = (mean(0.09, 0.02), kept * 0.031, kept * -0.012);
+        let expected = [[prr, prv, pra], [prv, pvv, pva], [pra, pva, paa]];
+        assert_is(mixed.state(7), [kept * r, mean(v, pool.v), mean(a, pool.a)], &expected);
+    }
+
+    #[test]
+    fn pooled_hypotheses_have_the_moments_of_all() {
+        let mut filters = Filters::new(10.0, 0.5);
+        let mut weights = Lanes::all(0.0);
+        // Two hypotheses, three to one, whose weights add up to 2.
+        (weights.0[1], weights.0[6]) = (1.5, 0.5);
+        filters.set(
+            1,
+            State { r: 0.0, v: 8.0, a: 1.0, prr: 1.0, prv: 0.0, pra: 0.0, pvv: 0.4, pva: 0.1, paa: 0.2 },
+        );
+        filters.set(
+            6,
+            State { r: 0.0, v: 12.0, a: -1.0, prr: 1.0, prv: 0.0, pra: 0.0, pvv: 0.8, pva: 0.3, paa: 0.6 },
+        );
+        let pool = filters.pooled(weights, 0.07);
+        // Means 9 and 0.5; about them ¾ of 1 and ¼ of 9, ¾ of −0.5 and ¼ of −4.5, ¾ of 0.25 and ¼ of 2.25.
+        let found = [pool.v, pool.a, pool.pvv, pool.pva, pool.paa, pool.prr];
+        for (found, expected) in found.into_iter().zip([9.0, 0.5, 0.5 + 3.0, 0.15 - 1.5, 0.3 + 0.75, 0.07]) {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn reversed_means_change_their_signs_and_covariances_stay() {
+        let mut reversed = filters();
+        reversed.reverse();
+        assert_is(reversed.state(4), [-0.3, -12.0, 0.7], &COVARIANCE);
+    }
+
     #[test]
     fn a_variance_that_is_cut_takes_its_covariances_with_it() {
         let mut filters = Filters::new(10.0, 5e4);
         filters.paa = Lanes::all(40.0);
         filters.pva = Lanes::all(1400.0);
+        filters.prr = Lanes::all(400.0);
+        (filters.prv, filters.pra) = (Lanes::all(1000.0), Lanes::all(20.0));
         filters.keep_sound();
-        let State { pvv, pva, paa, .. } = filters.state(0);
-        assert_eq!((pvv, paa), (1e4, 4.0));
-        assert!(pva > 0.0 && pva * pva <= pvv * paa, "{pva}");
+        let State { prr, prv, pra, pvv, pva, paa, .. } = filters.state(0);
+        assert_eq!((prr, pvv, paa), (1e2, 1e4, 4.0));
+        // A quarter, a fifth and a tenth are left of the variances.
+        for (found, expected) in [(prv, 1000.0 / 20.0), (pra, 20.0 / 40.0), (pva, 1400.0 / 50.0)] {
+            assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        }
+    }
+
+    #[test]
+    fn what_is_within_its_limits_is_not_touched_and_what_is_below_is_raised() {
+        let mut sound = filters();
+        sound.keep_sound();
+        assert_is(sound.state(1), MEAN, &COVARIANCE);
+        let mut low = filters();
+        (low.prr, low.pvv, low.paa) = (Lanes::all(0.0), Lanes::all(-1.0), Lanes::all(1e-9));
+        low.a = Lanes::all(11.0);
+        low.keep_sound();
+        let State { a, prr, pvv, paa, .. } = low.state(1);
+        assert_eq!((a, prr, pvv, paa), (10.0, 1e-10, 1e-8, 1e-8));
+        low.a = Lanes::all(-11.0);
+        low.keep_sound();
+        assert_eq!(low.state(6).a, -10.0);
     }
 }

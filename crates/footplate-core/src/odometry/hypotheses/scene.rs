@@ -50,3 +50,44 @@ pub(in super::super) struct Scene {
     /// The highest speed of the train (m/s).
     pub(in super::super) top_speed: f64,
 }
+
+#[cfg(test)]
+impl WheelScene {
+    /// A wheel that turns at a speed (m/s), and has turned for 0.05 s.
+    pub(super) fn of_test(speed: f64) -> Self {
+        Self {
+            counted: 0.05 * speed,
+            late: 0.0,
+            read: true,
+            stuck: false,
+            speed,
+            speed_deviation: 0.05,
+            acceleration: 0.0,
+            acceleration_deviation: 0.5,
+            pitch: 0.03,
+            tolerance: 0.002,
+            braked: true,
+            driven: true,
+        }
+    }
+}
+
+#[cfg(test)]
+impl Scene {
+    /// Two wheels that turn at these speeds (m/s) under a command (m/s²), of which full is 1 m/s².
+    pub(super) fn of_test(speeds: [f64; 2], commanded: Option<f64>) -> Self {
+        Self {
+            wheels: speeds.map(WheelScene::of_test),
+            acceleration: Range { low: -1.5, high: 1.0 },
+            rolling: Range { low: -1.4, high: 1.0 },
+            commanded,
+            brake: commanded.map_or(0.0, |commanded| (-commanded).max(0.0)),
+            traction: commanded.map_or(0.0, |commanded| commanded.max(0.0)),
+            slide: true,
+            slip: true,
+            inertial: None,
+            independent: false,
+            top_speed: 40.0,
+        }
+    }
+}

@@ -231,3 +231,114 @@ fn product(x: &[[f64; 3]; 3], y: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
         core::array::from_fn(|j| x[i][0] * y[0][j] + x[i][1] * y[1][j] + x[i][2] * y[2][j])
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// At 10 m/s, known to 0.5 m/s, with a bias and a leak of which nothing was learnt.
+    fn moving() -> InertialFilter {
+        let mut filter = InertialFilter::new(InertialNoise::default());
+        filter.begin(Speed::from_m_per_s(10.0), Speed::from_m_per_s(0.5));
+        filter
+    }
+
+    fn assert_is(filter: &InertialFilter, x: [f64; 3], p: [[f64; 3]; 3]) {
+        for (found, expected) in
+            filter.x.iter().chain(filter.p.iter().flatten()).zip(x.iter().chain(p.iter().flatten()))
+        {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected} {filter:?}");
+        }
+    }
+
+    fn second() -> TimeSpan {
+        TimeSpan::from_s(1.0)
+    }
+
+    #[test]
+    fn a_reading_changes_the_speed_less_bias_and_leak() {
+        let mut filter = moving();
+        (filter.x[1], filter.x[2]) = (0.1, 0.05);
+        filter.predict(second(), Some(Acceleration::from_m_per_s2(0.3)));
+        // 10 m of 500 m: a fiftieth of the leak is forgotten, and comes anew.
+        let keeps = 1.0 / 1.02;
+        let bias = 0.04 + 0.005 * 0.005 / 60.0;
+        let p = [
+            [0.25 + 0.04 + 0.01 + 0.01, -0.04, -0.01 * keeps],
+            [-0.04, bias, 0.0],
+            [-0.01 * keeps, 0.0, 0.01],
+        ];
+        assert_is(&filter, [10.15, 0.1, 0.05 * keeps], p);
+        assert!((filter.speed_deviation().as_m_per_s() - 0.31_f64.sqrt()).abs() < 1e-12);
+        assert!((filter.acceleration().as_m_per_s2() - (0.3 - 0.1 - 0.05 * keeps)).abs() < 1e-12);
+        let [excess, deviation] = filter.excess();
+        assert!((excess.as_m_per_s2() - 0.1 - 0.05 * keeps).abs() < 1e-12);
+        assert!((deviation.as_m_per_s2() - (bias + 0.01).sqrt()).abs() < 1e-12);
+        // Its time has to go on.
+        let before = filter.clone();
+        filter.predict(TimeSpan::ZERO, Some(Acceleration::from_m_per_s2(0.3)));
+        assert_eq!(filter, before);
+    }
+
+    #[test]
+    fn without_a_reading_the_speed_stays_and_may_change_by_a_metre_a_second() {
+        for reading in [None, Some(Acceleration::from_m_per_s2(f64::NAN))] {
+            let mut filter = moving();
+            (filter.x[1], filter.x[2]) = (0.1, 0.05);
+            filter.predict(second(), reading);
+            // (0.5 + 1)² m²/s².
+            let keeps = 1.0 / 1.02;
+            let bias = 0.04 + 0.005 * 0.005 / 60.0;
+            let p = [[2.25 + 0.01, 0.0, 0.0], [0.0, bias, 0.0], [0.0, 0.0, 0.01]];
+            assert_is(&filter, [10.0, 0.1, 0.05 * keeps], p);
+            assert!(filter.acceleration().as_m_per_s2().abs() < 2e-3);
+        }
+    }
+
+    #[test]
+    fn wheels_and_standing_still_are_measurements() {
+        const P: [[f64; 3]; 3] = [[0.31, -0.04, -0.02], [-0.04, 0.05, 0.01], [-0.02, 0.01, 0.03]];
+        let mut filter = moving();
+        (filter.p, filter.x, filter.latest) = (P, [10.0, 0.1, 0.05], 0.4);
+        let innovation = filter.innovation(Speed::from_m_per_s(10.9), Speed::from_m_per_s(0.3));
+        let deviation = (0.31_f64 + 0.09).sqrt();
+        assert!((innovation.value.as_m_per_s() - 0.9).abs() < 1e-12);
+        assert!((innovation.standardised() - 0.9 / deviation).abs() < 1e-12);
+        // The gain is a column of the covariance over 0.4.
+        let gain = P.map(|row| row[0] / 0.4);
+        let updated = core::array::from_fn(|i| core::array::from_fn(|j| P[i][j] - gain[i] * P[0][j]));
+        filter.align(Speed::from_m_per_s(10.9), Speed::from_m_per_s(0.3));
+        assert_is(&filter, [10.0 + 0.9 * gain[0], 0.1 + 0.9 * gain[1], 0.05 + 0.9 * gain[2]], updated);
+        let before = filter.clone();
+        filter.align(Speed::from_m_per_s(f64::NAN), Speed::from_m_per_s(0.3));
+        filter.align(Speed::from_m_per_s(9.0), Speed::from_m_per_s(f64::INFINITY));
+        filter.begin(Speed::from_m_per_s(f64::NAN), Speed::from_m_per_s(0.3));
+        filter.begin(Speed::from_m_per_s(9.0), Speed::from_m_per_s(f64::NAN));
+        assert_eq!(filter, before);
+
+        // At rest: the speed is zero to 0.01 m/s, and what was read, 0.4 m/s² to 0.1 m/s², is bias and leak.
+        let mut standing = moving();
+        (standing.p, standing.x, standing.latest) = ([[1e-4, 0.0, 0.0], P[1], P[2]], [0.02, 0.1, 0.05], 0.4);
+        (standing.p[1][0], standing.p[2][0]) = (0.0, 0.0);
+        standing.stand();
+        assert!((standing.x[0] - 0.01).abs() < 1e-12, "as sure as before");
+        let (of_bias, of_leak) = (0.06, 0.04);
+        let s = of_bias + of_leak + 0.01;
+        assert!((standing.x[1] - (0.1 + of_bias / s * 0.25)).abs() < 1e-12);
+        assert!((standing.x[2] - (0.05 + of_leak / s * 0.25)).abs() < 1e-12);
+        let [_, deviation] = standing.excess();
+        assert!((deviation.as_m_per_s2() - (0.1 - 0.01 / s).sqrt()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_speed_from_elsewhere_leaves_the_sensor_as_it_is_known() {
+        let mut filter = moving();
+        filter.predict(second(), Some(Acceleration::from_m_per_s2(0.3)));
+        let bias = filter.p[1][1];
+        filter.begin(Speed::from_m_per_s(4.0), Speed::from_m_per_s(0.2));
+        let p = [[0.04, 0.0, 0.0], [0.0, bias, 0.0], [0.0, 0.0, 0.01]];
+        assert_is(&filter, [4.0, 0.0, 0.0], p);
+        let new = InertialFilter::new(InertialNoise::default());
+        assert_is(&new, [0.0; 3], [[1e-4, 0.0, 0.0], [0.0, 0.04, 0.0], [0.0, 0.0, 0.01]]);
+    }
+}

@@ -122,3 +122,28 @@ fn cost_of(by: Timestamp, rest_times: Timestamp, rest: &Rest) -> f64 {
         ((rest_times - by).as_s() / TIME_TOLERANCE, rest.deviation().as_m() / PLACE_TOLERANCE);
     time_cost * time_cost + spread_cost * spread_cost
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::NodeId;
+    use crate::tracking::PathPoint;
+    use crate::units::Length;
+
+    #[test]
+    fn a_stop_costs_the_squares_of_its_errors_over_what_is_required() {
+        let rest = Rest {
+            at: PathPoint { node: NodeId(1), distance: Length::ZERO },
+            // 25 mm together.
+            doubt: Length::from_mm(15.0),
+            scatter: Length::from_mm(20.0),
+            time: Timestamp::ZERO,
+        };
+        let by = Timestamp::from_s(10.0);
+        // One standard deviation is 0.15 s and 12.5 mm.
+        for (time, cost) in [(10.0, 4.0), (10.3, 8.0), (9.7, 8.0), (10.15, 5.0)] {
+            let found = cost_of(by, Timestamp::from_s(time), &rest);
+            assert!((found - cost).abs() < 1e-9, "{found} {cost}");
+        }
+    }
+}

@@ -284,4 +284,35 @@ mod tests {
         let between = transit.time_at(Length::from_m(3.1)).expect("on the distance");
         assert!((transit.state_at(between).speed.as_m_per_s() - 0.2).abs() < 0.051);
     }
+
+    #[test]
+    fn a_limit_holds_within_its_part_and_nowhere_else() {
+        // A change from 0.1 to 0.5 m/s within 4 s, 1.2 m: at 0.3 m/s after 0.4 m, at 0.4 m/s after 0.75 m.
+        let motion = SpeedLaw::ConstantAcceleration.between(
+            Speed::from_m_per_s(0.1),
+            Speed::from_m_per_s(0.5),
+            TimeSpan::from_s(4.0),
+        );
+        let allows = |from: f64, to: f64, speed: f64| SlowPart { from, to, speed }.allows(&motion);
+        assert!(allows(0.0, 1.2, 0.501) && !allows(0.0, 1.2, 0.49));
+        assert!(allows(0.0, 0.39, 0.3) && !allows(0.0, 0.42, 0.3));
+        assert!(!allows(0.3, 0.42, 0.3) && allows(0.3, 0.39, 0.3));
+        assert!(!allows(0.75, 1.0, 0.39) && allows(1.3, 2.0, 0.1) && allows(-1.0, -0.1, 0.0));
+        let part = SlowPart { from: 2.0, to: 1.5, speed: 0.2 }.before(5.0);
+        assert_eq!((part.from, part.to, part.speed), (3.0, 3.5, 0.2));
+    }
+
+    #[test]
+    fn pieces_between_levels_are_worked_out_by_hand() {
+        // 2 s from 0.25 to 0.4 m/s and 2 s to 0.15 m/s, 0.65 and 0.55 m; the other 4.8 m at 0.4 m/s take 12 s.
+        let fast = ZonedTransit::at_speed(6.0, [0.25, 0.15], 0.4, &[]).expect("few parts");
+        assert!((fast.duration().as_s() - 16.0).abs() < 1e-5, "{:?}", fast.duration());
+        for (time, distance, speed) in
+            [(0.0, 0.0, 0.25), (2.0, 0.65, 0.4), (8.0, 3.05, 0.4), (14.0, 5.45, 0.4), (16.0, 6.0, 0.15)]
+        {
+            let state = fast.state_at(TimeSpan::from_s(time));
+            assert!((state.distance.as_m() - distance).abs() < 1e-5, "{time}: {state:?}");
+            assert!((state.speed.as_m_per_s() - speed).abs() < 1e-5, "{time}: {state:?}");
+        }
+    }
 }
