@@ -9,14 +9,14 @@ use super::evidence::{Compared, SILENT};
 use super::scene::{Scene, WheelScene};
 use crate::odometry::wheels::{Range, larger, smaller};
 
-/// Creepage of both wheelsets that begins unseen (part of the speed), under the brake and in traction. Steady creepage of
-/// converters and proportional protection reaches 0.2, but all beyond this begins visibly; rolling contact on a wet rail
-/// takes 0.05 for full traction.
-const UNSEEN: [f64; 2] = [0.2, 0.08];
+/// Creepage of both wheelsets that begins unseen (part of the speed of the wheels), under the brake and in traction. Steady
+/// creepage of converters and of proportional protection reaches 0.2; all beyond this begins visibly.
+const UNSEEN: [f64; 2] = [0.2, 0.155];
 /// The same where no command is recorded: most of the time that the wheels' acceleration is taken for, nothing acts.
 const UNSEEN_WITHOUT_COMMAND: [f64; 2] = [0.14, 0.07];
-/// Wheels that begin to creep faster than this are seen to (m/s²).
+/// Wheels that begin to creep faster than this are seen to (m/s²), and sooner after one of them was turned up to the train.
 const UNSEEN_RATE: f64 = 0.8;
+const UNSEEN_RATE_TOUCHED: f64 = 0.3;
 /// Wheels that turn alike so soon after one was turned up to the train (s), and slip with no more than this probability,
 /// roll.
 const TOUCHED_S: f64 = 3.0;
@@ -63,10 +63,24 @@ pub(super) struct Reach {
     alike_for: f64,
     /// Time since brake and traction acted (s).
     since: [f64; 2],
-    /// Time since both rolled for certain (s).
-    since_rolling: f64,
+    /// By how much they can have begun to creep unseen since both rolled for certain (m/s).
+    crept: f64,
     /// The acceleration that was last commanded (m/s²).
     by: f64,
+}
+
+/// What the wheels have shown up to a period.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shown {
+    /// Probabilities of the hypotheses.
+    pub(super) p: [f64; 8],
+    /// Time since a wheel was turned up to the train (s), and since one was while the other was not accelerated.
+    pub(super) since_touch: f64,
+    pub(super) since_lone_touch: f64,
+    /// Smoothed acceleration of the wheels (m/s²).
+    pub(super) wheels_a: f64,
+    /// 1 where wheels that slip turn slower than the train and −1 where faster.
+    pub(super) side: f64,
 }
 
 impl Reach {
@@ -78,7 +92,7 @@ impl Reach {
             side: 1.0,
             alike_for: 0.0,
             since: [f64::INFINITY; 2],
-            since_rolling: f64::INFINITY,
+            crept: f64::INFINITY,
             by: 0.0,
         }
     }
@@ -88,17 +102,16 @@ impl Reach {
         self.speed = self.speed.reversed();
     }
 
-    /// Widens the interval `likely` of a period of `t` seconds. `p` are the probabilities of the hypotheses, `since_touch` the
-    /// time since a wheel was turned up to the train (s), `wheels_a` how the wheels accelerate (m/s²).
+    /// Widens the interval `likely` of a period of `t` seconds by what the wheels have `shown`.
     pub(super) fn widen(
         &mut self,
         likely: Range,
         scene: &Scene,
         wheels: &[Compared; 2],
-        p: [f64; 8],
-        (since_touch, wheels_a, side): (f64, f64, f64),
+        shown: &Shown,
         t: f64,
     ) -> Range {
+        let Shown { p, since_touch, since_lone_touch, wheels_a, side } = *shown;
         let [.., slip, creep, _, first_dead, second_dead] = p;
         let silent = wheels.iter().all(|wheel| wheel.speed.abs() < SILENT);
         let [brakes, drives] = self.acts(scene, silent, wheels_a, [first_dead, second_dead]);
@@ -108,7 +121,10 @@ impl Reach {
         let [brake, traction] = self.since.map(|since| 1.0 - smaller(since / ROLLS_AFTER_S, 1.0));
         let dead = first_dead + second_dead;
         let turn_alike = turn_alike(scene, wheels, [first_dead, second_dead]);
-        let creeps_at_most = slip + creep < ALIKE && turn_alike && !(silent && self.slipped && brakes);
+        // Locked wheels turn alike until the brake has let go of them, and a wheel beside a dead sensor turns like no other.
+        let is_locked = silent && self.slipped && brake > 0.0;
+        let is_alone = dead > SEEN && (brakes || drives);
+        let creeps_at_most = slip + creep < ALIKE && turn_alike && !is_locked && !is_alone;
         self.alike_for = if creeps_at_most { self.alike_for + t } else { 0.0 };
         let alike = self.alike_for >= ALIKE_FOR_S;
         // Wheels that slipped and still accelerate towards the train beyond the command are returning.
@@ -124,7 +140,17 @@ impl Reach {
         let touched = is_known && since_touch < TOUCHED_S && slip + creep + dead < ROLLS;
         let roll = alike && (free || touched);
         self.slipped = slip + creep + dead > SEEN && !free || self.slipped && !roll;
-        self.since_rolling = if roll { 0.0 } else { self.since_rolling + t };
+        let rate =
+            if since_touch < TOUCHED_S { UNSEEN_RATE_TOUCHED } else { Self::creeps_away(scene, wheels_a) };
+        let touched_at =
+            if since_lone_touch < TOUCHED_S { UNSEEN_RATE_TOUCHED * since_lone_touch } else { f64::INFINITY };
+        self.crept = match (roll, self.slipped) {
+            (true, _) if free => 0.0,
+            // A converter that turns up both at once leaves them at any creepage.
+            (true, _) => smaller(self.crept + rate * t, touched_at),
+            (_, true) => f64::INFINITY,
+            _ => self.crept + rate * t,
+        };
 
         let Range { low, high } = scene.acceleration;
         let commanded = scene.commanded.unwrap_or(0.0);
@@ -144,10 +170,7 @@ impl Reach {
             if self.slipped {
                 LASTING.0 * moving + LASTING.1
             } else {
-                smaller(
-                    unseen * moving,
-                    if is_known { UNSEEN_RATE * self.since_rolling } else { f64::INFINITY },
-                )
+                smaller(unseen * moving, if is_known { self.crept } else { f64::INFINITY })
             }
         };
         let unseen = if scene.commanded.is_some() { UNSEEN } else { UNSEEN_WITHOUT_COMMAND };
@@ -163,14 +186,23 @@ impl Reach {
         };
         let reached = if alike || free && !self.slipped { reaches.and(about) } else { reaches };
         self.speed = Range { low: smaller(reached.low, likely.low), high: larger(reached.high, likely.high) };
-        if dead > SEEN && !turn_alike {
-            // The sensor that is taken for dead may be the one that is right.
-            self.speed = wheels.iter().fold(self.speed, |all, wheel| {
+        if dead > SEEN {
+            // The sensor that is taken for dead may be the one that is right, and what was made of the other may be late.
+            for (wheel, seen) in wheels.iter().zip(&scene.wheels) {
                 let off = OF_WHEEL * libm::sqrt(wheel.variance);
-                all.or(Range { low: wheel.speed - off, high: wheel.speed + off })
-            });
+                if !turn_alike || seen.counts() {
+                    self.speed = self.speed.or(Range { low: wheel.speed - off, high: wheel.speed + off });
+                }
+            }
         }
         self.speed
+    }
+
+    /// How fast wheels can begin to creep unseen (m/s²). Where they decelerate at least as the brake makes a train do whose rail
+    /// carries it, they creep away from that train no faster than by the rest.
+    fn creeps_away(scene: &Scene, wheels_a: f64) -> f64 {
+        let rest = scene.rolling.high - wheels_a;
+        if rest > 0.0 { smaller(rest, UNSEEN_RATE) } else { UNSEEN_RATE }
     }
 
     /// Whether brake and traction act on both wheelsets.
@@ -178,6 +210,7 @@ impl Reach {
         let [brakes, drives] = match scene.commanded {
             Some(commanded) => [commanded < -EFFORT, commanded > EFFORT],
             // Wheels that a brake has locked show nothing more of it.
+            None if silent && self.slipped => [true, false],
             None if silent => self.since.map(|since| since <= 0.0),
             None => [wheels_a < -TREND, wheels_a > TREND],
         };
@@ -245,7 +278,9 @@ mod tests {
         let likely = Range { low: 19.8, high: 20.2 };
         let mut high = 0.0;
         for _ in 0..(seconds / 0.05) as usize {
-            high = reach.widen(likely, &scene, &compared, p, (f64::INFINITY, 0.0, 1.0), 0.05).high;
+            let never = f64::INFINITY;
+            let shown = Shown { p, since_touch: never, since_lone_touch: never, wheels_a: 0.0, side: 1.0 };
+            high = reach.widen(likely, &scene, &compared, &shown, 0.05).high;
         }
         high - likely.high
     }
