@@ -13,7 +13,7 @@ use crate::odometry::wheels::{Range, larger, smaller};
 /// creepage of converters and of proportional protection reaches 0.2; all beyond this begins visibly.
 const UNSEEN: [f64; 2] = [0.2, 0.155];
 /// The same where no command is recorded: most of the time that the wheels' acceleration is taken for, nothing acts.
-const UNSEEN_WITHOUT_COMMAND: [f64; 2] = [0.14, 0.07];
+const UNSEEN_WITHOUT_COMMAND: [f64; 2] = [0.15, 0.1];
 /// Wheels that begin to creep faster than this are seen to (m/s²), and sooner after one of them was turned up to the train.
 const UNSEEN_RATE: f64 = 0.8;
 const UNSEEN_RATE_TOUCHED: f64 = 0.3;
@@ -22,7 +22,7 @@ const UNSEEN_RATE_TOUCHED: f64 = 0.3;
 const TOUCHED_S: f64 = 3.0;
 const ROLLS: f64 = 0.01;
 /// The same of wheelsets that are braked independently: no converter feeds both.
-const UNSEEN_INDEPENDENT: f64 = 0.04;
+const UNSEEN_INDEPENDENT: f64 = 0.02;
 /// A command of less acceleration than this is carried by what ice leaves of adhesion (m/s²).
 const SLIDES_BY: f64 = 0.2;
 /// Creepage of both that lasts after they were seen to slip: part of the speed, and m/s.
@@ -46,6 +46,8 @@ const LOCKED: f64 = 0.025;
 /// take every train that is driven for one whose wheels return.
 const RETURNS: f64 = 0.1;
 const RETURNS_FOR_S: f64 = 15.0;
+/// Beyond what its train can do, a wheel accelerates by no more than this while it rolls (m/s²).
+const STRAYS: f64 = 0.1;
 /// Least effort that makes wheels creep.
 const EFFORT: f64 = 0.02;
 /// Acceleration of wheels by which a train without a recorded command is braked or driven (m/s²).
@@ -63,6 +65,8 @@ pub(super) struct Reach {
     alike_for: f64,
     /// Time since brake and traction acted (s).
     since: [f64; 2],
+    /// One sensor is dead, and the wheel of the other accelerated as no train does since.
+    strayed: bool,
     /// By how much they can have begun to creep unseen since both rolled for certain (m/s).
     crept: f64,
     /// The acceleration that was last commanded (m/s²).
@@ -92,6 +96,7 @@ impl Reach {
             side: 1.0,
             alike_for: 0.0,
             since: [f64::INFINITY; 2],
+            strayed: false,
             crept: f64::INFINITY,
             by: 0.0,
         }
@@ -118,13 +123,23 @@ impl Reach {
         for (since, acts) in self.since.iter_mut().zip([brakes, drives]) {
             *since = if acts { 0.0 } else { *since + t };
         }
-        let [brake, traction] = self.since.map(|since| 1.0 - smaller(since / ROLLS_AFTER_S, 1.0));
+        let slipped = self.slipped;
+        let [brake, traction] = self.since.map(|since| {
+            let over = smaller(since / ROLLS_AFTER_S, 1.0);
+            // Wheels that slipped may return late.
+            if slipped && over < 1.0 { 1.0 } else { 1.0 - over }
+        });
         let dead = first_dead + second_dead;
         let turn_alike = turn_alike(scene, wheels, [first_dead, second_dead]);
-        // Locked wheels turn alike until the brake has let go of them, and a wheel beside a dead sensor turns like no other.
-        let is_locked = silent && self.slipped && brake > 0.0;
-        let is_alone = dead > SEEN && (brakes || drives);
-        let creeps_at_most = slip + creep < ALIKE && turn_alike && !is_locked && !is_alone;
+        // Locked wheels turn alike until the brake has let go of them.
+        let [since_brake, since_traction] = self.since;
+        let is_locked = silent && self.slipped && since_brake < RETURNS_FOR_S;
+        // A wheel beside a sensor that is dead, and silent, slips if it accelerates as its train cannot.
+        let own = 2.0 * wheels_a;
+        let Range { low, high } = scene.rolling;
+        let strays = own < low - STRAYS || own > high + STRAYS;
+        self.strayed = dead > SEEN && (strays || self.strayed);
+        let creeps_at_most = slip + creep < ALIKE && turn_alike && !is_locked && !self.strayed;
         self.alike_for = if creeps_at_most { self.alike_for + t } else { 0.0 };
         let alike = self.alike_for >= ALIKE_FOR_S;
         // Wheels that slipped and still accelerate towards the train beyond the command are returning.
@@ -132,16 +147,21 @@ impl Reach {
             self.side = side;
         }
         let beyond = self.side * (wheels_a - scene.commanded.unwrap_or(0.0));
-        let lately = self.since.iter().any(|since| *since < RETURNS_FOR_S);
-        let returns = self.slipped && lately && beyond > RETURNS;
+        let (since, opposite) =
+            if self.side > 0.0 { (since_brake, traction) } else { (since_traction, brake) };
+        let returns = self.slipped && since < RETURNS_FOR_S && (beyond > RETURNS || opposite > 0.0);
         let free = brake <= 0.0 && traction <= 0.0 && !returns;
+        self.strayed = self.strayed && !free;
         // A wheel that spins is slowed down to no certain speed.
         let is_known = scene.commanded.is_some() && traction <= 0.0;
         let touched = is_known && since_touch < TOUCHED_S && slip + creep + dead < ROLLS;
         let roll = alike && (free || touched);
         self.slipped = slip + creep + dead > SEEN && !free || self.slipped && !roll;
-        let rate =
-            if since_touch < TOUCHED_S { UNSEEN_RATE_TOUCHED } else { Self::creeps_away(scene, wheels_a) };
+        let rate = match () {
+            () if traction > 0.0 => UNSEEN_RATE,
+            () if since_touch < TOUCHED_S => UNSEEN_RATE_TOUCHED,
+            () => creeps_away(scene, wheels_a),
+        };
         let touched_at =
             if since_lone_touch < TOUCHED_S { UNSEEN_RATE_TOUCHED * since_lone_touch } else { f64::INFINITY };
         self.crept = match (roll, self.slipped) {
@@ -165,13 +185,10 @@ impl Reach {
         }
         let effort = smaller(self.by / SLIDES_BY, 1.0);
         let moving = larger(likely.high.abs(), likely.low.abs());
+        let crept = if scene.commanded.is_some() { self.crept } else { f64::INFINITY };
         let creeps = |unseen: f64| {
             let unseen = if scene.independent { UNSEEN_INDEPENDENT * effort } else { unseen };
-            if self.slipped {
-                LASTING.0 * moving + LASTING.1
-            } else {
-                smaller(unseen * moving, if is_known { self.crept } else { f64::INFINITY })
-            }
+            if self.slipped { LASTING.0 * moving + LASTING.1 } else { smaller(unseen * moving, crept) }
         };
         let unseen = if scene.commanded.is_some() { UNSEEN } else { UNSEEN_WITHOUT_COMMAND };
         let [of_brake, of_traction] = unseen.map(creeps);
@@ -184,7 +201,9 @@ impl Reach {
             low: likely.low - towards_low * of_traction,
             high: likely.high + towards_high * of_brake,
         };
-        let reached = if alike || free && !self.slipped { reaches.and(about) } else { reaches };
+        // Wheels that spin alike spin at any speed. Where a command is recorded, slip control acts in time.
+        let creeps_alike = alike && (self.side > 0.0 || !self.slipped || scene.commanded.is_some());
+        let reached = if creeps_alike || free && !self.slipped { reaches.and(about) } else { reaches };
         self.speed = Range { low: smaller(reached.low, likely.low), high: larger(reached.high, likely.high) };
         if dead > SEEN {
             // The sensor that is taken for dead may be the one that is right, and what was made of the other may be late.
@@ -196,13 +215,6 @@ impl Reach {
             }
         }
         self.speed
-    }
-
-    /// How fast wheels can begin to creep unseen (m/s²). Where they decelerate at least as the brake makes a train do whose rail
-    /// carries it, they creep away from that train no faster than by the rest.
-    fn creeps_away(scene: &Scene, wheels_a: f64) -> f64 {
-        let rest = scene.rolling.high - wheels_a;
-        if rest > 0.0 { smaller(rest, UNSEEN_RATE) } else { UNSEEN_RATE }
     }
 
     /// Whether brake and traction act on both wheelsets.
@@ -220,6 +232,13 @@ impl Reach {
         };
         [brakes && all(|wheel| wheel.braked), drives && all(|wheel| wheel.driven)]
     }
+}
+
+/// How fast wheels can begin to creep unseen (m/s²). Where they decelerate at least as the brake makes a train do whose rail
+/// carries it, they creep away from that train no faster than by the rest.
+fn creeps_away(scene: &Scene, wheels_a: f64) -> f64 {
+    let rest = scene.rolling.high - wheels_a;
+    if rest > 0.0 { smaller(rest, UNSEEN_RATE) } else { UNSEEN_RATE }
 }
 
 /// Whether what is read of the wheels is one speed; `dead` is the probability that the sensor of each is.

@@ -83,9 +83,13 @@ impl Bank {
         let scales = self.scales(scene);
         self.since_touch += t;
         self.since_lone_touch += t;
-        let [a, b] = scene.wheels.map(|wheel| self.side * (wheel.acceleration - train.a));
-        let beyond = [[a, b], [b, a]];
-        for (((touch, wheel), scale), [own, other]) in
+        let [a, b] = scene.wheels.map(|wheel| {
+            let beyond = self.side * (wheel.acceleration - train.a);
+            // What a stuck count hides may be as much.
+            (beyond, if wheel.read && !wheel.stuck { beyond } else { f64::INFINITY })
+        });
+        let beyond = [(a.0, b.1), (b.0, a.1)];
+        for (((touch, wheel), scale), (own, other)) in
             self.touches.iter_mut().zip(&scene.wheels).zip(scales).zip(beyond)
         {
             let speed = touch.follow((wheel.counted - wheel.late) * scale / t, train.a, t);
