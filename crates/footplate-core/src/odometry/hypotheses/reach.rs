@@ -136,7 +136,7 @@ impl Reach {
         let is_locked = silent && self.slipped && since_brake < RETURNS_FOR_S;
         // A wheel beside a sensor that is dead, and silent, slips if it accelerates as its train cannot.
         let own = 2.0 * wheels_a;
-        let Range { low, high } = scene.rolling;
+        let Range { low, high } = scene.acceleration;
         let strays = own < low - STRAYS || own > high + STRAYS;
         self.strayed = dead > SEEN && (strays || self.strayed);
         let creeps_at_most = slip + creep < ALIKE && turn_alike && !is_locked && !self.strayed;
@@ -172,7 +172,6 @@ impl Reach {
             _ => self.crept + rate * t,
         };
 
-        let Range { low, high } = scene.acceleration;
         let commanded = scene.commanded.unwrap_or(0.0);
         let up = if silent && brakes { -LOCKED } else { GRADIENT + larger(commanded, 0.0) };
         let (up, down) = match scene.commanded {
