@@ -149,7 +149,8 @@ impl Reach {
         let beyond = self.side * (wheels_a - scene.commanded.unwrap_or(0.0));
         let (since, opposite) =
             if self.side > 0.0 { (since_brake, traction) } else { (since_traction, brake) };
-        let returns = self.slipped && since < RETURNS_FOR_S && (beyond > RETURNS || opposite > 0.0);
+        let may_return = since < if self.slipped { RETURNS_FOR_S } else { ROLLS_AFTER_S };
+        let returns = may_return && (beyond > RETURNS || self.slipped && opposite > 0.0);
         let free = brake <= 0.0 && traction <= 0.0 && !returns;
         self.strayed = self.strayed && !free;
         // A wheel that spins is slowed down to no certain speed.
@@ -175,7 +176,11 @@ impl Reach {
         let commanded = scene.commanded.unwrap_or(0.0);
         let up = if silent && brakes { -LOCKED } else { GRADIENT + larger(commanded, 0.0) };
         let (up, down) = match scene.commanded {
-            Some(_) => (smaller(high, up), larger(low, smaller(commanded, 0.0) - GRADIENT)),
+            Some(_) => {
+                // The brake still acts after its command ended.
+                let braked = if brake > 0.0 { -self.by } else { 0.0 };
+                (smaller(high, up), larger(low, smaller(commanded, braked) - GRADIENT))
+            }
             None => (smaller(high, if silent { 0.0 } else { high }), low),
         };
         let reaches = Range { low: self.speed.low + down * t, high: self.speed.high + up * t };
