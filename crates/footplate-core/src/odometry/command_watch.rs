@@ -3,6 +3,7 @@
 //! A brake takes time to build up and to release, and a braked wheel takes time to turn with the train again. What may still act
 //! is assumed to act; what may not act yet is not.
 
+use super::recent::Recent;
 use super::sound::sound;
 use super::wheels::{Range, Vehicle, larger, smaller};
 
@@ -23,8 +24,8 @@ pub(super) struct CommandWatch {
     brake: f64,
     /// Largest effort from which traction has not faded.
     traction: f64,
-    widest: Range,
-    narrower_for: f64,
+    /// The strongest deceleration and acceleration lately (m/s²).
+    lately: [Recent; 2],
 }
 
 /// What the command allows in one period, in the direction of travel.
@@ -53,13 +54,12 @@ impl CommandWatch {
             built_up: 0.0,
             brake: 0.0,
             traction: 0.0,
-            widest: Range { low: 0.0, high: 0.0 },
-            narrower_for: 0.0,
+            lately: [Recent::new(0.0, REMEMBERED_S); 2],
         }
     }
 
-    /// The command of the next `t` seconds.
-    pub(super) fn next(&mut self, effort: Option<f64>, t: f64, vehicle: &Vehicle) -> Allowed {
+    /// The command of the next `t` seconds, for a train that runs backward or not.
+    pub(super) fn next(&mut self, effort: Option<f64>, backward: bool, t: f64, vehicle: &Vehicle) -> Allowed {
         let max_traction = vehicle.max_traction.as_m_per_s2();
         let max_brake = vehicle.max_brake.as_m_per_s2();
         let Some(effort) = effort else {
@@ -100,7 +100,9 @@ impl CommandWatch {
         let gradient = command.gradient.as_m_per_s2();
         let strongest =
             self.brake * full * (1.0 + command.tolerance) + gradient + command.resistance.as_m_per_s2();
-        let low = -smaller(strongest, max_brake);
+        // A train that rolls back is braked by its traction.
+        let against = if backward { self.traction * max_traction + gradient } else { 0.0 };
+        let low = -larger(smaller(strongest, max_brake), smaller(against, max_traction));
         let high = smaller(self.traction * max_traction + gradient, max_traction);
         let least = vehicle.thresholds.least_sliding_deceleration.as_m_per_s2();
         let by_brake = gradient - self.built_up * full * (1.0 - command.tolerance);
@@ -123,11 +125,9 @@ impl CommandWatch {
         }
     }
 
-    /// The widest range of the last windows.
+    /// The widest range of the last windows, on each side.
     fn lately(&mut self, now: Range, t: f64) -> Range {
-        let as_wide = now.low <= self.widest.low || now.high >= self.widest.high;
-        self.narrower_for = if as_wide { 0.0 } else { self.narrower_for + t };
-        self.widest = if self.narrower_for > REMEMBERED_S { now } else { self.widest.or(now) };
-        self.widest
+        let [low, high] = &mut self.lately;
+        Range { low: -low.push(-now.low, t), high: high.push(now.high, t) }
     }
 }

@@ -253,7 +253,7 @@ impl Odometer {
 
     fn follow(&mut self, period: &Period, last: MotionEstimate, t: f64) -> MotionEstimate {
         let effort = period.effort.filter(|effort| effort.abs() <= LARGEST_EFFORT);
-        let allowed = self.command.next(effort, t, &self.vehicle);
+        let allowed = self.command.next(effort, self.direction < 0.0, t, &self.vehicle);
         let counted = self.read(period, &allowed, t);
         let before = self.speed;
         let speed_before = self.bounds.speed();

@@ -6,7 +6,7 @@ use super::filters::{Filters, Pool};
 use super::interval::interval;
 use super::lanes::Lanes;
 use super::rates::{Transitions, transitions};
-use super::reach::Reach;
+use super::reach::{Reach, Shown};
 use super::scene::{Scene, WheelScene};
 use super::touch::Touch;
 use crate::odometry::wheels::{Range, Wheelset, larger, smaller};
@@ -92,8 +92,9 @@ pub(in super::super) struct Bank {
     pub(super) side: f64,
     /// Whether each wheel has been accelerated to the speed of the train.
     pub(super) touches: [Touch; 2],
-    /// Time since one of them was (s).
+    /// Time since one of them was (s), and since one was while the other was not accelerated.
     pub(super) since_touch: f64,
+    pub(super) since_lone_touch: f64,
     /// Which sensors were found dead and have not counted since: they are still dead after a stop.
     found_dead: [bool; 2],
     /// How far the train may be from wheels that lost the rail together.
@@ -125,6 +126,7 @@ impl Bank {
             side: 1.0,
             touches: [Touch::new(); 2],
             since_touch: f64::INFINITY,
+            since_lone_touch: f64::INFINITY,
             found_dead: [false; 2],
             reach: Reach::new(),
             speed,
@@ -184,14 +186,14 @@ impl Bank {
         let [likely, distance] =
             interval(&self.probability, &self.filters, &self.distances, scene, (risk, self.beyond), t);
         let wheels = self.compared(scene);
-        let speed = self.reach.widen(
-            likely,
-            scene,
-            &wheels,
-            self.probability.0,
-            (self.since_touch, self.wheels_a, self.side),
-            t,
-        );
+        let shown = Shown {
+            p: self.probability.0,
+            since_touch: self.since_touch,
+            since_lone_touch: self.since_lone_touch,
+            wheels_a: self.wheels_a,
+            side: self.side,
+        };
+        let speed = self.reach.widen(likely, scene, &wheels, &shown, t);
         let distance = Range {
             low: distance.low + (speed.low - likely.low) * t,
             high: distance.high + (speed.high - likely.high) * t,

@@ -9,20 +9,20 @@ use super::evidence::{Compared, SILENT};
 use super::scene::{Scene, WheelScene};
 use crate::odometry::wheels::{Range, larger, smaller};
 
-/// Creepage of both wheelsets that begins unseen (part of the speed), under the brake and in traction. Steady creepage of
-/// converters and proportional protection reaches 0.2, but all beyond this begins visibly; rolling contact on a wet rail
-/// takes 0.05 for full traction.
-const UNSEEN: [f64; 2] = [0.2, 0.08];
+/// Creepage of both wheelsets that begins unseen (part of the speed of the wheels), under the brake and in traction. Steady
+/// creepage of converters and of proportional protection reaches 0.2; all beyond this begins visibly.
+const UNSEEN: [f64; 2] = [0.2, 0.155];
 /// The same where no command is recorded: most of the time that the wheels' acceleration is taken for, nothing acts.
-const UNSEEN_WITHOUT_COMMAND: [f64; 2] = [0.14, 0.07];
-/// Wheels that begin to creep faster than this are seen to (m/s²).
+const UNSEEN_WITHOUT_COMMAND: [f64; 2] = [0.15, 0.1];
+/// Wheels that begin to creep faster than this are seen to (m/s²), and sooner after one of them was turned up to the train.
 const UNSEEN_RATE: f64 = 0.8;
+const UNSEEN_RATE_TOUCHED: f64 = 0.3;
 /// Wheels that turn alike so soon after one was turned up to the train (s), and slip with no more than this probability,
 /// roll.
 const TOUCHED_S: f64 = 3.0;
 const ROLLS: f64 = 0.01;
 /// The same of wheelsets that are braked independently: no converter feeds both.
-const UNSEEN_INDEPENDENT: f64 = 0.04;
+const UNSEEN_INDEPENDENT: f64 = 0.02;
 /// A command of less acceleration than this is carried by what ice leaves of adhesion (m/s²).
 const SLIDES_BY: f64 = 0.2;
 /// Creepage of both that lasts after they were seen to slip: part of the speed, and m/s.
@@ -46,6 +46,8 @@ const LOCKED: f64 = 0.025;
 /// take every train that is driven for one whose wheels return.
 const RETURNS: f64 = 0.1;
 const RETURNS_FOR_S: f64 = 15.0;
+/// Beyond what its train can do, a wheel accelerates by no more than this while it rolls (m/s²).
+const STRAYS: f64 = 0.1;
 /// Least effort that makes wheels creep.
 const EFFORT: f64 = 0.02;
 /// Acceleration of wheels by which a train without a recorded command is braked or driven (m/s²).
@@ -63,10 +65,26 @@ pub(super) struct Reach {
     alike_for: f64,
     /// Time since brake and traction acted (s).
     since: [f64; 2],
-    /// Time since both rolled for certain (s).
-    since_rolling: f64,
+    /// One sensor is dead, and the wheel of the other accelerated as no train does since.
+    strayed: bool,
+    /// By how much they can have begun to creep unseen since both rolled for certain (m/s).
+    crept: f64,
     /// The acceleration that was last commanded (m/s²).
     by: f64,
+}
+
+/// What the wheels have shown up to a period.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shown {
+    /// Probabilities of the hypotheses.
+    pub(super) p: [f64; 8],
+    /// Time since a wheel was turned up to the train (s), and since one was while the other was not accelerated.
+    pub(super) since_touch: f64,
+    pub(super) since_lone_touch: f64,
+    /// Smoothed acceleration of the wheels (m/s²).
+    pub(super) wheels_a: f64,
+    /// 1 where wheels that slip turn slower than the train and −1 where faster.
+    pub(super) side: f64,
 }
 
 impl Reach {
@@ -78,7 +96,8 @@ impl Reach {
             side: 1.0,
             alike_for: 0.0,
             since: [f64::INFINITY; 2],
-            since_rolling: f64::INFINITY,
+            strayed: false,
+            crept: f64::INFINITY,
             by: 0.0,
         }
     }
@@ -88,27 +107,39 @@ impl Reach {
         self.speed = self.speed.reversed();
     }
 
-    /// Widens the interval `likely` of a period of `t` seconds. `p` are the probabilities of the hypotheses, `since_touch` the
-    /// time since a wheel was turned up to the train (s), `wheels_a` how the wheels accelerate (m/s²).
+    /// Widens the interval `likely` of a period of `t` seconds by what the wheels have `shown`.
     pub(super) fn widen(
         &mut self,
         likely: Range,
         scene: &Scene,
         wheels: &[Compared; 2],
-        p: [f64; 8],
-        (since_touch, wheels_a, side): (f64, f64, f64),
+        shown: &Shown,
         t: f64,
     ) -> Range {
+        let Shown { p, since_touch, since_lone_touch, wheels_a, side } = *shown;
         let [.., slip, creep, _, first_dead, second_dead] = p;
         let silent = wheels.iter().all(|wheel| wheel.speed.abs() < SILENT);
         let [brakes, drives] = self.acts(scene, silent, wheels_a, [first_dead, second_dead]);
         for (since, acts) in self.since.iter_mut().zip([brakes, drives]) {
             *since = if acts { 0.0 } else { *since + t };
         }
-        let [brake, traction] = self.since.map(|since| 1.0 - smaller(since / ROLLS_AFTER_S, 1.0));
+        let slipped = self.slipped;
+        let [brake, traction] = self.since.map(|since| {
+            let over = smaller(since / ROLLS_AFTER_S, 1.0);
+            // Wheels that slipped may return late.
+            if slipped && over < 1.0 { 1.0 } else { 1.0 - over }
+        });
         let dead = first_dead + second_dead;
         let turn_alike = turn_alike(scene, wheels, [first_dead, second_dead]);
-        let creeps_at_most = slip + creep < ALIKE && turn_alike && !(silent && self.slipped && brakes);
+        // Locked wheels turn alike until the brake has let go of them.
+        let [since_brake, since_traction] = self.since;
+        let is_locked = silent && self.slipped && since_brake < RETURNS_FOR_S;
+        // A wheel beside a sensor that is dead, and silent, slips if it accelerates as its train cannot.
+        let own = 2.0 * wheels_a;
+        let Range { low, high } = scene.acceleration;
+        let strays = own < low - STRAYS || own > high + STRAYS;
+        self.strayed = dead > SEEN && (strays || self.strayed);
+        let creeps_at_most = slip + creep < ALIKE && turn_alike && !is_locked && !self.strayed;
         self.alike_for = if creeps_at_most { self.alike_for + t } else { 0.0 };
         let alike = self.alike_for >= ALIKE_FOR_S;
         // Wheels that slipped and still accelerate towards the train beyond the command are returning.
@@ -116,21 +147,40 @@ impl Reach {
             self.side = side;
         }
         let beyond = self.side * (wheels_a - scene.commanded.unwrap_or(0.0));
-        let lately = self.since.iter().any(|since| *since < RETURNS_FOR_S);
-        let returns = self.slipped && lately && beyond > RETURNS;
+        let (since, opposite) =
+            if self.side > 0.0 { (since_brake, traction) } else { (since_traction, brake) };
+        let may_return = since < if self.slipped { RETURNS_FOR_S } else { ROLLS_AFTER_S };
+        let returns = may_return && (beyond > RETURNS || self.slipped && opposite > 0.0);
         let free = brake <= 0.0 && traction <= 0.0 && !returns;
+        self.strayed = self.strayed && !free;
         // A wheel that spins is slowed down to no certain speed.
         let is_known = scene.commanded.is_some() && traction <= 0.0;
         let touched = is_known && since_touch < TOUCHED_S && slip + creep + dead < ROLLS;
         let roll = alike && (free || touched);
         self.slipped = slip + creep + dead > SEEN && !free || self.slipped && !roll;
-        self.since_rolling = if roll { 0.0 } else { self.since_rolling + t };
+        let rate = match () {
+            () if traction > 0.0 => UNSEEN_RATE,
+            () if since_touch < TOUCHED_S => UNSEEN_RATE_TOUCHED,
+            () => creeps_away(scene, wheels_a),
+        };
+        let touched_at =
+            if since_lone_touch < TOUCHED_S { UNSEEN_RATE_TOUCHED * since_lone_touch } else { f64::INFINITY };
+        self.crept = match (roll, self.slipped) {
+            (true, _) if free => 0.0,
+            // A converter that turns up both at once leaves them at any creepage.
+            (true, _) => smaller(self.crept + rate * t, touched_at),
+            (_, true) => f64::INFINITY,
+            _ => self.crept + rate * t,
+        };
 
-        let Range { low, high } = scene.acceleration;
         let commanded = scene.commanded.unwrap_or(0.0);
         let up = if silent && brakes { -LOCKED } else { GRADIENT + larger(commanded, 0.0) };
         let (up, down) = match scene.commanded {
-            Some(_) => (smaller(high, up), larger(low, smaller(commanded, 0.0) - GRADIENT)),
+            Some(_) => {
+                // The brake still acts after its command ended.
+                let braked = if brake > 0.0 { -self.by } else { 0.0 };
+                (smaller(high, up), larger(low, smaller(commanded, braked) - GRADIENT))
+            }
             None => (smaller(high, if silent { 0.0 } else { high }), low),
         };
         let reaches = Range { low: self.speed.low + down * t, high: self.speed.high + up * t };
@@ -139,16 +189,10 @@ impl Reach {
         }
         let effort = smaller(self.by / SLIDES_BY, 1.0);
         let moving = larger(likely.high.abs(), likely.low.abs());
+        let crept = if scene.commanded.is_some() { self.crept } else { f64::INFINITY };
         let creeps = |unseen: f64| {
             let unseen = if scene.independent { UNSEEN_INDEPENDENT * effort } else { unseen };
-            if self.slipped {
-                LASTING.0 * moving + LASTING.1
-            } else {
-                smaller(
-                    unseen * moving,
-                    if is_known { UNSEEN_RATE * self.since_rolling } else { f64::INFINITY },
-                )
-            }
+            if self.slipped { LASTING.0 * moving + LASTING.1 } else { smaller(unseen * moving, crept) }
         };
         let unseen = if scene.commanded.is_some() { UNSEEN } else { UNSEEN_WITHOUT_COMMAND };
         let [of_brake, of_traction] = unseen.map(creeps);
@@ -161,14 +205,18 @@ impl Reach {
             low: likely.low - towards_low * of_traction,
             high: likely.high + towards_high * of_brake,
         };
-        let reached = if alike || free && !self.slipped { reaches.and(about) } else { reaches };
+        // Wheels that spin alike spin at any speed. Where a command is recorded, slip control acts in time.
+        let creeps_alike = alike && (self.side > 0.0 || !self.slipped || scene.commanded.is_some());
+        let reached = if creeps_alike || free && !self.slipped { reaches.and(about) } else { reaches };
         self.speed = Range { low: smaller(reached.low, likely.low), high: larger(reached.high, likely.high) };
-        if dead > SEEN && !turn_alike {
-            // The sensor that is taken for dead may be the one that is right.
-            self.speed = wheels.iter().fold(self.speed, |all, wheel| {
+        if dead > SEEN {
+            // The sensor that is taken for dead may be the one that is right, and what was made of the other may be late.
+            for (wheel, seen) in wheels.iter().zip(&scene.wheels) {
                 let off = OF_WHEEL * libm::sqrt(wheel.variance);
-                all.or(Range { low: wheel.speed - off, high: wheel.speed + off })
-            });
+                if !turn_alike || seen.counts() {
+                    self.speed = self.speed.or(Range { low: wheel.speed - off, high: wheel.speed + off });
+                }
+            }
         }
         self.speed
     }
@@ -178,6 +226,7 @@ impl Reach {
         let [brakes, drives] = match scene.commanded {
             Some(commanded) => [commanded < -EFFORT, commanded > EFFORT],
             // Wheels that a brake has locked show nothing more of it.
+            None if silent && self.slipped => [true, false],
             None if silent => self.since.map(|since| since <= 0.0),
             None => [wheels_a < -TREND, wheels_a > TREND],
         };
@@ -187,6 +236,13 @@ impl Reach {
         };
         [brakes && all(|wheel| wheel.braked), drives && all(|wheel| wheel.driven)]
     }
+}
+
+/// How fast wheels can begin to creep unseen (m/s²). Where they decelerate at least as the brake makes a train do whose rail
+/// carries it, they creep away from that train no faster than by the rest.
+fn creeps_away(scene: &Scene, wheels_a: f64) -> f64 {
+    let rest = scene.rolling.high - wheels_a;
+    if rest > 0.0 { smaller(rest, UNSEEN_RATE) } else { UNSEEN_RATE }
 }
 
 /// Whether what is read of the wheels is one speed; `dead` is the probability that the sensor of each is.
@@ -245,7 +301,9 @@ mod tests {
         let likely = Range { low: 19.8, high: 20.2 };
         let mut high = 0.0;
         for _ in 0..(seconds / 0.05) as usize {
-            high = reach.widen(likely, &scene, &compared, p, (f64::INFINITY, 0.0, 1.0), 0.05).high;
+            let never = f64::INFINITY;
+            let shown = Shown { p, since_touch: never, since_lone_touch: never, wheels_a: 0.0, side: 1.0 };
+            high = reach.widen(likely, &scene, &compared, &shown, 0.05).high;
         }
         high - likely.high
     }

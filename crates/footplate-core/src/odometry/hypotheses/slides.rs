@@ -82,15 +82,27 @@ impl Bank {
         let reached = reached * reached;
         let scales = self.scales(scene);
         self.since_touch += t;
-        for ((touch, wheel), scale) in self.touches.iter_mut().zip(&scene.wheels).zip(scales) {
+        self.since_lone_touch += t;
+        let [a, b] = scene.wheels.map(|wheel| {
+            let beyond = self.side * (wheel.acceleration - train.a);
+            // What a stuck count hides may be as much.
+            (beyond, if wheel.read && !wheel.stuck { beyond } else { f64::INFINITY })
+        });
+        let beyond = [(a.0, b.1), (b.0, a.1)];
+        for (((touch, wheel), scale), (own, other)) in
+            self.touches.iter_mut().zip(&scene.wheels).zip(scales).zip(beyond)
+        {
             let speed = touch.follow((wheel.counted - wheel.late) * scale / t, train.a, t);
-            let has_reached = touch.reached(self.side * (wheel.acceleration - train.a), t);
+            let has_reached = touch.reached(own, other, t);
             if !wheel.read || wheel.stuck || speed.abs() < SILENT {
                 continue;
             }
             // A wheel that spun and was braked may have passed the train.
             if has_reached && self.side > 0.0 {
                 self.since_touch = 0.0;
+                if touch.alone {
+                    self.since_lone_touch = 0.0;
+                }
             }
             let y = speed - train.v;
             let pushes = if self.side * y > 0.0 { t / (FOLLOWED_S * PUSHES * PUSHES) } else { 0.0 };

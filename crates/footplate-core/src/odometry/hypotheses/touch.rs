@@ -13,6 +13,9 @@ const LEVEL_FOR_S: f64 = 0.25;
 const LOOKS_BACK_S: f64 = 0.1;
 /// The wheel has to keep its speed within this time after it was accelerated (s).
 const COUNTS_FOR_S: f64 = 1.0;
+/// A wheel is turned up alone if the other accelerates by less than this meanwhile (m/s²), relative to the train. A converter that
+/// feeds both turns up both at once, and to any creepage.
+const OTHER_STAYS: f64 = 1.0;
 
 /// One wheel.
 #[derive(Debug, Clone, Copy)]
@@ -21,11 +24,13 @@ pub(super) struct Touch {
     speed: f64,
     since_turned_up: f64,
     level_for: f64,
+    /// It was turned up while the other wheel was not.
+    pub(super) alone: bool,
 }
 
 impl Touch {
     pub(super) const fn new() -> Self {
-        Self { speed: 0.0, since_turned_up: f64::INFINITY, level_for: 0.0 }
+        Self { speed: 0.0, since_turned_up: f64::INFINITY, level_for: 0.0, alone: false }
     }
 
     /// Takes in the count of `t` seconds. Returns its speed if it turns with a train of acceleration `a`.
@@ -34,9 +39,11 @@ impl Touch {
         self.speed + a * LOOKS_BACK_S
     }
 
-    /// Whether it has just reached the train. `beyond` is its relative acceleration towards the train (m/s²).
-    pub(super) fn reached(&mut self, beyond: f64, t: f64) -> bool {
+    /// Whether it has just reached the train. `beyond` is its relative acceleration towards the train (m/s²), `other` that of the
+    /// other wheel.
+    pub(super) fn reached(&mut self, beyond: f64, other: f64, t: f64) -> bool {
         self.since_turned_up = if beyond > TURNED_UP {
+            self.alone = other < OTHER_STAYS || self.alone && self.since_turned_up <= 0.0;
             0.0
         } else if beyond < -TURNED_UP {
             // The brake has gripped.
@@ -60,7 +67,7 @@ mod tests {
 
     fn touches(accelerations: &[f64]) -> usize {
         let mut touch = Touch::new();
-        accelerations.iter().filter(|beyond| touch.reached(**beyond, 0.05)).count()
+        accelerations.iter().filter(|beyond| touch.reached(**beyond, 0.0, 0.05)).count()
     }
 
     #[test]
