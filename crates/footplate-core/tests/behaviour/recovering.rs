@@ -124,7 +124,7 @@ fn creeping() -> (Watched, usize) {
     let mut watched = Watched::asking();
     watched.dog.lose(watched.world.now, FIRST);
     watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
-    let creeps = |watched: &Watched| watched.world.trains[0].speed_mm_per_s > 20.0;
+    let creeps = |watched: &Watched| watched.world.train().speed_mm_per_s > 20.0;
     assert!(watched.run_until(60.0, creeps), "{:#?}", watched.notices);
     let so_far = watched.commanded.len();
     (watched, so_far)
@@ -141,7 +141,7 @@ fn stays_at_rest(watched: &Watched, since: usize) {
     assert_eq!(moved, None, "{:#?}", watched.notices);
     let asks = |notice: &&Notice| matches!(notice, Notice::NeedsOperator { train: FIRST, .. });
     assert_eq!(watched.notices.iter().filter(asks).count(), 1);
-    assert!(watched.world.trains[0].speed_mm_per_s < 1.0);
+    assert!(watched.world.train().speed_mm_per_s < 1.0);
 }
 
 #[test]
