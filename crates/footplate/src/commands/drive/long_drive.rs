@@ -136,6 +136,9 @@ impl<'l> LongDrive<'l> {
         for train in &trains {
             operator.lines.extend(placed(&**runtime.link(), layout, *train));
             operator.lines.push(lengths(*train));
+        }
+        // A journey would first look for a train that is not placed yet.
+        for train in &trains {
             operator.lines.extend(self.send(*train, began, &mut sent));
         }
         let mut since = began;
