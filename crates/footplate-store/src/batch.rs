@@ -227,7 +227,8 @@ impl Batch {
                 }
             }
         }
-        if let Some(train) = train.filter(|train| !known.contains(train)) {
+        // The runs of a calibration name the train by its commands alone.
+        if let Some(train) = train.filter(|train| runs.is_empty() && !known.contains(train)) {
             return Err(BatchError::NoRunOfTrain { train, there: known });
         }
         Self::of_runs(layout, runs, left_out)

@@ -88,9 +88,8 @@ impl Arguments {
             );
         }
         if self.store.is_some() && self.link.kind().usual_line().is_none() {
-            bail!(
-                "--store keeps nothing of this station, whose line has no delays that differ from one railway to another: \
-                 leave it out"
+            say!(
+                "--store keeps nothing of this station: its line has no delays that differ from one railway to another"
             );
         }
         let layout = self.link.simulated().map_or(&self.layout, |simulated| &simulated.layout);

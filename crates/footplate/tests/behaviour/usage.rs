@@ -54,7 +54,6 @@ fn a_reader_that_has_seen_enough_is_no_error() {
 fn a_value_that_means_nothing_is_refused_with_what_would() {
     for (arguments, says) in [
         (&["doctor", "--link", "sim:track-a", "--seconds", "1e6"][..], "use a time from 1 to 100000 s"),
-        (&["doctor", "--link", "sim:track-a", "--store", "x.db"], "--store keeps nothing of this station"),
         (&["simulate", "traffic", "--hours", "nan"], "`nan` is not a number of hours from 0.05 to 10000"),
         (&["simulate", "traffic", "--hours", "0"], "`0` is not a number of hours from 0.05 to 10000"),
     ] {
