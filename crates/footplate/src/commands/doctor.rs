@@ -87,11 +87,6 @@ impl Arguments {
                 SECONDS[1]
             );
         }
-        if self.store.is_some() && self.link.kind().usual_line().is_none() {
-            say!(
-                "--store keeps nothing of this station: its line has no delays that differ from one railway to another"
-            );
-        }
         let layout = self.link.simulated().map_or(&self.layout, |simulated| &simulated.layout);
         let layout = layout_named(layout)?.layout;
         let link = open(&self.link, &layout, Speed::Unpaced)?;
