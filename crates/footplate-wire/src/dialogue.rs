@@ -42,6 +42,8 @@ pub(crate) struct Dialogue<A: Awaited> {
     pub(crate) released: Vec<SensorId>,
     /// When the last message arrived.
     pub(crate) heard: Timestamp,
+    /// Since when the station was silent, until its states have been read again.
+    pub(crate) blind_since: Option<Timestamp>,
     /// Time of the last entry in the recording; entries stay in order.
     pub(crate) last_entry: Timestamp,
     pub(crate) farewell: Farewell,
@@ -75,6 +77,7 @@ impl<A: Awaited> Dialogue<A> {
             excess: TimeSpan::ZERO,
             released: Vec::new(),
             heard: now,
+            blind_since: None,
             last_entry: now,
             farewell: Farewell::default(),
             stops_all: false,
@@ -82,11 +85,13 @@ impl<A: Awaited> Dialogue<A> {
         }
     }
 
-    /// Advances the clock; returns whether the station has just become silent.
-    pub(crate) fn watch(&mut self, now: Timestamp) -> bool {
+    /// Advances the clock.
+    pub(crate) fn watch(&mut self, now: Timestamp) {
         self.now = now;
-        let notice = self.silence.watch(now);
-        notice.into_iter().map(|notice| self.notify(notice)).count() > 0
+        if let Some(notice) = self.silence.watch(now) {
+            self.notify(notice);
+            self.blind_since.get_or_insert(self.heard);
+        }
     }
 
     /// Resets what was on the line after it was opened again.
@@ -304,15 +309,6 @@ impl<A: Awaited> Dialogue<A> {
             self.silence.due(),
             self.farewell.due(),
         ];
-        times.into_iter().flatten().filter(|at| *at > self.now).min()
-    }
-
-    /// Returns when to continue at the latest while the line takes nothing; `written`: when it does again.
-    pub(crate) fn next_timeout_of_line(&self, written: Timestamp) -> Option<Timestamp> {
-        if self.farewell.is_over() {
-            return None;
-        }
-        let times = [Some(written), self.silence.due(), self.farewell.due()];
         times.into_iter().flatten().filter(|at| *at > self.now).min()
     }
 

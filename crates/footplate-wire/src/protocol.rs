@@ -32,8 +32,8 @@ pub(crate) trait Protocol {
     /// Takes bytes from the station.
     fn hear(&mut self, now: Timestamp, bytes: &[u8]);
 
-    /// Does what is due at this time, before anything is written. `is_silent`: the station has just become silent.
-    fn advance(&mut self, now: Timestamp, is_silent: bool);
+    /// Does what is due at this time, before anything is written.
+    fn advance(&mut self, _now: Timestamp) {}
 
     /// Forgets what was on the line that was opened again, and reads all states anew.
     fn begin_again(&mut self, now: Timestamp);
@@ -146,8 +146,9 @@ pub(crate) trait Protocol {
     /// When to continue.
     fn continues_at(&self) -> Option<Timestamp> {
         let dialogue = self.dialogue();
-        if let Some(written) = self.written_at() {
-            return dialogue.next_timeout_of_line(written);
+        if let Some(written) = self.written_at().filter(|_| !dialogue.farewell.is_over()) {
+            let times = [Some(written), dialogue.silence.due(), dialogue.farewell.due()];
+            return times.into_iter().flatten().filter(|at| *at > dialogue.now).min();
         }
         let is_ending = dialogue.farewell.has_begun();
         let usual = if is_ending { Some(dialogue.pacing.urgent_at()) } else { self.asks_at() };
@@ -156,8 +157,8 @@ pub(crate) trait Protocol {
 
     /// Sends what is due.
     fn go_on(&mut self, now: Timestamp) {
-        let is_silent = self.dialogue_mut().watch(now);
-        self.advance(now, is_silent);
+        self.dialogue_mut().watch(now);
+        self.advance(now);
         while let Some(next) = self.next(now) {
             self.send(now, next);
         }
@@ -226,6 +227,8 @@ impl<P: Protocol> Session for P {
     }
 
     fn handle_reopened(&mut self, now: Timestamp) {
+        let dialogue = self.dialogue_mut();
+        dialogue.blind_since.get_or_insert(dialogue.heard);
         self.begin_again(now);
         self.dialogue_mut().reopened();
         self.go_on(now);

@@ -45,18 +45,17 @@ impl Sensors {
 }
 
 impl<A: Awaited> Dialogue<A> {
-    /// Reports what has changed at a sensor within a span that ends at `latest`; `blind_since`: since when the line was silent, until the
-    /// states have been read again. It may have become occupied at any time since.
+    /// Reports what has changed at a sensor within a span that ends at `latest`. After a silence, it may have become occupied at any time
+    /// since that began.
     pub(crate) fn hear_of_change(
         &mut self,
         sensor: SensorId,
         change: Change,
         (latest, width): (Timestamp, TimeSpan),
-        blind_since: Option<Timestamp>,
     ) {
         match change {
             Change::Occupied => {
-                let width = blind_since.map_or(width, |since| width.max(latest - since));
+                let width = self.blind_since.map_or(width, |since| width.max(latest - since));
                 self.report(sensor, latest, width);
             }
             Change::Freed => self.report_free(sensor, latest, width),

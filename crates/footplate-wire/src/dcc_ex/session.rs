@@ -52,8 +52,6 @@ pub struct Client {
     unverified: Vec<TrainId>,
     /// Whether each locomotive ran forward by a report that no other has confirmed yet.
     reported_once: BTreeMap<TrainId, bool>,
-    /// Since when the station was silent, until its states have been read again.
-    blind_since: Option<Timestamp>,
 }
 
 impl Client {
@@ -68,7 +66,6 @@ impl Client {
             sensors: Sensors::default(),
             unverified: Vec::new(),
             reported_once: BTreeMap::new(),
-            blind_since: None,
         };
         client.go_on(now);
         client
@@ -97,10 +94,7 @@ impl Protocol for Client {
         }
     }
 
-    fn advance(&mut self, now: Timestamp, is_silent: bool) {
-        if is_silent {
-            self.blind_since.get_or_insert(self.dialogue.heard);
-        }
+    fn advance(&mut self, now: Timestamp) {
         if matches!(self.opening, Opening::Banner { until } if now >= until) {
             self.opening = Opening::Identity;
         }
@@ -108,7 +102,6 @@ impl Protocol for Client {
 
     fn begin_again(&mut self, now: Timestamp) {
         self.framing = Framing::default();
-        self.blind_since.get_or_insert(self.dialogue.heard);
         self.opening = Opening::begin(now, &self.settings);
     }
 

@@ -50,8 +50,6 @@ pub struct Client {
     identity: Option<String>,
     /// The last reason for which JMRI refused a request.
     refusal: Option<String>,
-    /// Since when JMRI was silent, until its states have been read again.
-    blind_since: Option<Timestamp>,
 }
 
 impl Client {
@@ -68,7 +66,6 @@ impl Client {
             unverified: Vec::new(),
             identity: None,
             refusal: None,
-            blind_since: None,
         };
         client.go_on(now);
         client
@@ -133,15 +130,8 @@ impl Protocol for Client {
         }
     }
 
-    fn advance(&mut self, _now: Timestamp, is_silent: bool) {
-        if is_silent {
-            self.blind_since.get_or_insert(self.dialogue.heard);
-        }
-    }
-
     fn begin_again(&mut self, _now: Timestamp) {
         self.lines = Lines::default();
-        self.blind_since.get_or_insert(self.dialogue.heard);
         self.verify();
         // JMRI stopped the trains when the connection ended, and has given up their throttles.
         for train in self.dialogue.directed() {

@@ -65,8 +65,6 @@ pub struct Client {
     /// Trains whose slots have to be read again.
     unverified: Vec<TrainId>,
     identity: Option<String>,
-    /// Since when the station was silent, until its states have been read again.
-    blind_since: Option<Timestamp>,
     /// Trains for which the station was said to have no slot.
     without_slot: Vec<TrainId>,
     polled: Timestamp,
@@ -90,7 +88,6 @@ impl Client {
             pulse: None,
             unverified: Vec::new(),
             identity: None,
-            blind_since: None,
             without_slot: Vec::new(),
             polled: now,
             polls: 0,
@@ -172,7 +169,7 @@ impl Client {
     /// Ends the opening: trains may run.
     fn opened(&mut self) {
         self.opening = Opening::Open;
-        (self.blind_since, self.polled) = (None, self.dialogue.now);
+        (self.dialogue.blind_since, self.polled) = (None, self.dialogue.now);
         self.dialogue.notify(LinkNotice::Answers);
     }
 
@@ -210,10 +207,7 @@ impl Protocol for Client {
         }
     }
 
-    fn advance(&mut self, now: Timestamp, is_silent: bool) {
-        if is_silent {
-            self.blind_since.get_or_insert(self.dialogue.heard);
-        }
+    fn advance(&mut self, now: Timestamp) {
         self.write_waiting(now);
     }
 
@@ -221,7 +215,6 @@ impl Protocol for Client {
         self.lines = Lines::default();
         self.outbox.clear();
         self.unused.clear();
-        self.blind_since.get_or_insert(self.dialogue.heard);
         self.verify();
     }
 

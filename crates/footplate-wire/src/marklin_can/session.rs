@@ -75,8 +75,6 @@ pub struct Client {
     polled: Timestamp,
     /// When the last byte arrived.
     arrived: Timestamp,
-    /// Whether the station was silent and its states have not been read since.
-    is_blind: bool,
 }
 
 /// A question about a locomotive.
@@ -109,7 +107,6 @@ impl Client {
             has_modules: true,
             polled: now,
             arrived: now,
-            is_blind: false,
         };
         client.open_adapter();
         client.go_on(now);
@@ -170,13 +167,8 @@ impl Protocol for Client {
         }
     }
 
-    fn advance(&mut self, _now: Timestamp, is_silent: bool) {
-        self.is_blind |= is_silent;
-    }
-
     fn begin_again(&mut self, _now: Timestamp) {
         self.framing = Framing::new(self.settings.transport);
-        self.is_blind = true;
         self.open_adapter();
         self.verify();
     }

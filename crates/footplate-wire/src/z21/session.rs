@@ -67,8 +67,6 @@ pub struct Client {
     polled: Timestamp,
     /// When the detectors on the CAN bus were polled last.
     asked_detectors: Option<Timestamp>,
-    /// Whether the station was silent and its states have not been read since.
-    is_blind: bool,
 }
 
 impl Client {
@@ -95,7 +93,6 @@ impl Client {
             polls: 0,
             polled: now,
             asked_detectors: None,
-            is_blind: false,
         };
         client.go_on(now);
         client
@@ -142,12 +139,7 @@ impl Protocol for Client {
         self.hear_datagram(now, bytes);
     }
 
-    fn advance(&mut self, _now: Timestamp, is_silent: bool) {
-        self.is_blind |= is_silent;
-    }
-
     fn begin_again(&mut self, _now: Timestamp) {
-        self.is_blind = true;
         self.verify();
     }
 

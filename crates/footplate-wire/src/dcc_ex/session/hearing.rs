@@ -81,7 +81,7 @@ impl Client {
                 self.verify();
             }
             Opening::Open { .. } if !was_asked && self.opening.is_reset_by_identity(now) => {
-                self.blind_since.get_or_insert(now);
+                self.dialogue.blind_since.get_or_insert(now);
                 self.restarted();
                 self.verify();
             }
@@ -103,7 +103,7 @@ impl Client {
 
     fn opened(&mut self, now: Timestamp) {
         self.opening = Opening::Open { since: now };
-        self.blind_since = None;
+        self.dialogue.blind_since = None;
         self.dialogue.notify(LinkNotice::Answers);
     }
 
@@ -165,7 +165,7 @@ impl Client {
         let sensor = SensorId(number);
         let change = self.sensors.heard(id, active, self.opening.is_listing());
         let span = occupied(now, self.dialogue.last_entry);
-        self.dialogue.hear_of_change(sensor, change, span, self.blind_since);
+        self.dialogue.hear_of_change(sensor, change, span);
     }
 }
 

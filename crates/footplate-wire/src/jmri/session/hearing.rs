@@ -128,7 +128,7 @@ impl Client {
     /// Ends the opening: trains may run.
     fn opened(&mut self) {
         self.opening = Opening::Open;
-        self.blind_since = None;
+        self.dialogue.blind_since = None;
         self.dialogue.notify(LinkNotice::Answers);
     }
 
@@ -233,6 +233,6 @@ impl Client {
         let Some(((number, sensor), active)) = self.sensor_named(name).zip(active) else { return };
         let change = self.sensors.heard(number, active, !self.opening.is_open());
         let span = occupied(now, self.dialogue.last_entry, self.settings.sensor_delay);
-        self.dialogue.hear_of_change(sensor, change, span, self.blind_since);
+        self.dialogue.hear_of_change(sensor, change, span);
     }
 }

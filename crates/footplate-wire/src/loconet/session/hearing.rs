@@ -194,6 +194,6 @@ impl Client {
         let sensor = SensorId(index);
         let change = self.sensors.heard(number, is_occupied, !self.opening.is_open());
         let span = occupied(now, self.dialogue.last_entry, self.settings.sensor_delay);
-        self.dialogue.hear_of_change(sensor, change, span, self.blind_since);
+        self.dialogue.hear_of_change(sensor, change, span);
     }
 }

@@ -171,7 +171,7 @@ impl Client {
     /// Ends the opening: trains may run.
     pub(super) fn opened(&mut self) {
         self.opening = Opening::Open;
-        self.is_blind = false;
+        self.dialogue.blind_since = None;
         self.dialogue.notify(LinkNotice::Answers);
     }
 
@@ -208,7 +208,7 @@ impl Client {
             return self.suspect(train, Query::Speed);
         }
         // The station confirms a state that was not commanded.
-        let was_blind = self.is_blind;
+        let was_blind = self.dialogue.blind_since.is_some();
         (locomotive.step, locomotive.is_stopped) = (step, false);
         self.dialogue.stop_at_end(train);
         if was_blind && step == SpeedStep::STAND {

@@ -70,7 +70,7 @@ impl Client {
                 // A change found by a poll may have happened any time since the sensor was last reported free.
                 let is_answer = matches!(reply, Reply::Can(_))
                     && self.asked_detectors.is_some_and(|asked| now - asked < DETECTORS_WITHIN);
-                let was_missed = answered.is_some() || is_answer || self.is_blind;
+                let was_missed = answered.is_some() || is_answer || self.dialogue.blind_since.is_some();
                 let detections: Vec<(u16, bool)> = self.settings.feedback.detections(reply).collect();
                 for (number, is_occupied) in detections {
                     self.hear_of_sensor(now, number, is_occupied, was_missed);
@@ -124,7 +124,7 @@ impl Client {
 
     pub(super) fn opened(&mut self) {
         self.opening = Opening::Open;
-        (self.is_blind, self.polled) = (false, self.dialogue.now);
+        (self.dialogue.blind_since, self.polled) = (None, self.dialogue.now);
         self.dialogue.notify(LinkNotice::Answers);
     }
 
@@ -136,7 +136,7 @@ impl Client {
         }
         if self.is_subscribed {
             self.is_subscribed = false;
-            self.is_blind = true;
+            self.dialogue.blind_since.get_or_insert(self.dialogue.heard);
             self.restarted();
             return self.verify();
         }
