@@ -262,12 +262,12 @@ impl Dispatcher {
         {
             return Err(Refusal::TurnoutOccupied { turnout, train: holder.id });
         }
+        // A refused order ends no journey.
+        self.watchdog.check(now, &order)?;
         if let Some(train) = order.train() {
-            // A refused order ends no journey.
-            self.watchdog.check(now, &order)?;
             self.take_by_hand(now, train)?;
         }
-        let taken = self.watchdog.order(now, order);
+        let taken = self.watchdog.carry_out(now, order);
         if let (Order::Reverse { train, .. }, Ok(_)) = (order, &taken) {
             self.note_reversal(train);
         }

@@ -3,7 +3,7 @@
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 
-use crate::control::drive::Order;
+use crate::control::drive::{Order, OrderId};
 use crate::event::{Approach, Command};
 use crate::ids::{EdgeId, SensorId, SpeedStep, TrainId};
 use crate::model::Rescaling;
@@ -191,11 +191,8 @@ impl Watchdog {
     /// An operator says where a train is: it is not searched any more, and trusted again if that was all that was wrong.
     pub(super) fn end_search(&mut self, now: Timestamp, train: TrainId) {
         if let Some(recovery) = self.dangers.get_mut(&train).filter(|recovery| recovery.is_searched()) {
-            recovery.phase = Phase::GivenUp;
-            if let Some((_, order)) = recovery.interrupted.take() {
-                self.notify(Notice::Cancelled { train, order });
-            }
-            self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
+            let order = recovery.give_up();
+            self.rest_without(now, train, order);
         }
         self.trust_again(train);
     }
@@ -211,10 +208,14 @@ impl Watchdog {
             Phase::GivenUp => return,
             _ => "while it was measured again",
         };
-        recovery.phase = Phase::GivenUp;
-        let order = recovery.interrupted.take();
+        let order = recovery.give_up();
         self.notify(Notice::NeedsOperator { train, while_it });
-        if let Some((_, order)) = order {
+        self.rest_without(now, train, order);
+    }
+
+    /// Cancels the order that a recovery had interrupted, and stops the train.
+    fn rest_without(&mut self, now: Timestamp, train: TrainId, interrupted: Option<(OrderId, Order)>) {
+        if let Some((_, order)) = interrupted {
             self.notify(Notice::Cancelled { train, order });
         }
         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });

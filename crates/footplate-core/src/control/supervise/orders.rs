@@ -15,51 +15,55 @@ impl Watchdog {
     /// As [`Driver::order`], and if the train is held, the station silent or the power off.
     pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
         self.check(now, &order)?;
+        self.carry_out(now, order)
+    }
+
+    /// Carries out an order that was checked.
+    pub(in crate::control) fn carry_out(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
         if let Order::Speed { train, step: SpeedStep::STAND } = order
             && self.dangers.get(&train).is_some_and(Recovery::is_active)
         {
             // What an operator has stopped stays at rest until an operator moves it.
             self.need_operator(now, train);
         }
-        self.carry_out(now, order)
+        self.give(now, order)
     }
 
     /// Refuses an order that is not carried out now. The only train is trusted again first: an operator who runs it over a sensor
     /// locates it.
     pub(in crate::control) fn check(&mut self, now: Timestamp, order: &Order) -> Result<(), Refusal> {
         self.driver.check(order)?;
-        if let Some(train) = order.train() {
-            let stops = matches!(order, Order::Speed { step: SpeedStep::STAND, .. });
-            if !stops && matches!(order, Order::Speed { .. }) && self.driver.trains().count() == 1 {
-                self.trust_again(train);
-            }
-            if !stops && (self.is_held(train) || self.could_meet(now, train)) {
-                let is_moved = self.dangers.is_empty() && self.has_intruder();
-                return Err(if is_moved { Refusal::TrackNotClear } else { Refusal::InDanger { train } });
-            }
-            if !stops && self.is_silent() {
-                return Err(Refusal::NoAnswer);
-            }
-            if !stops && !self.is_powered() {
-                return Err(Refusal::NoPower);
-            }
-            if matches!(order, Order::Reverse { .. })
-                && self.driver.is_at_rest(train, now)
-                && let Some(need) = self.driver.missing_for_reversal(now, train)
-            {
-                let (turnout, curved) = (need.turnout, need.leg.is_curved());
-                return Err(Refusal::PositionLost { train, turnout, curved });
-            }
+        let stops = matches!(order, Order::Speed { step: SpeedStep::STAND, .. });
+        let Some(train) = order.train().filter(|_| !stops) else { return Ok(()) };
+        if matches!(order, Order::Speed { .. }) && self.driver.trains().count() == 1 {
+            self.trust_again(train);
+        }
+        if self.is_held(train) || self.could_meet(now, train) {
+            let is_moved = self.dangers.is_empty() && self.has_intruder();
+            return Err(if is_moved { Refusal::TrackNotClear } else { Refusal::InDanger { train } });
+        }
+        if self.is_silent() {
+            return Err(Refusal::NoAnswer);
+        }
+        if !self.is_powered() {
+            return Err(Refusal::NoPower);
+        }
+        if matches!(order, Order::Reverse { .. })
+            && self.driver.is_at_rest(train, now)
+            && let Some(need) = self.driver.missing_for_reversal(now, train)
+        {
+            let (turnout, curved) = (need.turnout, need.leg.is_curved());
+            return Err(Refusal::PositionLost { train, turnout, curved });
         }
         Ok(())
     }
 
     /// Stops a train, as a dispatcher: its recovery goes on.
     pub(in crate::control) fn halt(&mut self, now: Timestamp, train: TrainId) {
-        let _ = self.carry_out(now, Order::Speed { train, step: SpeedStep::STAND });
+        let _ = self.give(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 
-    fn carry_out(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
+    fn give(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
         let id = self.driver.order(now, order)?;
         if let Some(train) = order.train() {
             if matches!(order, Order::Speed { step: SpeedStep::STAND, .. }) {

@@ -140,6 +140,12 @@ impl Recovery {
         }
     }
 
+    /// An operator is needed; returns the order that it had interrupted.
+    pub(super) const fn give_up(&mut self) -> Option<(OrderId, Order)> {
+        self.phase = Phase::GivenUp;
+        self.interrupted.take()
+    }
+
     /// Whether it creeps to be located.
     pub(super) const fn creeps(&self) -> bool {
         matches!(self.phase, Phase::Locating { .. })
