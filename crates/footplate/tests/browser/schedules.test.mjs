@@ -30,25 +30,27 @@ test("a schedule is written stop by stop, checked, saved and run line by line", 
   await until(page, () => document.querySelector("#stop-train").value === "24");
   await say(program, "turnout all straight");
   await page.selectOption("#stop-place", "C13");
+  // Before C13 the place would be called by the turnout: at ten times real time, a delay of this machine's moves a stop by centimetres.
+  await page.fill("#stop-beyond", "300");
   await page.fill("#stop-wait", "2");
   await page.click("#add-stop button[type=submit]");
-  assert.equal(await page.inputValue("#schedule-lines"), "go 24 to C13\nwait 24 at rest\nwait 2s");
+  assert.equal(await page.inputValue("#schedule-lines"), "go 24 to C13+300mm\nwait 24 at rest\nwait 2s");
   // Each line that cannot be read is named with its column.
-  await page.fill("#schedule-lines", "go 24 to C13\nwait 24 at rest\nwait 2s\nlight 24 onn\nquit");
+  await page.fill("#schedule-lines", "go 24 to C13+300mm\nwait 24 at rest\nwait 2s\nlight 24 onn\nquit");
   await page.fill("#schedule-name", "Evening");
   await page.click("#schedule-save");
   await until(page, () => document.querySelector("#schedule-answer.bad"));
   const mistakes = await page.locator("#schedule-answer").textContent();
   assert.match(mistakes, /line 4, column 10: `onn` should be `on` or `off`/);
   assert.match(mistakes, /line 5: `quit` is not for schedules/);
-  await page.fill("#schedule-lines", "go 24 to C13\nwait 24 at rest\nwait 2s\nlight 24 on");
+  await page.fill("#schedule-lines", "go 24 to C13+300mm\nwait 24 at rest\nwait 2s\nlight 24 on");
   await page.fill("#schedule-rounds", "2");
   await page.click("#schedule-save");
   await page.waitForSelector("[data-run='Evening']");
   assert.deepEqual(await findings(page), []);
 
   await page.click("[data-run='Evening']");
-  await until(page, () => document.querySelector(".schedule li[data-state='active'] code")?.textContent === "go 24 to C13");
+  await until(page, () => document.querySelector(".schedule li[data-state='active'] code")?.textContent === "go 24 to C13+300mm");
   await page.screenshot({ path: join(AT, "schedules.png"), fullPage: true });
   assert.match(await page.locator(".schedule [role=status]").textContent(), /Round [12] of 2/, "a busy machine may be in the second one");
   await until(page, () => /Round 2 of 2/.test(document.querySelector(".schedule [role=status]").textContent));
