@@ -9,10 +9,10 @@ use super::recovery::{Phase, Recovery};
 use super::watchdog::Watchdog;
 
 impl Watchdog {
-    /// Carries out an order; see [`Driver::order`].
+    /// Carries out an order; see [`Driver::order`](crate::control::Driver::order).
     ///
     /// # Errors
-    /// As [`Driver::order`], and if the train is held, the station silent or the power off.
+    /// As [`Driver::order`](crate::control::Driver::order), and if the train is held, the station silent or the power off.
     pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
         self.check(now, &order)?;
         self.carry_out(now, order)
