@@ -279,7 +279,10 @@ impl<A: Awaited> Dialogue<A> {
         if self.farewell.has_begun() {
             return Err(CommandError::Closed);
         }
-        self.waiting.push(command).map_err(CommandError::TooManyWaiting)
+        self.waiting.push(command).map_err(CommandError::TooManyWaiting)?;
+        // What a session asks from now on must not switch the power on again.
+        self.power &= command != Command::PowerOff;
+        Ok(())
     }
 
     /// Returns when to continue. `usual`: the session's next question; `release`: when to switch a coil off; `asks`: whether more
@@ -299,17 +302,19 @@ impl<A: Awaited> Dialogue<A> {
             let free = train_of(command).and_then(|train| self.outstanding.blocks(train, stops));
             free.unwrap_or(Timestamp::ZERO).max(if stops { urgent } else { paced })
         };
+        // What is due and held back by something else must not hide what comes next.
+        let is_coming = |at: &Timestamp| *at > self.now;
         let times = [
             usual,
             release.map(|due| due.max(urgent)),
             asks.then_some(paced),
-            self.waiting.iter().map(of_command).min(),
-            self.outstanding.due(true).map(|due| due.max(urgent)),
-            self.outstanding.due(false).map(|due| due.max(paced)),
+            self.waiting.iter().map(of_command).filter(is_coming).min(),
+            self.outstanding.due(true).map(|due| due.max(urgent)).filter(is_coming).min(),
+            self.outstanding.due(false).map(|due| due.max(paced)).filter(is_coming).min(),
             self.silence.due(),
             self.farewell.due(),
         ];
-        times.into_iter().flatten().filter(|at| *at > self.now).min()
+        times.into_iter().flatten().filter(is_coming).min()
     }
 
     // What the station says.
@@ -409,7 +414,12 @@ impl<A: Awaited> Dialogue<A> {
     pub(crate) fn restarted(&mut self) {
         self.notify(LinkNotice::Restarted);
         self.outstanding.clear();
+        let is_switched_off = self.waiting.iter().any(|command| *command == Command::PowerOff);
         self.waiting.clear();
+        if is_switched_off {
+            // An emergency stop is written to the station whatever it has forgotten.
+            let _ = self.waiting.push(Command::PowerOff);
+        }
         for locomotive in self.locomotives.iter_mut() {
             locomotive.step = SpeedStep::STAND;
         }

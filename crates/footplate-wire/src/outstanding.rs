@@ -195,9 +195,9 @@ impl<A: Awaited> AllOutstanding<A> {
         })
     }
 
-    /// Returns when the next request is overdue, of those that stop something or of the rest.
-    pub(crate) fn due(&self, urgent: bool) -> Option<Timestamp> {
-        self.0.iter().filter(|outstanding| outstanding.is_urgent() == urgent).map(Outstanding::due).min()
+    /// Returns when requests are overdue, of those that stop something or of the rest.
+    pub(crate) fn due(&self, urgent: bool) -> impl Iterator<Item = Timestamp> {
+        self.0.iter().filter(move |outstanding| outstanding.is_urgent() == urgent).map(Outstanding::due)
     }
 
     /// Until when a command to a train waits for the answer to an earlier one.

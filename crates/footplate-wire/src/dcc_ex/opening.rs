@@ -36,11 +36,11 @@ impl Opening {
         if settings.resets_on_open { Self::Banner { until: now + BANNER_WITHIN } } else { Self::Identity }
     }
 
-    /// The board is there: sensors, turnouts, power, and a request that is always answered, after which all else has been.
-    pub(super) fn ask_states(settings: &Settings, power: bool) -> Self {
+    /// The board is there: sensors, turnouts, power, and a request that is always answered, after which all else has been. Whether power
+    /// is switched on or off is decided when it is written.
+    pub(super) fn ask_states(settings: &Settings) -> Self {
         let turnouts = (settings.turnouts == TurnoutRequests::Defined).then_some(Request::Turnouts);
-        let power = if power { Power::Main } else { Power::All };
-        let power = Request::Power { on: power == Power::Main, tracks: power };
+        let power = Request::Power { on: true, tracks: Power::Main };
         Self::States(
             [Request::SensorStates].into_iter().chain(turnouts).chain([power, Request::Slots]).collect(),
         )

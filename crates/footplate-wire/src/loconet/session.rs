@@ -80,7 +80,7 @@ impl Client {
             dialogue: Dialogue::new(now, PACING, CHECKS),
             lines: Lines::default(),
             outbox: Outbox::default(),
-            opening: Opening::asking(questions(true)),
+            opening: Opening::asking(questions()),
             next_interrogation: now,
             slots: DrivenSlots::default(),
             unused: Vec::new(),
@@ -141,6 +141,11 @@ impl Client {
 
     /// A question of the opening.
     fn question(&mut self, now: Timestamp, request: Request) -> Outgoing<Awaited> {
+        // An emergency stop may have come since the question was put in the list.
+        let request = match request {
+            Request::Power { .. } => Request::Power { on: self.dialogue.power },
+            other => other,
+        };
         let awaited = match request {
             Request::Power { on } => Awaited::Power(on),
             Request::Interrogate(nth) => {
@@ -175,14 +180,15 @@ impl Client {
 
     /// Reads all states again, including every locomotive's.
     fn verify(&mut self) {
-        self.opening = Opening::asking(questions(self.dialogue.power));
+        self.opening = Opening::asking(questions());
         self.unverified = self.dialogue.directed();
     }
 }
 
-/// What is asked before trains are driven: whether the station answers, the power, and what detectors see.
-fn questions(power: bool) -> impl Iterator<Item = Request> {
-    let first = [Request::Slot(0), Request::Power { on: power }];
+/// What is asked before trains are driven: whether the station answers, the power, and what detectors see. Whether power is switched on
+/// or off is decided when it is written.
+fn questions() -> impl Iterator<Item = Request> {
+    let first = [Request::Slot(0), Request::Power { on: true }];
     first.into_iter().chain((0..INTERROGATIONS).map(Request::Interrogate)).chain([Request::Slot(0)])
 }
 

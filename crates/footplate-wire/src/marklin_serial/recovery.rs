@@ -11,12 +11,21 @@ use alloc::collections::VecDeque;
 
 use super::codec::Message;
 
+/// A message of a recovery.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Word {
+    /// Power on or off, as it is wanted when the message is sent.
+    Power,
+    SolenoidOff,
+    ResetMode,
+}
+
 /// The messages still to send, and whether the interface may be out of step.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Recovery {
-    words: VecDeque<Message>,
+    words: VecDeque<Word>,
     /// What is to be sent once a whole reply has come.
-    later: Option<Message>,
+    later: Option<Word>,
     /// Nothing was answered since the last recovery began.
     is_unanswered: bool,
     /// The interface may take the next byte for the second one of a message.
@@ -27,29 +36,35 @@ pub(super) struct Recovery {
 
 impl Recovery {
     /// After a disturbance: as little as brings it into step, unless that was tried and not answered.
-    pub(super) fn begin(&mut self, power: Message) {
+    pub(super) fn begin(&mut self) {
         if self.is_unanswered {
-            self.begin_anew(power);
-            self.later = Some(power);
+            self.begin_anew();
+            self.later = Some(Word::Power);
             return;
         }
         self.words.clear();
-        self.words.push_back(power);
-        (self.later, self.is_unanswered, self.is_out_of_step) = (Some(Message::SolenoidOff), true, true);
+        self.words.push_back(Word::Power);
+        (self.later, self.is_unanswered, self.is_out_of_step) = (Some(Word::SolenoidOff), true, true);
     }
 
     /// All messages that an interface in an unknown state needs.
-    pub(super) fn begin_anew(&mut self, power: Message) {
+    pub(super) fn begin_anew(&mut self) {
         self.words.clear();
         // The first may be swallowed.
-        self.words.extend([power, power, Message::SolenoidOff, Message::ResetMode { on: true }]);
+        self.words.extend([Word::Power, Word::Power, Word::SolenoidOff, Word::ResetMode]);
         (self.later, self.is_unanswered, self.is_out_of_step) = (None, true, true);
     }
 
-    /// The next message. A release is left out while a solenoid is powered on purpose.
-    pub(super) fn next(&mut self, solenoid_is_powered: bool) -> Option<Message> {
+    /// The next message; `power`: the one that switches the power as it is wanted now. A release is left out while a solenoid is
+    /// powered on purpose.
+    pub(super) fn next(&mut self, solenoid_is_powered: bool, power: Message) -> Option<Message> {
         let word = self.words.pop_front()?;
-        if word == Message::SolenoidOff && solenoid_is_powered { self.words.pop_front() } else { Some(word) }
+        let is_left_out = word == Word::SolenoidOff && solenoid_is_powered;
+        Some(match if is_left_out { self.words.pop_front()? } else { word } {
+            Word::Power => power,
+            Word::SolenoidOff => Message::SolenoidOff,
+            Word::ResetMode => Message::ResetMode { on: true },
+        })
     }
 
     /// Notes a frame that has left; returns whether it was one of these messages.
@@ -63,7 +78,7 @@ impl Recovery {
         self.is_unanswered = false;
         if let Some(later) = self.later.take() {
             // A byte that is swallowed as the address of a turnout powers a solenoid: the release comes last.
-            self.words.extend([later, Message::ResetMode { on: true }, Message::SolenoidOff]);
+            self.words.extend([later, Word::ResetMode, Word::SolenoidOff]);
         }
     }
 

@@ -98,7 +98,7 @@ impl Interface {
             nudged: true,
             output: VecDeque::new(),
         };
-        interface.recovery.begin_anew(interface.power_word());
+        interface.recovery.begin_anew();
         Ok(interface)
     }
 
@@ -178,7 +178,7 @@ impl Interface {
         let hurries = in_step && self.solenoid.hurries(now);
         let stops = in_step && !hurries && self.waiting.has_urgent();
         if !(hurries || stops || in_step && self.is_overtaken)
-            && let Some(word) = self.recovery.next(self.solenoid.is_powered())
+            && let Some(word) = self.recovery.next(self.solenoid.is_powered(), self.power_word())
         {
             return Some((word, Purpose::Recovery));
         }
@@ -203,7 +203,7 @@ impl Interface {
             return Some((self.decoders.message(command), Purpose::Command(command)));
         }
         if core::mem::take(&mut self.disturbed) {
-            self.recovery.begin(self.power_word());
+            self.recovery.begin();
             self.exchange = Exchange::Quiet(Quiet::begin(now, now, false));
             return None;
         }
@@ -345,7 +345,7 @@ impl Session for Interface {
         // Its next answer is news: trains wait for it.
         self.silence = Silence::default();
         self.distrust(now, now);
-        self.recovery.begin_anew(self.power_word());
+        self.recovery.begin_anew();
         self.pacing = Pacing::new(now, self.settings.pace);
         self.go_on(now);
     }

@@ -77,7 +77,7 @@ impl Client {
         let mut client = Self {
             settings,
             dialogue: Dialogue::new(now, PACING, CHECKS),
-            opening: Opening::asking(settings.questions(wanted, false, true)),
+            opening: Opening::asking(settings.questions(wanted, false)),
             sensors: Sensors::default(),
             outputs: Outputs::default(),
             wanted,

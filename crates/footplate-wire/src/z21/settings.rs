@@ -52,8 +52,8 @@ impl Settings {
     /// What the station is asked before trains are driven: what it is, what it tells this client, where trains are, and the power.
     ///
     /// `is_subscribed`: whether this client has already subscribed. Then it only asks, so that a station that was
-    /// restarted is recognised by what it has forgotten.
-    pub(super) fn questions(&self, wanted: Broadcasts, is_subscribed: bool, power: bool) -> Vec<Request> {
+    /// restarted is recognised by what it has forgotten. Whether power is switched on or off is decided when it is written.
+    pub(super) fn questions(&self, wanted: Broadcasts, is_subscribed: bool) -> Vec<Request> {
         let broadcasts = if is_subscribed { Request::Broadcasts } else { Request::SetBroadcasts(wanted) };
         let first = [Request::SerialNumber, Request::Hardware, Request::LockCode, broadcasts];
         let groups = self.groups().map(|group| Request::Feedback { group });
@@ -63,7 +63,7 @@ impl Settings {
             Feedback::LocoNet => Some(Request::ALL_LOCO_NET),
         };
         let groups = groups.filter(|_| detectors.is_none());
-        let last = [Request::Power { on: power }, Request::Status];
+        let last = [Request::Power { on: true }, Request::Status];
         first.into_iter().chain(groups).chain(detectors).chain(last).collect()
     }
 

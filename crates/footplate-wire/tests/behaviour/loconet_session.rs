@@ -11,7 +11,7 @@ use footplate_wire::{CommandError, LinkNotice, ReportedFunctions, Session};
 use crate::desk::{Station, T24, T58, function, ms, speed};
 
 /// A server and a command station that answer as the protocols say.
-struct Server {
+pub(crate) struct Server {
     slots: BTreeMap<u8, SlotData>,
     power: bool,
     occupied: Vec<u16>,
@@ -115,10 +115,10 @@ impl Station for Server {
     }
 }
 
-type Desk = crate::desk::Desk<Client, Server>;
+pub(crate) type Desk = crate::desk::Desk<Client, Server>;
 
 impl Desk {
-    fn new(settings: Settings) -> Self {
+    pub(crate) fn new(settings: Settings) -> Self {
         let station = Server {
             slots: BTreeMap::new(),
             power: false,

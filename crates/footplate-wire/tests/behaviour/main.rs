@@ -13,6 +13,7 @@ mod dcc_ex_session;
 mod dcc_ex_vectors;
 mod desk;
 mod directions;
+mod emergency_stops;
 mod floods;
 mod jmri_codec;
 mod jmri_session;

@@ -101,7 +101,7 @@ test("the prompt lists, begins and ends saved schedules by name", async () => {
   await give('schedule run "Round and round"');
   await log("schedule `Round and round` begins");
   await give("schedule list");
-  await log("schedule `Round and round` runs: round 1");
+  await log("schedule `Round and round` runs: round");
   await log("schedule `Evening` is saved");
   await give("schedule end Round and round");
   await log("schedule `Round and round` was ended");

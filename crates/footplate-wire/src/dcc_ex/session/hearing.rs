@@ -91,7 +91,7 @@ impl Client {
 
     /// Reads all states again, including every locomotive's.
     fn verify(&mut self) {
-        self.opening = Opening::ask_states(&self.settings, self.dialogue.power);
+        self.opening = Opening::ask_states(&self.settings);
         self.unverified = self.dialogue.directed();
     }
 

@@ -44,7 +44,7 @@ impl Interface {
         }
         (self.disturbed, self.is_overtaken) = (false, false);
         self.exchange = Exchange::Quiet(Quiet::begin(now, heard, true));
-        self.recovery.begin(self.power_word());
+        self.recovery.begin();
     }
 
     /// What the interface may have missed before the lost reply.
@@ -149,7 +149,7 @@ impl Interface {
                 self.notify(LinkNotice::ReplyLost { expected, found: expected + 1 });
                 self.garbled(now);
                 self.exchange = Exchange::Quiet(Quiet::begin(now, now, false));
-                self.recovery.begin(self.power_word());
+                self.recovery.begin();
             }
             Exchange::Quiet(quiet) => {
                 quiet.disturb(now);

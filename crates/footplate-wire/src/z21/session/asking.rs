@@ -53,6 +53,11 @@ impl Client {
 
     /// Returns a request, with the answer that it has.
     pub(super) const fn question(&self, request: Request) -> Outgoing<Awaited> {
+        // An emergency stop may have come since the question was put in the list.
+        let request = match request {
+            Request::Power { .. } => Request::Power { on: self.dialogue.power },
+            other => other,
+        };
         let awaited = match request {
             Request::SerialNumber => Awaited::SerialNumber,
             Request::Hardware => Awaited::Hardware,

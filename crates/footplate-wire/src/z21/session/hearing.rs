@@ -104,8 +104,7 @@ impl Client {
 
     /// Reads all states again, including every locomotive's.
     pub(super) fn verify(&mut self) {
-        self.opening =
-            Opening::asking(self.settings.questions(self.wanted, self.is_subscribed, self.dialogue.power));
+        self.opening = Opening::asking(self.settings.questions(self.wanted, self.is_subscribed));
         self.unverified = self.dialogue.directed();
     }
 
