@@ -1,6 +1,6 @@
 //! Trains in danger come back into service, or wait where creeping is not permitted.
 
-use footplate_core::control::{Alarm, LinkNews, Notice, Order, Reservation};
+use footplate_core::control::{Alarm, LinkNews, Notice, Order, Refusal, Reservation};
 use footplate_core::track::Leg;
 use footplate_core::tracking::PathPoint;
 use footplate_core::{Command, Length, SpeedStep, TimeSpan, TurnoutId};
@@ -162,6 +162,67 @@ fn a_recovery_that_an_operator_stops_does_not_go_on_by_itself() {
     watched.dog.order(watched.world.now, stop).expect("a stop is always taken");
     watched.run(80.0);
     stays_at_rest(&watched, since);
+}
+
+#[test]
+fn an_operators_stop_also_holds_a_train_that_only_waits_to_be_located() {
+    // Given a lost train that has asked to creep and waits,
+    let mut watched = Watched::asking();
+    watched.dog.lose(watched.world.now, FIRST);
+    let asks = |watched: &Watched| {
+        watched.notices.iter().any(|notice| matches!(notice, Notice::AsksToCreep { train: FIRST, .. }))
+    };
+    assert!(watched.run_until(60.0, asks), "{:#?}", watched.notices);
+    let since = watched.commanded.len();
+    // when an operator stops it, and the way becomes free,
+    let stop = Order::Speed { train: FIRST, step: SpeedStep::STAND };
+    watched.dog.order(watched.world.now, stop).expect("a stop is always taken");
+    watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
+    watched.run(40.0);
+    // then it stays at rest.
+    stays_at_rest(&watched, since);
+}
+
+#[test]
+fn a_train_that_is_lost_while_the_power_is_off_waits_for_an_operator() {
+    let mut watched = Watched::asking();
+    watched.dog.switch_power(watched.world.now, false);
+    watched.run(20.0);
+    watched.dog.lose(watched.world.now, FIRST);
+    let since = watched.commanded.len();
+    watched.dog.switch_power(watched.world.now, true);
+    watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
+    watched.run(60.0);
+    stays_at_rest(&watched, since);
+}
+
+#[test]
+fn a_refused_order_ends_no_danger() {
+    // Given the only train, whose recovery was given up by an emergency stop,
+    let (mut watched, since) = creeping();
+    watched.dog.switch_power(watched.world.now, false);
+    watched.run(20.0);
+    // when it is to run without power,
+    let run = Order::Speed { train: FIRST, step: SpeedStep::new(5).expect("a step") };
+    assert_eq!(watched.dog.order(watched.world.now, run), Err(Refusal::NoPower));
+    // then it stays in danger, and with power does not start by itself.
+    assert!(watched.dog.is_in_danger(FIRST));
+    watched.dog.switch_power(watched.world.now, true);
+    watched.run(20.0);
+    stays_at_rest(&watched, since);
+    // Ordered again, it runs: over a sensor it will be located.
+    watched.dog.order(watched.world.now, run).expect("an operator sees to it");
+    assert!(!watched.dog.is_in_danger(FIRST));
+}
+
+#[test]
+fn a_creeping_train_stops_while_the_line_is_silent() {
+    let (mut watched, since) = creeping();
+    watched.dog.handle_link(watched.world.now, LinkNews::Silent);
+    watched.run(15.0);
+    let runs = |(_, command): &(_, Command)| matches!(command, Command::Speed { step, .. } if *step > SpeedStep::STAND);
+    assert!(!watched.commanded.iter().skip(since).any(runs), "{:#?}", watched.commanded);
+    assert!(watched.world.train().speed_mm_per_s < 1.0);
 }
 
 #[test]

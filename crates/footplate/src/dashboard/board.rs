@@ -75,8 +75,10 @@ impl Request {
         match self {
             Self::EmergencyStop | Self::SavedSchedules(_) => true,
             Self::Line(line) => {
-                let words: Vec<&str> = line.split_whitespace().collect();
-                matches!(words[..], ["stop", ..] | ["speed", _, "0"] | ["power", "off"])
+                let said = line.split('#').next().unwrap_or_default();
+                let words: Vec<&str> = said.split_whitespace().collect();
+                // A stop at a place makes a train run that stands.
+                matches!(words[..], ["halt"] | ["stop", _] | ["speed", _, "0"])
             }
             _ => false,
         }
@@ -376,7 +378,15 @@ mod tests {
     #[test]
     fn what_was_answered_with_a_timeout_is_not_carried_out_later_unless_it_stops_trains() {
         let board = Board::new(7);
-        let lines = ["speed 24 8", "reverse 24", "stop 24", "speed 24 0", "power off", "power on"];
+        let lines = [
+            "speed 24 8",
+            "reverse 24",
+            "stop 24 # now",
+            "stop 24 at C13 at step 8",
+            "speed 24 0",
+            "halt",
+            "power on",
+        ];
         for line in lines {
             drop(board.ask(Request::Line(line.into())).expect("room"));
         }
@@ -384,7 +394,7 @@ mod tests {
         drop(board.ask(Request::EmergencyStop).expect("always"));
         let carried_out = std::iter::from_fn(|| board.next_request()).map(|pending| pending.request);
         let expected =
-            ["stop 24", "speed 24 0", "power off", "speed 58 8"].map(|line| Request::Line(line.into()));
+            ["stop 24 # now", "speed 24 0", "halt", "speed 58 8"].map(|line| Request::Line(line.into()));
         assert!(carried_out.eq([Request::EmergencyStop].into_iter().chain(expected)));
     }
 }

@@ -63,7 +63,7 @@ pub(crate) fn keep(cable: Cable, restarts: bool) -> anyhow::Result<ExitCode> {
         (watched.has_will, watched.runs) = (false, false);
         let (mut child, stream) = start().context("cannot start the program that drives")?;
         signals.pass_on_to(Some(child.id()));
-        if signals.gives_up() {
+        if signals.ends() {
             signals.pass_on_late();
         }
         let mut frames = FrameReader::new(stream.try_clone()?);
@@ -94,7 +94,7 @@ pub(crate) fn keep(cable: Cable, restarts: bool) -> anyhow::Result<ExitCode> {
             say(&what_happened(ended, was_late, said));
             restore(modes.as_ref());
         }
-        if !(restarts && died && said && !ended.success()) || signals.gives_up() {
+        if !(restarts && died && said && !ended.success()) || signals.ends() {
             return Ok(exit_code(ended));
         }
         if since.elapsed() < LONG_ENOUGH {
@@ -103,7 +103,7 @@ pub(crate) fn keep(cable: Cable, restarts: bool) -> anyhow::Result<ExitCode> {
         }
         say("the program is started again");
         std::thread::sleep(RESTART_AFTER);
-        if signals.gives_up() {
+        if signals.ends() {
             say("a signal asked it to end: it is not started again");
             return Ok(exit_code(ended));
         }

@@ -14,6 +14,7 @@ const NONE: i32 = 0;
 pub(super) struct Signals {
     child: Arc<AtomicI32>,
     gives_up: Arc<AtomicBool>,
+    ends: Arc<AtomicBool>,
 }
 
 impl Signals {
@@ -23,7 +24,8 @@ impl Signals {
     /// # Errors
     /// The system refuses the handlers.
     pub(super) fn listen() -> std::io::Result<Self> {
-        let signals = Self { child: Arc::new(AtomicI32::new(NONE)), gives_up: Arc::default() };
+        let signals =
+            Self { child: Arc::new(AtomicI32::new(NONE)), gives_up: Arc::default(), ends: Arc::default() };
         let mut incoming = signal_hook::iterator::Signals::new([SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGTSTP])?;
         let heard = signals.clone();
         std::thread::spawn(move || incoming.forever().for_each(|signal| heard.hear(signal)));
@@ -44,8 +46,11 @@ impl Signals {
                 // The child may have ended at this moment.
                 let _ = wanted.map(|signal| kill_process(child, signal));
             }
-            None if matches!(signal, SIGINT | SIGTERM) => self.gives_up.store(true, Ordering::Release),
-            None => {}
+            None => {
+                let asks = matches!(signal, SIGINT | SIGTERM);
+                self.gives_up.fetch_or(asks, Ordering::Release);
+                self.ends.fetch_or(asks || signal == SIGHUP, Ordering::Release);
+            }
         }
     }
 
@@ -62,9 +67,14 @@ impl Signals {
         }
     }
 
-    /// Whether a signal asked not to wait any longer.
+    /// Whether a signal asked not to wait any longer for a line over which trains are to be stopped.
     pub(super) fn gives_up(&self) -> bool {
         self.gives_up.load(Ordering::Acquire)
+    }
+
+    /// Whether a signal asked to start no program any more; the end of the terminal is one.
+    pub(super) fn ends(&self) -> bool {
+        self.ends.load(Ordering::Acquire)
     }
 }
 

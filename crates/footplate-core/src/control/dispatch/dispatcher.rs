@@ -177,9 +177,13 @@ impl Dispatcher {
     /// Sets the position of a train, as an operator entered it.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: PathPoint, uncertainty: Length) {
         self.watchdog.place(now, train, at, uncertainty);
-        self.awaiting_creep.remove(&train);
+        // A train whose speed or direction is in danger is measured again, wherever it was placed.
+        let is_in_danger = self.watchdog.is_in_danger(train);
+        if !is_in_danger {
+            self.awaiting_creep.remove(&train);
+        }
         if let Some(known) = self.trains.get_mut(&train) {
-            known.state = State::Resting;
+            known.state = if is_in_danger { State::InDanger } else { State::Resting };
             known.detected_since_reversal = false;
             known.detected_since_start = true;
             known.authorities.clear();

@@ -51,6 +51,13 @@ impl Watchdog {
             LinkNews::Silent if self.silent.is_none() => {
                 self.silent = Some(now);
                 self.distrust_last_commands(now);
+                // What creeps to be located would pass the sensors that end it without a report.
+                let creeping = self.dangers.iter().filter(|(_, recovery)| recovery.is_active());
+                let creeping: Vec<TrainId> = creeping.map(|(train, _)| *train).collect();
+                self.interrupt_recoveries(now);
+                for train in creeping {
+                    self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
+                }
                 let trains: Vec<TrainId> = self.driver.trains().collect();
                 for train in trains {
                     // A station that went off took the power with it: a train that was braking stands short of its stop.
@@ -81,7 +88,10 @@ impl Watchdog {
     /// recovered.
     pub fn switch_power(&mut self, now: Timestamp, on: bool) {
         if on {
-            self.is_switched_off = false;
+            if core::mem::take(&mut self.is_switched_off) {
+                // Of trains whose danger showed while the power was off, too.
+                self.give_up_recoveries(now);
+            }
             self.clear_intruder();
             if self.is_powered() {
                 self.release_held();
@@ -90,12 +100,17 @@ impl Watchdog {
         } else {
             self.is_switched_off = true;
             self.cut_power(now);
-            let recovered: Vec<TrainId> = self.dangers.keys().copied().collect();
-            for train in recovered {
-                self.need_operator(now, train);
-            }
+            self.give_up_recoveries(now);
         }
         self.act(now);
+    }
+
+    /// From now on an operator has to see to each train in danger.
+    fn give_up_recoveries(&mut self, now: Timestamp) {
+        let recovered: Vec<TrainId> = self.dangers.keys().copied().collect();
+        for train in recovered {
+            self.need_operator(now, train);
+        }
     }
 
     /// Switches a function of a train, such as its light; it does not affect the motion.

@@ -5,7 +5,7 @@ use crate::control::drive::{Order, OrderId};
 use crate::ids::{SpeedStep, TrainId};
 use crate::time::Timestamp;
 
-use super::recovery::{Phase, Recovery};
+use super::recovery::Phase;
 use super::watchdog::Watchdog;
 
 impl Watchdog {
@@ -20,26 +20,32 @@ impl Watchdog {
 
     /// Carries out an order that was checked.
     pub(in crate::control) fn carry_out(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
-        if let Order::Speed { train, step: SpeedStep::STAND } = order
-            && self.dangers.get(&train).is_some_and(Recovery::is_active)
-        {
-            // What an operator has stopped stays at rest until an operator moves it.
+        if let Order::Speed { train, step: SpeedStep::STAND } = order {
+            // What an operator has stopped stays at rest until an operator moves it, also if it only waits to be located.
             self.need_operator(now, train);
+        } else if let Some(train) = self.trusted_by(&order) {
+            self.trust_again(train);
         }
         self.give(now, order)
     }
 
-    /// Refuses an order that is not carried out now. The only train is trusted again first: an operator who runs it over a sensor
-    /// locates it.
-    pub(in crate::control) fn check(&mut self, now: Timestamp, order: &Order) -> Result<(), Refusal> {
+    /// The train that an order trusts again although its recovery was given up: the only one, which an operator runs over a sensor to
+    /// locate it.
+    fn trusted_by(&self, order: &Order) -> Option<TrainId> {
+        let Order::Speed { train, .. } = order else { return None };
+        let is_given_up = self.dangers.get(train).is_some_and(|danger| danger.phase == Phase::GivenUp);
+        (is_given_up && self.driver.trains().count() == 1).then_some(*train)
+    }
+
+    /// Refuses an order that is not carried out now.
+    pub(in crate::control) fn check(&self, now: Timestamp, order: &Order) -> Result<(), Refusal> {
         self.driver.check(order)?;
         let stops = matches!(order, Order::Speed { step: SpeedStep::STAND, .. });
         let Some(train) = order.train().filter(|_| !stops) else { return Ok(()) };
-        if matches!(order, Order::Speed { .. }) && self.driver.trains().count() == 1 {
-            self.trust_again(train);
-        }
-        if self.is_held(train) || self.could_meet(now, train) {
-            let is_moved = self.dangers.is_empty() && self.has_intruder();
+        let is_trusted = self.trusted_by(order).is_some();
+        let could_meet = if is_trusted { self.has_intruder() } else { self.could_meet(now, train) };
+        if !is_trusted && self.is_held(train) || could_meet {
+            let is_moved = (is_trusted || self.dangers.is_empty()) && self.has_intruder();
             return Err(if is_moved { Refusal::TrackNotClear } else { Refusal::InDanger { train } });
         }
         if self.is_silent() {

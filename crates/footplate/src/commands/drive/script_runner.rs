@@ -333,13 +333,17 @@ impl ScriptRunner {
     }
 
     fn send(&mut self, now: Timestamp, step: Step, train: TrainId, journey: Journey) {
+        if !step.is_retry {
+            // A new order looks for trains anew.
+            self.sought.clear();
+        }
         let before = self.dispatcher.journey(train);
         match self.dispatcher.go(now, train, journey) {
             Ok(id) => {
                 if let Some((before, _)) = before {
                     self.pending.remove(&before);
                 }
-                self.sought.clear();
+                self.deadlocks.remove(&train);
                 self.journeys.insert(id, now);
                 self.outputs.push_back(Output::Notice(SessionMessage::Begun(train)));
                 self.pending.insert(id, step);
