@@ -1,5 +1,6 @@
 //! What the protocol of a confirming station adds to the [`Dialogue`] that all of them share; a [`Session`] follows from it.
 
+use alloc::collections::VecDeque;
 use core::ops::{ControlFlow, RangeInclusive};
 
 use footplate_core::{
@@ -287,5 +288,24 @@ impl<P: Protocol> Session for P {
 
     fn closing(&self) -> Closing {
         self.dialogue().closing()
+    }
+}
+
+/// The state of the opening.
+#[derive(Debug, Clone)]
+pub(crate) enum Opening<Q> {
+    /// These are still to be asked, each when the one before is answered.
+    Asking(VecDeque<Q>),
+    /// Trains may be driven.
+    Open,
+}
+
+impl<Q> Opening<Q> {
+    pub(crate) fn asking(questions: impl IntoIterator<Item = Q>) -> Self {
+        Self::Asking(questions.into_iter().collect())
+    }
+
+    pub(crate) const fn is_open(&self) -> bool {
+        matches!(self, Self::Open)
     }
 }

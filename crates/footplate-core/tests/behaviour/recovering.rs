@@ -174,7 +174,7 @@ fn an_operators_stop_also_holds_a_train_that_only_waits_to_be_located() {
     };
     assert!(watched.run_until(60.0, asks), "{:#?}", watched.notices);
     let since = watched.commanded.len();
-    // when an operator stops it, and the way becomes free,
+    // when an operator stops it, and it is permitted to creep,
     let stop = Order::Speed { train: FIRST, step: SpeedStep::STAND };
     watched.dog.order(watched.world.now, stop).expect("a stop is always taken");
     watched.dog.permit(watched.world.now, FIRST, Reservation::empty());

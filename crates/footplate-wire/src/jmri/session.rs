@@ -15,11 +15,11 @@ use super::request::{LOCOMOTIVES, Request};
 use super::settings::{Settings, System};
 use super::throttle::ThrottleMessage;
 use crate::dcc_ex::{Throttle, speed_of};
-use crate::dialogue::{Dialogue, Opening};
+use crate::dialogue::Dialogue;
 use crate::locomotives::ReportedFunctions;
 use crate::outstanding::Outgoing;
 use crate::pacing::Pacing;
-use crate::protocol::Protocol;
+use crate::protocol::{Opening, Protocol};
 use crate::sensors::Sensors;
 use crate::silence::Checks;
 

@@ -19,10 +19,10 @@ use super::settings::{Settings, Transport};
 use super::solenoid::Solenoid;
 use super::speed::speed_of;
 use super::uid::Uid;
-use crate::dialogue::{Dialogue, Opening, Repeat};
+use crate::dialogue::{Dialogue, Repeat};
 use crate::outstanding::Outgoing;
 use crate::pacing::Pacing;
-use crate::protocol::Protocol;
+use crate::protocol::{Opening, Protocol};
 use crate::session::CommandError;
 use crate::silence::Checks;
 

@@ -19,10 +19,10 @@ use super::sensors::Sensors;
 use super::settings::Settings;
 use super::speed::Throttle;
 use super::turnouts::Outputs;
-use crate::dialogue::{Dialogue, Opening, Repeat};
+use crate::dialogue::{Dialogue, Repeat};
 use crate::outstanding::Outgoing;
 use crate::pacing::Pacing;
-use crate::protocol::Protocol;
+use crate::protocol::{Opening, Protocol};
 use crate::silence::Checks;
 
 /// Many quick datagrams from a computer are lost now and then; some milliseconds between them are asked for.

@@ -14,8 +14,8 @@ use super::super::throttle::ThrottleMessage;
 use super::super::time_model::occupied;
 use super::Client;
 use crate::dcc_ex::Throttle;
-use crate::dialogue::Opening;
 use crate::outstanding::Awaited as _;
+use crate::protocol::Opening;
 use crate::session::LinkNotice;
 
 /// JMRI's code for an object that is not in its tables; of those that are asked for here, only turnouts may be missing.

@@ -13,9 +13,9 @@ use super::super::speed::step_of;
 use super::super::time_model::{INPUTS_PER_MODULE, Order};
 use super::super::uid::Uid;
 use super::{Client, Query};
-use crate::dialogue::Opening;
 use crate::locomotives::ReportedFunctions;
 use crate::outstanding::Awaited as _;
+use crate::protocol::Opening;
 use crate::queue::train_of;
 use crate::session::LinkNotice;
 

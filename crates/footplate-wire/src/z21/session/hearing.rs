@@ -16,9 +16,9 @@ use super::super::speed::Throttle;
 use super::super::states::{Firmware, Lock, LocomotiveState, TurnoutPosition};
 use super::super::time_model::occupied;
 use super::{Client, DETECTORS_WITHIN};
-use crate::dialogue::Opening;
 use crate::locomotives::ReportedFunctions;
 use crate::outstanding::{Awaited as _, Outstanding};
+use crate::protocol::Opening;
 use crate::session::{LinkNotice, Transmit};
 
 /// A speed that a decoder reports again is passed on after this time: stations report many times a second (chosen: a few numbers
