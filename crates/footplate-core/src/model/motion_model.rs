@@ -148,7 +148,7 @@ impl MotionModel {
 
     /// Keeps the length that another copy of the model has measured better.
     pub(crate) const fn keep_length(&mut self, other: &Self) {
-        self.train_length = self.train_length.or_better(other.train_length);
+        self.train_length = self.train_length.or_newer(other.train_length);
     }
 
     /// The highest step of its decoder.

@@ -52,6 +52,9 @@ pub struct TrainLength {
     /// Measurements in a row that were not accepted.
     rejected: u8,
     date: Timestamp,
+    /// All measurements, those of earlier trains and those that were not accepted included.
+    #[cfg_attr(feature = "serde", serde(default))]
+    taken: u32,
 }
 
 impl Default for TrainLength {
@@ -62,6 +65,7 @@ impl Default for TrainLength {
             count: 0,
             rejected: 0,
             date: Timestamp::ZERO,
+            taken: 0,
         }
     }
 }
@@ -112,6 +116,7 @@ impl TrainLength {
     /// Takes a release. Returns whether it agrees with those before.
     pub fn take(&mut self, release: &BlockRelease) -> bool {
         let BlockRelease { beyond: [beyond, deviation], speed, window } = release;
+        self.taken = self.all_taken().saturating_add(1);
         let (v, deviation) = (speed.as_m_per_s(), deviation.as_m());
         let late = DELAY_SCATTER * DELAY_SCATTER + window.variance_s2();
         let r = deviation * deviation + BOUNDARY_SCATTER * BOUNDARY_SCATTER + v * v * late;
@@ -124,7 +129,7 @@ impl TrainLength {
             self.rejected += 1;
             if self.rejected >= ANOTHER_TRAIN {
                 let [_, delay] = self.x;
-                *self = Self { x: [LENGTH[0], delay], ..Self::default() };
+                *self = Self { x: [LENGTH[0], delay], taken: self.taken, ..Self::default() };
             }
             return false;
         }
@@ -149,10 +154,16 @@ impl TrainLength {
         true
     }
 
-    /// The better known of two: one was learnt while another copy of the model was in use.
+    /// The newer of two: one was learnt while another copy of the model was in use. A train that became shorter has a shorter count,
+    /// too, but has taken more measurements.
     #[must_use]
-    pub const fn or_better(self, other: Self) -> Self {
-        if other.count > self.count { other } else { self }
+    pub const fn or_newer(self, other: Self) -> Self {
+        if other.all_taken() > self.all_taken() { other } else { self }
+    }
+
+    /// All measurements; models of earlier versions have counted only those that were accepted.
+    const fn all_taken(&self) -> u32 {
+        if self.taken > self.count { self.taken } else { self.count }
     }
 }
 
@@ -209,5 +220,18 @@ mod tests {
         (0..4).for_each(|_| assert!(!length.take(&release(1_300.0, 300.0))));
         assert!(length.is_unknown());
         assert!(length.take(&release(1_300.0, 300.0)));
+    }
+
+    #[test]
+    fn a_longer_train_is_measured_although_a_copy_of_its_model_is_fitted_again_meanwhile() {
+        let (mut driven, fitted) = (measured(), measured());
+        for _ in 0..12 {
+            driven.take(&release(1_300.0 + 0.7 * 300.0, 300.0));
+            driven.take(&release(1_300.0 + 0.7 * 100.0, 100.0));
+            // A fit puts its model in place of the driven one.
+            driven = fitted.or_newer(driven);
+        }
+        let length = driven.known().expect("it was measured");
+        assert!((length.value.as_mm() - 1_300.0).abs() < 20.0, "{length:?}");
     }
 }
