@@ -1,5 +1,6 @@
 //! All hypotheses: a filter for each, and its probability.
 
+use super::advance::{Begins, Counts, MOVES, Ran};
 use super::arrivals::{Arrivals, arrivals};
 use super::evidence::{CREEP as CREEP_BY, Compared, SILENT, STEADY_S, evidence};
 use super::filters::{Filters, Pool};
@@ -28,10 +29,6 @@ const TRUSTS: Lanes = Lanes([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
 const COASTS: Lanes = Lanes([0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
 const NOT_ROLLING: Lanes = Lanes([0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]);
 const BOTH_ROLL: Lanes = Lanes([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-const STANDS: Lanes = Lanes([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
-/// Variance of the speed and acceleration at rest (m²/s², m²/s⁴): nothing but rounding.
-const AT_REST: f64 = 1e-6;
-const MOVES: Lanes = Lanes([1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0]);
 /// How long the error of a followed wheel lasts (s).
 const FOLLOWED_S: f64 = 0.15;
 /// Random walk of the ratio of the diameters (part, per square root of a second).
@@ -168,9 +165,9 @@ impl Bank {
         let wheels_a = 0.5 * (first.acceleration + second.acceleration);
         self.wheels_a += (wheels_a - self.wheels_a) * smaller(t / STEADY_S, 1.0);
         let wheels = self.compared(scene);
-        self.mix(scene, &wheels, t);
-        let (distances, surprise) = self.run(scene, t);
-        self.ahead += distances;
+        let begins = self.begins(scene, &wheels, t);
+        let counts = self.counts(scene, t);
+        let Ran { distances, surprise } = self.filters.advance(&begins, &counts, &mut self.ahead, t);
         self.distances = distances;
         self.correct_slips(scene, &wheels, t);
         let evidence = evidence(scene, &wheels, &self.filters, surprise, self.wheels_a, self.side, t);
@@ -241,8 +238,8 @@ impl Bank {
         [of(first, one, first_dead), of(second, other, second_dead)]
     }
 
-    /// Applies the transitions between hypotheses.
-    fn mix(&mut self, scene: &Scene, wheels: &[Compared; 2], t: f64) {
+    /// Applies the transitions between hypotheses to their probabilities. Returns what each begins with.
+    fn begins(&mut self, scene: &Scene, wheels: &[Compared; 2], t: f64) -> Begins {
         let Transitions { ends, after_rolling, after_others } = transitions(scene, self.found_dead, t);
         // A hypothesis that cannot begin now takes no probability.
         let may = self.may_begin();
@@ -263,17 +260,8 @@ impl Bank {
         let stays = self.probability - leaves;
         let next = (stays + arrives).at_least(LEAST);
         let share = arrives * next.inverse();
-        self.filters.mix(&pool, share);
-        self.filters.pvv += share * lost;
-        self.ahead += share * (Lanes::all(pooled_ahead) - self.ahead);
         self.probability = next * (1.0 / next.sum());
-        // A train at rest stays there.
-        let Filters { v, a, pvv, pva, paa, .. } = &mut self.filters;
-        *v *= MOVES;
-        *a *= MOVES;
-        *pva *= MOVES;
-        *pvv = *pvv * MOVES + STANDS * AT_REST;
-        *paa = *paa * MOVES + STANDS * AT_REST;
+        Begins { pool, ahead: pooled_ahead, share, lost }
     }
 
     /// Variance (m²/s²) that each hypothesis begins with in addition, if its speed has to leap: the leap then costs likelihood
@@ -319,30 +307,29 @@ impl Bank {
         Lanes([1.0, slips, slips, slips, creeps, stops, 1.0, 1.0])
     }
 
-    /// Predicts every filter and corrects those that trust a counter. Returns the distance run by each, and its squared
-    /// innovation over the variance.
-    fn run(&mut self, scene: &Scene, t: f64) -> (Lanes, Lanes) {
+    /// What the counters and the command of a period of `t` seconds say to each hypothesis.
+    fn counts(&mut self, scene: &Scene, t: f64) -> Counts {
         let [first, second] = &scene.wheels;
         let [one, other] = self.scales(scene);
-        let (counted_1, counted_2) = (first.counted * one, second.counted * other);
-        let both = shares(scene);
+        let counted = [first.counted * one, second.counted * other];
+        let [b1, b2] = shares(scene);
         // Without a reading, nothing corrects a hypothesis that trusts that wheel.
         let (one, two) = (f64::from(u8::from(first.read)), f64::from(u8::from(second.read)));
-        let [b1, b2] = both;
         let alpha = Lanes([b1, 0.0, one, 0.0, 0.0, 0.0, 0.0, one]);
         let beta = Lanes([b2, two, 0.0, 0.0, 0.0, 0.0, two, 0.0]);
         let trusted = TRUSTS * (alpha + beta).at_most(1.0);
         let rest = scene.commanded.map_or(0.0, |commanded| commanded - self.acted);
         let acts = rest * smaller(t / BUILD_UP_S, 1.0);
         self.acted += acts;
-        self.filters.a += TRUSTS * (EXPECTED * acts);
         let unannounced = if scene.commanded.is_some() { 0.0 } else { UNANNOUNCED };
-        let distances = self.filters.run(t, JERK + TRUSTS * unannounced);
-        self.filters.r += (distances - alpha * counted_1 - beta * counted_2) * trusted;
-        let off_1 = alpha * (first.pitch * (1.0 / 12.0_f64)) * alpha * first.pitch;
-        let off_2 = beta * (second.pitch * (1.0 / 12.0_f64)) * beta * second.pitch;
-        let (moved, surprise) = self.filters.place(off_1 + off_2 + Lanes::all(1e-9), trusted);
-        (distances + moved, surprise)
+        Counts {
+            weights: [alpha, beta],
+            trusted,
+            counted,
+            pitches: [first.pitch, second.pitch],
+            added: TRUSTS * (EXPECTED * acts),
+            jerk: JERK + TRUSTS * unannounced,
+        }
     }
 
     /// Factors that make both wheels agree while both roll.

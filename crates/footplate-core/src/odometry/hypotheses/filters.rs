@@ -36,11 +36,69 @@ pub(super) struct State {
     prv: f64,
     pra: f64,
     pub(super) pvv: f64,
-    pva: f64,
+    pub(super) pva: f64,
     pub(super) paa: f64,
 }
 
 impl State {
+    /// Predicts by `t` seconds with jerk of spectral density `q`. Returns the distance run.
+    #[inline(always)]
+    pub(super) fn run(&mut self, t: f64, q: f64) -> f64 {
+        let half = 0.5 * t * t;
+        let distance = self.v * t + self.a * half;
+        self.v += self.a * t;
+        let prv = self.prv + self.pvv * t + self.pva * half;
+        let pra = self.pra + self.pva * t + self.paa * half;
+        let pva = self.pva + self.paa * t;
+        self.prr += (self.prv + prv) * t + (self.pra + pra) * half + q * (t * t * t * t * t / 20.0);
+        self.prv = prv + pra * t + q * (t * t * t * t * 0.125);
+        self.pra = pra + q * (t * t * t / 6.0);
+        self.pvv += (self.pva + pva) * t + q * (t * t * t / 3.0);
+        self.pva = pva + q * (t * t * 0.5);
+        self.paa += q * t;
+        distance
+    }
+
+    /// Corrects by the measurement `r` = 0 with this variance, if `trusted` is 1. Returns by how much the place moved, and the
+    /// squared innovation over its variance.
+    #[inline(always)]
+    pub(super) fn place(&mut self, variance: f64, trusted: f64) -> (f64, f64) {
+        let per = 1.0 / (self.prr + variance) * trusted;
+        let surprise = self.r * self.r * per;
+        let (kr, kv, ka) = (self.prr * per, self.prv * per, self.pra * per);
+        let y = -self.r;
+        let moved = kr * y;
+        self.r += moved;
+        self.v += kv * y;
+        self.a += ka * y;
+        self.pvv -= kv * self.prv;
+        self.pva -= kv * self.pra;
+        self.paa -= ka * self.pra;
+        let kept = 1.0 - kr;
+        self.prr *= kept;
+        self.prv *= kept;
+        self.pra *= kept;
+        (moved, surprise)
+    }
+
+    /// Mixes a share of `pool` into it.
+    #[inline(always)]
+    pub(super) fn mix(&mut self, pool: &Pool, share: f64) {
+        let kept = 1.0 - share;
+        let (dv, da) = (pool.v - self.v, pool.a - self.a);
+        let spread = share * kept;
+        self.v += share * dv;
+        self.a += share * da;
+        self.pvv = self.pvv * kept + share * pool.pvv + spread * dv * dv;
+        self.pva = self.pva * kept + share * pool.pva + spread * dv * da;
+        self.paa = self.paa * kept + share * pool.paa + spread * da * da;
+        // A hypothesis that begins does not know its counter yet.
+        self.r *= kept;
+        self.prr = self.prr * kept + share * pool.prr;
+        self.prv *= kept;
+        self.pra *= kept;
+    }
+
     /// Corrects by an innovation `y` of the speed with this information (s²/m²); 0 for none.
     pub(super) fn speed(&mut self, y: f64, information: f64) {
         let per = information / (self.pvv * information + 1.0);
@@ -127,65 +185,6 @@ impl Filters {
             pva: zero,
             paa: Lanes::all(0.25),
         }
-    }
-
-    /// Predicts by `t` seconds with jerk of spectral density `q`. Returns the distances run.
-    #[inline]
-    pub(super) fn run(&mut self, t: f64, q: Lanes) -> Lanes {
-        let half = 0.5 * t * t;
-        let distance = self.v * t + self.a * half;
-        self.v += self.a * t;
-        let prv = self.prv + self.pvv * t + self.pva * half;
-        let pra = self.pra + self.pva * t + self.paa * half;
-        let pva = self.pva + self.paa * t;
-        self.prr += (self.prv + prv) * t + (self.pra + pra) * half + q * (t * t * t * t * t / 20.0);
-        self.prv = prv + pra * t + q * (t * t * t * t * 0.125);
-        self.pra = pra + q * (t * t * t / 6.0);
-        self.pvv += (self.pva + pva) * t + q * (t * t * t / 3.0);
-        self.pva = pva + q * (t * t * 0.5);
-        self.paa += q * t;
-        distance
-    }
-
-    /// Corrects by the measurement `r` = 0 with this variance, where `trusted` is 1. Returns by how much the place moved, and the
-    /// squared innovation over its variance.
-    #[inline]
-    pub(super) fn place(&mut self, variance: Lanes, trusted: Lanes) -> (Lanes, Lanes) {
-        let per = (self.prr + variance).inverse() * trusted;
-        let surprise = self.r * self.r * per;
-        let (kr, kv, ka) = (self.prr * per, self.prv * per, self.pra * per);
-        let y = -self.r;
-        let moved = kr * y;
-        self.r += moved;
-        self.v += kv * y;
-        self.a += ka * y;
-        self.pvv -= kv * self.prv;
-        self.pva -= kv * self.pra;
-        self.paa -= ka * self.pra;
-        let kept = Lanes::all(1.0) - kr;
-        self.prr *= kept;
-        self.prv *= kept;
-        self.pra *= kept;
-        (moved, surprise)
-    }
-
-    /// Mixes a share of `pool` into each filter.
-    #[inline]
-    pub(super) fn mix(&mut self, pool: &Pool, share: Lanes) {
-        let one = Lanes::all(1.0);
-        let kept = one - share;
-        let (dv, da) = (Lanes::all(pool.v) - self.v, Lanes::all(pool.a) - self.a);
-        let spread = share * kept;
-        self.v += share * dv;
-        self.a += share * da;
-        self.pvv = self.pvv * kept + share * pool.pvv + spread * dv * dv;
-        self.pva = self.pva * kept + share * pool.pva + spread * dv * da;
-        self.paa = self.paa * kept + share * pool.paa + spread * da * da;
-        // A hypothesis that begins does not know its counter yet.
-        self.r *= kept;
-        self.prr = self.prr * kept + share * pool.prr;
-        self.prv *= kept;
-        self.pra *= kept;
     }
 
     /// Keeps every covariance matrix finite and positive definite.
@@ -292,7 +291,8 @@ mod tests {
     fn a_prediction_is_the_transition_matrix_on_both_sides_and_integrated_white_jerk() {
         let (t, q) = (0.4, 0.3);
         let mut filters = filters();
-        let ran = filters.run(t, Lanes::all(q));
+        let mut state = filters.state(5);
+        let ran = state.run(t, q);
         let f = [[1.0, t, t * t / 2.0], [0.0, 1.0, t], [0.0, 0.0, 1.0]];
         let transposed = core::array::from_fn(|i| core::array::from_fn(|j| f[j][i]));
         let mut expected = product(&product(&f, &COVARIANCE), &transposed);
@@ -305,8 +305,8 @@ mod tests {
             }
         }
         // The place is counted from that of the counter, which the caller subtracts.
-        assert_is(filters.state(5), [0.3, 12.0 - 0.7 * 0.4, -0.7], &expected);
-        assert!((ran.0[5] - (12.0 * 0.4 - 0.7 * 0.08)).abs() < 1e-12);
+        assert_is(state, [0.3, 12.0 - 0.7 * 0.4, -0.7], &expected);
+        assert!((ran - (12.0 * 0.4 - 0.7 * 0.08)).abs() < 1e-12);
     }
 
     #[test]
@@ -323,16 +323,15 @@ mod tests {
         assert_is(state, mean, &covariance);
 
         // The counter says r = 0; a hypothesis that does not trust it stays as it is.
-        let mut trusting = filters();
-        let mut trusted = Lanes::all(1.0);
-        trusted.0[3] = 0.0;
-        let (moved, surprise) = trusting.place(Lanes::all(variance), trusted);
+        let mut trusting = filters().state(2);
+        let (moved, surprise) = trusting.place(variance, 1.0);
         let (mean, covariance) = updated(0, -0.3, variance);
-        assert_is(trusting.state(2), mean, &covariance);
-        assert!((moved.0[2] - (mean[0] - 0.3)).abs() < 1e-12);
-        assert!((surprise.0[2] - 0.09 / 0.13).abs() < 1e-12);
-        assert_is(trusting.state(3), MEAN, &COVARIANCE);
-        assert_eq!((moved.0[3], surprise.0[3]), (0.0, 0.0));
+        assert_is(trusting, mean, &covariance);
+        assert!((moved - (mean[0] - 0.3)).abs() < 1e-12);
+        assert!((surprise - 0.09 / 0.13).abs() < 1e-12);
+        let mut other = filters().state(3);
+        assert_eq!(other.place(variance, 0.0), (0.0, 0.0));
+        assert_is(other, MEAN, &COVARIANCE);
     }
 
     #[test]
@@ -347,8 +346,8 @@ mod tests {
     fn a_mixture_has_the_moments_of_a_mixture() {
         let pool = Pool { v: 11.0, a: 0.2, pvv: 0.5, pva: -0.1, paa: 0.3, prr: 0.02 };
         let (share, kept) = (0.3, 0.7);
-        let mut mixed = filters();
-        mixed.mix(&pool, Lanes::all(share));
+        let mut mixed = filters().state(7);
+        mixed.mix(&pool, share);
         let [_, [_, pvv, pva], [_, _, paa]] = COVARIANCE;
         let [r, v, a] = MEAN;
         // E x = Σ w x and E x y = Σ w (cov + x y).
@@ -362,7 +361,7 @@ mod tests {
         // The place of what begins is 0, and of the variance of the pool; it says nothing of speed and acceleration.
         let (prr, prv, pra) = (mean(0.09, 0.02), kept * 0.031, kept * -0.012);
         let expected = [[prr, prv, pra], [prv, pvv, pva], [pra, pva, paa]];
-        assert_is(mixed.state(7), [kept * r, mean(v, pool.v), mean(a, pool.a)], &expected);
+        assert_is(mixed, [kept * r, mean(v, pool.v), mean(a, pool.a)], &expected);
     }
 
     #[test]
