@@ -5,7 +5,7 @@ use super::arrivals::{Arrivals, arrivals};
 use super::evidence::{CREEP as CREEP_BY, Compared, SILENT, STEADY_S, evidence};
 use super::filters::{Filters, Pool};
 use super::interval::interval;
-use super::lanes::Lanes;
+use super::lanes::{Lanes, likelihood};
 use super::rates::{Transitions, transitions};
 use super::reach::{Reach, Shown};
 use super::scene::{Scene, WheelScene};
@@ -171,11 +171,19 @@ impl Bank {
         self.distances = distances;
         self.correct_slips(scene, &wheels, t);
         let evidence = evidence(scene, &wheels, &self.filters, surprise, self.wheels_a, self.side, t);
-        let weights = (self.probability * evidence.likelihoods()).at_least(LEAST);
-        self.probability = weights * (1.0 / weights.sum());
+        self.learn(&evidence);
         self.find_dead(scene);
         self.learn_ratio(scene, t);
         self.summed_up(scene.top_speed)
+    }
+
+    /// Takes in the logarithms of the likelihoods.
+    #[inline(never)]
+    fn learn(&mut self, evidence: &Lanes) {
+        for (p, evidence) in self.probability.0.iter_mut().zip(evidence.0) {
+            *p = larger(*p * likelihood(evidence), LEAST);
+        }
+        self.probability *= Lanes::all(1.0 / self.probability.sum());
     }
 
     /// Intervals of the speed (m/s) and of the distance of the period (m) that leave out no more than `risk`.
@@ -246,7 +254,7 @@ impl Bank {
         let (after_rolling, after_others) = (after_rolling * may, after_others * may);
         let [rolling, ..] = self.probability.0;
         let rest = self.probability * ends * NOT_ROLLING;
-        let Arrivals { stays_lost, others } = arrivals(scene, wheels, &self.filters, rest, after_others);
+        let Arrivals { stays_lost, others } = arrivals(scene, wheels, &self.filters, &rest, &after_others);
         let leaves = rest * (Lanes::all(after_others.sum()) - stays_lost)
             + BOTH_ROLL * (rolling * after_rolling.sum());
         let [first, second] = &scene.wheels;
