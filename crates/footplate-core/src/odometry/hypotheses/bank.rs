@@ -1,11 +1,11 @@
 //! All hypotheses: a filter for each, and its probability.
 
-use super::advance::{Begins, Counts, MOVES, Ran};
-use super::arrivals::{Arrivals, arrivals};
+use super::advance::{Begins, Counts, LEAST, MOVES, Ran};
+use super::arrivals::{Arrivals, Ending, arrivals};
 use super::evidence::{CREEP as CREEP_BY, Compared, SILENT, STEADY_S, evidence};
 use super::filters::{Filters, Pool};
 use super::interval::interval;
-use super::lanes::{Lanes, likelihood};
+use super::lanes::{Lanes, WIDTH, likelihood};
 use super::rates::{Transitions, transitions};
 use super::reach::{Reach, Shown};
 use super::scene::{Scene, WheelScene};
@@ -25,10 +25,6 @@ const EXPECTED: f64 = 0.5;
 const REGAINS: f64 = 0.4;
 /// 1 for hypotheses that trust a counter.
 const TRUSTS: Lanes = Lanes([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
-/// 1 for hypotheses in which no wheel tells the speed.
-const COASTS: Lanes = Lanes([0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
-const NOT_ROLLING: Lanes = Lanes([0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]);
-const BOTH_ROLL: Lanes = Lanes([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 /// How long the error of a followed wheel lasts (s).
 const FOLLOWED_S: f64 = 0.15;
 /// Random walk of the ratio of the diameters (part, per square root of a second).
@@ -42,8 +38,6 @@ const RATIO_CREEPAGE: f64 = 0.008;
 const CREEPAGE_FOR_S: f64 = 200.0;
 /// Share of a driven wheel in traction beside one that is not driven: creepage biases the driven one.
 const CREEPING_SHARE: f64 = 0.05;
-/// Least probability: far below the risk of any interval.
-const LEAST: f64 = 1e-30;
 /// Time constant of the acceleration that tells braking from motoring without a command (s).
 const SIDE_S: f64 = 1.0;
 /// Speed at which slips begin half as often as at high speed (m/s); the same for steady creep.
@@ -167,23 +161,46 @@ impl Bank {
         let wheels = self.compared(scene);
         let begins = self.begins(scene, &wheels, t);
         let counts = self.counts(scene, t);
-        let Ran { distances, surprise } = self.filters.advance(&begins, &counts, &mut self.ahead, t);
+        let Ran { distances, surprise, exceeds } = 
+            self.filters.advance(&begins, &counts, &mut self.probability, &mut self.ahead, t);
         self.distances = distances;
         self.correct_slips(scene, &wheels, t);
+        if exceeds {
+            self.filters.cut();
+        }
         let evidence = evidence(scene, &wheels, &self.filters, surprise, self.wheels_a, self.side, t);
-        self.learn(&evidence);
+        let distance = self.learn(&evidence, scene.top_speed);
         self.find_dead(scene);
         self.learn_ratio(scene, t);
-        self.summed_up(scene.top_speed)
+        distance
     }
 
-    /// Takes in the logarithms of the likelihoods.
+    /// Takes in the logarithms of the likelihoods and combines all hypotheses. Returns the distance that the estimate moved (m).
     #[inline(never)]
-    fn learn(&mut self, evidence: &Lanes) {
-        for (p, evidence) in self.probability.0.iter_mut().zip(evidence.0) {
-            *p = larger(*p * likelihood(evidence), LEAST);
+    #[expect(clippy::indexing_slicing, reason = "below the width of all")]
+    fn learn(&mut self, evidence: &Lanes, top: f64) -> f64 {
+        let one = 1.0 / self.probability.sum();
+        let about = self.speed;
+        let (Filters { v, a, pvv, .. }, p) = (&self.filters, &mut self.probability);
+        let [mut speeds, mut squares, mut accelerations, mut ahead] = [Lanes::all(0.0); 4];
+        for lane in 0..WIDTH {
+            let w = larger(p.0[lane] * one * likelihood(evidence.0[lane]), LEAST);
+            p.0[lane] = w;
+            let dv = v.0[lane] - about;
+            speeds.0[lane] = w * dv;
+            squares.0[lane] = w * (pvv.0[lane] + dv * dv);
+            accelerations.0[lane] = w * a.0[lane];
+            ahead.0[lane] = w * self.ahead.0[lane];
         }
-        self.probability *= Lanes::all(1.0 / self.probability.sum());
+        let one = 1.0 / p.sum();
+        *p *= Lanes::all(one);
+        let dv = speeds.sum() * one;
+        self.variance = squares.sum() * one - dv * dv;
+        self.speed = larger(smaller(about + dv, top), -top);
+        self.acceleration = accelerations.sum() * one;
+        let distance = ahead.sum() * one;
+        self.ahead -= Lanes::all(distance);
+        distance
     }
 
     /// Intervals of the speed (m/s) and of the distance of the period (m) that leave out no more than `risk`.
@@ -246,30 +263,30 @@ impl Bank {
         [of(first, one, first_dead), of(second, other, second_dead)]
     }
 
-    /// Applies the transitions between hypotheses to their probabilities. Returns what each begins with.
-    fn begins(&mut self, scene: &Scene, wheels: &[Compared; 2], t: f64) -> Begins {
+    /// What each hypothesis begins with by the transitions between them.
+    fn begins(&self, scene: &Scene, wheels: &[Compared; 2], t: f64) -> Begins {
         let Transitions { ends, after_rolling, after_others } = transitions(scene, self.found_dead, t);
         // A hypothesis that cannot begin now takes no probability.
         let may = self.may_begin();
-        let (after_rolling, after_others) = (after_rolling * may, after_others * may);
+        let (after_rolling, follows) = (after_rolling * may, after_others * may);
         let [rolling, ..] = self.probability.0;
-        let rest = self.probability * ends * NOT_ROLLING;
-        let Arrivals { stays_lost, others } = arrivals(scene, wheels, &self.filters, &rest, &after_others);
-        let leaves = rest * (Lanes::all(after_others.sum()) - stays_lost)
-            + BOTH_ROLL * (rolling * after_rolling.sum());
+        let ending = Ending {
+            filters: &self.filters,
+            probability: &self.probability,
+            ahead: &self.ahead,
+            ends: &ends,
+            follows: &follows,
+            of_rolling: rolling * after_rolling.sum(),
+            about: [self.speed, self.acceleration],
+        };
         let [first, second] = &scene.wheels;
         let pitch = larger(first.pitch, second.pitch);
-        let mut pool = self.filters.pooled(leaves, pitch * pitch);
-        pool.paa += REGAINS * REGAINS * (leaves * COASTS).sum() / leaves.sum();
-        let pooled_ahead = (leaves * self.ahead).sum() / leaves.sum();
+        let Arrivals { leaves, others, mut pool, ahead } = arrivals(scene, wheels, &ending, pitch * pitch);
+        let [.., slip, creep, _, _, _] = leaves.0;
+        pool.paa += REGAINS * REGAINS * (slip + creep) / leaves.sum();
         let lost = self.lost(scene, wheels, &pool);
         let found = Lanes(lost.0.map(|leap| if leap > 0.0 { LOST } else { 1.0 }));
-        let arrives = after_rolling * rolling + after_others * others * found;
-        let stays = self.probability - leaves;
-        let next = (stays + arrives).at_least(LEAST);
-        let share = arrives * next.inverse();
-        self.probability = next * (1.0 / next.sum());
-        Begins { pool, ahead: pooled_ahead, share, lost }
+        Begins { pool, ahead, leaves, others, follows, after_rolling, rolling, lost, found }
     }
 
     /// Variance (m²/s²) that each hypothesis begins with in addition, if its speed has to leap: the leap then costs likelihood
@@ -337,6 +354,8 @@ impl Bank {
             pitches: [first.pitch, second.pitch],
             added: TRUSTS * (EXPECTED * acts),
             jerk: JERK + TRUSTS * unannounced,
+            top: scene.top_speed,
+            inertial: scene.inertial.is_some(),
         }
     }
 
@@ -373,19 +392,6 @@ impl Bank {
         self.ratio_variance *= 1.0 - gain;
         let differ = larger((measured + self.ratio).abs() - most, 0.0);
         self.beyond += (differ - self.beyond) * smaller(t / BEYOND_S, 1.0);
-    }
-
-    /// Combines all hypotheses. Returns the distance that the estimate moved (m).
-    fn summed_up(&mut self, top: f64) -> f64 {
-        let p = self.probability;
-        let (v, a, distance) =
-            ((p * self.filters.v).sum(), (p * self.filters.a).sum(), (p * self.ahead).sum());
-        let dv = self.filters.v - Lanes::all(v);
-        self.variance = (p * (self.filters.pvv + dv * dv)).sum();
-        self.speed = larger(smaller(v, top), -top);
-        self.acceleration = a;
-        self.ahead -= Lanes::all(distance);
-        distance
     }
 }
 

@@ -4,13 +4,14 @@
 //! `pxy` covariances, `q` density of the jerk (m²/s⁵), `k` gain, `y` innovation.
 
 use super::lanes::Lanes;
+use crate::odometry::wheels::{larger, smaller};
 
 /// Limits of the variances, so that they stay positive and finite (m², m²/s², m²/s⁴).
 const PLACE: (f64, f64) = (1e-10, 1e2);
 const SPEED: (f64, f64) = (1e-8, 1e4);
 const ACCELERATION: (f64, f64) = (1e-8, 4.0);
 /// No train accelerates more (m/s²).
-const STRONGEST: f64 = 10.0;
+pub(super) const STRONGEST: f64 = 10.0;
 
 /// State and covariance of every hypothesis.
 #[derive(Debug, Clone, Copy)]
@@ -97,6 +98,24 @@ impl State {
         self.prr = self.prr * kept + share * pool.prr;
         self.prv *= kept;
         self.pra *= kept;
+    }
+
+    /// Keeps the state finite and the variances positive, of a train no faster than `top` (m/s) that accelerates by no more than
+    /// `strongest` (m/s²).
+    #[inline(always)]
+    pub(super) fn limit(&mut self, top: f64, strongest: f64) {
+        self.v = larger(smaller(self.v, top), -top);
+        self.a = larger(smaller(self.a, strongest), -strongest);
+        self.prr = larger(self.prr, PLACE.0);
+        self.pvv = larger(self.pvv, SPEED.0);
+        self.paa = larger(self.paa, ACCELERATION.0);
+    }
+
+    /// Its sign bit is set if a variance exceeds its largest: positive numbers are in the order of their bits.
+    #[inline(always)]
+    pub(super) fn exceeds(&self) -> u64 {
+        let over = |variance: f64, (_, most): (f64, f64)| most.to_bits().wrapping_sub(variance.to_bits());
+        over(self.prr, PLACE) | over(self.pvv, SPEED) | over(self.paa, ACCELERATION)
     }
 
     /// Corrects by an innovation `y` of the speed with this information (s²/m²); 0 for none.
@@ -187,26 +206,20 @@ impl Filters {
         }
     }
 
-    /// Keeps every covariance matrix finite and positive definite.
-    ///
-    /// The covariances of a variance that is cut to its limit are cut by the same factor. If the variance were cut alone, gains would
-    /// change sign and the filter would diverge.
-    #[inline]
-    pub(super) fn keep_sound(&mut self) {
-        let within = |lanes: Lanes, (least, most)| lanes.at_least(least).at_most(most);
+    /// Cuts variances to their largest, and their covariances by the same factor. If a variance were cut alone, gains would change
+    /// sign and the filter would diverge. Few periods need this.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn cut(&mut self) {
         let limits = [(self.prr, PLACE), (self.pvv, SPEED), (self.paa, ACCELERATION)];
-        // Few periods need these divisions. In the others they would multiply by 1.
-        if limits.iter().any(|(lanes, (_, most))| lanes.largest() > *most) {
-            let [of_r, of_v, of_a] =
-                limits.map(|(lanes, (_, most))| (lanes.at_least(most).inverse() * most).at_most(1.0));
-            self.prv *= of_r * of_v;
-            self.pra *= of_r * of_a;
-            self.pva *= of_v * of_a;
-        }
-        self.prr = within(self.prr, PLACE);
-        self.pvv = within(self.pvv, SPEED);
-        self.paa = within(self.paa, ACCELERATION);
-        self.a = self.a.at_least(-STRONGEST).at_most(STRONGEST);
+        let [of_r, of_v, of_a] =
+            limits.map(|(lanes, (_, most))| (lanes.at_least(most).inverse() * most).at_most(1.0));
+        self.prv *= of_r * of_v;
+        self.pra *= of_r * of_a;
+        self.pva *= of_v * of_a;
+        self.prr = self.prr.at_most(PLACE.1);
+        self.pvv = self.pvv.at_most(SPEED.1);
+        self.paa = self.paa.at_most(ACCELERATION.1);
     }
 
     /// Reverses everything: the train has reversed.
@@ -214,23 +227,6 @@ impl Filters {
         self.r = -self.r;
         self.v = -self.v;
         self.a = -self.a;
-    }
-
-    /// Mean and covariance over all hypotheses with these weights, which need not add up to 1.
-    #[inline]
-    pub(super) fn pooled(&self, weights: Lanes, prr: f64) -> Pool {
-        let total = weights.sum();
-        let share = weights * (1.0 / total);
-        let (v, a) = ((share * self.v).sum(), (share * self.a).sum());
-        let (dv, da) = (self.v - Lanes::all(v), self.a - Lanes::all(a));
-        Pool {
-            v,
-            a,
-            pvv: (share * (self.pvv + dv * dv)).sum(),
-            pva: (share * (self.pva + dv * da)).sum(),
-            paa: (share * (self.paa + da * da)).sum(),
-            prr,
-        }
     }
 }
 
@@ -243,6 +239,26 @@ pub(super) struct Pool {
     pub(super) pva: f64,
     pub(super) paa: f64,
     pub(super) prr: f64,
+}
+
+impl Pool {
+    /// First and second moments of a state about a speed and an acceleration near it: of speed and acceleration, of the square of
+    /// the speed, of their product, and of the square of the acceleration.
+    #[inline(always)]
+    pub(super) fn moments(
+        [v, a]: [f64; 2],
+        [pvv, pva, paa]: [f64; 3],
+        [about_v, about_a]: [f64; 2],
+    ) -> [f64; 5] {
+        let (dv, da) = (v - about_v, a - about_a);
+        [dv, da, pvv + dv * dv, pva + dv * da, paa + da * da]
+    }
+
+    /// Mean and covariance of hypotheses whose mean moments these are, with a variance of the place.
+    pub(super) fn of([dv, da, vv, va, aa]: [f64; 5], [about_v, about_a]: [f64; 2], prr: f64) -> Self {
+        let (v, a) = (about_v + dv, about_a + da);
+        Self { v, a, pvv: vv - dv * dv, pva: va - dv * da, paa: aa - da * da, prr }
+    }
 }
 
 #[cfg(test)]
@@ -366,19 +382,11 @@ mod tests {
 
     #[test]
     fn pooled_hypotheses_have_the_moments_of_all() {
-        let mut filters = Filters::new(10.0, 0.5);
-        let mut weights = Lanes::all(0.0);
-        // Two hypotheses, three to one, whose weights add up to 2.
-        (weights.0[1], weights.0[6]) = (1.5, 0.5);
-        filters.set(
-            1,
-            State { r: 0.0, v: 8.0, a: 1.0, prr: 1.0, prv: 0.0, pra: 0.0, pvv: 0.4, pva: 0.1, paa: 0.2 },
-        );
-        filters.set(
-            6,
-            State { r: 0.0, v: 12.0, a: -1.0, prr: 1.0, prv: 0.0, pra: 0.0, pvv: 0.8, pva: 0.3, paa: 0.6 },
-        );
-        let pool = filters.pooled(weights, 0.07);
+        // Two hypotheses, three to one.
+        let about = [10.0, 0.3];
+        let one = Pool::moments([8.0, 1.0], [0.4, 0.1, 0.2], about);
+        let other = Pool::moments([12.0, -1.0], [0.8, 0.3, 0.6], about);
+        let pool = Pool::of(core::array::from_fn(|k| 0.75 * one[k] + 0.25 * other[k]), about, 0.07);
         // Means 9 and 0.5; about them ¾ of 1 and ¼ of 9, ¾ of −0.5 and ¼ of −4.5, ¾ of 0.25 and ¼ of 2.25.
         let found = [pool.v, pool.a, pool.pvv, pool.pva, pool.paa, pool.prr];
         for (found, expected) in found.into_iter().zip([9.0, 0.5, 0.5 + 3.0, 0.15 - 1.5, 0.3 + 0.75, 0.07]) {
@@ -400,7 +408,8 @@ mod tests {
         filters.pva = Lanes::all(1400.0);
         filters.prr = Lanes::all(400.0);
         (filters.prv, filters.pra) = (Lanes::all(1000.0), Lanes::all(20.0));
-        filters.keep_sound();
+        assert_eq!(filters.state(0).exceeds() >> 63, 1);
+        filters.cut();
         let State { prr, prv, pra, pvv, pva, paa, .. } = filters.state(0);
         assert_eq!((prr, pvv, paa), (1e2, 1e4, 4.0));
         // A quarter, a fifth and a tenth are left of the variances.
@@ -412,16 +421,17 @@ mod tests {
     #[test]
     fn what_is_within_its_limits_is_not_touched_and_what_is_below_is_raised() {
         let mut sound = filters();
-        sound.keep_sound();
-        assert_is(sound.state(1), MEAN, &COVARIANCE);
-        let mut low = filters();
-        (low.prr, low.pvv, low.paa) = (Lanes::all(0.0), Lanes::all(-1.0), Lanes::all(1e-9));
-        low.a = Lanes::all(11.0);
-        low.keep_sound();
-        let State { a, prr, pvv, paa, .. } = low.state(1);
-        assert_eq!((a, prr, pvv, paa), (10.0, 1e-10, 1e-8, 1e-8));
-        low.a = Lanes::all(-11.0);
-        low.keep_sound();
-        assert_eq!(low.state(6).a, -10.0);
+        assert_eq!(sound.state(1).exceeds() >> 63, 0);
+        sound.cut();
+        let mut state = sound.state(1);
+        state.limit(40.0, STRONGEST);
+        assert_is(state, MEAN, &COVARIANCE);
+        (state.prr, state.pvv, state.paa) = (0.0, -1.0, 1e-9);
+        (state.v, state.a) = (41.0, 11.0);
+        state.limit(40.0, STRONGEST);
+        assert_eq!((state.v, state.a, state.prr, state.pvv, state.paa), (40.0, 10.0, 1e-10, 1e-8, 1e-8));
+        (state.v, state.a) = (-41.0, -11.0);
+        state.limit(40.0, STRONGEST);
+        assert_eq!((state.v, state.a), (-40.0, -10.0));
     }
 }

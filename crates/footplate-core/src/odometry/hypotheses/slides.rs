@@ -4,7 +4,7 @@
 
 use super::bank::Bank;
 use super::evidence::{CREEP, Compared, SILENT};
-use super::filters::State;
+use super::filters::{STRONGEST, State};
 use super::scene::{Scene, WheelScene};
 use crate::odometry::wheels::{Range, larger, smaller};
 
@@ -58,17 +58,17 @@ impl Bank {
         for (lane, mut state) in [(SLIPS, slip), (CREEPS, creep)] {
             state.v = larger(state.v, 0.0);
             state.a = larger(smaller(state.a, high), low);
+            state.limit(scene.top_speed, STRONGEST);
             self.filters.set(lane, state);
         }
         if let Some(inertial) = scene.inertial {
             for lane in MOVES {
                 let mut state = self.filters.state(lane);
                 state.acceleration(inertial - state.a, lasting(INERTIAL_WITHIN, SLIDES_FOR_S, t));
+                state.limit(scene.top_speed, STRONGEST);
                 self.filters.set(lane, state);
             }
         }
-        self.filters.v = self.filters.v.at_most(scene.top_speed).at_least(-scene.top_speed);
-        self.filters.keep_sound();
     }
 
     /// Corrects the speed by wheels that touch it.
