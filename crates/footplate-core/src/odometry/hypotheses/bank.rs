@@ -59,6 +59,8 @@ const FAR: f64 = 4.0;
 const FOUND_DEAD: f64 = 0.99;
 /// A train comes to rest from below this speed (m/s).
 const STOPS_BELOW: f64 = 0.15;
+/// Squared speed over its variance from which exp(−½ of it) is zero.
+const NEVER_STOPS: f64 = 1500.0;
 
 /// Filters and probabilities of all hypotheses.
 #[derive(Debug, Clone, Copy)]
@@ -168,7 +170,7 @@ impl Bank {
         if exceeds {
             self.filters.cut();
         }
-        let evidence = evidence(scene, &wheels, &self.filters, surprise, self.wheels_a, self.side, t);
+        let evidence = evidence(scene, &wheels, &self.filters, &surprise, self.wheels_a, self.side, t);
         let distance = self.learn(&evidence, scene.top_speed);
         self.find_dead(scene);
         self.learn_ratio(scene, t);
@@ -328,7 +330,12 @@ impl Bank {
         let moving = |above: f64| moves / (moves + above * above);
         let (slips, creeps) = (moving(SLIPS_ABOVE), moving(CREEPS_ABOVE) * moving(CREEPS_ABOVE));
         let slow = self.variance + STOPS_BELOW * STOPS_BELOW;
-        let stops = libm::exp(-0.5 * moves / slow) * STOPS_BELOW / libm::sqrt(slow);
+        // At speed this is less than the least number there is.
+        let stops = if moves > NEVER_STOPS * slow {
+            0.0
+        } else {
+            libm::exp(-0.5 * moves / slow) * STOPS_BELOW / libm::sqrt(slow)
+        };
         Lanes([1.0, slips, slips, slips, creeps, stops, 1.0, 1.0])
     }
 
