@@ -15,16 +15,16 @@ use crate::odometry::wheels::{Range, Wheelset, larger, smaller};
 /// Spectral density of the train's jerk (m²/s⁵) while a wheel tells the speed: 0.14 m/s² in a second, as a driver corrects a
 /// cruising train. While none does, the acceleration is then known to 0.3 m/s² after a few seconds.
 const JERK: Lanes = Lanes([0.02, 0.02, 0.02, 0.007, 0.05, 0.0, 0.02, 0.02]);
-/// What is added to that where no command is recorded.
-const UNANNOUNCED: f64 = 0.06;
+/// The same where no command is recorded: 0.06 more.
+const JERK_UNANNOUNCED: Lanes = Lanes([0.08, 0.08, 0.08, 0.007, 0.05, 0.0, 0.08, 0.08]);
+/// What is added to the variance of a count (m²), so that no filter takes it for exact.
+const ROUNDING: f64 = 1e-9;
 /// How long brakes and motors take to follow the command (s), and what part of it shows in the acceleration of a train whose wheels
 /// roll. The rest is uncertain: gradients, resistance and the state of the brakes.
 const BUILD_UP_S: f64 = 1.5;
 const EXPECTED: f64 = 0.5;
 /// Standard deviation of the change of acceleration when slipping wheels adhere again (m/s²).
 const REGAINS: f64 = 0.4;
-/// 1 for hypotheses that trust a counter.
-const TRUSTS: Lanes = Lanes([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
 /// How long the error of a followed wheel lasts (s).
 const FOLLOWED_S: f64 = 0.15;
 /// Random walk of the ratio of the diameters (part, per square root of a second).
@@ -161,10 +161,10 @@ impl Bank {
         let wheels_a = 0.5 * (first.acceleration + second.acceleration);
         self.wheels_a += (wheels_a - self.wheels_a) * smaller(t / STEADY_S, 1.0);
         let wheels = self.compared(scene);
-        let begins = self.begins(scene, &wheels, t);
+        let (begins, arrivals) = self.begins(scene, &wheels, t);
         let counts = self.counts(scene, t);
         let Ran { distances, surprise, exceeds } = 
-            self.filters.advance(&begins, &counts, &mut self.probability, &mut self.ahead, t);
+            self.filters.advance(&begins, &arrivals, &counts, &mut self.probability, &mut self.ahead, t);
         self.distances = distances;
         self.correct_slips(scene, &wheels, t);
         if exceeds {
@@ -266,11 +266,11 @@ impl Bank {
     }
 
     /// What each hypothesis begins with by the transitions between them.
-    fn begins(&self, scene: &Scene, wheels: &[Compared; 2], t: f64) -> Begins {
+    fn begins(&self, scene: &Scene, wheels: &[Compared; 2], t: f64) -> (Begins, Arrivals) {
         let Transitions { ends, after_rolling, after_others } = transitions(scene, self.found_dead, t);
         // A hypothesis that cannot begin now takes no probability.
         let may = self.may_begin();
-        let (after_rolling, follows) = (after_rolling * may, after_others * may);
+        let (after_rolling, mut follows) = (after_rolling * may, after_others * may);
         let [rolling, ..] = self.probability.0;
         let ending = Ending {
             filters: &self.filters,
@@ -283,21 +283,24 @@ impl Bank {
         };
         let [first, second] = &scene.wheels;
         let pitch = larger(first.pitch, second.pitch);
-        let Arrivals { leaves, others, mut pool, ahead } = arrivals(scene, wheels, &ending, pitch * pitch);
-        let [.., slip, creep, _, _, _] = leaves.0;
-        pool.paa += REGAINS * REGAINS * (slip + creep) / leaves.sum();
-        let lost = self.lost(scene, wheels, &pool);
-        let found = Lanes(lost.0.map(|leap| if leap > 0.0 { LOST } else { 1.0 }));
-        Begins { pool, ahead, leaves, others, follows, after_rolling, rolling, lost, found }
+        let mut arrivals = arrivals(scene, wheels, &ending, pitch * pitch);
+        let [.., slip, creep, _, _, _] = arrivals.leaves.0;
+        arrivals.pool.paa += REGAINS * REGAINS * (slip + creep) / arrivals.leaves.sum();
+        let [alike, of_first, of_second] = self.lost(scene, wheels, &arrivals.pool);
+        let lost = Lanes([alike, of_second, of_first, 0.0, 0.0, 0.0, of_second, of_first]);
+        if alike + of_first + of_second > 0.0 {
+            follows *= Lanes(lost.0.map(|leap| if leap > 0.0 { LOST } else { 1.0 }));
+        }
+        (Begins { follows, after_rolling, rolling, lost }, arrivals)
     }
 
-    /// Variance (m²/s²) that each hypothesis begins with in addition, if its speed has to leap: the leap then costs likelihood
-    /// once, not in every period.
+    /// Variance (m²/s²) that hypotheses begin with in addition, if their speed has to leap: the leap then costs likelihood once, not
+    /// in every period. Of "both roll", and of those in which the first and the second wheel rolls.
     ///
     /// A slide has lost the train where both wheels turn alike at quite another speed: they roll. A sensor that is taken for dead
     /// may be the good one: its wheel rolls, and the other slips or has the dead sensor. So may a wheel that is taken to slip beside a
     /// stuck count.
-    fn lost(&self, scene: &Scene, [one, other]: &[Compared; 2], pool: &Pool) -> Lanes {
+    fn lost(&self, scene: &Scene, [one, other]: &[Compared; 2], pool: &Pool) -> [f64; 3] {
         let [_, first_slips, second_slips, slip, _, _, first_dead, second_dead] = self.probability.0;
         let [_, (most, part)] = CREEP_BY;
         let leap = |speed: f64, variance: f64, least: f64| {
@@ -320,7 +323,7 @@ impl Bank {
         let lost_second = second_dead > 0.9 || first.stuck && second_slips > 0.9;
         let of_first = if lost_first { of_wheel(first, one) } else { 0.0 };
         let of_second = if lost_second { of_wheel(second, other) } else { 0.0 };
-        Lanes([alike, of_second, of_first, 0.0, 0.0, 0.0, of_second, of_first])
+        [alike, of_first, of_second]
     }
 
     /// How easily each hypothesis begins at the speed of the train, 0 to 1: nothing slips at rest, and only a slow train comes to
@@ -343,24 +346,23 @@ impl Bank {
     fn counts(&mut self, scene: &Scene, t: f64) -> Counts {
         let [first, second] = &scene.wheels;
         let [one, other] = self.scales(scene);
-        let counted = [first.counted * one, second.counted * other];
-        let [b1, b2] = shares(scene);
+        let [both_1, both_2] = shares(scene);
         // Without a reading, nothing corrects a hypothesis that trusts that wheel.
-        let (one, two) = (f64::from(u8::from(first.read)), f64::from(u8::from(second.read)));
-        let alpha = Lanes([b1, 0.0, one, 0.0, 0.0, 0.0, 0.0, one]);
-        let beta = Lanes([b2, two, 0.0, 0.0, 0.0, 0.0, two, 0.0]);
-        let trusted = TRUSTS * (alpha + beta).at_most(1.0);
+        let trusts = |wheel: &WheelScene| f64::from(u8::from(wheel.read));
+        let of_both = |both: f64, one: f64, two: f64| Lanes([both, two, one, 0.0, 0.0, 0.0, two, one]);
+        let (counted_1, counted_2) = (first.counted * one, second.counted * other);
+        let (white_1, white_2) = (first.pitch * first.pitch / 12.0, second.pitch * second.pitch / 12.0);
+        let both = both_1 * both_1 * white_1 + both_2 * both_2 * white_2;
         let rest = scene.commanded.map_or(0.0, |commanded| commanded - self.acted);
         let acts = rest * smaller(t / BUILD_UP_S, 1.0);
         self.acted += acts;
-        let unannounced = if scene.commanded.is_some() { 0.0 } else { UNANNOUNCED };
+        let added = EXPECTED * acts;
         Counts {
-            weights: [alpha, beta],
-            trusted,
-            counted,
-            pitches: [first.pitch, second.pitch],
-            added: TRUSTS * (EXPECTED * acts),
-            jerk: JERK + TRUSTS * unannounced,
+            counted: of_both(both_1 * counted_1 + both_2 * counted_2, counted_1, counted_2),
+            variance: of_both(both + ROUNDING, white_1 + ROUNDING, white_2 + ROUNDING),
+            trusted: of_both(smaller(both_1 + both_2, 1.0), trusts(first), trusts(second)),
+            added: of_both(added, added, added),
+            jerk: if scene.commanded.is_some() { &JERK } else { &JERK_UNANNOUNCED },
             top: scene.top_speed,
             inertial: scene.inertial.is_some(),
         }

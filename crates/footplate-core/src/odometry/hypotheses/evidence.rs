@@ -102,23 +102,28 @@ pub(super) fn evidence(
     let turned = |wheel: &WheelScene| if wheel.stuck { 0.0 } else { wheel.counted.abs() / wheel.pitch };
     let turned = larger(turned(first), turned(second));
     let shaken = larger(turned - SHAKEN, 0.0) * TURNS;
-    // Brakes do what is claimed of them where the rail carries it.
     // A train on whose rail one wheelset slides brakes no harder than the middle between what is commanded and the most.
     let halfway = match scene.commanded {
         Some(commanded) if commanded < 0.0 => 0.5 * (commanded - scene.acceleration.low),
         _ => 0.0,
     };
+    // Brakes do what is claimed of them where the rail carries it.
     let (rolling, any) = (scene.rolling, scene.acceleration);
     let low = any.low + larger(halfway, 0.0);
     let limits = [
         Lanes([rolling.low, low, low, any.low, any.low, any.low, rolling.low, rolling.low]),
         Lanes([rolling.high, any.high, any.high, any.high, any.high, any.high, rolling.high, rolling.high]),
     ];
-    let [rolls_1, rolls_2, usual] = costs(filters, surprise, &limits, [&one.terms(), &other.terms()], followed);
+    let terms = [one.terms(), other.terms()];
+    let [rolls_1, rolls_2, usual] = costs(filters, surprise, &limits, &terms, followed);
     let ([one_rolls, _, one_beside, .., one_rests, _, one_by_dead], [two_rolls, two_beside, .., two_rests, two_by_dead, _]) =
         (rolls_1.0, rolls_2.0);
-    let slips = slipping([&one, &other], [&first_slips, &second_slips, &slip, &slip]);
-    let [first_slips, second_slips, one_slips, two_slips] = slips;
+    let slips = slipping(&terms, [&first_slips, &second_slips, &slip, &slip]);
+    let [first_slips, second_slips, one_slips, two_slips] = if one.turns() && other.turns() {
+        slips
+    } else {
+        [one.slips(&first_slips), other.slips(&second_slips), one.slips(&slip), other.slips(&slip)]
+    };
     let rests = |shown: &Shown, rolls: f64| if shown.is_faulty() { 0.0 } else { rolls };
     let of_wheels = Lanes([
         one_rolls + two_rolls,
@@ -146,7 +151,7 @@ fn costs(
     filters: &Filters,
     surprise: &Lanes,
     [low, high]: &[Lanes; 2],
-    [one, other]: [&Terms; 2],
+    [one, other]: &[Terms; 2],
     followed: f64,
 ) -> [Lanes; 3] {
     let [mut rolls_1, mut rolls_2, mut usual] = [Lanes::all(0.0); 3];
@@ -163,18 +168,14 @@ fn costs(
     [rolls_1, rolls_2, usual]
 }
 
-/// What it costs the trains that the first, the second, the first and the second wheel slip.
+/// What it costs the trains that the first, the second, the first and the second wheel slip, if they turn.
 #[inline(never)]
 #[expect(clippy::indexing_slicing, reason = "below the length of all")]
-fn slipping([one, other]: [&Shown; 2], trains: [&State; 4]) -> [f64; 4] {
+fn slipping([one, other]: &[Terms; 2], trains: [&State; 4]) -> [f64; 4] {
     const SLIPS: usize = 4;
-    let terms = [one.terms(), other.terms()];
     let (v, a) = (trains.map(|train| train.v), trains.map(|train| train.a));
     let (pvv, paa) = (trains.map(|train| train.pvv), trains.map(|train| train.paa));
-    let twice = |of: fn(&Terms) -> f64| {
-        let [one, other] = [of(&terms[0]), of(&terms[1])];
-        [one, other, one, other]
-    };
+    let twice = |of: fn(&Terms) -> f64| [of(one), of(other), of(one), of(other)];
     let (speed, variance) = (twice(|terms| terms.speed), twice(|terms| terms.variance));
     let acceleration = twice(|terms| terms.acceleration);
     let acceleration_variance = twice(|terms| terms.acceleration_variance);
@@ -187,16 +188,9 @@ fn slipping([one, other]: [&Shown; 2], trains: [&State; 4]) -> [f64; 4] {
             acceleration: acceleration[slip],
             acceleration_variance: acceleration_variance[slip],
             ruled_out: ruled_out[slip],
-            ..terms[0]
+            ..*one
         };
         costs[slip] = terms.slips([v[slip], a[slip]], [pvv[slip], paa[slip]]);
-    }
-    // A wheel that is silent, or was not read, does not turn.
-    for (at, (cost, train)) in costs.iter_mut().zip(trains).enumerate() {
-        let shown = if at % 2 == 0 { one } else { other };
-        if let Some(still) = shown.still(train) {
-            *cost = still;
-        }
     }
     costs
 }
@@ -302,22 +296,22 @@ impl Shown<'_> {
         train.paa + own * own + RESTLESS_ACCELERATION
     }
 
-    /// It slips independently.
-    fn slips(&self, train: &State) -> f64 {
-        self.still(train).unwrap_or_else(|| self.terms().slips([train.v, train.a], [train.pvv, train.paa]))
+    /// Its count was read, and it is not silent.
+    fn turns(&self) -> bool {
+        self.wheel.read && self.wheel.speed.abs() > SILENT
     }
 
-    /// It slips and does not turn; nothing if it turns.
-    fn still(&self, train: &State) -> Option<f64> {
-        if !self.wheel.read {
-            return Some(0.0);
+    /// It slips independently.
+    fn slips(&self, train: &State) -> f64 {
+        if self.turns() {
+            return self.terms().slips([train.v, train.a], [train.pvv, train.paa]);
         }
-        if self.wheel.speed.abs() > SILENT {
-            return None;
+        if !self.wheel.read {
+            return 0.0;
         }
         // A silent wheel is locked and stays so.
         let still = 1.0 / (1.0 + train.v * train.v / (NEARLY_STANDING * NEARLY_STANDING));
-        Some(-self.t * (self.ruled_out() + LOCKED + still * still * IMPOSSIBLE))
+        -self.t * (self.ruled_out() + LOCKED + still * still * IMPOSSIBLE)
     }
 
     /// Its sensor is dead.

@@ -13,6 +13,9 @@ const ACCELERATION: (f64, f64) = (1e-8, 4.0);
 /// No train accelerates more (m/s²).
 pub(super) const STRONGEST: f64 = 10.0;
 
+/// Variance of the speed and acceleration at rest (m²/s², m²/s⁴): nothing but rounding.
+const AT_REST: f64 = 1e-6;
+
 /// State and covariance of every hypothesis.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Filters {
@@ -42,6 +45,13 @@ pub(super) struct State {
 }
 
 impl State {
+    /// That of a train at rest, after a period of `t` seconds.
+    pub(super) fn at_rest(t: f64) -> Self {
+        let pva = AT_REST * t;
+        let (pvv, paa) = (AT_REST + pva * t, AT_REST);
+        Self { r: 0.0, v: 0.0, a: 0.0, prr: PLACE.0, prv: 0.0, pra: 0.0, pvv, pva, paa }
+    }
+
     /// Predicts by `t` seconds with jerk of spectral density `q`. Returns the distance run.
     #[inline(always)]
     pub(super) fn run(&mut self, t: f64, q: f64) -> f64 {
