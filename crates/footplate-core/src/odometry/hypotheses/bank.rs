@@ -161,7 +161,9 @@ impl Bank {
         let wheels_a = 0.5 * (first.acceleration + second.acceleration);
         self.wheels_a += (wheels_a - self.wheels_a) * smaller(t / STEADY_S, 1.0);
         let wheels = self.compared(scene);
-        let (begins, arrivals) = self.begins(scene, &wheels, t);
+        let transitions = self.transitions(scene, t);
+        let arrivals = self.arrivals(scene, &wheels, &transitions);
+        let begins = self.begins(scene, &wheels, &transitions, &arrivals);
         let counts = self.counts(scene, t);
         let Ran { distances, surprise, exceeds } = 
             self.filters.advance(&begins, &arrivals, &counts, &mut self.probability, &mut self.ahead, t);
@@ -265,19 +267,23 @@ impl Bank {
         [of(first, one, first_dead), of(second, other, second_dead)]
     }
 
-    /// What each hypothesis begins with by the transitions between them.
-    fn begins(&self, scene: &Scene, wheels: &[Compared; 2], t: f64) -> (Begins, Arrivals) {
+    /// The transitions of a period. A hypothesis that cannot begin now takes no probability.
+    fn transitions(&self, scene: &Scene, t: f64) -> Transitions {
         let Transitions { ends, after_rolling, after_others } = transitions(scene, self.found_dead, t);
-        // A hypothesis that cannot begin now takes no probability.
         let may = self.may_begin();
-        let (after_rolling, mut follows) = (after_rolling * may, after_others * may);
+        Transitions { ends, after_rolling: after_rolling * may, after_others: after_others * may }
+    }
+
+    /// What ends in a period.
+    fn arrivals(&self, scene: &Scene, wheels: &[Compared; 2], transitions: &Transitions) -> Arrivals {
+        let Transitions { ends, after_rolling, after_others } = transitions;
         let [rolling, ..] = self.probability.0;
         let ending = Ending {
             filters: &self.filters,
             probability: &self.probability,
             ahead: &self.ahead,
-            ends: &ends,
-            follows: &follows,
+            ends,
+            follows: after_others,
             of_rolling: rolling * after_rolling.sum(),
             about: [self.speed, self.acceleration],
         };
@@ -286,12 +292,25 @@ impl Bank {
         let mut arrivals = arrivals(scene, wheels, &ending, pitch * pitch);
         let [.., slip, creep, _, _, _] = arrivals.leaves.0;
         arrivals.pool.paa += REGAINS * REGAINS * (slip + creep) / arrivals.leaves.sum();
+        arrivals
+    }
+
+    /// What each hypothesis begins with by the transitions between them.
+    fn begins(
+        &self,
+        scene: &Scene,
+        wheels: &[Compared; 2],
+        transitions: &Transitions,
+        arrivals: &Arrivals,
+    ) -> Begins {
+        let Transitions { after_rolling, after_others: mut follows, .. } = *transitions;
+        let [rolling, ..] = self.probability.0;
         let [alike, of_first, of_second] = self.lost(scene, wheels, &arrivals.pool);
         let lost = Lanes([alike, of_second, of_first, 0.0, 0.0, 0.0, of_second, of_first]);
         if alike + of_first + of_second > 0.0 {
             follows *= Lanes(lost.0.map(|leap| if leap > 0.0 { LOST } else { 1.0 }));
         }
-        (Begins { follows, after_rolling, rolling, lost }, arrivals)
+        Begins { follows, after_rolling, rolling, lost }
     }
 
     /// Variance (m²/s²) that hypotheses begin with in addition, if their speed has to leap: the leap then costs likelihood once, not

@@ -109,7 +109,9 @@ impl Bank {
             // A wheel that is too far off was stopped by its slide control.
             let off = y * y / ((train.pvv + reached) * REACHES_WITHIN);
             let tells = if has_reached { 1.0 / (reached * (1.0 + off * off)) } else { 0.0 };
-            train.speed(y, pushes + tells);
+            if pushes + tells > 0.0 {
+                train.speed(y, pushes + tells);
+            }
         }
     }
 }
