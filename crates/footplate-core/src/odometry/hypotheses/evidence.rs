@@ -4,8 +4,6 @@
 //! spin: faster) a wheel turns than the train moves, `v`, `a`, `pvv`, `paa` the train as in `filters`. The errors of a tracked
 //! speed are correlated; evidence counts once in a correlation time, not once a period.
 
-use core::array;
-
 use super::filters::{Filters, State};
 use super::lanes::{Lanes, WIDTH, ln};
 use super::scene::{Scene, WheelScene};
@@ -59,6 +57,11 @@ const SHAKEN: f64 = 1.5;
 const TURNS: f64 = 3.0;
 /// Squared innovations of the place over their variance up to this are no evidence.
 const SURPRISING: f64 = 7.0;
+/// The hypotheses that the first wheel slips, the second, and both, once for each; and others.
+const SLIPPING: [usize; 4] = [1, 2, 3, 3];
+const CREEPS: usize = 4;
+const FIRST_DEAD: usize = 6;
+const SECOND_DEAD: usize = 7;
 /// Largest evidence of one period (nats): one row may be faulty.
 const MOST: f64 = 25.0;
 
@@ -96,8 +99,6 @@ pub(super) fn evidence(
     let [a, b] = wheels;
     let of = |wheel, compared| Shown { scene, wheel, compared, side, followed, t };
     let (one, other) = (of(first, a), of(second, b));
-    let [_, first_slips, second_slips, slip, creep, _, first_dead, second_dead] =
-        array::from_fn(|lane| filters.state(lane));
     // A stuck count is no evidence against a train at rest.
     let turned = |wheel: &WheelScene| if wheel.stuck { 0.0 } else { wheel.counted.abs() / wheel.pitch };
     let turned = larger(turned(first), turned(second));
@@ -118,11 +119,12 @@ pub(super) fn evidence(
     let [rolls_1, rolls_2, usual] = costs(filters, surprise, &limits, &terms, followed);
     let ([one_rolls, _, one_beside, .., one_rests, _, one_by_dead], [two_rolls, two_beside, .., two_rests, two_by_dead, _]) =
         (rolls_1.0, rolls_2.0);
-    let slips = slipping(&terms, [&first_slips, &second_slips, &slip, &slip]);
+    let slips = slipping(filters, &terms);
     let [first_slips, second_slips, one_slips, two_slips] = if one.turns() && other.turns() {
         slips
     } else {
-        [one.slips(&first_slips), other.slips(&second_slips), one.slips(&slip), other.slips(&slip)]
+        let [of_first, of_second, of_one, of_other] = SLIPPING.map(|lane| filters.state(lane));
+        [one.slips(&of_first), other.slips(&of_second), one.slips(&of_one), other.slips(&of_other)]
     };
     let rests = |shown: &Shown, rolls: f64| if shown.is_faulty() { 0.0 } else { rolls };
     let of_wheels = Lanes([
@@ -130,14 +132,14 @@ pub(super) fn evidence(
         first_slips + two_beside,
         one_beside + second_slips,
         one_slips + two_slips,
-        alike(&one, &other, &creep, wheels_a),
+        alike(&one, &other, &filters.state(CREEPS), wheels_a),
         rests(&one, one_rests) + rests(&other, two_rests) - shaken,
         one.dead() + two_by_dead,
         one_by_dead + other.dead(),
     ]);
     let mut total = of_wheels + usual;
     if one.is_faulty() || other.is_faulty() {
-        total = total.or_if_larger(beside_dead(&one, &other, [&first_dead, &second_dead]));
+        total = total.or_if_larger(beside_dead(&one, &other, [&filters.state(FIRST_DEAD), &filters.state(SECOND_DEAD)]));
     }
     let best = total.largest();
     (total - Lanes::all(best)).at_least(-MOST)
@@ -171,17 +173,16 @@ fn costs(
 /// What it costs the trains that the first, the second, the first and the second wheel slip, if they turn.
 #[inline(never)]
 #[expect(clippy::indexing_slicing, reason = "below the length of all")]
-fn slipping([one, other]: &[Terms; 2], trains: [&State; 4]) -> [f64; 4] {
-    const SLIPS: usize = 4;
-    let (v, a) = (trains.map(|train| train.v), trains.map(|train| train.a));
-    let (pvv, paa) = (trains.map(|train| train.pvv), trains.map(|train| train.paa));
+fn slipping(filters: &Filters, [one, other]: &[Terms; 2]) -> [f64; 4] {
+    let of = |lanes: &Lanes| SLIPPING.map(|lane| lanes.0[lane]);
+    let (v, a, pvv, paa) = (of(&filters.v), of(&filters.a), of(&filters.pvv), of(&filters.paa));
     let twice = |of: fn(&Terms) -> f64| [of(one), of(other), of(one), of(other)];
     let (speed, variance) = (twice(|terms| terms.speed), twice(|terms| terms.variance));
     let acceleration = twice(|terms| terms.acceleration);
     let acceleration_variance = twice(|terms| terms.acceleration_variance);
     let ruled_out = twice(|terms| terms.ruled_out);
-    let mut costs = [0.0; SLIPS];
-    for slip in 0..SLIPS {
+    let mut costs = [0.0; SLIPPING.len()];
+    for slip in 0..SLIPPING.len() {
         let terms = Terms {
             speed: speed[slip],
             variance: variance[slip],
