@@ -100,7 +100,12 @@ struct Rolling {
 impl Rolling {
     fn new(read: bool, wheel: &Compared) -> Self {
         let most = if wheel.speed.abs() > SILENT { MEETS_NOT.0 } else { MEETS_NOT.1 };
-        Self { read: f64::from(u8::from(read)), speed: wheel.speed, variance: wheel.variance + MEETS * MEETS, most }
+        Self {
+            read: f64::from(u8::from(read)),
+            speed: wheel.speed,
+            variance: wheel.variance + MEETS * MEETS,
+            most,
+        }
     }
 
     /// How well its speed meets that of a train, 0 to 1.

@@ -71,6 +71,8 @@ pub(in super::super) struct Bank {
     ahead: Lanes,
     /// Distance run in the last period by each hypothesis (m).
     distances: Lanes,
+    /// The shares of both wheels in the period where both roll.
+    shares: [f64; 2],
     /// First over second wheel speed when both roll, less 1, and its variance.
     pub(super) ratio: f64,
     ratio_variance: f64,
@@ -110,6 +112,7 @@ impl Bank {
             filters,
             ahead: Lanes::all(0.0),
             distances: Lanes::all(0.0),
+            shares: [0.0; 2],
             ratio: 0.0,
             beyond: 0.0,
             ratio_variance: variances.iter().sum(),
@@ -157,6 +160,7 @@ impl Bank {
     /// Takes in a period of `t` seconds. Returns the distance run (m).
     pub(in super::super) fn step(&mut self, scene: &Scene, t: f64) -> f64 {
         self.side = self.next_side(scene, t);
+        self.shares = shares(scene);
         let [first, second] = &scene.wheels;
         let wheels_a = 0.5 * (first.acceleration + second.acceleration);
         self.wheels_a += (wheels_a - self.wheels_a) * smaller(t / STEADY_S, 1.0);
@@ -165,7 +169,7 @@ impl Bank {
         let arrivals = self.arrivals(scene, &wheels, &transitions);
         let begins = self.begins(scene, &wheels, &transitions, &arrivals);
         let counts = self.counts(scene, t);
-        let Ran { distances, surprise, exceeds } = 
+        let Ran { distances, surprise, exceeds } =
             self.filters.advance(&begins, &arrivals, &counts, &mut self.probability, &mut self.ahead, t);
         self.distances = distances;
         self.correct_slips(scene, &wheels, t);
@@ -262,7 +266,7 @@ impl Bank {
             let ratio = 0.25 * self.ratio_variance * speed * speed;
             Compared { speed, variance: wheel.speed_deviation * wheel.speed_deviation + ratio, dead }
         };
-        let [one, other] = self.scales(scene);
+        let [one, other] = self.scales();
         let [first_dead, second_dead] = self.found_dead;
         [of(first, one, first_dead), of(second, other, second_dead)]
     }
@@ -364,8 +368,8 @@ impl Bank {
     /// What the counters and the command of a period of `t` seconds say to each hypothesis.
     fn counts(&mut self, scene: &Scene, t: f64) -> Counts {
         let [first, second] = &scene.wheels;
-        let [one, other] = self.scales(scene);
-        let [both_1, both_2] = shares(scene);
+        let [one, other] = self.scales();
+        let [both_1, both_2] = self.shares;
         // Without a reading, nothing corrects a hypothesis that trusts that wheel.
         let trusts = |wheel: &WheelScene| f64::from(u8::from(wheel.read));
         let of_both = |both: f64, one: f64, two: f64| Lanes([both, two, one, 0.0, 0.0, 0.0, two, one]);
@@ -388,8 +392,8 @@ impl Bank {
     }
 
     /// Factors that make both wheels agree while both roll.
-    pub(super) fn scales(&self, scene: &Scene) -> [f64; 2] {
-        let [one, other] = shares(scene);
+    pub(super) fn scales(&self) -> [f64; 2] {
+        let [one, other] = self.shares;
         [1.0 - other * self.ratio, 1.0 + one * self.ratio]
     }
 
@@ -436,77 +440,4 @@ fn shares(scene: &Scene) -> [f64; 2] {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::odometry::wheels::Axle;
-    use crate::units::Length;
-
-    fn bank(speed: f64) -> Bank {
-        let wheelset = Wheelset {
-            teeth: 100,
-            diameter: Length::from_m(0.955),
-            diameter_tolerance: 0.002,
-            axle: Axle::Powered,
-        };
-        Bank::new(speed, 1.0, &[wheelset; 2])
-    }
-
-    fn assert_near(found: f64, expected: f64) {
-        assert!((found - expected).abs() <= 1e-9 * (1.0 + expected.abs()), "{found} {expected}");
-    }
-
-    /// The wheels of a run in which everything happens: a run, a slide of one and of both, a wheel that comes back, a dead
-    /// sensor, a stuck count, a missing row, and a spin.
-    fn eventful(period: usize, spins: bool) -> Scene {
-        let second = period / 20;
-        let (speeds, commanded) = match second {
-            3.. if spins => ([19.0, 17.0], Some(0.6)),
-            0..=2 => ([15.0, 15.0], Some(0.0)),
-            3..=4 => ([9.0, 15.0 - 0.02 * period as f64], Some(-0.8)),
-            5..=7 => ([8.0, 6.5], Some(-0.8)),
-            8..=9 => ([13.0, 9.0], Some(-0.3)),
-            _ => ([12.5, 0.0], None),
-        };
-        let mut scene = Scene::of_test(speeds, commanded);
-        let [first, second_wheel] = &mut scene.wheels;
-        first.acceleration = [-0.1, 5.0, -6.0, 0.4][period / 4 % 4];
-        second_wheel.acceleration = if period % 40 < 20 { 0.3 } else { -0.5 };
-        second_wheel.stuck = second == 12;
-        first.read = !period.is_multiple_of(17);
-        first.late = 0.01;
-        scene.inertial = (second % 4 == 3).then_some(-0.4);
-        scene.independent = second > 10;
-        scene
-    }
-
-    #[test]
-    fn which_wheelset_is_called_the_first_does_not_matter() {
-        mirrored(270, false);
-        mirrored(120, true);
-    }
-
-    fn mirrored(periods: usize, spins: bool) {
-        let (mut one, mut other) = (bank(15.0), bank(15.0));
-        for period in 0..periods {
-            let scene = eventful(period, spins);
-            let mut swapped = scene;
-            swapped.wheels.reverse();
-            assert_near(one.step(&scene, 0.05), other.step(&swapped, 0.05));
-            let [roll, first, second, slip, creep, rest, first_dead, second_dead] = other.probabilities();
-            let mirrored = [roll, second, first, slip, creep, rest, second_dead, first_dead];
-            for (found, expected) in one.probabilities().into_iter().zip(mirrored) {
-                assert_near(found, expected);
-            }
-            assert_near(one.probabilities().iter().sum(), 1.0);
-            assert_near(one.speed, other.speed);
-            assert_near(one.acceleration, other.acceleration);
-            assert_near(one.variance, other.variance);
-            let ranges =
-                one.interval(&scene, 1e-4, 0.05).into_iter().zip(other.interval(&swapped, 1e-4, 0.05));
-            for (found, expected) in ranges {
-                assert_near(found.low, expected.low);
-                assert_near(found.high, expected.high);
-            }
-        }
-    }
-}
+mod tests;

@@ -117,8 +117,10 @@ pub(super) fn evidence(
     ];
     let terms = [one.terms(), other.terms()];
     let [rolls_1, rolls_2, usual] = costs(filters, surprise, &limits, &terms, followed);
-    let ([one_rolls, _, one_beside, .., one_rests, _, one_by_dead], [two_rolls, two_beside, .., two_rests, two_by_dead, _]) =
-        (rolls_1.0, rolls_2.0);
+    let (
+        [one_rolls, _, one_beside, .., one_rests, _, one_by_dead],
+        [two_rolls, two_beside, .., two_rests, two_by_dead, _],
+    ) = (rolls_1.0, rolls_2.0);
     let slips = slipping(filters, &terms);
     let [first_slips, second_slips, one_slips, two_slips] = if one.turns() && other.turns() {
         slips
@@ -139,7 +141,11 @@ pub(super) fn evidence(
     ]);
     let mut total = of_wheels + usual;
     if one.is_faulty() || other.is_faulty() {
-        total = total.or_if_larger(beside_dead(&one, &other, [&filters.state(FIRST_DEAD), &filters.state(SECOND_DEAD)]));
+        total = total.or_if_larger(beside_dead(
+            &one,
+            &other,
+            [&filters.state(FIRST_DEAD), &filters.state(SECOND_DEAD)],
+        ));
     }
     let best = total.largest();
     (total - Lanes::all(best)).at_least(-MOST)

@@ -33,16 +33,15 @@ pub(super) fn interval(
     let wide = 0.5 * (first.tolerance + second.tolerance) * TOLERANCE;
     let wider = larger(first.tolerance, second.tolerance);
     let effort = scene.brake + scene.traction;
-    for (lane, coasts) in COASTS.into_iter().enumerate() {
-        let (Some(&w), Some(&v), Some(&pvv), Some(&ran)) =
-            (p.0.get(lane), filters.v.0.get(lane), filters.pvv.0.get(lane), distances.0.get(lane))
-        else {
-            continue;
-        };
+    // Both wheels tell the speed of "both roll".
+    let mut tolerance = wide;
+    for ((((&w, &v), &pvv), &ran), coasts) in
+        p.0.iter().zip(&filters.v.0).zip(&filters.pvv.0).zip(&distances.0).zip(COASTS)
+    {
+        let tolerance = core::mem::replace(&mut tolerance, wider);
         if w <= part {
             continue;
         }
-        let tolerance = if lane == 0 { wide } else { wider };
         let scale = (tolerance + beyond + if coasts { 0.0 } else { CREEPAGE * effort }) * v.abs();
         // k deviations, with k² = 2 ln (w / part).
         let off = libm::sqrt(2.0 * ln(w * per_part) * pvv) + scale;

@@ -80,7 +80,7 @@ impl Bank {
         let [in_a_slide, in_a_spin] = REACHED;
         let reached = if self.side > 0.0 { in_a_slide } else { in_a_spin };
         let reached = reached * reached;
-        let scales = self.scales(scene);
+        let scales = self.scales();
         self.since_touch += t;
         self.since_lone_touch += t;
         let [a, b] = scene.wheels.map(|wheel| {
