@@ -316,7 +316,7 @@ mod tests {
     #[test]
     fn a_prediction_is_the_transition_matrix_on_both_sides_and_integrated_white_jerk() {
         let (t, q) = (0.4, 0.3);
-        let mut filters = filters();
+        let filters = filters();
         let mut state = filters.state(5);
         let ran = state.run(t, q);
         let f = [[1.0, t, t * t / 2.0], [0.0, 1.0, t], [0.0, 0.0, 1.0]];
