@@ -1,10 +1,11 @@
 //! All hypotheses: a filter for each, and its probability.
 
-use super::arrivals::{Arrivals, arrivals};
+use super::advance::{Begins, Counts, LEAST, MOVES, Ran};
+use super::arrivals::{Arrivals, Ending, arrivals};
 use super::evidence::{CREEP as CREEP_BY, Compared, SILENT, STEADY_S, evidence};
 use super::filters::{Filters, Pool};
 use super::interval::interval;
-use super::lanes::Lanes;
+use super::lanes::{Lanes, WIDTH, likelihood};
 use super::rates::{Transitions, transitions};
 use super::reach::{Reach, Shown};
 use super::scene::{Scene, WheelScene};
@@ -14,24 +15,16 @@ use crate::odometry::wheels::{Range, Wheelset, larger, smaller};
 /// Spectral density of the train's jerk (m²/s⁵) while a wheel tells the speed: 0.14 m/s² in a second, as a driver corrects a
 /// cruising train. While none does, the acceleration is then known to 0.3 m/s² after a few seconds.
 const JERK: Lanes = Lanes([0.02, 0.02, 0.02, 0.007, 0.05, 0.0, 0.02, 0.02]);
-/// What is added to that where no command is recorded.
-const UNANNOUNCED: f64 = 0.06;
+/// The same where no command is recorded: 0.06 more.
+const JERK_UNANNOUNCED: Lanes = Lanes([0.08, 0.08, 0.08, 0.007, 0.05, 0.0, 0.08, 0.08]);
+/// What is added to the variance of a count (m²), so that no filter takes it for exact.
+const ROUNDING: f64 = 1e-9;
 /// How long brakes and motors take to follow the command (s), and what part of it shows in the acceleration of a train whose wheels
 /// roll. The rest is uncertain: gradients, resistance and the state of the brakes.
 const BUILD_UP_S: f64 = 1.5;
 const EXPECTED: f64 = 0.5;
 /// Standard deviation of the change of acceleration when slipping wheels adhere again (m/s²).
 const REGAINS: f64 = 0.4;
-/// 1 for hypotheses that trust a counter.
-const TRUSTS: Lanes = Lanes([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
-/// 1 for hypotheses in which no wheel tells the speed.
-const COASTS: Lanes = Lanes([0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
-const NOT_ROLLING: Lanes = Lanes([0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]);
-const BOTH_ROLL: Lanes = Lanes([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-const STANDS: Lanes = Lanes([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
-/// Variance of the speed and acceleration at rest (m²/s², m²/s⁴): nothing but rounding.
-const AT_REST: f64 = 1e-6;
-const MOVES: Lanes = Lanes([1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0]);
 /// How long the error of a followed wheel lasts (s).
 const FOLLOWED_S: f64 = 0.15;
 /// Random walk of the ratio of the diameters (part, per square root of a second).
@@ -45,8 +38,6 @@ const RATIO_CREEPAGE: f64 = 0.008;
 const CREEPAGE_FOR_S: f64 = 200.0;
 /// Share of a driven wheel in traction beside one that is not driven: creepage biases the driven one.
 const CREEPING_SHARE: f64 = 0.05;
-/// Least probability: far below the risk of any interval.
-const LEAST: f64 = 1e-30;
 /// Time constant of the acceleration that tells braking from motoring without a command (s).
 const SIDE_S: f64 = 1.0;
 /// Speed at which slips begin half as often as at high speed (m/s); the same for steady creep.
@@ -68,6 +59,8 @@ const FAR: f64 = 4.0;
 const FOUND_DEAD: f64 = 0.99;
 /// A train comes to rest from below this speed (m/s).
 const STOPS_BELOW: f64 = 0.15;
+/// Squared speed over its variance from which exp(−½ of it) is zero.
+const NEVER_STOPS: f64 = 1500.0;
 
 /// Filters and probabilities of all hypotheses.
 #[derive(Debug, Clone, Copy)]
@@ -78,6 +71,8 @@ pub(in super::super) struct Bank {
     ahead: Lanes,
     /// Distance run in the last period by each hypothesis (m).
     distances: Lanes,
+    /// The shares of both wheels in the period where both roll.
+    shares: [f64; 2],
     /// First over second wheel speed when both roll, less 1, and its variance.
     pub(super) ratio: f64,
     ratio_variance: f64,
@@ -117,6 +112,7 @@ impl Bank {
             filters,
             ahead: Lanes::all(0.0),
             distances: Lanes::all(0.0),
+            shares: [0.0; 2],
             ratio: 0.0,
             beyond: 0.0,
             ratio_variance: variances.iter().sum(),
@@ -164,21 +160,55 @@ impl Bank {
     /// Takes in a period of `t` seconds. Returns the distance run (m).
     pub(in super::super) fn step(&mut self, scene: &Scene, t: f64) -> f64 {
         self.side = self.next_side(scene, t);
+        self.shares = shares(scene);
         let [first, second] = &scene.wheels;
         let wheels_a = 0.5 * (first.acceleration + second.acceleration);
         self.wheels_a += (wheels_a - self.wheels_a) * smaller(t / STEADY_S, 1.0);
         let wheels = self.compared(scene);
-        self.mix(scene, &wheels, t);
-        let (distances, surprise) = self.run(scene, t);
-        self.ahead += distances;
+        let transitions = self.transitions(scene, t);
+        let arrivals = self.arrivals(scene, &wheels, &transitions);
+        let begins = self.begins(scene, &wheels, &transitions, &arrivals);
+        let counts = self.counts(scene, t);
+        let Ran { distances, surprise, exceeds } =
+            self.filters.advance(&begins, &arrivals, &counts, &mut self.probability, &mut self.ahead, t);
         self.distances = distances;
         self.correct_slips(scene, &wheels, t);
-        let evidence = evidence(scene, &wheels, &self.filters, surprise, self.wheels_a, self.side, t);
-        let weights = (self.probability * evidence.likelihoods()).at_least(LEAST);
-        self.probability = weights * (1.0 / weights.sum());
+        if exceeds {
+            self.filters.cut();
+        }
+        let evidence = evidence(scene, &wheels, &self.filters, &surprise, self.wheels_a, self.side, t);
+        let distance = self.learn(&evidence, scene.top_speed);
         self.find_dead(scene);
         self.learn_ratio(scene, t);
-        self.summed_up(scene.top_speed)
+        distance
+    }
+
+    /// Takes in the logarithms of the likelihoods and combines all hypotheses. Returns the distance that the estimate moved (m).
+    #[inline(never)]
+    #[expect(clippy::indexing_slicing, reason = "below the width of all")]
+    fn learn(&mut self, evidence: &Lanes, top: f64) -> f64 {
+        let one = 1.0 / self.probability.sum();
+        let about = self.speed;
+        let (Filters { v, a, pvv, .. }, p) = (&self.filters, &mut self.probability);
+        let [mut speeds, mut squares, mut accelerations, mut ahead] = [Lanes::all(0.0); 4];
+        for lane in 0..WIDTH {
+            let w = larger(p.0[lane] * one * likelihood(evidence.0[lane]), LEAST);
+            p.0[lane] = w;
+            let dv = v.0[lane] - about;
+            speeds.0[lane] = w * dv;
+            squares.0[lane] = w * (pvv.0[lane] + dv * dv);
+            accelerations.0[lane] = w * a.0[lane];
+            ahead.0[lane] = w * self.ahead.0[lane];
+        }
+        let one = 1.0 / p.sum();
+        *p *= Lanes::all(one);
+        let dv = speeds.sum() * one;
+        self.variance = squares.sum() * one - dv * dv;
+        self.speed = larger(smaller(about + dv, top), -top);
+        self.acceleration = accelerations.sum() * one;
+        let distance = ahead.sum() * one;
+        self.ahead -= Lanes::all(distance);
+        distance
     }
 
     /// Intervals of the speed (m/s) and of the distance of the period (m) that leave out no more than `risk`.
@@ -236,53 +266,64 @@ impl Bank {
             let ratio = 0.25 * self.ratio_variance * speed * speed;
             Compared { speed, variance: wheel.speed_deviation * wheel.speed_deviation + ratio, dead }
         };
-        let [one, other] = self.scales(scene);
+        let [one, other] = self.scales();
         let [first_dead, second_dead] = self.found_dead;
         [of(first, one, first_dead), of(second, other, second_dead)]
     }
 
-    /// Applies the transitions between hypotheses.
-    fn mix(&mut self, scene: &Scene, wheels: &[Compared; 2], t: f64) {
+    /// The transitions of a period. A hypothesis that cannot begin now takes no probability.
+    fn transitions(&self, scene: &Scene, t: f64) -> Transitions {
         let Transitions { ends, after_rolling, after_others } = transitions(scene, self.found_dead, t);
-        // A hypothesis that cannot begin now takes no probability.
         let may = self.may_begin();
-        let (after_rolling, after_others) = (after_rolling * may, after_others * may);
-        let [rolling, ..] = self.probability.0;
-        let rest = self.probability * ends * NOT_ROLLING;
-        let Arrivals { stays_lost, others } = arrivals(scene, wheels, &self.filters, rest, after_others);
-        let leaves = rest * (Lanes::all(after_others.sum()) - stays_lost)
-            + BOTH_ROLL * (rolling * after_rolling.sum());
-        let [first, second] = &scene.wheels;
-        let pitch = larger(first.pitch, second.pitch);
-        let mut pool = self.filters.pooled(leaves, pitch * pitch);
-        pool.paa += REGAINS * REGAINS * (leaves * COASTS).sum() / leaves.sum();
-        let pooled_ahead = (leaves * self.ahead).sum() / leaves.sum();
-        let lost = self.lost(scene, wheels, &pool);
-        let found = Lanes(lost.0.map(|leap| if leap > 0.0 { LOST } else { 1.0 }));
-        let arrives = after_rolling * rolling + after_others * others * found;
-        let stays = self.probability - leaves;
-        let next = (stays + arrives).at_least(LEAST);
-        let share = arrives * next.inverse();
-        self.filters.mix(&pool, share);
-        self.filters.pvv += share * lost;
-        self.ahead += share * (Lanes::all(pooled_ahead) - self.ahead);
-        self.probability = next * (1.0 / next.sum());
-        // A train at rest stays there.
-        let Filters { v, a, pvv, pva, paa, .. } = &mut self.filters;
-        *v *= MOVES;
-        *a *= MOVES;
-        *pva *= MOVES;
-        *pvv = *pvv * MOVES + STANDS * AT_REST;
-        *paa = *paa * MOVES + STANDS * AT_REST;
+        Transitions { ends, after_rolling: after_rolling * may, after_others: after_others * may }
     }
 
-    /// Variance (m²/s²) that each hypothesis begins with in addition, if its speed has to leap: the leap then costs likelihood
-    /// once, not in every period.
+    /// What ends in a period.
+    fn arrivals(&self, scene: &Scene, wheels: &[Compared; 2], transitions: &Transitions) -> Arrivals {
+        let Transitions { ends, after_rolling, after_others } = transitions;
+        let [rolling, ..] = self.probability.0;
+        let ending = Ending {
+            filters: &self.filters,
+            probability: &self.probability,
+            ahead: &self.ahead,
+            ends,
+            follows: after_others,
+            of_rolling: rolling * after_rolling.sum(),
+            about: [self.speed, self.acceleration],
+        };
+        let [first, second] = &scene.wheels;
+        let pitch = larger(first.pitch, second.pitch);
+        let mut arrivals = arrivals(scene, wheels, &ending, pitch * pitch);
+        let [.., slip, creep, _, _, _] = arrivals.leaves.0;
+        arrivals.pool.paa += REGAINS * REGAINS * (slip + creep) / arrivals.leaves.sum();
+        arrivals
+    }
+
+    /// What each hypothesis begins with by the transitions between them.
+    fn begins(
+        &self,
+        scene: &Scene,
+        wheels: &[Compared; 2],
+        transitions: &Transitions,
+        arrivals: &Arrivals,
+    ) -> Begins {
+        let Transitions { after_rolling, after_others: mut follows, .. } = *transitions;
+        let [rolling, ..] = self.probability.0;
+        let [alike, of_first, of_second] = self.lost(scene, wheels, &arrivals.pool);
+        let lost = Lanes([alike, of_second, of_first, 0.0, 0.0, 0.0, of_second, of_first]);
+        if alike + of_first + of_second > 0.0 {
+            follows *= Lanes(lost.0.map(|leap| if leap > 0.0 { LOST } else { 1.0 }));
+        }
+        Begins { follows, after_rolling, rolling, lost }
+    }
+
+    /// Variance (m²/s²) that hypotheses begin with in addition, if their speed has to leap: the leap then costs likelihood once, not
+    /// in every period. Of "both roll", and of those in which the first and the second wheel rolls.
     ///
     /// A slide has lost the train where both wheels turn alike at quite another speed: they roll. A sensor that is taken for dead
     /// may be the good one: its wheel rolls, and the other slips or has the dead sensor. So may a wheel that is taken to slip beside a
     /// stuck count.
-    fn lost(&self, scene: &Scene, [one, other]: &[Compared; 2], pool: &Pool) -> Lanes {
+    fn lost(&self, scene: &Scene, [one, other]: &[Compared; 2], pool: &Pool) -> [f64; 3] {
         let [_, first_slips, second_slips, slip, _, _, first_dead, second_dead] = self.probability.0;
         let [_, (most, part)] = CREEP_BY;
         let leap = |speed: f64, variance: f64, least: f64| {
@@ -305,7 +346,7 @@ impl Bank {
         let lost_second = second_dead > 0.9 || first.stuck && second_slips > 0.9;
         let of_first = if lost_first { of_wheel(first, one) } else { 0.0 };
         let of_second = if lost_second { of_wheel(second, other) } else { 0.0 };
-        Lanes([alike, of_second, of_first, 0.0, 0.0, 0.0, of_second, of_first])
+        [alike, of_first, of_second]
     }
 
     /// How easily each hypothesis begins at the speed of the train, 0 to 1: nothing slips at rest, and only a slow train comes to
@@ -315,39 +356,44 @@ impl Bank {
         let moving = |above: f64| moves / (moves + above * above);
         let (slips, creeps) = (moving(SLIPS_ABOVE), moving(CREEPS_ABOVE) * moving(CREEPS_ABOVE));
         let slow = self.variance + STOPS_BELOW * STOPS_BELOW;
-        let stops = libm::exp(-0.5 * moves / slow) * STOPS_BELOW / libm::sqrt(slow);
+        // At speed this is less than the least number there is.
+        let stops = if moves > NEVER_STOPS * slow {
+            0.0
+        } else {
+            libm::exp(-0.5 * moves / slow) * STOPS_BELOW / libm::sqrt(slow)
+        };
         Lanes([1.0, slips, slips, slips, creeps, stops, 1.0, 1.0])
     }
 
-    /// Predicts every filter and corrects those that trust a counter. Returns the distance run by each, and its squared
-    /// innovation over the variance.
-    fn run(&mut self, scene: &Scene, t: f64) -> (Lanes, Lanes) {
+    /// What the counters and the command of a period of `t` seconds say to each hypothesis.
+    fn counts(&mut self, scene: &Scene, t: f64) -> Counts {
         let [first, second] = &scene.wheels;
-        let [one, other] = self.scales(scene);
-        let (counted_1, counted_2) = (first.counted * one, second.counted * other);
-        let both = shares(scene);
+        let [one, other] = self.scales();
+        let [both_1, both_2] = self.shares;
         // Without a reading, nothing corrects a hypothesis that trusts that wheel.
-        let (one, two) = (f64::from(u8::from(first.read)), f64::from(u8::from(second.read)));
-        let [b1, b2] = both;
-        let alpha = Lanes([b1, 0.0, one, 0.0, 0.0, 0.0, 0.0, one]);
-        let beta = Lanes([b2, two, 0.0, 0.0, 0.0, 0.0, two, 0.0]);
-        let trusted = TRUSTS * (alpha + beta).at_most(1.0);
+        let trusts = |wheel: &WheelScene| f64::from(u8::from(wheel.read));
+        let of_both = |both: f64, one: f64, two: f64| Lanes([both, two, one, 0.0, 0.0, 0.0, two, one]);
+        let (counted_1, counted_2) = (first.counted * one, second.counted * other);
+        let (white_1, white_2) = (first.pitch * first.pitch / 12.0, second.pitch * second.pitch / 12.0);
+        let both = both_1 * both_1 * white_1 + both_2 * both_2 * white_2;
         let rest = scene.commanded.map_or(0.0, |commanded| commanded - self.acted);
         let acts = rest * smaller(t / BUILD_UP_S, 1.0);
         self.acted += acts;
-        self.filters.a += TRUSTS * (EXPECTED * acts);
-        let unannounced = if scene.commanded.is_some() { 0.0 } else { UNANNOUNCED };
-        let distances = self.filters.run(t, JERK + TRUSTS * unannounced);
-        self.filters.r += (distances - alpha * counted_1 - beta * counted_2) * trusted;
-        let off_1 = alpha * (first.pitch * (1.0 / 12.0_f64)) * alpha * first.pitch;
-        let off_2 = beta * (second.pitch * (1.0 / 12.0_f64)) * beta * second.pitch;
-        let (moved, surprise) = self.filters.place(off_1 + off_2 + Lanes::all(1e-9), trusted);
-        (distances + moved, surprise)
+        let added = EXPECTED * acts;
+        Counts {
+            counted: of_both(both_1 * counted_1 + both_2 * counted_2, counted_1, counted_2),
+            variance: of_both(both + ROUNDING, white_1 + ROUNDING, white_2 + ROUNDING),
+            trusted: of_both(smaller(both_1 + both_2, 1.0), trusts(first), trusts(second)),
+            added: of_both(added, added, added),
+            jerk: if scene.commanded.is_some() { &JERK } else { &JERK_UNANNOUNCED },
+            top: scene.top_speed,
+            inertial: scene.inertial.is_some(),
+        }
     }
 
     /// Factors that make both wheels agree while both roll.
-    pub(super) fn scales(&self, scene: &Scene) -> [f64; 2] {
-        let [one, other] = shares(scene);
+    pub(super) fn scales(&self) -> [f64; 2] {
+        let [one, other] = self.shares;
         [1.0 - other * self.ratio, 1.0 + one * self.ratio]
     }
 
@@ -379,19 +425,6 @@ impl Bank {
         let differ = larger((measured + self.ratio).abs() - most, 0.0);
         self.beyond += (differ - self.beyond) * smaller(t / BEYOND_S, 1.0);
     }
-
-    /// Combines all hypotheses. Returns the distance that the estimate moved (m).
-    fn summed_up(&mut self, top: f64) -> f64 {
-        let p = self.probability;
-        let (v, a, distance) =
-            ((p * self.filters.v).sum(), (p * self.filters.a).sum(), (p * self.ahead).sum());
-        let dv = self.filters.v - Lanes::all(v);
-        self.variance = (p * (self.filters.pvv + dv * dv)).sum();
-        self.speed = larger(smaller(v, top), -top);
-        self.acceleration = a;
-        self.ahead -= Lanes::all(distance);
-        distance
-    }
 }
 
 /// The shares of both wheels where both roll.
@@ -407,77 +440,4 @@ fn shares(scene: &Scene) -> [f64; 2] {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::odometry::wheels::Axle;
-    use crate::units::Length;
-
-    fn bank(speed: f64) -> Bank {
-        let wheelset = Wheelset {
-            teeth: 100,
-            diameter: Length::from_m(0.955),
-            diameter_tolerance: 0.002,
-            axle: Axle::Powered,
-        };
-        Bank::new(speed, 1.0, &[wheelset; 2])
-    }
-
-    fn assert_near(found: f64, expected: f64) {
-        assert!((found - expected).abs() <= 1e-9 * (1.0 + expected.abs()), "{found} {expected}");
-    }
-
-    /// The wheels of a run in which everything happens: a run, a slide of one and of both, a wheel that comes back, a dead
-    /// sensor, a stuck count, a missing row, and a spin.
-    fn eventful(period: usize, spins: bool) -> Scene {
-        let second = period / 20;
-        let (speeds, commanded) = match second {
-            3.. if spins => ([19.0, 17.0], Some(0.6)),
-            0..=2 => ([15.0, 15.0], Some(0.0)),
-            3..=4 => ([9.0, 15.0 - 0.02 * period as f64], Some(-0.8)),
-            5..=7 => ([8.0, 6.5], Some(-0.8)),
-            8..=9 => ([13.0, 9.0], Some(-0.3)),
-            _ => ([12.5, 0.0], None),
-        };
-        let mut scene = Scene::of_test(speeds, commanded);
-        let [first, second_wheel] = &mut scene.wheels;
-        first.acceleration = [-0.1, 5.0, -6.0, 0.4][period / 4 % 4];
-        second_wheel.acceleration = if period % 40 < 20 { 0.3 } else { -0.5 };
-        second_wheel.stuck = second == 12;
-        first.read = !period.is_multiple_of(17);
-        first.late = 0.01;
-        scene.inertial = (second % 4 == 3).then_some(-0.4);
-        scene.independent = second > 10;
-        scene
-    }
-
-    #[test]
-    fn which_wheelset_is_called_the_first_does_not_matter() {
-        mirrored(270, false);
-        mirrored(120, true);
-    }
-
-    fn mirrored(periods: usize, spins: bool) {
-        let (mut one, mut other) = (bank(15.0), bank(15.0));
-        for period in 0..periods {
-            let scene = eventful(period, spins);
-            let mut swapped = scene;
-            swapped.wheels.reverse();
-            assert_near(one.step(&scene, 0.05), other.step(&swapped, 0.05));
-            let [roll, first, second, slip, creep, rest, first_dead, second_dead] = other.probabilities();
-            let mirrored = [roll, second, first, slip, creep, rest, second_dead, first_dead];
-            for (found, expected) in one.probabilities().into_iter().zip(mirrored) {
-                assert_near(found, expected);
-            }
-            assert_near(one.probabilities().iter().sum(), 1.0);
-            assert_near(one.speed, other.speed);
-            assert_near(one.acceleration, other.acceleration);
-            assert_near(one.variance, other.variance);
-            let ranges =
-                one.interval(&scene, 1e-4, 0.05).into_iter().zip(other.interval(&swapped, 1e-4, 0.05));
-            for (found, expected) in ranges {
-                assert_near(found.low, expected.low);
-                assert_near(found.high, expected.high);
-            }
-        }
-    }
-}
+mod tests;

@@ -4,12 +4,10 @@
 //! spin: faster) a wheel turns than the train moves, `v`, `a`, `pvv`, `paa` the train as in `filters`. The errors of a tracked
 //! speed are correlated; evidence counts once in a correlation time, not once a period.
 
-use core::array;
-
 use super::filters::{Filters, State};
-use super::lanes::Lanes;
+use super::lanes::{Lanes, WIDTH, ln};
 use super::scene::{Scene, WheelScene};
-use crate::odometry::wheels::{Range, larger, smaller};
+use crate::odometry::wheels::{larger, smaller};
 
 /// Correlation time of the error of a tracked wheel speed (s).
 const FOLLOWED_S: f64 = 0.15;
@@ -59,12 +57,13 @@ const SHAKEN: f64 = 1.5;
 const TURNS: f64 = 3.0;
 /// Squared innovations of the place over their variance up to this are no evidence.
 const SURPRISING: f64 = 7.0;
+/// The hypotheses that the first wheel slips, the second, and both, once for each; and others.
+const SLIPPING: [usize; 4] = [1, 2, 3, 3];
+const CREEPS: usize = 4;
+const FIRST_DEAD: usize = 6;
+const SECOND_DEAD: usize = 7;
 /// Largest evidence of one period (nats): one row may be faulty.
 const MOST: f64 = 25.0;
-
-/// Hypotheses by which the rail carries the whole brake, and by which one wheelset finds that it does not.
-const GRIPS: Lanes = Lanes([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
-const ONE_SLIPS: Lanes = Lanes([0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
 
 impl WheelScene {
     /// Whether its count is that of a wheel that turns.
@@ -90,7 +89,7 @@ pub(super) fn evidence(
     scene: &Scene,
     wheels: &[Compared; 2],
     filters: &Filters,
-    surprise: Lanes,
+    surprise: &Lanes,
     wheels_a: f64,
     side: f64,
     t: f64,
@@ -100,41 +99,159 @@ pub(super) fn evidence(
     let [a, b] = wheels;
     let of = |wheel, compared| Shown { scene, wheel, compared, side, followed, t };
     let (one, other) = (of(first, a), of(second, b));
-    let [both, first_slips, second_slips, slip, creep, stands, first_dead, second_dead] =
-        array::from_fn(|lane| filters.state(lane));
     // A stuck count is no evidence against a train at rest.
     let turned = |wheel: &WheelScene| if wheel.stuck { 0.0 } else { wheel.counted.abs() / wheel.pitch };
     let turned = larger(turned(first), turned(second));
     let shaken = larger(turned - SHAKEN, 0.0) * TURNS;
-    let of_wheels = Lanes([
-        one.rolls(&both) + other.rolls(&both),
-        one.slips(&first_slips) + other.rolls(&first_slips),
-        one.rolls(&second_slips) + other.slips(&second_slips),
-        one.slips(&slip) + other.slips(&slip),
-        alike(&one, &other, &creep, wheels_a),
-        one.rests(&stands) + other.rests(&stands) - shaken,
-        one.dead() + other.rolls(&first_dead),
-        one.rolls(&second_dead) + other.dead(),
-    ]);
-
-    // Brakes do what is claimed of them where the rail carries it.
-    let range = |of: fn(&Range) -> f64| {
-        GRIPS * of(&scene.rolling) + (Lanes::all(1.0) - GRIPS) * of(&scene.acceleration)
-    };
-    let (low, high) = (range(|range| range.low), range(|range| range.high));
     // A train on whose rail one wheelset slides brakes no harder than the middle between what is commanded and the most.
     let halfway = match scene.commanded {
         Some(commanded) if commanded < 0.0 => 0.5 * (commanded - scene.acceleration.low),
         _ => 0.0,
     };
-    let low = low + ONE_SLIPS * larger(halfway, 0.0);
-    let beyond = (filters.a - high).at_least(0.0) + (filters.a - low).at_most(0.0);
-    let surprising = (surprise - Lanes::all(SURPRISING)).at_least(0.0) * -0.5;
-    let known = (filters.paa - Lanes::all(UNKNOWN)).at_least(0.0) + Lanes::all(BEYOND * BEYOND);
-    let total = of_wheels + surprising - beyond * beyond * known.inverse() * (0.5 * followed);
-    let total = total.or_if_larger(beside_dead(&one, &other, [&first_dead, &second_dead]));
+    // Brakes do what is claimed of them where the rail carries it.
+    let (rolling, any) = (scene.rolling, scene.acceleration);
+    let low = any.low + larger(halfway, 0.0);
+    let limits = [
+        Lanes([rolling.low, low, low, any.low, any.low, any.low, rolling.low, rolling.low]),
+        Lanes([rolling.high, any.high, any.high, any.high, any.high, any.high, rolling.high, rolling.high]),
+    ];
+    let terms = [one.terms(), other.terms()];
+    let [rolls_1, rolls_2, usual] = costs(filters, surprise, &limits, &terms, followed);
+    let (
+        [one_rolls, _, one_beside, .., one_rests, _, one_by_dead],
+        [two_rolls, two_beside, .., two_rests, two_by_dead, _],
+    ) = (rolls_1.0, rolls_2.0);
+    let slips = slipping(filters, &terms);
+    let [first_slips, second_slips, one_slips, two_slips] = if one.turns() && other.turns() {
+        slips
+    } else {
+        let [of_first, of_second, of_one, of_other] = SLIPPING.map(|lane| filters.state(lane));
+        [one.slips(&of_first), other.slips(&of_second), one.slips(&of_one), other.slips(&of_other)]
+    };
+    let rests = |shown: &Shown, rolls: f64| if shown.is_faulty() { 0.0 } else { rolls };
+    let of_wheels = Lanes([
+        one_rolls + two_rolls,
+        first_slips + two_beside,
+        one_beside + second_slips,
+        one_slips + two_slips,
+        alike(&one, &other, &filters.state(CREEPS), wheels_a),
+        rests(&one, one_rests) + rests(&other, two_rests) - shaken,
+        one.dead() + two_by_dead,
+        one_by_dead + other.dead(),
+    ]);
+    let mut total = of_wheels + usual;
+    if one.is_faulty() || other.is_faulty() {
+        total = total.or_if_larger(beside_dead(
+            &one,
+            &other,
+            [&filters.state(FIRST_DEAD), &filters.state(SECOND_DEAD)],
+        ));
+    }
     let best = total.largest();
     (total - Lanes::all(best)).at_least(-MOST)
+}
+
+/// What it costs every hypothesis that the first and the second wheel roll, and what it costs it that its train accelerates beyond
+/// its `limits` and its place is surprising.
+#[inline(never)]
+#[expect(clippy::indexing_slicing, reason = "below the width of all")]
+fn costs(
+    filters: &Filters,
+    surprise: &Lanes,
+    [low, high]: &[Lanes; 2],
+    [one, other]: &[Terms; 2],
+    followed: f64,
+) -> [Lanes; 3] {
+    let [mut rolls_1, mut rolls_2, mut usual] = [Lanes::all(0.0); 3];
+    let Filters { v, a, pvv, paa, .. } = filters;
+    for lane in 0..WIDTH {
+        let (v, a, pvv, paa) = (v.0[lane], a.0[lane], pvv.0[lane], paa.0[lane]);
+        rolls_1.0[lane] = one.rolls([v, a], [pvv, paa]);
+        rolls_2.0[lane] = other.rolls([v, a], [pvv, paa]);
+        let beyond = larger(a - high.0[lane], 0.0) + smaller(a - low.0[lane], 0.0);
+        let surprising = larger(surprise.0[lane] - SURPRISING, 0.0) * -0.5;
+        let known = larger(paa - UNKNOWN, 0.0) + BEYOND * BEYOND;
+        usual.0[lane] = surprising - beyond * beyond * (1.0 / known) * (0.5 * followed);
+    }
+    [rolls_1, rolls_2, usual]
+}
+
+/// What it costs the trains that the first, the second, the first and the second wheel slip, if they turn.
+#[inline(never)]
+#[expect(clippy::indexing_slicing, reason = "below the length of all")]
+fn slipping(filters: &Filters, [one, other]: &[Terms; 2]) -> [f64; 4] {
+    let of = |lanes: &Lanes| SLIPPING.map(|lane| lanes.0[lane]);
+    let (v, a, pvv, paa) = (of(&filters.v), of(&filters.a), of(&filters.pvv), of(&filters.paa));
+    let twice = |of: fn(&Terms) -> f64| [of(one), of(other), of(one), of(other)];
+    let (speed, variance) = (twice(|terms| terms.speed), twice(|terms| terms.variance));
+    let acceleration = twice(|terms| terms.acceleration);
+    let acceleration_variance = twice(|terms| terms.acceleration_variance);
+    let ruled_out = twice(|terms| terms.ruled_out);
+    let mut costs = [0.0; SLIPPING.len()];
+    for slip in 0..SLIPPING.len() {
+        let terms = Terms {
+            speed: speed[slip],
+            variance: variance[slip],
+            acceleration: acceleration[slip],
+            acceleration_variance: acceleration_variance[slip],
+            ruled_out: ruled_out[slip],
+            ..*one
+        };
+        costs[slip] = terms.slips([v[slip], a[slip]], [pvv[slip], paa[slip]]);
+    }
+    costs
+}
+
+/// What one wheel shows, the same for every hypothesis.
+struct Terms {
+    /// Speed (m/s) and acceleration (m/s²), and their variances without those of the train.
+    speed: f64,
+    variance: f64,
+    acceleration: f64,
+    acceleration_variance: f64,
+    /// Standard deviation of the creepage of a wheel that rolls (part of the speed).
+    creepage: f64,
+    /// 1 if it was read, otherwise 0.
+    read: f64,
+    /// Cost of taking it for a wheel that rolls, and cost of a slip (nats).
+    fault: f64,
+    ruled_out: f64,
+    side: f64,
+    followed: f64,
+    t: f64,
+}
+
+impl Terms {
+    /// It rolls.
+    #[inline(always)]
+    fn rolls(&self, [v, a]: [f64; 2], [pvv, paa]: [f64; 2]) -> f64 {
+        let creep = self.creepage * v;
+        let y = self.speed - v;
+        let speed = unusual(y * y / (pvv + self.variance + creep * creep));
+        let b = self.acceleration - a;
+        let unsteady = unusual(b * b / (paa + self.acceleration_variance));
+        (-0.5 * self.followed * (speed + unsteady) - self.fault) * self.read
+    }
+
+    /// It turns and slips independently.
+    #[inline(always)]
+    fn slips(&self, [v, a]: [f64; 2], [pvv, paa]: [f64; 2]) -> f64 {
+        let u = (v - self.speed) * self.side;
+        let ahead = smaller(u, 0.0);
+        let b = self.acceleration - a;
+        let (least, part) = SLIPS;
+        let mean = least + larger(part * v, 0.0);
+        // The tracker lags behind a wheel that accelerates.
+        let late = b * FOLLOWED_S;
+        let variance = pvv + self.variance + late * late;
+        let steady = paa + self.acceleration_variance;
+        let wide = steady + SLIP_ACCELERATION * SLIP_ACCELERATION;
+        let spread = larger(mean * mean, variance) * wide / (variance * steady);
+        let further = smaller(larger(u, 0.0) / mean, FARTHEST);
+        -0.5 * self.followed * (ahead * ahead / variance + jerks(b * b / wide))
+            - self.ruled_out
+            - self.t * ((further + 0.5 * ln(spread)) / SLIP_S)
+    }
 }
 
 /// One wheel as hypotheses have to explain it.
@@ -154,24 +271,25 @@ impl Shown<'_> {
         self.wheel.stuck || self.compared.dead
     }
 
-    /// It rolls.
-    fn rolls(&self, train: &State) -> f64 {
-        let Self { scene, wheel, compared, .. } = self;
-        if !wheel.read {
-            return 0.0;
-        }
+    /// What it shows to every hypothesis.
+    fn terms(&self) -> Terms {
+        let Self { scene, wheel, compared, side, followed, t } = *self;
         let effort =
             if wheel.braked { scene.brake } else { 0.0 } + if wheel.driven { scene.traction } else { 0.0 };
-        let creep = (ROLLING_CREEPAGE * effort + RESTLESS) * train.v;
-        let y = compared.speed - train.v;
-        let speed = unusual(y * y / (train.pvv + compared.variance + creep * creep));
-        let faulty = if self.is_faulty() { STUCK } else { 0.0 };
-        -0.5 * self.followed * (speed + self.unsteady(train)) - faulty * self.t
-    }
-
-    /// It rests with the train.
-    fn rests(&self, train: &State) -> f64 {
-        if self.is_faulty() { 0.0 } else { self.rolls(train) }
+        let own = wheel.acceleration_deviation;
+        Terms {
+            speed: compared.speed,
+            variance: compared.variance,
+            acceleration: wheel.acceleration,
+            acceleration_variance: own * own + RESTLESS_ACCELERATION,
+            creepage: ROLLING_CREEPAGE * effort + RESTLESS,
+            read: f64::from(u8::from(wheel.read)),
+            fault: if self.is_faulty() { STUCK * t } else { 0.0 },
+            ruled_out: self.ruled_out() * t,
+            side,
+            followed,
+            t,
+        }
     }
 
     /// By how much its acceleration is unlike that of the train.
@@ -185,32 +303,22 @@ impl Shown<'_> {
         train.paa + own * own + RESTLESS_ACCELERATION
     }
 
+    /// Its count was read, and it is not silent.
+    fn turns(&self) -> bool {
+        self.wheel.read && self.wheel.speed.abs() > SILENT
+    }
+
     /// It slips independently.
     fn slips(&self, train: &State) -> f64 {
-        let Self { wheel, compared, followed, t, .. } = self;
-        if !wheel.read {
+        if self.turns() {
+            return self.terms().slips([train.v, train.a], [train.pvv, train.paa]);
+        }
+        if !self.wheel.read {
             return 0.0;
         }
-        let ruled_out = self.ruled_out();
-        if wheel.speed.abs() <= SILENT {
-            // A silent wheel is locked and stays so.
-            let still = 1.0 / (1.0 + train.v * train.v / (NEARLY_STANDING * NEARLY_STANDING));
-            return -t * (ruled_out + LOCKED + still * still * IMPOSSIBLE);
-        }
-        let u = (train.v - compared.speed) * self.side;
-        let ahead = smaller(u, 0.0);
-        let b = wheel.acceleration - train.a;
-        let (least, part) = SLIPS;
-        let mean = least + larger(part * train.v, 0.0);
-        // The tracker lags behind a wheel that accelerates.
-        let late = b * FOLLOWED_S;
-        let variance = train.pvv + compared.variance + late * late;
-        let steady = self.acceleration_variance(train);
-        let wide = steady + SLIP_ACCELERATION * SLIP_ACCELERATION;
-        let spread = larger(mean * mean / variance, 1.0) * wide / steady;
-        let further = smaller(larger(u, 0.0) / mean, FARTHEST);
-        -0.5 * followed * (ahead * ahead / variance + jerks(b * b / wide))
-            - t * (ruled_out + (further + 0.5 * libm::log(spread)) / SLIP_S)
+        // A silent wheel is locked and stays so.
+        let still = 1.0 / (1.0 + train.v * train.v / (NEARLY_STANDING * NEARLY_STANDING));
+        -self.t * (self.ruled_out() + LOCKED + still * still * IMPOSSIBLE)
     }
 
     /// Its sensor is dead.
@@ -268,8 +376,9 @@ fn alike(one: &Shown, other: &Shown, train: &State, wheels_a: f64) -> f64 {
 }
 
 /// Heavy-tailed cost of a squared innovation of the acceleration of a slipping wheel: the rail grips and lets go in jerks.
+#[inline(always)]
 fn jerks(square: f64) -> f64 {
-    JERKS * libm::log1p(square * (1.0 / JERKS))
+    JERKS * ln(1.0 + square * (1.0 / JERKS))
 }
 
 /// A squared innovation without its usual part: no hypothesis gains by explaining noise.

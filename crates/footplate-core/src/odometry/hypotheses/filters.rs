@@ -4,13 +4,17 @@
 //! `pxy` covariances, `q` density of the jerk (m²/s⁵), `k` gain, `y` innovation.
 
 use super::lanes::Lanes;
+use crate::odometry::wheels::{larger, smaller};
 
 /// Limits of the variances, so that they stay positive and finite (m², m²/s², m²/s⁴).
 const PLACE: (f64, f64) = (1e-10, 1e2);
 const SPEED: (f64, f64) = (1e-8, 1e4);
 const ACCELERATION: (f64, f64) = (1e-8, 4.0);
 /// No train accelerates more (m/s²).
-const STRONGEST: f64 = 10.0;
+pub(super) const STRONGEST: f64 = 10.0;
+
+/// Variance of the speed and acceleration at rest (m²/s², m²/s⁴): nothing but rounding.
+const AT_REST: f64 = 1e-6;
 
 /// State and covariance of every hypothesis.
 #[derive(Debug, Clone, Copy)]
@@ -36,11 +40,94 @@ pub(super) struct State {
     prv: f64,
     pra: f64,
     pub(super) pvv: f64,
-    pva: f64,
+    pub(super) pva: f64,
     pub(super) paa: f64,
 }
 
 impl State {
+    /// That of a train at rest, after a period of `t` seconds.
+    pub(super) fn at_rest(t: f64) -> Self {
+        let pva = AT_REST * t;
+        let (pvv, paa) = (AT_REST + pva * t, AT_REST);
+        Self { r: 0.0, v: 0.0, a: 0.0, prr: PLACE.0, prv: 0.0, pra: 0.0, pvv, pva, paa }
+    }
+
+    /// Predicts by `t` seconds with jerk of spectral density `q`. Returns the distance run.
+    #[inline(always)]
+    pub(super) fn run(&mut self, t: f64, q: f64) -> f64 {
+        let half = 0.5 * t * t;
+        let distance = self.v * t + self.a * half;
+        self.v += self.a * t;
+        let prv = self.prv + self.pvv * t + self.pva * half;
+        let pra = self.pra + self.pva * t + self.paa * half;
+        let pva = self.pva + self.paa * t;
+        self.prr += (self.prv + prv) * t + (self.pra + pra) * half + q * (t * t * t * t * t / 20.0);
+        self.prv = prv + pra * t + q * (t * t * t * t * 0.125);
+        self.pra = pra + q * (t * t * t / 6.0);
+        self.pvv += (self.pva + pva) * t + q * (t * t * t / 3.0);
+        self.pva = pva + q * (t * t * 0.5);
+        self.paa += q * t;
+        distance
+    }
+
+    /// Corrects by the measurement `r` = 0 with this variance, if `trusted` is 1. Returns by how much the place moved, and the
+    /// squared innovation over its variance.
+    #[inline(always)]
+    pub(super) fn place(&mut self, variance: f64, trusted: f64) -> (f64, f64) {
+        let per = 1.0 / (self.prr + variance) * trusted;
+        let surprise = self.r * self.r * per;
+        let (kr, kv, ka) = (self.prr * per, self.prv * per, self.pra * per);
+        let y = -self.r;
+        let moved = kr * y;
+        self.r += moved;
+        self.v += kv * y;
+        self.a += ka * y;
+        self.pvv -= kv * self.prv;
+        self.pva -= kv * self.pra;
+        self.paa -= ka * self.pra;
+        let kept = 1.0 - kr;
+        self.prr *= kept;
+        self.prv *= kept;
+        self.pra *= kept;
+        (moved, surprise)
+    }
+
+    /// Mixes a share of `pool` into it.
+    #[inline(always)]
+    pub(super) fn mix(&mut self, pool: &Pool, share: f64) {
+        let kept = 1.0 - share;
+        let (dv, da) = (pool.v - self.v, pool.a - self.a);
+        let spread = share * kept;
+        self.v += share * dv;
+        self.a += share * da;
+        self.pvv = self.pvv * kept + share * pool.pvv + spread * dv * dv;
+        self.pva = self.pva * kept + share * pool.pva + spread * dv * da;
+        self.paa = self.paa * kept + share * pool.paa + spread * da * da;
+        // A hypothesis that begins does not know its counter yet.
+        self.r *= kept;
+        self.prr = self.prr * kept + share * pool.prr;
+        self.prv *= kept;
+        self.pra *= kept;
+    }
+
+    /// Keeps the state finite and the variances positive, of a train no faster than `top` (m/s) that accelerates by no more than
+    /// `strongest` (m/s²).
+    #[inline(always)]
+    pub(super) fn limit(&mut self, top: f64, strongest: f64) {
+        self.v = larger(smaller(self.v, top), -top);
+        self.a = larger(smaller(self.a, strongest), -strongest);
+        self.prr = larger(self.prr, PLACE.0);
+        self.pvv = larger(self.pvv, SPEED.0);
+        self.paa = larger(self.paa, ACCELERATION.0);
+    }
+
+    /// Its sign bit is set if a variance exceeds its largest: positive numbers are in the order of their bits.
+    #[inline(always)]
+    pub(super) fn exceeds(&self) -> u64 {
+        let over = |variance: f64, (_, most): (f64, f64)| most.to_bits().wrapping_sub(variance.to_bits());
+        over(self.prr, PLACE) | over(self.pvv, SPEED) | over(self.paa, ACCELERATION)
+    }
+
     /// Corrects by an innovation `y` of the speed with this information (s²/m²); 0 for none.
     pub(super) fn speed(&mut self, y: f64, information: f64) {
         let per = information / (self.pvv * information + 1.0);
@@ -129,85 +216,20 @@ impl Filters {
         }
     }
 
-    /// Predicts by `t` seconds with jerk of spectral density `q`. Returns the distances run.
-    #[inline]
-    pub(super) fn run(&mut self, t: f64, q: Lanes) -> Lanes {
-        let half = 0.5 * t * t;
-        let distance = self.v * t + self.a * half;
-        self.v += self.a * t;
-        let prv = self.prv + self.pvv * t + self.pva * half;
-        let pra = self.pra + self.pva * t + self.paa * half;
-        let pva = self.pva + self.paa * t;
-        self.prr += (self.prv + prv) * t + (self.pra + pra) * half + q * (t * t * t * t * t / 20.0);
-        self.prv = prv + pra * t + q * (t * t * t * t * 0.125);
-        self.pra = pra + q * (t * t * t / 6.0);
-        self.pvv += (self.pva + pva) * t + q * (t * t * t / 3.0);
-        self.pva = pva + q * (t * t * 0.5);
-        self.paa += q * t;
-        distance
-    }
-
-    /// Corrects by the measurement `r` = 0 with this variance, where `trusted` is 1. Returns by how much the place moved, and the
-    /// squared innovation over its variance.
-    #[inline]
-    pub(super) fn place(&mut self, variance: Lanes, trusted: Lanes) -> (Lanes, Lanes) {
-        let per = (self.prr + variance).inverse() * trusted;
-        let surprise = self.r * self.r * per;
-        let (kr, kv, ka) = (self.prr * per, self.prv * per, self.pra * per);
-        let y = -self.r;
-        let moved = kr * y;
-        self.r += moved;
-        self.v += kv * y;
-        self.a += ka * y;
-        self.pvv -= kv * self.prv;
-        self.pva -= kv * self.pra;
-        self.paa -= ka * self.pra;
-        let kept = Lanes::all(1.0) - kr;
-        self.prr *= kept;
-        self.prv *= kept;
-        self.pra *= kept;
-        (moved, surprise)
-    }
-
-    /// Mixes a share of `pool` into each filter.
-    #[inline]
-    pub(super) fn mix(&mut self, pool: &Pool, share: Lanes) {
-        let one = Lanes::all(1.0);
-        let kept = one - share;
-        let (dv, da) = (Lanes::all(pool.v) - self.v, Lanes::all(pool.a) - self.a);
-        let spread = share * kept;
-        self.v += share * dv;
-        self.a += share * da;
-        self.pvv = self.pvv * kept + share * pool.pvv + spread * dv * dv;
-        self.pva = self.pva * kept + share * pool.pva + spread * dv * da;
-        self.paa = self.paa * kept + share * pool.paa + spread * da * da;
-        // A hypothesis that begins does not know its counter yet.
-        self.r *= kept;
-        self.prr = self.prr * kept + share * pool.prr;
-        self.prv *= kept;
-        self.pra *= kept;
-    }
-
-    /// Keeps every covariance matrix finite and positive definite.
-    ///
-    /// The covariances of a variance that is cut to its limit are cut by the same factor. If the variance were cut alone, gains would
-    /// change sign and the filter would diverge.
-    #[inline]
-    pub(super) fn keep_sound(&mut self) {
-        let within = |lanes: Lanes, (least, most)| lanes.at_least(least).at_most(most);
+    /// Cuts variances to their largest, and their covariances by the same factor. If a variance were cut alone, gains would change
+    /// sign and the filter would diverge. Few periods need this.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn cut(&mut self) {
         let limits = [(self.prr, PLACE), (self.pvv, SPEED), (self.paa, ACCELERATION)];
-        // Few periods need these divisions. In the others they would multiply by 1.
-        if limits.iter().any(|(lanes, (_, most))| lanes.largest() > *most) {
-            let [of_r, of_v, of_a] =
-                limits.map(|(lanes, (_, most))| (lanes.at_least(most).inverse() * most).at_most(1.0));
-            self.prv *= of_r * of_v;
-            self.pra *= of_r * of_a;
-            self.pva *= of_v * of_a;
-        }
-        self.prr = within(self.prr, PLACE);
-        self.pvv = within(self.pvv, SPEED);
-        self.paa = within(self.paa, ACCELERATION);
-        self.a = self.a.at_least(-STRONGEST).at_most(STRONGEST);
+        let [of_r, of_v, of_a] =
+            limits.map(|(lanes, (_, most))| (lanes.at_least(most).inverse() * most).at_most(1.0));
+        self.prv *= of_r * of_v;
+        self.pra *= of_r * of_a;
+        self.pva *= of_v * of_a;
+        self.prr = self.prr.at_most(PLACE.1);
+        self.pvv = self.pvv.at_most(SPEED.1);
+        self.paa = self.paa.at_most(ACCELERATION.1);
     }
 
     /// Reverses everything: the train has reversed.
@@ -215,23 +237,6 @@ impl Filters {
         self.r = -self.r;
         self.v = -self.v;
         self.a = -self.a;
-    }
-
-    /// Mean and covariance over all hypotheses with these weights, which need not add up to 1.
-    #[inline]
-    pub(super) fn pooled(&self, weights: Lanes, prr: f64) -> Pool {
-        let total = weights.sum();
-        let share = weights * (1.0 / total);
-        let (v, a) = ((share * self.v).sum(), (share * self.a).sum());
-        let (dv, da) = (self.v - Lanes::all(v), self.a - Lanes::all(a));
-        Pool {
-            v,
-            a,
-            pvv: (share * (self.pvv + dv * dv)).sum(),
-            pva: (share * (self.pva + dv * da)).sum(),
-            paa: (share * (self.paa + da * da)).sum(),
-            prr,
-        }
     }
 }
 
@@ -244,6 +249,26 @@ pub(super) struct Pool {
     pub(super) pva: f64,
     pub(super) paa: f64,
     pub(super) prr: f64,
+}
+
+impl Pool {
+    /// First and second moments of a state about a speed and an acceleration near it: of speed and acceleration, of the square of
+    /// the speed, of their product, and of the square of the acceleration.
+    #[inline(always)]
+    pub(super) fn moments(
+        [v, a]: [f64; 2],
+        [pvv, pva, paa]: [f64; 3],
+        [about_v, about_a]: [f64; 2],
+    ) -> [f64; 5] {
+        let (dv, da) = (v - about_v, a - about_a);
+        [dv, da, pvv + dv * dv, pva + dv * da, paa + da * da]
+    }
+
+    /// Mean and covariance of hypotheses whose mean moments these are, with a variance of the place.
+    pub(super) fn of([dv, da, vv, va, aa]: [f64; 5], [about_v, about_a]: [f64; 2], prr: f64) -> Self {
+        let (v, a) = (about_v + dv, about_a + da);
+        Self { v, a, pvv: vv - dv * dv, pva: va - dv * da, paa: aa - da * da, prr }
+    }
 }
 
 #[cfg(test)]
@@ -291,8 +316,9 @@ mod tests {
     #[test]
     fn a_prediction_is_the_transition_matrix_on_both_sides_and_integrated_white_jerk() {
         let (t, q) = (0.4, 0.3);
-        let mut filters = filters();
-        let ran = filters.run(t, Lanes::all(q));
+        let filters = filters();
+        let mut state = filters.state(5);
+        let ran = state.run(t, q);
         let f = [[1.0, t, t * t / 2.0], [0.0, 1.0, t], [0.0, 0.0, 1.0]];
         let transposed = core::array::from_fn(|i| core::array::from_fn(|j| f[j][i]));
         let mut expected = product(&product(&f, &COVARIANCE), &transposed);
@@ -305,8 +331,8 @@ mod tests {
             }
         }
         // The place is counted from that of the counter, which the caller subtracts.
-        assert_is(filters.state(5), [0.3, 12.0 - 0.7 * 0.4, -0.7], &expected);
-        assert!((ran.0[5] - (12.0 * 0.4 - 0.7 * 0.08)).abs() < 1e-12);
+        assert_is(state, [0.3, 12.0 - 0.7 * 0.4, -0.7], &expected);
+        assert!((ran - (12.0 * 0.4 - 0.7 * 0.08)).abs() < 1e-12);
     }
 
     #[test]
@@ -323,16 +349,15 @@ mod tests {
         assert_is(state, mean, &covariance);
 
         // The counter says r = 0; a hypothesis that does not trust it stays as it is.
-        let mut trusting = filters();
-        let mut trusted = Lanes::all(1.0);
-        trusted.0[3] = 0.0;
-        let (moved, surprise) = trusting.place(Lanes::all(variance), trusted);
+        let mut trusting = filters().state(2);
+        let (moved, surprise) = trusting.place(variance, 1.0);
         let (mean, covariance) = updated(0, -0.3, variance);
-        assert_is(trusting.state(2), mean, &covariance);
-        assert!((moved.0[2] - (mean[0] - 0.3)).abs() < 1e-12);
-        assert!((surprise.0[2] - 0.09 / 0.13).abs() < 1e-12);
-        assert_is(trusting.state(3), MEAN, &COVARIANCE);
-        assert_eq!((moved.0[3], surprise.0[3]), (0.0, 0.0));
+        assert_is(trusting, mean, &covariance);
+        assert!((moved - (mean[0] - 0.3)).abs() < 1e-12);
+        assert!((surprise - 0.09 / 0.13).abs() < 1e-12);
+        let mut other = filters().state(3);
+        assert_eq!(other.place(variance, 0.0), (0.0, 0.0));
+        assert_is(other, MEAN, &COVARIANCE);
     }
 
     #[test]
@@ -347,8 +372,8 @@ mod tests {
     fn a_mixture_has_the_moments_of_a_mixture() {
         let pool = Pool { v: 11.0, a: 0.2, pvv: 0.5, pva: -0.1, paa: 0.3, prr: 0.02 };
         let (share, kept) = (0.3, 0.7);
-        let mut mixed = filters();
-        mixed.mix(&pool, Lanes::all(share));
+        let mut mixed = filters().state(7);
+        mixed.mix(&pool, share);
         let [_, [_, pvv, pva], [_, _, paa]] = COVARIANCE;
         let [r, v, a] = MEAN;
         // E x = Σ w x and E x y = Σ w (cov + x y).
@@ -362,24 +387,16 @@ mod tests {
         // The place of what begins is 0, and of the variance of the pool; it says nothing of speed and acceleration.
         let (prr, prv, pra) = (mean(0.09, 0.02), kept * 0.031, kept * -0.012);
         let expected = [[prr, prv, pra], [prv, pvv, pva], [pra, pva, paa]];
-        assert_is(mixed.state(7), [kept * r, mean(v, pool.v), mean(a, pool.a)], &expected);
+        assert_is(mixed, [kept * r, mean(v, pool.v), mean(a, pool.a)], &expected);
     }
 
     #[test]
     fn pooled_hypotheses_have_the_moments_of_all() {
-        let mut filters = Filters::new(10.0, 0.5);
-        let mut weights = Lanes::all(0.0);
-        // Two hypotheses, three to one, whose weights add up to 2.
-        (weights.0[1], weights.0[6]) = (1.5, 0.5);
-        filters.set(
-            1,
-            State { r: 0.0, v: 8.0, a: 1.0, prr: 1.0, prv: 0.0, pra: 0.0, pvv: 0.4, pva: 0.1, paa: 0.2 },
-        );
-        filters.set(
-            6,
-            State { r: 0.0, v: 12.0, a: -1.0, prr: 1.0, prv: 0.0, pra: 0.0, pvv: 0.8, pva: 0.3, paa: 0.6 },
-        );
-        let pool = filters.pooled(weights, 0.07);
+        // Two hypotheses, three to one.
+        let about = [10.0, 0.3];
+        let one = Pool::moments([8.0, 1.0], [0.4, 0.1, 0.2], about);
+        let other = Pool::moments([12.0, -1.0], [0.8, 0.3, 0.6], about);
+        let pool = Pool::of(core::array::from_fn(|k| 0.75 * one[k] + 0.25 * other[k]), about, 0.07);
         // Means 9 and 0.5; about them ¾ of 1 and ¼ of 9, ¾ of −0.5 and ¼ of −4.5, ¾ of 0.25 and ¼ of 2.25.
         let found = [pool.v, pool.a, pool.pvv, pool.pva, pool.paa, pool.prr];
         for (found, expected) in found.into_iter().zip([9.0, 0.5, 0.5 + 3.0, 0.15 - 1.5, 0.3 + 0.75, 0.07]) {
@@ -401,7 +418,8 @@ mod tests {
         filters.pva = Lanes::all(1400.0);
         filters.prr = Lanes::all(400.0);
         (filters.prv, filters.pra) = (Lanes::all(1000.0), Lanes::all(20.0));
-        filters.keep_sound();
+        assert_eq!(filters.state(0).exceeds() >> 63, 1);
+        filters.cut();
         let State { prr, prv, pra, pvv, pva, paa, .. } = filters.state(0);
         assert_eq!((prr, pvv, paa), (1e2, 1e4, 4.0));
         // A quarter, a fifth and a tenth are left of the variances.
@@ -413,16 +431,17 @@ mod tests {
     #[test]
     fn what_is_within_its_limits_is_not_touched_and_what_is_below_is_raised() {
         let mut sound = filters();
-        sound.keep_sound();
-        assert_is(sound.state(1), MEAN, &COVARIANCE);
-        let mut low = filters();
-        (low.prr, low.pvv, low.paa) = (Lanes::all(0.0), Lanes::all(-1.0), Lanes::all(1e-9));
-        low.a = Lanes::all(11.0);
-        low.keep_sound();
-        let State { a, prr, pvv, paa, .. } = low.state(1);
-        assert_eq!((a, prr, pvv, paa), (10.0, 1e-10, 1e-8, 1e-8));
-        low.a = Lanes::all(-11.0);
-        low.keep_sound();
-        assert_eq!(low.state(6).a, -10.0);
+        assert_eq!(sound.state(1).exceeds() >> 63, 0);
+        sound.cut();
+        let mut state = sound.state(1);
+        state.limit(40.0, STRONGEST);
+        assert_is(state, MEAN, &COVARIANCE);
+        (state.prr, state.pvv, state.paa) = (0.0, -1.0, 1e-9);
+        (state.v, state.a) = (41.0, 11.0);
+        state.limit(40.0, STRONGEST);
+        assert_eq!((state.v, state.a, state.prr, state.pvv, state.paa), (40.0, 10.0, 1e-10, 1e-8, 1e-8));
+        (state.v, state.a) = (-41.0, -11.0);
+        state.limit(40.0, STRONGEST);
+        assert_eq!((state.v, state.a), (-40.0, -10.0));
     }
 }

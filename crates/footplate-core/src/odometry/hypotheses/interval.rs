@@ -4,7 +4,7 @@
 //! more than `risk` if it is given `k` deviations either side with `w exp(−k²/2) ≤ risk`.
 
 use super::filters::Filters;
-use super::lanes::Lanes;
+use super::lanes::{Lanes, ln};
 use super::scene::Scene;
 use crate::odometry::wheels::{Range, larger, smaller};
 
@@ -26,25 +26,25 @@ pub(super) fn interval(
     t: f64,
 ) -> [Range; 2] {
     let part = risk / 8.0;
+    let per_part = 1.0 / part;
     let mut speed = Range { low: f64::INFINITY, high: f64::NEG_INFINITY };
     let mut distance = speed;
     let [first, second] = &scene.wheels;
     let wide = 0.5 * (first.tolerance + second.tolerance) * TOLERANCE;
     let wider = larger(first.tolerance, second.tolerance);
     let effort = scene.brake + scene.traction;
-    for (lane, coasts) in COASTS.into_iter().enumerate() {
-        let (Some(&w), Some(&v), Some(&pvv), Some(&ran)) =
-            (p.0.get(lane), filters.v.0.get(lane), filters.pvv.0.get(lane), distances.0.get(lane))
-        else {
-            continue;
-        };
+    // Both wheels tell the speed of "both roll".
+    let mut tolerance = wide;
+    for ((((&w, &v), &pvv), &ran), coasts) in
+        p.0.iter().zip(&filters.v.0).zip(&filters.pvv.0).zip(&distances.0).zip(COASTS)
+    {
+        let tolerance = core::mem::replace(&mut tolerance, wider);
         if w <= part {
             continue;
         }
-        let k = libm::sqrt(2.0 * libm::log(w / part));
-        let tolerance = if lane == 0 { wide } else { wider };
         let scale = (tolerance + beyond + if coasts { 0.0 } else { CREEPAGE * effort }) * v.abs();
-        let off = k * libm::sqrt(pvv) + scale;
+        // k deviations, with k² = 2 ln (w / part).
+        let off = libm::sqrt(2.0 * ln(w * per_part) * pvv) + scale;
         speed = speed.or(Range { low: v - off, high: v + off });
         let drift = if coasts { off } else { scale };
         distance = distance.or(Range { low: ran - drift * t, high: ran + drift * t });

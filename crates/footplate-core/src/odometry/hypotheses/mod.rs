@@ -4,6 +4,7 @@
 //! rates (`rates`). Where likelihoods cannot tell them apart, the interval reaches further (`reach`). The bank of filters
 //! (`bank`) is an interacting multiple model (Blom and Bar-Shalom, 1988) in which all transitions pass through one pool.
 
+mod advance;
 mod arrivals;
 mod bank;
 mod evidence;

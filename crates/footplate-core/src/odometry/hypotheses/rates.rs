@@ -60,6 +60,7 @@ const UNKNOWN_EFFORT: f64 = 0.4;
 
 /// Probability that hypotheses other than "both roll" end within the period, and that each begins after "both roll" or
 /// after another that ends.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Transitions {
     pub(super) ends: Lanes,
     pub(super) after_rolling: Lanes,

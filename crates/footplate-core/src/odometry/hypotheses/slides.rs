@@ -4,7 +4,7 @@
 
 use super::bank::Bank;
 use super::evidence::{CREEP, Compared, SILENT};
-use super::filters::State;
+use super::filters::{STRONGEST, State};
 use super::scene::{Scene, WheelScene};
 use crate::odometry::wheels::{Range, larger, smaller};
 
@@ -58,17 +58,17 @@ impl Bank {
         for (lane, mut state) in [(SLIPS, slip), (CREEPS, creep)] {
             state.v = larger(state.v, 0.0);
             state.a = larger(smaller(state.a, high), low);
+            state.limit(scene.top_speed, STRONGEST);
             self.filters.set(lane, state);
         }
         if let Some(inertial) = scene.inertial {
             for lane in MOVES {
                 let mut state = self.filters.state(lane);
                 state.acceleration(inertial - state.a, lasting(INERTIAL_WITHIN, SLIDES_FOR_S, t));
+                state.limit(scene.top_speed, STRONGEST);
                 self.filters.set(lane, state);
             }
         }
-        self.filters.v = self.filters.v.at_most(scene.top_speed).at_least(-scene.top_speed);
-        self.filters.keep_sound();
     }
 
     /// Corrects the speed by wheels that touch it.
@@ -80,7 +80,7 @@ impl Bank {
         let [in_a_slide, in_a_spin] = REACHED;
         let reached = if self.side > 0.0 { in_a_slide } else { in_a_spin };
         let reached = reached * reached;
-        let scales = self.scales(scene);
+        let scales = self.scales();
         self.since_touch += t;
         self.since_lone_touch += t;
         let [a, b] = scene.wheels.map(|wheel| {
@@ -109,7 +109,9 @@ impl Bank {
             // A wheel that is too far off was stopped by its slide control.
             let off = y * y / ((train.pvv + reached) * REACHES_WITHIN);
             let tells = if has_reached { 1.0 / (reached * (1.0 + off * off)) } else { 0.0 };
-            train.speed(y, pushes + tells);
+            if pushes + tells > 0.0 {
+                train.speed(y, pushes + tells);
+            }
         }
     }
 }

@@ -132,7 +132,7 @@ impl CountWindows {
     #[inline]
     fn turned(&self, lag: usize) -> Turned {
         let (now, then) = (&self.readings[self.newest], &self.readings[(self.newest + RING - lag) % RING]);
-        Turned { back: now.back - then.back + ONE_PULSE, forth: now.forth - then.forth + ONE_PULSE }
+        Turned::between(now, then)
     }
 
     /// Between which speeds (m/s) the wheel must turn now, with a pitch (m) within `pitch` and accelerations (m/s²)
@@ -141,11 +141,14 @@ impl CountWindows {
     #[must_use]
     pub fn speed(&self, pitch: Range, acceleration: Range) -> Range {
         let mut fastest = [f64::INFINITY; 2];
-        for Window { lag, half, per_second } in self.windows {
+        let now = &self.readings[self.newest];
+        for &Window { lag, half, per_second } in &self.windows {
             if lag >= self.good {
                 break;
             }
-            let [back, forth] = self.turned(lag).distances(pitch);
+            let then = &self.readings[(self.newest + RING - lag) % RING];
+            let turned = Turned::between(now, then);
+            let [back, forth] = turned.distances(pitch);
             let [fastest_back, fastest_forth] = fastest;
             fastest = [
                 smaller(back * per_second - half * acceleration.low, fastest_back),
@@ -166,6 +169,11 @@ struct Turned {
 }
 
 impl Turned {
+    #[inline]
+    fn between(now: &Reading, then: &Reading) -> Self {
+        Self { back: now.back - then.back + ONE_PULSE, forth: now.forth - then.forth + ONE_PULSE }
+    }
+
     /// How far the wheel rolled at most, backwards and forwards (m).
     #[inline]
     fn distances(self, pitch: Range) -> [f64; 2] {

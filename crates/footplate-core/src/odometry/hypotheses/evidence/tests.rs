@@ -1,7 +1,7 @@
 //! What hypotheses cost, worked out by hand.
 
 use super::*;
-use crate::odometry::hypotheses::lanes::WIDTH;
+use crate::odometry::wheels::Range;
 
 const T: f64 = 0.05;
 /// The part of the evidence that is new in a period: 0.05 s of 0.15 s.
@@ -24,6 +24,17 @@ fn shown<'a>(scene: &'a Scene, compared: &'a Compared, side: f64) -> Shown<'a> {
 
 fn assert_near(found: f64, expected: f64) {
     assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+}
+
+impl Shown<'_> {
+    /// What it costs that it rolls, and that it rests with the train.
+    fn rolls(&self, train: &State) -> f64 {
+        self.terms().rolls([train.v, train.a], [train.pvv, train.paa])
+    }
+
+    fn rests(&self, train: &State) -> f64 {
+        if self.is_faulty() { 0.0 } else { self.rolls(train) }
+    }
 }
 
 #[test]
@@ -174,7 +185,7 @@ fn wheels_that_creep_alike_keep_within_limits_and_near_each_other() {
 /// Evidence of the hypotheses, all of which are about trains at this speed.
 fn of_all(scene: &Scene, speed: f64, surprise: f64) -> [f64; WIDTH] {
     let wheels = [0, 1].map(|nth| compared(scene.wheels[nth].speed));
-    evidence(scene, &wheels, &filters(speed), Lanes::all(surprise), 0.1, 1.0, T).0
+    evidence(scene, &wheels, &filters(speed), &Lanes::all(surprise), 0.1, 1.0, T).0
 }
 
 #[test]
@@ -195,7 +206,7 @@ fn a_train_that_accelerates_beyond_its_limits_is_improbable() {
         let wheels = [compared(20.0); 2];
         let mut trains = filters(20.0);
         trains.a = Lanes::all(a);
-        let found = evidence(scene, &wheels, &trains, Lanes::all(0.0), a, 1.0, T);
+        let found = evidence(scene, &wheels, &trains, &Lanes::all(0.0), a, 1.0, T);
         let [both, one_slips, .., dead] = found.0;
         [both - one_slips, dead - one_slips]
     };
@@ -230,7 +241,7 @@ fn a_place_that_is_surprising_costs_half_its_excess() {
     let mut surprise = Lanes::all(0.0);
     (surprise.0[1], surprise.0[2]) = (6.9, 8.0);
     let wheels = [compared(20.0); 2];
-    let found = evidence(&scene, &wheels, &filters(20.0), surprise, 0.1, 1.0, T);
+    let found = evidence(&scene, &wheels, &filters(20.0), &surprise, 0.1, 1.0, T);
     assert_near(found.0[1] - found.0[2], 0.5);
 }
 
