@@ -5,8 +5,8 @@ use footplate_core::control::LinkNews;
 use crate::session::LinkNotice;
 
 impl LinkNotice {
-    /// Whether the station has fallen silent or answers again, or which train may face either way; most of what is heard
-    /// says nothing of the kind.
+    /// Whether the station has fallen silent or answers again, whether the power was lost, or which train may face either way; most of
+    /// what is heard says nothing of the kind.
     #[must_use]
     pub const fn news(&self) -> Option<LinkNews> {
         match self {
@@ -17,6 +17,7 @@ impl LinkNotice {
             | Self::Restarted
             | Self::Reopened => Some(LinkNews::Silent),
             Self::Answers => Some(LinkNews::Answers),
+            Self::PowerLost => Some(LinkNews::PowerLost),
             Self::ReverseInDoubt { train } | Self::OtherThrottle { train, reversed: true } => {
                 Some(LinkNews::ReverseInDoubt { train: *train })
             }

@@ -197,6 +197,30 @@ fn a_train_that_is_lost_while_the_power_is_off_waits_for_an_operator() {
 }
 
 #[test]
+fn no_train_runs_on_by_itself_after_a_short_circuit() {
+    // Given a train that runs,
+    let mut watched = Watched::one();
+    watched.go(FIRST, 8);
+    watched.run(6.0);
+    let since = watched.commanded.len();
+    // when the track loses its power, and an operator switches it on again,
+    watched.dog.handle_link(watched.world.now, LinkNews::PowerLost);
+    assert!(!watched.dog.is_powered());
+    watched.run(5.0);
+    watched.dog.switch_power(watched.world.now, true);
+    let powered = |watched: &Watched| watched.notices.iter().any(|notice| matches!(notice, Notice::PowerOn));
+    assert!(watched.run_until(30.0, powered), "{:#?}", watched.notices);
+    // then the power returns only when the train is commanded to stand.
+    let commands = watched.commanded.iter().skip(since).map(|(_, command)| *command);
+    let order: Vec<Command> =
+        commands.filter(|command| !matches!(command, Command::Function { .. })).collect();
+    let stand =
+        order.iter().position(|command| *command == Command::Speed { train: FIRST, step: SpeedStep::STAND });
+    let on = order.iter().position(|command| *command == Command::PowerOn);
+    assert!(stand < on && on.is_some(), "{order:?}");
+}
+
+#[test]
 fn a_refused_order_ends_no_danger() {
     // Given the only train, whose recovery was given up by an emergency stop,
     let (mut watched, since) = creeping();

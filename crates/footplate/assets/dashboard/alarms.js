@@ -92,7 +92,10 @@ export class Alarmed extends EventTarget {
     end.addEventListener("click", () => {
       // The next picture removes the row.
       end.disabled = true;
-      ask(`/api/alarms/${alarm.id}/end`, {}).catch(({ message }) => fails(message));
+      ask(`/api/alarms/${alarm.id}/end`, {}).catch(({ message }) => {
+        end.disabled = false;
+        fails(message);
+      });
     });
     const acts = remedy(alarm, fails);
     put(text, described(alarm));

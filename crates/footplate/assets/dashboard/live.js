@@ -9,6 +9,9 @@ const KEPT = 4000;
 /** Interval between attempts to listen again after the server refused (ms). */
 const AGAIN_MS = 3000;
 
+/** After this time without a picture the server is asked whether it is there, and its answer awaited as long (ms). */
+const SILENT_MS = 6000;
+
 /** Appends to a list of limited length. */
 function keep(list, item) {
   list.push(item);
@@ -23,7 +26,7 @@ export class Live extends EventTarget {
   /** Who serves the pages, and whether another program is about to. */
   setUp; awaitsMode = false;
   layout; picture; state = "connecting"; lines = []; passed = []; ended = []; alarms = [];
-  #session; #drawing = false;
+  #session; #last = -1; #drawing = false; #heardAt = 0;
 
   /** A train with the name that its owner gave it in the set-up. */
   called(train) {
@@ -45,18 +48,42 @@ export class Live extends EventTarget {
     this.#say("state", state);
   }
 
-  /** The id of an event contains its session and its number: `1700000000-12`. */
-  #isOf({ lastEventId }) {
-    const session = lastEventId.slice(0, lastEventId.lastIndexOf("-"));
+  /**
+   * Whether an event is new. Its id contains its session and its number: `1700000000-12`. A connection that the browser did not
+   * renew by itself begins with those that are here already.
+   */
+  #isNew({ lastEventId }) {
+    const at = lastEventId.lastIndexOf("-");
+    const [session, number] = [lastEventId.slice(0, at), Number(lastEventId.slice(at + 1))];
     if (this.#session !== undefined && session !== this.#session) {
       [this.lines, this.passed, this.ended, this.alarms] = [[], [], [], []];
+      this.#last = -1;
       this.#say("anew");
     }
     this.#session = session;
+    if (number <= this.#last) return false;
+    this.#last = number;
+    return true;
+  }
+
+  /** A line that is cut, or a server without power, ends no connection by itself. */
+  async #check(events) {
+    if (document.hidden || performance.now() - this.#heardAt < SILENT_MS) return;
+    this.#heardAt = performance.now();
+    try {
+      await fetch(withToken("/api/layout"), { signal: AbortSignal.timeout(SILENT_MS) });
+    } catch {
+      if (events.readyState === EventSource.CLOSED) return;
+      events.close();
+      this.#stands("lost");
+      this.#listen();
+    }
   }
 
   #listen() {
     const events = new EventSource(withToken("/api/events"));
+    this.#heardAt = performance.now();
+    const check = setInterval(() => (events.readyState === EventSource.CLOSED ? clearInterval(check) : this.#check(events)), AGAIN_MS);
     events.addEventListener("open", () => this.#stands("connected"));
     events.addEventListener("error", () => {
       this.#stands("lost");
@@ -64,6 +91,7 @@ export class Live extends EventTarget {
       if (events.readyState === EventSource.CLOSED) setTimeout(() => this.#listen(), AGAIN_MS);
     });
     events.addEventListener("picture", (event) => {
+      this.#heardAt = performance.now();
       this.picture = JSON.parse(event.data);
       // One drawing per frame, of the newest picture.
       if (!this.picture || this.#drawing) return;
@@ -74,7 +102,7 @@ export class Live extends EventTarget {
       });
     });
     const happens = (kind, list) => events.addEventListener(kind, (event) => {
-      this.#isOf(event);
+      if (!this.#isNew(event)) return;
       const what = JSON.parse(event.data);
       keep(this[list], what);
       this.#say(kind, what);

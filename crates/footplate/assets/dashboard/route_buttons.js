@@ -4,6 +4,9 @@ import { make, put } from "./dom.js";
 import { ask, get } from "./server.js";
 import { logged, say } from "./words.js";
 
+/** Longer than between the clicks of a double click (ms). */
+const DOUBLE_CLICK_MS = 500;
+
 export class RouteButtons {
   #place; #answer; #buttons = new Map();
 
@@ -28,6 +31,7 @@ export class RouteButtons {
     const made = make("button", { type: "button", title: lines.join("\n"), "aria-pressed": "false" }, name);
     made.addEventListener("click", async () => {
       const ends = made.getAttribute("aria-pressed") === "true";
+      made.disabled = true;
       this.#answer.className = "answer";
       put(this.#answer, say(ends ? "schedule-ends" : "schedule-begins", name));
       try {
@@ -36,6 +40,8 @@ export class RouteButtons {
         this.#answer.className = "answer bad";
         put(this.#answer, message);
       }
+      // The second click of a double click would end what the first one began.
+      setTimeout(() => (made.disabled = false), DOUBLE_CLICK_MS);
     });
     return made;
   }

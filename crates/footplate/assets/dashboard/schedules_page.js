@@ -21,7 +21,7 @@ function lineState({ active, next, refused, is_over: isOver }, nth) {
 export function schedulesPage(root, live) {
   const $ = (selector) => root.querySelector(selector);
   const cards = new Map();
-  let saved = [];
+  let saved = [], unsaved = "";
 
   const button = (text, does, more = {}) => {
     const made = make("button", { type: "button", ...more }, text);
@@ -62,6 +62,7 @@ export function schedulesPage(root, live) {
     saved = schedules;
     cards.clear();
     $("#schedules").replaceChildren(...saved.map(card));
+    unsaved = "";
     $("#no-schedule").hidden = saved.length > 0;
     if (live.picture) show(live.picture);
   }
@@ -83,7 +84,17 @@ export function schedulesPage(root, live) {
         put(row.lastElementChild, is === "refused" ? ` ${say("refused", logged(state.refused[nth]))}` : state && is !== "later" ? ` ${say(`line-${is}`)}` : "");
       });
     }
+    showUnsaved(states.filter(({ name, is_over: isOver }) => !isOver && !cards.has(name)).map(({ name }) => name));
     choices(live.picture);
+  }
+
+  /** What runs and is not saved can be ended, too: it was deleted meanwhile, or another program began it. */
+  function showUnsaved(names) {
+    if (names.join("\n") === unsaved) return;
+    unsaved = names.join("\n");
+    document.querySelectorAll("#schedules [data-unsaved]").forEach((made) => made.remove());
+    $("#schedules").append(...names.map((name) => make("article", { class: "card schedule", "data-unsaved": name }, make("h3", {}, name),
+      make("div", { class: "does" }, button(say("schedule-end"), () => request("/api/schedules/end", { name }), { "data-end": name })))));
   }
 
   /** The trains of the session, and the sensors of the layout, as choices. */

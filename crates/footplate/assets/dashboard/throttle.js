@@ -77,7 +77,7 @@ export class Throttle {
     if (highest) this.#slider.max = String(highest);
     if (step === this.#asked || performance.now() - this.#askedAt > ASKED_FOR_MS) this.#asked = undefined;
     if (this.isDragged || this.#asked !== undefined) return;
-    if (document.activeElement !== this.#slider) this.#slider.value = String(step);
+    this.#slider.value = String(step);
     put(this.#shown, String(step));
   }
 

@@ -71,6 +71,7 @@ impl Input {
             Self::Order(order) => ("order", serde_json::to_string(order).unwrap_or_default()),
             Self::Link(LinkNews::Silent) => ("link", "silent".to_owned()),
             Self::Link(LinkNews::Answers) => ("link", "answers".to_owned()),
+            Self::Link(LinkNews::PowerLost) => ("link", "power-lost".to_owned()),
             Self::Link(LinkNews::ReverseInDoubt { train }) => ("link", format!("{REVERSE_IN_DOUBT}{train}")),
             Self::Link(LinkNews::ReportedSpeed { train, number }) => {
                 ("link", format!("{REPORTED_SPEED}{number} {train}"))
@@ -97,6 +98,7 @@ impl Input {
             "link" => match text {
                 "silent" => Self::Link(LinkNews::Silent),
                 "answers" => Self::Link(LinkNews::Answers),
+                "power-lost" => Self::Link(LinkNews::PowerLost),
                 _ => {
                     let news = text.strip_prefix(REPORTED_SPEED).map_or_else(
                         || {
@@ -110,7 +112,7 @@ impl Input {
                         },
                     );
                     Self::Link(news.ok_or_else(|| {
-                        let why = "it should be `silent`, `answers`, `reverse-in-doubt 24` or `reported-speed 63 24`";
+                        let why = "it should be `silent`, `answers`, `power-lost`, `reverse-in-doubt 24` or `reported-speed 63 24`";
                         InputError::Wrong { kind: kind.to_owned(), text: text.to_owned(), why: why.to_owned() }
                     })?)
                 }
@@ -182,6 +184,7 @@ mod tests {
             Input::NoMoreLines,
             Input::Link(LinkNews::Silent),
             Input::Link(LinkNews::Answers),
+            Input::Link(LinkNews::PowerLost),
             Input::Link(LinkNews::ReverseInDoubt { train }),
             Input::Link(LinkNews::ReportedSpeed { train, number: 63 }),
             Input::Order(Order::Stop(StopOrder {

@@ -18,6 +18,8 @@ pub enum LinkNews {
     Silent,
     /// The station answers, for the first time or again.
     Answers,
+    /// The track has lost its power, or the station has stopped all locomotives: a short circuit, or another throttle.
+    PowerLost,
     /// A decoder has reported the speed of its train, in a unit that only its owner knows.
     ReportedSpeed {
         /// The train.
@@ -48,6 +50,8 @@ impl Watchdog {
                 }
             }
             _ if !self.is_watching() => {}
+            // The station would run every train on at its last step when the power returns.
+            LinkNews::PowerLost => self.switch_power(now, false),
             LinkNews::Silent if self.silent.is_none() => {
                 self.silent = Some(now);
                 self.distrust_last_commands(now);

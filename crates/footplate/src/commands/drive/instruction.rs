@@ -2,7 +2,7 @@
 
 use footplate_core::control::{Journey, Order, TrainLengths};
 use footplate_core::track::Landmark;
-use footplate_core::{FunctionNumber, SensorId, TimeSpan, TrainId};
+use footplate_core::{FunctionNumber, SensorId, SpeedStep, TimeSpan, TrainId};
 use footplate_store::Schedule;
 
 /// One line of a script or of the prompt.
@@ -51,6 +51,24 @@ impl Instruction {
             _ => None,
         }
     }
+
+    /// The train that it drives, locates or waits for.
+    pub(super) fn concerned(&self) -> Option<TrainId> {
+        match self {
+            Self::Wait(until) => until.train(),
+            _ => self.driven(),
+        }
+    }
+
+    /// Whether it only stops a train.
+    pub(super) const fn is_plain_stop(&self) -> bool {
+        matches!(self, Self::Order(Order::Speed { step: SpeedStep::STAND, .. }))
+    }
+
+    /// Whether it is carried out at once, without further instructions.
+    pub(super) const fn is_at_once(&self) -> bool {
+        !matches!(self, Self::Go(..) | Self::Find(_) | Self::Place(..) | Self::Straighten | Self::Wait(_))
+    }
 }
 
 /// The condition of a `wait`.
@@ -64,6 +82,16 @@ pub(super) enum Until {
     At(TrainId, SensorId),
     /// The position of a train is known.
     Located(TrainId),
+}
+
+impl Until {
+    /// The train that it waits for.
+    pub(super) const fn train(&self) -> Option<TrainId> {
+        match self {
+            Self::Passed(_) => None,
+            Self::AtRest(train) | Self::At(train, _) | Self::Located(train) => Some(*train),
+        }
+    }
 }
 
 /// The text of `help`.

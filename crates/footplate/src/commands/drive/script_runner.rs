@@ -162,11 +162,9 @@ impl ScriptRunner {
     fn handle_line(&mut self, now: Timestamp, line: &str) {
         match step(line, self.known()) {
             Ok(Some(Step { instruction: Instruction::Halt, .. })) => return self.halt(now),
+            Ok(Some(step)) if self.is_interactive() => self.hear(now, step),
             Ok(heard) => {
-                // A new line from an operator ends the wait.
-                let ends_wait = heard.is_some() && self.is_interactive();
                 if let Some(session) = self.queues.get_mut(QueueId::SESSION) {
-                    session.wait = session.wait.filter(|_| !ends_wait);
                     session.steps.extend(heard);
                 }
             }
@@ -305,7 +303,8 @@ impl ScriptRunner {
             }
             Instruction::Wait(until) => {
                 if let Some(queue) = self.queues.get_mut(step.queue) {
-                    queue.wait = Some(Wait { until, since: now, is_met: false, line: step.line });
+                    let Step { line, is_part, .. } = step;
+                    queue.wait = Some(Wait { until, since: now, is_met: false, is_part, line });
                 }
             }
             Instruction::ListSchedules => self.list_schedules(),

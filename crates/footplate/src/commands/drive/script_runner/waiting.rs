@@ -17,6 +17,8 @@ pub(super) struct Wait {
     pub(super) until: Until,
     pub(super) since: Timestamp,
     pub(super) is_met: bool,
+    /// Whether it is part of the search for a train.
+    pub(super) is_part: bool,
     /// The number of its line in a schedule, from 0.
     pub(super) line: usize,
 }
@@ -107,6 +109,28 @@ impl ScriptRunner {
         self.queues.is_script(step.queue) && !step.is_retry && is_to_place && was_lost
     }
 
+    /// Takes a line of an operator. It ends a wait, and a search if it is for the train that is searched for. What stops a train waits
+    /// for nothing.
+    pub(super) fn hear(&mut self, now: Timestamp, step: Step) {
+        let Some(session) = self.queues.get_mut(QueueId::SESSION) else { return };
+        let train = step.instruction.driven();
+        let searched = session.wait.filter(|wait| wait.is_part).and_then(|wait| wait.until.train());
+        let is_stop = step.instruction.is_plain_stop();
+        if is_stop || searched.is_some() && searched == train {
+            session.steps.retain(|waiting| waiting.instruction.concerned() != train);
+            session.wait = session.wait.filter(|wait| wait.until.train() != train);
+        }
+        if is_stop {
+            self.carry_out(now, step);
+        } else if searched.is_some() && searched != train && step.instruction.is_at_once() {
+            // Not searched for in its turn: that would wait behind this search.
+            self.carry_out(now, Step { is_retry: true, ..step });
+        } else {
+            session.wait = session.wait.filter(|wait| wait.is_part);
+            session.steps.push_back(step);
+        }
+    }
+
     /// Has a lost train run to a sensor and stop before its order is carried out.
     pub(super) fn locate_first(&mut self, train: TrainId, step: &Step) {
         self.say(format!("train {train} is located first"));
@@ -181,4 +205,68 @@ impl ScriptRunner {
 /// Whether an order continues until another one replaces it.
 pub(super) fn is_open_ended(step: &Step) -> bool {
     matches!(step.instruction, Instruction::Order(Order::Hold { .. } | Order::Follow { .. }))
+}
+
+#[cfg(test)]
+mod tests {
+    use footplate_core::Command;
+    use footplate_core::control::{Driver, Machine as _, Output};
+    use footplate_core::model::MotionModel;
+    use footplate_core::track::TurnoutStates;
+    use footplate_store::layout_named;
+
+    use super::super::CommandSource;
+    use super::*;
+    use crate::commands::drive::learning::Learning;
+    use crate::recorded::{Input, Listener as _};
+
+    const T24: TrainId = TrainId(24);
+    const T58: TrainId = TrainId(58);
+
+    /// An operator's session with two trains whose places are unknown, 24 being searched for.
+    fn searching() -> ScriptRunner {
+        let layout = layout_named("track-a").expect("built in").layout;
+        let mut driver = Driver::new(layout.clone(), TurnoutStates::default());
+        for train in [T24, T58] {
+            driver.add_train(MotionModel::unknown(train, SpeedStep::new(14).expect("a step")));
+        }
+        let mut runner =
+            ScriptRunner::new(driver, Learning::new(&layout, Vec::new()), CommandSource::Person, Vec::new());
+        runner.handle_timeout(Timestamp::ZERO);
+        runner.handle_word(Timestamp::from_s(1.0), &Input::Line("speed 58 8".to_owned()));
+        runner.handle_word(Timestamp::from_s(2.0), &Input::Line("find 24".to_owned()));
+        assert!(speeds(&mut runner).iter().any(|(train, step)| *train == T24 && *step > 0));
+        runner
+    }
+
+    /// The commanded speeds since the last call.
+    fn speeds(runner: &mut ScriptRunner) -> Vec<(TrainId, u8)> {
+        let outputs = std::iter::from_fn(|| runner.poll_output());
+        let speed = |output| match output {
+            Output::Command(Command::Speed { train, step }) => Some((train, step.get())),
+            _ => None,
+        };
+        outputs.filter_map(speed).collect()
+    }
+
+    #[test]
+    fn a_stop_overtakes_a_search_which_goes_on() {
+        let mut runner = searching();
+        runner.handle_word(Timestamp::from_s(3.0), &Input::Line("stop 58".to_owned()));
+        assert_eq!(speeds(&mut runner), [(T58, 0)]);
+        runner.handle_word(Timestamp::from_s(4.0), &Input::Line("light 58 on".to_owned()));
+        assert_eq!(speeds(&mut runner), []);
+        assert_eq!(runner.driver().commanded(T24), runner.driver().finding_step(T24));
+    }
+
+    #[test]
+    fn a_line_for_the_train_that_is_searched_for_ends_the_search() {
+        for (line, expected) in [("stop 24", (T24, 0)), ("speed 24 9", (T24, 9))] {
+            let mut runner = searching();
+            runner.handle_word(Timestamp::from_s(3.0), &Input::Line(line.to_owned()));
+            assert_eq!(speeds(&mut runner), [expected]);
+            runner.handle_timeout(Timestamp::from_s(4.0));
+            assert_eq!(speeds(&mut runner), []);
+        }
+    }
 }
