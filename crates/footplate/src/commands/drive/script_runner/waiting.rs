@@ -265,7 +265,8 @@ mod tests {
             let mut runner = searching();
             runner.handle_word(Timestamp::from_s(3.0), &Input::Line(line.to_owned()));
             assert_eq!(speeds(&mut runner), [expected]);
-            runner.handle_timeout(Timestamp::from_s(4.0));
+            // Nothing of the search is left.
+            runner.handle_timeout(Timestamp::from_s(3.1));
             assert_eq!(speeds(&mut runner), []);
         }
     }
