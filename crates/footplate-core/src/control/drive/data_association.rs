@@ -101,6 +101,12 @@ impl DataAssociation {
             .map(|one| one.train)
     }
 
+    /// An ambiguous detection that was assigned to no train: its sensor and time.
+    pub(super) fn unassigned(&self) -> Option<(SensorId, Timestamp)> {
+        let ambiguity = self.ambiguity.as_ref().filter(|ambiguity| !ambiguity.is_assigned)?;
+        Some((ambiguity.detection.sensor, ambiguity.detection.window.until))
+    }
+
     /// Whether an earlier detection that no train explained was probably of a train that is elsewhere, of which it then had
     /// this density (ln 1/s).
     pub(super) fn is_probable_then(&self, sensor: SensorId, now: Timestamp, log_density: f64) -> bool {

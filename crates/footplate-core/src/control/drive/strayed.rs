@@ -16,6 +16,11 @@ impl Driver {
         self.association.probably_strayed()
     }
 
+    /// A detection that was assigned to no train, and that some train may have caused: its sensor and time.
+    pub(in crate::control) fn unassigned_detection(&self) -> Option<(SensorId, Timestamp)> {
+        self.association.unassigned()
+    }
+
     /// Whether a train that a sensor should have reported has probably caused an earlier detection elsewhere, which no train
     /// explained.
     pub(in crate::control) fn has_probably_strayed(

@@ -34,8 +34,10 @@ impl Watchdog {
         let passed = self.monitors.get(&train).and_then(|monitor| monitor.last());
         let is_since =
             |time: Timestamp| now - time <= SAME_TRAIN_WITHIN && passed.is_none_or(|passed| passed < time);
-        if let Some((sensor, time)) = self.intruder.last.filter(|(_, time)| is_since(*time))
-            && self.driver.has_probably_strayed(now, train, sensor)
+        let reported = [self.driver.unassigned_detection(), self.intruder.last].into_iter().flatten();
+        let mut elsewhere = reported.filter(|(_, time)| is_since(*time));
+        if let Some((sensor, time)) =
+            elsewhere.find(|(sensor, _)| self.driver.has_probably_strayed(now, train, *sensor))
         {
             self.raise_elsewhere(now, train, sensor, time);
         }
