@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 
 use super::stopped_run::StoppedRun;
 use super::stops_picture::measured_stops;
-use crate::clock::now;
+use crate::clock::{LATEST, now};
 use crate::commands::Outcome;
 use crate::commands::plot::PictureFile;
 use crate::error_text::error_text;
@@ -140,7 +140,7 @@ struct Known {
 }
 
 fn known(layout: &Layout, store: &Store, train: TrainId, from: SpeedStep) -> Option<Known> {
-    let batch = Batch::of_store(layout, store, now(), Some(train)).ok()?;
+    let batch = Batch::of_store(layout, store, LATEST, Some(train)).ok()?;
     let train = batch.trains.first()?;
     let model = train.replay.fit.model();
     let is_known = [Approach::Below, Approach::Above].iter().any(|side| model.speed(from, *side).count > 0);
@@ -149,7 +149,7 @@ fn known(layout: &Layout, store: &Store, train: TrainId, from: SpeedStep) -> Opt
 }
 
 fn last_event(store: &Store, stopped: &StoppedRun) -> anyhow::Result<EventKey> {
-    let runs = store.runs(stopped.recording.key, now())?;
+    let runs = store.runs(stopped.recording.key, LATEST)?;
     let run = runs.iter().find(|run| run.key == stopped.run.key);
     let last = run.and_then(|run| run.events.last());
     last.map(|stored| stored.key).context("the run has gone from the store")
