@@ -62,6 +62,13 @@ impl StoppedRun {
         at: Landmark,
         took: Option<TimeSpan>,
     ) -> anyhow::Result<Event> {
+        if self.run.accepted().reported_train().is_none() {
+            bail!(
+                "other trains moved in run {}, too, and its reports do not say which train they are of, so a stop of train \
+                 {train} in it cannot be used; drive train {train} alone and measure its next stop",
+                self.run.id
+            );
+        }
         let landmark = sensor_of(layout, at)?;
         let event =
             Event { time: self.time(took), kind: EventKind::Stopped { train, landmark, offset: at.offset } };
