@@ -69,7 +69,7 @@ fn a_model_of_126_steps_keeps_them_when_runs_are_fitted() {
 }
 
 #[test]
-fn a_run_is_of_the_train_that_moves_named_or_not_whoever_stands_beside_it() {
+fn a_run_is_of_the_only_train_that_moves_beside_trains_at_rest_and_in_live_sessions() {
     let layout = built_in("track-a").unwrap().layout;
     let context = ReplayContext { layout: &layout, turnouts: &[] };
     let score = |change: &dyn Fn(&mut Run)| {
