@@ -317,10 +317,8 @@ fn batch_run(
     events: Vec<BatchEvent>,
     wanted: Option<TrainId>,
 ) -> Result<Option<BatchRun>, BatchError> {
-    let moving = run.moving();
-    let only = match (run.only_train(), moving.as_slice()) {
+    let only = match (run.reported_train(), run.moving().as_slice()) {
         (Some(only), _) => only,
-        (None, [only]) => *only,
         (None, []) => return Ok(None),
         (None, several) => {
             return Err(BatchError::SeveralTrains {

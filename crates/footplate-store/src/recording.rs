@@ -105,6 +105,16 @@ impl Run {
         moving
     }
 
+    /// The train that the reports of a run are of: the only one there is, or the only one that moves. A live session names no
+    /// trains at its start, and one that stands all the time trips no sensor.
+    #[must_use]
+    pub fn reported_train(&self) -> Option<TrainAtStart> {
+        self.only_train().or_else(|| match self.moving().as_slice() {
+            [only] => Some(*only),
+            _ => None,
+        })
+    }
+
     /// The contacts that were reported, repeats included.
     pub fn reports(&self) -> impl Iterator<Item = (Timestamp, Report)> + '_ {
         self.events.iter().filter_map(|raw| match raw.event.kind {

@@ -7,6 +7,8 @@ use footplate_core::Timestamp;
 use jiff::civil::{Date, DateTime};
 use jiff::tz::TimeZone;
 
+use crate::standard_error::say;
+
 /// How long something takes, whatever becomes of the date meanwhile.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Stopwatch(Instant);
@@ -26,6 +28,23 @@ impl Stopwatch {
 pub(crate) fn now() -> Timestamp {
     timestamp(jiff::Timestamp::now())
 }
+
+/// The time now, for what is stored next; warns if it is before `newest`, the time of something that was stored before.
+pub(crate) fn now_after(newest: Option<Timestamp>) -> Timestamp {
+    let now = now();
+    if let Some(newest) = newest.filter(|newest| *newest > now) {
+        say!(
+            "the clock of this computer is behind: it shows {}, and the store has entries of {}; nothing is lost, but set \
+             the clock so that --as-of finds this session under its date",
+            local(now),
+            local(newest)
+        );
+    }
+    now
+}
+
+/// The date at which a store has all that is in it: whatever was stored counts, even if this computer's clock is behind.
+pub(crate) const LATEST: Timestamp = Timestamp::from_ns(i64::MAX);
 
 /// A moment that a person named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

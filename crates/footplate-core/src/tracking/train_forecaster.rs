@@ -93,6 +93,10 @@ impl TrainForecaster {
 
     /// Takes over a model from elsewhere. It counts until the runs of this train have passed more sensors than it was made of.
     pub(super) fn know(&mut self, model: MotionModel) {
+        // The runs to come are fitted for the same decoder, or that fit would replace the model by one of another decoder.
+        if model.highest() != self.fit.model().highest() {
+            self.fit = MotionFit::new(self.train(), model.highest());
+        }
         self.model = model;
     }
 

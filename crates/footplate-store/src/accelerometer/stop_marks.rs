@@ -8,7 +8,7 @@ use footplate_core::Timestamp;
 
 use super::error::AccelerometerError;
 use crate::decimal::scaled;
-use crate::table::{Table, TableError, shown};
+use crate::table::{LastLine, Table, TableError, shown};
 
 /// The end of the name of a recording, and of that of the marks that belong to it.
 const OF_RECORDING: &str = "_accel";
@@ -76,6 +76,9 @@ impl StopMarks {
                         .into());
                 }
             }
+        }
+        if table.last_line() == LastLine::CutOff {
+            return Err(AccelerometerError::CutOff { file: file.to_owned(), line: table.line() });
         }
         if stops.is_empty() {
             return Err(AccelerometerError::NoRows { file: file.to_owned() });

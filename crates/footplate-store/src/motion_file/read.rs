@@ -5,10 +5,11 @@ use std::path::Path;
 
 use footplate_core::model::MotionModel;
 use footplate_core::track::Layout;
-use footplate_core::{Timestamp, TrainId};
+use footplate_core::{DecoderSteps, SpeedStep, Timestamp, TrainId};
+use serde::Deserialize;
 
 use super::form::{MOTION_MODEL_VERSION, MotionFile};
-use crate::store::{NewCalibration, Store, StoreError};
+use crate::store::{Calibration, NewCalibration, Store, StoreError};
 use crate::whole_file::write_whole;
 
 /// The largest file: a model of a decoder with 126 steps has about 1 MB.
@@ -140,18 +141,34 @@ impl MotionFile {
         Ok(store.keep_calibration(new, now)?)
     }
 
-    /// The model of a train as of a date.
+    /// The latest model of a train as of a date, on whatever layout it was made.
     ///
     /// # Errors
     /// The store cannot be read, or the model is of another version of the formulas.
     pub fn of_store(store: &Store, train: TrainId, at: Timestamp) -> Result<Option<Self>, MotionFileError> {
-        let Some(kept) = store.calibration(train, at)? else { return Ok(None) };
-        let place = format!("{}, motion model of train {train}", store.path().display());
+        store.calibration(train, at)?.map(|kept| Self::of_row(store, kept)).transpose()
+    }
+
+    /// The latest model of a train on a layout as of a date.
+    ///
+    /// # Errors
+    /// As for [`of_store`](Self::of_store).
+    pub fn of_store_on(
+        store: &Store,
+        train: TrainId,
+        layout: &str,
+        at: Timestamp,
+    ) -> Result<Option<Self>, MotionFileError> {
+        store.calibration_on(train, layout, at)?.map(|kept| Self::of_row(store, kept)).transpose()
+    }
+
+    fn of_row(store: &Store, kept: Calibration) -> Result<Self, MotionFileError> {
+        let place = format!("{}, motion model of train {}", store.path().display(), kept.train);
         if kept.model_version != MOTION_MODEL_VERSION {
             return Err(MotionFileError::OtherModel { file: place, found: kept.model_version });
         }
         let parsed = serde_json::from_str(&kept.body).map_err(|error| error.to_string());
-        Self::checked(place, parsed).map(Some)
+        Self::checked(place, parsed)
     }
 
     fn checked(file: String, parsed: Result<Self, String>) -> Result<Self, MotionFileError> {
@@ -174,7 +191,16 @@ pub enum StoredModel {
     /// A usable model.
     Model(Box<MotionModel>),
     /// A model of another version of the formulas. It can be fitted again from the stored events.
-    Outdated,
+    Outdated {
+        /// The highest step of the train's decoder, if the model states it.
+        highest: Option<SpeedStep>,
+    },
+}
+
+/// What a model of any version states of the train's decoder.
+#[derive(Deserialize)]
+struct StatedDecoder {
+    highest_step: SpeedStep,
 }
 
 impl StoredModel {
@@ -188,17 +214,31 @@ impl StoredModel {
         train: TrainId,
         at: Timestamp,
     ) -> Result<Self, MotionFileError> {
-        let file = match MotionFile::of_store(store, train, at) {
-            Ok(file) => file.filter(|file| file.layout == layout.name()),
-            Err(MotionFileError::OtherModel { .. }) => return Ok(Self::Outdated),
+        let Some(kept) = store.calibration_on(train, layout.name(), at)? else { return Ok(Self::Nothing) };
+        let stated = serde_json::from_str::<StatedDecoder>(&kept.body).ok();
+        let outdated = Self::Outdated { highest: stated.map(|stated| stated.highest_step) };
+        let file = match MotionFile::of_row(store, kept) {
+            Ok(file) => file,
+            Err(MotionFileError::OtherModel { .. }) => return Ok(outdated),
             Err(error) => return Err(error),
         };
-        Ok(match file.map(|file| file.model(layout)) {
-            None => Self::Nothing,
-            Some(Ok(model)) => Self::Model(Box::new(model)),
-            // Numbers that are not a model today may have been one in their own version.
-            Some(Err(_)) => Self::Outdated,
-        })
+        // Numbers that are not a model today may have been one in their own version.
+        Ok(file.model(layout).map_or(outdated, |model| Self::Model(Box::new(model))))
+    }
+
+    /// The steps of the train's decoder: as the model states them, or else the fewest that contain every step that the
+    /// train was commanded to until a date; 14 for a train that was never commanded.
+    ///
+    /// # Errors
+    /// The store cannot be read.
+    pub fn decoder(&self, store: &Store, train: TrainId, at: Timestamp) -> Result<DecoderSteps, StoreError> {
+        let stated = match self {
+            Self::Model(model) => Some(model.highest()),
+            Self::Outdated { highest } => *highest,
+            Self::Nothing => None,
+        };
+        let highest = stated.map_or_else(|| store.highest_step(train, at), Ok)?;
+        Ok(DecoderSteps::with(highest))
     }
 }
 
@@ -227,6 +267,36 @@ mod tests {
         assert_eq!(MotionFile::of_store(&store, TrainId(24), at(9.0)).unwrap(), None);
         file().keep(&mut store, at(1.0), at(2.0)).unwrap();
         assert_eq!(MotionFile::of_store(&store, TrainId(24), at(9.0)).unwrap(), Some(file()));
+    }
+
+    #[test]
+    fn a_model_of_one_layout_stays_in_force_when_the_train_runs_on_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut store = Store::open_or_create(&folder.path().join("railway.db")).unwrap();
+        let (layout, at) = (crate::built_in("track-a").unwrap().layout, Timestamp::from_s);
+        let of_store =
+            |store: &Store, date| StoredModel::of_store(&layout, store, TrainId(24), at(date)).unwrap();
+        let with_126 = MotionModel::unknown(TrainId(24), DecoderSteps::All.highest());
+        let here = MotionFile::of(&layout, &with_126, None);
+        let there = MotionFile { layout: "yard".to_owned(), ..file() };
+        there.keep(&mut store, at(1.0), at(1.0)).unwrap();
+        assert_eq!(of_store(&store, 9.0), StoredModel::Nothing);
+        here.keep(&mut store, at(2.0), at(2.0)).unwrap();
+        there.keep(&mut store, at(3.0), at(3.0)).unwrap();
+        MotionFile { model_version: "0".to_owned(), ..there.clone() }
+            .keep(&mut store, at(4.0), at(4.0))
+            .unwrap();
+        let StoredModel::Model(model) = of_store(&store, 9.0) else { panic!("{:?}", of_store(&store, 9.0)) };
+        assert_eq!(model.highest(), DecoderSteps::All.highest());
+        assert_eq!(MotionFile::of_store_on(&store, TrainId(24), "yard", at(3.0)).unwrap(), Some(there));
+        assert_eq!(
+            MotionFile::of_store_on(&store, TrainId(24), "track-a", at(3.0)).unwrap(),
+            Some(here.clone())
+        );
+        // An outdated model of this layout says which decoder to fit the events for.
+        MotionFile { model_version: "0".to_owned(), ..here }.keep(&mut store, at(5.0), at(5.0)).unwrap();
+        let highest = Some(DecoderSteps::All.highest());
+        assert_eq!(of_store(&store, 9.0), StoredModel::Outdated { highest });
     }
 
     #[test]

@@ -15,6 +15,8 @@ use crate::recording::{GatePass, Run};
 pub const GATE_DISTANCE: Length = Length::from_mm(20.0);
 /// The resolution of the gates' clock.
 pub const GATE_TICK: TimeSpan = TimeSpan::from_ms(1);
+/// Two passes further apart are not of one crossing: that would be 10 mm/s, slower than any train ran. Chosen.
+const LONGEST_CROSSING: TimeSpan = TimeSpan::from_ms(2_000);
 
 /// A pair of gate passes beside the estimate of its lap.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -153,7 +155,8 @@ impl LapSpeeds {
     /// The gate checks of the run; an incomplete last lap ends with the run.
     pub(super) fn checks(&self, run: &Run, train: TrainId, step: SpeedStep) -> Vec<GateCheck> {
         let mut checks = Vec::new();
-        for (place, (second, took)) in pairs(&run.gates).enumerate() {
+        for (place, crossing) in crossings(&run.gates).enumerate() {
+            let Some((second, took)) = crossing else { continue };
             let Some(estimated) = self.laps.get(place).copied().or(self.latest) else { continue };
             let spot = GATE_DISTANCE / took;
             // Each time stamp has a uniform error of ± half a tick: tick/√12, and √2 times that for a difference.
@@ -165,11 +168,36 @@ impl LapSpeeds {
     }
 }
 
-/// The second pass of every pair, and the time between both.
-fn pairs(gates: &[GatePass]) -> impl Iterator<Item = (GatePass, TimeSpan)> {
-    gates.chunks_exact(2).filter_map(|pair| {
-        let [first, second] = pair else { return None };
+/// The times at which the train crossed the gates: the pass of the second one and the time between both, or `None` if only
+/// one of them saw the train. Two passes belong together if the gates differ and the train cannot have run a lap between them.
+fn crossings(gates: &[GatePass]) -> impl Iterator<Item = Option<(GatePass, TimeSpan)>> {
+    let mut rest = gates;
+    std::iter::from_fn(move || {
+        let (first, others) = rest.split_first()?;
+        rest = others;
+        let (second, later) = others.split_first()?;
         let took = second.time - first.time;
-        (first.gate != second.gate && took > TimeSpan::ZERO).then_some((*second, took))
+        if first.gate == second.gate || took <= TimeSpan::ZERO || took > LONGEST_CROSSING {
+            return Some(None);
+        }
+        rest = later;
+        Some(Some((*second, took)))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use footplate_core::Timestamp;
+
+    use super::*;
+
+    #[test]
+    fn a_missed_pass_costs_the_pair_of_its_lap_only() {
+        let pass = |(gate, s)| GatePass { line: 0, gate, time: Timestamp::from_s(s) };
+        // Three laps of 20 s, 0.5 s between the gates; gate 2 misses the train on the second lap.
+        let gates = [(1, 0.0), (2, 0.5), (1, 20.0), (1, 40.0), (2, 40.5)].map(pass);
+        let found: Vec<Option<f64>> =
+            crossings(&gates).map(|crossing| crossing.map(|(_, took)| took.as_s())).collect();
+        assert_eq!(found, [Some(0.5), None, Some(0.5)]);
+    }
 }

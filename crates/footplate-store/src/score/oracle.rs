@@ -47,7 +47,8 @@ pub(super) fn hindsight(
         predictor.trains().map(TrainForecaster::model).map(MotionModel::taken_for_certain).collect();
     let mut expected = Vec::new();
     for (run, hits) in runs.iter().zip(&walks) {
-        let model = run.only_train().and_then(|ran| models.iter().find(|model| model.train() == ran.train));
+        let model =
+            run.reported_train().and_then(|ran| models.iter().find(|model| model.train() == ran.train));
         let mut times = model
             .map_or_else(Vec::new, |model| give_speeds(context.layout, &mut predictor, model.clone(), hits));
         let mut place = times.iter_mut();

@@ -44,6 +44,17 @@ fn listed(trains: &[TrainId]) -> String {
     trains.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
+/// Why the reports of a run are not of one train.
+fn no_train(run: &Run) -> ReplayError {
+    let moving = run.moving();
+    let trains = if moving.is_empty() { &run.trains } else { &moving };
+    let trains: Vec<TrainId> = trains.iter().map(|known| known.train).collect();
+    if trains.is_empty() {
+        return ReplayError::NoTrain { run: run.id };
+    }
+    ReplayError::ManyTrains { run: run.id, trains }
+}
+
 /// Feeds one run to the estimator in the order of time and calls `see` for every passage of a sensor, with the event
 /// that reported it and the estimator after it.
 ///
@@ -55,14 +66,7 @@ pub fn replay_run(
     predictor: &mut Predictor,
     mut see: impl FnMut(&RawEvent, Hit, &Predictor),
 ) -> Result<(), ReplayError> {
-    let at_start = match run.trains.as_slice() {
-        [only] => *only,
-        [] => return Err(ReplayError::NoTrain { run: run.id }),
-        many => {
-            let trains = many.iter().map(|known| known.train).collect();
-            return Err(ReplayError::ManyTrains { run: run.id, trains });
-        }
-    };
+    let at_start = run.reported_train().ok_or_else(|| no_train(run))?;
     let ReplayContext { layout, turnouts } = context;
     predictor.begin_run(at_start.train, at_start.step);
     for (turnout, leg) in turnouts {

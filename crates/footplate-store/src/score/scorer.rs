@@ -69,7 +69,8 @@ pub fn score_recording(
     only: Option<TrainId>,
     forecasters: &mut Forecasters,
 ) -> Result<ScoredRecording, ReplayError> {
-    let wanted = |run: &&Run| only.is_none() || run.only_train().is_none_or(|run| Some(run.train) == only);
+    let wanted =
+        |run: &&Run| only.is_none() || run.reported_train().is_none_or(|run| Some(run.train) == only);
     let runs: Vec<&Run> = recording.runs.iter().filter(wanted).collect();
     let expected = hindsight(context, &runs, &forecasters.predictor)?;
     let mut scored = ScoredRecording {
@@ -92,7 +93,7 @@ fn score_run(
     scored: &mut ScoredRecording,
 ) -> Result<(), ReplayError> {
     let Forecasters { predictor, baselines } = forecasters;
-    let Some(at_start) = run.only_train() else { return Ok(()) };
+    let Some(at_start) = run.reported_train() else { return Ok(()) };
     let train = at_start.train;
     let (mut laps, mut hindsight) = (LapSpeeds::default(), hindsight.iter());
     baselines.begin_run();

@@ -63,6 +63,21 @@ impl Store {
         Ok(self.rows(&sql, (KIND, train.0, at.as_ns()), read)?.pop())
     }
 
+    /// The motion model in force for a train on a layout at a date: the last one made there until then. Models of other
+    /// layouts do not count.
+    pub fn calibration_on(
+        &self,
+        train: TrainId,
+        layout: &str,
+        at: Timestamp,
+    ) -> Result<Option<Calibration>, StoreError> {
+        let sql = format!(
+            "SELECT {COLUMNS} FROM calibrations WHERE kind = ?1 AND train = ?2 AND made_at_ns <= ?3 \
+             AND json_extract(body, '$.layout') = ?4 ORDER BY id DESC LIMIT 1"
+        );
+        Ok(self.rows(&sql, (KIND, train.0, at.as_ns(), layout), read)?.pop())
+    }
+
     /// All calibrations of a train in the order of their making, including older forms.
     pub fn calibrations(&self, train: TrainId) -> Result<Vec<Calibration>, StoreError> {
         let sql = format!("SELECT {COLUMNS} FROM calibrations WHERE train = ?1 ORDER BY id");

@@ -1,6 +1,6 @@
 //! Reads a store: its state at a date, and the changes between two dates.
 
-use footplate_core::{RunId, Timestamp, TrainId};
+use footplate_core::{RunId, SpeedStep, Timestamp, TrainId};
 use rusqlite::{Connection, Row};
 
 use super::error::StoreError;
@@ -206,6 +206,25 @@ impl Store {
             },
         )?;
         Ok(StoredRun { key: RunKey(key), id, began_at, trains, events, gates })
+    }
+
+    /// The highest step that a train was commanded to, or ran at when a run began, on any layout until a date; 0 if it
+    /// never ran.
+    pub fn highest_step(&self, train: TrainId, as_of: Timestamp) -> Result<SpeedStep, StoreError> {
+        let sql = "SELECT max(step) FROM (SELECT step FROM events WHERE kind = 'speed' AND train = ?1 AND \
+                   stored_at_ns <= ?2 UNION ALL SELECT step FROM starts JOIN runs ON runs.id = run JOIN recordings ON \
+                   recordings.id = recording WHERE train = ?1 AND stored_at_ns <= ?2)";
+        let highest = self.rows(sql, (train.0, as_of.as_ns()), |row| row.get::<_, Option<u8>>(0))?;
+        Ok(highest.into_iter().flatten().find_map(SpeedStep::new).unwrap_or_default())
+    }
+
+    /// When the newest recording, event or calibration was stored, by the clock of the computer that stored it.
+    pub fn newest_stamp(&self) -> Result<Option<Timestamp>, StoreError> {
+        let sql = "SELECT max(stamp) FROM (SELECT max(stored_at_ns) AS stamp FROM recordings UNION ALL \
+                   SELECT stored_at_ns FROM events WHERE id = (SELECT max(id) FROM events) UNION ALL \
+                   SELECT max(made_at_ns) FROM calibrations)";
+        let newest = self.rows(sql, [], |row| row.get::<_, Option<i64>>(0))?;
+        Ok(newest.into_iter().flatten().map(Timestamp::from_ns).next())
     }
 
     /// The changes after one date and until another, in order: why estimates of the two differ.

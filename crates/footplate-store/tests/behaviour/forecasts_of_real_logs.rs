@@ -1,10 +1,12 @@
 //! How near forecasts come on the recordings of real trains: true numbers, not that two walks agree.
 
-use footplate_core::tracking::Phase;
-use footplate_store::built_in;
+use footplate_core::model::MotionModel;
+use footplate_core::tracking::{Phase, Predictor};
+use footplate_core::{DecoderSteps, Event, EventKind, SpeedStep, Timestamp, TrainId};
 use footplate_store::score::{
     Comparison, Forecasters, ReferenceForecaster, ReplayContext, ScoredHit, ScoredRecording, score_recording,
 };
+use footplate_store::{RawEvent, Run, TrainAtStart, built_in};
 
 use crate::recordings::{ALL, real};
 
@@ -53,4 +55,42 @@ fn little_is_left_to_learn_of_a_long_log() {
     // then knowing all of it beforehand would help by no more than 15 %.
     let ratio = steady.reference(ReferenceForecaster::Oracle).unwrap().ratio().unwrap();
     assert!(ratio <= 1.15, "{ratio}");
+}
+
+#[test]
+fn a_model_of_126_steps_keeps_them_when_runs_are_fitted() {
+    let layout = built_in("track-a").unwrap().layout;
+    let (train, every) = (TrainId(24), DecoderSteps::All.highest());
+    let mut predictor = Predictor::new(&layout);
+    predictor.know(MotionModel::unknown(train, every));
+    predictor.begin_run(train, DecoderSteps::Fourteen.highest());
+    predictor.end_run();
+    assert_eq!(predictor.train(train).unwrap().model().highest(), every);
+}
+
+#[test]
+fn a_run_is_of_the_only_train_that_moves_beside_trains_at_rest_and_in_live_sessions() {
+    let layout = built_in("track-a").unwrap().layout;
+    let context = ReplayContext { layout: &layout, turnouts: &[] };
+    let score = |change: &dyn Fn(&mut Run)| {
+        let mut recording = real(ALL[0]);
+        recording.runs.iter_mut().for_each(change);
+        let (only, mut forecasters) = (Some(TrainId(1)), Forecasters::of_layout(&layout));
+        let scored = score_recording(context, &recording, only, &mut forecasters).unwrap();
+        assert_eq!(scored.runs, recording.runs.len());
+        scored.hits.len()
+    };
+    let stands = |train| TrainAtStart { train: TrainId(train), step: SpeedStep::STAND };
+    // By awk: 100 sensor rows of train 1 that differ from the row before, some of them bounces.
+    let alone = score(&|_| {});
+    assert!((80..=100).contains(&alone), "{alone}");
+    assert_eq!(score(&|run| run.trains.push(stands(58))), alone, "train 58 stands beside it");
+    // A live session names no trains when it begins; the first command shows which one moves.
+    let live = score(&|run| {
+        let at_start = run.trains.remove(0);
+        let kind = EventKind::Speed { train: at_start.train, step: SpeedStep::new(8).unwrap() };
+        let time = run.events.first().map_or(Timestamp::ZERO, |raw| raw.event.time);
+        run.events.insert(0, RawEvent { line: 0, event: Event { time, kind } });
+    });
+    assert_eq!(live, alone, "a live session");
 }

@@ -16,6 +16,7 @@ use footplate_store::{Direction, Journal, JournalEntry, NewMachine, Side, Store,
 
 use super::life::Life;
 use super::plan::{Planned, Trouble};
+use crate::clock::LATEST;
 use crate::runtime::Recorder;
 use crate::session_journal::IfUnkept;
 
@@ -245,11 +246,9 @@ fn beside(path: &Path, ending: &str) -> PathBuf {
 fn kept(path: &Path, recorded: &[Event], least: usize, most: usize) -> anyhow::Result<()> {
     let store = Store::open(path).context("the store cannot be opened after its program died")?;
     store.check()?;
-    // Whatever the calendar showed at that time.
-    let ever = Timestamp::from_ns(i64::MAX);
-    let recordings = store.recordings(ever)?;
+    let recordings = store.recordings(LATEST)?;
     let session = recordings.last().context("the session is not in the store")?;
-    let runs = store.runs(session.key, ever)?;
+    let runs = store.runs(session.key, LATEST)?;
     let events: Vec<Event> = runs.iter().flat_map(|run| &run.events).map(|stored| stored.raw.event).collect();
     ensure!(
         (least..=most).contains(&events.len()),

@@ -23,7 +23,7 @@ use super::Outcome;
 use super::log_file::LogFile;
 use super::output_files::check_outputs;
 use super::plot::PictureFile;
-use crate::clock::{Moment, now};
+use crate::clock::{LATEST, Moment, now};
 use crate::dashboard::ServedAt;
 use crate::layout_check::{LengthWarning, check_runs};
 use crate::link::{Address, NamedTrain};
@@ -197,13 +197,14 @@ impl Arguments {
                 if import(&layout, &logs, &mut store)? == Outcome::FallsShort {
                     outcome = Outcome::FallsShort;
                 }
-                let as_of = self.as_of.map_or_else(now, |moment| moment.0);
-                (Batch::of_store(&layout, &store, as_of, train)?, Some((store, as_of)))
+                let as_of = self.as_of.map_or(LATEST, |moment| moment.0);
+                (Batch::of_store(&layout, &store, as_of, train)?, Some(store))
             }
         };
-        if let Some((store, as_of)) = store.as_mut().filter(|_| self.is_kept()) {
+        if let Some(store) = store.as_mut().filter(|_| self.is_kept()) {
+            let made = now();
             for train in &batch.trains {
-                train.file(&layout).keep(store, *as_of, now())?;
+                train.file(&layout).keep(store, made, made)?;
             }
         }
         if let Some(path) = &self.out {

@@ -12,7 +12,7 @@ use footplate_store::{
     parse_sensor_log,
 };
 
-use crate::clock::now;
+use crate::clock::LATEST;
 use crate::reading::ProgressReader;
 use crate::standard_error::say;
 
@@ -75,11 +75,10 @@ impl LogFile {
         kept: RecordingKey,
         layout: &Layout,
     ) -> anyhow::Result<Option<String>> {
-        let now = now();
-        let Some(recording) = store.recordings(now)?.into_iter().find(|stored| stored.key == kept) else {
+        let Some(recording) = store.recordings(LATEST)?.into_iter().find(|stored| stored.key == kept) else {
             return Ok(None);
         };
-        let runs = store.runs(kept, now)?;
+        let runs = store.runs(kept, LATEST)?;
         let of_run = |run: &StoredRun| run.accepted().trains.iter().map(|at_start| at_start.train).collect();
         let trains: BTreeSet<TrainId> = runs.iter().flat_map(|run| -> Vec<TrainId> { of_run(run) }).collect();
         let layout_differs = recording.layout != layout.name();

@@ -11,11 +11,11 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use footplate_core::track::Layout;
-use footplate_core::{SpeedStep, Timestamp, TrainId};
+use footplate_core::{SpeedStep, TrainId};
 use footplate_store::{MotionFile, ProfileContext, Store, layout_named};
 
 use super::Outcome;
-use crate::clock::now;
+use crate::clock::{LATEST, now};
 
 /// Import and export speed profiles: JMRI roster entries, Rocrail's mvtrack.csv, CSV.
 #[derive(Args)]
@@ -64,7 +64,7 @@ impl Withdrawal {
     fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let train = TrainId(self.train);
         let mut store = Store::open(&self.store)?;
-        let Some(profile) = store.profile(train, now())? else {
+        let Some(profile) = store.profile(train, LATEST)? else {
             writeln!(output, "train {train} has no imported profile; nothing to withdraw")?;
             return Ok(Outcome::Done);
         };
@@ -121,9 +121,14 @@ fn stored_model(
     store: &Store,
     train: TrainId,
     layout: Option<&str>,
-    at: Timestamp,
 ) -> anyhow::Result<Option<(MotionFile, Layout)>> {
-    let Some(file) = MotionFile::of_store(store, train, at)? else { return Ok(None) };
+    // A layout that is named asks for the model made there, even if the train ran on another one since.
+    if let Some(Ok(named)) = layout.map(layout_named)
+        && let Some(file) = MotionFile::of_store_on(store, train, named.layout.name(), LATEST)?
+    {
+        return Ok(Some((file, named.layout)));
+    }
+    let Some(file) = MotionFile::of_store(store, train, LATEST)? else { return Ok(None) };
     let name = layout.unwrap_or(&file.layout);
     let layout = layout_named(name)
         .with_context(|| {

@@ -14,7 +14,7 @@ use footplate_core::{TimeSpan, Timestamp};
 use footplate_store::{RecordingKey, Store, StoredMachine, StoredRecording};
 
 use super::Outcome;
-use crate::clock::now;
+use crate::clock::LATEST;
 use crate::recorded::{Ending, Extent};
 use crate::session_journal::PROGRAM;
 use page::Page;
@@ -85,7 +85,7 @@ impl Arguments {
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let store = Store::open_to_read(&self.store)?;
         let machines = store.machines()?;
-        let recordings = store.recordings(now())?;
+        let recordings = store.recordings(LATEST)?;
         let page = Page { is_json: self.json, is_diff: self.diff };
         if self.list {
             page.list(&machines, &recordings, output)?;

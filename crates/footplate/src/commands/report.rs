@@ -13,14 +13,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
+use footplate_core::TrainId;
 use footplate_core::track::Layout;
-use footplate_core::{Timestamp, TrainId};
 use footplate_store::{Batch, Findings, Run, Store, layout_named, write_whole};
 
 use super::Outcome;
 use super::log_file::LogFile;
 use super::output_files::check_outputs;
 use super::web_page::Language;
+use crate::clock::LATEST;
 use crate::layout_check::{LengthWarning, check_runs};
 use data::{ReportData, TrainReport};
 use german_law::german_law;
@@ -109,19 +110,19 @@ impl Arguments {
     }
 }
 
-/// All that a store holds of a layout. No clock is asked: whatever is in it was there before.
+/// All that a store holds of a layout.
 fn of_store(layout: &Layout, store: &Store, train: Option<TrainId>) -> anyhow::Result<(Vec<Session>, Batch)> {
-    let now = Timestamp::from_ns(i64::MAX);
     let mut sessions = Vec::new();
-    for recording in store.recordings(now)?.into_iter().filter(|recording| recording.layout == layout.name())
+    for recording in
+        store.recordings(LATEST)?.into_iter().filter(|recording| recording.layout == layout.name())
     {
-        let runs = store.runs(recording.key, now)?;
+        let runs = store.runs(recording.key, LATEST)?;
         sessions.push(Session {
             name: recording.name,
             runs: runs.iter().map(footplate_store::StoredRun::accepted).collect(),
         });
     }
-    Ok((sessions, Batch::of_store(layout, store, now, train)?))
+    Ok((sessions, Batch::of_store(layout, store, LATEST, train)?))
 }
 
 /// What a store holds of one train, as the charts of a report read it.

@@ -21,7 +21,7 @@ pub use loss::Loss;
 pub use period::{Count, Direction, Period, WheelReading};
 pub use range::{Range, larger, smaller};
 pub use reported_direction::ReportedDirection;
-pub use tachometer::{Expected, Heading, Quality, Tachometer, Turn};
+pub use tachometer::{Expected, Heading, Quality, Tachometer, Turn, unwrapped};
 pub use thresholds::Thresholds;
 pub use vehicle::{BrakeCommand, SlideProtection, Vehicle, VehicleError};
 pub use wheel_tracker::WheelTracker;

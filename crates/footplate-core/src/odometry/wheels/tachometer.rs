@@ -268,8 +268,10 @@ impl Default for Tachometer {
     }
 }
 
-/// The difference of a running counter, through a wrap if nothing else is possible.
-fn unwrapped(before: i64, now: i64, most: f64) -> Option<f64> {
+/// The difference of two readings of a running counter (pulses), through a wrap in either direction if a plain difference
+/// is more than the wheel can have turned, `most` pulses; `None` if no difference is possible.
+#[must_use]
+pub fn unwrapped(before: i64, now: i64, most: f64) -> Option<f64> {
     let moved = now.saturating_sub(before) as f64;
     if moved.abs() <= most {
         return Some(moved);

@@ -15,6 +15,8 @@ pub(super) struct Strays<'a> {
     trial: Connection,
     /// The columns of each of `TABLES`.
     columns: Vec<Vec<String>>,
+    /// Which of them are of real numbers.
+    reals: Vec<Vec<String>>,
 }
 
 impl<'a> Strays<'a> {
@@ -25,7 +27,8 @@ impl<'a> Strays<'a> {
         }
         trial.pragma_update(None, "foreign_keys", false)?;
         let columns = TABLES.iter().map(|(name, _)| columns_of(&trial, name)).collect();
-        Ok(Self { pages, trial, columns })
+        let reals = TABLES.iter().map(|(name, _)| reals_of(&trial, name)).collect::<Result<_, _>>()?;
+        Ok(Self { pages, trial, columns, reals })
     }
 
     /// Inserts those that can only be rows of this table and are not in it yet. Counts again what is lost.
@@ -38,14 +41,14 @@ impl<'a> Strays<'a> {
         let Some(at) = TABLES.iter().position(|(name, _)| *name == table.name) else { return Ok(()) };
         let mut last = i64::try_from(table.rows + table.lost).unwrap_or(i64::MAX);
         for row in self.pages.rows().filter(could_be_ours) {
-            if !self.fits(at, &row)? || is_there(into, table.name, self.columns_for(at, &row), &row)? {
+            if !self.fits(at, &row)? || self.is_there(into, at, &row)? {
                 continue;
             }
             if self.candidates(&row)? != [at] {
                 continue;
             }
             let columns = self.columns_for(at, &row);
-            let values = values_of(&row);
+            let values = self.values_for(at, &row);
             if let Some(parent) = parent
                 && let Some(place) = columns.iter().position(|column| column == parent.column)
                 && let Some(Value::Integer(key)) = values.get(place)
@@ -67,9 +70,9 @@ impl<'a> Strays<'a> {
         let mut count = 0;
         for row in self.pages.rows().filter(could_be_ours) {
             let mut is_in_one = false;
-            for (at, (name, _)) in TABLES.iter().enumerate() {
+            for at in 0..TABLES.len() {
                 let columns = self.columns_for(at, &row);
-                is_in_one |= columns.len() == row.values.len() && is_there(into, name, columns, &row)?;
+                is_in_one |= columns.len() == row.values.len() && self.is_there(into, at, &row)?;
             }
             if !is_in_one {
                 count += u64::from(self.candidates(&row)?.len() > 1);
@@ -94,12 +97,13 @@ impl<'a> Strays<'a> {
         let (Some((name, _)), columns) = (TABLES.get(at), self.columns_for(at, row)) else {
             return Ok(false);
         };
-        if columns.len() != row.values.len() || !checksum::holds(name, columns, &values_of(row)) {
+        let values = self.values_for(at, row);
+        if columns.len() != row.values.len() || !checksum::holds(name, columns, &values) {
             return Ok(false);
         }
         let mut insert = self.trial.prepare_cached(&insertion(name, columns))?;
         self.trial.execute_batch("SAVEPOINT trial")?;
-        let fits = accepted(&mut insert, &values_of(row));
+        let fits = accepted(&mut insert, &values);
         self.trial.execute_batch("ROLLBACK TO trial; RELEASE trial")?;
         fits
     }
@@ -108,6 +112,29 @@ impl<'a> Strays<'a> {
     fn columns_for(&self, at: usize, row: &FoundRow) -> &[String] {
         let columns = self.columns.get(at).map(Vec::as_slice).unwrap_or_default();
         columns.get(..row.values.len()).unwrap_or_default()
+    }
+
+    /// The values of a row as a table has them: SQLite writes a whole number into a column of real ones as an integer.
+    fn values_for(&self, at: usize, row: &FoundRow) -> Vec<Value> {
+        let reals = self.reals.get(at).map(Vec::as_slice).unwrap_or_default();
+        let mut values = values_of(row);
+        for (column, value) in self.columns_for(at, row).iter().zip(&mut values) {
+            if let Value::Integer(number) = *value
+                && reals.contains(column)
+            {
+                *value = Value::Real(number as f64);
+            }
+        }
+        values
+    }
+
+    /// Whether a table has exactly this row.
+    fn is_there(&self, into: &Transaction<'_>, at: usize, row: &FoundRow) -> rusqlite::Result<bool> {
+        let Some((table, _)) = TABLES.get(at) else { return Ok(false) };
+        let same: Vec<String> =
+            self.columns_for(at, row).iter().map(|column| format!("{column} IS ?")).collect();
+        let same = format!("SELECT 1 FROM {table} WHERE {}", same.join(" AND "));
+        into.prepare_cached(&same)?.exists(params_from_iter(self.values_for(at, row)))
     }
 }
 
@@ -125,14 +152,8 @@ fn insertion(table: &str, columns: &[String]) -> String {
     format!("INSERT INTO {table} ({}) VALUES ({places})", columns.join(", "))
 }
 
-/// Whether a table has exactly this row.
-fn is_there(
-    into: &Transaction<'_>,
-    table: &str,
-    columns: &[String],
-    row: &FoundRow,
-) -> rusqlite::Result<bool> {
-    let same: Vec<String> = columns.iter().map(|column| format!("{column} IS ?")).collect();
-    let same = format!("SELECT 1 FROM {table} WHERE {}", same.join(" AND "));
-    into.prepare_cached(&same)?.exists(params_from_iter(values_of(row)))
+/// The columns of a table that hold real numbers.
+fn reals_of(connection: &Connection, table: &str) -> rusqlite::Result<Vec<String>> {
+    let mut names = connection.prepare("SELECT name FROM pragma_table_info(?1) WHERE type = 'REAL'")?;
+    names.query_map([table], |row| row.get(0))?.collect()
 }

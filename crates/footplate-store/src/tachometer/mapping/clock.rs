@@ -67,6 +67,8 @@ impl Clock {
         let ns = i64::try_from(time.duration_since(midnight).as_nanos()).ok()?;
         // Half a day back is the next day; less is a clock that was set.
         self.days += i64::from(ns < self.latest.saturating_sub(NS_A_DAY / 2));
+        // Half a day on is a row of the day before that was written late.
+        self.days -= i64::from(self.days > 0 && ns > self.latest.saturating_add(NS_A_DAY / 2));
         self.latest = ns;
         self.days.checked_mul(NS_A_DAY)?.checked_add(ns)
     }
@@ -108,6 +110,8 @@ mod tests {
             [0.0, 0.5, 1.5]
         );
         assert_eq!(seconds(TimeForm::TimeOfDay, &["23:59:59.5", "00:00:00.5"]), [0.0, 1.0]);
+        let late = ["23:59:59.5", "00:00:00.5", "23:59:59.8", "00:00:01.5"];
+        assert_eq!(seconds(TimeForm::TimeOfDay, &late), [0.0, 1.0, 0.3, 2.0], "a row that is late");
         let mut dated = Clock::new(TimeForm::TimeOfDay, true, 0.05);
         assert_eq!(dated.read("23:59:59", "2014-04-01", STYLE), Ok(0));
         assert_eq!(dated.read("00:00:01", "2014-04-02", STYLE), Ok(2_000_000_000));

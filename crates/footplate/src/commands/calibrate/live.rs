@@ -27,7 +27,7 @@ use self::ended::{Why, outcome_of};
 pub(in crate::commands) use self::printed::line as calibration_line;
 use self::watcher::Watcher;
 use super::picture;
-use crate::clock::now;
+use crate::clock::{LATEST, now};
 use crate::commands::Outcome;
 use crate::commands::left_running::stop_left_running;
 use crate::commands::plot::PictureFile;
@@ -249,7 +249,7 @@ impl Session<'_> {
         }
     }
 
-    /// The steps of the train's decoder: as named, as the simulated layout has it, as a stored model has it, or 14.
+    /// The steps of the train's decoder: as named, as the simulated layout has it, as the store shows it, or 14.
     fn decoder(&self, layout: &Layout) -> anyhow::Result<DecoderSteps> {
         let named = NamedTrain { train: self.train, decoder: self.decoder };
         let decoders = self.link.decoders(&[named]).map_err(|error| anyhow!(error))?;
@@ -259,10 +259,8 @@ impl Session<'_> {
         let store =
             self.store.filter(|path| path.exists() && !self.is_afresh).map(Store::open).transpose()?;
         let Some(store) = store else { return Ok(DecoderSteps::Fourteen) };
-        Ok(match StoredModel::of_store(layout, &store, self.train, now())? {
-            StoredModel::Model(model) => DecoderSteps::with(model.highest()),
-            StoredModel::Outdated | StoredModel::Nothing => DecoderSteps::Fourteen,
-        })
+        let stored = StoredModel::of_store(layout, &store, self.train, LATEST)?;
+        Ok(stored.decoder(&store, self.train, LATEST)?)
     }
 
     /// What is known of the train and the turnouts from earlier sessions, so that this one goes on from there.
@@ -273,7 +271,7 @@ impl Session<'_> {
             return Ok(nothing);
         };
         let mut store = Store::open(path)?;
-        let replay = MotionReplay::of_store(layout, &mut store, self.train, highest, now())?;
+        let replay = MotionReplay::of_store(layout, &mut store, self.train, highest, LATEST)?;
         if replay.is_empty() {
             let Some(profile) = replay.profile else { return Ok(nothing) };
             say!("beginning with the speeds of {profile}; --afresh begins from nothing");
@@ -285,7 +283,7 @@ impl Session<'_> {
             self.train
         );
         let mut fit = replay.fit;
-        if let StoredModel::Model(model) = StoredModel::of_store(layout, &store, self.train, now())?
+        if let StoredModel::Model(model) = StoredModel::of_store(layout, &store, self.train, LATEST)?
             && model.highest() == highest
         {
             // Which steps do not move it follows from what was tried, not from the events alone.

@@ -16,7 +16,7 @@ use super::learning::Learning;
 use super::reader::Known;
 use super::script::step;
 use super::script_runner::{CommandSource, ScriptRunner};
-use crate::clock::{local, now};
+use crate::clock::{local, now_after};
 use crate::commands::written_layout::WrittenLayout;
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
 
@@ -87,10 +87,10 @@ impl DriveBeginning {
         at: Timestamp,
         when_full: WhenFull,
     ) -> anyhow::Result<SessionJournal> {
-        let now = now();
+        let store = Store::open_or_create(path)?;
+        let now = now_after(store.newest_stamp()?);
         let began_at = Some(now + (Timestamp::ZERO - at));
         let name = format!("drive {}", local(now));
-        let store = Store::open_or_create(path)?;
         let mut journal = Journal::begin(store, &name, layout.name(), began_at, &[], now)?;
         let body = serde_json::to_string(self)?;
         journal.begin_machine(NewMachine { kind: Self::KIND, program: PROGRAM, body: &body }, now)?;

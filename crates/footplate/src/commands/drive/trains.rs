@@ -11,7 +11,7 @@ use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{DecoderSteps, SpeedStep, TrainId};
 use footplate_store::{MotionFile, MotionReplay, Store, StoredModel};
 
-use crate::clock::now;
+use crate::clock::{LATEST, now};
 use crate::link::StationKind;
 use crate::standard_error::say;
 
@@ -114,10 +114,11 @@ impl KnownTrains {
         train: TrainId,
         named: Option<Option<DecoderSteps>>,
     ) -> anyhow::Result<()> {
-        let at = now();
-        match StoredModel::of_store(layout, store, train, at)? {
+        let stored = StoredModel::of_store(layout, store, train, LATEST)?;
+        let decoder = stored.decoder(store, train, LATEST)?;
+        match stored {
             StoredModel::Model(model) => drop(self.models.insert(train, model.for_later_session())),
-            StoredModel::Outdated => say!(
+            StoredModel::Outdated { .. } => say!(
                 "the stored model of train {train} is from another version of the formulas; it is \
                  fitted again from the stored events"
             ),
@@ -126,12 +127,15 @@ impl KnownTrains {
         }
         let highest = match self.models.get(&train) {
             Some(model) => model.highest(),
-            None => named.flatten().unwrap_or(DecoderSteps::Fourteen).highest(),
+            None => named.flatten().unwrap_or(decoder).highest(),
         };
-        let replay = MotionReplay::of_store(layout, store, train, highest, at)?;
+        let replay = MotionReplay::of_store(layout, store, train, highest, LATEST)?;
         if replay.is_empty() {
-            if let (Some(profile), true) = (&replay.profile, !self.models.contains_key(&train)) {
-                say!("train {train} begins with the speeds of {profile}");
+            let begins = replay.profile.is_some() || named.is_some();
+            if begins && !self.models.contains_key(&train) {
+                if let Some(profile) = &replay.profile {
+                    say!("train {train} begins with the speeds of {profile}");
+                }
                 self.models.insert(train, replay.fit.model().clone());
                 self.fits.push(replay.fit);
                 self.unknown.push(train);
@@ -170,8 +174,76 @@ impl KnownTrains {
             MotionFile::of(layout, model, Some(at)).keep(&mut store, at, at)?;
             // Digests the events of this session now, while all trains are at rest, instead of at the start of the next
             // session.
-            MotionReplay::of_store(layout, &mut store, model.train(), model.highest(), at)?;
+            MotionReplay::of_store(layout, &mut store, model.train(), model.highest(), LATEST)?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use footplate_core::{Event, EventKind, Timestamp};
+    use footplate_store::{Journal, NewCalibration, built_in};
+
+    use super::*;
+
+    const TRAIN: TrainId = TrainId(24);
+
+    /// A store in which the train was driven at a step on Track A.
+    fn driven(path: &Path, step: u8, date: Timestamp) -> Store {
+        let store = Store::open_or_create(path).unwrap();
+        let mut journal = Journal::begin(store, "evening", "track-a", None, &[], date).unwrap();
+        let step = SpeedStep::new(step).unwrap();
+        let event = Event { time: Timestamp::from_s(1.0), kind: EventKind::Speed { train: TRAIN, step } };
+        journal.append(&[event], date).unwrap();
+        journal.end()
+    }
+
+    #[test]
+    fn a_clock_that_is_behind_hides_nothing_that_was_stored() {
+        let folder = tempfile::tempdir().unwrap();
+        let layout = built_in("track-a").unwrap().layout;
+        let next_year = now() + footplate_core::TimeSpan::from_s(31_536_000.0);
+        let mut store = driven(&folder.path().join("railway.db"), 20, next_year);
+        assert_eq!(gathered(&mut store, None).get(), 28, "the events");
+        let model = MotionModel::unknown(TRAIN, DecoderSteps::All.highest());
+        MotionFile::of(&layout, &model, None).keep(&mut store, next_year, next_year).unwrap();
+        assert_eq!(gathered(&mut store, None).get(), 126, "the model");
+        assert_eq!(store.newest_stamp().unwrap(), Some(next_year));
+    }
+
+    fn outdated(store: &mut Store, body: &str) {
+        let old = NewCalibration { train: TRAIN, as_of: now(), model_version: "9", body };
+        store.keep_calibration(old, now()).unwrap();
+    }
+
+    fn gathered(store: &mut Store, named: Option<DecoderSteps>) -> SpeedStep {
+        let layout = built_in("track-a").unwrap().layout;
+        let named = BTreeMap::from([(TRAIN, named)]);
+        let sources = Sources { files: &[], store: Some(store), named, station: StationKind::DccEx };
+        let known = KnownTrains::gather(&layout, sources).unwrap();
+        assert_eq!(known.fits.len(), 1);
+        assert_eq!(known.fits[0].model().highest(), known.models[&TRAIN].highest());
+        known.models[&TRAIN].highest()
+    }
+
+    #[test]
+    fn a_train_keeps_the_steps_of_its_decoder_when_its_model_is_outdated() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut store = driven(&folder.path().join("stated.db"), 10, now());
+        outdated(&mut store, r#"{"layout":"track-a","highest_step":126}"#);
+        assert_eq!(gathered(&mut store, None), DecoderSteps::All.highest());
+        assert_eq!(gathered(&mut store, Some(DecoderSteps::TwentyEight)).get(), 28, "as named");
+    }
+
+    #[test]
+    fn a_train_without_a_stated_decoder_has_every_step_that_it_was_commanded_to() {
+        let folder = tempfile::tempdir().unwrap();
+        for (step, highest) in [(14, 14), (15, 28), (29, 126)] {
+            let mut store = driven(&folder.path().join(format!("{step}.db")), step, now());
+            assert_eq!(gathered(&mut store, None).get(), highest, "only driven");
+            outdated(&mut store, r#"{"layout":"track-a"}"#);
+            assert_eq!(gathered(&mut store, None).get(), highest, "driven, with a model that says nothing");
+        }
     }
 }

@@ -9,13 +9,13 @@ use clap::Args;
 use footplate_core::model::MotionModel;
 use footplate_core::model::survey::{SectionIndex, TrackSurvey};
 use footplate_core::track::{Hop, Layout, Survey};
-use footplate_core::{DecoderSteps, HALF_95, Length, TrainId};
+use footplate_core::{HALF_95, Length, TrainId};
 use footplate_store::{
     LayoutFile, MotionReplay, Store, StoredModel, layout_named, write_layout, write_whole,
 };
 use serde_json::{Value, json};
 
-use crate::clock::now;
+use crate::clock::LATEST;
 use crate::commands::Outcome;
 use crate::commands::output_files::check_outputs;
 use crate::counted::counted;
@@ -112,20 +112,18 @@ fn surveyed(layout: &Layout, sections: &SectionIndex, survey: &TrackSurvey) -> V
 /// The models of all trains that ran on the layout alone.
 fn models(layout: &Layout, path: &Path) -> anyhow::Result<Vec<MotionModel>> {
     let mut store = Store::open(path)?;
-    let at = now();
     let mut trains: BTreeSet<TrainId> = BTreeSet::new();
-    for recording in store.recordings(at)?.into_iter().filter(|recording| recording.layout == layout.name()) {
-        for run in store.runs(recording.key, at)? {
+    for recording in
+        store.recordings(LATEST)?.into_iter().filter(|recording| recording.layout == layout.name())
+    {
+        for run in store.runs(recording.key, LATEST)? {
             trains.extend(run.accepted().moving().iter().map(|at_start| at_start.train));
         }
     }
     let mut models = Vec::new();
     for train in trains {
-        let highest = match StoredModel::of_store(layout, &store, train, at)? {
-            StoredModel::Model(model) => model.highest(),
-            StoredModel::Outdated | StoredModel::Nothing => DecoderSteps::Fourteen.highest(),
-        };
-        let replay = MotionReplay::of_store(layout, &mut store, train, highest, at)?;
+        let decoder = StoredModel::of_store(layout, &store, train, LATEST)?.decoder(&store, train, LATEST)?;
+        let replay = MotionReplay::of_store(layout, &mut store, train, decoder.highest(), LATEST)?;
         if !replay.is_empty() {
             models.push(replay.fit.model().clone());
         }

@@ -15,7 +15,7 @@ use serde_json::{Value, json};
 
 use super::stopped_run::StoppedRun;
 use super::stops_picture::measured_stops;
-use crate::clock::now;
+use crate::clock::{LATEST, now};
 use crate::commands::Outcome;
 use crate::commands::plot::PictureFile;
 use crate::error_text::error_text;
@@ -85,10 +85,10 @@ impl Arguments {
         let layout = self.layout_of(&stopped)?;
         let at = layout.landmark(&self.at)?;
         let event = stopped.entry(&layout, train, at, self.took.map(|took| took.0))?;
-        let before = known(&layout, &store, train, stopped.from());
+        let before = known(&layout, &store, train, stopped.from(), None);
         store.append(stopped.run.key, &[event], now())?;
-        let after = known(&layout, &store, train, stopped.from());
         let key = last_event(&store, &stopped)?;
+        let after = known(&layout, &store, train, stopped.from(), Some(key));
         let measured =
             MeasuredStop { arguments: &self, layout: &layout, stopped: &stopped, key, before, after };
         if self.json {
@@ -135,21 +135,30 @@ impl Arguments {
 struct Known {
     /// By the motion model.
     stop: StopForecast,
-    /// The last stop that was measured.
-    last: Option<TapedStop>,
+    /// The stop that was measured now, once it is stored and can be counted from its command.
+    this: Option<TapedStop>,
 }
 
-fn known(layout: &Layout, store: &Store, train: TrainId, from: SpeedStep) -> Option<Known> {
-    let batch = Batch::of_store(layout, store, now(), Some(train)).ok()?;
+/// What the store shows of stops of a train from a step, and of the one that is stored as `key`.
+fn known(
+    layout: &Layout,
+    store: &Store,
+    train: TrainId,
+    from: SpeedStep,
+    key: Option<EventKey>,
+) -> Option<Known> {
+    let batch = Batch::of_store(layout, store, LATEST, Some(train)).ok()?;
     let train = batch.trains.first()?;
     let model = train.replay.fit.model();
     let is_known = [Approach::Below, Approach::Above].iter().any(|side| model.speed(from, *side).count > 0);
-    let last = train.review.stops.iter().rev().find(|stop| stop.step == from).copied();
-    is_known.then(|| Known { stop: model.stop(from, Approach::Below), last })
+    let stored_as = |stop: &TapedStop| batch.event(stop.run, stop.entry).and_then(|event| event.stored_as);
+    let is_this = |stop: &&TapedStop| key.is_some_and(|key| stored_as(stop) == Some(key.0));
+    let this = train.review.stops.iter().find(is_this).copied();
+    is_known.then(|| Known { stop: model.stop(from, Approach::Below), this })
 }
 
 fn last_event(store: &Store, stopped: &StoppedRun) -> anyhow::Result<EventKey> {
-    let runs = store.runs(stopped.recording.key, now())?;
+    let runs = store.runs(stopped.recording.key, LATEST)?;
     let run = runs.iter().find(|run| run.key == stopped.run.key);
     let last = run.and_then(|run| run.events.last());
     last.map(|stored| stored.key).context("the run has gone from the store")
@@ -201,7 +210,7 @@ impl MeasuredStop<'_> {
     /// How far the reading is from what the model expected before it, if that is far.
     fn remarkable(&self) -> Option<f64> {
         let StopForecast { distance, doubt, scatter, .. } = self.before.as_ref()?.stop;
-        let this = self.after.as_ref()?.last?;
+        let this = self.after.as_ref()?.this?;
         let variance = doubt.as_m().powi(2) + scatter.as_m().powi(2) + this.uncertainty.as_m().powi(2);
         let sigmas = (this.distance.length() - distance).as_m().abs() / variance.sqrt();
         (sigmas > REMARKABLE).then_some(sigmas)

@@ -8,7 +8,7 @@ use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Event, EventKind, Length, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_store::{RecordingKey, Run, Store, StoredRecording, StoredRun};
 
-use crate::clock::now;
+use crate::clock::{LATEST, now};
 
 /// A person who reads a tape does so at least this long after the train was commanded to stop; a reading without a watch
 /// is dated so late that its date is not taken for the time of the stop.
@@ -29,15 +29,14 @@ pub(super) struct StoppedRun {
 impl StoppedRun {
     /// The last run in which the train was commanded anything, of one recording or of all.
     pub(super) fn find(store: &Store, train: TrainId, of: Option<RecordingKey>) -> anyhow::Result<Self> {
-        let at = now();
-        let recordings = store.recordings(at)?;
+        let recordings = store.recordings(LATEST)?;
         if let Some(key) = of
             && recordings.iter().all(|recording| recording.key != key)
         {
             bail!("there is no recording {key}; `footplate store show` lists them");
         }
         for recording in recordings.into_iter().rev().filter(|one| of.is_none_or(|key| one.key == key)) {
-            for run in store.runs(recording.key, at)?.into_iter().rev() {
+            for run in store.runs(recording.key, LATEST)?.into_iter().rev() {
                 if let Some((commanded, from)) = last_command(&run.accepted(), train)? {
                     return Ok(Self { recording, run, commanded, from });
                 }
@@ -63,6 +62,13 @@ impl StoppedRun {
         at: Landmark,
         took: Option<TimeSpan>,
     ) -> anyhow::Result<Event> {
+        if self.run.accepted().reported_train().is_none() {
+            bail!(
+                "other trains moved in run {}, too, and its reports do not say which train they are of, so a stop of train \
+                 {train} in it cannot be used; drive train {train} alone and measure its next stop",
+                self.run.id
+            );
+        }
         let landmark = sensor_of(layout, at)?;
         let event =
             Event { time: self.time(took), kind: EventKind::Stopped { train, landmark, offset: at.offset } };

@@ -6,7 +6,7 @@ use footplate_core::track::Layout;
 use footplate_core::{Approach, HALF_95, SpeedStep, TrainId};
 use footplate_store::{Batch, BatchTrain, Store};
 
-use crate::clock::now;
+use crate::clock::LATEST;
 use crate::commands::plot::{Ink, Layer, Panel, Picture, Shape};
 
 /// Every stop, the stopping distances of the motion model, and the stops from `newest` pointed out.
@@ -19,7 +19,7 @@ pub(super) fn measured_stops(
     train: TrainId,
     newest: SpeedStep,
 ) -> anyhow::Result<Picture> {
-    let batch = Batch::of_store(layout, store, now(), Some(train))?;
+    let batch = Batch::of_store(layout, store, LATEST, Some(train))?;
     match batch.trains.as_slice() {
         [one] if !one.review.stops.is_empty() => Ok(picture(one, layout.name(), newest)),
         _ => bail!(

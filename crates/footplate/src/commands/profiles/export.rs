@@ -11,7 +11,6 @@ use footplate_store::{
 };
 
 use super::stored_model;
-use crate::clock::now;
 use crate::commands::Outcome;
 use crate::commands::output_files::check_outputs;
 use crate::counted::counted;
@@ -98,7 +97,7 @@ impl Arguments {
 
     fn rows(&self, train: TrainId) -> anyhow::Result<Vec<ModelRow>> {
         let store = Store::open(&self.store)?;
-        let Some((file, layout)) = stored_model(&store, train, self.layout.as_deref(), now())? else {
+        let Some((file, layout)) = stored_model(&store, train, self.layout.as_deref())? else {
             bail!(
                 "train {train} has no motion model in {}; calibrate or drive it first",
                 self.store.display()

@@ -6,13 +6,13 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
+use footplate_core::TrainId;
 use footplate_core::model::MotionModel;
-use footplate_core::{Timestamp, TrainId};
 use footplate_store::{MotionReplay, SpeedProfile, Store, layout_named, read_profile};
 
 use super::preview::Preview;
 use super::{Reading, short, stored_model};
-use crate::clock::now;
+use crate::clock::{LATEST, now};
 use crate::commands::Outcome;
 
 /// Import speed profiles, each for one train; without --store, only show what they would change.
@@ -57,7 +57,7 @@ impl Arguments {
         let existing =
             self.store.as_ref().filter(|path| path.exists()).map(|path| Store::open(path)).transpose()?;
         for (train, profile) in &profiles {
-            let [current, merged] = self.models(existing.as_ref(), *train, profile, at)?;
+            let [current, merged] = self.models(existing.as_ref(), *train, profile)?;
             let kept_in = self.store.as_ref().filter(|_| !self.preview).map(|path| short(path));
             let preview = Preview { train: *train, profile, current: &current, merged: &merged, kept_in };
             if self.json { preview.write_json(output)? } else { preview.write(output)? }
@@ -99,23 +99,23 @@ impl Arguments {
         store: Option<&Store>,
         train: TrainId,
         profile: &SpeedProfile,
-        at: Timestamp,
     ) -> anyhow::Result<[MotionModel; 2]> {
         let highest = self.reading.highest();
         if let Some(store) = store {
             let named = |name: &String| layout_named(name).map(|named| named.layout);
-            let layout = match stored_model(store, train, self.layout.as_deref(), at)? {
+            let layout = match stored_model(store, train, self.layout.as_deref())? {
                 Some((_, layout)) => Some(layout),
                 None => self.layout.as_ref().map(named).transpose()?,
             };
             if let Some(layout) = layout {
-                let merged = MotionReplay::with_profile(&layout, store, Some(profile), train, highest, at)?;
-                let before = store.profile(train, at)?;
+                let merged =
+                    MotionReplay::with_profile(&layout, store, Some(profile), train, highest, LATEST)?;
+                let before = store.profile(train, LATEST)?;
                 let current =
-                    MotionReplay::with_profile(&layout, store, before.as_ref(), train, highest, at)?;
+                    MotionReplay::with_profile(&layout, store, before.as_ref(), train, highest, LATEST)?;
                 return Ok([current.fit.model().clone(), merged.fit.model().clone()]);
             }
-            if let Some(before) = store.profile(train, at)? {
+            if let Some(before) = store.profile(train, LATEST)? {
                 return Ok([before.beginning(train, highest), profile.beginning(train, highest)]);
             }
         }

@@ -4,6 +4,7 @@ use footplate_core::TrainId;
 use footplate_core::model::Passage;
 use footplate_core::track::Layout;
 use footplate_core::tracking::{Phase, Predictor};
+use footplate_store::Run;
 use footplate_store::score::{ReplayContext, replay_run};
 
 use super::Session;
@@ -21,7 +22,8 @@ pub(super) fn of_train(
     let mut points = Vec::new();
     for session in sessions {
         let mut predictor = Predictor::new(layout);
-        let own = session.runs.iter().filter(|run| run.only_train().is_some_and(|only| only.train == train));
+        let is_own = |run: &&Run| run.reported_train().is_some_and(|reported| reported.train == train);
+        let own = session.runs.iter().filter(is_own);
         for run in own {
             replay_run(context, run, &mut predictor, |raw, hit, _| {
                 let Passage { sensor, drive, path, window, .. } = &hit.passage;

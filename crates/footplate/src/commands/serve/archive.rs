@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::answer_queue::{AnswerForm, AnswerQueue, Rejection};
-use crate::clock::{now, rfc3339};
+use crate::clock::{LATEST, now, rfc3339};
 use crate::commands::calibrate;
 use crate::commands::clerk::Question;
 use crate::commands::replay::pictures;
@@ -128,7 +128,7 @@ impl StoreQuery {
             }
             Self::Why { train, number } => {
                 let question: calibrate::Question = number.parse().map_err(anyhow::Error::msg)?;
-                let batch = Batch::of_store(layout, &store, now(), Some(train_of(&train)?))?;
+                let batch = Batch::of_store(layout, &store, LATEST, Some(train_of(&train)?))?;
                 let mut text = Vec::new();
                 question.answer(layout, &batch, true, &mut text)?;
                 Ok(String::from_utf8(text)?)
@@ -163,7 +163,7 @@ async fn recordings(State(archive): State<Archive>) -> Response {
 fn listed(store: &Store) -> anyhow::Result<String> {
     let machines = store.machines()?;
     let list: Vec<Value> = store
-        .recordings(now())?
+        .recordings(LATEST)?
         .into_iter()
         .map(|recording| {
             let own = || machines.iter().filter(|machine| machine.recording == recording.key);
@@ -203,10 +203,9 @@ async fn marks(State(archive): State<Archive>) -> Response {
 }
 
 fn marked(layout: &Layout, store: &Store) -> anyhow::Result<String> {
-    let at = now();
     let mut list = Vec::new();
-    for recording in store.recordings(at)?.into_iter().filter(|recording| recording.excluded > 0) {
-        let runs = store.runs(recording.key, at)?;
+    for recording in store.recordings(LATEST)?.into_iter().filter(|recording| recording.excluded > 0) {
+        let runs = store.runs(recording.key, LATEST)?;
         for event in runs.iter().flat_map(|run| &run.events).filter(|event| event.is_excluded()) {
             let mark = event.mark.as_ref();
             list.push(json!({

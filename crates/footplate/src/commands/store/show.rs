@@ -13,7 +13,7 @@ use footplate_store::{
 };
 use serde_json::{Value, json};
 
-use crate::clock::{Moment, local, now, rfc3339};
+use crate::clock::{LATEST, Moment, local, now, rfc3339};
 use crate::commands::Outcome;
 use crate::commands::calibrate::draw_calibration;
 use crate::commands::plot::PictureFile;
@@ -53,7 +53,7 @@ impl Arguments {
     pub(super) fn run(self, path: &Path, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let store = Store::open_to_read(path)?;
         store.check()?;
-        let as_of = self.as_of.map_or_else(now, |moment| moment.0);
+        let as_of = self.as_of.map_or(LATEST, |moment| moment.0);
         let recordings = store.recordings(as_of)?;
         if let Some(plot) = &self.plot {
             let layout = self.layout_drawn(&recordings)?;
@@ -63,7 +63,8 @@ impl Arguments {
         let Some(key) = self.recording.map(RecordingKey) else {
             if self.json {
                 let list: Vec<Value> = recordings.iter().map(recording_value).collect();
-                let list = json!({ "store": path, "as_of": rfc3339(as_of), "recordings": list });
+                let date = rfc3339(self.as_of.map_or_else(now, |moment| moment.0));
+                let list = json!({ "store": path, "as_of": date, "recordings": list });
                 writeln!(output, "{list:#}")?;
             } else {
                 write_list(path, &recordings, output)?;

@@ -7,7 +7,7 @@ use footplate_core::{Timestamp, TrainId};
 use footplate_store::{Journal, NewMachine, Store};
 
 use super::beginning::CalibrationBeginning;
-use crate::clock::{local, now};
+use crate::clock::{local, now_after};
 use crate::link::Address;
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};
 use crate::standard_error::say;
@@ -24,10 +24,10 @@ pub(super) fn begin(
     at: Timestamp,
     beginning: &CalibrationBeginning,
 ) -> anyhow::Result<SessionJournal> {
-    let now = now();
+    let store = Store::open_or_create(path)?;
+    let now = now_after(store.newest_stamp()?);
     let began_at = now + (Timestamp::ZERO - at);
     let name = format!("calibration of train {train}, {}", local(now));
-    let store = Store::open_or_create(path)?;
     let mut journal = Journal::begin(store, &name, layout.name(), Some(began_at), &[], now)?;
     let body = serde_json::to_string(beginning)?;
     journal

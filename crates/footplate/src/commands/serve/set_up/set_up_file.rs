@@ -9,7 +9,7 @@ use footplate_core::{DecoderSteps, TrainId};
 use footplate_store::{Store, StoredModel, write_whole};
 use serde::{Deserialize, Serialize};
 
-use crate::clock::now;
+use crate::clock::LATEST;
 use crate::commands::written_layout::WrittenLayout;
 use crate::link::{Address, Speed, StationKind, open_simulated};
 
@@ -236,7 +236,7 @@ impl SetUp {
         let (layout, store) = (WrittenLayout::named(layout)?.layout, Store::open(store)?);
         let mut found = BTreeSet::new();
         for train in &self.trains {
-            if StoredModel::of_store(&layout, &store, TrainId(train.address), now())? != StoredModel::Nothing
+            if StoredModel::of_store(&layout, &store, TrainId(train.address), LATEST)? != StoredModel::Nothing
             {
                 found.insert(train.address);
             }
