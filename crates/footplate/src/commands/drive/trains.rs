@@ -213,7 +213,7 @@ mod tests {
     }
 
     fn outdated(store: &mut Store, body: &str) {
-        let old = NewCalibration { train: TRAIN, as_of: now(), model_version: "9", body };
+        let old = NewCalibration { train: TRAIN, as_of: now(), model_version: "8", body };
         store.keep_calibration(old, now()).unwrap();
     }
 
