@@ -29,13 +29,13 @@ impl Watchdog {
     }
 
     /// A sensor is silent at which a train is overdue: raises the alarm if another has reported, since its last detection,
-    /// what no train explained. The silent one itself may only have reported early.
-    pub(super) fn compare_with_unexplained(&mut self, now: Timestamp, train: TrainId, silent: SensorId) {
+    /// what no train explained.
+    pub(super) fn compare_with_unexplained(&mut self, now: Timestamp, train: TrainId) {
         let passed = self.monitors.get(&train).and_then(|monitor| monitor.last());
         let is_since =
             |time: Timestamp| now - time <= SAME_TRAIN_WITHIN && passed.is_none_or(|passed| passed < time);
         let reported = [self.driver.unassigned_detection(), self.intruder.last].into_iter().flatten();
-        let mut elsewhere = reported.filter(|(sensor, time)| *sensor != silent && is_since(*time));
+        let mut elsewhere = reported.filter(|(_, time)| is_since(*time));
         if let Some((sensor, time)) =
             elsewhere.find(|(sensor, _)| self.driver.has_probably_strayed(now, train, *sensor))
         {

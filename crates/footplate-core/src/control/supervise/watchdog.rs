@@ -302,10 +302,10 @@ impl Watchdog {
                     return self.note_unexplained(now, sensor, time);
                 }
             }
-            Notice::Overdue { train, sensor, .. } if self.is_watching => {
-                let (train, sensor) = (*train, *sensor);
+            Notice::Overdue { train, .. } if self.is_watching => {
+                let train = *train;
                 self.notify(notice);
-                return self.compare_with_unexplained(now, train, sensor);
+                return self.compare_with_unexplained(now, train);
             }
             Notice::Ambiguous { sensor, time, likeliest, or } => {
                 let (train, is_spurious) = (*likeliest, or.is_none());
