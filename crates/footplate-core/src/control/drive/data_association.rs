@@ -88,32 +88,6 @@ impl DataAssociation {
         branches.into_iter().any(|branch| branch.train == train)
     }
 
-    /// The train that is probably not where it was estimated, but at the sensor of the ambiguous detection.
-    pub(super) fn probably_strayed(&self) -> Option<TrainId> {
-        let ambiguity = self.ambiguity.as_ref().filter(|ambiguity| !ambiguity.is_assigned)?;
-        let has_strayed = |branch: &&Branch| {
-            branch.passes.first().is_some_and(|pass| matches!(pass.explanation, Explanation::Strayed(_)))
-        };
-        let strayed = ambiguity.branches.iter().filter(has_strayed);
-        strayed
-            .max_by(|one, other| one.probability.total_cmp(&other.probability))
-            .filter(|one| one.probability >= ASSIGNED_FROM)
-            .map(|one| one.train)
-    }
-
-    /// An ambiguous detection that was assigned to no train: its sensor and time.
-    pub(super) fn unassigned(&self) -> Option<(SensorId, Timestamp)> {
-        let ambiguity = self.ambiguity.as_ref().filter(|ambiguity| !ambiguity.is_assigned)?;
-        Some((ambiguity.detection.sensor, ambiguity.detection.window.until))
-    }
-
-    /// Whether an earlier detection that no train explained was probably of a train that is elsewhere, of which it then had
-    /// this density (ln 1/s).
-    pub(super) fn is_probable_then(&self, sensor: SensorId, now: Timestamp, log_density: f64) -> bool {
-        let log_odds = log_density - self.faults.log_rate_before(sensor, now);
-        log_odds >= libm::log(ASSIGNED_FROM / (1.0 - ASSIGNED_FROM))
-    }
-
     /// A turnout was commanded: branches no longer depend on where it was before.
     pub(super) fn turnout_thrown(&mut self, turnout: TurnoutId) {
         let branches = self.ambiguity.iter_mut().flat_map(|ambiguity| &mut ambiguity.branches);

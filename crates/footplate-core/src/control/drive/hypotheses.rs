@@ -91,7 +91,8 @@ pub(super) fn hypotheses(
         let is_missed = train.missed_sensor().is_some();
         let missed_share = train.missed_share(context, detection.window.middle());
         // The missed sensor has already happened under every hypothesis: condition on it.
-        let conditioned = if is_missed { -libm::log(missed_or_elsewhere(missed_share)) } else { 0.0 };
+        let happened = missed_share + CHANGED + STRAYED;
+        let conditioned = if is_missed { -libm::log(happened) } else { 0.0 };
         let claim = |context: TrackContext<'_>| {
             let Detection { sensor, window } = detection;
             let claim = train.locator.claim(context, &train.model, sensor, window, missed_share)?;
@@ -113,26 +114,10 @@ pub(super) fn hypotheses(
                 }
             }
         }
-        let strayed = if is_missed { log_strayed(missed_share) } else { LOG_LIFTED };
+        let strayed = if is_missed { libm::log(STRAYED / happened) } else { LOG_LIFTED };
         add(Explanation::Strayed(id), anywhere + strayed);
     }
     found
-}
-
-/// The probability that a sensor does not report a train that should have passed it, of which sensors miss a share.
-const fn missed_or_elsewhere(missed_share: f64) -> f64 {
-    missed_share + CHANGED + STRAYED
-}
-
-/// ln of the probability that a train which a sensor should have reported is not where it was estimated.
-fn log_strayed(missed_share: f64) -> f64 {
-    libm::log(STRAYED / missed_or_elsewhere(missed_share))
-}
-
-/// ln of the density (1/s) with which a train that a sensor should have reported, and did not, is elsewhere and causes a
-/// detection there.
-pub(super) fn log_density_if_strayed(train: &DrivenTrain, context: TrackContext<'_>, at: Timestamp) -> f64 {
-    log_density_if_lost(train, context) + log_strayed(train.missed_share(context, at))
 }
 
 /// Whether a train moved in the window or just before it; a train at rest causes no detection.

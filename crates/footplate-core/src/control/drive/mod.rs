@@ -26,7 +26,6 @@ mod sensor_faults;
 mod speed_reports;
 mod speed_supervision;
 mod stop_planning;
-mod strayed;
 mod task;
 mod turnout_guard;
 

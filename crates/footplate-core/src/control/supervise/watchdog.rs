@@ -302,18 +302,9 @@ impl Watchdog {
                     return self.note_unexplained(now, sensor, time);
                 }
             }
-            Notice::Overdue { train, .. } if self.is_watching => {
-                let train = *train;
-                self.notify(notice);
-                return self.compare_with_unexplained(now, train);
-            }
             Notice::Ambiguous { sensor, time, likeliest, or } => {
                 let (train, is_spurious) = (*likeliest, or.is_none());
-                if !self.note_backward(now, *sensor, *time)
-                    && let Some(strayed) = self.driver.probably_strayed()
-                {
-                    self.raise_elsewhere(now, strayed, *sensor, *time);
-                }
+                self.note_backward(now, *sensor, *time);
                 // A train that creeps to be located has only so many sensors ahead before the track ends.
                 if is_spurious && !self.permits_all && self.dangers.get(&train).is_some_and(Recovery::creeps)
                 {
