@@ -131,7 +131,8 @@ impl KnownTrains {
         };
         let replay = MotionReplay::of_store(layout, store, train, highest, LATEST)?;
         if replay.is_empty() {
-            let begins = replay.profile.is_some() || named.is_some();
+            // What nothing is known of, not even its decoder, begins as `gather` has it.
+            let begins = replay.profile.is_some() || named.is_some() && decoder != DecoderSteps::Fourteen;
             if begins && !self.models.contains_key(&train) {
                 if let Some(profile) = &replay.profile {
                     say!("train {train} begins with the speeds of {profile}");
