@@ -128,6 +128,13 @@ pub(crate) trait Protocol {
 
     // What follows from the above.
 
+    /// Returns the request for the power as it is wanted now. A question that is put in a list does not say which: an emergency stop
+    /// may come before it is written.
+    fn wanted_power(&self) -> Outgoing<Self::Awaited> {
+        let (request, awaited) = self.switch_power(self.dialogue().power);
+        Outgoing { request, awaited, command: None, tries: 1 }
+    }
+
     /// Returns the request for a command, and notes what it commands.
     fn outgoing(&mut self, now: Timestamp, command: Command) -> Next<Self> {
         let (request, awaited) = match command {

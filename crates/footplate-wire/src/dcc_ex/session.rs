@@ -188,15 +188,13 @@ impl Protocol for Client {
     }
 
     fn next_question(&mut self, _now: Timestamp) -> ControlFlow<Option<Outgoing<Awaited>>> {
-        // As it is wanted now: an emergency stop may have come since the question was put in the list.
-        let power = self.switch_power(self.dialogue.power).0;
         let question = match &mut self.opening {
             Opening::Banner { .. } => None,
             Opening::Identity if self.dialogue.outstanding.has(&Awaited::Identity) => None,
             Opening::Identity => Some(Outgoing::asks(Request::Status, Awaited::Identity)),
             Opening::States(requests) => requests.pop_front().map(|request| match request {
                 Request::Slots => Outgoing::asks(request, Awaited::Slots),
-                Request::Power { .. } => Outgoing::asks(power, Awaited::Power(self.dialogue.power)),
+                Request::Power { .. } => self.wanted_power(),
                 _ => Outgoing::says(request),
             }),
             Opening::Open { .. } => match self.dialogue.take_unblocked(&mut self.unverified) {

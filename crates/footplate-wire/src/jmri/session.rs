@@ -199,7 +199,7 @@ impl Protocol for Client {
             return ControlFlow::Break(requests.pop_front().map(|request| match request {
                 Request::Ping => Outgoing::asks(request, Awaited::Pong),
                 Request::Powers => Outgoing::asks(request, Awaited::Powers),
-                Request::Power { on, .. } => Outgoing::asks(request, Awaited::Power(on)),
+                Request::Power { .. } => self.wanted_power(),
                 Request::Sensors => Outgoing::asks(request, Awaited::Sensors),
                 _ => Outgoing::says(request),
             }));

@@ -141,13 +141,8 @@ impl Client {
 
     /// A question of the opening.
     fn question(&mut self, now: Timestamp, request: Request) -> Outgoing<Awaited> {
-        // An emergency stop may have come since the question was put in the list.
-        let request = match request {
-            Request::Power { .. } => Request::Power { on: self.dialogue.power },
-            other => other,
-        };
         let awaited = match request {
-            Request::Power { on } => Awaited::Power(on),
+            Request::Power { .. } => return self.wanted_power(),
             Request::Interrogate(nth) => {
                 self.next_interrogation = now + INTERROGATION_EVERY;
                 Awaited::Interrogation(nth)

@@ -2,11 +2,11 @@
 
 use footplate_core::{Command, TimeSpan, TurnoutId};
 use footplate_wire::dcc_ex;
-use footplate_wire::{Session, loconet, z21};
+use footplate_wire::{Session, jmri, loconet, marklin_can, z21};
 
 use crate::desk::{Desk, Station, T24, ms, speed};
 use crate::marklin_serial_bench::Bench;
-use crate::{dcc_ex_desk, loconet_session, z21_desk};
+use crate::{dcc_ex_desk, jmri_session, loconet_session, marklin_can_session, z21_desk};
 
 /// Longer than every opening, and than a recovery that was not answered (ms).
 const OPENING: i64 = 1_500;
@@ -45,6 +45,19 @@ fn an_emergency_stop_during_an_opening_is_not_undone_by_what_is_still_to_be_aske
             _ => None,
         });
         assert_eq!(dcc_ex, Some(false), "DCC-EX, {at} ms");
+        let jmri = jmri_session::Desk::new(jmri::Settings::default());
+        let jmri = last_switch(jmri, at, |written| match written {
+            jmri::Request::Power { on, .. } => Some(*on),
+            _ => None,
+        });
+        assert_eq!(jmri, Some(false), "JMRI, {at} ms");
+        let central = marklin_can_session::Desk::new(marklin_can::Settings::default());
+        let central = last_switch(central, at, |written| match written {
+            marklin_can::Message::Go(_) => Some(true),
+            marklin_can::Message::Stop(_) => Some(false),
+            _ => None,
+        });
+        assert_eq!(central, Some(false), "Central Station, {at} ms");
     }
 }
 

@@ -10,7 +10,7 @@ use footplate_wire::{CommandError, LinkNotice, ReportedFunctions, Session};
 use crate::desk::{Station, T24, T58, function, ms, speed};
 
 /// JMRI as its sources describe it.
-struct Jmri {
+pub(crate) struct Jmri {
     systems: Vec<(&'static str, Option<&'static str>, bool)>,
     /// Whether the track has power; `None` if the hardware does not say.
     power: Option<bool>,
@@ -99,10 +99,10 @@ impl Station for Jmri {
     }
 }
 
-type Desk = crate::desk::Desk<Client, Jmri>;
+pub(crate) type Desk = crate::desk::Desk<Client, Jmri>;
 
 impl Desk {
-    fn new(settings: Settings) -> Self {
+    pub(crate) fn new(settings: Settings) -> Self {
         let station = Jmri {
             systems: vec![("LocoNet", Some("L"), true), ("Internal", Some("I"), false)],
             power: Some(false),

@@ -92,7 +92,7 @@ impl Client {
             && self.dialogue.outstanding.answered(&Answer::Powers).is_some()
         {
             self.system = self.system_among(&all);
-            self.opening = Opening::asking([self.power(self.dialogue.power), Request::Sensors]);
+            self.opening = Opening::asking([self.power(true), Request::Sensors]);
         } else if is_of(|one| matches!(one, Reply::Sensor { .. }))
             && self.dialogue.outstanding.answered(&Answer::Sensors).is_some()
         {

@@ -11,6 +11,7 @@ use super::super::settings::Transport;
 use super::super::uid::Uid;
 use super::{Client, Query};
 use crate::outstanding::{Outgoing, Outstanding};
+use crate::protocol::Protocol as _;
 
 impl Client {
     pub(super) fn asking(&mut self, now: Timestamp, question: Question) -> Outgoing<Awaited> {
@@ -24,11 +25,7 @@ impl Client {
                 let modules = self.settings.modules;
                 Outgoing::asks(Message::ModulePoll { uid: Uid::ALL, modules }, Awaited::Modules)
             }
-            Question::Power => {
-                let message =
-                    if self.dialogue.power { Message::Go(Uid::ALL) } else { Message::Stop(Uid::ALL) };
-                Outgoing::asks(message, Awaited::Power(self.dialogue.power))
-            }
+            Question::Power => self.wanted_power(),
             Question::Roster => Outgoing::asks(
                 Message::File(LOCOMOTIVES_FILE),
                 Awaited::Roster { has_begun: self.roster.has_begun() },

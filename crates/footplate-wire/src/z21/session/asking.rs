@@ -52,12 +52,7 @@ impl Client {
     }
 
     /// Returns a request, with the answer that it has.
-    pub(super) const fn question(&self, request: Request) -> Outgoing<Awaited> {
-        // An emergency stop may have come since the question was put in the list.
-        let request = match request {
-            Request::Power { .. } => Request::Power { on: self.dialogue.power },
-            other => other,
-        };
+    pub(super) fn question(&self, request: Request) -> Outgoing<Awaited> {
         let awaited = match request {
             Request::SerialNumber => Awaited::SerialNumber,
             Request::Hardware => Awaited::Hardware,
@@ -65,7 +60,7 @@ impl Client {
             Request::SetBroadcasts(_) | Request::Broadcasts => Awaited::Broadcasts(self.wanted),
             Request::Status => Awaited::Status,
             Request::Feedback { group } => Awaited::Feedback(group),
-            Request::Power { on } => Awaited::Power(on),
+            Request::Power { .. } => return self.wanted_power(),
             _ => return Outgoing::says(request),
         };
         Outgoing::asks(request, awaited)
