@@ -8,7 +8,7 @@ use footplate_core::model::report::{PositionPoint, SeriesError, SeriesFit};
 use footplate_core::{Length, TimeSpan};
 
 use crate::decimal::scaled;
-use crate::table::{LastLine, Row, Table, TableError};
+use crate::table::{Row, Table, TableError};
 
 const TIME: &str = "t_s";
 const POSITION: &str = "position_mm";
@@ -59,14 +59,6 @@ pub enum PositionSeriesError {
         /// The file.
         file: String,
         /// The line of the first row too many.
-        line: u64,
-    },
-    /// The last line breaks off.
-    #[error("{file}, line {line}: the line breaks off; complete it or delete it")]
-    CutOff {
-        /// The file.
-        file: String,
-        /// The line.
         line: u64,
     },
     /// The rows are in order, and say nothing of a change of speed.
@@ -147,9 +139,7 @@ impl PositionSeries {
             }
             points.push(point);
         }
-        if table.last_line() == LastLine::CutOff {
-            return Err(PositionSeriesError::CutOff { file: file.to_owned(), line: table.line() });
-        }
+        table.check_end()?;
         Ok(Some(Self { file: file.to_owned(), points }))
     }
 

@@ -8,7 +8,7 @@ use std::path::Path;
 use footplate_core::{Length, TimeSpan, TrainId};
 
 use crate::decimal::scaled;
-use crate::table::{LastLine, Table, TableError};
+use crate::table::{Table, TableError};
 
 const TIME: &str = "command_time_s";
 const DISTANCE: &str = "distance_mm";
@@ -45,14 +45,6 @@ pub enum TapedMovesError {
         /// The file.
         file: String,
         /// The line of the first row too many.
-        line: u64,
-    },
-    /// The last line breaks off.
-    #[error("{file}, line {line}: the line breaks off; complete it or delete it")]
-    CutOff {
-        /// The file.
-        file: String,
-        /// The line.
         line: u64,
     },
 }
@@ -98,9 +90,7 @@ impl TapedMoves {
                 .transpose()?;
             moves.trains.entry(train).or_default().push((time, distance));
         }
-        if table.last_line() == LastLine::CutOff {
-            return Err(TapedMovesError::CutOff { file: file.to_owned(), line: table.line() });
-        }
+        table.check_end()?;
         Ok(Some(moves))
     }
 }

@@ -21,14 +21,6 @@ pub enum AccelerometerError {
         /// What the header names, shortened if long.
         found: String,
     },
-    /// The last line breaks off.
-    #[error("{file}, line {line}: the line breaks off; complete it or delete it")]
-    CutOff {
-        /// The file.
-        file: String,
-        /// The line.
-        line: u64,
-    },
     /// There is a header and nothing below it.
     #[error("{file}: no rows below the header; there should be at least one")]
     NoRows {

@@ -8,7 +8,7 @@ use footplate_core::Timestamp;
 
 use super::error::AccelerometerError;
 use crate::decimal::scaled;
-use crate::table::{Column, LastLine, Table, TableError, shown};
+use crate::table::{Column, Table, TableError, shown};
 
 /// Three axes, as phones and as inertial boxes call them, or one along the track.
 const AXES: [[&str; 3]; 2] = [["ax_m_s2", "ay_m_s2", "az_m_s2"], ["acc_x_m_s2", "acc_y_m_s2", "acc_z_m_s2"]];
@@ -94,9 +94,7 @@ impl AccelerometerRecording {
                 readings.push((now, read));
             }
         }
-        if table.last_line() == LastLine::CutOff {
-            return Err(AccelerometerError::CutOff { file: file.to_owned(), line: table.line() });
-        }
+        table.check_end()?;
         if readings.is_empty() {
             return Err(AccelerometerError::NoRows { file: file.to_owned() });
         }

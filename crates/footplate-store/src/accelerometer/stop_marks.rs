@@ -8,7 +8,7 @@ use footplate_core::Timestamp;
 
 use super::error::AccelerometerError;
 use crate::decimal::scaled;
-use crate::table::{LastLine, Table, TableError, shown};
+use crate::table::{Table, TableError, shown};
 
 /// The end of the name of a recording, and of that of the marks that belong to it.
 const OF_RECORDING: &str = "_accel";
@@ -77,9 +77,7 @@ impl StopMarks {
                 }
             }
         }
-        if table.last_line() == LastLine::CutOff {
-            return Err(AccelerometerError::CutOff { file: file.to_owned(), line: table.line() });
-        }
+        table.check_end()?;
         if stops.is_empty() {
             return Err(AccelerometerError::NoRows { file: file.to_owned() });
         }

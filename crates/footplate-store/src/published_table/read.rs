@@ -6,7 +6,7 @@ use std::path::Path;
 
 use footplate_core::{Approach, SpeedStep, TrainId};
 
-use crate::table::{Column, LastLine, Row, Table, TableError};
+use crate::table::{Column, Row, Table, TableError};
 
 /// The largest plausible figure (mm/s, or mm of stopping distance): beyond it a unit is wrong.
 const LARGEST_FIGURE: f64 = 100_000.0;
@@ -68,14 +68,6 @@ pub enum PublishedTableError {
         /// The line of the header.
         line: u64,
     },
-    /// The last line breaks off.
-    #[error("{file}, line {line}: the line breaks off; complete it or delete it")]
-    CutOff {
-        /// The file.
-        file: String,
-        /// The line.
-        line: u64,
-    },
     /// The table has no rows.
     #[error("{file}: the table has no row below its header")]
     NoRow {
@@ -105,9 +97,7 @@ pub fn read_published_table(path: &Path) -> Result<Vec<PublishedFigure>, Publish
     while let Some(row) = table.next_row()? {
         figures.push(figure(row, shared, value, counted_from)?);
     }
-    if table.last_line() == LastLine::CutOff {
-        return Err(PublishedTableError::CutOff { file, line: table.line() });
-    }
+    table.check_end()?;
     if figures.is_empty() {
         return Err(PublishedTableError::NoRow { file });
     }

@@ -45,6 +45,14 @@ pub enum TableError {
         /// The byte in the line, counted from 1.
         byte: usize,
     },
+    /// The last line breaks off.
+    #[error("{file}, line {line}: the line breaks off; complete it or delete it")]
+    CutOff {
+        /// The file.
+        file: String,
+        /// The line.
+        line: u64,
+    },
     /// A quote without its partner.
     #[error("{file}, line {line}: a quote is opened and not closed on the same line")]
     QuoteNotClosed {

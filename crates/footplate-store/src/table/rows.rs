@@ -97,6 +97,14 @@ impl<R: BufRead> Table<R> {
         self.last_line
     }
 
+    /// Refuses a last line that breaks off, once [`next_row`](Self::next_row) has found the end.
+    pub(crate) fn check_end(&self) -> Result<(), TableError> {
+        match self.last_line {
+            LastLine::CutOff => Err(TableError::CutOff { file: self.file.clone(), line: self.line }),
+            _ => Ok(()),
+        }
+    }
+
     /// Says that the last line broke off, after one of its fields turned out to be wrong.
     pub(crate) fn last_line_is_cut_off(&mut self) {
         self.last_line = LastLine::CutOff;
