@@ -146,7 +146,7 @@ impl MotionFile {
     /// # Errors
     /// The store cannot be read, or the model is of another version of the formulas.
     pub fn of_store(store: &Store, train: TrainId, at: Timestamp) -> Result<Option<Self>, MotionFileError> {
-        store.calibration(train, at)?.map(|kept| Self::of_row(store, kept)).transpose()
+        store.calibration(train, at)?.map(|kept| Self::of_row(store, &kept)).transpose()
     }
 
     /// The latest model of a train on a layout as of a date.
@@ -159,13 +159,13 @@ impl MotionFile {
         layout: &str,
         at: Timestamp,
     ) -> Result<Option<Self>, MotionFileError> {
-        store.calibration_on(train, layout, at)?.map(|kept| Self::of_row(store, kept)).transpose()
+        store.calibration_on(train, layout, at)?.map(|kept| Self::of_row(store, &kept)).transpose()
     }
 
-    fn of_row(store: &Store, kept: Calibration) -> Result<Self, MotionFileError> {
+    fn of_row(store: &Store, kept: &Calibration) -> Result<Self, MotionFileError> {
         let place = format!("{}, motion model of train {}", store.path().display(), kept.train);
         if kept.model_version != MOTION_MODEL_VERSION {
-            return Err(MotionFileError::OtherModel { file: place, found: kept.model_version });
+            return Err(MotionFileError::OtherModel { file: place, found: kept.model_version.clone() });
         }
         let parsed = serde_json::from_str(&kept.body).map_err(|error| error.to_string());
         Self::checked(place, parsed)
@@ -215,15 +215,19 @@ impl StoredModel {
         at: Timestamp,
     ) -> Result<Self, MotionFileError> {
         let Some(kept) = store.calibration_on(train, layout.name(), at)? else { return Ok(Self::Nothing) };
-        let stated = serde_json::from_str::<StatedDecoder>(&kept.body).ok();
-        let outdated = Self::Outdated { highest: stated.map(|stated| stated.highest_step) };
-        let file = match MotionFile::of_row(store, kept) {
-            Ok(file) => file,
-            Err(MotionFileError::OtherModel { .. }) => return Ok(outdated),
+        let model = match MotionFile::of_row(store, &kept) {
+            // Numbers that are not a model today may have been one in their own version.
+            Ok(file) => file.model(layout).ok(),
+            Err(MotionFileError::OtherModel { .. }) => None,
             Err(error) => return Err(error),
         };
-        // Numbers that are not a model today may have been one in their own version.
-        Ok(file.model(layout).map_or(outdated, |model| Self::Model(Box::new(model))))
+        Ok(model.map_or_else(
+            || {
+                let stated = serde_json::from_str::<StatedDecoder>(&kept.body).ok();
+                Self::Outdated { highest: stated.map(|stated| stated.highest_step) }
+            },
+            |model| Self::Model(Box::new(model)),
+        ))
     }
 
     /// The steps of the train's decoder: as the model states them, or else the fewest that contain every step that the

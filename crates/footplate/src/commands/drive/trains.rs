@@ -67,10 +67,8 @@ impl KnownTrains {
                     );
                 }
             } else {
-                let fit = MotionFit::new(*train, decoder.unwrap_or(DecoderSteps::Fourteen).highest());
-                known.models.insert(*train, fit.model().clone());
-                known.fits.push(fit);
-                known.unknown.push(*train);
+                let decoder = decoder.unwrap_or(DecoderSteps::Fourteen);
+                known.begin(MotionFit::new(*train, decoder.highest()));
             }
         }
         // A store may hold trains that only another station can command.
@@ -90,6 +88,13 @@ impl KnownTrains {
             );
         }
         Ok(known)
+    }
+
+    /// Adds a train that has not run yet.
+    fn begin(&mut self, fit: MotionFit) {
+        self.models.insert(fit.model().train(), fit.model().clone());
+        self.unknown.push(fit.model().train());
+        self.fits.push(fit);
     }
 
     fn add(&mut self, layout: &Layout, file: &MotionFile, place: &str) -> anyhow::Result<()> {
@@ -115,31 +120,32 @@ impl KnownTrains {
         named: Option<Option<DecoderSteps>>,
     ) -> anyhow::Result<()> {
         let stored = StoredModel::of_store(layout, store, train, LATEST)?;
-        let decoder = stored.decoder(store, train, LATEST)?;
+        if stored == StoredModel::Nothing && named.is_none() {
+            return Ok(());
+        }
+        let highest = match (&stored, named.flatten()) {
+            (StoredModel::Model(model), _) => model.highest(),
+            (_, Some(decoder)) => decoder.highest(),
+            (_, None) => stored.decoder(store, train, LATEST)?.highest(),
+        };
         match stored {
             StoredModel::Model(model) => drop(self.models.insert(train, model.for_later_session())),
             StoredModel::Outdated { .. } => say!(
                 "the stored model of train {train} is from another version of the formulas; it is \
                  fitted again from the stored events"
             ),
-            StoredModel::Nothing if named.is_some() => {}
-            StoredModel::Nothing => return Ok(()),
+            StoredModel::Nothing => {}
         }
-        let highest = match self.models.get(&train) {
-            Some(model) => model.highest(),
-            None => named.flatten().unwrap_or(decoder).highest(),
-        };
         let replay = MotionReplay::of_store(layout, store, train, highest, LATEST)?;
         if replay.is_empty() {
-            // What nothing is known of, not even its decoder, begins as `gather` has it.
-            let begins = replay.profile.is_some() || named.is_some() && decoder != DecoderSteps::Fourteen;
-            if begins && !self.models.contains_key(&train) {
-                if let Some(profile) = &replay.profile {
-                    say!("train {train} begins with the speeds of {profile}");
-                }
-                self.models.insert(train, replay.fit.model().clone());
-                self.fits.push(replay.fit);
-                self.unknown.push(train);
+            if self.models.contains_key(&train) {
+                return Ok(());
+            }
+            if let Some(profile) = &replay.profile {
+                say!("train {train} begins with the speeds of {profile}");
+                self.begin(replay.fit);
+            } else if named.is_some() {
+                self.begin(MotionFit::new(train, highest));
             }
             return Ok(());
         }
