@@ -230,7 +230,7 @@ impl ScriptRunner {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use footplate_core::SpeedStep;
     use footplate_core::control::{Driver, Machine as _};
     use footplate_core::model::MotionModel;
@@ -247,10 +247,13 @@ mod tests {
         Schedule { name: name.to_owned(), lines, rounds, is_button: false }
     }
 
-    fn runner() -> ScriptRunner {
+    /// An operator's session with trains whose places are unknown.
+    pub(in super::super) fn runner(trains: &[TrainId]) -> ScriptRunner {
         let layout = layout_named("track-a").expect("built in").layout;
         let mut driver = Driver::new(layout.clone(), TurnoutStates::default());
-        driver.add_train(MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step")));
+        for train in trains {
+            driver.add_train(MotionModel::unknown(*train, SpeedStep::new(14).expect("a step")));
+        }
         let mut runner =
             ScriptRunner::new(driver, Learning::new(&layout, Vec::new()), CommandSource::Person, Vec::new());
         runner.handle_timeout(Timestamp::ZERO);
@@ -267,7 +270,7 @@ mod tests {
 
     #[test]
     fn rounds_follow_each_other_a_second_apart_at_least_and_end() {
-        let mut runner = runner();
+        let mut runner = runner(&[TrainId(24)]);
         let at = Timestamp::from_s;
         runner.handle_word(
             at(1.0),
@@ -287,7 +290,7 @@ mod tests {
 
     #[test]
     fn a_command_by_hand_ends_the_schedule_of_its_train_and_a_wait_does_not() {
-        let mut runner = runner();
+        let mut runner = runner(&[TrainId(24)]);
         let at = Timestamp::from_s;
         let lines = ["wait 100s", "", "speed 24 3 # the third line"];
         runner.handle_word(at(1.0), &Input::Schedule(schedule("evening", &lines, None)));
@@ -306,7 +309,7 @@ mod tests {
 
     #[test]
     fn a_line_begins_and_ends_a_saved_schedule_by_its_name() {
-        let mut runner = runner();
+        let mut runner = runner(&[TrainId(24)]);
         let at = Timestamp::from_s;
         let said = |runner: &mut ScriptRunner| {
             let outputs = std::iter::from_fn(|| runner.poll_output());
@@ -338,7 +341,7 @@ mod tests {
 
     #[test]
     fn a_schedule_that_cannot_be_read_names_every_mistake() {
-        let runner = runner();
+        let runner = runner(&[TrainId(24)]);
         let read = |lines: &[&str], rounds| {
             runner.read_schedule(&schedule("x", lines, rounds)).expect_err("mistakes")
         };

@@ -210,14 +210,10 @@ pub(super) fn is_open_ended(step: &Step) -> bool {
 #[cfg(test)]
 mod tests {
     use footplate_core::Command;
-    use footplate_core::control::{Driver, Machine as _, Output};
-    use footplate_core::model::MotionModel;
-    use footplate_core::track::TurnoutStates;
-    use footplate_store::layout_named;
+    use footplate_core::control::{Machine as _, Output};
 
-    use super::super::CommandSource;
+    use super::super::schedules::tests::runner;
     use super::*;
-    use crate::commands::drive::learning::Learning;
     use crate::recorded::{Input, Listener as _};
 
     const T24: TrainId = TrainId(24);
@@ -225,14 +221,7 @@ mod tests {
 
     /// An operator's session with two trains whose places are unknown, 24 being searched for.
     fn searching() -> ScriptRunner {
-        let layout = layout_named("track-a").expect("built in").layout;
-        let mut driver = Driver::new(layout.clone(), TurnoutStates::default());
-        for train in [T24, T58] {
-            driver.add_train(MotionModel::unknown(train, SpeedStep::new(14).expect("a step")));
-        }
-        let mut runner =
-            ScriptRunner::new(driver, Learning::new(&layout, Vec::new()), CommandSource::Person, Vec::new());
-        runner.handle_timeout(Timestamp::ZERO);
+        let mut runner = runner(&[T24, T58]);
         runner.handle_word(Timestamp::from_s(1.0), &Input::Line("speed 58 8".to_owned()));
         runner.handle_word(Timestamp::from_s(2.0), &Input::Line("find 24".to_owned()));
         assert!(speeds(&mut runner).iter().any(|(train, step)| *train == T24 && *step > 0));
