@@ -146,7 +146,7 @@ impl MotionModel {
         self.train_length.take(release)
     }
 
-    /// Keeps the length that another copy of the model has measured better.
+    /// Keeps the length that another copy of the model has measured later.
     pub(crate) const fn keep_length(&mut self, other: &Self) {
         self.train_length = self.train_length.or_newer(other.train_length);
     }

@@ -161,8 +161,8 @@ impl TrainLength {
         true
     }
 
-    /// The newer of two: one was learnt while another copy of the model was in use. A train that became shorter has a shorter count,
-    /// too, but has taken more measurements.
+    /// The newer of two: one was learnt while another copy of the model was in use. It may count fewer measurements: of a train that
+    /// became longer or shorter, those before do not count.
     #[must_use]
     pub const fn or_newer(self, other: Self) -> Self {
         if other.all_taken() > self.all_taken() { other } else { self }

@@ -43,8 +43,9 @@ impl Watchdog {
         let stops = matches!(order, Order::Speed { step: SpeedStep::STAND, .. });
         let Some(train) = order.train().filter(|_| !stops) else { return Ok(()) };
         let is_trusted = self.trusted_by(order).is_some();
-        let could_meet = if is_trusted { self.has_intruder() } else { self.could_meet(now, train) };
-        if !is_trusted && self.is_held(train) || could_meet {
+        let is_blocked =
+            if is_trusted { self.has_intruder() } else { self.is_held(train) || self.could_meet(now, train) };
+        if is_blocked {
             let is_moved = (is_trusted || self.dangers.is_empty()) && self.has_intruder();
             return Err(if is_moved { Refusal::TrackNotClear } else { Refusal::InDanger { train } });
         }

@@ -376,7 +376,7 @@ impl MotionFit {
         self.model.take_release(release)
     }
 
-    /// Keeps the train's length if another copy of its model has measured it better.
+    /// Keeps the train's length if another copy of its model has measured it later.
     pub const fn keep_length(&mut self, of: &MotionModel) {
         self.model.keep_length(of);
     }
