@@ -29,6 +29,7 @@ const SENTENCES = [
   [/^`(.*)` should be (.*)$/, (_, value, expected) => `\`${value}\` ist falsch; richtig wäre ${inGerman(EXPECTED, expected)}`],
   [/^cannot be read: (.*)$/, "nicht lesbar: $1"], [/^the file is empty; .*$/, "die Datei ist leer; ihre erste Zeile sollte die Spalten nennen"],
   [/^the line is longer than (\S+) bytes; .*$/, "die Zeile ist länger als $1 Bytes; ist es eine CSV-Datei mit einer Zeile je Messung?"], [/^byte (\S+) of the line is not UTF-8; .*$/, "Byte $1 der Zeile ist kein UTF-8; die Datei als UTF-8 sichern"],
+  [/^the line breaks off; complete it or delete it$/, "die Zeile bricht ab; sie ergänzen oder löschen"],
   [/^a quote is opened and not closed on the same line$/, "ein Anführungszeichen wird geöffnet und in derselben Zeile nicht geschlossen"], [/^(.*) fields where the header names (\S+) columns$/, "$1 Felder, wo die Kopfzeile $2 Spalten nennt"],
   [/^two columns are called `(.*)`; .*$/, "zwei Spalten heißen `$1`; jeder einen eigenen Namen geben"], [/^(.*) needs the column `(.*)`, which the header does not name$/, "$1 braucht die Spalte `$2`, die die Kopfzeile nicht nennt"],
   [/^the file is longer than (\S+) bytes; is it a vehicle\?$/, "die Datei ist länger als $1 Bytes; ist es ein Fahrzeug?"], [/^no UTF-8 text; .*$/, "kein UTF-8-Text; die Datei als UTF-8 sichern"],
