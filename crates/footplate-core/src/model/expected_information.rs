@@ -98,7 +98,10 @@ impl MotionModel {
         let whole = stop_distance(&answers, step, above);
         // The place of the train at the command.
         let begin = sum_of_squares(&[speed * TIMING, PLACE]);
-        let mut seen = Vec::new();
+        let (time, creep_speed) = self.creep(creep, if past.is_some() { TO_NEXT } else { CREEP });
+        let started = |answers: &Answers<'_>| start_to(answers, creep.get()).distance(time);
+        let late = creep_speed * LATE_START;
+        let restart = [late, creep_speed * TIMING, PLACE];
         if let Some(past) = past {
             let until = (whole - past.as_m()).max(0.0);
             let distance = |answers: &Answers<'_>, time: f64| {
@@ -106,21 +109,28 @@ impl MotionModel {
                 let segment = stop_from(answers, step, speed);
                 speed * segment.begins + segment.distance(time)
             };
-            let time = time_of(until, |time| distance(&answers, time));
-            let slow = stop_from(&answers, step, speed).speed(time);
-            let variance = begin + sum_of_squares(&[slow * TIMING, SHAPE * whole, scatter]);
-            seen.push(Seen { slopes: self.slopes(|answers| distance(answers, time)), variance });
+            let passed = time_of(until, |time| distance(&answers, time));
+            let slow = stop_from(&answers, step, speed).speed(passed);
+            // The stop's own scatter comes about as it runs. What comes after the sensor is measured from there.
+            let before = if whole > 0.0 { until / whole } else { 0.0 };
+            let here = [slow * TIMING, SHAPE * whole];
+            let first = begin + sum_of_squares(&here) + sum_of_squares(&[before * scatter]);
+            let rest = sum_of_squares(&here)
+                + sum_of_squares(&restart)
+                + sum_of_squares(&[(1.0 - before) * scatter, TRIP_DEVIATION * TO_NEXT]);
+            let remaining = |answers: &Answers<'_>| {
+                stop_distance(answers, step, above) - distance(answers, passed) + started(answers)
+            };
+            return ExpectedInformation {
+                seen: vec![
+                    Seen { slopes: self.slopes(|answers| distance(answers, passed)), variance: first },
+                    Seen { slopes: self.slopes(remaining), variance: rest },
+                ],
+            };
         }
-        let rest = if past.is_some() { TO_NEXT } else { CREEP };
-        let (time, creep_speed) = self.creep(creep, rest);
-        let slopes = self.slopes(|answers| {
-            stop_distance(answers, step, above) + start_to(answers, creep.get()).distance(time)
-        });
-        let late = creep_speed * LATE_START;
-        let variance =
-            begin + sum_of_squares(&[scatter, late, creep_speed * TIMING, TRIP_DEVIATION * rest, PLACE]);
-        seen.push(Seen { slopes, variance });
-        ExpectedInformation { seen }
+        let slopes = self.slopes(|answers| stop_distance(answers, step, above) + started(answers));
+        let variance = begin + sum_of_squares(&restart) + sum_of_squares(&[scatter, TRIP_DEVIATION * CREEP]);
+        ExpectedInformation { seen: vec![Seen { slopes, variance }] }
     }
 
     /// A short move from a place of rest that was reached at creep speed, then creep to the next sensor.

@@ -66,7 +66,8 @@ const USUAL: f64 = 10.0;
 /// Measurements after which older ones fade: of residuals, and of promises, where a change has to show soon.
 const MEMORY: f64 = 60.0;
 const PROMISES_KEPT: f64 = 25.0;
-/// Larger squared residuals (in variances) have another cause than the train's own scatter; they count as this large.
+/// Larger squared residuals (in variances of the train, at least the usual one) have another cause than the train's own scatter; they
+/// count as this large.
 const WILD: f64 = 9.0;
 const WILD_PROMISE: f64 = 16.0;
 /// Bounds of the factors.
@@ -90,7 +91,8 @@ pub(crate) struct ScatterSum {
 impl ScatterSum {
     /// Adds one: its square divided by the usual variance.
     pub(super) fn take(&mut self, square: f64) {
-        self.add(square.min(WILD), 1.0, MEMORY);
+        let scale = self.scale().max(1.0);
+        self.add(square.min(WILD * scale * scale), 1.0, MEMORY);
     }
 
     /// Returns the share of all before that is kept.

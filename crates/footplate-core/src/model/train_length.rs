@@ -53,15 +53,8 @@ pub struct TrainLength {
     rejected: u8,
     date: Timestamp,
     /// All measurements, those of earlier trains and those that were not accepted included.
-    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
+    #[cfg_attr(feature = "serde", serde(default))]
     taken: u32,
-}
-
-/// Models without a measured length have the form that they had before these were counted.
-#[cfg(feature = "serde")]
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "the form that serde asks for")]
-const fn is_zero(taken: &u32) -> bool {
-    *taken == 0
 }
 
 impl Default for TrainLength {

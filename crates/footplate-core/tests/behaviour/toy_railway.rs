@@ -382,6 +382,7 @@ fn known_after(train: u16, steps: &[u8]) -> MotionModel {
             }
         }
         fit.note_use(step(speed), StepUse::Moves);
+        fit.refit(&SectionIndex::of(&world.layout));
     }
     let rest = if steps.is_empty() { None } else { Some((0, 5.0)) };
     for (speed, runs_for) in steps.iter().map(|speed| (*speed, 9.0)).chain(rest) {

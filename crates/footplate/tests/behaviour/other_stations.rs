@@ -45,6 +45,9 @@ fn mean_and_median(mut errors: Vec<f64>) -> [f64; 2] {
 }
 
 /// Mean and median of true errors (mm) of stops over stations, with the same calibration in each world.
+///
+/// A stop that says that a sensor before it was not seen is left out: that train had stalled at a dirty place, which says nothing
+/// about the station.
 fn measured<const N: usize>(
     layout: &str,
     budget: &str,
@@ -60,7 +63,10 @@ fn measured<const N: usize>(
             let moved = folder.join(station);
             std::fs::create_dir_all(&moved).expect("a folder");
             std::fs::copy(folder.join("railway.db"), moved.join("railway.db")).expect("a copy of the store");
-            all.extend(errors(&tried_on(layout, &moved, &link(station), script).1).0);
+            let stops = tried_on(layout, &moved, &link(station), script).1;
+            all.extend(
+                errors(&stops.into_iter().filter(|stop| stop["unseen"].is_null()).collect::<Vec<_>>()).0,
+            );
         }
     }
     let mut names = stations.into_iter();
@@ -104,7 +110,7 @@ fn on_blocks_alone_it_is_valid_over_every_other_station_too() {
         [CALIBRATED_OVER, "dcc-ex", "z21", "marklin-can", "loconet", "jmri", QUICK_CAN],
     );
     assert_valid_over_all(&[over_6051, dcc_ex, z21, loconet, jmri, quick_can]);
-    // A new Central Station reads its contacts every 100 ms, in which the train of most scripts runs 18 mm: the middle of its errors is
-    // further out, and the mean, in which the stops of the model's own errors count, is not.
-    assert!(can[0] <= 1.2 * over_6051[0], "{can:.1?} {over_6051:.1?}");
+    // A new Central Station reads its contacts every 100 ms, in which the train of most scripts runs 18 mm: an even spread over that
+    // adds 5.2 mm (18/√12).
+    assert!(can[0] <= over_6051[0].hypot(5.2), "{can:.1?} {over_6051:.1?}");
 }

@@ -32,7 +32,7 @@ impl Point<'_> {
         after: TripAt<'_>,
     ) -> Option<Foreseen> {
         let stopping = self.rows(before, true);
-        let stop = stopping.iter().position(|row| row.source == Source::Stop)?;
+        let stop = stopping.iter().position(|row| row.source == Source::Rest)?;
         let last = stop.checked_sub(1).and_then(|place| stopping.get(place));
         let last = last.filter(|row| row.source == Source::Sensor);
         let starting = self.rows(after, true);

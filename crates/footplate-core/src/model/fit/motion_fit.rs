@@ -349,22 +349,23 @@ impl MotionFit {
         for place in 0..=count {
             let Some(at) = self.trip_at(values, place) else { break };
             let rows = point.rows(at, false);
-            let of = |source| rows.iter().find(|row| row.source == source);
-            let Some(stop) = core::mem::replace(&mut stop_before, of(Source::Stop).cloned()) else {
-                continue;
-            };
+            let of = |source| rows.iter().rev().find(|row| row.source == source);
+            // Only a stop that the next trip goes on from is measured; what is unknown of its track is measured with it.
+            let stopped =
+                of(Source::Rest).zip(of(Source::Stop)).map(|(rest, stop)| (stop.clone(), rest.once));
+            let Some((stop, free)) = core::mem::replace(&mut stop_before, stopped) else { continue };
             let Some(start) = of(Source::Start) else { continue };
             let Some(first) = point.first_sensor(at) else { continue };
             let expected = |row: &Linear, own: f64, other: f64| {
                 row.residual * row.residual + own * other / (own + other)
             };
             let late = first.speed * first.speed * start.variance;
-            let found = expected(&stop, stop.variance, first.variance + late);
-            // The train's own scatter is this share of the variance of a stop; offsets and the floor are the rest.
+            let found = expected(&stop, stop.variance, first.variance + late + free);
+            // The train's own scatter is this share of the variance of a stop; the floor and late beginnings are the rest.
             let share = stop.once / stop.variance;
             let own = share * found / stop.variance + 1.0 - share;
             sums.stops.take(own * point.scatter.stops * point.scatter.stops);
-            let other = (first.variance + stop.variance) / (first.speed * first.speed);
+            let other = (first.variance + stop.variance + free) / (first.speed * first.speed);
             let found = expected(start, start.variance, other);
             sums.starts.take(found / start.variance * point.scatter.starts * point.scatter.starts);
         }

@@ -34,8 +34,10 @@ const ANYWHERE: f64 = 10.0;
 pub(super) enum Source {
     /// A sensor passed, or a tape.
     Sensor,
-    /// A stop: the next trip begins where this one came to rest.
+    /// The prior of by how much a stop is longer or shorter than usual.
     Stop,
+    /// Of a stop: the next trip begins where this one came to rest.
+    Rest,
     /// The prior of a start from rest.
     Start,
     /// The prior of a trip's other numbers.
@@ -49,7 +51,7 @@ pub(super) struct Linear {
     pub(super) residual: f64,
     pub(super) variance: f64,
     /// Variance of a single such measurement, without the factor for common errors of a law's shape; of a stop, that of the
-    /// train's own scatter.
+    /// train's own scatter, and of where it came to rest, that of unknown track.
     pub(super) once: f64,
     pub(super) source: Source,
 }
@@ -63,7 +65,7 @@ impl Linear {
     fn robust_weight(&self, believes_all: bool) -> Option<RobustWeight> {
         match self.source {
             _ if believes_all => None,
-            Source::Usual => None,
+            Source::Usual | Source::Rest => None,
             Source::Sensor => Some(RobustWeight::SENSORS),
             Source::Stop | Source::Start => Some(RobustWeight::STOPS),
         }
@@ -163,9 +165,9 @@ impl Point<'_> {
     pub(super) fn rows(&self, at: TripAt<'_>, with_slopes: bool) -> Vec<Linear> {
         let TripAt { trip, own, next_place } = at;
         let columns = self.columns;
-        let mut rows = self.usual(trip, own);
         let (mut segments, read) = (Vec::new(), Read::nothing());
         trip.segments(&Answers::noting(self.lasting, self.highest, &read), own, &mut segments);
+        let mut rows = self.usual(trip, own, &segments);
         let course = Course::new(trip, &segments);
         let here = course.outcome(own);
         let errors: Vec<Error> = course.passages(own).map(|passage| self.error(trip, &passage)).collect();
@@ -204,9 +206,6 @@ impl Point<'_> {
         let (longer, sections) =
             self.longer(trip.detections.iter().flat_map(|detection| &detection.sections));
         let beyond_last = own.place + here.rest - surveyed - longer;
-        let alone = self.scatter.of_stop_alone(stop_speed);
-        let scatter = self.scatter.of_stop(stop_speed);
-        let scatter = scatter * scatter + REST_SCATTER * REST_SCATTER;
         let next_place = next_place.filter(|_| trip.came_to_rest);
         if let Some(next_place) = next_place {
             let mut terms = terms_of(&|outcome| outcome.rest);
@@ -220,7 +219,8 @@ impl Point<'_> {
             if with_slopes {
                 self.scaled(&mut terms, residual, stop_step);
             }
-            rows.push(Linear { once: alone * alone, ..row(terms, residual, scatter + free, Source::Stop) });
+            let variance = REST_SCATTER * REST_SCATTER + free;
+            rows.push(Linear { once: free, ..row(terms, residual, variance, Source::Rest) });
         }
         if let Some(rest) = &trip.measured {
             let counted = || trip.detections.iter().take(rest.detections);
@@ -228,18 +228,18 @@ impl Point<'_> {
             let passed = counted().flat_map(|detection| &detection.sections).chain(&rest.sections);
             let (taped_longer, taped_sections) = self.longer(passed);
             let tape = TAPE * TAPE + PATH_LENGTH_SPREAD * PATH_LENGTH_SPREAD * rest.beyond * rest.beyond;
-            // With a next trip the tape measures its beginning; otherwise the scatter of the stop is included.
-            let (mut terms, at_rest, variance) = match next_place {
+            // With a next trip the tape measures its beginning.
+            let (mut terms, at_rest) = match next_place {
                 Some(place) => {
                     let mut terms = sections;
                     terms.push((columns.next_place(), 1.0));
-                    (terms, place + surveyed + longer, tape)
+                    (terms, place + surveyed + longer)
                 }
-                None => (terms_of(&|outcome| outcome.rest), own.place + here.rest, tape + scatter),
+                None => (terms_of(&|outcome| outcome.rest), own.place + here.rest),
             };
             subtract(&mut terms, &taped_sections);
             terms.retain(|(_, slope)| *slope != 0.0);
-            rows.push(row(terms, at_rest - taped - taped_longer, variance, Source::Sensor));
+            rows.push(row(terms, at_rest - taped - taped_longer, tape, Source::Sensor));
         }
         rows
     }
@@ -273,33 +273,39 @@ impl Point<'_> {
     }
 
     /// Priors of a trip's own numbers.
-    fn usual(&self, trip: &Trip, own: &Own) -> Vec<Linear> {
+    fn usual(&self, trip: &Trip, own: &Own, segments: &[Segment]) -> Vec<Linear> {
         let columns = self.columns;
         let mut rows = Vec::new();
-        let mut add = |terms: Vec<(usize, f64)>, residual: f64, deviation: f64, source: Source| {
-            let variance = deviation * deviation;
-            rows.push(Linear { terms, residual, variance, once: variance, source });
-        };
         if !trip.continues {
-            add(vec![(columns.place(), 1.0)], own.place, ANYWHERE, Source::Usual);
+            rows.push(prior(columns.place(), own.place, ANYWHERE, Source::Usual));
         }
-        let late = self.scatter.of_start();
-        add(vec![(columns.late_start(), 1.0)], own.late_start, late, Source::Start);
+        rows.push(prior(columns.late_start(), own.late_start, self.scatter.of_start(), Source::Start));
         for (piece, deviation) in own.deviations.iter().enumerate() {
+            let column = columns.deviation(piece);
             match piece.checked_sub(1) {
-                None => add(vec![(columns.deviation(0), 1.0)], *deviation, TRIP_DEVIATION, Source::Usual),
+                None => rows.push(prior(column, *deviation, TRIP_DEVIATION, Source::Usual)),
                 Some(before) => {
-                    let terms = vec![(columns.deviation(piece), 1.0), (columns.deviation(before), -1.0)];
-                    add(terms, deviation - own.deviations[before], WANDER, Source::Usual);
+                    let residual = deviation - own.deviations[before];
+                    let mut wander = prior(column, residual, WANDER, Source::Usual);
+                    wander.terms.push((columns.deviation(before), -1.0));
+                    rows.push(wander);
                 }
             }
         }
         for (index, commanded) in trip.commanded.iter().enumerate() {
-            // Starts and stops have residuals of their own, by speed.
-            let is_end = commanded.to == 0 || commanded.at_rest;
-            let change = if is_end { 0.0 } else { self.speed(commanded.to) - self.speed(commanded.from) };
-            let terms = vec![(columns.change(trip, index), 1.0)];
-            add(terms, own.changes[index], change_error(change), Source::Usual);
+            let (column, residual) = (columns.change(trip, index), own.changes[index]);
+            if commanded.to == 0 {
+                // A sensor passed while braking sees the part of the stop's own scatter that has come about by then.
+                let speed = segments.get(index + 1).map_or(0.0, |stop| stop.from.speed);
+                let (alone, all) = (self.scatter.of_stop_alone(speed), self.scatter.of_stop(speed));
+                let stop = prior(column, residual, libm::hypot(all, change_error(0.0)), Source::Stop);
+                rows.push(Linear { once: alone * alone, ..stop });
+            } else {
+                // Starts have residuals of their own, by speed.
+                let (from, to) = (self.speed(commanded.from), self.speed(commanded.to));
+                let change = if commanded.at_rest { 0.0 } else { to - from };
+                rows.push(prior(column, residual, change_error(change), Source::Usual));
+            }
         }
         rows
     }
@@ -348,6 +354,12 @@ impl Point<'_> {
         }
         slopes
     }
+}
+
+/// The prior of a number that is about zero.
+fn prior(column: usize, residual: f64, deviation: f64, source: Source) -> Linear {
+    let variance = deviation * deviation;
+    Linear { terms: vec![(column, 1.0)], residual, variance, once: variance, source }
 }
 
 pub(super) fn add_term(terms: &mut Vec<(usize, f64)>, column: usize, by: f64) {
