@@ -1,5 +1,7 @@
 //! Incidents: collisions, derailments, overruns and burnt coils.
 
+use core::fmt;
+
 use footplate_core::{Timestamp, TrainId, TurnoutId};
 
 /// An event that an operator has to set right.
@@ -34,4 +36,19 @@ pub enum IncidentKind {
         /// The turnout.
         turnout: TurnoutId,
     },
+}
+
+impl fmt::Display for Incident {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.1} s: ", self.at.as_s())?;
+        if let Some(train) = self.train {
+            write!(f, "train {} ", train.0)?;
+        }
+        match self.kind {
+            IncidentKind::Collision { with } => write!(f, "ran into train {}", with.0),
+            IncidentKind::Derailment { turnout } => write!(f, "derailed at turnout {}", turnout.0),
+            IncidentKind::Overrun => write!(f, "ran past the end of its track"),
+            IncidentKind::CoilBurnt { turnout } => write!(f, "the coil of turnout {} burnt", turnout.0),
+        }
+    }
 }

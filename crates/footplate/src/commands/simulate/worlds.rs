@@ -19,7 +19,6 @@ use super::again::{FailedRun, name_failed};
 use super::score_form::ScoreForm;
 use super::series::Series;
 use crate::commands::written_layout::WrittenLayout;
-use crate::counted::counted;
 
 /// Calibrate a train once, then drive sessions of stops in which it goes on learning, in worlds whose physics are drawn
 /// from wide ranges; score each stop against the 95 % promise that was made for it.
@@ -80,8 +79,8 @@ impl Arguments {
 
     /// A world in which a train came to grief.
     fn failure(&self, world: &ScoredWorld) -> Option<FailedRun> {
-        (world.incidents > 0).then(|| FailedRun {
-            what: format!("seed {}, {}: {}", world.seed, world.name, counted(world.incidents, "incident")),
+        (!world.incidents.is_empty()).then(|| FailedRun {
+            what: format!("seed {}, {}: {}", world.seed, world.name, world.incidents.join("; ")),
             again: self.series.again(
                 "worlds",
                 world.seed,

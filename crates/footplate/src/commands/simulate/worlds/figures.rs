@@ -44,7 +44,7 @@ impl Figures {
             bias: quantile(stops().map(|stop| stop.error), 0.5),
             widths: [widths(true), widths(false)],
             failed: worlds.iter().map(|world| world.failures.len()).sum(),
-            incidents: worlds.iter().map(|world| world.incidents).sum(),
+            incidents: worlds.iter().map(|world| world.incidents.len()).sum(),
         }
     }
 

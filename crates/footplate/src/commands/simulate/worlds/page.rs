@@ -100,7 +100,7 @@ impl WrittenScores for Page<'_> {
         for name in self.names {
             let worlds = self.of(*name);
             let figures = Figures::of(&worlds);
-            let wrecked = worlds.iter().filter(|world| world.incidents > 0).count();
+            let wrecked = worlds.iter().filter(|world| !world.incidents.is_empty()).count();
             let broken = figures.stops - figures.kept;
             rates.push(Rate::grief(wrecked, worlds.len()));
             rates.push(Rate::new(format!("{name}: 95 % promises broken"), broken, figures.stops));

@@ -67,7 +67,7 @@ pub(super) struct ScoredWorld {
     pub(super) stops: Vec<ScoredStop>,
     /// Stops asked for that were refused, or did not end.
     pub(super) failures: Vec<String>,
-    pub(super) incidents: usize,
+    pub(super) incidents: Vec<String>,
     /// Sessions in which it was said that the train breaks its promises.
     pub(super) sessions_warned: usize,
     /// Track time of the calibration, in s, and why it ended.
@@ -95,7 +95,7 @@ pub(super) fn score(
         seed,
         stops: Vec::new(),
         failures: Vec::new(),
-        incidents: 0,
+        incidents: Vec::new(),
         sessions_warned: 0,
         calibration_s: calibrated.seconds,
         ending: calibrated.ending,
@@ -112,7 +112,7 @@ pub(super) fn score(
             break;
         }
     }
-    let incidents = driven.line.station.world().incidents().len();
+    let incidents = driven.line.station.world().incidents().iter().map(ToString::to_string).collect();
     scored.incidents = incidents;
     Ok(scored)
 }
