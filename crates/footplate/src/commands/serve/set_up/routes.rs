@@ -30,7 +30,7 @@ use serde_json::{Value, json};
 
 use super::super::answer_queue::Rejection;
 use super::super::drawn_layout::{DrawnLayout, LARGEST_LAYOUT, drawn_layout_routes};
-use super::set_up_file::{SetUp, SetUpTrain};
+use super::set_up_file::{SetUp, SetUpTrain, StepResult};
 use super::{Next, check_link};
 use crate::clock::now;
 use crate::dashboard::{LayoutPicture, Routes};
@@ -278,11 +278,27 @@ impl Pages {
         Ok(text.to_owned())
     }
 
-    /// Goes over to another process.
-    fn go_on(&self, next: Next) -> anyhow::Result<Value> {
+    fn wait_for_check(&self) -> anyhow::Result<()> {
         if self.shared.checking.available_permits() == 0 {
             bail!("the link is still being checked: wait for its result");
         }
+        Ok(())
+    }
+
+    /// Keeps the result of a check of the link of a set-up that may have been changed meanwhile.
+    fn keep_check(&self, checked: &SetUp, line: StepResult) -> anyhow::Result<Value> {
+        let mut changed = self.set_up();
+        if changed.link != checked.link {
+            bail!("another link was chosen while the link was being checked: check it again");
+        }
+        changed.line = Some(line);
+        self.write(changed)?;
+        Ok(self.json())
+    }
+
+    /// Goes over to another process.
+    fn go_on(&self, next: Next) -> anyhow::Result<Value> {
+        self.wait_for_check()?;
         // A second click changes nothing: the first one is carried out.
         let _ = self.shared.chosen.try_send(next);
         Ok(json!({ "taken": true }))
@@ -310,6 +326,8 @@ impl Pages {
         if changed.trains.is_empty() {
             bail!("name a train first");
         }
+        // A refused request leaves the set-up as it is.
+        self.wait_for_check()?;
         changed.is_complete = true;
         self.write(changed)?;
         self.go_on(Next::Drive)
@@ -361,14 +379,10 @@ async fn doctor(State(pages): State<Pages>) -> Response {
         return answer(Err(anyhow::anyhow!("the link is being checked already: wait for its result")));
     };
     let (set_up, store) = (pages.set_up(), pages.shared.store.clone());
-    let checked = tokio::task::spawn_blocking(move || check_link(&set_up, &store)).await;
-    let keep = |line| {
-        let mut changed = pages.set_up();
-        changed.line = Some(line);
-        pages.write(changed)?;
-        Ok(pages.json())
-    };
-    answer(checked.map_err(anyhow::Error::from).and_then(|line| line).and_then(keep))
+    let checked = set_up.clone();
+    let line = tokio::task::spawn_blocking(move || check_link(&set_up, &store)).await;
+    let keep = |line| pages.keep_check(&checked, line);
+    answer(line.map_err(anyhow::Error::from).and_then(|line| line).and_then(keep))
 }
 
 async fn calibrate(State(pages): State<Pages>, body: Result<Json<ToCalibrate>, JsonRejection>) -> Response {
@@ -390,4 +404,50 @@ pub(crate) fn fuzzed_set_up_routes(store: PathBuf) -> Routes {
 pub(crate) fn set_up_paths() -> Vec<&'static str> {
     let pages = fuzzed_set_up_routes(PathBuf::new());
     pages.paths().iter().chain(SetUpRoute::fixed().routes().paths()).copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The pages of a simulated railway with a train, in a folder of their own.
+    fn pages(folder: &std::path::Path) -> Pages {
+        let mut set_up = SetUp::default();
+        set_up.set_link("sim", None).expect("a simulation");
+        set_up.set_layout("track-a").expect("it is built in");
+        set_up
+            .set_trains(vec![SetUpTrain { address: 24, name: String::new() }])
+            .expect("a train that it has");
+        let (chosen, _) = std::sync::mpsc::sync_channel(1);
+        Pages::new(set_up, folder.join("railway.db"), None, chosen)
+    }
+
+    fn refused(result: anyhow::Result<Value>) -> String {
+        result.expect_err("it should be refused").to_string()
+    }
+
+    #[test]
+    fn driving_that_is_refused_while_the_link_is_being_checked_leaves_the_set_up_open() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let pages = pages(folder.path());
+        let checking = pages.shared.checking.try_acquire().expect("nothing else checks");
+        assert!(refused(pages.drive()).contains("wait for its result"));
+        assert!(!pages.set_up().is_complete);
+        drop(checking);
+        pages.drive().expect("it goes on");
+        assert!(pages.set_up().is_complete);
+    }
+
+    #[test]
+    fn a_check_of_a_link_that_was_replaced_meanwhile_says_nothing_of_the_new_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let pages = pages(folder.path());
+        let line = StepResult { status: 0, report: "a 6051".to_owned() };
+        let mut other = pages.set_up();
+        other.link = Some("z21:192.168.0.111".to_owned());
+        assert!(refused(pages.keep_check(&other, line.clone())).contains("check it again"));
+        assert!(pages.set_up().line.is_none());
+        pages.keep_check(&pages.set_up(), line).expect("it is the link that was checked");
+        assert!(pages.set_up().line.is_some());
+    }
 }
