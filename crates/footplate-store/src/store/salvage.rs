@@ -264,8 +264,11 @@ fn copy_table(
         if stretch.ended {
             break;
         }
-        // The next row cannot be read: continue behind it.
-        next = stretch.last_read.unwrap_or(next).saturating_add(1);
+        // The next row cannot be read: continue behind it, or behind all of its page.
+        next = match stretch.last_read {
+            Some(read) => read.saturating_add(1),
+            None => copy.readable_after(next, last),
+        };
     }
     copy.table.lost = u64::try_from(last_known).unwrap_or(0).saturating_sub(copy.table.rows);
     Ok(copy.table)
@@ -302,6 +305,32 @@ struct Stretch {
 }
 
 impl TableCopy<'_> {
+    /// The first number after an unreadable one at which reading goes on, or the one after `last`: ever further ahead, then
+    /// by halves. A page of readable rows between two damaged ones can be passed over; its rows are found as strays.
+    fn readable_after(&mut self, unreadable: i64, last: i64) -> i64 {
+        let (mut bad, mut step) = (unreadable, 1_i64);
+        let mut good = loop {
+            let probe = bad.saturating_add(step);
+            if probe > last {
+                return last.saturating_add(1);
+            }
+            if self.reads_at(probe) {
+                break probe;
+            }
+            (bad, step) = (probe, step.saturating_mul(2));
+        };
+        while good - bad > 1 {
+            let middle = bad + (good - bad) / 2;
+            if self.reads_at(middle) { good = middle } else { bad = middle }
+        }
+        good
+    }
+
+    /// Whether a row from a number on can be read, or the end of the table.
+    fn reads_at(&mut self, number: i64) -> bool {
+        self.select.query([number]).is_ok_and(|mut rows| rows.next().is_ok())
+    }
+
     /// Copies rows from number `first` on, until one cannot be read.
     fn copy_from(&mut self, first: i64) -> rusqlite::Result<Stretch> {
         let mut stretch = Stretch { last_read: None, ended: false };
