@@ -24,6 +24,7 @@ mod short_moves;
 mod speed_change_laws;
 mod speed_zones;
 mod stopping;
+mod strayed_trains;
 mod toy_body;
 mod toy_railway;
 mod trains_fitted;

@@ -19,6 +19,7 @@ use super::ambiguity::{Ambiguity, Branch};
 use super::driven_train::DrivenTrain;
 use super::hypotheses::{Detection, Explanation, Hypothesis, hypotheses};
 use super::sensor_faults::SensorFaults;
+use super::unassigned::Unassigned;
 
 /// A detection is assigned to a train from this probability on.
 const ASSIGNED_FROM: f64 = 0.9;
@@ -59,6 +60,8 @@ pub(super) enum Resolution {
 pub(super) struct DataAssociation {
     faults: SensorFaults,
     ambiguity: Option<Ambiguity>,
+    /// The last detection that no train explained.
+    unexplained: Option<Unassigned>,
 }
 
 impl DataAssociation {
@@ -80,12 +83,32 @@ impl DataAssociation {
     /// Drops an ambiguity about a train whose position was entered or is lost.
     pub(super) fn forget(&mut self, train: TrainId) {
         self.ambiguity.take_if(|ambiguity| ambiguity.branches.iter().any(|branch| branch.train == train));
+        self.unexplained.take_if(|unexplained| unexplained.may_be_of(train));
     }
 
     /// Whether the position of a train depends on an ambiguous detection.
     pub(super) fn is_ambiguous(&self, train: TrainId) -> bool {
         let branches = self.ambiguity.iter().flat_map(|ambiguity| &ambiguity.branches);
         branches.into_iter().any(|branch| branch.train == train)
+    }
+
+    /// The train that is probably not where it was estimated, but at the sensor of the ambiguous detection.
+    pub(super) fn probably_strayed(&self) -> Option<TrainId> {
+        let ambiguity = self.ambiguity.as_ref().filter(|ambiguity| !ambiguity.is_assigned)?;
+        let strayed = ambiguity.branches.iter().filter(|branch| branch.has_strayed());
+        strayed
+            .max_by(|one, other| one.probability.total_cmp(&other.probability))
+            .filter(|one| one.probability >= ASSIGNED_FROM)
+            .map(|one| one.train)
+    }
+
+    /// The detections that a train has probably caused elsewhere, although they were assigned to no train: a sensor has been silent
+    /// at which it was overdue since, as one is with this probability if the train has not strayed.
+    pub(super) fn probably_elsewhere(&self, train: TrainId, silent: f64) -> impl Iterator<Item = Detection> {
+        let ambiguous = self.ambiguity.as_ref().filter(|ambiguity| !ambiguity.is_assigned);
+        let found = ambiguous.map(|ambiguity| Unassigned::ambiguous(ambiguity, 1.0));
+        let found = found.into_iter().chain(self.unexplained.clone());
+        found.filter(move |one| one.is_probably_of(train, silent, ASSIGNED_FROM)).map(|one| one.detection)
     }
 
     /// A turnout was commanded: branches no longer depend on where it was before.
@@ -120,7 +143,11 @@ impl DataAssociation {
     ) -> Option<Resolution> {
         let mut ambiguity = self.ambiguity.take()?;
         if ambiguity.is_over(now) {
-            return (!ambiguity.is_assigned).then_some(Resolution::Spurious(ambiguity.detection));
+            if ambiguity.is_assigned {
+                return None;
+            }
+            self.unexplained = Some(Unassigned::ambiguous(&ambiguity, 1.0));
+            return Some(Resolution::Spurious(ambiguity.detection));
         }
         let log_spurious = self.faults.log_rate(detection.sensor, now);
         // The likelihood of the further detection in one branch.
@@ -136,6 +163,7 @@ impl DataAssociation {
         let all = assigned + ambiguity.branches.iter().map(|branch| branch.probability).sum::<f64>();
         if !ambiguity.is_assigned && assigned >= ASSIGNED_FROM * all {
             self.faults.note_unexplained(ambiguity.detection.sensor, ambiguity.detection.window.until);
+            self.unexplained = Some(Unassigned::ambiguous(&ambiguity, all));
             return Some(Resolution::Spurious(ambiguity.detection));
         }
         if ambiguity.is_assigned && assigned >= RESOLVED_FROM * all {
@@ -218,7 +246,7 @@ impl DataAssociation {
             }
         }
         let Some((likeliest, _)) = best.filter(|_| spurious < ASSIGNED_FROM * all) else {
-            return self.unexplained(detection);
+            return self.unexplained(detection, &found, all);
         };
         if self.faults.is_stuck(detection.sensor) {
             self.faults.note_unexplained(detection.sensor, now);
@@ -234,13 +262,16 @@ impl DataAssociation {
         Association::Ambiguous { likeliest, or: second.map(|(train, _)| *train) }
     }
 
-    fn unexplained(&mut self, detection: Detection) -> Association {
+    fn unexplained(&mut self, detection: Detection, found: &[Hypothesis], all: f64) -> Association {
         let was_stuck = self.faults.is_stuck(detection.sensor);
         let is_newly_stuck = self.faults.note_unexplained(detection.sensor, detection.window.until);
         match (was_stuck, is_newly_stuck) {
             (true, _) => Association::Ignored,
             (false, true) => Association::Stuck,
-            (false, false) => Association::Unexplained,
+            (false, false) => {
+                self.unexplained = Some(Unassigned::unexplained(detection, found, all));
+                Association::Unexplained
+            }
         }
     }
 }

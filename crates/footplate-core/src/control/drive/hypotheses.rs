@@ -91,8 +91,7 @@ pub(super) fn hypotheses(
         let is_missed = train.missed_sensor().is_some();
         let missed_share = train.missed_share(context, detection.window.middle());
         // The missed sensor has already happened under every hypothesis: condition on it.
-        let happened = missed_share + CHANGED + STRAYED;
-        let conditioned = if is_missed { -libm::log(happened) } else { 0.0 };
+        let conditioned = if is_missed { -libm::log(missed_or_elsewhere(missed_share)) } else { 0.0 };
         let claim = |context: TrackContext<'_>| {
             let Detection { sensor, window } = detection;
             let claim = train.locator.claim(context, &train.model, sensor, window, missed_share)?;
@@ -114,10 +113,15 @@ pub(super) fn hypotheses(
                 }
             }
         }
-        let strayed = if is_missed { libm::log(STRAYED / happened) } else { LOG_LIFTED };
+        let strayed = if is_missed { libm::log(STRAYED) + conditioned } else { LOG_LIFTED };
         add(Explanation::Strayed(id), anywhere + strayed);
     }
     found
+}
+
+/// The probability that a sensor does not report a train that should have passed it, of which sensors miss a share.
+pub(super) const fn missed_or_elsewhere(missed_share: f64) -> f64 {
+    missed_share + CHANGED + STRAYED
 }
 
 /// Whether a train moved in the window or just before it; a train at rest causes no detection.

@@ -26,8 +26,10 @@ mod sensor_faults;
 mod speed_reports;
 mod speed_supervision;
 mod stop_planning;
+mod strayed;
 mod task;
 mod turnout_guard;
+mod unassigned;
 
 pub use driver::Driver;
 pub use order::{Aim, Gap, Order, OrderId, StopOrder};

@@ -99,6 +99,11 @@ impl ConsistencyMonitor {
         *self = Self::default();
     }
 
+    /// When a sensor last reported the train since it was located.
+    pub(super) const fn last(&self) -> Option<Timestamp> {
+        self.last
+    }
+
     /// Tests a passage at a speed at which sensors miss a share of detections. Returns the alarm that it raises, if any.
     pub(super) fn pass(&mut self, passed: &PassedSensor, missed_share: f64) -> Option<Alarm> {
         let before = self.last.replace(passed.window.until);

@@ -95,7 +95,10 @@ impl Watchdog {
         let layout = self.driver.layout();
         let behind = *self.behind.get(&train).filter(|_| !self.undirected.contains(&train))?;
         let run = self.unheard_run(now, train);
-        let reach = edges_within(layout, behind, run + BODY);
+        let closed = self.closed_to(now, train);
+        // Without a dispatcher, closed track is under other trains: this one is not beyond it.
+        let occupied = if self.permits_all { &closed } else { &Reservation::empty() };
+        let reach = edges_within(layout, behind, run + BODY, occupied);
         if self.lies_otherwise(&reach) {
             return None;
         }
@@ -106,14 +109,14 @@ impl Watchdog {
         let back = Ahead { run: Length::ZERO, sensors: if run < HOLDS { 2 } else { 1 } };
         // The train may have run over either leg of a turnout that was thrown since.
         let set = TurnoutStates::unknown();
-        reports_before(layout, &set, begins, back, &self.closed_to(now, train)).then(|| behind.reverse())
+        reports_before(layout, &set, begins, back, &closed).then(|| behind.reverse())
     }
 
     /// Whether a train may stand on points that it pushed over since a sensor reported it: back over them it would derail.
     pub(super) fn has_pushed_over_points(&self, now: Timestamp, train: TrainId) -> bool {
         let Some(behind) = self.behind.get(&train) else { return false };
         let run = self.unheard_run(now, train);
-        self.lies_otherwise(&edges_within(self.driver.layout(), *behind, run + BODY))
+        self.lies_otherwise(&edges_within(self.driver.layout(), *behind, run + BODY, &Reservation::empty()))
     }
 
     /// Whether a turnout that is trailed on one of these edges lies for the other leg.
@@ -183,12 +186,18 @@ impl Watchdog {
 }
 
 /// The edges that begin within a distance of a node, over both legs of every turnout, with the distance that is left
-/// at their beginning.
-fn edges_within(layout: &Layout, from: NodeId, reach: Length) -> BTreeMap<EdgeId, Length> {
+/// at their beginning. Edges with occupied track are left out, and what is beyond them.
+fn edges_within(
+    layout: &Layout,
+    from: NodeId,
+    reach: Length,
+    occupied: &Reservation,
+) -> BTreeMap<EdgeId, Length> {
     let mut best: BTreeMap<EdgeId, Length> = BTreeMap::new();
     let mut open: Vec<(EdgeId, Length)> = layout.outgoing(from).edges().map(|edge| (edge, reach)).collect();
     while let Some((edge, left)) = open.pop() {
-        if left <= Length::ZERO || best.get(&edge).is_some_and(|known| *known >= left) {
+        let is_occupied = occupied.begins_on(layout, edge, Length::ZERO).is_some();
+        if left <= Length::ZERO || is_occupied || best.get(&edge).is_some_and(|known| *known >= left) {
             continue;
         }
         best.insert(edge, left);

@@ -272,6 +272,7 @@ impl Watchdog {
         if self.note_backward(now, sensor, time) {
             return;
         }
+        self.note_stopping(sensor, time);
         let before = self.intruder.take(self.driver.layout(), sensor, time);
         if self.intruder.near.is_some() {
             self.intruder.near = Some(sensor);

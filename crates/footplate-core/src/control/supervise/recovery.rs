@@ -248,16 +248,16 @@ impl Watchdog {
     }
 
     /// Creeps to locate a lost train. Other trains may be near, and the track may end ahead; behind the train is track that it ran
-    /// over.
+    /// over. Without a dispatcher, a train that was not detected elsewhere creeps ahead even where nothing shows that this is safe.
     fn search(&mut self, now: Timestamp, train: TrainId) {
         let Some(recovery) = self.dangers.get(&train) else { return };
         let may_reverse = recovery.reversals < MAX_REVERSALS;
-        if self.permits_all {
-            return self.creep_ahead(now, train);
-        }
+        let was_moved = matches!(recovery.why, Alarm::Elsewhere(_));
+        let is_clear_ahead = self.is_clear_ahead(now, train);
         match self.sensor_behind(now, train) {
+            _ if self.permits_all && is_clear_ahead => self.creep_ahead(now, train),
             seen @ Some(_) if may_reverse => self.creep_back(now, train, seen),
-            _ if self.is_clear_ahead(now, train) => self.creep_ahead(now, train),
+            _ if is_clear_ahead || self.permits_all && !was_moved => self.creep_ahead(now, train),
             _ => self.need_operator(now, train),
         }
     }

@@ -302,9 +302,18 @@ impl Watchdog {
                     return self.note_unexplained(now, sensor, time);
                 }
             }
+            Notice::Overdue { train, sensor, .. } if self.is_watching => {
+                let (train, silent) = (*train, *sensor);
+                self.notify(notice);
+                return self.compare_with_unexplained(now, train, silent);
+            }
             Notice::Ambiguous { sensor, time, likeliest, or } => {
                 let (train, is_spurious) = (*likeliest, or.is_none());
-                self.note_backward(now, *sensor, *time);
+                if !self.note_backward(now, *sensor, *time)
+                    && let Some(strayed) = self.driver.probably_strayed()
+                {
+                    self.raise_elsewhere(now, strayed, *sensor, *time);
+                }
                 // A train that creeps to be located has only so many sensors ahead before the track ends.
                 if is_spurious && !self.permits_all && self.dangers.get(&train).is_some_and(Recovery::creeps)
                 {

@@ -1,0 +1,78 @@
+//! A train that is probably not where it was estimated: it is stopped, and searched from where it was detected.
+
+use crate::ids::{SensorId, TrainId};
+use crate::time::{TimeSpan, Timestamp};
+use crate::track::Position;
+use crate::units::Length;
+
+use super::alarm::Alarm;
+use super::recovery::{Phase, Recovery};
+use super::watchdog::Watchdog;
+
+/// A detection elsewhere this long before a sensor is overdue may be the same train: from one to the other it runs two
+/// hops (the longest, 1.5 m) at 200 mm/s.
+const SAME_TRAIN_WITHIN: TimeSpan = TimeSpan::from_s(15.0);
+/// A hand needs at least this long to lift a moving train and put it on other track (chosen: re-railing a locomotive takes a
+/// practised hand two seconds). A report elsewhere sooner after its last detection is not of this train.
+const HANDLED_IN: TimeSpan = TimeSpan::from_s(2.0);
+
+impl Watchdog {
+    /// Raises the alarm for a train that was detected elsewhere.
+    pub(super) fn raise_elsewhere(
+        &mut self,
+        now: Timestamp,
+        train: TrainId,
+        sensor: SensorId,
+        time: Timestamp,
+    ) {
+        if self.is_watching() && !self.is_in_danger(train) && self.may_have_been_moved(train, time) {
+            self.note_elsewhere(train, sensor, time);
+            self.raise(now, train, Alarm::Elsewhere(sensor));
+        }
+    }
+
+    /// A sensor is silent at which a train is overdue: raises the alarm if another has reported, since its last detection,
+    /// what no train explained and this one probably caused. An earlier report of the silent sensor itself says that the train was
+    /// early, or that the report was spurious.
+    pub(super) fn compare_with_unexplained(&mut self, now: Timestamp, train: TrainId, silent: SensorId) {
+        let is_elsewhere = |(sensor, time): &(SensorId, Timestamp)| {
+            *sensor != silent && now - *time <= SAME_TRAIN_WITHIN && self.may_have_been_moved(train, *time)
+        };
+        let found = self.driver.probably_elsewhere(now, train).find(is_elsewhere);
+        if let Some((sensor, time)) = found {
+            self.raise_elsewhere(now, train, sensor, time);
+        }
+    }
+
+    /// Whether there was time to move a train by hand between its last detection and a report elsewhere.
+    fn may_have_been_moved(&self, train: TrainId, time: Timestamp) -> bool {
+        let passed = self.monitors.get(&train).and_then(|monitor| monitor.last());
+        passed.is_none_or(|passed| time - passed >= HANDLED_IN)
+    }
+
+    /// A detection that no train explains while a lost train comes to rest is of that train.
+    pub(super) fn note_stopping(&mut self, sensor: SensorId, time: Timestamp) {
+        let stops = |(train, danger): (&TrainId, &Recovery)| {
+            (danger.is_searched() && danger.phase == Phase::Stopping).then_some(*train)
+        };
+        let mut stopping = self.dangers.iter().filter_map(stops);
+        if let (Some(train), None) = (stopping.next(), stopping.next()) {
+            self.note_elsewhere(train, sensor, time);
+        }
+    }
+
+    /// Searches for a train from a sensor. One that reports both directions of travel does not show the direction.
+    fn note_elsewhere(&mut self, train: TrainId, sensor: SensorId, time: Timestamp) {
+        let layout = self.driver.layout();
+        let Some(node) = layout.sensor_node(sensor) else { return };
+        let Some(edge) = layout.outgoing(node).edges().next() else { return };
+        if layout.sensor_at(node.reverse()).is_none() {
+            self.undirected.insert(train);
+        } else {
+            self.undirected.remove(&train);
+        }
+        self.seen.insert(train, Position { edge, offset: Length::ZERO });
+        self.behind.insert(train, node);
+        self.note_detection(train, time);
+    }
+}
