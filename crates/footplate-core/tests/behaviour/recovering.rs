@@ -67,6 +67,28 @@ fn a_train_that_sets_out_backward_is_stopped_by_the_sensor_behind_it() {
 }
 
 #[test]
+fn a_train_that_was_turned_does_not_resume_its_order() {
+    for is_turned in [false, true] {
+        // Given a train that runs,
+        let mut watched = Watched::one();
+        watched.go(FIRST, 8);
+        watched.run(12.0);
+        // when it is turned by hand, or only no longer trusted,
+        if is_turned {
+            watched.world.turn_around(FIRST);
+        } else {
+            watched.dog.distrust(watched.world.now, FIRST);
+        }
+        assert!(watched.run_until(200.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
+        watched.run(3.0);
+        // then its order is cancelled if its direction is another than the one for which it was given.
+        let is_resumed = watched.notices.iter().any(|notice| matches!(notice, Notice::Resumed { .. }));
+        let is_cancelled = watched.notices.iter().any(|notice| matches!(notice, Notice::Cancelled { .. }));
+        assert_eq!((is_resumed, is_cancelled), (!is_turned, is_turned), "{:#?}", watched.notices);
+    }
+}
+
+#[test]
 fn a_train_that_a_person_places_is_searched_no_more() {
     // Given a train that creeps to be located,
     let mut watched = Watched::asking();

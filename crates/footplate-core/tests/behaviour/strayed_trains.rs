@@ -1,6 +1,6 @@
 //! A train that is lifted and put elsewhere is stopped by one report there and one silent sensor, before it runs into
 //! another train or off its track.
-#![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
+#![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
 use footplate_core::control::Alarm;
 use footplate_core::{Command, SensorId};

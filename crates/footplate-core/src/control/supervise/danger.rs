@@ -48,7 +48,9 @@ impl Watchdog {
         let interrupted = self.held.remove(&train).flatten().or_else(|| self.unfinished.remove(&train));
         // Its speeds and stops are uncertain until it has been measured.
         self.driver.set_model(model.rescaled(&Rescaling::doubt(UNKNOWN_RATIO)));
-        self.dangers.insert(train, Recovery::new(now, model, why, interrupted));
+        let faced = self.driver.position(train, now).or_else(|| self.seen.get(&train).copied());
+        let faced = faced.map(|place| place.edge);
+        self.dangers.insert(train, Recovery::new(now, model, why, interrupted, faced));
         let stopped = self.hold_endangered(now);
         let interrupted = interrupted.map(|(_, order)| order);
         self.notify(Notice::Danger { train, why, stopped, interrupted });

@@ -14,7 +14,7 @@
 //! danger  stops        trains that are stopped and held; stops that have to be confirmed
 //! creeping  unheard    where a train in recovery may go; how far it can have run
 //! intruder             movements that no session drives
-//! strayed              trains that are not where they were estimated
+//! strayed  facing      trains that are not where they were estimated, or in another direction
 //! line  orders         the link and the track power; which orders are carried out now
 //! recovery             the recovery of one train
 //! remeasuring  trials  its measurements, and the conclusions from them
@@ -23,6 +23,7 @@
 mod alarm;
 mod creeping;
 mod danger;
+mod facing;
 mod intruder;
 mod line;
 mod orders;

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use crate::control::dispatch::Reservation;
 use crate::control::drive::{Order, OrderId, Refusal};
 use crate::event::{Event, EventKind, Report};
-use crate::ids::{NodeId, SpeedStep, TrainId};
+use crate::ids::{EdgeId, NodeId, SpeedStep, TrainId};
 use crate::model::MotionFit;
 use crate::model::{MeasuredRatio, MotionModel, Rescaling, StepUse};
 use crate::time::{TimeSpan, Timestamp};
@@ -13,6 +13,7 @@ use crate::tracking::PassedSensor;
 use crate::units::Length;
 
 use super::alarm::Alarm;
+use super::facing::was_turned;
 use super::trials::{SpeedTrial, Steps};
 use super::watchdog::Watchdog;
 use crate::control::{Notice, Outcome};
@@ -43,6 +44,8 @@ const LONGEST_STOP: TimeSpan = TimeSpan::from_s(5.0);
 pub(super) struct Recovery {
     pub(super) why: Alarm,
     pub(super) interrupted: Option<(OrderId, Order)>,
+    /// The edge along which it faced.
+    faced: Option<EdgeId>,
     pub(super) phase: Phase,
     began: Timestamp,
     pub(super) by: Timestamp,
@@ -97,10 +100,12 @@ impl Recovery {
         base: MotionModel,
         why: Alarm,
         interrupted: Option<(OrderId, Order)>,
+        faced: Option<EdgeId>,
     ) -> Self {
         Self {
             why,
             interrupted,
+            faced,
             phase: Phase::Stopping,
             began: now,
             by: now + STOPPED_WITHIN,
@@ -450,7 +455,16 @@ impl Watchdog {
         if self.dangers.is_empty() {
             let held = core::mem::take(&mut self.held);
             let interrupted = held.into_iter().filter_map(|(train, order)| Some((train, order?)));
-            let own = recovery.interrupted.map(|order| (train, order));
+            let faces = self.driver.position(train, now).map(|place| place.edge);
+            let is_turned = recovery
+                .faced
+                .zip(faces)
+                .is_some_and(|(before, faces)| was_turned(self.driver.layout(), before, faces));
+            if let Some((_, order)) = recovery.interrupted.filter(|_| is_turned) {
+                // It was meant for the other direction.
+                self.notify(Notice::Cancelled { train, order });
+            }
+            let own = recovery.interrupted.filter(|_| !is_turned).map(|order| (train, order));
             for (train, (id, order)) in interrupted.chain(own).collect::<Vec<_>>() {
                 self.resume(now, train, id, order);
             }
