@@ -283,6 +283,71 @@ fn a_journey_interrupted_by_a_silent_station_is_completed_after_recovery() {
 }
 
 #[test]
+fn a_train_that_stalls_while_it_is_driven_by_hand_keeps_the_track_under_it() {
+    // Given a train that stalls 100 mm beyond `A1`, before a turnout,
+    let mut traffic = Traffic::with(Dispatcher::new, [STARTS[0], ("E1", 300.0)]);
+    let [train, _] = TRAINS;
+    let speed = |number| Order::Speed { train, step: step(number) };
+    traffic.dispatcher.order(traffic.world.now, speed(9)).expect("free");
+    let a1 = traffic.world.layout.sensor_named("A1").expect("a sensor");
+    while !traffic.world.passes.iter().any(|(_, sensor, _)| *sensor == a1) {
+        traffic.run(0.05);
+    }
+    traffic.run(0.35);
+    traffic.world.trains.iter_mut().filter(|toy| toy.id == train).for_each(|toy| toy.wheels = 0.0);
+    // when it is estimated to run on, and is stopped,
+    traffic.run(0.8);
+    traffic.dispatcher.order(traffic.world.now, speed(0)).expect("stops");
+    traffic.run(20.0);
+    let located = traffic.dispatcher.driver().locate(train, traffic.world.now).expect("located");
+    assert!(located.at_rest && located.at.distance > Length::from_mm(300.0), "{located:?}");
+    // then the track on which it stands is reserved for it, and the turnout before it does not move.
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+    let throw = Order::Turnout { turnout: TurnoutId(1), curved: true };
+    assert!(traffic.dispatcher.order(traffic.world.now, throw).is_err());
+    // A journey does not release it either, until a sensor reports the train.
+    traffic.world.trains.iter_mut().for_each(|toy| toy.wheels = 1.0);
+    traffic.go(train, "D1+150mm");
+    traffic.run(60.0);
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+    assert_eq!(traffic.arrivals(train), 1, "{:#?}", traffic.notices);
+}
+
+#[test]
+fn a_train_that_is_placed_occupies_the_track_that_the_turnouts_lead_to() {
+    let mut traffic = Traffic::new();
+    let [train, _] = TRAINS;
+    let layout = traffic.world.layout.clone();
+    let [b1, c1, mr2] = ["B1", "C1", "MR2"].map(|name| layout.node_named(name).expect("a node"));
+    let sure = Length::from_mm(2.0);
+    // Given a train on the curved leg of a turnout that is set straight,
+    traffic.dispatcher.place(
+        traffic.world.now,
+        train,
+        PathPoint { node: c1, distance: Length::from_mm(200.0) },
+        sure,
+    );
+    traffic.dispatcher.handle_timeout(traffic.world.now);
+    // when it is lifted and put down just beyond the turnout,
+    traffic.dispatcher.place(
+        traffic.world.now,
+        train,
+        PathPoint { node: b1, distance: Length::from_mm(520.0) },
+        sure,
+    );
+    traffic.dispatcher.handle_timeout(traffic.world.now);
+    traffic.dispatcher.set_lengths(traffic.world.now, train, LENGTHS);
+    // then its rear is on the straight leg, not on the one where it was before.
+    let reserved = traffic.dispatcher.reservation(train).expect("dispatched");
+    let holds = |from, length_mm: f64| {
+        let edge = layout.edge_between(from, mr2).expect("an edge");
+        is_held(&layout, Position { edge, offset: Length::from_mm(length_mm - 30.0) }, reserved)
+    };
+    assert!(holds(b1, 500.0));
+    assert!(!holds(c1, 450.0));
+}
+
+#[test]
 fn a_train_driven_by_hand_is_stopped_before_another_and_can_be_dispatched_afterwards() {
     let mut traffic = Traffic::new();
     traffic

@@ -1,15 +1,17 @@
-//! Trains driven by plain orders: the track ahead of them is reserved as far as it is free.
+//! Trains driven by plain orders: the track ahead of them is reserved as far as it is free, and the track behind them until a
+//! sensor reports them. Trains stall on dirt, and are then not where they are estimated.
 
 use alloc::vec::Vec;
 
 use crate::control::drive::Refusal;
-use crate::ids::TrainId;
+use crate::ids::{SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
 
 use super::dispatched_train::State;
 use super::dispatcher::Dispatcher;
 use super::path::Path;
+use super::reservation::Reservation;
 
 /// The smallest and the largest distance that is reserved ahead of a train driven by hand: the length of a
 /// locomotive, and more than any train needs to stop from its highest step (1.2 m) and the next sensor.
@@ -46,13 +48,14 @@ impl Dispatcher {
         }
     }
 
-    /// Reduces the reservation of a train driven by hand to the track under it, if it is at rest without an order.
-    /// Returns whether it is.
+    /// Ends driving a train by hand that is at rest without an order. Its reservation is reduced to the track under it, unless it
+    /// has run since a sensor reported it. Returns whether it is at rest.
     pub(super) fn rest_by_hand(&mut self, now: Timestamp, id: TrainId) -> bool {
         let is_done = self.watchdog.driver().is_at_rest(id, now) && self.watchdog.driver().busy(id).is_none();
         let is_known = self.watchdog.driver().locate(id, now).is_some();
         if is_done && is_known {
-            self.halted(now, id, true);
+            let confirmed = self.trains.get(&id).is_some_and(|train| train.detected_since_start);
+            self.halted(now, id, confirmed);
         }
         is_done && is_known
     }
@@ -63,7 +66,17 @@ impl Dispatcher {
         self.drive_by_hand(now, id);
     }
 
-    /// Reserves more of the track ahead, and releases the track behind.
+    /// A sensor has reported a train: the track behind it is released, unless the report is ambiguous.
+    pub(super) fn detected_by_hand(&mut self, id: TrainId) {
+        let is_ambiguous = self.watchdog.driver().is_position_ambiguous(id);
+        let known =
+            self.trains.get_mut(&id).filter(|train| matches!(train.state, State::ByHand | State::Lost));
+        if let Some(train) = known.filter(|_| !is_ambiguous) {
+            train.kept = Reservation::empty();
+        }
+    }
+
+    /// Reserves more of the track ahead. The track behind stays reserved until a sensor reports the train.
     pub(super) fn drive_by_hand(&mut self, now: Timestamp, id: TrainId) {
         let Some(train) = self.trains.get(&id) else { return };
         let (Some(place), Some(located)) =
@@ -115,9 +128,7 @@ impl Dispatcher {
         let mut reservation =
             self.reserved(path.reservation(layout, at - envelope.behind, own_end + envelope.ahead));
         self.reserve_anchors(now, id, place, &mut reservation);
-        if self.watchdog.driver().is_position_ambiguous(id) {
-            reservation.add(layout, &train.reservation);
-        }
+        reservation.add(layout, &train.kept);
         // Neither the horizon nor a turnout of unknown position is an end of authority: the operator sees them.
         let limit = (end < reach).then(|| {
             let limit = path
@@ -126,11 +137,17 @@ impl Dispatcher {
             limit.filter(|limit| limit.distance >= located.at.distance).unwrap_or(located.at)
         });
         self.watchdog.set_end_of_authority(now, id, limit);
-        if let Some(train) = self.trains.get_mut(&id)
-            && train.reservation != reservation
-        {
-            train.reservation = reservation;
-            self.has_changed = true;
+        let driver = self.watchdog.driver();
+        let runs = driver.commanded(id) > SpeedStep::STAND || !driver.is_at_rest(id, now);
+        if let Some(train) = self.trains.get_mut(&id) {
+            if runs {
+                train.detected_since_start = false;
+                train.kept = reservation.clone();
+            }
+            if train.reservation != reservation {
+                train.reservation = reservation;
+                self.has_changed = true;
+            }
         }
     }
 

@@ -103,7 +103,8 @@ pub(super) struct DispatchedTrain {
     pub(super) no_room_until: Timestamp,
     /// Whether a sensor has reported it since it reversed or was placed.
     pub(super) detected_since_reversal: bool,
-    /// Whether a sensor has reported it since it last started. Until then it may still be there: trains stall on dirt.
+    /// Whether a sensor has reported it since it last started; of a train driven by hand, since it last ran. Until then it may still
+    /// be there: trains stall on dirt.
     pub(super) detected_since_start: bool,
     /// A sensor did not report it, and no path leads ahead: it may run back to be detected.
     pub(super) looks_back: bool,

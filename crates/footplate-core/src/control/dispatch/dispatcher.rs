@@ -18,6 +18,7 @@ use super::dispatched_train::{Assignment, DispatchedTrain, Journey, State};
 use super::movement_authority::{
     ClearanceEnvelope, PARKED, TrainLengths, parking_places, standstill_reservation,
 };
+use super::path::OccupiedPath;
 use super::reservation::{Blocks, Reservation};
 use super::route_setting::TurnoutCommand;
 use crate::control::Notice;
@@ -190,6 +191,7 @@ impl Dispatcher {
             known.unobstructed_s = None;
             known.waiting_reported = false;
             known.reservation = Reservation::empty();
+            known.occupied = OccupiedPath::default();
         }
         self.reserve_standstill(now, train);
     }
@@ -420,7 +422,7 @@ impl Dispatcher {
         if let Some(train) = self.trains.get_mut(&id) {
             let confirmed = match train.state {
                 State::Running { confirmed, .. } | State::Halting { confirmed, .. } => confirmed,
-                State::ByHand => is_seen,
+                State::ByHand => is_seen && train.detected_since_start,
                 _ => false,
             };
             train.authorities.clear();
