@@ -2,7 +2,8 @@
 //! if it is spurious; ambiguous detections change no estimate, and a lost train is reported.
 #![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
-use footplate_core::control::{Driver, Notice, Order};
+use footplate_core::control::{Driver, Notice, Order, StopOrder};
+use footplate_core::tracking::PathPoint;
 use footplate_core::{Length, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 
@@ -211,4 +212,56 @@ proptest! {
         let [right, wrong] = assigned(&world);
         prop_assert!(wrong <= by_themselves && right >= 3, "{right} right, {wrong} wrong: {:#?}", world.notices);
     }
+}
+
+/// A train at `D1+300mm` whose position is uncertain by 1 m, so that a spurious report of `B1`, 1.3 m ahead, is assigned to it
+/// for a while.
+fn uncertain() -> (ToyRailway, Driver) {
+    let world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = driver_of(&world, "D1", 300.0);
+    let node = world.layout.node_named("D1").expect("a node");
+    let at = PathPoint { node, distance: Length::from_mm(300.0) };
+    driver.place(world.now, FIRST, at, Length::from_m(1.0));
+    (world, driver)
+}
+
+/// Lets `B1` report spuriously. Runs until `A1` has reported the train, which shows that it had not reached `B1`.
+fn b1_reports_and_is_revised(world: &mut ToyRailway, driver: &mut Driver) {
+    let [a1, b1] = ["A1", "B1"].map(|name| world.layout.sensor_named(name).expect("a sensor"));
+    world.run(driver, 2.4);
+    world.close(b1);
+    let has_passed = |world: &ToyRailway, at| {
+        world
+            .notices
+            .iter()
+            .any(|notice| matches!(notice, Notice::Passed { passed, .. } if passed.sensor == at))
+    };
+    assert!(world.run_until(driver, 1.0, |world| has_passed(world, b1)), "{:#?}", world.notices);
+    assert!(world.run_until(driver, 10.0, |world| has_passed(world, a1)), "{:#?}", world.notices);
+    let is_revised = |notice: &Notice| matches!(notice, Notice::Unexplained { sensor, .. } if *sensor == b1);
+    assert!(world.notices.iter().any(is_revised), "{:#?}", world.notices);
+}
+
+#[test]
+fn a_revised_detection_beyond_the_target_moves_neither_the_target_nor_the_end_of_authority() {
+    let (mut world, mut driver) = uncertain();
+    // Given a train that is to stop between two sensors of a circuit,
+    let target = world.layout.landmark("A1+350mm").expect("a place");
+    let stop = StopOrder { step: Some(step(8)), ..StopOrder::at(FIRST, target) };
+    driver.order(world.now, Order::Stop(stop)).expect("ahead");
+    let [d1, a1] = ["D1", "A1"].map(|name| world.layout.node_named(name).expect("a node"));
+    // and whose authority ends two laps ahead,
+    let end = PathPoint { node: d1, distance: Length::from_m(5.0) };
+    driver.set_end_of_authority(world.now, FIRST, Some(end));
+    // when the second one seems to have reported it, so that it is stopped, and the first one does,
+    b1_reports_and_is_revised(&mut world, &mut driver);
+    // then its authority ends where it did, 4.1 m beyond the first one,
+    let end = driver.end_of_authority(FIRST).expect("authority");
+    assert!(end.node == a1 && (end.distance - Length::from_mm(4_100.0)).as_mm().abs() < 40.0, "{end:?}");
+    world.run(&mut driver, 10.0);
+    // and it says how far from its target it came to rest.
+    let error = world.finished().first().and_then(|finished| finished.achieved.as_ref()?.error);
+    let error_mm = error.expect("at rest").as_mm();
+    let truth_mm = world.beyond_mm("A1+350mm");
+    assert!((error_mm - truth_mm).abs() < 40.0, "{error_mm} mm, in truth {truth_mm} mm");
 }

@@ -9,6 +9,7 @@ use crate::track::{Leg, TurnoutStates};
 use crate::tracking::{Locator, PassedSensor, TrackContext};
 
 use super::driven_train::DrivenTrain;
+use super::ends::Ends;
 use super::hypotheses::{Detection, Explanation, Hypothesis, hypotheses};
 
 /// An ambiguity that lasts longer is never resolved: even a creeping train reaches two more sensors in this time.
@@ -40,6 +41,8 @@ pub(super) struct Branch {
     pub(super) locator: Locator,
     /// A sensor that should have reported it before.
     pub(super) missed_sensor: Option<SensorId>,
+    /// Where its run and its authority ended, before the detection.
+    pub(super) ends: Ends,
     /// The prior probability, updated with each later detection.
     pub(super) probability: f64,
 }
@@ -132,6 +135,7 @@ impl Branch {
             legs,
             locator,
             missed_sensor,
+            ends: train.ends(),
             probability,
         }
     }

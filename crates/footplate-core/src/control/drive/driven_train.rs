@@ -58,6 +58,8 @@ pub(super) struct DrivenTrain {
     pub(super) reported: ReportedSpeed,
     /// Where its movement authority ends; `None` without a limit.
     pub(super) end_of_authority: Option<PathPoint>,
+    /// How many authorities it has been given.
+    pub(super) authorities_given: u32,
     /// Its lengths ahead of and behind the leading end of the pickup.
     pub(super) reach: [Length; 2],
     /// The state of its speed supervision.
@@ -86,6 +88,7 @@ impl DrivenTrain {
             detections: Detections::default(),
             reported: ReportedSpeed::default(),
             end_of_authority: None,
+            authorities_given: 0,
             reach: [TRAIN_REACH; 2],
             speed_supervision: SpeedSupervision::default(),
             pacing: None,

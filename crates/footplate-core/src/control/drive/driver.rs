@@ -382,7 +382,7 @@ impl Driver {
 
     /// Corrects a train after later detections have shown that it caused an earlier one, or that it did not.
     fn revise(&mut self, now: Timestamp, branch: Branch) {
-        let Branch { detection, caused, train, passes, legs, locator, missed_sensor, .. } = branch;
+        let Branch { detection, caused, train, passes, legs, locator, missed_sensor, ends, .. } = branch;
         if !caused {
             let Detection { sensor, window } = detection;
             self.outputs.notify(Notice::Unexplained { sensor, time: window.until });
@@ -392,6 +392,8 @@ impl Driver {
         let Some(train) = self.trains.get_mut(&train) else { return };
         train.locator = locator;
         train.expected.missed_sensor = missed_sensor;
+        train.passages.forget_from(detection.window.after - BOUNCE_TIME);
+        train.restore_ends(ends);
         for pass in &passes {
             if let Some(node) = context.node_of(pass.detection.sensor) {
                 train.passed(context, now, node, pass.passed, &mut self.outputs);

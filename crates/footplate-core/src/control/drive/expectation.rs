@@ -298,6 +298,7 @@ impl DrivenTrain {
         end: Option<PathPoint>,
     ) {
         self.end_of_authority = end;
+        self.authorities_given = self.authorities_given.wrapping_add(1);
         self.update_authority_stop(context, now);
     }
 
@@ -305,6 +306,7 @@ impl DrivenTrain {
     pub(super) fn end_authority_here(&mut self, context: TrackContext<'_>, now: Timestamp) {
         if self.end_of_authority.is_some() {
             self.end_of_authority = self.located(context, now).map(|located| located.at);
+            self.authorities_given = self.authorities_given.wrapping_add(1);
         }
     }
 

@@ -13,6 +13,7 @@ mod data_association;
 mod detections;
 mod driven_train;
 mod driver;
+mod ends;
 mod expectation;
 mod hypotheses;
 mod order;

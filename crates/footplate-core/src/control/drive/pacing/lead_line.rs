@@ -116,6 +116,11 @@ impl Passages {
         self.0.push_back((node, time));
     }
 
+    /// Drops the passages from a time on: they are noted again as they were.
+    pub(in crate::control::drive) fn forget_from(&mut self, time: Timestamp) {
+        self.0.retain(|(_, passed)| *passed < time);
+    }
+
     /// Clears the record: the train is elsewhere.
     pub(in crate::control::drive) fn forget(&mut self) {
         self.0.clear();
@@ -123,5 +128,20 @@ impl Passages {
 
     pub(super) fn iter(&self) -> impl DoubleEndedIterator<Item = (NodeId, Timestamp)> + '_ {
         self.0.iter().copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spurious_passage_leaves_the_record_and_earlier_ones_stay() {
+        let mut passages = Passages::default();
+        for (node, seconds) in [(1, 10.0), (2, 12.0), (3, 13.5)] {
+            passages.note(NodeId(node), Timestamp::from_s(seconds));
+        }
+        passages.forget_from(Timestamp::from_s(11.8));
+        assert_eq!(passages.iter().collect::<Vec<_>>(), [(NodeId(1), Timestamp::from_s(10.0))]);
     }
 }
