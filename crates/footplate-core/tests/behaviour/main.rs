@@ -20,6 +20,7 @@ mod pacing;
 mod paths_on_tracks;
 mod profiles;
 mod recovering;
+mod reserved_track;
 mod short_moves;
 mod speed_change_laws;
 mod speed_zones;

@@ -67,8 +67,8 @@ impl Dispatcher {
     }
 
     /// A sensor has reported a train: the track behind it is released, unless the report is ambiguous.
-    pub(super) fn detected_by_hand(&mut self, id: TrainId) {
-        let is_ambiguous = self.watchdog.driver().is_position_ambiguous(id);
+    pub(super) fn detected_by_hand(&mut self, now: Timestamp, id: TrainId) {
+        let is_ambiguous = self.watchdog.driver().is_position_ambiguous(id, now);
         let known =
             self.trains.get_mut(&id).filter(|train| matches!(train.state, State::ByHand | State::Lost));
         if let Some(train) = known.filter(|_| !is_ambiguous) {

@@ -106,6 +106,8 @@ pub(super) struct DispatchedTrain {
     /// Whether a sensor has reported it since it last started; of a train driven by hand, since it last ran. Until then it may still
     /// be there: trains stall on dirt.
     pub(super) detected_since_start: bool,
+    /// Its last run ended while its position depended on an ambiguous detection: it keeps the track of that run meanwhile.
+    pub(super) ambiguous_at_rest: bool,
     /// A sensor did not report it, and no path leads ahead: it may run back to be detected.
     pub(super) looks_back: bool,
     /// It has run a short distance ahead to be detected, since its last detection.
@@ -144,6 +146,7 @@ impl DispatchedTrain {
             no_room_until: Timestamp::ZERO,
             detected_since_reversal: false,
             detected_since_start: true,
+            ambiguous_at_rest: false,
             looks_back: false,
             has_looked_ahead: false,
             unobstructed_s: None,

@@ -37,7 +37,7 @@ impl Dispatcher {
                     train.detected_since_start = true;
                     train.has_looked_ahead = false;
                 }
-                self.detected_by_hand(*train);
+                self.detected_by_hand(now, *train);
                 let node = self.watchdog.driver().layout().sensor_node(passed.sensor);
                 let is_on_its_path = node.is_some_and(|node| self.confirmed_at(now, *train, node));
                 let state = self.trains.get(train).map(|train| train.state);

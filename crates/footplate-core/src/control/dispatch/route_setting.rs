@@ -42,6 +42,9 @@ impl TurnoutCommand {
 const POINTS_MOVE: TimeSpan = TimeSpan::from_ms(350);
 /// A turnout command is sent within this time: two polls, and the solenoids of a dozen others before it.
 const SENT_WITHIN: TimeSpan = TimeSpan::from_s(5.0);
+/// A journey is given up if the commands to a turnout were not sent for this long, although the station answers: the link
+/// has no such turnout address. That is three commands.
+const NEVER_SENT: TimeSpan = TimeSpan::from_s(15.0);
 /// An authority is withdrawn if a turnout cannot be thrown for this long: a train is nearer to it than estimated.
 const PATIENCE: TimeSpan = TimeSpan::from_s(8.0);
 
@@ -91,6 +94,14 @@ impl Dispatcher {
         if self.blocks_itself(now, id, &missing, &locked) {
             return false;
         }
+        if now - since >= NEVER_SENT
+            && !self.watchdog.is_interrupted(now, id)
+            && let Some(turnout) = self.not_sent(now, &missing)
+        {
+            self.throwing.remove(&turnout);
+            self.cannot_go(now, id, Refusal::TurnoutNotSent { turnout });
+            return false;
+        }
         for need in missing {
             // A second command that fails could leave moving points halfway.
             let moves =
@@ -123,6 +134,13 @@ impl Dispatcher {
             }
         }
         false
+    }
+
+    /// A turnout whose last command was not sent in time.
+    fn not_sent(&self, now: Timestamp, missing: &[TurnoutNeed]) -> Option<TurnoutId> {
+        let is_late =
+            |turnout: &TurnoutId| self.throwing.contains_key(turnout) && !self.is_being_thrown(now, *turnout);
+        missing.iter().map(|need| need.turnout).find(is_late)
     }
 
     /// Withdraws the authority of a train that is too near to a turnout of its run: another path may help, waiting

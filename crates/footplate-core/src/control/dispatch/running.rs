@@ -33,6 +33,10 @@ const RESTART_AFTER: TimeSpan = TimeSpan::from_s(1.0);
 /// A train that was stopped this close to its destination has arrived: to come closer it would have to leave first.
 const NEAR_ENOUGH: Length = Length::from_mm(80.0);
 
+/// A run that ends this far from its destination was planned from a wrong position: the train has not arrived. The most cautious
+/// stop, five standard deviations of 5 cm before its target, is nearer.
+const FAR: Length = Length::from_mm(500.0);
+
 impl Dispatcher {
     /// Advances every train.
     pub(super) fn advance_trains(&mut self, now: Timestamp) {
@@ -55,6 +59,7 @@ impl Dispatcher {
                 }
                 State::Lost if self.is_unattended(now, id) => self.watchdog.lose(now, id),
                 State::ByHand if !self.rest_by_hand(now, id) => self.drive_by_hand(now, id),
+                State::Resting if self.is_resolved_at_rest(now, id) => self.reserve_standstill(now, id),
                 State::Resting
                     if self.has_reservation(id)
                         && self.watchdog.driver().position(id, now).is_none()
@@ -66,6 +71,16 @@ impl Dispatcher {
                 _ => {}
             }
         }
+    }
+
+    /// Whether a train has arrived while its position depended on an ambiguous detection, and no longer does.
+    fn is_resolved_at_rest(&mut self, now: Timestamp, id: TrainId) -> bool {
+        let driver = self.watchdog.driver();
+        let is_certain = !driver.is_position_ambiguous(id, now)
+            && driver.missed_sensor(id, now).is_none()
+            && driver.position(id, now).is_some();
+        let known = self.trains.get_mut(&id).filter(|_| is_certain);
+        known.is_some_and(|train| core::mem::take(&mut train.ambiguous_at_rest))
     }
 
     /// Whether a train is lost, and neither a recovery searches for it nor an operator runs it over a sensor.
@@ -200,6 +215,7 @@ impl Dispatcher {
                 if let Some(train) = self.trains.get_mut(&id) {
                     train.withdrawn = 0;
                     train.detected_since_start = false;
+                    train.ambiguous_at_rest = false;
                 }
                 self.reserve_runs(now, id);
             }
@@ -213,7 +229,9 @@ impl Dispatcher {
         let State::Running { rear, confirmed, .. } = train.state else { return };
         let is_on_trailed = self.is_on_trailed_points(now, id);
         let Some(train) = self.trains.get_mut(&id) else { return };
-        let confirmed = confirmed && !unseen && !self.watchdog.driver().is_position_ambiguous(id);
+        let is_ambiguous = self.watchdog.driver().is_position_ambiguous(id, now);
+        train.ambiguous_at_rest = confirmed && !unseen && is_ambiguous;
+        let confirmed = confirmed && !unseen && !is_ambiguous;
         let ended = train.authorities.pop_front();
         if unseen && !train.authorities.is_empty() {
             // Its position is wrong, so the runs planned from there are invalid.
@@ -227,7 +245,10 @@ impl Dispatcher {
             train.state = State::Resting;
             self.watchdog.set_end_of_authority(now, id, None);
             self.rest(now, id, rear, confirmed.then_some(ended).flatten());
-            self.arrived(now, id, error);
+            // Otherwise its journey goes on.
+            if error.is_none_or(|error| error.abs() <= FAR) {
+                self.arrived(now, id, error);
+            }
         } else {
             train.state = State::Setting { ready: None, since: now };
             train.skipped.clear();
@@ -403,7 +424,7 @@ impl Dispatcher {
         let layout = self.watchdog.driver().layout();
         let Some(at) = run.path.find_node(layout, sensor, rear) else { return false };
         // Another train may have caused the detection, or none.
-        if self.watchdog.driver().is_position_ambiguous(id) {
+        if self.watchdog.driver().is_position_ambiguous(id, now) {
             return true;
         }
         let rear = rear.max(at - train.lengths.behind() - SLACK);

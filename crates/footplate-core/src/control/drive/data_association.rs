@@ -86,9 +86,10 @@ impl DataAssociation {
         self.unexplained.take_if(|unexplained| unexplained.may_be_of(train));
     }
 
-    /// Whether the position of a train depends on an ambiguous detection.
-    pub(super) fn is_ambiguous(&self, train: TrainId) -> bool {
-        let branches = self.ambiguity.iter().flat_map(|ambiguity| &ambiguity.branches);
+    /// Whether the position of a train depends on an ambiguous detection that later ones may still resolve.
+    pub(super) fn is_ambiguous(&self, train: TrainId, now: Timestamp) -> bool {
+        let open = self.ambiguity.iter().filter(|ambiguity| !ambiguity.is_over(now));
+        let branches = open.flat_map(|ambiguity| &ambiguity.branches);
         branches.into_iter().any(|branch| branch.train == train)
     }
 

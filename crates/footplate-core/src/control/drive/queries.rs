@@ -70,10 +70,10 @@ impl Driver {
         self.trains.get(&train).map_or(0.0, |train| train.missed_share(self.track.context(), now))
     }
 
-    /// Whether the position of a train depends on an ambiguous detection.
+    /// Whether the position of a train depends on an ambiguous detection that later ones may still resolve.
     #[must_use]
-    pub fn is_position_ambiguous(&self, train: TrainId) -> bool {
-        self.association.is_ambiguous(train)
+    pub fn is_position_ambiguous(&self, train: TrainId, now: Timestamp) -> bool {
+        self.association.is_ambiguous(train, now)
     }
 
     /// Measures the position of a train at rest from the node behind its pickup: turnouts further away no longer

@@ -124,6 +124,11 @@ pub enum Refusal {
         /// The train.
         train: TrainId,
     },
+    /// The commands to a turnout were not sent.
+    TurnoutNotSent {
+        /// The turnout.
+        turnout: TurnoutId,
+    },
     /// It has not come to its destination for so long.
     NotArrived {
         /// The train.
@@ -303,6 +308,11 @@ impl fmt::Display for Refusal {
                 f,
                 "the position of turnout {turnout} is unknown and train {train} may be on it: enter its position, for \
                  example `turnout {turnout} straight`, or run the train over the next sensor"
+            ),
+            Self::TurnoutNotSent { turnout } => write!(
+                f,
+                "the commands to turnout {turnout} could not be sent: check its address in the layout and the turnout \
+                 addresses of this link, or choose a place that needs no turnout {turnout}"
             ),
             Self::NotArrived { train, within } => write!(
                 f,

@@ -1,0 +1,132 @@
+//! A dispatched train keeps the track on which it may be, and no more: when it stalls, is placed by hand, or when a report is
+//! ambiguous. A journey whose turnouts cannot be set is given up.
+
+use footplate_core::control::{Dispatcher, Machine, Notice, Order, Refusal};
+use footplate_core::track::Position;
+use footplate_core::tracking::PathPoint;
+use footplate_core::{Length, TurnoutId};
+
+use crate::dispatching::{LENGTHS, STARTS, TRAINS, Traffic, is_held};
+use crate::toy_railway::{step, straight};
+
+#[test]
+fn a_train_that_stalls_while_it_is_driven_by_hand_keeps_the_track_under_it() {
+    // Given a train that stalls 100 mm beyond `A1`, before a turnout,
+    let mut traffic = Traffic::with(Dispatcher::new, [STARTS[0], ("E1", 300.0)]);
+    let [train, _] = TRAINS;
+    let speed = |number| Order::Speed { train, step: step(number) };
+    traffic.dispatcher.order(traffic.world.now, speed(9)).expect("free");
+    let a1 = traffic.world.layout.sensor_named("A1").expect("a sensor");
+    while !traffic.world.passes.iter().any(|(_, sensor, _)| *sensor == a1) {
+        traffic.run(0.05);
+    }
+    traffic.run(0.35);
+    traffic.world.trains.iter_mut().filter(|toy| toy.id == train).for_each(|toy| toy.wheels = 0.0);
+    // when it is estimated to run on, and is stopped,
+    traffic.run(0.8);
+    traffic.dispatcher.order(traffic.world.now, speed(0)).expect("stops");
+    traffic.run(20.0);
+    let located = traffic.dispatcher.driver().locate(train, traffic.world.now).expect("located");
+    assert!(located.at_rest && located.at.distance > Length::from_mm(300.0), "{located:?}");
+    // then the track on which it stands is reserved for it, and the turnout before it does not move.
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+    let throw = Order::Turnout { turnout: TurnoutId(1), curved: true };
+    assert!(traffic.dispatcher.order(traffic.world.now, throw).is_err());
+    // A journey does not release it either, until a sensor reports the train.
+    traffic.world.trains.iter_mut().for_each(|toy| toy.wheels = 1.0);
+    traffic.go(train, "D1+150mm");
+    traffic.run(60.0);
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+    assert_eq!(traffic.arrivals(train), 1, "{:#?}", traffic.notices);
+}
+
+#[test]
+fn a_train_that_is_placed_occupies_the_track_that_the_turnouts_lead_to() {
+    let mut traffic = Traffic::new();
+    let [train, _] = TRAINS;
+    let layout = traffic.world.layout.clone();
+    let [b1, c1, mr2] = ["B1", "C1", "MR2"].map(|name| layout.node_named(name).expect("a node"));
+    let sure = Length::from_mm(2.0);
+    // Given a train on the curved leg of a turnout that is set straight,
+    traffic.dispatcher.place(
+        traffic.world.now,
+        train,
+        PathPoint { node: c1, distance: Length::from_mm(200.0) },
+        sure,
+    );
+    traffic.dispatcher.handle_timeout(traffic.world.now);
+    // when it is lifted and put down just beyond the turnout,
+    traffic.dispatcher.place(
+        traffic.world.now,
+        train,
+        PathPoint { node: b1, distance: Length::from_mm(520.0) },
+        sure,
+    );
+    traffic.dispatcher.handle_timeout(traffic.world.now);
+    traffic.dispatcher.set_lengths(traffic.world.now, train, LENGTHS);
+    // then its rear is on the straight leg, not on the one where it was before.
+    let reserved = traffic.dispatcher.reservation(train).expect("dispatched");
+    let holds = |from, length_mm: f64| {
+        let edge = layout.edge_between(from, mr2).expect("an edge");
+        is_held(&layout, Position { edge, offset: Length::from_mm(length_mm - 30.0) }, reserved)
+    };
+    assert!(holds(b1, 500.0));
+    assert!(!holds(c1, 450.0));
+}
+
+#[test]
+fn an_arrived_train_keeps_its_run_only_while_its_position_is_ambiguous() {
+    // Given a train that has passed the last sensor on its run,
+    let mut traffic = Traffic::with(Dispatcher::new, [STARTS[0], ("E1", 300.0)]);
+    let [train, _] = TRAINS;
+    let sensor = |traffic: &Traffic, name| traffic.world.layout.sensor_named(name).expect("a sensor");
+    let [last, elsewhere] = ["B1", "F1"].map(|name| sensor(&traffic, name));
+    traffic.go(train, "B1+250mm");
+    while !traffic.world.passes.iter().any(|(_, sensor, _)| *sensor == last) {
+        traffic.run(0.1);
+    }
+    traffic.run(0.2);
+    let place = traffic.world.layout.landmark("BR1+450mm").expect("a place");
+    let behind = traffic.world.layout.locate(place, &straight()).expect("a place");
+    let is_reserved = |traffic: &Traffic| {
+        is_held(&traffic.world.layout, behind, traffic.dispatcher.reservation(train).expect("dispatched"))
+    };
+    // when another sensor reports what may be that train, if it was lifted, and the train arrives,
+    traffic.world.close(elsewhere);
+    for _ in 0..60 {
+        if traffic.arrivals(train) == 0 {
+            traffic.run(0.5);
+        }
+    }
+    assert_eq!(traffic.arrivals(train), 1, "{:#?}", traffic.notices);
+    let now = traffic.world.now;
+    assert_eq!(
+        (traffic.dispatcher.driver().is_position_ambiguous(train, now), is_reserved(&traffic)),
+        (true, true),
+        "{now:?} {:#?}",
+        traffic.notices
+    );
+    // then it releases its run once no later report can show otherwise.
+    traffic.run(20.0);
+    traffic.dispatcher.handle_timeout(traffic.world.now);
+    assert!(!is_reserved(&traffic));
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+}
+
+#[test]
+fn a_journey_over_a_turnout_that_the_link_cannot_address_is_given_up() {
+    let mut traffic = Traffic::new();
+    traffic.unsent = Some(TurnoutId(1));
+    traffic.go(TRAINS[0], "C1+150mm");
+    traffic.run(40.0);
+    let why = traffic.notices.iter().find_map(|notice| match notice {
+        Notice::GivenUp { train, why, .. } if *train == TRAINS[0] => Some(why.clone()),
+        _ => None,
+    });
+    assert_eq!(why, Some(Refusal::TurnoutNotSent { turnout: TurnoutId(1) }), "{:#?}", traffic.notices);
+    // Once its address is right, the same journey is carried out.
+    traffic.unsent = None;
+    traffic.go(TRAINS[0], "C1+150mm");
+    traffic.run(60.0);
+    assert_eq!((traffic.arrivals(TRAINS[0]), traffic.wrongs.len()), (1, 0), "{:#?}", traffic.notices);
+}
