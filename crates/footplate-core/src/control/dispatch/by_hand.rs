@@ -56,8 +56,19 @@ impl Dispatcher {
         if is_done && is_known {
             let confirmed = self.trains.get(&id).is_some_and(|train| train.detected_since_start);
             self.halted(now, id, confirmed);
+            if !confirmed {
+                self.keep_run_by_hand(now, id);
+            }
         }
         is_done && is_known
+    }
+
+    /// Reduces the reservation of a train at rest to the track under it, and on which it may have stalled.
+    fn keep_run_by_hand(&mut self, now: Timestamp, id: TrainId) {
+        self.restore_reservation(now, id);
+        if let Some(train) = self.trains.get_mut(&id) {
+            train.kept = train.reservation.clone();
+        }
     }
 
     /// A lost train was detected while it runs.
@@ -129,6 +140,9 @@ impl Dispatcher {
             self.reserved(path.reservation(layout, at - envelope.behind, own_end + envelope.ahead));
         self.reserve_anchors(now, id, place, &mut reservation);
         reservation.add(layout, &train.kept);
+        // Not the track ahead, where it may never come.
+        let mut kept = self.reserved(path.reservation(layout, at - envelope.behind, at + envelope.ahead));
+        kept.add(layout, &train.kept);
         // Neither the horizon nor a turnout of unknown position is an end of authority: the operator sees them.
         let limit = (end < reach).then(|| {
             let limit = path
@@ -142,7 +156,7 @@ impl Dispatcher {
         if let Some(train) = self.trains.get_mut(&id) {
             if runs {
                 train.detected_since_start = false;
-                train.kept = reservation.clone();
+                train.kept = kept;
             }
             if train.reservation != reservation {
                 train.reservation = reservation;

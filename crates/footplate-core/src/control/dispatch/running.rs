@@ -370,7 +370,7 @@ impl Dispatcher {
     }
 
     /// Restores the reservation of a train that does not start, with the track under it, as it may have reversed.
-    fn restore_reservation(&mut self, now: Timestamp, id: TrainId) {
+    pub(super) fn restore_reservation(&mut self, now: Timestamp, id: TrainId) {
         let kept = self.trains.get_mut(&id).map(|train| core::mem::take(&mut train.kept));
         self.reserve_standstill(now, id);
         let layout = self.watchdog.driver().layout();
