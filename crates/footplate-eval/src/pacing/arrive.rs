@@ -182,9 +182,7 @@ impl Trip<'_, '_> {
         }
         let until = self.now() + TimeSpan::from_s(STANDS_WITHIN);
         while self.counted.drive(&mut self.prepared.line, until).is_some() {}
-        if self.prepared.world().incidents().len() > incidents {
-            arrived.trouble = Some("it came to grief".to_owned());
-        }
+        arrived.trouble = self.prepared.grief_since(incidents).or_else(|| arrived.trouble.take());
         arrived.commands = self.counted.steps(self.train) - before;
         if arrived.trouble.is_none() {
             arrived.late_and_beyond = self.late_and_beyond(target, by);

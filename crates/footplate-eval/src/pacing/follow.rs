@@ -28,9 +28,6 @@ const STEPS_BEYOND: f64 = 0.1;
 const LENGTHS: TrainLengths =
     TrainLengths { overhang: Length::from_mm(100.0), pickup: Length::from_mm(45.0) };
 
-/// The failure of trains that touched, derailed or ran off the track.
-pub(super) const GRIEF: &str = "they came to grief";
-
 /// The drivers of followers.
 pub(super) const DRIVERS: [By; 2] = [By::Footplate, By::Step];
 
@@ -181,15 +178,13 @@ impl<'a, 'l> Row<'a, 'l> {
         let (since, before) =
             (self.now(), self.trains.iter().map(|train| self.counted.steps(*train)).collect::<Vec<_>>());
         self.drive(lasts);
-        let grief = self.prepared.world().incidents().len() > incidents;
+        let grief = self.prepared.grief_since(incidents);
         let truth = self.prepared.world().truth();
         for followed in &mut self.followed {
             let leader = self.trains[followed.place - 1];
             followed.seconds = lasts;
             followed.commands = self.counted.steps(followed.train) - before[followed.place];
-            if grief {
-                followed.trouble.get_or_insert_with(|| GRIEF.to_owned());
-            }
+            followed.trouble = grief.clone().or_else(|| followed.trouble.take());
             followed.compare(truth, leader, since, &self.odometers);
         }
         self.followed

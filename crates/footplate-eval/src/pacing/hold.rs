@@ -170,9 +170,7 @@ fn held(layout: &Layout, mut prepared: PreparedTrains<'_>, train: TrainId, by: B
             until = prepared.line.now() + TimeSpan::from_s(HELD_FOR);
         }
     }
-    if prepared.world().incidents().len() > before {
-        held.trouble = Some("it came to grief".to_owned());
-    }
+    held.trouble = prepared.grief_since(before).or_else(|| held.trouble.take());
     let Some((ideal, commands)) = ideal else {
         held.trouble.get_or_insert_with(|| "it never began".to_owned());
         return held;

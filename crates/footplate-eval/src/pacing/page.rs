@@ -11,6 +11,7 @@ use super::counted::By;
 use super::follow::{self, Followed, Kept};
 use super::hold::{Held, HoldRecord};
 use crate::figures::{quantile, root_mean_square, shown, within_pct};
+use crate::testbed::GRIEF;
 use crate::written_scores::{Rate, WrittenScores};
 
 const HEAD: &str = "\
@@ -152,7 +153,7 @@ impl WrittenScores for Page {
     }
 
     fn rates(&self) -> Vec<Rate> {
-        let griefs = |scored: &&Scored| scored.troubles().any(|(_, trouble)| trouble == follow::GRIEF);
+        let griefs = |scored: &&Scored| scored.troubles().any(|(_, trouble)| trouble.starts_with(GRIEF));
         let failed = self.scored.iter().filter(|scored| scored.troubles().next().is_some());
         let arrived: Vec<[f64; 2]> = self
             .scored

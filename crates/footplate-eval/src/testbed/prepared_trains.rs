@@ -32,7 +32,17 @@ pub struct PreparedTrains<'l> {
     places: BTreeMap<TrainId, PathPoint>,
 }
 
+/// How the trouble of a train begins that touched another, derailed or ran off the track.
+pub(crate) const GRIEF: &str = "came to grief";
+
 impl<'l> PreparedTrains<'l> {
+    /// What happened since there were this many incidents, if trains came to grief.
+    pub(crate) fn grief_since(&self, incidents: usize) -> Option<String> {
+        let since = self.world().incidents().get(incidents..).unwrap_or_default();
+        let said: Vec<String> = since.iter().map(ToString::to_string).collect();
+        (!said.is_empty()).then(|| format!("{GRIEF}: {}", said.join("; ")))
+    }
+
     /// Draws trains and track from the seed, calibrates each train while the others are off the layout, lifts them all,
     /// and sets all turnouts straight. A calibration with a fault is repeated from another place.
     ///

@@ -153,9 +153,7 @@ impl Ride<'_, '_> {
             }
             watched.look(self.prepared.world().truth(), self.prepared.line.now());
         }
-        if self.prepared.world().incidents().len() > incidents {
-            trouble = Some("it came to grief".to_owned());
-        }
+        let trouble = self.prepared.grief_since(incidents).or(trouble);
         Ridden {
             task: self.task,
             train: self.train,
