@@ -114,6 +114,7 @@ const LINES = [
   [/^train (\d+) is not part of this session$/, "Zug $1 gehört nicht zu dieser Sitzung"], [/^the layout has no turnout (\d+)$/, "die Anlage hat keine Weiche $1"],
   [/^step (\d+) is too high: the highest step of this train is (\d+)$/, "Stufe $1 ist zu hoch: die höchste Stufe dieses Zuges ist $2"],
   [/^probability (\S+) % is out of range: .*$/, "Wahrscheinlichkeit $1 % ist außerhalb des Bereichs: 0.0001 % bis 50 %"], [/^distance (\S+) mm is out of range: .*$/, "Strecke $1 mm ist außerhalb des Bereichs: 1 mm bis 100000 mm"],
+  [/^the commands to turnout (\d+) could not be sent: .*$/, "die Befehle an Weiche $1 konnten nicht gesendet werden: ihre Adresse im Gleisplan und die Weichenadressen dieser Verbindung prüfen, oder ein Ziel ohne Weiche $1 wählen"],
   [/^train (\d+) did not arrive within (\S+) s: .*$/, "Zug $1 ist in $2 s nicht angekommen: wegräumen, was seinen Weg versperrt, und Züge mit unsicherer Position über einen Rückmelder fahren"],
   [/^train (\d+) already follows train (\d+): .*$/, "Zug $1 folgt schon Zug $2: Zug $1 erst einen anderen Befehl geben"], [/^gap to train (\d+) too short to stop safely: use at least (.*)$/, "Abstand zu Zug $1 ist zu kurz, um sicher zu halten: mindestens $2"],
   [/^(\S+) mm\/s cannot be held: use (\S+) to (\S+) mm\/s$/, "$1 mm/s lassen sich nicht halten: $2 bis $3 mm/s"], [/^no sensor reported train (\d+) within (\S+) s: .*$/, "kein Rückmelder hat Zug $1 in $2 s gemeldet: prüfen, ob er fährt und auf dieser Anlage ist"],
