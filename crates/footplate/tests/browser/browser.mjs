@@ -23,11 +23,11 @@ export async function openPage(browser, address, options = {}) {
   return { page, complaints };
 }
 
-/** Opens a live page; collects console errors. */
+/** Opens a live page; collects console errors, with the address of what could not be loaded. */
 export async function openQuietly(browser, address, options = {}) {
   const page = await browser.newPage({ viewport: { width: 1300, height: 900 }, ...options });
   const complaints = [];
-  page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
+  page.on("console", (message) => message.type() === "error" && complaints.push(`${message.text()} ${message.location().url}`));
   page.on("pageerror", (error) => complaints.push(String(error)));
   await page.goto(address);
   return { page, complaints };

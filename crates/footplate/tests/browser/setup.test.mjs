@@ -14,8 +14,9 @@ import { PATIENCE, begin, end } from "./railway.mjs";
 
 /** The time limit of a calibration: five minutes at twenty times real time, on a busy machine. */
 const CALIBRATED_MS = 120_000;
-/** While another program takes over the address, a browser reports that the server does not answer. */
-const GOES_OVER = /ERR_CONNECTION_REFUSED|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET|ERR_INCOMPLETE_CHUNKED_ENCODING|ERR_SOCKET_NOT_CONNECTED/;
+/** While another program takes over the address, a browser reports that the server does not answer, or that the set-up has not what
+ * the page of a session asked for last. */
+const GOES_OVER = /status of 404 .*\/api\/(?:layout|schedules|truth)$|ERR_CONNECTION_REFUSED|ERR_EMPTY_RESPONSE|ERR_CONNECTION_RESET|ERR_INCOMPLETE_CHUNKED_ENCODING|ERR_SOCKET_NOT_CONNECTED/;
 
 let browser;
 const running = new Set();
