@@ -5,7 +5,7 @@ use footplate_core::track::Leg;
 use footplate_core::tracking::PathPoint;
 use footplate_core::{Command, Length, SpeedStep, TimeSpan, TurnoutId};
 
-use crate::watching::{FIRST, Watched};
+use crate::watching::{FIRST, SECOND, Watched};
 
 #[test]
 fn a_train_stopped_in_the_instant_of_its_start_is_recovered() {
@@ -86,6 +86,27 @@ fn a_train_that_was_turned_does_not_resume_its_order() {
         let is_cancelled = watched.notices.iter().any(|notice| matches!(notice, Notice::Cancelled { .. }));
         assert_eq!((is_resumed, is_cancelled), (!is_turned, is_turned), "{:#?}", watched.notices);
     }
+}
+
+#[test]
+fn a_turned_train_that_is_held_for_another_one_does_not_resume_its_order_either() {
+    // Given a train that was turned by hand while it ran, and another one in danger just before it is back in service,
+    let mut watched = Watched::with_another_at("E1", 300.0);
+    watched.go(FIRST, 8);
+    watched.run(12.0);
+    watched.world.turn_around(FIRST);
+    let is_measured = |watched: &Watched| {
+        watched.notices.iter().any(|notice| matches!(notice, Notice::SpeedMeasured { .. }))
+    };
+    assert!(watched.run_until(200.0, is_measured), "{:#?}", watched.notices);
+    watched.dog.distrust(watched.world.now, SECOND);
+    // when it is back before the other one is,
+    assert!(watched.run_until(200.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
+    assert!(!watched.dog.is_in_danger(FIRST) && watched.dog.is_in_danger(SECOND), "{:#?}", watched.notices);
+    // then its order is cancelled, and does not wait for the other one's recovery.
+    let is_cancelled = |notice: &Notice| matches!(notice, Notice::Cancelled { train, .. } if *train == FIRST);
+    assert!(watched.notices.iter().any(is_cancelled), "{:#?}", watched.notices);
+    assert!(watched.dog.is_held(FIRST));
 }
 
 #[test]

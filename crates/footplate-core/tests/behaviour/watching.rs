@@ -19,7 +19,7 @@ use proptest::prelude::{Just, ProptestConfig, Strategy, any, prop_assert, prop_o
 use crate::toy_railway::{ToyRailway, add_train, driver_of, step};
 
 pub(crate) const FIRST: TrainId = TrainId(24);
-const SECOND: TrainId = TrainId(58);
+pub(crate) const SECOND: TrainId = TrainId(58);
 
 /// A world with a watchdog, and all its notices and commands.
 pub(crate) struct Watched {
@@ -49,10 +49,14 @@ impl Watched {
 
     /// The same, with train 58 half a lap ahead.
     pub(crate) fn two() -> Self {
+        Self::with_another_at("B1", 100.0)
+    }
+
+    pub(crate) fn with_another_at(node: &str, mm: f64) -> Self {
         let mut world = ToyRailway::new(24, "D1", 300.0);
-        world.put(58, "B1", 100.0);
+        world.put(58, node, mm);
         let mut driver = driver_of(&world, "D1", 300.0);
-        add_train(&mut driver, &world, 58, Some(("B1", 100.0)));
+        add_train(&mut driver, &world, 58, Some((node, mm)));
         let dog = Watchdog::new(driver, world.now);
         Self { world, dog, notices: Vec::new(), commanded: Vec::new() }
     }

@@ -452,25 +452,25 @@ impl Watchdog {
         }
         self.notify(Notice::Recovered { train, outcome, took: now - recovery.began });
         self.clear_intruder();
+        let faces = self.driver.position(train, now).map(|place| place.edge);
+        let is_turned = recovery
+            .faced
+            .zip(faces)
+            .is_some_and(|(before, faces)| was_turned(self.driver.layout(), before, faces));
+        if let Some((_, order)) = recovery.interrupted.filter(|_| is_turned) {
+            // It was meant for the other direction.
+            self.notify(Notice::Cancelled { train, order });
+        }
+        let own = recovery.interrupted.filter(|_| !is_turned);
         if self.dangers.is_empty() {
             let held = core::mem::take(&mut self.held);
-            let interrupted = held.into_iter().filter_map(|(train, order)| Some((train, order?)));
-            let faces = self.driver.position(train, now).map(|place| place.edge);
-            let is_turned = recovery
-                .faced
-                .zip(faces)
-                .is_some_and(|(before, faces)| was_turned(self.driver.layout(), before, faces));
-            if let Some((_, order)) = recovery.interrupted.filter(|_| is_turned) {
-                // It was meant for the other direction.
-                self.notify(Notice::Cancelled { train, order });
-            }
-            let own = recovery.interrupted.filter(|_| !is_turned).map(|order| (train, order));
-            for (train, (id, order)) in interrupted.chain(own).collect::<Vec<_>>() {
+            let interrupted = held.into_iter().chain([(train, own)]);
+            for (train, (id, order)) in interrupted.filter_map(|(train, order)| Some((train, order?))) {
                 self.resume(now, train, id, order);
             }
         } else {
             // Hold it until no other train is in danger.
-            self.held.insert(train, recovery.interrupted);
+            self.held.insert(train, own);
         }
     }
 
