@@ -162,6 +162,14 @@ impl Traffic {
         self.wrongs.extend(wrongs);
     }
 
+    /// Runs on until a sensor has been passed.
+    pub(crate) fn run_to(&mut self, name: &str) {
+        let reached = self.world.layout.sensor_named(name).expect("a sensor");
+        while !self.world.passes.iter().any(|(_, sensor, _)| *sensor == reached) {
+            self.run(0.05);
+        }
+    }
+
     pub(crate) fn arrivals(&self, train: TrainId) -> usize {
         let here =
             |notice: &&Notice| matches!(notice, Notice::Arrived { train: arrived, .. } if *arrived == train);

@@ -16,10 +16,7 @@ fn a_train_that_stalls_while_it_is_driven_by_hand_keeps_the_track_under_it() {
     let [train, _] = TRAINS;
     let speed = |number| Order::Speed { train, step: step(number) };
     traffic.dispatcher.order(traffic.world.now, speed(9)).expect("free");
-    let a1 = traffic.world.layout.sensor_named("A1").expect("a sensor");
-    while !traffic.world.passes.iter().any(|(_, sensor, _)| *sensor == a1) {
-        traffic.run(0.05);
-    }
+    traffic.run_to("A1");
     traffic.run(0.35);
     traffic.world.trains.iter_mut().filter(|toy| toy.id == train).for_each(|toy| toy.wheels = 0.0);
     // when it is estimated to run on, and is stopped,
@@ -46,23 +43,15 @@ fn a_train_that_is_placed_occupies_the_track_that_the_turnouts_lead_to() {
     let [train, _] = TRAINS;
     let layout = traffic.world.layout.clone();
     let [b1, c1, mr2] = ["B1", "C1", "MR2"].map(|name| layout.node_named(name).expect("a node"));
-    let sure = Length::from_mm(2.0);
+    let mut place = |node, beyond_mm| {
+        let at = PathPoint { node, distance: Length::from_mm(beyond_mm) };
+        traffic.dispatcher.place(traffic.world.now, train, at, Length::from_mm(2.0));
+        traffic.dispatcher.handle_timeout(traffic.world.now);
+    };
     // Given a train on the curved leg of a turnout that is set straight,
-    traffic.dispatcher.place(
-        traffic.world.now,
-        train,
-        PathPoint { node: c1, distance: Length::from_mm(200.0) },
-        sure,
-    );
-    traffic.dispatcher.handle_timeout(traffic.world.now);
+    place(c1, 200.0);
     // when it is lifted and put down just beyond the turnout,
-    traffic.dispatcher.place(
-        traffic.world.now,
-        train,
-        PathPoint { node: b1, distance: Length::from_mm(520.0) },
-        sure,
-    );
-    traffic.dispatcher.handle_timeout(traffic.world.now);
+    place(b1, 520.0);
     traffic.dispatcher.set_lengths(traffic.world.now, train, LENGTHS);
     // then its rear is on the straight leg, not on the one where it was before.
     let reserved = traffic.dispatcher.reservation(train).expect("dispatched");
@@ -79,12 +68,9 @@ fn an_arrived_train_keeps_its_run_only_while_its_position_is_ambiguous() {
     // Given a train that has passed the last sensor on its run,
     let mut traffic = Traffic::with(Dispatcher::new, [STARTS[0], ("E1", 300.0)]);
     let [train, _] = TRAINS;
-    let sensor = |traffic: &Traffic, name| traffic.world.layout.sensor_named(name).expect("a sensor");
-    let [last, elsewhere] = ["B1", "F1"].map(|name| sensor(&traffic, name));
+    let elsewhere = traffic.world.layout.sensor_named("F1").expect("a sensor");
     traffic.go(train, "B1+250mm");
-    while !traffic.world.passes.iter().any(|(_, sensor, _)| *sensor == last) {
-        traffic.run(0.1);
-    }
+    traffic.run_to("B1");
     traffic.run(0.2);
     let place = traffic.world.layout.landmark("BR1+450mm").expect("a place");
     let behind = traffic.world.layout.locate(place, &straight()).expect("a place");

@@ -112,10 +112,13 @@ impl Dispatcher {
         // A follower may run over the track of its leader, of that one's leader, and so on: the driver keeps gaps
         // safe. It reserves none of it; otherwise its leader would be stopped before its own follower.
         let row = self.row_ahead(id);
+        let reserved_between =
+            |from: Length, end: Length| self.reserved(path.reservation(layout, from, end + envelope.ahead));
+        let rear = at - envelope.behind;
         let is_free = |end: Length, shared: &[TrainId]| {
-            let taken = self.reserved(path.reservation(layout, at - envelope.behind, end + envelope.ahead));
+            let taken = reserved_between(rear, end);
             // The margins of its followers, close behind, may overlap its own.
-            let ahead = self.reserved(path.reservation(layout, at, end + envelope.ahead));
+            let ahead = reserved_between(at, end);
             self.trains.values().all(|other| {
                 let taken = if self.row_ahead(other.id).contains(&id) { &ahead } else { &taken };
                 shared.contains(&other.id) || !other.reservation.meets(taken)
@@ -136,13 +139,17 @@ impl Dispatcher {
             return;
         }
         let own_end = free_until(end, &[id]);
-        let mut reservation =
-            self.reserved(path.reservation(layout, at - envelope.behind, own_end + envelope.ahead));
+        let mut reservation = reserved_between(rear, own_end);
         self.reserve_anchors(now, id, place, &mut reservation);
         reservation.add(layout, &train.kept);
-        // Not the track ahead, where it may never come.
-        let mut kept = self.reserved(path.reservation(layout, at - envelope.behind, at + envelope.ahead));
-        kept.add(layout, &train.kept);
+        let driver = self.watchdog.driver();
+        let runs = driver.commanded(id) > SpeedStep::STAND || !driver.is_at_rest(id, now);
+        let kept = runs.then(|| {
+            // Not the track ahead, where it may never come.
+            let mut kept = reserved_between(rear, at);
+            kept.add(layout, &train.kept);
+            kept
+        });
         // Neither the horizon nor a turnout of unknown position is an end of authority: the operator sees them.
         let limit = (end < reach).then(|| {
             let limit = path
@@ -151,10 +158,8 @@ impl Dispatcher {
             limit.filter(|limit| limit.distance >= located.at.distance).unwrap_or(located.at)
         });
         self.watchdog.set_end_of_authority(now, id, limit);
-        let driver = self.watchdog.driver();
-        let runs = driver.commanded(id) > SpeedStep::STAND || !driver.is_at_rest(id, now);
         if let Some(train) = self.trains.get_mut(&id) {
-            if runs {
+            if let Some(kept) = kept {
                 train.detected_since_start = false;
                 train.kept = kept;
             }

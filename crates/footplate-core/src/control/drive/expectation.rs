@@ -297,16 +297,19 @@ impl DrivenTrain {
         now: Timestamp,
         end: Option<PathPoint>,
     ) {
+        self.give_authority(end);
+        self.update_authority_stop(context, now);
+    }
+
+    fn give_authority(&mut self, end: Option<PathPoint>) {
         self.end_of_authority = end;
         self.authorities_given = self.authorities_given.wrapping_add(1);
-        self.update_authority_stop(context, now);
     }
 
     /// Ends the authority where the train is: it was placed or reversed, and the authority no longer applies.
     pub(super) fn end_authority_here(&mut self, context: TrackContext<'_>, now: Timestamp) {
         if self.end_of_authority.is_some() {
-            self.end_of_authority = self.located(context, now).map(|located| located.at);
-            self.authorities_given = self.authorities_given.wrapping_add(1);
+            self.give_authority(self.located(context, now).map(|located| located.at));
         }
     }
 
