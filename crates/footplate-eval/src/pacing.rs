@@ -18,7 +18,7 @@ use self::follow::{Followed, Kept, follow};
 use self::hold::{Held, hold};
 pub use self::page::Page;
 use crate::seeds::Choice;
-use crate::testbed::{LongestCircuit, PreparedTrains};
+use crate::testbed::{GRIEF, LongestCircuit, PreparedTrains};
 
 /// Three trains, in the order in which they follow each other.
 const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(63)];
@@ -37,10 +37,11 @@ pub struct Scored {
 }
 
 impl Scored {
-    /// The first train that Footplate drove and whose order failed, and why.
+    /// The first train that Footplate drove and whose order failed, and why; before all others one that came to grief.
     #[must_use]
     pub fn failures(&self) -> Vec<String> {
-        self.troubles().take(1).map(|(train, trouble)| format!("train {train}: {trouble}")).collect()
+        let worst = self.troubles().min_by_key(|(_, trouble)| !trouble.starts_with(GRIEF));
+        worst.map(|(train, trouble)| format!("train {train}: {trouble}")).into_iter().collect()
     }
 
     fn troubles(&self) -> impl Iterator<Item = (TrainId, &str)> {

@@ -385,12 +385,21 @@ impl MotionModel {
     /// How long it takes, from the command's leaving the line, to be steady at a step coming from another.
     #[must_use]
     pub fn settles_within(&self, from: SpeedStep, to: SpeedStep) -> TimeSpan {
+        TimeSpan::from_s(self.change(from, to).settled().max(LEAST_STOP_S))
+    }
+
+    /// The same until the change has shown, so that another would not interrupt it.
+    pub(crate) fn shows_within(&self, from: SpeedStep, to: SpeedStep) -> TimeSpan {
+        TimeSpan::from_s(self.change(from, to).shown())
+    }
+
+    /// The change from one step, at which it runs steadily, to another that is commanded at zero.
+    fn change(&self, from: SpeedStep, to: SpeedStep) -> Segment {
         let answers = self.answers();
         let commanded =
             SpeedCommand { sent: 0.0, from: from.get(), to: to.get(), at_rest: from == SpeedStep::STAND };
         let pace = Pace::steady(answers.speed(usize::from(from.get()), false));
-        let segment = Segment::of(&commanded, &answers, pace);
-        TimeSpan::from_s(segment.settled().max(LEAST_STOP_S))
+        Segment::of(&commanded, &answers, pace)
     }
 
     /// The path length of a hop, and one standard deviation of it.

@@ -107,6 +107,9 @@ impl Rolling {
 /// A change counts as done when this share of it is left: the last 3 % of a stop from 0.4 m/s are run at less than 12 mm/s.
 const SETTLED: f64 = 0.03;
 
+/// The longest lag (s) that is an eased change: the middle of a window or a start at rate zero of 0.9 s. A longer one is the motor's.
+const EASED_LAG: f64 = 0.45;
+
 /// Standard deviation of the speed in the middle of a change, as part of the change: an eased ramp (3τ² − 2τ³) and an even one
 /// differ by up to 0.096.
 const SHAPE_SPEED_ERROR: f64 = 0.07;
@@ -266,6 +269,12 @@ impl Segment {
     /// When the change is done but for the rest that does not count (s, on the clock of the run).
     pub(crate) fn settled(&self) -> f64 {
         self.begins + self.braking.map_or_else(|| self.shape.settled(SETTLED), |rolling| rolling.ends())
+    }
+
+    /// When a change that is eased is done (s, on the clock of the run). A decoder that eases in begins at rate zero again with
+    /// each command: commanded to go down step by step before that, it hardly slows down at all.
+    pub(crate) fn shown(&self) -> f64 {
+        self.begins + self.shape.ramp() + 2.0 * self.shape.lag().min(EASED_LAG)
     }
 
     /// The whole distance of a stop (m).

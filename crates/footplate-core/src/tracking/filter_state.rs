@@ -112,6 +112,11 @@ impl FilterState {
         self.step == 0 && time >= self.rest_time()
     }
 
+    /// Whether all that was commanded has taken effect, and has shown.
+    pub(super) fn has_shown(&self, time: f64) -> bool {
+        self.pending.iter().all(Option::is_none) && self.segment.shown() <= time
+    }
+
     pub(super) fn rest_time(&self) -> f64 {
         if self.segment.from.speed == 0.0 { self.segment.begins } else { self.segment.settled() }
     }

@@ -376,6 +376,12 @@ impl Locator {
         self.rest_of(context, stopped, model)
     }
 
+    /// Whether the change of speed commanded last has shown: another one would not be as if it had.
+    #[must_use]
+    pub fn has_change_shown(&self, model: &MotionModel, at: Timestamp) -> bool {
+        self.filter.has_shown(model, self.seconds(at))
+    }
+
     /// The same for a train at rest that receives a step at `start` first: a short move.
     #[must_use]
     pub fn rest_after_move(

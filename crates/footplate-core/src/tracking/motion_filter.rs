@@ -107,6 +107,11 @@ impl<const L: usize> MotionFilter<L> {
         self.course.rests_at(time)
     }
 
+    /// Whether the change commanded last has shown by a time: see [`Segment::shown`](crate::model::Segment::shown).
+    pub(crate) fn has_shown(&self, model: &MotionModel, time: f64) -> bool {
+        self.at(model, time).course.has_shown(time)
+    }
+
     /// Takes all that has taken effect by a time into the state.
     fn settle(&mut self, model: &MotionModel, time: f64) {
         while let Some((commanded, begins)) =

@@ -5,8 +5,8 @@
 //! gaps, not its own leader's corrections: errors do not grow along the chain.
 //!
 //! Whatever the gap, the follower can stop before the rear of its leader if the leader is commanded to stop now, with
-//! a probability of about 0.999. It slows down step by step before that takes a stop. If the leader's position is
-//! uncertain, only its last detection counts.
+//! a probability of about 0.999. It slows down step by step before that takes a stop, each step once the last has
+//! shown. If the leader's position is uncertain, only its last detection counts.
 
 use alloc::collections::BTreeMap;
 
@@ -27,7 +27,6 @@ use crate::units::{Length, Ratio, Speed};
 use super::lead_line::LeadLine;
 use super::pace::{Following, Pace, Pacing};
 use super::reference::{Reference, SurveyedPath};
-use super::step_search::seconds;
 
 /// Smallest clearance between the rear of a train and the front of the next.
 pub(in crate::control) const SAFE_GAP: Length = Length::from_mm(50.0);
@@ -49,8 +48,7 @@ const MIN_STEP_TIME: TimeSpan = TimeSpan::from_ms(300);
 const RECHECK_INTERVAL: f64 = 0.4;
 /// A stopped follower starts again when it can run this far before it would have to stop.
 const WORTH_STARTING: Length = Length::from_mm(150.0);
-/// A follower that will no longer be able to stop after this time slows down: a change of step takes effect within
-/// it, and a longer time would slow down trains in no danger.
+/// A follower that will no longer be able to stop after this time slows down: a longer time would slow down trains in no danger.
 const LOOKAHEAD: TimeSpan = TimeSpan::from_ms(500);
 /// Below the first speed a train may stall; above the second it does not.
 const CREEP_SPEED: Speed = Speed::from_mm_per_s(60.0);
@@ -277,20 +275,28 @@ impl DrivenTrain {
         !(has_run && speed >= STALL_FREE_SPEED && self.missed_just_one(now))
     }
 
-    /// The fastest step that still allows a stop before the rear of the leader after [`LOOKAHEAD`], if neither train
-    /// is commanded anything else before; `None` if the train has to stop.
+    /// The fastest step that still allows a stop before the rear of the leader when the next command is due, if neither train is
+    /// commanded anything else before: after [`LOOKAHEAD`], or once a new step has shown. Without such a step, one that allows it
+    /// after [`LOOKAHEAD`]; `None` if the train has to stop.
     fn fastest_behind(&self, context: TrackContext<'_>, now: Timestamp, leader: &Self) -> Option<SpeedStep> {
-        let later = now + LOOKAHEAD;
-        let rear = self.rear_of(context, now, leader, later)?;
         let start = now + self.link.usually_left();
-        let is_safe = |step: &SpeedStep| {
-            let rest = self.locator.rest_after_move(context, &self.model, start, *step, later);
+        let is_safe = |step: &SpeedStep, until: Timestamp| {
+            let Some(rear) = self.rear_of(context, now, leader, until) else { return false };
+            let rest = self.locator.rest_after_move(context, &self.model, start, *step, until);
             let beyond = rest
                 .and_then(|rest| self.aimed_beyond(context, &rest, rear, Aim::NotBeyond(BEYOND_PROBABILITY)));
             beyond.is_some_and(|beyond| beyond <= Length::ZERO)
         };
+        let soon = now + LOOKAHEAD;
+        // The next step down, or the stop, is commanded once this one has shown.
+        let next = |step: &SpeedStep| {
+            let shown = start + self.model.shows_within(self.commanded, *step) + MIN_STEP_TIME;
+            if *step == self.commanded { soon } else { shown.max(soon) }
+        };
         let runs = |step: &&SpeedStep| self.model.steady_speed(**step, Approach::Below) >= CREEP_SPEED;
-        self.pacing.as_ref()?.usable.iter().rev().filter(runs).find(|step| is_safe(step)).copied()
+        let steps = || self.pacing.iter().flat_map(|pacing| pacing.usable.iter().rev()).filter(runs);
+        let lasting = steps().find(|step| is_safe(step, next(step)));
+        lasting.or_else(|| steps().find(|step| is_safe(step, soon))).copied()
     }
 
     /// Checks the clearance to the leader and slows down or stops if need be. Returns whether the train may be paced
@@ -323,7 +329,8 @@ impl DrivenTrain {
             ahead.commanded > SpeedStep::STAND && beyond.is_some_and(|beyond| beyond < -WORTH_STARTING)
         });
         let commanded = self.commanded;
-        let Some(Pacing { pace: Pace::Follow(following), next_update, budget, .. }) = &mut self.pacing else {
+        let has_shown = self.locator.has_change_shown(&self.model, now);
+        let Some(Pacing { pace: Pace::Follow(following), next_update, .. }) = &mut self.pacing else {
             return true;
         };
         *next_update =
@@ -332,7 +339,7 @@ impl DrivenTrain {
         if is_free {
             following.is_stopped = false;
             let slower = fastest.filter(|step| *step < commanded);
-            if let Some(step) = slower.filter(|_| budget.spaced() <= seconds(now)) {
+            if let Some(step) = slower.filter(|_| has_shown) {
                 self.command_step(context, now, step, out);
             }
             return slower.is_none();

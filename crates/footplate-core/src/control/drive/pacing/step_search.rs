@@ -181,12 +181,6 @@ impl CommandBudget {
         (last + SPACING.as_s()).max(oldest + BUDGET.as_s())
     }
 
-    /// When the next urgent command may be sent, whatever the budget.
-    pub(super) fn spaced(&self) -> f64 {
-        let [.., last] = self.sent;
-        last + SPACING.as_s()
-    }
-
     /// The same budget on a clock that is ahead by a time (s).
     pub(super) fn later(self, by: f64) -> Self {
         Self { sent: self.sent.map(|sent| sent + by) }
