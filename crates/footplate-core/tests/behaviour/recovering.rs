@@ -3,7 +3,7 @@
 use footplate_core::control::{Alarm, LinkNews, Notice, Order, Refusal, Reservation};
 use footplate_core::track::Leg;
 use footplate_core::tracking::PathPoint;
-use footplate_core::{Command, Length, SpeedStep, TimeSpan, TurnoutId};
+use footplate_core::{Command, Length, SensorId, SpeedStep, TimeSpan, TurnoutId};
 
 use crate::watching::{FIRST, SECOND, Watched};
 
@@ -45,6 +45,39 @@ fn a_train_lost_again_on_reserved_track_does_not_creep_on() {
     assert!(watched.run_until(10.0, |watched| {
         watched.commanded.iter().skip(from).any(|(_, command)| matches!(command, Command::Reverse { .. }))
     }));
+}
+
+#[test]
+fn a_train_whose_rear_is_on_points_that_it_pushed_over_does_not_creep_back() {
+    for is_curved in [false, true] {
+        // Given a train under a dispatcher, and turnout 2, whose points it trails 100 mm before D1, set for its leg or not,
+        let mut watched = Watched::asking();
+        watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
+        assert!(watched.run_until(200.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
+        watched.run(5.0);
+        watched.go(FIRST, 4);
+        let [a1, d1] = [0, 6].map(SensorId);
+        let reaches = |watched: &mut Watched, sensor: SensorId| {
+            let passes = watched.world.passes.len();
+            watched.run_until(120.0, |watched| {
+                watched.world.passes.iter().skip(passes).any(|(_, at, _)| *at == sensor)
+            })
+        };
+        assert!(reaches(&mut watched, a1), "{:#?}", watched.notices);
+        let throw = Order::Turnout { turnout: TurnoutId(2), curved: is_curved };
+        watched.dog.order(watched.world.now, throw).expect("a turnout");
+        let from = watched.commanded.len();
+        assert!(reaches(&mut watched, d1), "{:#?}", watched.notices);
+        watched.run(0.2);
+        // when its position is lost just behind D1,
+        watched.dog.lose(watched.world.now, FIRST);
+        watched.run(8.0);
+        watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
+        watched.run(12.0);
+        // then it reverses only if the points lie for the leg that it came from.
+        let reverses = |(_, command): &(_, Command)| matches!(command, Command::Reverse { .. });
+        assert_eq!(watched.commanded.iter().skip(from).any(reverses), !is_curved, "{:#?}", watched.notices);
+    }
 }
 
 #[test]

@@ -8,7 +8,7 @@ use crate::event::Approach;
 use crate::ids::{EdgeId, NodeId, SpeedStep, TrainId};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Layout, Position, TurnoutNeed, TurnoutStates};
+use crate::track::{Layout, MAX_MISSED, Position, TurnoutNeed, TurnoutStates};
 use crate::units::Length;
 
 use super::danger::{BODY, CERTAIN, CLEAR, LOST_REACH, rails_within};
@@ -93,13 +93,13 @@ impl Watchdog {
     /// lie.
     pub(super) fn sensor_behind(&self, now: Timestamp, train: TrainId) -> Option<NodeId> {
         let layout = self.driver.layout();
-        let behind = *self.behind.get(&train).filter(|_| !self.undirected.contains(&train))?;
+        let behind = self.behind.get(&train).filter(|_| !self.undirected.contains(&train))?.sensor;
         let run = self.unheard_run(now, train);
         let closed = self.closed_to(now, train);
         // Without a dispatcher, closed track is under other trains: this one is not beyond it.
         let occupied = if self.permits_all { &closed } else { &Reservation::empty() };
         let reach = edges_within(layout, behind, run + BODY, occupied);
-        if self.lies_otherwise(&reach) {
+        if self.has_pushed_over_points(now, train) {
             return None;
         }
         let length = |edge| layout.edge(edge).map_or(Length::ZERO, |edge| edge.length);
@@ -112,19 +112,43 @@ impl Watchdog {
         reports_before(layout, &set, begins, back, &closed).then(|| behind.reverse())
     }
 
-    /// Whether a train may stand on points that it pushed over since a sensor reported it: back over them it would derail.
+    /// Whether a train may stand on points that it pushed over: back over them it would derail.
     pub(super) fn has_pushed_over_points(&self, now: Timestamp, train: TrainId) -> bool {
         let Some(behind) = self.behind.get(&train) else { return false };
         let run = self.unheard_run(now, train);
-        self.lies_otherwise(&edges_within(self.driver.layout(), *behind, run + BODY, &Reservation::empty()))
+        let layout = self.driver.layout();
+        let reach = edges_within(layout, behind.sensor, run + BODY, &Reservation::empty());
+        behind.trails_otherwise || reach.keys().any(|edge| self.lies_otherwise(*edge))
     }
 
-    /// Whether a turnout that is trailed on one of these edges lies for the other leg.
-    fn lies_otherwise(&self, edges: &BTreeMap<EdgeId, Length>) -> bool {
+    /// Whether a turnout that is trailed on an edge lies for the other leg.
+    fn lies_otherwise(&self, edge: EdgeId) -> bool {
         let is_other = |need: TurnoutNeed| {
             !need.facing && self.driver.turnouts().get(need.turnout).is_some_and(|leg| leg != need.leg)
         };
-        edges.keys().any(|edge| self.driver.layout().needs_of(*edge).any(is_other))
+        self.driver.layout().needs_of(edge).any(is_other)
+    }
+
+    /// A train has passed a sensor.
+    pub(super) fn note_behind(&mut self, train: TrainId, sensor: NodeId) {
+        let before = self.behind.get(&train).map(|behind| behind.sensor);
+        let trails_otherwise = before.is_some_and(|before| {
+            let mut edges: Vec<EdgeId> = Vec::new();
+            for hop in self.driver.context().hops_ahead(before).take(MAX_MISSED + 1) {
+                edges.extend(hop.edges);
+                if hop.to == sensor {
+                    break;
+                }
+            }
+            let mut left = BODY;
+            let under = edges.into_iter().rev().take_while(|edge| {
+                let is_under = left > Length::ZERO;
+                left -= self.driver.layout().edge(*edge).map_or(Length::ZERO, |edge| edge.length);
+                is_under
+            });
+            under.collect::<Vec<_>>().into_iter().any(|edge| self.lies_otherwise(edge))
+        });
+        self.behind.insert(train, Behind { sensor, trails_otherwise });
     }
 
     /// The longest distance that a train can have run since its last detection.
@@ -183,6 +207,15 @@ impl Watchdog {
         let step = self.unheard.get(&train).map_or(SpeedStep::STAND, |known| known.step);
         self.unheard.insert(train, Unheard { step, since: now, before: step, ..Unheard::default() });
     }
+}
+
+/// What is behind a train.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Behind {
+    /// The sensor that reported it last.
+    pub(super) sensor: NodeId,
+    /// Whether the rear of a train that has just reached the sensor is on points that it pushed over.
+    pub(super) trails_otherwise: bool,
 }
 
 /// The edges that begin within a distance of a node, over both legs of every turnout, with the distance that is left

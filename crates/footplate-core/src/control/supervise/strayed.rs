@@ -6,6 +6,7 @@ use crate::track::Position;
 use crate::units::Length;
 
 use super::alarm::Alarm;
+use super::creeping::Behind;
 use super::recovery::{Phase, Recovery};
 use super::watchdog::Watchdog;
 
@@ -72,7 +73,7 @@ impl Watchdog {
             self.undirected.remove(&train);
         }
         self.seen.insert(train, Position { edge, offset: Length::ZERO });
-        self.behind.insert(train, node);
+        self.behind.insert(train, Behind { sensor: node, trails_otherwise: false });
         self.note_detection(train, time);
     }
 }

@@ -7,7 +7,7 @@ use crate::control::dispatch::Reservation;
 use crate::control::drive::{Driver, Order, OrderId, Refusal};
 use crate::control::{Machine, Output};
 use crate::event::{Command, Event, EventKind};
-use crate::ids::{NodeId, SpeedStep, TrainId};
+use crate::ids::{SpeedStep, TrainId};
 use crate::model::MotionModel;
 use crate::time::Timestamp;
 use crate::track::Position;
@@ -15,6 +15,7 @@ use crate::tracking::{Locator, PathPoint};
 use crate::units::Length;
 
 use super::alarm::{Alarm, ConsistencyMonitor};
+use super::creeping::Behind;
 use super::intruder::Intruder;
 use super::recovery::{Phase, Recovery};
 use super::stops::Stops;
@@ -46,8 +47,8 @@ pub struct Watchdog {
     pub(super) unfinished: BTreeMap<TrainId, (OrderId, Order)>,
     /// The position at which each train was last detected or placed, in its direction.
     pub(super) seen: BTreeMap<TrainId, Position>,
-    /// The sensor that reported each train last since it reversed or was placed: it is behind the train.
-    pub(super) behind: BTreeMap<TrainId, NodeId>,
+    /// What is behind each train that was reported since it reversed or was placed.
+    pub(super) behind: BTreeMap<TrainId, Behind>,
     /// Trains that may face in either direction, until they are located.
     pub(super) undirected: BTreeSet<TrainId>,
     /// How far each train may have run since its last detection.
@@ -367,7 +368,7 @@ impl Watchdog {
         self.note_place(now, train);
         self.note_detection(train, passed.window.until);
         if let Some(node) = self.driver.node_passed(passed) {
-            self.behind.insert(train, node);
+            self.note_behind(train, node);
         }
         if self.is_watching && self.stops.should_be_at_rest(train, now) {
             self.raise(now, train, Alarm::DoesNotStop(passed.sensor));
