@@ -13,7 +13,7 @@ use crate::units::Length;
 
 use super::danger::{BODY, CERTAIN, CLEAR, LOST_REACH, rails_within};
 use super::recovery::Recovery;
-use super::unheard::Unheard;
+use super::unheard::{Behind, Unheard};
 use super::watchdog::Watchdog;
 
 /// A lost train needs this many sensors ahead, one of them beyond all places where it may be: one may stay silent.
@@ -207,15 +207,6 @@ impl Watchdog {
         let step = self.unheard.get(&train).map_or(SpeedStep::STAND, |known| known.step);
         self.unheard.insert(train, Unheard { step, since: now, before: step, ..Unheard::default() });
     }
-}
-
-/// What is behind a train.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Behind {
-    /// The sensor that reported it last.
-    pub(super) sensor: NodeId,
-    /// Whether the rear of a train that has just reached the sensor is on points that it pushed over.
-    pub(super) trails_otherwise: bool,
 }
 
 /// The edges that begin within a distance of a node, over both legs of every turnout, with the distance that is left

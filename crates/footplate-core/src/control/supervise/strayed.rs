@@ -6,8 +6,8 @@ use crate::track::Position;
 use crate::units::Length;
 
 use super::alarm::Alarm;
-use super::creeping::Behind;
 use super::recovery::{Phase, Recovery};
+use super::unheard::Behind;
 use super::watchdog::Watchdog;
 
 /// A detection elsewhere this long before a sensor is overdue may be the same train: from one to the other it runs two

@@ -1,7 +1,7 @@
-//! How far a train can have run since its last detection, by its commands.
+//! Where a train that is not heard may be: how far it can have run since its last detection, by its commands, and what is behind it.
 
 use crate::event::Approach;
-use crate::ids::SpeedStep;
+use crate::ids::{NodeId, SpeedStep};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::Length;
@@ -27,4 +27,13 @@ impl Unheard {
         let span = (now - self.since).max(TimeSpan::ZERO);
         Self { run: self.run + speed * span, since: now.max(self.since), ..self }
     }
+}
+
+/// What is behind a train.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Behind {
+    /// The sensor that reported it last.
+    pub(super) sensor: NodeId,
+    /// Whether the rear of a train that has just reached the sensor is on points that it pushed over.
+    pub(super) trails_otherwise: bool,
 }

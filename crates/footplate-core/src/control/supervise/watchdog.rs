@@ -15,11 +15,10 @@ use crate::tracking::{Locator, PathPoint};
 use crate::units::Length;
 
 use super::alarm::{Alarm, ConsistencyMonitor};
-use super::creeping::Behind;
 use super::intruder::Intruder;
 use super::recovery::{Phase, Recovery};
 use super::stops::Stops;
-use super::unheard::Unheard;
+use super::unheard::{Behind, Unheard};
 use crate::control::Notice;
 
 /// The track power, as commanded.
