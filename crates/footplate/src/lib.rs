@@ -7,6 +7,7 @@
 mod chaos;
 mod clock;
 mod commands;
+mod comment;
 mod counted;
 mod dashboard;
 mod error_text;

@@ -13,6 +13,7 @@ use serde_json::json;
 use tokio::sync::{oneshot, watch};
 
 use super::history::{History, Sample};
+use crate::comment::without_comment;
 use crate::session_journal::WrittenUntil;
 
 /// Events kept for watchers that reconnect: a quarter of an hour of a busy railway.
@@ -75,8 +76,7 @@ impl Request {
         match self {
             Self::EmergencyStop | Self::SavedSchedules(_) => true,
             Self::Line(line) => {
-                let said = line.split('#').next().unwrap_or_default();
-                let words: Vec<&str> = said.split_whitespace().collect();
+                let words: Vec<&str> = without_comment(line).split_whitespace().collect();
                 // A stop at a place makes a train run that stands.
                 matches!(words[..], ["halt"] | ["stop", _] | ["speed", _, "0"])
             }

@@ -6,6 +6,7 @@ use footplate_core::{FunctionNumber, SpeedStep};
 use super::instruction::{Instruction, Until};
 use super::reader::{Known, Words};
 use super::words::{Mistake, meant, words};
+use crate::comment::without_comment;
 
 const VERBS: [&str; 20] = [
     "speed", "reverse", "turnout", "stop", "go", "move", "hold", "follow", "arrive", "find", "place",
@@ -19,7 +20,7 @@ const VERBS: [&str; 20] = [
 pub(super) fn parse(line: &str, known: Known<'_>) -> Result<Option<Instruction>, Mistake> {
     let words = words(line);
     let Some((verb, rest)) = words.split_first() else { return Ok(None) };
-    let end = line.split('#').next().unwrap_or_default().trim_end().chars().count() + 2;
+    let end = without_comment(line).trim_end().chars().count() + 2;
     let mut words = Words { rest, known, end, after: *verb };
     let instruction = match verb.text {
         "speed" => {

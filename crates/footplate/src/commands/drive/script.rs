@@ -7,6 +7,7 @@ use anyhow::{Context, anyhow, bail};
 use super::instruction::Instruction;
 use super::parse::parse;
 use super::reader::Known;
+use crate::comment::without_comment;
 
 /// The largest script, in bytes: about a day of driving.
 const LONGEST: u64 = 1 << 20;
@@ -71,7 +72,7 @@ pub(super) fn read_script(path: &Path, known: Known<'_>) -> anyhow::Result<Vec<S
 
 /// Parses one line; `None` for an empty line or a comment.
 pub(super) fn step(line: &str, known: Known<'_>) -> Result<Option<Step>, super::words::Mistake> {
-    let text = line.split('#').next().unwrap_or_default().trim();
+    let text = without_comment(line).trim();
     Ok(parse(line, known)?.map(|instruction| Step {
         text: text.to_owned(),
         instruction,

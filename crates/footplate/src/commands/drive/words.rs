@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::comment::without_comment;
+
 /// A word and the column at which it begins, counted from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Word<'t> {
@@ -9,10 +11,10 @@ pub(super) struct Word<'t> {
     pub(super) column: usize,
 }
 
-/// Splits a line at spaces and drops the comment after `#`.
+/// Splits a line at spaces and drops its comment.
 pub(super) fn words(line: &str) -> Vec<Word<'_>> {
-    let said = line.split('#').next().unwrap_or_default();
-    said.split_whitespace()
+    without_comment(line)
+        .split_whitespace()
         .map(|text| {
             // Both point into the same line: the difference is the word's byte offset.
             let byte = text.as_ptr() as usize - line.as_ptr() as usize;
