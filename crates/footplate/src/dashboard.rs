@@ -37,7 +37,7 @@ mod token;
 mod travelled_distance;
 
 pub(crate) use alarm::Alarm;
-pub(crate) use board::{Answer, Board, PendingRequest, Request};
+pub(crate) use board::{Answer, Board, LateRefusal, PendingRequest, Request, Unfulfilled};
 pub(crate) use painter::{Painter, TrainPassed};
 pub(crate) use picture::{LayoutPicture, SchedulePicture, SessionState, TrainTask};
 pub(crate) use read_only::{CalibrationFollower, ReadOnlyDashboard};

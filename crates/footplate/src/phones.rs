@@ -3,6 +3,8 @@
 //! Phones give orders in the words of the prompt through the board of the dashboard, like browsers: they are checked,
 //! reserved for and recorded alike. The protocol has no token: everyone who can reach the port can drive.
 
+mod given_orders;
+
 use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr};
 use std::str::FromStr;
@@ -24,6 +26,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 use tokio::time::{interval, sleep, timeout};
 
+use self::given_orders::{GivenOrders, line};
 use crate::clock::Stopwatch;
 use crate::dashboard::{Board, Request};
 use crate::link::{PowerCommand, SharedTallies};
@@ -217,8 +220,9 @@ impl Station {
             }
         };
         let mut phone = Phone::connected(self.now(), roster, railway);
+        let (mut given, mut refusals) = (GivenOrders::default(), self.board.refusals());
         let mut line = Vec::new();
-        while self.carry_out(&mut phone, &mut write).await {
+        while self.carry_out(&mut phone, &mut given, &mut write).await {
             let silent_at = phone.next_timeout().map(|at| (at - self.now()).as_s().max(0.0));
             let silence = async {
                 match silent_at {
@@ -240,15 +244,25 @@ impl Station {
                         phone.handle_railway(self.now(), railway);
                     }
                 }
+                refusal = refusals.recv() => {
+                    if let Ok(refusal) = refusal && given.remove(&refusal) {
+                        phone.handle_refusal(self.now(), &refusal.why);
+                    }
+                }
                 () = silence => phone.handle_timeout(self.now()),
             }
         }
         phone.handle_closed();
-        self.carry_out(&mut phone, &mut write).await;
+        self.carry_out(&mut phone, &mut given, &mut write).await;
     }
 
     /// Sends the lines and carries out the orders of a phone. Returns whether the conversation goes on.
-    async fn carry_out(&self, phone: &mut Phone, write: &mut OwnedWriteHalf) -> bool {
+    async fn carry_out(
+        &self,
+        phone: &mut Phone,
+        given: &mut GivenOrders,
+        write: &mut OwnedWriteHalf,
+    ) -> bool {
         let mut goes_on = true;
         while let Some(output) = phone.poll_output() {
             match output {
@@ -259,11 +273,10 @@ impl Station {
                 }
                 // The trains of a phone that does not read are stopped without more waiting.
                 PhoneOutput::Line(_) => {}
-                PhoneOutput::Order(order) => {
-                    if let Err(why) = self.order(order).await {
-                        phone.handle_refusal(self.now(), &why);
-                    }
-                }
+                PhoneOutput::Order(order) => match self.order(order).await {
+                    Ok(()) => given.add(order),
+                    Err(why) => phone.handle_refusal(self.now(), &why),
+                },
                 PhoneOutput::Close => goes_on = false,
             }
         }
@@ -271,20 +284,7 @@ impl Station {
     }
 
     async fn order(&self, order: PhoneOrder) -> Result<(), String> {
-        let request = match order {
-            PhoneOrder::Speed { train, step } => Request::Line(format!("speed {train} {step}")),
-            PhoneOrder::Reverse { train } => Request::Line(format!("reverse {train}")),
-            PhoneOrder::Function { train, function, on } => {
-                let (number, state) = (function.get(), if on { "on" } else { "off" });
-                Request::Line(format!("function {train} {number} {state}"))
-            }
-            PhoneOrder::Turnout { turnout, leg } => {
-                let leg = if leg == Leg::Curved { "curved" } else { "straight" };
-                Request::Line(format!("turnout {turnout} {leg}"))
-            }
-            PhoneOrder::EmergencyStop => Request::EmergencyStop,
-            PhoneOrder::PowerOn => Request::Line("power on".to_owned()),
-        };
+        let request = line(order).map_or(Request::EmergencyStop, Request::Line);
         self.board.ask_and_wait(request).await.map(drop).map_err(|not_done| not_done.says().to_owned())
     }
 }

@@ -6,11 +6,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use footplate_core::model::MotionModel;
-use footplate_core::{Timestamp, TrainId};
+use footplate_core::{Command, Timestamp, TrainId};
 use footplate_store::Schedule;
 use serde::Serialize;
 use serde_json::json;
-use tokio::sync::{oneshot, watch};
+use tokio::sync::{broadcast, oneshot, watch};
 
 use super::history::{History, Sample};
 use crate::comment::without_comment;
@@ -26,6 +26,8 @@ const MAX_PICTURES_A_SECOND: u32 = 400;
 const MAX_WATCHERS: usize = 2_000;
 /// Requests that may wait for the loop, which reads them every few hundredths of a second: operators do not reach it.
 const MAX_WAITING: usize = 64;
+/// Refusals kept for a listener that is slow: more than all lines that can wait.
+const MAX_REFUSALS: usize = 128;
 
 /// An event with its number. All watchers share its text.
 #[derive(Debug, Clone)]
@@ -124,6 +126,22 @@ impl NotDone {
     }
 }
 
+/// What was not carried out after it had been accepted.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Unfulfilled {
+    /// The order of this line.
+    Line(String),
+    /// A command that the link did not send.
+    Command(Command),
+}
+
+/// An accepted order that was not carried out, with the reason.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct LateRefusal {
+    pub(crate) of: Unfulfilled,
+    pub(crate) why: String,
+}
+
 /// Rejected: too many requests are waiting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct TooMany;
@@ -150,6 +168,8 @@ pub(crate) struct Board {
     histories: Mutex<BTreeMap<TrainId, History>>,
     models: Mutex<BTreeMap<TrainId, Arc<MotionModel>>>,
     waiting: Mutex<VecDeque<PendingRequest>>,
+    /// Orders that were refused after they had been accepted, for the programs that gave them.
+    refusals: broadcast::Sender<LateRefusal>,
     /// How much of the session is on disk, if it is recorded.
     journal: Mutex<Option<WrittenUntil>>,
     /// The number of connected watchers.
@@ -166,6 +186,7 @@ impl Board {
             histories: Mutex::default(),
             models: Mutex::default(),
             waiting: Mutex::default(),
+            refusals: broadcast::Sender::new(MAX_REFUSALS),
             journal: Mutex::default(),
             watchers: AtomicUsize::new(0),
         })
@@ -193,6 +214,17 @@ impl Board {
     /// Publishes a line of text.
     pub(crate) fn say(&self, t_s: f64, text: &str) {
         self.publish("line", &json!({ "t_s": t_s, "text": text }));
+    }
+
+    /// Publishes that an accepted order was not carried out.
+    pub(crate) fn refuse(&self, of: Unfulfilled, why: &str) {
+        // Without a listener there is no one to answer.
+        let _ = self.refusals.send(LateRefusal { of, why: why.to_owned() });
+    }
+
+    /// The orders that are refused from now on although they were accepted.
+    pub(crate) fn refusals(&self) -> broadcast::Receiver<LateRefusal> {
+        self.refusals.subscribe()
     }
 
     /// Publishes an event.

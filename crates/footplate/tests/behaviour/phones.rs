@@ -87,4 +87,9 @@ fn a_phone_drives_and_no_train_runs_on_without_it() {
     let off = line.await_words(b"<0>", since) - since;
     assert!(off < WITHIN, "{off:?}");
     phone.await_line("PPA0");
+    // An order that the railway refuses is answered with the reason.
+    phone.send("MTAS24<;>V126");
+    let refused = phone.await_line("HM");
+    let reasons = ["train 24 is stopped for safety", "track power is off"];
+    assert!(reasons.iter().any(|reason| refused.contains(reason)), "{refused}");
 }

@@ -13,9 +13,9 @@ use footplate_core::{Command, Timestamp, TrainId};
 use footplate_wire::{BlockReports, CommandError, LinkNotice, ReportedFunctions};
 
 use super::script_runner::ScriptRunner;
-use super::session_message::SessionMessage;
+use super::session_message::{Ended, SessionMessage};
 use crate::clock::Stopwatch;
-use crate::dashboard::{Alarm, Answer, Board, Painter, PendingRequest, Request};
+use crate::dashboard::{Alarm, Answer, Board, Painter, PendingRequest, Request, Unfulfilled};
 use crate::layout_check::LiveWarning;
 use crate::recorded::{Input, Recorded};
 use crate::runtime::{Attendant, Wish};
@@ -232,7 +232,14 @@ impl Attendant<Recorded<ScriptRunner>> for Console {
             }
             SessionMessage::Alarm(alarm) => self.alarm(now, &alarm),
             SessionMessage::Over => self.is_over = true,
-            begun_or_ended => self.for_scoring.push(begun_or_ended),
+            begun_or_ended => {
+                if let (SessionMessage::Ended(Ended { text, refused: Some(why), .. }), Some(live_view)) =
+                    (&begun_or_ended, &self.live_view)
+                {
+                    live_view.board.refuse(Unfulfilled::Line(text.clone()), why);
+                }
+                self.for_scoring.push(begun_or_ended);
+            }
         }
     }
 
@@ -266,6 +273,9 @@ impl Attendant<Recorded<ScriptRunner>> for Console {
         let why = format!("{command}: {error}");
         self.screen.say(&format!("not sent: {why}"), "");
         self.alarm(now, &Alarm::not_sent(&why));
+        if let Some(live_view) = &self.live_view {
+            live_view.board.refuse(Unfulfilled::Command(command), &format!("not sent: {why}"));
+        }
     }
 
     fn attend(&mut self, now: Timestamp, script_runner: &mut Recorded<ScriptRunner>) -> Wish {
