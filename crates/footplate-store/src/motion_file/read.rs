@@ -230,8 +230,8 @@ impl StoredModel {
         ))
     }
 
-    /// The steps of the train's decoder: as the model states them, or else the fewest that contain every step that the
-    /// train was commanded to until a date; 14 for a train that was never commanded.
+    /// The steps of the train's decoder: as the model states them, or else the fewest that contain the highest step of the
+    /// imported profile and every step that the train was commanded to until a date; 14 if neither is there.
     ///
     /// # Errors
     /// The store cannot be read.
@@ -241,8 +241,11 @@ impl StoredModel {
             Self::Outdated { highest } => *highest,
             Self::Nothing => None,
         };
-        let highest = stated.map_or_else(|| store.highest_step(train, at), Ok)?;
-        Ok(DecoderSteps::with(highest))
+        let Some(stated) = stated else {
+            let imported = store.profile(train, at)?.and_then(|profile| profile.highest).unwrap_or_default();
+            return Ok(DecoderSteps::with(store.highest_step(train, at)?.max(imported)));
+        };
+        Ok(DecoderSteps::with(stated))
     }
 }
 

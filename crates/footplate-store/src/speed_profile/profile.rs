@@ -17,6 +17,9 @@ pub struct SpeedProfile {
     pub source: String,
     /// The decoder's address, if the file names one.
     pub train: Option<TrainId>,
+    /// The highest step of the decoder, if it was stated with the import.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub highest: Option<SpeedStep>,
     /// The entries, in the order of the file.
     pub speeds: Vec<ProfileSpeed>,
     /// The time (s) of the decoder's ramp from rest to its highest step, if the file states its momentum.

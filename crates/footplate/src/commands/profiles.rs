@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 use clap::{Args, Subcommand};
 use footplate_core::track::Layout;
-use footplate_core::{SpeedStep, TrainId};
+use footplate_core::{DecoderSteps, SpeedStep, TrainId};
 use footplate_store::{MotionFile, ProfileContext, Store, layout_named};
 
 use super::Outcome;
@@ -81,9 +81,9 @@ impl Withdrawal {
 /// What a profile does not say itself.
 #[derive(Args)]
 struct Reading {
-    /// The highest step of the decoder, as the trains are driven.
-    #[arg(long, value_name = "N", default_value_t = 14, value_parser = clap::value_parser!(u8).range(1..=126))]
-    steps: u8,
+    /// The highest step of the decoder, as the trains are driven [default: 14].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=126))]
+    steps: Option<u8>,
     /// The scale, such as 87 for H0: needed where speeds are those of the full-size train.
     #[arg(long, value_name = "N", value_parser = positive)]
     scale: Option<f64>,
@@ -96,8 +96,13 @@ struct Reading {
 }
 
 impl Reading {
+    /// The highest step as stated.
+    fn stated(&self) -> Option<SpeedStep> {
+        self.steps.and_then(SpeedStep::new)
+    }
+
     fn highest(&self) -> SpeedStep {
-        SpeedStep::new(self.steps).unwrap_or_default()
+        self.stated().unwrap_or(DecoderSteps::Fourteen.highest())
     }
 
     fn context(&self) -> ProfileContext {

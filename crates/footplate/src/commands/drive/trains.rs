@@ -190,7 +190,7 @@ impl KnownTrains {
 #[cfg(test)]
 mod tests {
     use footplate_core::{Event, EventKind, Timestamp};
-    use footplate_store::{Journal, NewCalibration, built_in};
+    use footplate_store::{Journal, NewCalibration, ProfileSpeed, SpeedProfile, built_in};
 
     use super::*;
 
@@ -217,6 +217,28 @@ mod tests {
         MotionFile::of(&layout, &model, None).keep(&mut store, next_year, next_year).unwrap();
         assert_eq!(gathered(&mut store, None).get(), 126, "the model");
         assert_eq!(store.newest_stamp().unwrap(), Some(next_year));
+    }
+
+    #[test]
+    fn a_train_with_an_imported_profile_begins_with_the_steps_of_its_decoder() {
+        let folder = tempfile::tempdir().unwrap();
+        for (steps, highest) in [(None, 14), (Some(28), 28), (Some(126), 126)] {
+            let path = folder.path().join(format!("{highest}.db"));
+            let mut store = Store::open_or_create(&path).unwrap();
+            let speed = ProfileSpeed {
+                line: 2,
+                throttle: 0.5,
+                forward_mm_s: Some(220.0),
+                reverse_mm_s: None,
+                uncertainty_mm_s: None,
+            };
+            let highest_step = steps.and_then(SpeedStep::new);
+            let profile =
+                SpeedProfile { highest: highest_step, speeds: vec![speed], ..SpeedProfile::default() };
+            store.keep_profile(TRAIN, Some(&profile), now()).unwrap();
+            assert_eq!(gathered(&mut store, None).get(), highest, "as imported");
+            assert_eq!(gathered(&mut store, Some(DecoderSteps::TwentyEight)).get(), 28, "as named");
+        }
     }
 
     fn outdated(store: &mut Store, body: &str) {

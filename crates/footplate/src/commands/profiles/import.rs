@@ -80,7 +80,7 @@ impl Arguments {
             let Some(train) = self.train.map(TrainId).or(profile.train) else {
                 bail!("{}: the file names no address; say which train it is with --train", path.display());
             };
-            profile.source = short(path);
+            (profile.source, profile.highest) = (short(path), self.reading.stated());
             if let Some(other) = profiles.get(&train) {
                 bail!(
                     "{}: a profile of train {train}, as {} is; import one of them",
