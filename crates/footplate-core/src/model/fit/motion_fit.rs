@@ -352,7 +352,7 @@ impl MotionFit {
             let of = |source| rows.iter().rev().find(|row| row.source == source);
             // Only a stop that the next trip goes on from is measured; what is unknown of its track is measured with it.
             let stopped =
-                of(Source::Rest).zip(of(Source::Stop)).map(|(rest, stop)| (stop.clone(), rest.once));
+                of(Source::Rest).zip(of(Source::Stop)).map(|(rest, stop)| (stop.clone(), rest.unknown_track));
             let Some((stop, free)) = core::mem::replace(&mut stop_before, stopped) else { continue };
             let Some(start) = of(Source::Start) else { continue };
             let Some(first) = point.first_sensor(at) else { continue };

@@ -50,13 +50,19 @@ pub(super) struct Linear {
     pub(super) terms: Vec<(usize, f64)>,
     pub(super) residual: f64,
     pub(super) variance: f64,
-    /// Variance of a single such measurement, without the factor for common errors of a law's shape; of a stop, that of the
-    /// train's own scatter, and of where it came to rest, that of unknown track.
+    /// Variance of one such measurement alone: of a sensor without the factor for common errors of a law's shape, of a stop
+    /// the train's own scatter.
     pub(super) once: f64,
+    /// The part of the variance (m²) that comes from unknown track; only where a train came to rest.
+    pub(super) unknown_track: f64,
     pub(super) source: Source,
 }
 
 impl Linear {
+    fn new(terms: Vec<(usize, f64)>, residual: f64, variance: f64, source: Source) -> Self {
+        Self { terms, residual, variance, once: variance, unknown_track: 0.0, source }
+    }
+
     fn size(&self) -> f64 {
         self.residual.abs() / libm::sqrt(self.variance)
     }
@@ -185,8 +191,7 @@ impl Point<'_> {
             );
             terms
         };
-        let row =
-            |terms, residual, variance, source| Linear { terms, residual, variance, once: variance, source };
+        let row = Linear::new;
         let mut surveyed = 0.0;
         for (index, detection) in trip.detections.iter().enumerate() {
             surveyed += detection.length;
@@ -220,7 +225,7 @@ impl Point<'_> {
                 self.scaled(&mut terms, residual, stop_step);
             }
             let variance = REST_SCATTER * REST_SCATTER + free;
-            rows.push(Linear { once: free, ..row(terms, residual, variance, Source::Rest) });
+            rows.push(Linear { unknown_track: free, ..row(terms, residual, variance, Source::Rest) });
         }
         if let Some(rest) = &trip.measured {
             let counted = || trip.detections.iter().take(rest.detections);
@@ -359,7 +364,7 @@ impl Point<'_> {
 /// The prior of a number that is about zero.
 fn prior(column: usize, residual: f64, deviation: f64, source: Source) -> Linear {
     let variance = deviation * deviation;
-    Linear { terms: vec![(column, 1.0)], residual, variance, once: variance, source }
+    Linear::new(vec![(column, 1.0)], residual, variance, source)
 }
 
 pub(super) fn add_term(terms: &mut Vec<(usize, f64)>, column: usize, by: f64) {
