@@ -2,10 +2,12 @@
 #![expect(clippy::expect_used, reason = "a test may stop at the first surprise")]
 
 use footplate_core::control::{Driver, Gap, Notice, Order, Refusal};
-use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId};
+use footplate_core::track::{Layout, LayoutPlan, Leg, Place, RailEnd, Stretch, Survey};
+use footplate_core::tracking::PathPoint;
+use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 
-use crate::toy_railway::{ToyRailway, add_train, driver_of, step};
+use crate::toy_railway::{ToyRailway, add_train, driver_of, step, straight};
 
 /// The follower, and its leader.
 const FOLLOWER: TrainId = TrainId(24);
@@ -162,4 +164,63 @@ proptest! {
             }
         }
     }
+}
+
+/// An oval of 2.3 m whose only sensor is D.
+fn one_sensor() -> Layout {
+    let turnout = |number: u16| Place::Turnout {
+        names: [format!("BR{number}"), format!("MR{number}")],
+        turnout: TurnoutId(number),
+    };
+    let end = |node: &str, leg| RailEnd { node: node.into(), leg };
+    let stretch =
+        |from: RailEnd, to: RailEnd, mm: f64| Stretch { from, to, length: Length::from_mm(mm).into() };
+    let legs = [(Leg::Straight, 1_000.0), (Leg::Curved, 970.0)];
+    let mut stretches = vec![
+        stretch(end("D1", None), end("BR1", None), 1_100.0),
+        stretch(end("MR2", None), end("D1", None), 200.0),
+    ];
+    stretches.extend(legs.map(|(leg, mm)| stretch(end("BR1", Some(leg)), end("MR2", Some(leg)), mm)));
+    let sensor = Place::Sensor { names: ["D1".into(), "D2".into()], sensors: [SensorId(6), SensorId(7)] };
+    let plan = LayoutPlan {
+        name: "one sensor".into(),
+        survey: Survey::taped(Length::from_mm(2.0), "made up".into()),
+        places: vec![sensor, turnout(1), turnout(2)],
+        stretches,
+        never_both_curved: vec![],
+        zones: vec![],
+        blocks: vec![],
+    };
+    Layout::build(&plan).expect("a layout")
+}
+
+#[test]
+fn a_gap_is_kept_on_a_circuit_with_one_sensor() {
+    let (mut world, known) = two_trains();
+    world.layout = one_sensor();
+    world.put(24, "D1", 100.0);
+    world.put(58, "D1", 800.0);
+    let mut driver = Driver::new(world.layout.clone(), straight());
+    for (train, mm) in [(FOLLOWER, 100.0), (LEADER, 800.0)] {
+        driver.add_train(known.model(train).expect("a model").clone());
+        let node = world.layout.node_named("D1").expect("a node");
+        let at = PathPoint { node, distance: Length::from_mm(mm) };
+        driver.place(world.now, train, at, Length::from_mm(2.0));
+        driver.set_reach(train, REACH[0], REACH[1]);
+    }
+    run_leader(&world, &mut driver, 7);
+    world.run(&mut driver, 2.0);
+    driver.order(world.now, follow(seconds(5.0))).expect("a safe gap");
+    // One report in a lap of 10 s: the speed is corrected once in that time.
+    world.run(&mut driver, 90.0);
+    let (since, notices) = (world.now, world.notices.len());
+    world.run(&mut driver, 80.0);
+    let gaps = gaps(&world, since);
+    let held_back = |notice: &Notice| matches!(notice, Notice::HeldBack { .. });
+    assert!(!world.notices[notices..].iter().any(held_back));
+    assert!(gaps.len() >= 6, "{gaps:?}");
+    let off = gaps.iter().map(|gap| (gap - 5.0).abs()).fold(0.0, f64::max);
+    assert!(off < 1.0, "{gaps:?}");
+    let mean = gaps.iter().sum::<f64>() / gaps.len() as f64;
+    assert!((mean - 5.0).abs() < 0.25, "{gaps:?}");
 }

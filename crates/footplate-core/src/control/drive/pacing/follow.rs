@@ -15,7 +15,7 @@ use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::driver::Driver;
 use crate::control::drive::order::{Aim, Gap, OrderId};
 use crate::control::drive::outputs::Outputs;
-use crate::control::drive::path::distance_between;
+use crate::control::drive::path::{circuit_length, distance_between};
 use crate::control::drive::refusal::Refusal;
 use crate::control::drive::task::{Goal, Task, TaskPhase};
 use crate::event::Approach;
@@ -257,7 +257,23 @@ impl DrivenTrain {
         });
         let from = rest.map_or(seen, |rest| rest.at.node);
         let between = distance_between(context, &self.model, node, from)?;
-        Some(PathPoint { node, distance: between + past - leader.reach[1] - self.reach[0] - SAFE_GAP })
+        let lap = self.lap_to(context, now, leader, node).unwrap_or(Length::ZERO);
+        Some(PathPoint { node, distance: between + lap + past - leader.reach[1] - self.reach[0] - SAFE_GAP })
+    }
+
+    /// The lap by which a leader is further ahead than its distance past the sensor says: it has passed the only sensor of a
+    /// circuit again, and this train not yet. `None` if that is not so.
+    fn lap_to(
+        &self,
+        context: TrackContext<'_>,
+        now: Timestamp,
+        leader: &Self,
+        node: NodeId,
+    ) -> Option<Length> {
+        context.hops_ahead(node).next().filter(|hop| hop.to == node)?;
+        let [own, ahead] = [self.located(context, now)?.at, leader.located(context, now)?.at];
+        let is_lapped = own.node == node && ahead.node == node && ahead.distance < own.distance;
+        circuit_length(context, &self.model, node).filter(|_| is_lapped)
     }
 
     /// Whether the train may be far from its estimated position. Sensors miss a train thirty times as often as trains

@@ -45,27 +45,15 @@ impl<'a> LeadLine<'a> {
         let zero = rollout.seconds(now);
         let mut here = rollout;
         let since = path.surveyed(here.place(&leader.model, zero));
-        let mut begins = ahead_of(context, from, rollout.node())?;
-        // The leader may have been missed there and be less than a lap ahead.
-        if let Some(lap) = surveyed_distance(context, from, from).map(Length::as_m)
-            && begins + since - lap > past
-        {
-            begins -= lap;
-        }
-        let mut marks: Vec<[f64; 2]> = Vec::new();
-        let (mut surveyed, mut next) = (begins, rollout.node());
-        for (node, time) in leader.passages.iter().rev() {
-            if node != next {
-                surveyed -= surveyed_distance(context, node, next)?.as_m();
-            }
-            next = node;
-            marks.push([(time - now).as_s(), surveyed]);
-            // Detections behind the follower no longer matter.
-            if surveyed <= 0.0 {
-                break;
-            }
-        }
-        marks.reverse();
+        let begins = within_a_lap(
+            ahead_of(context, from, rollout.node())?,
+            since,
+            past,
+            surveyed_distance(context, from, from).map(Length::as_m),
+        );
+        let between = |from, to| surveyed_distance(context, from, to).map(Length::as_m);
+        let passages = leader.passages.iter().rev().map(|(node, time)| (node, (time - now).as_s()));
+        let marks = marks(passages, (rollout.node(), begins), between)?;
         Some(Self { marks, rollout, begins, path, model: &leader.model, now: zero })
     }
 
@@ -97,6 +85,50 @@ impl<'a> LeadLine<'a> {
 /// The surveyed distance (m) from a sensor to one ahead, zero to itself.
 fn ahead_of(context: TrackContext<'_>, from: NodeId, to: NodeId) -> Option<f64> {
     if from == to { Some(0.0) } else { surveyed_distance(context, from, to).map(Length::as_m) }
+}
+
+/// Where a leader passed its last sensor (m past the follower's last sensor), such that it is ahead of the follower, by less
+/// than a lap if it was missed.
+///
+/// `begins` is the distance from the follower's last sensor to the leader's, zero if they are the same; `since` is how far the
+/// leader has run from there, and `past` the follower.
+fn within_a_lap(begins: f64, since: f64, past: f64, lap: Option<f64>) -> f64 {
+    let Some(lap) = lap else { return begins };
+    // The leader may have been missed there and be less than a lap ahead.
+    if begins + since - lap > past {
+        return begins - lap;
+    }
+    // The leader has passed the sensor after the follower: it is nearly a lap ahead. Where there is only one sensor, that is so
+    // once in every lap.
+    let is_same = begins <= 0.0;
+    if is_same && begins + since < past { begins + lap } else { begins }
+}
+
+/// The detections of a leader, oldest first: time (s from now) and place.
+///
+/// `passages` are the sensors and times, newest first; `last` is where its motion is predicted from, and `between` the distance
+/// from one sensor to the next passage of another. `None` if no path connects two of them.
+fn marks(
+    passages: impl Iterator<Item = (NodeId, f64)>,
+    last: (NodeId, f64),
+    between: impl Fn(NodeId, NodeId) -> Option<f64>,
+) -> Option<Vec<[f64; 2]>> {
+    let mut marks: Vec<[f64; 2]> = Vec::new();
+    let (mut next, mut surveyed) = last;
+    for (nth, (node, time)) in passages.enumerate() {
+        // The newest is usually the sensor that the motion is predicted from. Before that, the same sensor is a lap away.
+        if nth > 0 || node != next {
+            surveyed -= between(node, next)?;
+        }
+        next = node;
+        marks.push([time, surveyed]);
+        // Detections behind the follower no longer matter.
+        if surveyed <= 0.0 {
+            break;
+        }
+    }
+    marks.reverse();
+    Some(marks)
 }
 
 /// Detections kept: enough for the last train of a chain, ten seconds of the densest known track, twice over.
@@ -133,7 +165,43 @@ impl Passages {
 
 #[cfg(test)]
 mod tests {
+    use alloc::vec;
+
     use super::*;
+
+    /// The lap of a circuit with one sensor, or of one with two that are half a lap apart (m).
+    const LAP: f64 = 3.0;
+
+    #[test]
+    fn each_passage_of_the_only_sensor_is_a_lap_after_the_one_before() {
+        let only = NodeId(1);
+        let passages = [(only, -2.0), (only, -12.0), (only, -22.0)].into_iter();
+        let marks = marks(passages, (only, LAP), |_, _| Some(LAP));
+        assert_eq!(marks, Some(vec![[-12.0, 0.0], [-2.0, LAP]]), "up to the follower's last sensor");
+    }
+
+    #[test]
+    fn passages_of_several_sensors_are_as_far_apart_as_surveyed() {
+        let [one, other] = [NodeId(1), NodeId(2)];
+        let passages = [(other, -1.0), (one, -6.0), (other, -11.0)].into_iter();
+        let between = |from, to| Some(if from == to { LAP } else { 0.5 * LAP });
+        let found = marks(passages, (other, 0.5 * LAP), between);
+        assert_eq!(found, Some(vec![[-6.0, 0.0], [-1.0, 0.5 * LAP]]));
+    }
+
+    #[test]
+    fn a_leader_that_passed_the_same_sensor_is_ahead_of_its_follower() {
+        // It passed first and is 1 m past it, its follower 0.4 m.
+        assert_eq!(within_a_lap(0.0, 1.0, 0.4, Some(LAP)), 0.0);
+        // It passed again, and its follower not yet.
+        assert_eq!(within_a_lap(0.0, 0.2, 2.4, Some(LAP)), LAP);
+        // It was missed there: it is 0.6 m past it in the next lap.
+        assert_eq!(within_a_lap(0.0, LAP + 0.6, 0.1, Some(LAP)), -LAP);
+        // Its last sensor is another one, which its follower was not seen to pass.
+        assert_eq!(within_a_lap(1.5, 0.2, 1.8, Some(LAP)), 1.5);
+        // The track is no circuit.
+        assert_eq!(within_a_lap(0.0, 0.2, 0.4, None), 0.0);
+    }
 
     #[test]
     fn a_spurious_passage_leaves_the_record_and_earlier_ones_stay() {
