@@ -35,7 +35,7 @@ pub(crate) fn chosen<'a>(table: &Table<'a>, key: &str, which: Option<&str>) -> R
 
 /// Names as an error lists them: the first of many, on one line.
 pub(crate) fn listed(names: &[&str]) -> String {
-    /// Beyond so many a list helps nobody.
+    /// A longer list does not help its reader.
     const MOST: usize = 10;
     let mut listed: Vec<String> =
         names.iter().take(MOST).map(|name| name.escape_debug().to_string()).collect();

@@ -161,7 +161,7 @@ fn an_import_from_above_or_beside_is_noticed() {
     assert_eq!(
         noticed("time.rs", "use crate::units::Length;"),
         1,
-        "units knows time, not the other way round"
+        "units knows time, and time must not know units"
     );
     assert_eq!(noticed("track/graph.rs", "use super::node::Node; use crate::{Length, ids::NodeId};"), 0);
     assert_eq!(noticed("track/graph.rs", "#[cfg(test)] mod tests { use crate::estimation::Prediction; }"), 0);

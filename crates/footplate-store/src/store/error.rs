@@ -180,7 +180,7 @@ impl StoreError {
     }
 }
 
-/// Whether it was writing that failed, in whatever way.
+/// Whether it was writing that failed, for any reason.
 fn is_write(error: &rusqlite::Error) -> bool {
     use rusqlite::ffi::{
         SQLITE_IOERR_FSYNC, SQLITE_IOERR_SHMMAP, SQLITE_IOERR_SHMSIZE, SQLITE_IOERR_TRUNCATE,

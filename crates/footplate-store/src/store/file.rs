@@ -264,7 +264,7 @@ mod tests {
         std::fs::write(
             &path,
             "This is a letter, and a long one, with more than the hundred bytes a header has, \
-            so that nobody takes it for an empty file.",
+            so that it is not taken for an empty file.",
         )
         .unwrap();
         assert!(matches!(Store::open_or_create(&path), Err(StoreError::NotAStore { .. })));

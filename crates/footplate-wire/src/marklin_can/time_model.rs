@@ -37,7 +37,7 @@ pub const TIME_MODEL: TimeModel = TimeModel {
     report_window: SCAN_EVERY,
 };
 
-/// The line that these times hold for: answers come within what a network takes at the longest, and once more for the way there.
+/// The line that these times hold for: a command and its answer each take what a network takes at the longest.
 pub const USUAL_LINE: UsualLine = UsualLine {
     answers_within: TimeSpan::from_ns(2 * NETWORK_LONGEST.as_ns()),
     repeated_after: REPEATED_AFTER,

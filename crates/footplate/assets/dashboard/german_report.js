@@ -23,9 +23,10 @@ const PHRASES = [
   ["does not say what it is", "nennt seine Art nicht"], ["station at", "Zentrale bei"], [/train (\d+): (\d+) received, (\d+) errors/, "Zug $1: $2 empfangen, $3 Fehler"], ["reports speed", "meldet Tempo"],
   ["wrong; they are not relied on", "falsch; sie werden nicht verwendet"], [/number (\S+), version/, "Nummer $1, Version"], [/, number (0x)/, ", Nummer $1"],
   [/of sensors taken to be (\S+) ms, as set in the station \(scan\)/, "der Rückmelder, angenommen: $1 ms, wie in der Zentrale eingestellt (scan)"],
-  [/(\d+) in slot (\d+), used by a throttle/, "$1 in Slot $2, von einem Fahrregler belegt"], [/(\d+) in slot (\d+), used by nobody/, "$1 in Slot $2, frei"], [/refused (\d+) messages/, "$1 Nachrichten abgelehnt"],
+  [/(\d+) in slot (\d+), used by a throttle/, "$1 in Slot $2, von einem Fahrregler belegt"], [/(\d+) in slot (\d+), not in use/, "$1 in Slot $2, frei"], [/refused (\d+) messages/, "$1 Nachrichten abgelehnt"],
   [/as fast as usual: 99 of 100 answers within (\S+) ms/, "so schnell wie üblich: 99 von 100 Antworten innerhalb von $1 ms"],
   [/(\S+) ms slower than usual \((\S+) ms\), (\S+) % lost: a command may need (\d+) more tries/, "$1 ms langsamer als üblich ($2 ms), $3 % verloren: ein Befehl kann $4 weitere Versuche brauchen"],
+  [/no participant on the CAN bus has named itself; check the station's address, or the adapter and its cable/, "kein Teilnehmer am CAN-Bus hat sich gemeldet; Adresse der Zentrale oder Adapter und Kabel prüfen"],
   ["a Central Station", "eine Central Station"], ["a track processor", "ein Gleisprozessor"], ["none", "keine"],
 ];
 /** Lines of the result of a calibration. */

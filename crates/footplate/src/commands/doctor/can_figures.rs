@@ -95,7 +95,7 @@ impl CanFigures {
 impl StationFigures for CanFigures {
     fn check(&self) -> Result<(), &'static str> {
         (!self.participants.is_empty()).then_some(()).ok_or(
-            "nobody on the CAN bus has named themselves; check the station's address, or the adapter and its cable",
+            "no participant on the CAN bus has named itself; check the station's address, or the adapter and its cable",
         )
     }
 

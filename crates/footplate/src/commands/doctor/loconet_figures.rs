@@ -109,7 +109,7 @@ impl StationFigures for LocoNetFigures {
     fn write_station(&self, output: &mut dyn Write) -> std::io::Result<()> {
         writeln!(output, "server        {}", self.version.as_deref().unwrap_or("does not say what it is"))?;
         for (slot, (address, slot_use)) in &self.slots {
-            let used = if *slot_use == SlotUse::InUse { "used by a throttle" } else { "used by nobody" };
+            let used = if *slot_use == SlotUse::InUse { "used by a throttle" } else { "not in use" };
             writeln!(output, "locomotive    {address} in slot {slot}, {used}")?;
         }
         Ok(())
