@@ -32,16 +32,11 @@ pub struct Scored {
 }
 
 impl Scored {
-    /// Runs with faults of the simulated world, and disturbances that were not detected.
+    /// What happened to trains in the simulated world, and disturbances that were not detected.
     #[must_use]
     pub fn failures(&self) -> Vec<String> {
         let failures = self.runs.iter().filter_map(|(kind, run)| {
-            let what = match run.faults {
-                0 if *kind == Kind::Faultless || run.noticed.is_some() => return None,
-                0 => "not noticed".to_owned(),
-                1 => "1 fault".to_owned(),
-                faults => format!("{faults} faults"),
-            };
+            let what = run.failure(*kind)?;
             Some(format!("{}: {what}", kind.description()))
         });
         failures.collect()

@@ -41,7 +41,7 @@ pub fn score(
         distances: Vec::new(),
         not_run: 0,
         scale: survey.scale(),
-        faults: prepared.world().incidents().len(),
+        incidents: prepared.incidents_since(0),
     };
     let mut seen = Vec::new();
     let known_hop = layout
@@ -83,8 +83,8 @@ pub struct Surveyed {
     not_run: usize,
     /// The standard deviation of the common scale, as stated by the survey.
     scale: f64,
-    /// Faults of the simulated world.
-    pub faults: usize,
+    /// What happened in the simulated world, in words.
+    pub incidents: Vec<String>,
 }
 
 /// The distance from one sensor to another.

@@ -8,7 +8,7 @@ use footplate_core::{Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::kind::{Kind, places_along};
 use crate::seeds::Choice;
-use crate::testbed::{LongestCircuit, PreparedTrains};
+use crate::testbed::{GRIEF, LongestCircuit, PreparedTrains};
 
 /// The disturbed train.
 pub(super) const TRAIN: TrainId = TrainId(24);
@@ -41,11 +41,22 @@ pub(super) struct Outcomes {
     /// Errors of stops (mm) before and after.
     pub(super) before: Vec<f64>,
     pub(super) after: Vec<f64>,
-    /// Faults of the simulated world, and whether the track power was switched off.
-    pub(super) faults: usize,
+    /// What happened in the simulated world, in words.
+    pub(super) incidents: Vec<String>,
+    /// Whether the track power was switched off.
     pub(super) powered_off: bool,
     /// The notices, for debugging.
     pub(super) notices: Vec<String>,
+}
+
+impl Outcomes {
+    /// What went wrong: incidents, or a disturbance that was not noticed.
+    pub(super) fn failure(&self, kind: Kind) -> Option<String> {
+        if !self.incidents.is_empty() {
+            return Some(format!("{GRIEF}: {}", self.incidents.join("; ")));
+        }
+        (kind != Kind::Faultless && self.noticed.is_none()).then(|| "not noticed".to_owned())
+    }
 }
 
 /// One run.
@@ -56,8 +67,8 @@ pub(super) struct DisturbedRun<'l> {
     choice: Choice,
     step: SpeedStep,
     lap_mm: f64,
-    /// Faults before the run, during calibration.
-    faults: usize,
+    /// The number of incidents before the run, during calibration.
+    incidents_before: usize,
     pub(super) result: Outcomes,
     recovered_at: Cell<Option<Timestamp>>,
     noticed_at: Cell<Option<Timestamp>>,
@@ -85,7 +96,7 @@ impl<'l> DisturbedRun<'l> {
         let step = prepared.nearest_step(TRAIN, SPEED);
         let lap_mm =
             circuit.edges.iter().map(|edge| prepared.world().truth().track().length(*edge).as_mm()).sum();
-        let faults = prepared.world().incidents().len();
+        let incidents_before = prepared.world().incidents().len();
         Ok(Self {
             layout,
             prepared,
@@ -93,7 +104,7 @@ impl<'l> DisturbedRun<'l> {
             choice,
             step,
             lap_mm,
-            faults,
+            incidents_before,
             result: Outcomes::default(),
             recovered_at: Cell::new(None),
             noticed_at: Cell::new(None),
@@ -209,7 +220,7 @@ impl<'l> DisturbedRun<'l> {
         if kind == Kind::Faultless {
             self.wait(UNDISTURBED_TIME);
             self.result.watched_s = (self.now() - began).as_s();
-            self.result.faults = self.prepared.world().incidents().len() - self.faults;
+            self.result.incidents = self.prepared.incidents_since(self.incidents_before);
             return Ok(self.result);
         }
         self.result.watched_s = (self.now() - began).as_s();
@@ -243,7 +254,23 @@ impl<'l> DisturbedRun<'l> {
                 self.result.after.extend(error);
             }
         }
-        self.result.faults = self.prepared.world().incidents().len() - self.faults;
+        self.result.incidents = self.prepared.incidents_since(self.incidents_before);
         Ok(self.result)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_run_says_what_happened() {
+        let incidents = vec!["12.5 s: train 24 ran into train 58".to_owned()];
+        let wrecked = Outcomes { incidents, ..Outcomes::default() };
+        let says = "came to grief: 12.5 s: train 24 ran into train 58";
+        assert_eq!(wrecked.failure(Kind::Faultless).as_deref(), Some(says));
+        assert_eq!(wrecked.failure(Kind::Swapped).as_deref(), Some(says), "before that it was not noticed");
+        assert_eq!(Outcomes::default().failure(Kind::Swapped).as_deref(), Some("not noticed"));
+        assert_eq!(Outcomes::default().failure(Kind::Faultless), None);
     }
 }

@@ -20,7 +20,7 @@ pub(super) struct Figures {
     /// Absolute errors of stops (mm).
     pub(super) before: Vec<f64>,
     pub(super) after: Vec<f64>,
-    pub(super) faults: usize,
+    pub(super) incidents: usize,
     pub(super) powered_off: usize,
 }
 
@@ -41,7 +41,7 @@ impl Figures {
             needed_operator: runs.iter().filter(|run| run.needed_operator).count(),
             before: all(|run| &run.before),
             after: all(|run| &run.after),
-            faults: runs.iter().map(|run| run.faults).sum(),
+            incidents: runs.iter().map(|run| run.incidents.len()).sum(),
             powered_off: runs.iter().filter(|run| run.powered_off).count(),
         }
     }
@@ -54,7 +54,7 @@ impl Figures {
             "run_until_then_mm": median_and_high(self.noticed.iter().map(|[_, mm]| *mm)),
             "recovered": self.recovered.len(), "recovered_s": median_and_high(self.recovered.iter().copied()),
             "as_before": as_before, "rescaled": rescaled, "learnt_anew": anew,
-            "needed_person": self.needed_operator, "powered_off": self.powered_off, "incidents": self.faults,
+            "needed_person": self.needed_operator, "powered_off": self.powered_off, "incidents": self.incidents,
             "stops_before": self.before.len(), "before_mm": median_and_high(self.before.iter().copied()),
             "stops_after": self.after.len(), "after_mm": median_and_high(self.after.iter().copied()),
         })

@@ -69,7 +69,7 @@ impl WrittenScores for Page {
                 shown_pair(median_and_high(figures.before.iter().copied())),
                 figures.after.len(),
                 shown_pair(median_and_high(figures.after.iter().copied())),
-                figures.faults,
+                figures.incidents,
             )?;
         }
         let (alarms, hours) = self.alarms();
@@ -105,7 +105,7 @@ impl WrittenScores for Page {
         let runs = runs.map(|(seed, (kind, run))| {
             json!({
                 "seed": seed, "kind": kind.key(), "noticed": run.noticed, "recovered": run.recovered,
-                "needed_person": run.needed_operator, "false_alarms": run.false_alarms, "incidents": run.faults,
+                "needed_person": run.needed_operator, "false_alarms": run.false_alarms, "incidents": run.incidents,
                 "before_mm": run.before, "after_mm": run.after, "said": run.notices,
             })
         });
@@ -134,7 +134,7 @@ impl WrittenScores for Page {
             [all + figures.runs, noticed + figures.noticed.len(), persons + figures.needed_operator]
         });
         vec![
-            Rate::grief(runs().filter(|(_, run)| run.faults > 0).count(), runs().count()),
+            Rate::grief(runs().filter(|(_, run)| !run.incidents.is_empty()).count(), runs().count()),
             Rate::new("not noticed", events - noticed, events),
             Rate::new("needed a person", persons, events),
         ]

@@ -11,7 +11,7 @@ use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{Command, Event, EventKind, Length, NodeId, SensorId, SpeedStep, TimeSpan, Timestamp};
 
 use super::trial::{Counts, Plan, Results, TRAIN};
-use crate::testbed::VirtualLine;
+use crate::testbed::{VirtualLine, in_words};
 
 /// The time after a command at which the speed counts as steady, in s (chosen: the slowest trains need five).
 const SETTLING_S: f64 = 6.0;
@@ -107,7 +107,7 @@ impl<'a, 'l> CourseProject<'a, 'l> {
             let moved = step.and_then(|step| self.short_move(ordered, step));
             results.moves.extend(moved.map(|moved| [ordered, moved]));
         }
-        results.faults = self.line.station.world().incidents().len();
+        results.incidents = in_words(self.line.station.world().incidents());
         results
     }
 

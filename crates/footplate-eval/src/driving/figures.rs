@@ -23,10 +23,10 @@ pub struct ScoredTrain {
 }
 
 impl ScoredTrain {
-    /// Faults of the simulated world while Footplate drove.
+    /// What happened in the simulated world while Footplate drove, in words.
     #[must_use]
-    pub fn faults(&self) -> usize {
-        self.by.first().map_or(0, |ours| ours.faults)
+    pub fn incidents(&self) -> &[String] {
+        self.by.first().map_or(&[], |ours| &ours.incidents)
     }
 }
 
@@ -70,7 +70,7 @@ pub(super) struct Figures {
     pub(super) position_checks: [u64; 2],
     pub(super) stops: [usize; 2],
     pub(super) failed: u32,
-    pub(super) faults: usize,
+    pub(super) incidents: usize,
 }
 
 /// The tolerance of a short move: this, or this share of it.
@@ -108,7 +108,7 @@ impl Figures {
                 sum(|results| u64::from(results.position_checks[1])),
             ],
             failed: results.clone().map(|results| results.failed).sum(),
-            faults: results.clone().map(|results| results.faults).sum(),
+            incidents: results.clone().map(|results| results.incidents.len()).sum(),
         }
     }
 
@@ -134,7 +134,7 @@ impl Figures {
             "mid_stop_mm": self.mid, "mid_stops": self.stops[0], "top_stop_mm": self.top,
             "top_stops": self.stops[1], "move_mm": self.moves, "moves": self.good_moves[1],
             "moves_within_8_mm_or_5_pct": self.good_moves[0], "not_beyond": beyond,
-            "position_inside_pct": self.covered_pct(), "failed": self.failed, "incidents": self.faults,
+            "position_inside_pct": self.covered_pct(), "failed": self.failed, "incidents": self.incidents,
         })
     }
 }

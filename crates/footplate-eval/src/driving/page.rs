@@ -86,7 +86,7 @@ impl WrittenScores for Page<'_> {
         let [_, moves] = ours.good_moves;
         let limited: usize = ours.beyond.iter().map(|[_, stops]| *stops).sum();
         let orders = ours.stops[0] + ours.stops[1] + limited + moves + ours.failed as usize;
-        let wrecked = self.trains.iter().filter(|train| train.by.first().is_some_and(|by| by.faults > 0));
+        let wrecked = self.trains.iter().filter(|train| !train.incidents().is_empty());
         let mut rates = vec![
             Rate::grief(wrecked.count(), self.trains.len()),
             Rate::new("orders not carried out", ours.failed as usize, orders),
@@ -204,7 +204,7 @@ impl Page<'_> {
             Driven::ALL.map(|by| format!("{} {}", by.key(), figure(&self.figures(None, by)))).join(", ")
         };
         writeln!(output, "Orders not carried out: {}.", counted(|figures| figures.failed as usize))?;
-        writeln!(output, "Trains that came to grief: {}.", counted(|figures| figures.faults))
+        writeln!(output, "Trains that came to grief: {}.", counted(|figures| figures.incidents))
     }
 }
 

@@ -6,7 +6,7 @@ use footplate_core::{Approach, Length, NodeId, Ratio, SpeedStep, TimeSpan, Times
 use footplate_sim::{LawFamily, LivingSwitches, TrainTruth, VirtualStation};
 
 use crate::seeds::Choice;
-use crate::testbed::{Calibrated, VirtualLine};
+use crate::testbed::{Calibrated, VirtualLine, in_words};
 
 /// The train's address.
 pub const TRAIN: TrainId = TrainId(24);
@@ -53,7 +53,8 @@ pub(super) struct Results {
     pub(super) position_checks: [u32; 2],
     /// Orders that were refused or not carried out.
     pub(super) failed: u32,
-    pub(super) faults: usize,
+    /// What happened in the simulated world, in words.
+    pub(super) incidents: Vec<String>,
     /// The reasons of failed orders.
     pub(super) failures: Vec<String>,
 }
@@ -161,7 +162,7 @@ impl<'a, 'l> Trial<'a, 'l> {
         for _ in 0..counts.moves {
             self.short_move();
         }
-        self.results.faults = self.line.station.world().incidents().len();
+        self.results.incidents = in_words(self.line.station.world().incidents());
     }
 
     fn truth(&self) -> Option<TrainTruth> {

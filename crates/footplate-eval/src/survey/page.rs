@@ -77,7 +77,7 @@ impl WrittenScores for Page<'_> {
     }
 
     fn rates(&self) -> Vec<Rate> {
-        let wrecked = self.worlds.iter().filter(|world| world.faults > 0).count();
+        let wrecked = self.worlds.iter().filter(|world| !world.incidents.is_empty()).count();
         let distances = || self.worlds.iter().flat_map(Surveyed::scored);
         let outside = distances().filter(|distance| !distance.is_inside()).count();
         vec![
@@ -98,7 +98,7 @@ impl WrittenScores for Page<'_> {
             json!({
                 "seed": world.seed, "rms_mm": figures.off, "worst_mm": figures.worst, "path_rms_mm": figures.path_length,
                 "inside_pct": figures.inside_pct, "scale_pct": figures.scale_pct, "said_scale_pct": 100.0 * world.scale,
-                "unseen": world.not_run, "incidents": world.faults, "distances": distances.collect::<Vec<Value>>(),
+                "unseen": world.not_run, "incidents": world.incidents, "distances": distances.collect::<Vec<Value>>(),
             })
         });
         let all = Figures::of(self.worlds.iter().flat_map(Surveyed::scored));

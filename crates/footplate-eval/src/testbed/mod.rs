@@ -12,5 +12,5 @@ mod virtual_line;
 pub use self::calibrated::{Calibrated, calibrate};
 pub use self::longest_circuit::LongestCircuit;
 pub use self::prepared_trains::PreparedTrains;
-pub(crate) use self::prepared_trains::{GRIEF, nearest_step, speed, steps};
+pub(crate) use self::prepared_trains::{GRIEF, in_words, nearest_step, speed, steps};
 pub use self::virtual_line::VirtualLine;

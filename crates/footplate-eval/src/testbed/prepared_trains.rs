@@ -8,6 +8,7 @@ use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg, Position, TurnoutStates};
 use footplate_core::tracking::PathPoint;
 use footplate_core::{Approach, Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_sim::Incident;
 use footplate_sim::living::{End, LivingLayout, LivingSwitches, VirtualStation};
 
 use super::{VirtualLine, calibrate};
@@ -35,12 +36,21 @@ pub struct PreparedTrains<'l> {
 /// How the trouble of a train begins that touched another, derailed or ran off the track.
 pub(crate) const GRIEF: &str = "came to grief";
 
+/// What happened, one sentence each.
+pub(crate) fn in_words(incidents: &[Incident]) -> Vec<String> {
+    incidents.iter().map(ToString::to_string).collect()
+}
+
 impl<'l> PreparedTrains<'l> {
     /// What happened since there were this many incidents, if trains came to grief.
     pub(crate) fn grief_since(&self, incidents: usize) -> Option<String> {
-        let since = self.world().incidents().get(incidents..).unwrap_or_default();
-        let said: Vec<String> = since.iter().map(ToString::to_string).collect();
+        let said = self.incidents_since(incidents);
         (!said.is_empty()).then(|| format!("{GRIEF}: {}", said.join("; ")))
+    }
+
+    /// The incidents since there were this many, in words.
+    pub(crate) fn incidents_since(&self, incidents: usize) -> Vec<String> {
+        in_words(self.world().incidents().get(incidents..).unwrap_or_default())
     }
 
     /// Draws trains and track from the seed, calibrates each train while the others are off the layout, lifts them all,
@@ -194,6 +204,13 @@ impl Machine for Idle {
 mod tests {
     use super::*;
     use footplate_store::layout_named;
+
+    #[test]
+    fn an_incident_says_when_and_to_which_train_it_happened() {
+        let kind = footplate_sim::IncidentKind::Overrun;
+        let incident = Incident { at: Timestamp::from_s(12.5), train: Some(TrainId(24)), kind };
+        assert_eq!(in_words(&[incident]), ["12.5 s: train 24 ran past the end of its track"]);
+    }
 
     #[test]
     fn trains_are_located_at_rest_where_they_were_put() {

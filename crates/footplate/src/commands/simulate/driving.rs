@@ -10,7 +10,6 @@ use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
 use super::score_form::ScoreForm;
 use super::series::Series;
-use crate::counted::counted;
 use crate::link::law_named;
 
 /// Calibrate random trains from nothing known, drive them to exact stops, and score both by the truth.
@@ -53,11 +52,11 @@ impl Arguments {
 
     /// What went wrong with a train that we drove: how others drive it is no check of ours.
     fn failure(&self, train: &ScoredTrain) -> Option<FailedRun> {
-        let incidents = train.faults();
-        (incidents > 0).then(|| {
+        let incidents = train.incidents();
+        (!incidents.is_empty()).then(|| {
             let (seed, law) = (train.seed, train.law);
             let again = self.series.again("driving", seed, &format!(" --law {law}"));
-            let what = format!("seed {seed}, law {law}: {}", counted(incidents, "incident"));
+            let what = format!("seed {seed}, law {law}: {}", incidents.join("; "));
             FailedRun { what, again }
         })
     }

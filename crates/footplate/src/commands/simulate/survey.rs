@@ -10,7 +10,6 @@ use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
 use super::score_form::ScoreForm;
 use super::series::Series;
-use crate::counted::counted;
 
 /// Survey a layout of which one length is known by driving random trains, and score the lengths by the truth.
 ///
@@ -49,8 +48,8 @@ impl Arguments {
     }
 
     fn failure(&self, world: &Surveyed) -> Option<FailedRun> {
-        (world.faults > 0).then(|| FailedRun {
-            what: format!("seed {}: {}", world.seed, counted(world.faults, "incident")),
+        (!world.incidents.is_empty()).then(|| FailedRun {
+            what: format!("seed {}: {}", world.seed, world.incidents.join("; ")),
             again: self.series.again("survey", world.seed, &self.own()),
         })
     }
