@@ -171,6 +171,29 @@ fn events_whose_recording_is_lost_are_kept_under_a_stand_in() {
 }
 
 #[test]
+fn directions_whose_tree_is_lost_are_not_taken_for_runs() {
+    /// Enough for several pages.
+    const DIRECTIONS: u64 = 1_000;
+    let shelf = Shelf::new();
+    full(&shelf);
+    let connection = rusqlite::Connection::open(shelf.path()).unwrap();
+    let insert = "INSERT INTO directions (train, forward, stored_at_ns) VALUES (?1, ?2, ?3)";
+    for nth in 0..DIRECTIONS {
+        connection.execute(insert, (24 + nth % 3, nth % 2, 1_000 + nth)).unwrap();
+    }
+    let root: usize = connection
+        .query_row("SELECT rootpage FROM sqlite_schema WHERE name = 'directions'", [], |row| row.get(0))
+        .unwrap();
+    drop(connection);
+    let mut bent = fs::read(shelf.path()).unwrap();
+    bent[(root - 1) * PAGE..root * PAGE].fill(0x55);
+    fs::write(shelf.path(), &bent).unwrap();
+    let salvaged = salvage(&shelf.path(), &shelf.file("new.db")).unwrap();
+    assert_eq!((rows(&salvaged, "directions"), salvaged.ambiguous), (DIRECTIONS, 0));
+    assert_eq!((rows(&salvaged, "runs"), rows(&salvaged, "recordings")), (96, 9), "and no run is invented");
+}
+
+#[test]
 fn what_is_only_in_the_journal_is_salvaged_too() {
     let shelf = Shelf::new();
     let mut store = shelf.store();

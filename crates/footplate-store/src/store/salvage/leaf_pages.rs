@@ -44,9 +44,14 @@ impl<'a> Pages<'a> {
         Self { bytes, size, usable }
     }
 
-    /// Every row of every page that can be a leaf of a table.
+    /// The rows of every page that can be a leaf of a table, page by page.
+    pub(super) fn leaves(self) -> impl Iterator<Item = Vec<FoundRow>> + 'a {
+        (0..self.bytes.len().div_ceil(self.size)).map(move |number| self.rows_of(number))
+    }
+
+    /// Every row of every such page.
     pub(super) fn rows(self) -> impl Iterator<Item = FoundRow> + 'a {
-        (0..self.bytes.len().div_ceil(self.size)).flat_map(move |number| self.rows_of(number))
+        self.leaves().flatten()
     }
 
     fn rows_of(self, number: usize) -> Vec<FoundRow> {

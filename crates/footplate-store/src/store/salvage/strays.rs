@@ -8,6 +8,9 @@ use super::{Parent, SalvagedTable, TABLES, accepted, columns_of, stand_in};
 use crate::store::checksum;
 use crate::store::file::Store;
 
+/// The type of columns with real numbers.
+const REAL: &str = "REAL";
+
 /// All rows of a file by its pages, and an empty store to try them in.
 pub(super) struct Strays<'a> {
     pages: Pages<'a>,
@@ -15,8 +18,8 @@ pub(super) struct Strays<'a> {
     trial: Connection,
     /// The columns of each of `TABLES`.
     columns: Vec<Vec<String>>,
-    /// Which of them are of real numbers.
-    reals: Vec<Vec<String>>,
+    /// Their types, in the same order.
+    types: Vec<Vec<String>>,
 }
 
 impl<'a> Strays<'a> {
@@ -27,8 +30,8 @@ impl<'a> Strays<'a> {
         }
         trial.pragma_update(None, "foreign_keys", false)?;
         let columns = TABLES.iter().map(|(name, _)| columns_of(&trial, name)).collect();
-        let reals = TABLES.iter().map(|(name, _)| reals_of(&trial, name)).collect::<Result<_, _>>()?;
-        Ok(Self { pages, trial, columns, reals })
+        let types = TABLES.iter().map(|(name, _)| types_of(&trial, name)).collect::<Result<_, _>>()?;
+        Ok(Self { pages, trial, columns, types })
     }
 
     /// Inserts those that can only be rows of this table and are not in it yet. Counts again what is lost.
@@ -40,29 +43,83 @@ impl<'a> Strays<'a> {
     ) -> rusqlite::Result<()> {
         let Some(at) = TABLES.iter().position(|(name, _)| *name == table.name) else { return Ok(()) };
         let mut last = i64::try_from(table.rows + table.lost).unwrap_or(i64::MAX);
-        for row in self.pages.rows().filter(could_be_ours) {
-            if !self.fits(at, &row)? || self.is_there(into, at, &row)? {
-                continue;
-            }
-            if self.candidates(&row)? != [at] {
-                continue;
-            }
-            let columns = self.columns_for(at, &row);
-            let values = self.values_for(at, &row);
-            if let Some(parent) = parent
-                && let Some(place) = columns.iter().position(|column| column == parent.column)
-                && let Some(Value::Integer(key)) = values.get(place)
-            {
-                table.stand_ins += u64::from(stand_in(into, parent, *key)?);
-            }
-            let mut insert = into.prepare_cached(&insertion(table.name, columns))?;
-            if accepted(&mut insert, &values)? {
-                table.rows += 1;
-                last = last.max(row.id);
+        for leaf in self.pages.leaves() {
+            for row in self.homeless(into, at, &leaf)? {
+                let columns = self.columns_for(at, row);
+                let values = self.values_for(at, row);
+                if let Some(parent) = parent
+                    && let Some(place) = columns.iter().position(|column| column == parent.column)
+                    && let Some(Value::Integer(key)) = values.get(place)
+                {
+                    table.stand_ins += u64::from(stand_in(into, parent, *key)?);
+                }
+                let mut insert = into.prepare_cached(&insertion(table.name, columns))?;
+                if accepted(&mut insert, &values)? {
+                    table.rows += 1;
+                    last = last.max(row.id);
+                }
             }
         }
         table.lost = u64::try_from(last).unwrap_or(0).saturating_sub(table.rows);
         Ok(())
+    }
+
+    /// The rows of a leaf that belong to this table and are not in it yet. A row that several tables would take, as a run of number
+    /// 0 or 1 and a direction are, belongs to the table that alone takes all rows of its leaf.
+    fn homeless<'r>(
+        &self,
+        into: &Transaction<'_>,
+        at: usize,
+        leaf: &'r [FoundRow],
+    ) -> rusqlite::Result<Vec<&'r FoundRow>> {
+        let mut homeless = Vec::new();
+        let mut of_leaf = None;
+        for row in leaf.iter().filter(|row| could_be_ours(row)) {
+            if !self.fits(at, row)? || self.is_there(into, at, row)? {
+                continue;
+            }
+            if self.candidates(row)? != [at] {
+                let home = match of_leaf {
+                    Some(home) => home,
+                    None => *of_leaf.insert(self.home_of(into, leaf)?),
+                };
+                if home != Some(at) {
+                    continue;
+                }
+            }
+            homeless.push(row);
+        }
+        Ok(homeless)
+    }
+
+    /// The only table that takes all rows of a leaf together; `None` if there are several, or none.
+    fn home_of(&self, into: &Transaction<'_>, leaf: &[FoundRow]) -> rusqlite::Result<Option<usize>> {
+        let mut homes = Vec::new();
+        for at in 0..TABLES.len() {
+            if self.takes_all(into, at, leaf)? {
+                homes.push(at);
+            }
+        }
+        Ok(match homes[..] {
+            [home] => Some(home),
+            _ => None,
+        })
+    }
+
+    /// Whether a table would take all rows of a leaf, and has no other rows of their numbers.
+    fn takes_all(&self, into: &Transaction<'_>, at: usize, leaf: &[FoundRow]) -> rusqlite::Result<bool> {
+        self.trial.execute_batch("SAVEPOINT leaf")?;
+        let all = || -> rusqlite::Result<bool> {
+            for row in leaf {
+                if !self.takes(at, row)? || self.is_taken(into, at, row)? {
+                    return Ok(false);
+                }
+            }
+            Ok(true)
+        };
+        let takes_all = all();
+        self.trial.execute_batch("ROLLBACK TO leaf; RELEASE leaf")?;
+        takes_all
     }
 
     /// Rows that could belong to several tables and are in none of them now.
@@ -92,8 +149,16 @@ impl<'a> Strays<'a> {
         Ok(takes)
     }
 
-    /// Whether a table would take a row.
+    /// Whether a table would take a row by itself.
     fn fits(&self, at: usize, row: &FoundRow) -> rusqlite::Result<bool> {
+        self.trial.execute_batch("SAVEPOINT trial")?;
+        let fits = self.takes(at, row);
+        self.trial.execute_batch("ROLLBACK TO trial; RELEASE trial")?;
+        fits
+    }
+
+    /// Inserts a row into a table of the trial, beside those that are there. Returns whether it was taken.
+    fn takes(&self, at: usize, row: &FoundRow) -> rusqlite::Result<bool> {
         let (Some((name, _)), columns) = (TABLES.get(at), self.columns_for(at, row)) else {
             return Ok(false);
         };
@@ -101,11 +166,11 @@ impl<'a> Strays<'a> {
         if columns.len() != row.values.len() || !checksum::holds(name, columns, &values) {
             return Ok(false);
         }
-        let mut insert = self.trial.prepare_cached(&insertion(name, columns))?;
-        self.trial.execute_batch("SAVEPOINT trial")?;
-        let fits = accepted(&mut insert, &values);
-        self.trial.execute_batch("ROLLBACK TO trial; RELEASE trial")?;
-        fits
+        // SQLite would take a number as text, but a row that it wrote into a text column has text there.
+        if !self.types_of(at).iter().zip(&values).all(|(kind, value)| is_of(kind, value)) {
+            return Ok(false);
+        }
+        accepted(&mut *self.trial.prepare_cached(&insertion(name, columns))?, &values)
     }
 
     /// The columns of a table that a row has; an older store has fewer.
@@ -116,16 +181,26 @@ impl<'a> Strays<'a> {
 
     /// The values of a row as a table has them: SQLite writes a whole number into a column of real ones as an integer.
     fn values_for(&self, at: usize, row: &FoundRow) -> Vec<Value> {
-        let reals = self.reals.get(at).map(Vec::as_slice).unwrap_or_default();
         let mut values = values_of(row);
-        for (column, value) in self.columns_for(at, row).iter().zip(&mut values) {
+        for (kind, value) in self.types_of(at).iter().zip(&mut values) {
             if let Value::Integer(number) = *value
-                && reals.contains(column)
+                && kind == REAL
             {
                 *value = Value::Real(number as f64);
             }
         }
         values
+    }
+
+    fn types_of(&self, at: usize) -> &[String] {
+        self.types.get(at).map(Vec::as_slice).unwrap_or_default()
+    }
+
+    /// Whether a table has another row of this number.
+    fn is_taken(&self, into: &Transaction<'_>, at: usize, row: &FoundRow) -> rusqlite::Result<bool> {
+        let Some((table, _)) = TABLES.get(at) else { return Ok(false) };
+        let of_number = format!("SELECT 1 FROM {table} WHERE id = ?1");
+        Ok(into.prepare_cached(&of_number)?.exists([row.id])? && !self.is_there(into, at, row)?)
     }
 
     /// Whether a table has exactly this row.
@@ -152,8 +227,19 @@ fn insertion(table: &str, columns: &[String]) -> String {
     format!("INSERT INTO {table} ({}) VALUES ({places})", columns.join(", "))
 }
 
-/// The columns of a table that hold real numbers.
-fn reals_of(connection: &Connection, table: &str) -> rusqlite::Result<Vec<String>> {
-    let mut names = connection.prepare("SELECT name FROM pragma_table_info(?1) WHERE type = 'REAL'")?;
-    names.query_map([table], |row| row.get(0))?.collect()
+/// The types of the columns of a table.
+fn types_of(connection: &Connection, table: &str) -> rusqlite::Result<Vec<String>> {
+    let mut types = connection.prepare("SELECT type FROM pragma_table_info(?1)")?;
+    types.query_map([table], |row| row.get(0))?.collect()
+}
+
+/// Whether a column of this type keeps such a value as it is.
+fn is_of(kind: &str, value: &Value) -> bool {
+    match value {
+        Value::Null => true,
+        Value::Integer(_) => kind == "INTEGER",
+        Value::Real(_) => kind == REAL,
+        Value::Text(_) => kind == "TEXT",
+        Value::Blob(_) => kind == "BLOB",
+    }
 }
