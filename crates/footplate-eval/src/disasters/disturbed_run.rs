@@ -26,6 +26,10 @@ const RECOVERY_TIMEOUT: f64 = 420.0;
 const STOP_TIMEOUT: f64 = 90.0;
 /// Stops before the disturbance, and after the recovery.
 const STOPS: usize = 3;
+/// Stops that show whether a train is where it is estimated: a place may be too near for the third.
+const STOPS_SEEN: usize = 2;
+/// A person does not see that a train stops so far (mm) from where it was ordered to: half a short locomotive.
+const UNSEEN_MM: f64 = 60.0;
 
 /// The results of one run.
 #[derive(Debug, Clone, Default)]
@@ -55,7 +59,15 @@ impl Outcomes {
         if !self.incidents.is_empty() {
             return Some(format!("{GRIEF}: {}", self.incidents.join("; ")));
         }
-        (kind != Kind::Faultless && self.noticed.is_none()).then(|| "not noticed".to_owned())
+        (kind != Kind::Faultless && self.is_unnoticed()).then(|| "not noticed".to_owned())
+    }
+
+    /// Whether nothing was noticed that a person sees: a train that was put down where its next reports are due runs and stops as
+    /// if nothing had happened.
+    pub(super) fn is_unnoticed(&self) -> bool {
+        let is_as_ordered = |mm: &f64| mm.abs() <= UNSEEN_MM;
+        let stops_as_ordered = self.after.len() >= STOPS_SEEN && self.after.iter().all(is_as_ordered);
+        self.noticed.is_none() && !stops_as_ordered
     }
 }
 
@@ -131,11 +143,7 @@ impl<'l> DisturbedRun<'l> {
     fn note(&mut self, notice: &Notice) {
         let now = self.now();
         match notice {
-            Notice::Danger { train: TRAIN, .. } => match self.disturbed_at {
-                None => self.result.false_alarms += 1,
-                Some(_) if self.noticed_at.get().is_none() => self.noticed_at.set(Some(now)),
-                Some(_) => {}
-            },
+            Notice::Danger { train: TRAIN, .. } => self.note_alarm(now),
             Notice::Recovered { train: TRAIN, outcome, .. } => {
                 self.recovered_at.set(Some(now));
                 if let Some(disturbed_at) = self.disturbed_at {
@@ -147,12 +155,26 @@ impl<'l> DisturbedRun<'l> {
                     self.result.recovered = Some(((now - disturbed_at).as_s(), what));
                 }
             }
+            // Nothing goes on until an operator says that the track is clear.
+            Notice::UnauthorisedMovement { stopped, .. } if stopped.contains(&TRAIN) => {
+                self.note_alarm(now);
+                self.result.needed_operator = true;
+            }
             Notice::NeedsOperator { .. } => self.result.needed_operator = true,
             Notice::PowerOff { .. } => self.result.powered_off = true,
             Notice::Passed { .. } | Notice::Planned(_) | Notice::TurnoutThrown { .. } => return,
             _ => {}
         }
         self.result.notices.push(format!("{:.1} {notice:?}", (now - Timestamp::ZERO).as_s()));
+    }
+
+    /// An alarm: false before anything has happened.
+    fn note_alarm(&mut self, now: Timestamp) {
+        if self.disturbed_at.is_none() {
+            self.result.false_alarms += 1;
+        } else if self.noticed_at.get().is_none() {
+            self.noticed_at.set(Some(now));
+        }
     }
 
     fn wait(&mut self, seconds: f64) {
@@ -247,7 +269,7 @@ impl<'l> DisturbedRun<'l> {
                 self.result.noticed = Some([(at - disturbed_at).as_s(), odometer(&self) - ran]);
             }
         }
-        if self.recovered_at.get().is_some() {
+        if self.recovered_at.get().is_some() || self.result.noticed.is_none() {
             self.wait(1.0);
             for _ in 0..STOPS {
                 let error = self.stop();
@@ -271,6 +293,13 @@ mod tests {
         assert_eq!(wrecked.failure(Kind::Faultless).as_deref(), Some(says));
         assert_eq!(wrecked.failure(Kind::Swapped).as_deref(), Some(says), "before that it was not noticed");
         assert_eq!(Outcomes::default().failure(Kind::Swapped).as_deref(), Some("not noticed"));
+        let stopped = |mm: f64| Outcomes { after: vec![4.0, mm, -12.0], ..Outcomes::default() };
+        assert_eq!(
+            stopped(31.0).failure(Kind::Swapped),
+            None,
+            "it runs and stops as if nothing had happened"
+        );
+        assert_eq!(stopped(-140.0).failure(Kind::Swapped).as_deref(), Some("not noticed"));
         assert_eq!(Outcomes::default().failure(Kind::Faultless), None);
     }
 }

@@ -12,6 +12,8 @@ pub(super) struct Figures {
     pub(super) runs: usize,
     /// Seconds until detection, and the distance run until then (mm).
     pub(super) noticed: Vec<[f64; 2]>,
+    /// Runs in which nothing was noticed that a person sees.
+    pub(super) unnoticed: usize,
     /// Seconds until the train was back in service.
     pub(super) recovered: Vec<f64>,
     /// The outcomes of recoveries: as before, rescaled, learnt anew.
@@ -36,6 +38,7 @@ impl Figures {
             kind,
             runs: runs.len(),
             noticed: runs.iter().filter_map(|run| run.noticed).collect(),
+            unnoticed: runs.iter().filter(|run| run.is_unnoticed()).count(),
             recovered: runs.iter().filter_map(|run| run.recovered).map(|(seconds, _)| seconds).collect(),
             outcomes: ["as before", "rescaled", "learnt anew"].map(counted),
             needed_operator: runs.iter().filter(|run| run.needed_operator).count(),
@@ -49,7 +52,7 @@ impl Figures {
     pub(super) fn json(&self) -> Value {
         let [as_before, rescaled, anew] = self.outcomes;
         json!({
-            "kind": self.kind.key(), "runs": self.runs, "noticed": self.noticed.len(),
+            "kind": self.kind.key(), "runs": self.runs, "noticed": self.noticed.len(), "unnoticed": self.unnoticed,
             "noticed_s": median_and_high(self.noticed.iter().map(|[seconds, _]| *seconds)),
             "run_until_then_mm": median_and_high(self.noticed.iter().map(|[_, mm]| *mm)),
             "recovered": self.recovered.len(), "recovered_s": median_and_high(self.recovered.iter().copied()),

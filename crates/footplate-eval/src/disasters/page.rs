@@ -21,7 +21,9 @@ program. The simulator's truth is used for these figures alone.
 ";
 
 const LEGEND: &str = "\
-*Noticed* is from what happened until the train is commanded to stop for it, and how far it ran in between; *known again* until
+*Noticed* is from what happened until the train is commanded to stop for it, and how far it ran in between; *unnoticed* if it is
+not, and the train does not stop again and again within 60 mm of where it is ordered to (one that is put down where its next reports
+are due runs and stops as if nothing had happened); *known again* until
 the train stands, is located again and measured, and may be ordered again: as it was before, its model rescaled, or learnt
 anew. *Stops* are at random places, from the step with about 280 mm/s, as far from there as the truth says (mm, median /
 95th percentile), before and afterwards. *Grief* counts collisions, derailments and trains that ran past the end of
@@ -46,19 +48,20 @@ impl WrittenScores for Page {
     fn write_text(&self, output: &mut dyn Write) -> io::Result<()> {
         writeln!(
             output,
-            "| what happened | runs | noticed | after s | distance mm | known again | after s | as before | rescaled | \
+            "| what happened | runs | noticed | unnoticed | after s | distance mm | known again | after s | as before | rescaled | \
              anew | person | power off | stops before | mm | stops after | mm | grief |\n\
              | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | \
-             ---: | ---: | ---: |"
+             ---: | ---: | ---: | ---: |"
         )?;
         for figures in self.figures() {
             let [as_before, rescaled, anew] = figures.outcomes;
             writeln!(
                 output,
-                "| {} | {} | {} | {} | {} | {} | {} | {as_before} | {rescaled} | {anew} | {} | {} | {} | {} | {} | {} | {} |",
+                "| {} | {} | {} | {} | {} | {} | {} | {} | {as_before} | {rescaled} | {anew} | {} | {} | {} | {} | {} | {} | {} |",
                 figures.kind.description(),
                 figures.runs,
                 figures.noticed.len(),
+                figures.unnoticed,
                 shown_pair(median_and_high(figures.noticed.iter().map(|[seconds, _]| *seconds))),
                 shown_pair(median_and_high(figures.noticed.iter().map(|[_, mm]| *mm))),
                 figures.recovered.len(),
@@ -130,12 +133,12 @@ impl WrittenScores for Page {
     fn rates(&self) -> Vec<Rate> {
         let runs = || self.scored.iter().flat_map(|scored| &scored.runs);
         let happened = || self.figures();
-        let [events, noticed, persons] = happened().fold([0; 3], |[all, noticed, persons], figures| {
-            [all + figures.runs, noticed + figures.noticed.len(), persons + figures.needed_operator]
+        let [events, unnoticed, persons] = happened().fold([0; 3], |[all, unnoticed, persons], figures| {
+            [all + figures.runs, unnoticed + figures.unnoticed, persons + figures.needed_operator]
         });
         vec![
             Rate::grief(runs().filter(|(_, run)| !run.incidents.is_empty()).count(), runs().count()),
-            Rate::new("not noticed", events - noticed, events),
+            Rate::new("not noticed", unnoticed, events),
             Rate::new("needed a person", persons, events),
         ]
     }
