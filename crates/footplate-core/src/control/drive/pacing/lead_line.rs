@@ -45,12 +45,9 @@ impl<'a> LeadLine<'a> {
         let zero = rollout.seconds(now);
         let mut here = rollout;
         let since = path.surveyed(here.place(&leader.model, zero));
-        let begins = within_a_lap(
-            ahead_of(context, from, rollout.node())?,
-            since,
-            past,
-            surveyed_distance(context, from, from).map(Length::as_m),
-        );
+        let lap = surveyed_distance(context, from, from).map(Length::as_m);
+        let is_only = context.hops_ahead(from).next().is_some_and(|hop| hop.to == from);
+        let begins = within_a_lap([ahead_of(context, from, rollout.node())?, since, past], lap, is_only);
         let between = |from, to| surveyed_distance(context, from, to).map(Length::as_m);
         let passages = leader.passages.iter().rev().map(|(node, time)| (node, (time - now).as_s()));
         let marks = marks(passages, (rollout.node(), begins), between)?;
@@ -91,17 +88,16 @@ fn ahead_of(context: TrackContext<'_>, from: NodeId, to: NodeId) -> Option<f64> 
 /// than a lap if it was missed.
 ///
 /// `begins` is the distance from the follower's last sensor to the leader's, zero if they are the same; `since` is how far the
-/// leader has run from there, and `past` the follower.
-fn within_a_lap(begins: f64, since: f64, past: f64, lap: Option<f64>) -> f64 {
+/// leader has run from there, and `past` the follower. `is_only` is whether the circuit has no other sensor.
+fn within_a_lap([begins, since, past]: [f64; 3], lap: Option<f64>, is_only: bool) -> f64 {
     let Some(lap) = lap else { return begins };
     // The leader may have been missed there and be less than a lap ahead.
     if begins + since - lap > past {
         return begins - lap;
     }
-    // The leader has passed the sensor after the follower: it is nearly a lap ahead. Where there is only one sensor, that is so
-    // once in every lap.
-    let is_same = begins <= 0.0;
-    if is_same && begins + since < past { begins + lap } else { begins }
+    // Once in every lap the leader has passed the only sensor again and the follower has not. With several, the last sensor of
+    // both is the same only if the leader passed it first: a leader estimated behind its follower has stalled.
+    if is_only && begins + since < past { begins + lap } else { begins }
 }
 
 /// The detections of a leader, oldest first: time (s from now) and place.
@@ -192,15 +188,15 @@ mod tests {
     #[test]
     fn a_leader_that_passed_the_same_sensor_is_ahead_of_its_follower() {
         // It passed first and is 1 m past it, its follower 0.4 m.
-        assert_eq!(within_a_lap(0.0, 1.0, 0.4, Some(LAP)), 0.0);
-        // It passed again, and its follower not yet.
-        assert_eq!(within_a_lap(0.0, 0.2, 2.4, Some(LAP)), LAP);
+        assert_eq!(within_a_lap([0.0, 1.0, 0.4], Some(LAP), true), 0.0);
+        // It passed the only sensor again, and its follower not yet.
+        assert_eq!(within_a_lap([0.0, 0.2, 2.4], Some(LAP), true), LAP);
+        // There are more sensors: it stalled, and its follower was estimated to pass it.
+        assert_eq!(within_a_lap([0.0, 0.2, 0.4], Some(LAP), false), 0.0);
         // It was missed there: it is 0.6 m past it in the next lap.
-        assert_eq!(within_a_lap(0.0, LAP + 0.6, 0.1, Some(LAP)), -LAP);
-        // Its last sensor is another one, which its follower was not seen to pass.
-        assert_eq!(within_a_lap(1.5, 0.2, 1.8, Some(LAP)), 1.5);
+        assert_eq!(within_a_lap([0.0, LAP + 0.6, 0.1], Some(LAP), true), -LAP);
         // The track is no circuit.
-        assert_eq!(within_a_lap(0.0, 0.2, 0.4, None), 0.0);
+        assert_eq!(within_a_lap([0.0, 0.2, 0.4], None, false), 0.0);
     }
 
     #[test]
