@@ -252,7 +252,7 @@ impl DrivenTrain {
                     self.commanded = step;
                 }
                 self.expect_after_command(context, now);
-                self.pacing_step_sent(event.time);
+                self.pacing_step_sent(context, event.time);
                 self.step_sent(context, now, step, out);
             }
             EventKind::Reverse { .. } => {

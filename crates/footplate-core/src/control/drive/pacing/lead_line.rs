@@ -133,29 +133,44 @@ const MAX_PASSAGES: usize = 40;
 /// The sensors that a train passed last, oldest first, each with the most likely time, from its report and the
 /// train's motion.
 #[derive(Debug, Clone, Default)]
-pub(in crate::control::drive) struct Passages(VecDeque<(NodeId, Timestamp)>);
+pub(in crate::control::drive) struct Passages {
+    passed: VecDeque<(NodeId, Timestamp)>,
+    /// Whether it has been commanded to set out from rest since the last of them.
+    has_set_out: bool,
+}
 
 impl Passages {
     /// Adds a passage.
     pub(in crate::control::drive) fn note(&mut self, node: NodeId, time: Timestamp) {
-        if self.0.len() >= MAX_PASSAGES {
-            self.0.pop_front();
+        if self.passed.len() >= MAX_PASSAGES {
+            self.passed.pop_front();
         }
-        self.0.push_back((node, time));
+        self.passed.push_back((node, time));
+        self.has_set_out = false;
+    }
+
+    /// The train sets out from rest.
+    pub(super) const fn set_out(&mut self) {
+        self.has_set_out = true;
+    }
+
+    /// Whether it may still stand where it was commanded to set out: no sensor has reported it since.
+    pub(super) const fn may_not_have_started(&self) -> bool {
+        self.has_set_out
     }
 
     /// Drops the passages from a time on: they are noted again as they were.
     pub(in crate::control::drive) fn forget_from(&mut self, time: Timestamp) {
-        self.0.retain(|(_, passed)| *passed < time);
+        self.passed.retain(|(_, passed)| *passed < time);
     }
 
     /// Clears the record: the train is elsewhere.
     pub(in crate::control::drive) fn forget(&mut self) {
-        self.0.clear();
+        self.passed.clear();
     }
 
     pub(super) fn iter(&self) -> impl DoubleEndedIterator<Item = (NodeId, Timestamp)> + '_ {
-        self.0.iter().copied()
+        self.passed.iter().copied()
     }
 }
 
@@ -197,6 +212,17 @@ mod tests {
         assert_eq!(within_a_lap([0.0, LAP + 0.6, 0.1], Some(LAP), true), -LAP);
         // The track is no circuit.
         assert_eq!(within_a_lap([0.0, 0.2, 0.4], None, false), 0.0);
+    }
+
+    #[test]
+    fn a_train_that_set_out_may_still_stand_until_a_sensor_reports_it() {
+        let mut passages = Passages::default();
+        passages.note(NodeId(1), Timestamp::from_s(10.0));
+        assert!(!passages.may_not_have_started());
+        passages.set_out();
+        assert!(passages.may_not_have_started());
+        passages.note(NodeId(2), Timestamp::from_s(12.0));
+        assert!(!passages.may_not_have_started());
     }
 
     #[test]

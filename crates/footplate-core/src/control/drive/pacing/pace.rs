@@ -146,7 +146,11 @@ impl DrivenTrain {
     }
 
     /// A step has been sent.
-    pub(in crate::control::drive) fn pacing_step_sent(&mut self, sent: Timestamp) {
+    pub(in crate::control::drive) fn pacing_step_sent(&mut self, context: TrackContext<'_>, sent: Timestamp) {
+        let stands = self.located(context, sent).is_some_and(|located| located.speed <= Speed::ZERO);
+        if stands && self.commanded > SpeedStep::STAND {
+            self.passages.set_out();
+        }
         if let Some(pacing) = &mut self.pacing {
             pacing.budget.record(seconds(sent));
             pacing.next_update = Some(sent + SPACING);
