@@ -376,12 +376,6 @@ impl Locator {
         self.rest_of(context, stopped, model)
     }
 
-    /// Whether the change of speed commanded last has shown: another one would not be as if it had.
-    #[must_use]
-    pub fn has_change_shown(&self, model: &MotionModel, at: Timestamp) -> bool {
-        self.filter.has_shown(model, self.seconds(at))
-    }
-
     /// The same for a train at rest that receives a step at `start` first: a short move.
     #[must_use]
     pub fn rest_after_move(
@@ -396,6 +390,12 @@ impl Locator {
         moved.command(model, self.seconds(start), step.get());
         moved.command(model, self.seconds(stop.max(start)), 0);
         self.rest_of(context, moved, model)
+    }
+
+    /// Whether the change of speed commanded last has shown: one more would interrupt it otherwise.
+    #[must_use]
+    pub fn has_change_shown(&self, model: &MotionModel, at: Timestamp) -> bool {
+        self.filter.has_shown(model, self.seconds(at))
     }
 
     /// By how much (m) the stop of a train that was commanded to stop is longer because of the track that it runs over.

@@ -141,12 +141,12 @@ impl Watchdog {
                 }
             }
             let mut left = BODY;
-            let under = edges.into_iter().rev().take_while(|edge| {
+            let mut under = edges.into_iter().rev().take_while(|edge| {
                 let is_under = left > Length::ZERO;
                 left -= self.driver.layout().edge(*edge).map_or(Length::ZERO, |edge| edge.length);
                 is_under
             });
-            under.collect::<Vec<_>>().into_iter().any(|edge| self.lies_otherwise(edge))
+            under.any(|edge| self.lies_otherwise(edge))
         });
         self.behind.insert(train, Behind { sensor, trails_otherwise });
     }

@@ -276,10 +276,10 @@ impl DrivenTrain {
         circuit_length(context, &self.model, node).filter(|_| is_lapped)
     }
 
-    /// Whether the train may be far from its estimated position. One that sets out on dirt stays where it is. Sensors miss a train thirty times as often as trains
-    /// stall: one missed detection is no evidence against a train that was running and is too fast to stall, until
-    /// the next is late. For a creeping train only the last detection is certain: it may stall at any time, and its
-    /// next detection is late long after.
+    /// Whether the train may be far from its estimated position. One that sets out on dirt stays where it is. Sensors miss
+    /// a train thirty times as often as trains stall: one missed detection is no evidence against a train that was running
+    /// and is too fast to stall, until the next is late. For a creeping train only the last detection is certain: it may
+    /// stall at any time, and its next detection is late long after.
     fn is_position_uncertain(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
         let Some(located) = self.located(context, now) else { return true };
         if self.passages.may_not_have_started() {
