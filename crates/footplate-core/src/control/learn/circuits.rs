@@ -118,7 +118,7 @@ impl<'l> Calibrator<'l> {
         }
         self.notify(CalibrationNotice::Circuit(other.clone()));
         self.circuit = Some(other);
-        Some(self.throw_unlocked(now, node, &locked))
+        Some(self.throw_unlocked(now, node, &locked, |_, _| false))
     }
 }
 
@@ -200,15 +200,18 @@ pub(super) fn path_from(layout: &Layout, circuit: &Circuit, node: NodeId) -> imp
     circuit.hops().skip(at.unwrap_or(0)).take(steps)
 }
 
-/// The turnout positions that a circuit needs ahead of a node, nearest first, each for its next passage.
-pub(super) fn wanted_legs(layout: &Layout, circuit: &Circuit, node: NodeId) -> Vec<(TurnoutId, Leg)> {
-    let mut wanted: Vec<(TurnoutId, Leg)> = Vec::new();
+/// The turnout positions that a circuit needs ahead of a node, nearest first, each for its next passage, with the least distance
+/// after which it is needed.
+pub(super) fn wanted_legs(layout: &Layout, circuit: &Circuit, node: NodeId) -> Vec<(TurnoutId, Leg, Length)> {
+    let mut wanted: Vec<(TurnoutId, Leg, Length)> = Vec::new();
+    let mut gone = Length::ZERO;
     for hop in path_from(layout, circuit, node).filter_map(|id| layout.hop(id)) {
         for need in hop.needs {
-            if wanted.iter().all(|(turnout, _)| *turnout != need.turnout) {
-                wanted.push((need.turnout, need.leg));
+            if wanted.iter().all(|(turnout, ..)| *turnout != need.turnout) {
+                wanted.push((need.turnout, need.leg, gone));
             }
         }
+        gone += layout.least_length(&hop);
     }
     wanted
 }
@@ -264,6 +267,10 @@ mod tests {
         assert_eq!(names("B1"), ["D1", "A1", "B1"]);
         assert!(names("C1").is_empty());
         let wanted = wanted_legs(&layout, &circuit, node(&layout, "B1"));
-        assert_eq!(wanted, [(TurnoutId(2), Leg::Straight), (TurnoutId(1), Leg::Straight)]);
+        let mm = Length::from_mm;
+        assert_eq!(
+            wanted,
+            [(TurnoutId(2), Leg::Straight, mm(0.0)), (TurnoutId(1), Leg::Straight, mm(800.0))]
+        );
     }
 }

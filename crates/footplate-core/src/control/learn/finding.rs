@@ -37,6 +37,9 @@ const MAX_REVERSALS: u8 = 3;
 /// A turnout has moved within this time, its command and the one before it included.
 pub(super) const THROWN_WITHIN: TimeSpan = TimeSpan::from_ms(700);
 
+/// A turnout that waits behind another one moves later by this time: half of the above, which counts two commands.
+const NEXT_THROWN_WITHIN: TimeSpan = TimeSpan::from_ms(350);
+
 /// Experiments begin when the turnouts are set over this distance: the longest stop and the hop before it.
 const SET_AHEAD: Length = Length::from_mm(2_500.0);
 
@@ -57,6 +60,16 @@ const ASK_AGAIN: TimeSpan = TimeSpan::from_ms(3_000);
 
 /// An unknown train is at rest this long after the stop command (the longest of the published stops).
 const AT_REST_WITHIN: TimeSpan = TimeSpan::from_ms(5_000);
+
+/// A turnout that is to be thrown.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Throw {
+    turnout: TurnoutId,
+    /// The least distance after which the train needs it.
+    needed_after: Length,
+    /// How many others the station throws before it.
+    behind: usize,
+}
 
 impl Calibrator<'_> {
     /// Starts the calibration: stops the train and listens for stuck sensors.
@@ -264,36 +277,48 @@ impl Calibrator<'_> {
         self.circuit.as_ref().is_some_and(|circuit| path_from(self.layout, circuit, node).next().is_some())
     }
 
-    /// Throws turnouts for the circuit that are not locked by the train.
+    /// Throws turnouts for the circuit that are not locked by the train. A station throws one after the other, and the train runs on
+    /// meanwhile: one that it has reached by then, and needs only when it comes back, waits until the train has passed.
     pub(super) fn throw_turnouts(&mut self, now: Timestamp, node: NodeId) {
         let locked = self.locked(node);
-        self.throw_unlocked(now, node, &locked);
+        let length = self.settings.train_length;
+        let speed = self.fastest_now();
+        let is_under_train = |this: &Self, Throw { turnout, needed_after, behind }: Throw| {
+            let within = THROWN_WITHIN + TimeSpan::from_ns(NEXT_THROWN_WITHIN.as_ns() * behind as i64);
+            let ahead = speed * within + MARGIN;
+            needed_after > ahead && this.locked_within(node, ahead, length).contains_key(&turnout)
+        };
+        self.throw_unlocked(now, node, &locked, is_under_train);
     }
 
-    /// Throws turnouts for the circuit, but none that is locked. Returns how many were commanded.
+    /// Throws turnouts for the circuit, but none that is locked or has to wait. Returns how many were commanded.
     pub(super) fn throw_unlocked(
         &mut self,
         now: Timestamp,
         node: NodeId,
         locked: &BTreeMap<TurnoutId, Option<Leg>>,
+        has_to_wait: impl Fn(&Self, Throw) -> bool,
     ) -> usize {
         let Some(circuit) = &self.circuit else { return 0 };
         let wanted = wanted_legs(self.layout, circuit, node);
         let mut commanded = 0;
-        let mut throws: alloc::vec::Vec<(TurnoutId, Leg)> = alloc::vec::Vec::new();
-        for (turnout, leg) in wanted {
+        let mut throws: alloc::vec::Vec<(TurnoutId, Leg, Length)> = alloc::vec::Vec::new();
+        for (turnout, leg, needed_after) in wanted {
             if locked.contains_key(&turnout) || self.turnouts.get(turnout) == Some(leg) {
                 continue;
             }
             // Its partner in the same place has to be straight first.
             let partner = self.layout.never_curved_with(turnout).filter(|_| leg.is_curved());
             let partner = partner.filter(|partner| self.turnouts.get(*partner) != Some(Leg::Straight));
-            throws.extend(partner.map(|partner| (partner, Leg::Straight)));
-            throws.push((turnout, leg));
+            throws.extend(partner.map(|partner| (partner, Leg::Straight, needed_after)));
+            throws.push((turnout, leg, needed_after));
         }
-        for (turnout, leg) in throws {
+        for (turnout, leg, needed_after) in throws {
             let requested = self.requested_turnouts.get(&turnout);
             if requested.is_some_and(|(requested, since)| *requested == leg && now - *since < ASK_AGAIN) {
+                continue;
+            }
+            if has_to_wait(self, Throw { turnout, needed_after, behind: commanded }) {
                 continue;
             }
             self.requested_turnouts.insert(turnout, (leg, now));
