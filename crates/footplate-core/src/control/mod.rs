@@ -19,4 +19,4 @@ pub use drive::{Aim, ArrivalProfile, Driver, Gap, Order, OrderId, Refusal, StopO
 pub use learn::{CalibrationNotice, Calibrator, CalibratorSettings};
 pub use machine::{Machine, Output};
 pub use notice::{Achieved, Finished, Notice, Outcome, PacedLine, PlannedArrival, PlannedStop, Promise};
-pub use supervise::{Alarm, LinkNews, Watchdog};
+pub use supervise::{Alarm, LinkNews, Remeasured, Watchdog};

@@ -141,10 +141,16 @@ impl NormalEquations {
     /// Adds variances (the lower triangle of a covariance, row by row) to the unknowns: they may have changed by as
     /// much since they were measured. Every unknown must be bounded.
     pub fn widen(&mut self, by: &[f64]) {
+        self.change(|_, covariance| {
+            covariance.iter_mut().zip(by).for_each(|(variance, more)| *variance += more);
+        });
+    }
+
+    /// Replaces what is known by what a function makes of the values and of the lower triangle of their covariance, row by row.
+    /// Every unknown must be bounded.
+    pub fn change(&mut self, by: impl FnOnce(&mut [f64], &mut [f64])) {
         let Some(mut solution) = self.solve() else { return };
-        for (variance, more) in solution.covariance.iter_mut().zip(by) {
-            *variance += more;
-        }
+        by(&mut solution.values, &mut solution.covariance);
         let Some(factor) = cholesky(&solution.covariance, self.unknowns) else { return };
         self.a = first_of_inverse(&factor, self.unknowns, self.unknowns);
         for i in 0..self.unknowns {

@@ -50,7 +50,7 @@ pub use passage::{Drive, Passage, PassageTracker, STALE_WITHIN, Sighting};
 pub(crate) use priors::{
     PATH_LENGTH_SPREAD, TRIP_DEVIATION, WANDER, change_error, run_variance, section_variance,
 };
-pub use rescaled::{MeasuredRatio, Rescaling};
+pub use rescaled::{ChangedNumbers, MeasuredRatio, Rescaling};
 pub(crate) use segment::{Pace, Segment, SpeedCommand};
 pub(crate) use sensor_scatter::SensorScatter;
 pub use short_moves::ShortMoveForecast;

@@ -24,6 +24,11 @@ const MOST: f64 = 5.0;
 /// Steps that were not measured differ from those that were by at least this part (chosen: repeats of one run differ by
 /// half as much).
 const LEAST_DEVIATION: f64 = 0.01;
+/// Speeds of one train differ by no more than this between two sessions (2 % is one deviation over the pairs of sessions of the
+/// published logs); more is dirt or another engine.
+const OTHER_SPEEDS: f64 = 0.05;
+/// Stops that are longer or shorter by more than this part have changed (chosen: twice what differs between two sessions).
+const OTHER_STOPS: f64 = 0.10;
 /// What is not known of stops where speeds are as they were.
 const LEAST_STOP_DEVIATION: f64 = 0.01;
 
@@ -92,6 +97,25 @@ impl Rescaling {
         if least > 0.0 && most > 0.0 { most / least } else { 1.0 }
     }
 
+    /// Stops may be longer or shorter by about such a part of their distance.
+    pub fn widen_stops(&mut self, part: f64) {
+        if part.is_finite() {
+            self.stops_deviation = self.stops_deviation.max(part.abs().min(MOST));
+        }
+    }
+
+    /// Whether speeds differ by more than from one session to the next.
+    #[must_use]
+    pub fn has_other_speeds(&self) -> bool {
+        (self.ratio - 1.0).abs() > OTHER_SPEEDS
+    }
+
+    /// Whether stops differ from those of a train that is only faster or slower by more than is within reach of its speeds.
+    #[must_use]
+    pub fn has_other_stops(&self) -> bool {
+        (self.stops - 1.0).abs() > OTHER_STOPS
+    }
+
     /// Takes in that a stop went on for so much longer than was forecast, as a part of its distance, with one standard deviation
     /// of what was measured.
     pub fn take_stop(&mut self, longer: f64, deviation: f64) {
@@ -105,10 +129,69 @@ impl Rescaling {
     }
 }
 
+/// What a change makes of the numbers of one model: new values, and what is known of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChangedNumbers {
+    values: Vec<f64>,
+    /// By what their deviations from the old values count in the new ones.
+    scale: Vec<f64>,
+    /// Those that were measured anew.
+    measured: Vec<usize>,
+    /// Deviations that several of them have in common, ...
+    common: [Vec<f64>; 3],
+    /// ... and the variance of each by itself.
+    own: Vec<f64>,
+}
+
+impl ChangedNumbers {
+    /// What a number is that was off an old value by so much.
+    pub(super) fn value(&self, place: usize, off: f64) -> f64 {
+        at(&self.values, place) + self.scale(place) * off
+    }
+
+    fn scale(&self, place: usize) -> f64 {
+        self.scale.get(place).copied().unwrap_or(1.0)
+    }
+
+    /// The covariance of two numbers, given what it was. Numbers that are not the train's stay as they are.
+    pub(super) fn covariance(&self, one: usize, other: usize, before: f64) -> f64 {
+        let shared: f64 = self.common.iter().map(|common| at(common, one) * at(common, other)).sum();
+        let own = if one == other { at(&self.own, one) } else { 0.0 };
+        self.scale(one) * self.scale(other) * before + shared + own
+    }
+}
+
+fn at(values: &[f64], place: usize) -> f64 {
+    values.get(place).copied().unwrap_or(0.0)
+}
+
 impl MotionModel {
     /// The same train changed like this, as uncertain as what was measured leaves it.
     #[must_use]
     pub fn rescaled(&self, change: &Rescaling) -> Self {
+        self.with_numbers(&self.changed_numbers(change))
+    }
+
+    /// The same train with other numbers.
+    pub(crate) fn with_numbers(&self, numbers: &ChangedNumbers) -> Self {
+        let side = self.values.len();
+        let lower: Vec<f64> = (0..side)
+            .flat_map(|i| (0..=i).map(move |j| (i, j)))
+            .map(|(i, j)| {
+                // What was measured anew owes nothing to what was known.
+                let is_new = [i, j].iter().any(|place| numbers.measured.contains(place));
+                numbers.covariance(i, j, if is_new { 0.0 } else { self.spread.between(i, j) })
+            })
+            .collect();
+        let mut changed = self.clone();
+        changed.values = numbers.values.clone();
+        changed.spread = Spread::of_lower_triangle(side, &lower);
+        changed
+    }
+
+    /// Its numbers once it has changed like this.
+    #[must_use]
+    pub fn changed_numbers(&self, change: &Rescaling) -> ChangedNumbers {
         let ratio = change.ratio.clamp(1.0 / MOST, MOST);
         let stops = change.stops.clamp(1.0 / MOST, MOST);
         let (steps, side) = (self.steps(), self.values.len());
@@ -144,14 +227,7 @@ impl MotionModel {
             if let Some(value) = values.get_mut(speed_at(knot)) {
                 *value += libm::log(by);
             }
-            if measured(knot).is_some()
-                && let Some(slot) = scale.get_mut(speed_at(knot))
-            {
-                // What was measured anew owes nothing to what was known.
-                *slot = 0.0;
-            }
         }
-        let at = |values: &[f64], place: usize| values.get(place).copied().unwrap_or(0.0);
         let along = |places: &mut dyn Iterator<Item = usize>| {
             let mut doubt = vec![0.0; side];
             for place in places {
@@ -174,18 +250,9 @@ impl MotionModel {
             let new = of_speed.and_then(measured).map_or(0.0, |one| one.deviation);
             new * new + at(&unmeasured, place) * at(&unmeasured, place)
         };
-        let lower: Vec<f64> = (0..side)
-            .flat_map(|i| (0..=i).map(move |j| (i, j)))
-            .map(|(i, j)| {
-                let old = at(&scale, i) * at(&scale, j) * self.spread.between(i, j);
-                let shared: f64 = common.iter().map(|doubt| at(doubt, i) * at(doubt, j)).sum();
-                old + shared + if i == j { own(i) } else { 0.0 }
-            })
-            .collect();
-        let mut changed = self.clone();
-        changed.values = values;
-        changed.spread = Spread::of_lower_triangle(side, &lower);
-        changed
+        let own = (0..side).map(own).collect();
+        let measured = (1..=knots).filter(|knot| measured(*knot).is_some()).map(speed_at).collect();
+        ChangedNumbers { values, scale, measured, common, own }
     }
 }
 

@@ -1,7 +1,7 @@
 //! A model that learns for long stays accurate: outliers get their due weight, and old trips become a prior.
 
-use footplate_core::model::MotionFit;
 use footplate_core::model::survey::SectionIndex;
+use footplate_core::model::{MeasuredRatio, MotionFit, Rescaling};
 use footplate_core::{Approach, Command, EdgeId, Event, EventKind, Length, SpeedStep, TimeSpan, TrainId};
 
 use crate::toy_railway::{ToyRailway, step, straight};
@@ -99,6 +99,42 @@ fn after_three_hundred_stops_a_model_is_as_accurate_as_stated() {
         assert!(off.abs() < 0.01, "step {number}: {off}");
         assert!(speed.count >= 60, "all sensors count: {}", speed.count);
     }
+}
+
+#[test]
+fn a_train_that_was_measured_again_goes_on_learning_from_there() {
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let sections = SectionIndex::of(&world.layout);
+    let mut fit = MotionFit::new(TRAIN, step(14));
+    for number in [8, 12, 4, 10, 6, 8, 4, 12, 6, 10, 8, 4, 10, 6] {
+        trip(&mut world, &mut fit, number, TimeSpan::ZERO);
+        fit.refit(&sections);
+    }
+    // Its wheels get dirty: everything takes as long as before over four fifths of the distance. A recovery measures three speeds.
+    world.trains[0].wheels = 0.8;
+    let measured =
+        [5, 8, 11].map(|number| MeasuredRatio { step: step(number), ratio: 0.8, deviation: 0.006 });
+    let change = Rescaling::of(measured.to_vec());
+    fit.change(&fit.model().changed_numbers(&change));
+    let deviations = |fit: &MotionFit| stops_mm(fit).into_iter().map(|(_, _, deviation)| deviation);
+    let changed: Vec<f64> = deviations(&fit).collect();
+    for number in [8, 12, 4, 10, 6, 8, 4, 12, 6, 10, 8, 4, 10, 6] {
+        trip(&mut world, &mut fit, number, TimeSpan::ZERO);
+        fit.refit(&sections);
+    }
+    for (number, distance, deviation) in stops_mm(&fit) {
+        let off = distance - 0.8 * true_stop_mm(number);
+        assert!(off.abs() < 2.0 * deviation, "step {number}: off by {off} ± {deviation} mm");
+        let speed = fit.model().speed(step(number), Approach::Below).value.as_mm_per_s();
+        let off = speed / (0.8 * 32.0 * f64::from(number)) - 1.0;
+        assert!(off.abs() < 0.015, "step {number}: {off}");
+    }
+    // It knows its stops better than right after the recovery.
+    assert!(
+        deviations(&fit).zip(&changed).all(|(now, then)| now < 0.9 * then),
+        "{changed:?}, {:?}",
+        stops_mm(&fit)
+    );
 }
 
 /// How much further a train rolls if it comes to rest on the falling hop (mm).

@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use footplate_core::control::{
-    Alarm, LinkNews, Machine, Notice, Order, Outcome, Output, Refusal, StopOrder, Watchdog,
+    Alarm, LinkNews, Machine, Notice, Order, Outcome, Output, Refusal, Remeasured, StopOrder, Watchdog,
 };
 use footplate_core::track::Landmark;
 use footplate_core::{
@@ -148,6 +148,9 @@ fn dirty_wheels_are_detected_measured_and_compensated() {
     assert!(watched.run_until(200.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
     let Some(Outcome::Rescaled { ratio }) = watched.recovered() else { panic!("{:#?}", watched.notices) };
     assert!((ratio - 0.8).abs() < 0.02, "{ratio}");
+    // hands over what its fit goes on from, once,
+    assert!(matches!(watched.dog.take_remeasured(FIRST), Some(Remeasured::Changed(_))));
+    assert!(watched.dog.take_remeasured(FIRST).is_none());
     // continues its order,
     assert!(watched.notices.iter().any(|notice| matches!(notice, Notice::Resumed { train: FIRST, .. })));
     watched.run(20.0);

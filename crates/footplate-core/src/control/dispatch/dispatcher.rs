@@ -4,7 +4,7 @@ use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
 use alloc::vec::Vec;
 
 use crate::control::drive::{Driver, Order, OrderId, Refusal};
-use crate::control::supervise::{LinkNews, Watchdog};
+use crate::control::supervise::{LinkNews, Remeasured, Watchdog};
 use crate::control::{Machine, Output};
 use crate::event::Event;
 use crate::ids::{FunctionNumber, TrainId, TurnoutId};
@@ -173,6 +173,11 @@ impl Dispatcher {
     /// See [`Driver::set_model`].
     pub fn set_model(&mut self, model: MotionModel) {
         self.watchdog.set_model(model);
+    }
+
+    /// See [`Watchdog::take_remeasured`].
+    pub fn take_remeasured(&mut self, train: TrainId) -> Option<Remeasured> {
+        self.watchdog.take_remeasured(train)
     }
 
     /// Sets the position of a train, as an operator entered it.

@@ -37,4 +37,5 @@ mod watchdog;
 
 pub use alarm::Alarm;
 pub use line::LinkNews;
+pub use trials::Remeasured;
 pub use watchdog::Watchdog;

@@ -1,11 +1,12 @@
-//! The measurements of a recovery: the speeds at a few steps.
+//! The measurements of a recovery, the speeds at a few steps, and what it found.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep};
 use crate::link::DetectionWindow;
-use crate::model::{MeasuredRatio, MotionModel, StepUse};
+use crate::model::{ChangedNumbers, MeasuredRatio, MotionFit, MotionModel, StepUse};
 use crate::time::{TimeSpan, Timestamp};
 use crate::units::{Length, Speed};
 
@@ -35,6 +36,15 @@ const SETTLES_MORE: TimeSpan = TimeSpan::from_ms(400);
 /// Whether a measured speed is that of the model.
 pub(super) fn is_same(measured: &MeasuredRatio) -> bool {
     libm::log(measured.ratio).abs() <= SAME.max(SAME_DEVIATIONS * measured.deviation)
+}
+
+/// What a recovery found of a train that is no longer as it was: its fit goes on from there.
+#[derive(Debug, Clone)]
+pub enum Remeasured {
+    /// The same train, changed.
+    Changed(ChangedNumbers),
+    /// Another train, with the fit to what it has done since.
+    Another(Box<MotionFit>),
 }
 
 /// The steps that a recovery uses.

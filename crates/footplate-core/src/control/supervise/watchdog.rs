@@ -18,6 +18,7 @@ use super::alarm::{Alarm, ConsistencyMonitor};
 use super::intruder::Intruder;
 use super::recovery::{Phase, Recovery};
 use super::stops::Stops;
+use super::trials::Remeasured;
 use super::unheard::{Behind, Unheard};
 use crate::control::Notice;
 
@@ -40,6 +41,8 @@ pub struct Watchdog {
     pub(super) silent: Option<Timestamp>,
     /// Trains in danger: their recoveries.
     pub(super) dangers: BTreeMap<TrainId, Recovery>,
+    /// What recoveries found of trains that have changed, until it is taken.
+    pub(super) remeasured: BTreeMap<TrainId, Remeasured>,
     /// Trains that are held until the danger is over, with their interrupted orders.
     pub(super) held: BTreeMap<TrainId, Option<(OrderId, Order)>>,
     /// The last order of each train that has not ended.
@@ -79,6 +82,7 @@ impl Watchdog {
             power: Power::On,
             silent: None,
             dangers: BTreeMap::new(),
+            remeasured: BTreeMap::new(),
             held: BTreeMap::new(),
             unfinished: BTreeMap::new(),
             seen: BTreeMap::new(),
@@ -137,6 +141,11 @@ impl Watchdog {
         if !self.dangers.contains_key(&model.train()) {
             self.driver.set_model(model);
         }
+    }
+
+    /// What the last recovery of a train found of it, once, if it is no longer as it was.
+    pub fn take_remeasured(&mut self, train: TrainId) -> Option<Remeasured> {
+        self.remeasured.remove(&train)
     }
 
     /// See [`Driver::set_end_of_authority`]. A train in danger keeps the limits of its recovery.

@@ -13,6 +13,7 @@ use crate::linalg::NormalEquations;
 use crate::model::motion_model::Counts;
 use crate::model::parameters::{SPEEDS, STOP_NODES};
 use crate::model::priors::prior;
+use crate::model::rescaled::ChangedNumbers;
 use crate::model::scatter::ScatterSums;
 use crate::model::variation::Variation;
 
@@ -114,7 +115,24 @@ impl MarginalPrior {
         self.widen(values, highest, &Variation::between_sessions());
     }
 
-    fn widen(&mut self, values: &[f64], highest: usize, by: &Variation) {
+    /// The train was measured again and has changed; the track has not. `old` is what the train's numbers were: all lengths
+    /// and speeds here may be longer by the same part, which the survey decides later.
+    pub(super) fn change(&mut self, old: &[f64], numbers: &ChangedNumbers) {
+        self.bound();
+        let side = self.equations.unknowns();
+        self.equations.change(|values, covariance| {
+            for (place, (value, old)) in values.iter_mut().zip(old).enumerate() {
+                *value = numbers.value(place, *value - old);
+            }
+            let places = (0..side).flat_map(|one| (0..=one).map(move |other| (one, other)));
+            for (slot, (one, other)) in covariance.iter_mut().zip(places) {
+                *slot = numbers.covariance(one, other, *slot);
+            }
+        });
+    }
+
+    /// Gives every number a bound.
+    fn bound(&mut self) {
         let side = self.equations.unknowns();
         // The first place, a section or an offset may have no information yet; a covariance needs a bound.
         for free in side - 1 - self.local.len()..side {
@@ -123,6 +141,11 @@ impl MarginalPrior {
         for node in STOP_NODES..SPEEDS {
             self.equations.add(&[(node, 1.0)], 0.0, NODE_BOUND * NODE_BOUND);
         }
+    }
+
+    fn widen(&mut self, values: &[f64], highest: usize, by: &Variation) {
+        self.bound();
+        let side = self.equations.unknowns();
         let mut more = vec![0.0; side * (side + 1) / 2];
         let mut add = |one: usize, other: usize, variance: f64| {
             let (low, high) = (one.min(other), one.max(other));

@@ -30,6 +30,7 @@ use crate::model::BlockRelease;
 use crate::model::motion_model::{MotionModel, StepUse};
 use crate::model::parameters::{START_NODES, STOP_NODES};
 use crate::model::priors::{independent_nodes, section_variance};
+use crate::model::rescaled::ChangedNumbers;
 use crate::model::scatter::{Scatter, ScatterSums};
 use crate::model::survey::SectionIndex;
 use crate::time::Timestamp;
@@ -175,6 +176,15 @@ impl MotionFit {
         self.condense(self.chain.trips.len());
         self.prior.begin_session(&self.model.values, self.highest());
         self.refit(sections);
+    }
+
+    /// The train was measured again and has changed: what was learnt of it before counts for as much as that leaves of it, and what
+    /// was learnt of the track counts as before. Costs a small part of a fit.
+    pub fn change(&mut self, numbers: &ChangedNumbers) {
+        self.interrupt();
+        self.condense(self.chain.trips.len());
+        self.prior.change(&self.model.values, numbers);
+        self.model = self.model.with_numbers(numbers);
     }
 
     /// Breaks the chain: the train was lifted, pushed, stalled or lost. Earlier trips still count.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::control::Driver;
+use footplate_core::control::{Driver, Remeasured};
 use footplate_core::model::MotionModel;
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::model::{MotionFit, Refit};
@@ -87,11 +87,20 @@ impl Learning {
         }
     }
 
-    /// Drops the fit of a train that has changed. It is not fitted again in this session, and its earlier fit is not
-    /// stored.
-    pub(super) fn forget(&mut self, train: TrainId) {
-        self.fits.remove(&train);
+    /// Goes on from what a recovery found of a train that is no longer as it was.
+    pub(super) fn go_on(&mut self, train: TrainId, from: Remeasured) {
         self.in_progress.remove(&train);
+        match from {
+            Remeasured::Changed(numbers) => {
+                if let Some(fit) = self.fits.get_mut(&train) {
+                    fit.change(&numbers);
+                }
+            }
+            Remeasured::Another(mut fit) => {
+                fit.interrupt();
+                self.fits.insert(train, *fit);
+            }
+        }
     }
 
     /// All fits, with their current runs ended: what the trains do between sessions is unknown.

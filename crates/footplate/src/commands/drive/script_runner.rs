@@ -145,10 +145,10 @@ impl ScriptRunner {
     pub(super) fn learnt(&mut self) -> Vec<MotionModel> {
         let trains: Vec<TrainId> = self.trains.keys().copied().collect();
         let learnt = trains.into_iter().filter_map(|train| {
-            // A recovery measured this train again: its model is kept as measured.
-            let measured_again =
-                self.changed.contains(&train).then(|| self.dispatcher.driver().model(train).cloned());
-            measured_again.flatten().or_else(|| self.learning.model(train))
+            // A train without a fit that a recovery measured again has a model as measured.
+            let measured_again = self.changed.contains(&train);
+            let fitted = self.learning.model(train);
+            fitted.or_else(|| self.dispatcher.driver().model(train).filter(|_| measured_again).cloned())
         });
         learnt.collect()
     }

@@ -1,8 +1,6 @@
 //! The results of instructions: refusals, notices of the dispatcher, ended orders, refitted models.
 
-use footplate_core::control::{
-    Achieved, Finished, Machine, Notice, Order, OrderId, Outcome, Output, Refusal,
-};
+use footplate_core::control::{Achieved, Finished, Machine, Notice, Order, OrderId, Output, Refusal};
 use footplate_core::model::MotionModel;
 use footplate_core::track::Landmark;
 use footplate_core::{Length, TimeSpan, Timestamp, TrainId};
@@ -20,20 +18,6 @@ const UNRELIABLE_FROM: Length = Length::from_mm(15.0);
 
 /// No refit is computed if something is due within this time: one part takes less.
 const DUE_SOON: TimeSpan = TimeSpan::from_ms(50);
-
-/// Speeds of one train differ by no more than this between two sessions (2 % is one deviation over the pairs of sessions of the
-/// published logs); more is dirt or another engine.
-const SAME_TRAIN: f64 = 0.05;
-
-/// Whether what was learnt of a train before its recovery still holds, so that it goes on being learnt. A train that no longer
-/// learns keeps no promise once its stops have changed.
-fn goes_on_learning(outcome: Outcome) -> bool {
-    match outcome {
-        Outcome::AsBefore => true,
-        Outcome::Rescaled { ratio } => (ratio - 1.0).abs() <= SAME_TRAIN,
-        _ => false,
-    }
-}
 
 impl ScriptRunner {
     pub(super) fn refuse(&mut self, now: Timestamp, step: &Step, why: &Refusal) {
@@ -136,11 +120,13 @@ impl ScriptRunner {
                     self.cancelled(now, step, &Refusal::InDanger { train: *train });
                 }
             }
-            // Earlier events belong to the train as it was before.
-            Notice::Recovered { train, outcome, .. } if !goes_on_learning(*outcome) => {
-                self.learning.forget(*train);
-                self.refitted.remove(train);
-                self.changed.insert(*train);
+            Notice::Recovered { train, .. } => {
+                if let Some(remeasured) = self.dispatcher.take_remeasured(*train) {
+                    // What is being fitted is the train as it was before.
+                    self.learning.go_on(*train, remeasured);
+                    self.refitted.remove(train);
+                    self.changed.insert(*train);
+                }
             }
             Notice::NeedsOperator { .. } => self.fell_short = true,
             Notice::Arrived { order, train, error, .. } => self.arrived(now, *order, *train, *error),
