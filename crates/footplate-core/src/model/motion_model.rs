@@ -347,9 +347,9 @@ impl MotionModel {
         TimeSpan::from_s(distance_and_time_to_rest(&self.answers(), step.get(), above).1.max(LEAST_STOP_S))
     }
 
-    /// One standard deviation (m) of stops from a speed (m/s).
+    /// One standard deviation (m) of where stops from a speed (m/s) end.
     pub(crate) fn scatter(&self, speed: f64) -> f64 {
-        self.scatter.of_stop(speed)
+        self.scatter.of_forecast(speed)
     }
 
     /// Variance (m²) of where a sensor trips about its usual place.

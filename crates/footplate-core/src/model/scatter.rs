@@ -45,6 +45,11 @@ impl Scatter {
         libm::hypot(self.of_stop_alone(speed), self.unexplained(speed))
     }
 
+    /// The same for a forecast of where a stop ends.
+    pub(super) fn of_forecast(self, speed: f64) -> f64 {
+        libm::hypot(self.of_stop_alone(speed), UNSEEN * self.unexplained(speed))
+    }
+
     /// What only broken promises show.
     pub(super) fn unexplained(self, speed: f64) -> f64 {
         libm::hypot(self.floor, self.delay * speed)
@@ -61,6 +66,8 @@ impl Scatter {
     }
 }
 
+/// What laws lack shows in the sum of a stop and the next start. Their difference, which no sensor shows, is assumed to be as far off.
+const UNSEEN: f64 = core::f64::consts::SQRT_2;
 /// The usual scatter weighs as much as this many stops or starts of the train.
 const USUAL: f64 = 10.0;
 /// Measurements after which older ones fade: of residuals, and of promises, where a change has to show soon.

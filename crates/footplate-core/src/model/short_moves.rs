@@ -70,7 +70,11 @@ impl MotionModel {
         ShortMoveForecast {
             distance: Length::from_m(distance),
             uncertainty: Length::from_m(libm::hypot(libm::hypot(unknown, shape), END_OF_MOVE)),
-            scatter: Length::from_m(libm::hypot(self.scatter(reached), reached * self.start_scatter())),
+            // A short move is the sum of a start and a stop itself.
+            scatter: Length::from_m(libm::hypot(
+                self.scatter.of_stop(reached),
+                reached * self.start_scatter(),
+            )),
         }
     }
 

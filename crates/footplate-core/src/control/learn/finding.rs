@@ -302,28 +302,30 @@ impl Calibrator<'_> {
         let Some(circuit) = &self.circuit else { return 0 };
         let wanted = wanted_legs(self.layout, circuit, node);
         let mut commanded = 0;
-        let mut throws: alloc::vec::Vec<(TurnoutId, Leg, Length)> = alloc::vec::Vec::new();
         for (turnout, leg, needed_after) in wanted {
-            if locked.contains_key(&turnout) || self.turnouts.get(turnout) == Some(leg) {
+            if self.turnouts.get(turnout) == Some(leg) {
                 continue;
             }
             // Its partner in the same place has to be straight first.
             let partner = self.layout.never_curved_with(turnout).filter(|_| leg.is_curved());
             let partner = partner.filter(|partner| self.turnouts.get(*partner) != Some(Leg::Straight));
-            throws.extend(partner.map(|partner| (partner, Leg::Straight, needed_after)));
-            throws.push((turnout, leg, needed_after));
-        }
-        for (turnout, leg, needed_after) in throws {
-            let requested = self.requested_turnouts.get(&turnout);
-            if requested.is_some_and(|(requested, since)| *requested == leg && now - *since < ASK_AGAIN) {
+            let both = || partner.map(|partner| (partner, Leg::Straight)).into_iter().chain([(turnout, leg)]);
+            let stays = |(turnout, _): (TurnoutId, Leg)| {
+                let throw = Throw { turnout, needed_after, behind: commanded };
+                locked.contains_key(&turnout) || has_to_wait(self, throw)
+            };
+            if both().any(stays) {
                 continue;
             }
-            if has_to_wait(self, Throw { turnout, needed_after, behind: commanded }) {
-                continue;
+            for (turnout, leg) in both() {
+                let requested = self.requested_turnouts.get(&turnout);
+                if requested.is_some_and(|(requested, since)| *requested == leg && now - *since < ASK_AGAIN) {
+                    continue;
+                }
+                self.requested_turnouts.insert(turnout, (leg, now));
+                self.command(Command::Turnout { turnout, curved: leg.is_curved() });
+                commanded += 1;
             }
-            self.requested_turnouts.insert(turnout, (leg, now));
-            self.command(Command::Turnout { turnout, curved: leg.is_curved() });
-            commanded += 1;
         }
         commanded
     }

@@ -88,7 +88,8 @@ pub(super) enum Phase {
     LearningRest,
     /// The recovery is complete: it comes to rest ...
     Ending { outcome: Outcome },
-    /// ... and is turned to the direction in which it was before, if it reversed an odd number of times and remains located.
+    /// ... and is turned to the direction in which it was before, if it reversed an odd number of times, remains located and stands on no
+    /// points that it pushed over.
     Turning { outcome: Outcome },
     /// An operator is needed.
     GivenUp,
@@ -202,7 +203,9 @@ impl Watchdog {
                     if self.stops.at_rest(train).is_some_and(|at_rest| at_rest <= now) =>
                 {
                     let is_turned = !recovery.reversals.is_multiple_of(2);
-                    if !is_turned || !self.driver.stays_located_reversed(train, now) {
+                    let can_turn = self.driver.stays_located_reversed(train, now)
+                        && !self.has_pushed_over_points(now, train);
+                    if !is_turned || !can_turn {
                         self.recovered(now, train, outcome);
                     } else {
                         self.set_phase(train, Phase::Turning { outcome }, now + STOPPED_WITHIN);
