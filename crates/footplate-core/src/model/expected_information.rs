@@ -94,7 +94,7 @@ impl MotionModel {
         let (step, above) = (step.get(), approach == Approach::Above);
         let answers = self.answers();
         let speed = answers.speed(usize::from(step), above);
-        let scatter = self.scatter(speed);
+        let scatter = self.scatter.of_stop(speed);
         let whole = stop_distance(&answers, step, above);
         // The place of the train at the command.
         let begin = sum_of_squares(&[speed * TIMING, PLACE]);
@@ -146,7 +146,7 @@ impl MotionModel {
         let reached = start_to(&answers, step.get()).speed(run.as_s());
         let late =
             sum_of_squares(&[creep_speed * LATE_START, reached * LATE_START, creep_speed * TIMING, PLACE]);
-        let scatter = self.scatter(reached);
+        let scatter = self.scatter.of_stop(reached);
         ExpectedInformation { seen: vec![Seen { slopes, variance: late + scatter * scatter }] }
     }
 

@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use super::parameters::{Answers, between_knots, knots, prior_means, speed_prior, stride};
 use super::priors::end_of_stop;
 use super::priors::section_variance;
-use super::scatter::{MEDIUM_SPEED, Scatter};
+use super::scatter::{MEDIUM_SPEED, Scatter, WATCHED_FROM};
 use super::segment::{Pace, Segment, SpeedCommand};
 use super::sensor_scatter::SensorVariances;
 use super::spread::Spread;
@@ -349,7 +349,14 @@ impl MotionModel {
 
     /// One standard deviation (m) of where stops from a speed (m/s) end.
     pub(crate) fn scatter(&self, speed: f64) -> f64 {
-        self.scatter.of_forecast(speed)
+        let stops = self.stops();
+        let compared = f64::from(stops.saturating_sub(WATCHED_FROM)) / f64::from(stops.max(1));
+        self.scatter.of_forecast(speed, compared)
+    }
+
+    /// All stops that were measured.
+    pub(crate) fn stops(&self) -> u32 {
+        self.counts.iter().flatten().map(|counts| counts.stops).sum()
     }
 
     /// Variance (m²) of where a sensor trips about its usual place.

@@ -44,7 +44,7 @@ impl Objective {
         for step in steps.iter().map(|step| step.get()) {
             for above in [false, true] {
                 let speed = model.answers().speed(usize::from(step), above);
-                let scatter = model.scatter(speed).max(LEAST_SCATTER);
+                let scatter = model.scatter.of_stop(speed).max(LEAST_SCATTER);
                 let weight = 1.0 / (scatter * scatter);
                 targets.push((model.slopes(|answers| stop_distance(answers, step, above)), weight));
                 let run = |answers: &super::parameters::Answers<'_>| {

@@ -45,9 +45,10 @@ impl Scatter {
         libm::hypot(self.of_stop_alone(speed), self.unexplained(speed))
     }
 
-    /// The same for a forecast of where a stop ends.
-    pub(super) fn of_forecast(self, speed: f64) -> f64 {
-        libm::hypot(self.of_stop_alone(speed), UNSEEN * self.unexplained(speed))
+    /// The same for a forecast of where a stop ends. What laws lack shows in the sum of a stop and the next start; their
+    /// difference, which no sensor shows, is assumed to be as far off, as far as this part of all stops was compared with promises.
+    pub(super) fn of_forecast(self, speed: f64, compared: f64) -> f64 {
+        libm::hypot(self.of_stop_alone(speed), libm::sqrt(1.0 + compared) * self.unexplained(speed))
     }
 
     /// What only broken promises show.
@@ -66,8 +67,9 @@ impl Scatter {
     }
 }
 
-/// What laws lack shows in the sum of a stop and the next start. Their difference, which no sensor shows, is assumed to be as far off.
-const UNSEEN: f64 = core::f64::consts::SQRT_2;
+/// Promises are checked once this many stops are known. Before that they are broken because the fit is far from linear, which
+/// shows nothing about the scatter of stops.
+pub(super) const WATCHED_FROM: u32 = 20;
 /// The usual scatter weighs as much as this many stops or starts of the train.
 const USUAL: f64 = 10.0;
 /// Measurements after which older ones fade: of residuals, and of promises, where a change has to show soon.

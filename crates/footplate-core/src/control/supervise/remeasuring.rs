@@ -33,6 +33,7 @@ impl Watchdog {
     /// Concludes the recovery: sets the model and stops the train.
     pub(super) fn end(&mut self, now: Timestamp, train: TrainId, outcome: Outcome) {
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
+        self.remeasured.remove(&train);
         let model = match outcome {
             Outcome::AsBefore => recovery.base.clone(),
             Outcome::Rescaled { .. } => {

@@ -31,14 +31,11 @@ use crate::model::motion_model::{MotionModel, StepUse};
 use crate::model::parameters::{START_NODES, STOP_NODES};
 use crate::model::priors::{independent_nodes, section_variance};
 use crate::model::rescaled::ChangedNumbers;
-use crate::model::scatter::{Scatter, ScatterSums};
+use crate::model::scatter::{Scatter, ScatterSums, WATCHED_FROM};
 use crate::model::survey::SectionIndex;
 use crate::time::Timestamp;
 use crate::track::{Layout, TurnoutStates};
 
-/// Promises are checked once this many stops are known. Before that they are broken because the fit is far from linear, which
-/// shows nothing about the scatter of stops.
-const WATCHED_FROM: u32 = 20;
 /// After this many steps the iteration ends where it is.
 const MOST_ITERATIONS: usize = 15;
 /// After this many halvings of a step the point counts as the best.
@@ -320,8 +317,7 @@ impl MotionFit {
 
     /// Compares the first sensor after each new stop with its prediction from before the fit.
     fn compare_promises(&mut self, columns: &Columns, values: &Values) {
-        let stops: u32 = self.model.counts.iter().flatten().map(|counts| counts.stops).sum();
-        if stops < WATCHED_FROM {
+        if self.model.stops() < WATCHED_FROM {
             return;
         }
         let point = self.point(columns, &values.lasting);

@@ -336,6 +336,10 @@ fn supervised(notice: &Notice) -> Option<String> {
         ),
         Notice::Recovered { train, outcome, took } => {
             let found = match outcome {
+                // Its speeds were found to be the same.
+                Outcome::Rescaled { ratio } if (ratio - 1.0).abs() < f64::EPSILON => {
+                    "it runs as fast as before, and its stops have changed".to_owned()
+                }
                 Outcome::Rescaled { ratio } => {
                     format!("it runs at {:.0} % of its calibrated speeds", 100.0 * ratio)
                 }
