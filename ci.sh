@@ -148,7 +148,7 @@ each_table() {
   "$1" cross-check compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv --markdown
   "$1" running-times example running_times
   "$1" driving simulate driving --seeds 1..5 --markdown
-  "$1" worlds simulate worlds --seeds fresh:5@d0391b6172f8c15ff33f9677ac5b49d5b205ea28 --markdown
+  "$1" worlds simulate worlds --seeds fresh:5@da1b69c12d6b818e212372d9a9d87a2112e841b4 --markdown
   "$1" disasters simulate disasters --seeds 1..8 --markdown
   "$1" pacing simulate pacing --seeds 1..3 --markdown
   "$1" zones simulate zones --seeds 21..26 --markdown
