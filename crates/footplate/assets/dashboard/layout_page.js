@@ -159,7 +159,9 @@ export function layoutPage(root, live, about) {
   $("#order").addEventListener("submit", async (event) => {
     event.preventDefault();
     const field = $("#line");
-    if (field.value.trim() && (await give(field.value, $("#answer")))) field.value = "";
+    const line = field.value;
+    // What was written while the answer was on its way stays.
+    if (line.trim() && (await give(line, $("#answer"))) && field.value === line) field.value = "";
   });
 
   $("#commands").addEventListener("click", () => give("help", $("#answer")));

@@ -105,6 +105,18 @@ test("the prompt lists, begins and ends saved schedules by name", async () => {
   await log("schedule `Evening` is saved");
   await give("schedule end Round and round");
   await log("schedule `Round and round` was ended");
+  // The next line is written while the answer to the last one is on its way.
+  await page.route("**/api/orders", async (route) => {
+    const response = await route.fetch();
+    await until(page, () => document.querySelector("#line").value === "schedule list");
+    await route.fulfill({ response });
+  }, { times: 1 });
+  const answered = page.waitForResponse("**/api/orders");
+  await give("help");
+  await page.fill("#line", "schedule list");
+  await (await answered).finished();
+  await page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
+  assert.equal(await page.inputValue("#line"), "schedule list");
   await page.close();
 });
 
