@@ -327,7 +327,7 @@ impl MotionModel {
                 end_of_stop(speed),
             )),
             scatter: Length::from_m(libm::hypot(
-                self.scatter(speed),
+                self.forecast_scatter(speed),
                 libm::sqrt(self.stop_offset(core::iter::empty(), speed).variance),
             )),
             time: TimeSpan::from_s(time.max(LEAST_STOP_S)),
@@ -348,7 +348,7 @@ impl MotionModel {
     }
 
     /// One standard deviation (m) of where stops from a speed (m/s) end.
-    pub(crate) fn scatter(&self, speed: f64) -> f64 {
+    pub(crate) fn forecast_scatter(&self, speed: f64) -> f64 {
         let stops = self.stops();
         let compared = f64::from(stops.saturating_sub(WATCHED_FROM)) / f64::from(stops.max(1));
         self.scatter.of_forecast(speed, compared)

@@ -85,7 +85,7 @@ impl Rescaling {
 
     /// A train that may be as it was or different by about such a part, nobody knows.
     #[must_use]
-    pub const fn doubt(part: f64) -> Self {
+    pub const fn uncertain_by(part: f64) -> Self {
         Self { measured: Vec::new(), ratio: 1.0, deviation: part, stops: 1.0, stops_deviation: part }
     }
 
@@ -110,7 +110,7 @@ impl Rescaling {
         (self.ratio - 1.0).abs() > OTHER_SPEEDS
     }
 
-    /// Whether stops differ from those of a train that is only faster or slower by more than is within reach of its speeds.
+    /// Whether stops differ by more than its speeds explain.
     #[must_use]
     pub fn has_other_stops(&self) -> bool {
         (self.stops - 1.0).abs() > OTHER_STOPS
@@ -229,13 +229,13 @@ impl MotionModel {
             }
         }
         let along = |places: &mut dyn Iterator<Item = usize>| {
-            let mut doubt = vec![0.0; side];
+            let mut deviations = vec![0.0; side];
             for place in places {
-                if let Some(slot) = doubt.get_mut(place) {
+                if let Some(slot) = deviations.get_mut(place) {
                     *slot = at(&values, place) * change.stops_deviation;
                 }
             }
-            doubt
+            deviations
         };
         let mut unmeasured = vec![0.0; side];
         for knot in (1..=knots).filter(|knot| measured(*knot).is_none()) {
@@ -307,11 +307,11 @@ mod tests {
     }
 
     #[test]
-    fn nothing_measured_is_no_change_but_for_doubt() {
+    fn nothing_measured_is_no_change_but_for_uncertainty() {
         let before = known();
-        assert_eq!(before.rescaled(&Rescaling::doubt(0.0)), before);
-        let doubted = before.rescaled(&Rescaling::doubt(0.3));
-        let speed = doubted.speed(step(7), Approach::Below);
+        assert_eq!(before.rescaled(&Rescaling::uncertain_by(0.0)), before);
+        let uncertain = before.rescaled(&Rescaling::uncertain_by(0.3));
+        let speed = uncertain.speed(step(7), Approach::Below);
         assert!(speed.uncertainty / speed.value > 0.3);
         assert!((Rescaling::of(vec![ratio(5, 0.5), ratio(9, 1.0)]).disagreement() - 2.0).abs() < 1e-12);
         assert!(Rescaling::of(vec![ratio(5, f64::NAN), ratio(5, -1.0)]).measured.is_empty());

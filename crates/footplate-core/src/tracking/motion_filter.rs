@@ -168,7 +168,7 @@ impl<const L: usize> MotionFilter<L> {
         self.p[Z][Z] = deviation * deviation + error * error + carried * carried;
         if commanded.to == 0 {
             let speed = speed * self.course.grown();
-            let scatter = model.scatter(speed);
+            let scatter = model.forecast_scatter(speed);
             let offset = self.stop_offset.unwrap_or_else(|| model.stop_offset(core::iter::empty(), speed));
             self.p[Z][Z] += scatter * scatter + offset.variance;
             self.course.x[Z] = offset.mean;
@@ -298,7 +298,7 @@ impl<const L: usize> MotionFilter<L> {
         }
         let (mean, slope) = later.place_and_slopes(f64::INFINITY);
         let speed = later.course.segment.from.speed * later.course.grown();
-        let scatter = if speed > 0.0 { model.scatter(speed) } else { 0.0 };
+        let scatter = if speed > 0.0 { model.forecast_scatter(speed) } else { 0.0 };
         let scatter = scatter * scatter;
         let variance = (later.variance_along(slope) - scatter).max(0.0);
         Some((Gaussian { mean, variance }, scatter, later.course.rest_time()))

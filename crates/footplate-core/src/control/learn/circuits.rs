@@ -118,7 +118,7 @@ impl<'l> Calibrator<'l> {
         }
         self.notify(CalibrationNotice::Circuit(other.clone()));
         self.circuit = Some(other);
-        Some(self.throw_unlocked(now, node, &locked, |_, _| false))
+        Some(self.throw_unlocked(now, node, &locked, false))
     }
 }
 

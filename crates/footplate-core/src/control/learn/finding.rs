@@ -61,16 +61,6 @@ const ASK_AGAIN: TimeSpan = TimeSpan::from_ms(3_000);
 /// An unknown train is at rest this long after the stop command (the longest of the published stops).
 const AT_REST_WITHIN: TimeSpan = TimeSpan::from_ms(5_000);
 
-/// A turnout that is to be thrown.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Throw {
-    turnout: TurnoutId,
-    /// The least distance after which the train needs it.
-    needed_after: Length,
-    /// How many others the station throws before it.
-    behind: usize,
-}
-
 impl Calibrator<'_> {
     /// Starts the calibration: stops the train and listens for stuck sensors.
     pub(super) fn begin(&mut self, now: Timestamp) {
@@ -281,23 +271,17 @@ impl Calibrator<'_> {
     /// meanwhile: one that it has reached by then, and needs only when it comes back, waits until the train has passed.
     pub(super) fn throw_turnouts(&mut self, now: Timestamp, node: NodeId) {
         let locked = self.locked(node);
-        let length = self.settings.train_length;
-        let speed = self.fastest_now();
-        let is_under_train = |this: &Self, Throw { turnout, needed_after, behind }: Throw| {
-            let within = THROWN_WITHIN + TimeSpan::from_ns(NEXT_THROWN_WITHIN.as_ns() * behind as i64);
-            let ahead = speed * within + MARGIN;
-            needed_after > ahead && this.locked_within(node, ahead, length).contains_key(&turnout)
-        };
-        self.throw_unlocked(now, node, &locked, is_under_train);
+        self.throw_unlocked(now, node, &locked, true);
     }
 
-    /// Throws turnouts for the circuit, but none that is locked or has to wait. Returns how many were commanded.
+    /// Throws turnouts for the circuit, but none that is locked or, under a running train, has to wait. Returns how many were
+    /// commanded.
     pub(super) fn throw_unlocked(
         &mut self,
         now: Timestamp,
         node: NodeId,
         locked: &BTreeMap<TurnoutId, Option<Leg>>,
-        has_to_wait: impl Fn(&Self, Throw) -> bool,
+        is_running: bool,
     ) -> usize {
         let Some(circuit) = &self.circuit else { return 0 };
         let wanted = wanted_legs(self.layout, circuit, node);
@@ -311,8 +295,8 @@ impl Calibrator<'_> {
             let partner = partner.filter(|partner| self.turnouts.get(*partner) != Some(Leg::Straight));
             let both = || partner.map(|partner| (partner, Leg::Straight)).into_iter().chain([(turnout, leg)]);
             let stays = |(turnout, _): (TurnoutId, Leg)| {
-                let throw = Throw { turnout, needed_after, behind: commanded };
-                locked.contains_key(&turnout) || has_to_wait(self, throw)
+                locked.contains_key(&turnout)
+                    || is_running && self.has_to_wait(node, turnout, needed_after, commanded)
             };
             if both().any(stays) {
                 continue;
@@ -332,8 +316,20 @@ impl Calibrator<'_> {
 
     /// Turnouts that the train occupies or reaches before they have moved, and jammed ones, with their positions.
     pub(super) fn locked(&self, node: NodeId) -> BTreeMap<TurnoutId, Option<Leg>> {
-        let ahead = self.fastest_now() * THROWN_WITHIN + MARGIN;
-        self.locked_within(node, ahead, self.settings.train_length)
+        self.locked_within(node, self.reach_when_thrown(0), self.settings.train_length)
+    }
+
+    /// Whether the train has reached a turnout by the time that it is thrown behind so many others, and needs it only later.
+    fn has_to_wait(&self, node: NodeId, turnout: TurnoutId, needed_after: Length, behind: usize) -> bool {
+        let reach = self.reach_when_thrown(behind);
+        let locked = || self.locked_within(node, reach, self.settings.train_length);
+        needed_after > reach && locked().contains_key(&turnout)
+    }
+
+    /// How far the train runs until a turnout has moved that is thrown behind so many others.
+    fn reach_when_thrown(&self, behind: usize) -> Length {
+        let within = THROWN_WITHIN + TimeSpan::from_ns(NEXT_THROWN_WITHIN.as_ns() * behind as i64);
+        self.fastest_now() * within + MARGIN
     }
 
     /// The same for a train at rest beyond a node: turnouts under it, within the uncertainty of its position. `None` if that is

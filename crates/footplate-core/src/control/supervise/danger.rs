@@ -47,7 +47,7 @@ impl Watchdog {
         let Some(model) = self.driver.model(train).cloned() else { return };
         let interrupted = self.held.remove(&train).flatten().or_else(|| self.unfinished.remove(&train));
         // Its speeds and stops are uncertain until it has been measured.
-        self.driver.set_model(model.rescaled(&Rescaling::doubt(UNKNOWN_RATIO)));
+        self.driver.set_model(model.rescaled(&Rescaling::uncertain_by(UNKNOWN_RATIO)));
         let faced = self.driver.position(train, now).or_else(|| self.seen.get(&train).copied());
         let faced = faced.map(|place| place.edge);
         self.dangers.insert(train, Recovery::new(now, model, why, interrupted, faced));

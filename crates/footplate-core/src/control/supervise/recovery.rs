@@ -202,14 +202,14 @@ impl Watchdog {
                 Phase::Ending { outcome }
                     if self.stops.at_rest(train).is_some_and(|at_rest| at_rest <= now) =>
                 {
-                    let is_turned = !recovery.reversals.is_multiple_of(2);
-                    let can_turn = self.driver.stays_located_reversed(train, now)
+                    let turns = !recovery.reversals.is_multiple_of(2)
+                        && self.driver.stays_located_reversed(train, now)
                         && !self.has_pushed_over_points(now, train);
-                    if !is_turned || !can_turn {
-                        self.recovered(now, train, outcome);
-                    } else {
+                    if turns {
                         self.set_phase(train, Phase::Turning { outcome }, now + STOPPED_WITHIN);
                         self.issue(now, Order::Reverse { train, then: SpeedStep::STAND });
+                    } else {
+                        self.recovered(now, train, outcome);
                     }
                 }
                 Phase::Measuring { trial, .. } if recovery.by <= now => self.skip(now, train, trial.step),
