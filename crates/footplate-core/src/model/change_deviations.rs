@@ -43,9 +43,10 @@ impl MotionModel {
         self.spread.variance_along(&slopes) + between * between
     }
 
-    /// Variance of the delay of a start (s²).
-    pub(crate) fn start_delay_variance(&self) -> f64 {
-        self.spread.variance(START_DELAY)
+    /// Variance of the time of a start (s²): of what is known of its delay, and of single starts.
+    pub(crate) fn start_variance(&self) -> f64 {
+        let scatter = self.scatter.of_start();
+        scatter * scatter + self.spread.variance(START_DELAY)
     }
 
     /// One standard deviation (m) of the stopping distance from a speed (m/s), by the uncertainty of the law.

@@ -243,6 +243,22 @@ impl Segment {
         Pace { speed: self.speed(time), set }
     }
 
+    /// By how much later (s) this change is for each second by which the one was late that it interrupts at a time. A change that
+    /// hardly changes the speed has no time of its own: at most as late.
+    pub(crate) fn later_by(&self, before: &Self, time: f64) -> f64 {
+        let set_slope = |of: &Self| (of.to - of.from.set) / of.shape.ramp();
+        let is_set = time - before.begins >= before.shape.ramp();
+        let (was, is) = (if is_set { 0.0 } else { set_slope(before) }, set_slope(self));
+        let ratio = if was == 0.0 || is == 0.0 {
+            let Pace { speed, set } = before.pace(time);
+            let delay = self.shape.delay();
+            (set - speed) / before.shape.lag() * delay / (self.speed(self.begins + delay) - speed)
+        } else {
+            was / is
+        };
+        if ratio.is_finite() { ratio.clamp(-1.0, 1.0) } else { 0.0 }
+    }
+
     /// Whether it ends at rest.
     pub(crate) const fn is_stop(&self) -> bool {
         self.braking.is_some()

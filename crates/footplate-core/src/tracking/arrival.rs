@@ -110,7 +110,7 @@ impl<const L: usize> MotionFilter<L> {
         let speed = course.speed(high).max(SLOWEST);
         let there = self.at(model, high);
         let (_, slope) = there.place_and_slopes(high);
-        let shape = there.shape_error(high);
+        let shape = there.course.segment.shape_error(high);
         let variance = there.variance_along(Self::past(slope, slopes)) + shape * shape + place.variance;
         Some(Arrival { time: high, variance: variance / (speed * speed), speed })
     }

@@ -136,21 +136,24 @@ impl FilterState {
         }
     }
 
-    /// The next segment begins at a place (m), which becomes its origin. Returns the speed there.
+    /// The next segment begins at a place (m), which becomes its origin. Returns the speed there, and by how much later (s) this
+    /// change is for each second by which the last one is later than estimated.
     pub(super) fn begin(
         &mut self,
         model: &MotionModel,
         commanded: SpeedCommand,
         begins: f64,
         distance: f64,
-    ) -> f64 {
+    ) -> (f64, f64) {
         self.pending.rotate_left(1);
         self.pending[MOST_PENDING - 1] = None;
         let pace = if commanded.at_rest { Pace::steady(0.0) } else { self.segment.pace(begins - self.x[H]) };
         self.x[B] = distance;
         let apart = self.apart.map(|apart| apart.next(self, &commanded, begins));
+        let (before, late) = (self.segment, begins - self.x[H]);
         self.segment = Segment::of(&commanded, &model.answers(), pace);
         self.segment.begins = begins;
+        let later = if commanded.at_rest { 0.0 } else { self.segment.later_by(&before, late) };
         (self.step, self.is_above) = (commanded.to, commanded.above());
         for letter in [H, Z] {
             self.x[letter] = 0.0;
@@ -167,7 +170,7 @@ impl FilterState {
         }
         self.apart = apart;
         self.linearise(model);
-        pace.speed
+        (pace.speed, later)
     }
 
     /// Whether a command is one of many that are alike.

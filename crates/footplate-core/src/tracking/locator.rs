@@ -26,6 +26,8 @@ const MISSED_BEYOND: f64 = 4.0;
 const LEAST_LIKELIHOOD: f64 = -40.0;
 /// A report with a larger innovation (standard deviations) contradicts the estimate of the train or of the path.
 pub(super) const GATE: f64 = 3.0;
+/// 95 % of starts are less late than this many standard deviations.
+const LATE: f64 = 1.645;
 /// The least speed with which times are converted to distances (m/s): a train thought at rest may still creep.
 pub(super) const LEAST_SPEED_M_PER_S: f64 = 0.005;
 
@@ -396,6 +398,12 @@ impl Locator {
     #[must_use]
     pub fn has_change_shown(&self, model: &MotionModel, at: Timestamp) -> bool {
         self.filter.has_shown(model, self.seconds(at))
+    }
+
+    /// By when a train that was commanded to start from rest has started, with 95 % probability.
+    pub(crate) fn started_by(&self, model: &MotionModel) -> Option<Timestamp> {
+        let (begins, deviation) = self.filter.course().start(model)?;
+        Some(self.timestamp(begins + LATE * deviation))
     }
 
     /// By how much (m) the stop of a train that was commanded to stop is longer because of the track that it runs over.

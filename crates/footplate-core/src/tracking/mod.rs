@@ -17,6 +17,7 @@ mod claim;
 mod drift_test;
 mod filter_state;
 mod forecast;
+mod late_start;
 mod location;
 mod locator;
 mod motion_filter;

@@ -132,19 +132,18 @@ impl<const L: usize> MotionFilter<L> {
         // A train at rest has run its whole stopping distance, whenever the next step is commanded.
         let time = if from_rest { f64::INFINITY } else { begins };
         let (place, slope) = self.place_and_slopes(time);
-        let unshaped = if from_rest { 0.0 } else { self.shape_speed_error(begins) };
+        let unshaped = if from_rest { 0.0 } else { self.course.segment.shape_speed_error(begins) };
         let unsettled = self.course.unsettled(begins);
         self.transform(slope);
         let kept = self.course.kept(commanded.to, commanded.above());
-        let speed = self.course.begin(model, commanded, begins, place);
-        for letter in [H, Z] {
-            self.forget(letter);
-        }
+        let anew = self.course.started_anew(model, &commanded);
+        let (speed, later) = self.course.begin(model, commanded, begins, place);
+        self.stay_late(later, anew, speed * self.course.grown());
+        self.forget(Z);
         if from_rest {
             self.forget(E);
             self.p[E][E] = run_variance(model.ln_speed_variance(commanded.to, false));
-            let late = model.start_scatter();
-            self.p[H][H] = late * late + model.start_delay_variance();
+            self.p[H][H] = model.start_variance();
         }
         if commanded.to != 0 {
             self.widen_step(model.ln_speed_variance(commanded.to, commanded.above()), kept.is_some());
@@ -245,7 +244,7 @@ impl<const L: usize> MotionFilter<L> {
         let later = self.at(model, time);
         let is_done = later.rests_at(time) && !later.course.is_still();
         let (mean, slope) = later.place_and_slopes(if is_done { f64::INFINITY } else { time });
-        let shape = later.shape_error(time);
+        let shape = later.course.segment.shape_error(time);
         Gaussian { mean, variance: later.variance_along(slope) + shape * shape }
     }
 
@@ -269,7 +268,7 @@ impl<const L: usize> MotionFilter<L> {
     pub(crate) fn changing_speed(&self, model: &MotionModel, time: f64) -> Gaussian {
         let speed = self.speed(model, time);
         let later = self.at(model, time);
-        let shape = later.shape_speed_error(time);
+        let shape = later.course.segment.shape_speed_error(time);
         let lateness = libm::sqrt(later.p[H][H]);
         let late = time - later.course.x[H];
         let [before, after] = [late - lateness, late + lateness].map(|late| later.course.segment.speed(late));
@@ -311,15 +310,6 @@ impl<const L: usize> MotionFilter<L> {
         let effect =
             StopEffect { speed: grown * segment.from.speed, distance: grown * segment.distance_to_rest() };
         (later.course.step == 0).then(|| (later.place_and_slopes(f64::INFINITY).0, effect))
-    }
-
-    /// One standard deviation (m/s) of the speed in the middle of a change.
-    fn shape_speed_error(&self, time: f64) -> f64 {
-        self.course.segment.shape_speed_error(time)
-    }
-
-    pub(super) fn shape_error(&self, time: f64) -> f64 {
-        self.course.segment.shape_error(time)
     }
 
     /// Where it is at a time, with the slopes of that.
@@ -365,7 +355,7 @@ impl<const L: usize> MotionFilter<L> {
     ) -> Gaussian {
         self.settle(model, time);
         let speed = self.course.speed(time);
-        let shape = self.shape_error(time);
+        let shape = self.course.segment.shape_error(time);
         let noise = place.variance + speed * speed * time_variance + shape * shape;
         let (mean, before) = (self.course.x, *self);
         let (first, slope) = self.place_and_slopes(time);

@@ -216,6 +216,13 @@ impl DrivenTrain {
             });
             return;
         };
+        let starts_until = self.locator.started_by(&self.model).filter(|started| now < *started);
+        if let (Some(started), Some(pacing)) = (starts_until, &mut self.pacing) {
+            // Decoders that are commanded again before their train has started begin to start anew.
+            pacing.next_update =
+                Some(pacing.next_update.filter(|at| now < *at).map_or(started, |at| at.min(started)));
+            return;
+        }
         let (node, model) = (rollout.node(), &self.model);
         let followed = match self.pacing.as_ref().map(|pacing| &pacing.pace) {
             Some(Pace::Follow(following)) => self.follow_reference(context, now, *following, node, others),
