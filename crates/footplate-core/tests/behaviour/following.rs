@@ -224,3 +224,28 @@ fn a_gap_is_kept_on_a_circuit_with_one_sensor() {
     let mean = gaps.iter().sum::<f64>() / gaps.len() as f64;
     assert!((mean - 5.0).abs() < 0.25, "{gaps:?}");
 }
+
+#[test]
+fn a_follower_waits_at_the_end_of_its_authority_and_goes_on_when_it_is_extended() {
+    // Given a follower at rest whose authority ends 0.3 m ahead, behind a train that runs on,
+    let (mut world, mut driver) = two_trains();
+    let node = world.layout.node_named("D1").expect("a node");
+    let end = |mm: f64| Some(PathPoint { node, distance: Length::from_mm(mm) });
+    driver.set_end_of_authority(world.now, FOLLOWER, end(400.0));
+    run_leader(&world, &mut driver, 7);
+    world.run(&mut driver, 1.0);
+    driver.order(world.now, follow(seconds(3.0))).expect("a safe gap");
+    world.run(&mut driver, 3.0);
+    // then it comes to rest before that and keeps its order,
+    let follower =
+        |world: &ToyRailway| world.trains.iter().find(|train| train.id == FOLLOWER).expect("a train").clone();
+    let (at, is_at_rest) = (follower(&world).travelled_mm, follower(&world).speed_mm_per_s < 1.0);
+    assert!(is_at_rest && (20.0..300.0).contains(&at), "{at} mm");
+    assert!(world.notices.iter().any(|notice| matches!(notice, Notice::HeldBack { .. })));
+    assert!(!world.notices.iter().any(|notice| matches!(notice, Notice::GivenUp { .. })));
+    // and follows once the authority is extended.
+    driver.set_end_of_authority(world.now, FOLLOWER, None);
+    world.run(&mut driver, 3.0);
+    assert!(follower(&world).travelled_mm > at + 200.0, "{} mm after {at} mm", follower(&world).travelled_mm);
+    assert_eq!(driver.leader(FOLLOWER), Some(LEADER));
+}

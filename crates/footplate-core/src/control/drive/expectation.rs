@@ -246,8 +246,11 @@ impl DrivenTrain {
         let train = self.id();
         if self.authority_stop_time().is_some_and(|at| at <= now) {
             self.expected.authority_stop = None;
-            out.notify(Notice::AuthorityEnds { train });
-            self.give_up(now, Refusal::AtLimit { train }, out);
+            // A follower goes on once the trains ahead have left the track behind them.
+            if !self.hold_back(now, out) {
+                out.notify(Notice::AuthorityEnds { train });
+                self.give_up(now, Refusal::AtLimit { train }, out);
+            }
         }
         if let (Some(at), Some((_, end))) = (self.track_end_stop_time(), self.expected.track_end_stop)
             && at <= now

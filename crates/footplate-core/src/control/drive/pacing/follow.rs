@@ -328,7 +328,6 @@ impl DrivenTrain {
         out: &mut Outputs,
     ) -> bool {
         let Some(following) = self.followed().copied() else { return true };
-        let Some(task) = self.task else { return false };
         let leader = following.leader;
         let Some(ahead) = others.get(&leader) else {
             self.give_up(now, Refusal::UnknownTrain { train: leader }, out);
@@ -344,8 +343,11 @@ impl DrivenTrain {
                     && stop_by.is_none_or(|by| by > now + self.link.command + self.link.command);
             }
             let rest = self.locator.rest_if_stopped(context, &self.model, now);
-            let beyond = rest.and_then(|rest| self.beyond(context, rest.at, rear));
-            ahead.commanded > SpeedStep::STAND && beyond.is_some_and(|beyond| beyond < -WORTH_STARTING)
+            let beyond = |end| rest.and_then(|rest| self.beyond(context, rest.at, end));
+            let has_room = |beyond: Length| beyond < -WORTH_STARTING;
+            ahead.commanded > SpeedStep::STAND
+                && beyond(rear).is_some_and(has_room)
+                && self.end_of_authority.and_then(beyond).is_none_or(has_room)
         });
         let commanded = self.commanded;
         let has_shown = self.locator.has_change_shown(&self.model, now);
@@ -363,14 +365,24 @@ impl DrivenTrain {
             }
             return slower.is_none();
         }
-        if commanded > SpeedStep::STAND {
-            if !following.is_stopped {
-                following.is_stopped = true;
+        self.hold_back(now, out);
+        false
+    }
+
+    /// Stops a follower until the track ahead is free again. Returns whether the train follows another.
+    pub(in crate::control::drive) fn hold_back(&mut self, now: Timestamp, out: &mut Outputs) -> bool {
+        let (Some(task), Some(leader)) = (self.task, self.followed().map(|following| following.leader))
+        else {
+            return false;
+        };
+        let Some(Pacing { pace: Pace::Follow(following), .. }) = &mut self.pacing else { return false };
+        if self.commanded > SpeedStep::STAND {
+            if !core::mem::replace(&mut following.is_stopped, true) {
                 out.notify(Notice::HeldBack { order: task.order, train: self.id(), leader });
             }
             self.command_stop(now, out);
         }
-        false
+        true
     }
 
     /// Whether a step may be commanded now: a stop commanded as soon as the line is free again must still end before
