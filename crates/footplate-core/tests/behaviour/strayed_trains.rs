@@ -2,7 +2,7 @@
 //! another train or off its track.
 #![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
-use footplate_core::control::Alarm;
+use footplate_core::control::{Alarm, Notice, Outcome};
 use footplate_core::{Command, SensorId};
 
 use crate::watching::{FIRST, Watched};
@@ -76,4 +76,34 @@ fn a_report_elsewhere_sooner_than_a_hand_can_move_a_train_is_not_of_it() {
     assert_eq!(watched.alarm(), None, "{:#?}", watched.notices);
     // Were it there later, a hand may have.
     assert!(matches!(spurious_and_missed(2.4).alarm(), Some(Alarm::Elsewhere(_))));
+}
+
+#[test]
+fn an_alarm_by_a_report_that_turns_out_to_be_spurious_ends_without_a_search() {
+    let mut watched = Watched::one();
+    watched.go(FIRST, 9);
+    watched.run(20.0);
+    // Given a report of the sensor ahead, half a second before the train comes,
+    let due = |watched: &Watched| {
+        watched.notices.iter().rev().find_map(|notice| match notice {
+            Notice::Passed { next: Some(due), .. } => {
+                Some((due.sensor, (due.time - watched.world.now).as_s()))
+            }
+            _ => None,
+        })
+    };
+    assert!(
+        watched.run_until(20.0, |watched| due(watched).is_some_and(|(_, left)| (0.5..0.6).contains(&left)))
+    );
+    let (sensor, _) = due(&watched).expect("a sensor");
+    watched.world.close(sensor);
+    assert!(watched.run_until(0.5, |watched| watched.alarm().is_some()), "{:#?}", watched.notices);
+    assert_eq!(watched.alarm(), Some(Alarm::Untimely(sensor)));
+    // when the train passes it while it stops,
+    assert!(watched.run_until(8.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
+    // then it is as before, was not searched, and goes on.
+    assert_eq!(watched.recovered(), Some(Outcome::AsBefore));
+    assert!(!watched.notices.iter().any(|notice| matches!(notice, Notice::Creeps { .. })));
+    watched.run(5.0);
+    assert!(watched.world.trains[0].speed_mm_per_s > 100.0);
 }

@@ -14,7 +14,7 @@ use crate::units::Length;
 use super::alarm::Alarm;
 use super::recovery::{Phase, Recovery, STOPPED_WITHIN, UNKNOWN_RATIO};
 use super::watchdog::{Power, Watchdog};
-use crate::control::Notice;
+use crate::control::{Notice, Outcome};
 
 /// Trains are at rest this long after the power went off; they take a third of a second from top speed.
 const AT_REST_WITHOUT_POWER: TimeSpan = TimeSpan::from_s(2.0);
@@ -55,6 +55,16 @@ impl Watchdog {
         let interrupted = interrupted.map(|(_, order)| order);
         self.notify(Notice::Danger { train, why, stopped, interrupted });
         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
+    }
+
+    /// A report is found to be no train's. A train that it put in danger was where it should be all the time: it goes on as before once
+    /// it is at rest. Returns whether there is one.
+    pub(super) fn refute(&mut self, now: Timestamp, sensor: SensorId, time: Timestamp) -> bool {
+        let refuted = self.dangers.iter().find(|(_, recovery)| recovery.is_refuted_by(sensor, time));
+        let train =
+            refuted.map(|(train, _)| *train).filter(|train| self.driver.locate(*train, now).is_some());
+        train.into_iter().for_each(|train| self.end(now, train, Outcome::AsBefore));
+        train.is_some()
     }
 
     /// Stops every moving train that could meet one in danger, and returns them.

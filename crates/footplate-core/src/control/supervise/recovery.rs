@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use crate::control::dispatch::Reservation;
 use crate::control::drive::{Order, OrderId, Refusal};
 use crate::event::{Event, EventKind, Report};
-use crate::ids::{EdgeId, NodeId, SpeedStep, TrainId};
+use crate::ids::{EdgeId, NodeId, SensorId, SpeedStep, TrainId};
 use crate::model::MotionFit;
 use crate::model::{MeasuredRatio, MotionModel, Rescaling, StepUse};
 use crate::time::{TimeSpan, Timestamp};
@@ -135,6 +135,11 @@ impl Recovery {
     /// Whether its position was about right when the alarm came: its speed was not.
     const fn is_roughly_located(&self) -> bool {
         matches!(self.why, Alarm::Drift(_) | Alarm::Misses | Alarm::Distrusted)
+    }
+
+    /// Whether it was begun by a report that turns out to be no train's, and nothing else has been done yet than to stop the train.
+    pub(super) fn is_refuted_by(&self, sensor: SensorId, time: Timestamp) -> bool {
+        self.why == Alarm::Untimely(sensor) && time <= self.began && self.phase == Phase::Stopping
     }
 
     /// Whether it is searched, or will be once it is at rest.

@@ -296,6 +296,7 @@ impl Watchdog {
                 self.notify(notice);
                 return self.lost(now, train, Alarm::Lost);
             }
+            Notice::Unexplained { sensor, time } if self.refute(now, *sensor, *time) => {}
             Notice::Unexplained { sensor, time } if self.is_watching => {
                 let stray = |train: &TrainId| {
                     self.stops.should_be_at_rest(*train, now)
