@@ -35,6 +35,8 @@ pub(crate) const N: usize = STEPS + STEPS_KEPT;
 /// Commands that can wait for their effect one by one. A start takes up to half a second to take effect, in which a quick
 /// line carries more: see [`FilterState::tell`].
 const MOST_PENDING: usize = 6;
+/// A train that comes to rest within this time (s) of a command is at rest when that takes effect (0.16 to 0.26 s on published trains).
+const TAKES_EFFECT: f64 = 0.25;
 
 /// A train in motion. Distances in m from an origin that the caller keeps, times in s on the caller's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,7 +100,8 @@ impl FilterState {
         if from == step {
             return;
         }
-        let at_rest = from == 0 && self.pending.iter().all(Option::is_none) && self.rests_at(sent);
+        let at_rest =
+            from == 0 && self.pending.iter().all(Option::is_none) && self.rests_at(sent + TAKES_EFFECT);
         if let Some(free) = self.pending.iter_mut().find(|slot| slot.is_none()) {
             *free = Some(SpeedCommand { sent, from, to: step, at_rest });
         } else if let Some(last) = self.pending.last_mut() {
