@@ -156,7 +156,9 @@ impl FilterState {
         let (before, late) = (self.segment, begins - self.x[H]);
         self.segment = Segment::of(&commanded, &model.answers(), pace);
         self.segment.begins = begins;
-        let later = if commanded.at_rest { 0.0 } else { self.segment.later_by(&before, late) };
+        // Late in a stop, too, a train that set out late was uncertain by 1.2 m and no journey could begin from there.
+        let later =
+            if commanded.at_rest || commanded.to == 0 { 0.0 } else { self.segment.later_by(&before, late) };
         (self.step, self.is_above) = (commanded.to, commanded.above());
         for letter in [H, Z] {
             self.x[letter] = 0.0;
