@@ -45,7 +45,7 @@ impl MotionModel {
 
     /// Variance of the time of a start (s²): of what is known of its delay, and of single starts.
     pub(crate) fn start_variance(&self) -> f64 {
-        let scatter = self.scatter.of_start();
+        let scatter = self.start_scatter();
         scatter * scatter + self.spread.variance(START_DELAY)
     }
 
