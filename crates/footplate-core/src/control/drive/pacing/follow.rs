@@ -334,7 +334,6 @@ impl DrivenTrain {
             return false;
         };
         let rear = self.rear_of(context, now, ahead, now);
-        let is_at_rest = self.located(context, now).is_some_and(|located| located.at_rest);
         let fastest = self.fastest_behind(context, now, ahead);
         let soon = now + self.link.command + TimeSpan::from_s(RECHECK_INTERVAL);
         let stop_by = rear.and_then(|rear| self.last_stop_before(context, now, rear));
@@ -349,7 +348,7 @@ impl DrivenTrain {
             // A stop and a start in turn are unpredictable: a decoder that eases in and out hardly does either, and a train that
             // almost rests may stick or not.
             ahead.commanded > SpeedStep::STAND
-                && is_at_rest
+                && self.is_at_rest(context, now)
                 && beyond(rear).is_some_and(has_room)
                 && self.end_of_authority.and_then(beyond).is_none_or(has_room)
         });
