@@ -128,12 +128,20 @@ impl SequenceTest {
             return;
         };
         let unknown = TurnoutStates::unknown();
-        let leads_here =
-            |from: &NodeId| layout.reaches(*from, &unknown, MAX_SILENT).any(|reach| reach.to == node);
-        if let Some(train) = self.places.iter().position(leads_here) {
+        // How many sensors further on this one is, at the least.
+        let sensors_on = |from: &NodeId| {
+            let reaches = layout.reaches(*from, &unknown, MAX_SILENT).filter(|reach| reach.to == node);
+            reaches.map(|reach| reach.hops().len()).min()
+        };
+        // Another train may be behind this one: the nearest was here. Of several, the one that was detected longest ago.
+        let nearest = (0..self.places.len())
+            .rev()
+            .filter_map(|place| Some((sensors_on(self.places.get(place)?)?, place)))
+            .min_by_key(|(sensors_on, _)| *sensors_on);
+        if let Some((_, train)) = nearest {
             self.followed += 1;
             self.places.remove(train);
-        } else if self.elsewhere.as_ref().is_some_and(leads_here) {
+        } else if self.elsewhere.as_ref().and_then(sensors_on).is_some() {
             // It was a train: the one detected longest ago.
             self.followed += 1;
             self.places.pop();
@@ -189,16 +197,21 @@ fn chance_of_as_many(count: u32, all: u32) -> f64 {
 mod tests {
     use super::*;
     use crate::event::Report;
-    use crate::track::example::oval;
+    use crate::track::example::{oval, oval_plan, stretch};
+    use crate::track::{LayoutPlan, Place};
+    use alloc::format;
 
     fn walked(trains: usize, names: &[&str]) -> SequenceVerdict {
-        let layout = oval();
+        walked_on(&oval(), trains, names)
+    }
+
+    fn walked_on(layout: &Layout, trains: usize, names: &[&str]) -> SequenceVerdict {
         let mut test = SequenceTest::default();
         test.begin_run(trains);
         for (second, name) in names.iter().enumerate() {
             let sensor = layout.sensor_named(name).unwrap_or(SensorId(90 + second as u16));
             let kind = EventKind::Sensor(Report { sensor, poll_interval: None });
-            test.take(&layout, &Event { time: Timestamp::from_s(second as f64), kind });
+            test.take(layout, &Event { time: Timestamp::from_s(second as f64), kind });
         }
         test.verdict()
     }
@@ -211,6 +224,33 @@ mod tests {
         assert_eq!(walked(1, &names), SequenceVerdict::Fits);
         assert_eq!(walked(1, &[]), SequenceVerdict::Fits);
         assert_eq!(walked(1, &["A1", "E1", "B2"]), SequenceVerdict::Fits, "too few to tell");
+    }
+
+    #[test]
+    fn a_report_ahead_of_two_trains_is_of_the_nearer_one() {
+        // Given a ring of eight sensors, each 500 mm behind the one before,
+        let names = ["A", "B", "C", "D", "E", "F", "G", "H"];
+        let place = |(nth, name): (usize, &&str)| Place::Sensor {
+            names: [format!("{name}1"), format!("{name}2")],
+            sensors: [SensorId(2 * nth as u16), SensorId(2 * nth as u16 + 1)],
+        };
+        let nexts = names.iter().cycle().skip(1);
+        let stretches = names.iter().zip(nexts);
+        let plan = LayoutPlan {
+            name: "ring".into(),
+            places: names.iter().enumerate().map(place).collect(),
+            stretches: stretches
+                .map(|(from, to)| stretch(&format!("{from}1"), &format!("{to}1"), 500.0))
+                .collect(),
+            ..oval_plan()
+        };
+        let layout = Layout::build(&plan).unwrap();
+        // when a train follows another one sensor behind it, for two rounds,
+        let round = (0..16).flat_map(|nth| [names[(nth + 1) % 8], names[nth % 8]]);
+        let reports: Vec<_> = round.map(|name| format!("{name}1")).collect();
+        let reports: Vec<&str> = reports.iter().map(|name| name.as_str()).collect();
+        // then each report has a train that caused it.
+        assert_eq!(walked_on(&layout, 2, &reports), SequenceVerdict::Fits);
     }
 
     #[test]
