@@ -172,7 +172,7 @@ impl Dispatcher {
     /// that may not have started at all, may run back to be detected; after [`MAX_FAILED_SEARCHES`] searches the
     /// first of them is located again. Returns whether there is one.
     fn suspect_position(&mut self, now: Timestamp) -> bool {
-        self.failed_searches += 1;
+        self.failed_searches = self.failed_searches.saturating_add(1);
         let is_unseen = |train: &&DispatchedTrain| {
             let unseen = self.watchdog.driver().missed_sensor(train.id, now).is_some();
             train.is_ready(now) && (unseen || !train.detected_since_start)

@@ -16,9 +16,10 @@ use crate::units::{Length, Speed};
 use super::dispatched_train::{DispatchedTrain, Purpose, State};
 use super::dispatcher::Dispatcher;
 use super::itinerary::{Itinerary, Pace, Search};
-use super::movement_authority::{MovementAuthority, Start, granted};
+use super::movement_authority::{ClearanceEnvelope, MovementAuthority, Start, granted};
 use super::path::{OccupiedPath, Path};
 use super::reservation::{Obstacles, Reservation};
+use super::running::FAR;
 
 /// Expected wait for a train at rest and for a running one, in seconds: the first has to step aside, the second
 /// leaves by itself.
@@ -96,10 +97,14 @@ impl Dispatcher {
             let (Some(targets), Some(start)) = (self.targets(id), self.start(now, id)) else { continue };
             let unobstructed = self.unobstructed(now, id, &start, &targets);
             let Some(unobstructed) = unobstructed else {
-                if self.watchdog.driver().missed_sensor(id, now).is_none() {
-                    self.cannot_go(now, id, self.unreachable(id));
-                } else if !self.look_back(id) && !self.look_ahead(now, id, &start) {
+                if self.watchdog.driver().missed_sensor(id, now).is_some() {
+                    if !self.look_back(id) && !self.look_ahead(now, id, &start) {
+                        self.lose(now, id);
+                    }
+                } else if self.only_uncertainty_bars(id, &start, &targets) {
                     self.lose(now, id);
+                } else {
+                    self.cannot_go(now, id, self.unreachable(id));
                 }
                 continue;
             };
@@ -170,6 +175,18 @@ impl Dispatcher {
             train.examined_at = now;
         }
         seconds
+    }
+
+    /// Whether the position of a train is very uncertain, and nothing else bars its path: it has to be located first.
+    fn only_uncertainty_bars(&self, id: TrainId, start: &Start, targets: &[Position]) -> bool {
+        let Some(train) = self.trains.get(&id).filter(|_| self.watchdog.is_watching()) else { return false };
+        if start.envelope.ahead - start.envelope.front <= FAR {
+            return false;
+        }
+        let envelope = ClearanceEnvelope::of(train.lengths, Length::ZERO, self.overrun(id, Length::ZERO));
+        // Turnouts that it may stand on are not thrown; a located train stands on few.
+        let located = Start { envelope, frozen: Vec::new(), ..start.clone() };
+        self.propose(&located, targets, &Obstacles::default()).is_some()
     }
 
     /// The destinations of the journey: in one direction or in both.
@@ -340,6 +357,13 @@ impl Dispatcher {
         let widest = widest.map(|widest| Length::from_m(libm::hypot(widest.as_m(), place)));
         let usual = widest.map_or(OVERRUNS[1], |widest| (widest * OVERRUN).max(OVERRUNS[0]).min(OVERRUNS[1]));
         usual * self.trains.get(&id).map_or(1.0, |train| train.caution)
+    }
+
+    /// Whether a train at rest may be further from its estimate than any overrun: its end of authority would stop it as soon as
+    /// it starts, and each start and stop makes its position more uncertain.
+    pub(super) fn is_too_uncertain(&self, now: Timestamp, id: TrainId) -> bool {
+        let located = self.watchdog.driver().locate(id, now);
+        located.is_some_and(|located| located.uncertainty * OVERRUN > OVERRUNS[1])
     }
 
     /// The step for a run: the fastest that settles within the distance and stops precisely enough; if the distance

@@ -35,7 +35,7 @@ const NEAR_ENOUGH: Length = Length::from_mm(80.0);
 
 /// A run that ends this far from its destination was planned from a wrong position: the train has not arrived. The most cautious
 /// stop, five standard deviations of 5 cm before its target, is nearer.
-const FAR: Length = Length::from_mm(500.0);
+pub(super) const FAR: Length = Length::from_mm(500.0);
 
 impl Dispatcher {
     /// Advances every train.
@@ -58,6 +58,7 @@ impl Dispatcher {
                     self.found_by_hand(now, id);
                 }
                 State::Lost if self.is_unattended(now, id) => self.watchdog.lose(now, id),
+                State::Resting if self.is_to_be_located(now, id) => self.lose(now, id),
                 State::ByHand if !self.rest_by_hand(now, id) => self.drive_by_hand(now, id),
                 State::Resting if self.is_resolved_at_rest(now, id) => self.reserve_standstill(now, id),
                 State::Resting
@@ -89,6 +90,14 @@ impl Dispatcher {
             && !self.watchdog.is_in_danger(id)
             && self.watchdog.driver().locate(id, now).is_none()
             && self.watchdog.driver().commanded(id) == SpeedStep::STAND
+    }
+
+    /// Whether the position of a train at rest is too uncertain to run it, and nothing locates it yet.
+    fn is_to_be_located(&self, now: Timestamp, id: TrainId) -> bool {
+        self.watchdog.is_watching()
+            && !self.watchdog.is_in_danger(id)
+            && self.watchdog.driver().missed_sensor(id, now).is_none()
+            && self.is_too_uncertain(now, id)
     }
 
     /// Gives up the position of a train that a sensor did not report, if no path leads to a sensor: the watchdog
