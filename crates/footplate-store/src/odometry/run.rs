@@ -2,7 +2,7 @@
 
 use footplate_core::Estimate;
 use footplate_core::odometry::diameter::WheelScale;
-use footplate_core::odometry::wheels::{Period, Vehicle, VehicleError};
+use footplate_core::odometry::wheels::{Period, Vehicle, VehicleError, Wheelset};
 use footplate_core::odometry::{ImplausibleClaims, MotionEstimate, Odometer, OdometrySettings, PlacedValue};
 
 use super::counted_distances::DistanceCounter;
@@ -57,6 +57,9 @@ impl Preset {
         }
     }
 }
+
+/// Deviations beyond which a learnt diameter is clearly another than claimed.
+const CLEARLY: f64 = 3.0;
 
 /// What is known before a run begins.
 #[derive(Debug, Clone, Copy)]
@@ -175,7 +178,16 @@ impl OdometryRun {
     /// Claims of the vehicle file that the run contradicts.
     #[must_use]
     pub fn implausible_claims(&self) -> ImplausibleClaims {
-        self.odometer.implausible_claims()
+        let claims = self.odometer.implausible_claims();
+        let Some(placed) = &self.placed else { return claims };
+        let mut diameters = placed.scales().into_iter().zip(self.context.vehicle.wheelsets).map(
+            |(scale, Wheelset { diameter_tolerance, .. })| {
+                let PlacedValue { value, deviation } = scale?;
+                let is_clear = (value - 1.0).abs() - CLEARLY * deviation > diameter_tolerance;
+                is_clear.then_some(value)
+            },
+        );
+        ImplausibleClaims { diameters: core::array::from_fn(|_| diameters.next().flatten()), ..claims }
     }
 
     /// How good its estimates were, if that was asked for.

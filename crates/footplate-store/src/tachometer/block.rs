@@ -1,7 +1,7 @@
 //! Some rows of a recording, column by column.
 
 use footplate_core::odometry::wheels::{Count, Direction, Period, WheelReading};
-use footplate_core::{Acceleration, Length, Speed, Timestamp};
+use footplate_core::{Acceleration, Length, Speed, TimeSpan, Timestamp};
 
 use super::columns::{Quantity, TachometerColumns};
 use super::note::TachometerNote;
@@ -9,6 +9,11 @@ use super::time_watch::TimeFaults;
 
 /// Most rows of a block: with all columns it fits the second cache of a core, and a block takes some 100 µs.
 pub(super) const BLOCK_ROWS: usize = 4096;
+
+/// Of so many rows the usual time step is taken: hours of rows would show no more.
+const JUDGED_ROWS: usize = 201;
+/// The median of fewer steps may be that of a disturbance.
+const FEWEST_STEPS: usize = 20;
 
 /// What stands for a count or a time that is missing. No counter has it: it cannot be written without its sign.
 pub(super) const MISSING: i64 = i64::MIN;
@@ -90,6 +95,17 @@ impl TachometerBlock {
             distance: self.number(row, Quantity::TrueDistance).map(Length::from_m),
             wheels: [speed(Quantity::TrueWheel1), speed(Quantity::TrueWheel2)],
         }
+    }
+
+    /// The median time between the first rows of a run in this block; `None` where they are too few.
+    #[must_use]
+    pub fn usual_step(&self, run: usize) -> Option<TimeSpan> {
+        let rows = (0..self.len()).filter(|row| self.run(*row) == run).take(JUDGED_ROWS);
+        let times: Vec<Timestamp> = rows.filter_map(|row| self.times.get(row).copied()).collect();
+        let mut steps: Vec<TimeSpan> =
+            times.iter().zip(times.iter().skip(1)).map(|(from, to)| *to - *from).collect();
+        steps.sort_unstable();
+        steps.get(steps.len() / 2).copied().filter(|_| steps.len() >= FEWEST_STEPS)
     }
 
     #[inline]

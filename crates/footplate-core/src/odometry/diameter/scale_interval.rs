@@ -55,6 +55,31 @@ impl ScaleInterval {
     }
 }
 
+/// A scale beyond the tolerance that pairs of balises, one after the other, agree on. One wrong balise makes two such pairs,
+/// which disagree: its error makes one longer and the other shorter.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct AgreedBeyond {
+    agreed: Option<ScaleInterval>,
+    pairs: u32,
+}
+
+/// So many pairs in a row are no chance.
+const PAIRS: u32 = 3;
+
+impl AgreedBeyond {
+    /// Takes in what the latest pair allows; `None` for one that agrees with the tolerance, or that says nothing.
+    pub(super) fn take(&mut self, allowed: Option<ScaleInterval>) {
+        let both = self.agreed.zip(allowed).and_then(|(agreed, allowed)| agreed.meet(allowed));
+        self.pairs = both.map_or_else(|| u32::from(allowed.is_some()), |_| self.pairs.saturating_add(1));
+        self.agreed = both.or(allowed);
+    }
+
+    /// The middle of the interval that enough pairs agree on.
+    pub(super) fn scale(self) -> Option<f64> {
+        self.agreed.filter(|_| self.pairs >= PAIRS).map(|agreed| 0.5 * (agreed.low + agreed.high))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -77,5 +102,26 @@ mod tests {
             Some(ScaleInterval { low: 1.005, high: 1.01 })
         );
         assert_eq!(ScaleInterval::of_distances([Length::ZERO; 2], [Length::ZERO; 2]), None);
+    }
+
+    #[test]
+    fn three_pairs_that_agree_beyond_the_tolerance_are_no_chance() {
+        let around = |scale: f64| Some(ScaleInterval { low: scale - 0.004, high: scale + 0.004 });
+        let mut beyond = AgreedBeyond::default();
+        for (pair, scale) in [1.05, 1.051].into_iter().enumerate() {
+            beyond.take(around(scale));
+            assert_eq!(beyond.scale(), None, "after {pair}");
+        }
+        beyond.take(around(1.052));
+        // 1.048 to 1.054 are left of all three.
+        assert!((beyond.scale().unwrap() - 1.051).abs() < 1e-12);
+        // A wrong balise: one pair too long, the next too short.
+        let mut wrong = AgreedBeyond::default();
+        for scale in [1.05, 0.95, 1.05] {
+            wrong.take(around(scale));
+        }
+        assert_eq!(wrong.scale(), None);
+        beyond.take(None);
+        assert_eq!(beyond.scale(), None, "a pair that fits");
     }
 }

@@ -12,7 +12,7 @@ use libm::{log, sqrt};
 use super::balise_accuracy::BaliseAccuracy;
 use super::balise_passage::{PairedDistance, Passage, distances};
 use super::scale_filter::ScaleFilter;
-use super::scale_interval::ScaleInterval;
+use super::scale_interval::{AgreedBeyond, ScaleInterval};
 use crate::estimate::Estimate;
 use crate::odometry::wheels::Wheelset;
 use crate::time::Timestamp;
@@ -74,6 +74,8 @@ pub struct WheelDiameters {
     balise: BaliseAccuracy,
     filter: ScaleFilter,
     intervals: [ScaleInterval; 2],
+    /// What pairs of balises say that contradict the tolerances.
+    beyond: [AgreedBeyond; 2],
     counts: [u32; 2],
     dates: [Timestamp; 2],
     /// The latest balise that agreed with the one before it.
@@ -102,6 +104,7 @@ impl WheelDiameters {
             balise,
             filter: ScaleFilter::new([1.0; 2], deviations),
             intervals: wheelsets.map(|wheelset| ScaleInterval::of_tolerance(wheelset.diameter_tolerance)),
+            beyond: [AgreedBeyond::default(); 2],
             counts: [0; 2],
             dates: [Timestamp::ZERO; 2],
             trusted: None,
@@ -186,6 +189,9 @@ impl WheelDiameters {
             within: [first, second],
             rolled: [true; 2],
         };
+        if let Some(latest) = self.disputed.or(self.trusted) {
+            self.note_beyond(&latest, &here);
+        }
         let mut refusal = None;
         for before in [self.trusted, self.disputed].into_iter().flatten() {
             match self.pair(time, &before, &here) {
@@ -202,6 +208,26 @@ impl WheelDiameters {
             }
             None => self.trust(here, PairVerdict::First),
         }
+    }
+
+    /// Notes what a pair allows where no diameter within the tolerance does.
+    fn note_beyond(&mut self, from: &Passage, to: &Passage) {
+        let off = 2.0 * self.balise.bound;
+        let each = self.beyond.iter_mut().zip(&self.wheelsets).zip(from.distances_to(to));
+        for ((beyond, wheelset), distance) in each {
+            if !distance.rolled || distance.counted.as_m() < NEAREST_PAIR_M {
+                continue;
+            }
+            let tolerated = ScaleInterval::of_tolerance(wheelset.diameter_tolerance);
+            let allowed = distance.allows(off, wheelset.pulse_pitch());
+            beyond.take(allowed.filter(|allowed| tolerated.meet(*allowed).is_none()));
+        }
+    }
+
+    /// True over stated diameter of each wheelset that several balises agree on, where that is beyond its tolerance.
+    #[must_use]
+    pub fn beyond_tolerance(&self) -> [Option<f64>; 2] {
+        self.beyond.map(AgreedBeyond::scale)
     }
 
     fn trust(&mut self, here: Passage, verdict: PairVerdict) -> PairVerdict {

@@ -44,8 +44,8 @@ impl Bank {
         let side = self.side;
         // How fast the train can change its speed with both wheelsets slipping.
         let wanted = scene.commanded.unwrap_or(-side * SLIDES_BY);
-        let most = if side > 0.0 { SLIDES_BY } else { SPINS_BY };
-        let slides = -side * smaller(larger(-side * wanted, 0.0), most);
+        // Wheels that spun and are braked carry less than those that roll, but they brake.
+        let slides = larger(smaller(wanted, SPINS_BY), -SLIDES_BY);
         let usual = lasting(SLIDES_WITHIN.0 + SLIDES_WITHIN.1 * slides.abs(), SLIDES_FOR_S, t);
         let mut slip = self.filters.state(SLIPS);
         slip.acceleration(slides - slip.a, usual);

@@ -21,9 +21,10 @@ pub(super) fn each_block(
     for _ in 0..BLOCKS {
         let _ = empty.send(TachometerBlock::default());
     }
-    thread::scope(|scope| {
+    // Both ends of the channels are moved in and dropped when `work` has failed, so that the reader ends, too.
+    thread::scope(move |scope| {
         scope.spawn(move || fill(reader, &to_fill, &full));
-        for block in &to_work {
+        for block in to_work {
             let block = block?;
             work(&block)?;
             // The reader may have ended.

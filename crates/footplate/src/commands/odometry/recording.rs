@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 
 use anyhow::bail;
+use footplate_core::TimeSpan;
 use footplate_core::odometry::wheels::Vehicle;
 use footplate_store::odometry::{OdometryRun, RunContext};
 use footplate_store::{ColumnMapping, TachometerBlock, TachometerNote, TachometerReader, TimeFaults};
@@ -15,6 +16,9 @@ use super::report::{MOST_POINTS, RunSeries};
 use super::results::Results;
 use crate::progress::with_progress;
 use crate::standard_error::say;
+
+/// Rows this much further apart than claimed, or nearer, have another period: clocks and jitter differ by less.
+const OTHER_PERIOD: f64 = 0.1;
 
 /// A recording whose columns are known and whose rows are not read yet.
 pub(super) struct OpenRecording {
@@ -115,19 +119,29 @@ impl OpenRecording {
             notes: Vec::new(),
             time_faults: TimeFaults::default(),
         };
-        if !has_run_ids {
-            walked.add_run(None, context, charts_left)?;
-        }
         let extent = reader.extent().and_then(|extent| usize::try_from(extent).ok());
         with_progress("estimating", extent.unwrap_or_default(), |done| {
             each_block(reader, |block| {
+                if !has_run_ids && walked.runs.is_empty() {
+                    walked.add_run(None, context, block.usual_step(0), charts_left)?;
+                }
                 walked.take(block, context, results.as_deref_mut(), charts_left)?;
                 done.store(block.read_up_to, Ordering::Relaxed);
                 Ok(())
             })
         })?;
+        if !has_run_ids && walked.runs.is_empty() {
+            walked.add_run(None, context, None, charts_left)?;
+        }
         Ok(walked)
     }
+}
+
+/// The vehicle with the period that the rows have, if that is not the claimed one: otherwise longer steps would count as lost
+/// rows, with distances up to twice the true one.
+fn with_period_of_rows(claimed: Vehicle, step: TimeSpan) -> Option<Vehicle> {
+    let ratio = step.as_s() / claimed.period.as_s();
+    ((ratio - 1.0).abs() > OTHER_PERIOD).then_some(Vehicle { period: step, ..claimed })
 }
 
 impl WalkedRecording {
@@ -135,6 +149,7 @@ impl WalkedRecording {
         &mut self,
         id: Option<&str>,
         context: &RunContext,
+        step: Option<TimeSpan>,
         charts_left: &mut usize,
     ) -> anyhow::Result<()> {
         let has_charts = *charts_left > 0;
@@ -144,10 +159,22 @@ impl WalkedRecording {
             Some(id) => id.to_owned(),
             None => self.file.clone(),
         };
+        let claimed = context.vehicle.period.as_s();
+        // A step that no odometer works with is no period; the gaps are said.
+        let other = step.and_then(|step| with_period_of_rows(context.vehicle, step)).and_then(|vehicle| {
+            let odometry = OdometryRun::new(&RunContext { vehicle, ..*context }).ok()?;
+            say!(
+                "{name}: rows are {:.4} s apart, and period_s says {claimed:.4}: taken as {:.4} s; correct period_s in the \
+                 vehicle file",
+                vehicle.period.as_s(),
+                vehicle.period.as_s()
+            );
+            Some(odometry)
+        });
         self.runs.push(WalkedRun {
             id: id.map(ToOwned::to_owned),
             name,
-            odometry: OdometryRun::new(context)?,
+            odometry: other.map_or_else(|| OdometryRun::new(context), Ok)?,
             series: has_charts.then(|| RunSeries::new(&context.vehicle, MOST_POINTS)),
         });
         Ok(())
@@ -161,7 +188,7 @@ impl WalkedRecording {
         charts_left: &mut usize,
     ) -> anyhow::Result<()> {
         for id in &block.new_runs {
-            self.add_run(Some(id), context, charts_left)?;
+            self.add_run(Some(id), context, block.usual_step(self.runs.len()), charts_left)?;
         }
         for note in &block.notes {
             say!("{}, {note}", self.file);
