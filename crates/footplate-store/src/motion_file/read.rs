@@ -1,6 +1,6 @@
 //! Reads and writes motion model files, and stores models.
 
-use std::fs;
+use std::io;
 use std::path::Path;
 
 use footplate_core::model::MotionModel;
@@ -10,10 +10,10 @@ use serde::Deserialize;
 
 use super::form::{MOTION_MODEL_VERSION, MotionFile};
 use crate::store::{Calibration, NewCalibration, Store, StoreError};
-use crate::whole_file::write_whole;
+use crate::whole_file::{read_at_most, write_whole};
 
 /// The largest file: a model of a decoder with 126 steps has about 1 MB.
-const LARGEST: u64 = 16 << 20;
+const LARGEST: usize = 16 << 20;
 
 /// A motion model that could not be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -28,12 +28,10 @@ pub enum MotionFileError {
         source: std::io::Error,
     },
     /// The file is too large to be a motion model.
-    #[error("{file}: {bytes} bytes, which no motion model has; one has at most {LARGEST}")]
+    #[error("{file}: too large for a motion model, which has at most {LARGEST} bytes")]
     TooLarge {
         /// The file.
         file: String,
-        /// Its size.
-        bytes: u64,
     },
     /// The extension is neither .toml nor .json.
     #[error("{file}: a motion model is a .toml or .json file")]
@@ -97,11 +95,13 @@ impl MotionFile {
     pub fn read(path: &Path) -> Result<Self, MotionFileError> {
         let file = path.display().to_string();
         let system = |source| MotionFileError::System { file: file.clone(), source };
-        let bytes = fs::metadata(path).map_err(system)?.len();
-        if bytes > LARGEST {
-            return Err(MotionFileError::TooLarge { file, bytes });
+        // Devices and pipes have no size that could be asked for.
+        let bytes = read_at_most(path, LARGEST).map_err(system)?;
+        if bytes.len() > LARGEST {
+            return Err(MotionFileError::TooLarge { file });
         }
-        let text = fs::read_to_string(path).map_err(system)?;
+        let text = String::from_utf8(bytes)
+            .map_err(|error| system(io::Error::new(io::ErrorKind::InvalidData, error)))?;
         if is_old_form(&text) {
             return Err(MotionFileError::OldForm { file });
         }
@@ -251,6 +251,8 @@ impl StoredModel {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use footplate_core::SpeedStep;
     use footplate_core::model::MotionModel;
 

@@ -124,6 +124,23 @@ fn a_log_may_come_through_a_pipe() {
     assert_eq!(run.status.code(), Some(0), "{}", String::from_utf8_lossy(&run.stderr));
 }
 
+#[cfg(unix)]
+#[test]
+fn a_script_and_a_model_without_an_end_are_refused() {
+    let folder = folder("endless");
+    let model = folder.join("endless.toml");
+    std::os::unix::fs::symlink("/dev/zero", &model).expect("a link to a device");
+    let model = model.display().to_string();
+    for (given, says) in [
+        (["--script", "/dev/zero"], "/dev/zero: too long for a script: the limit is 1048576 bytes"),
+        (["--model", &model], "endless.toml: too large for a motion model, which has at most 16777216 bytes"),
+    ] {
+        let run = footplate(&[&["drive", "--link", "sim:track-a?seed=7&trains=24"], &given[..]].concat());
+        assert_eq!(run.status, 2, "{}", run.errors);
+        assert!(run.errors.contains(says), "{}", run.errors);
+    }
+}
+
 #[test]
 fn files_of_several_kinds_are_named_by_their_kinds() {
     let positions = testdata("position-series/cs452_2015_stop_1.csv");

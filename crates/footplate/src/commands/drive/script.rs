@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
+use footplate_store::read_at_most;
 
 use super::instruction::Instruction;
 use super::parse::parse;
@@ -10,7 +11,7 @@ use super::reader::Known;
 use crate::comment::without_comment;
 
 /// The largest script, in bytes: about a day of driving.
-const LONGEST: u64 = 1 << 20;
+const LONGEST: usize = 1 << 20;
 
 /// The number of a queue of steps in a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -43,11 +44,11 @@ pub(super) struct Step {
 /// All mistakes of the script, each with its line and column.
 pub(super) fn read_script(path: &Path, known: Known<'_>) -> anyhow::Result<Vec<Step>> {
     let named = || format!("reading script `{}`", path.display());
-    let size = std::fs::metadata(path).with_context(named)?.len();
-    if size > LONGEST {
-        bail!("{}: {size} bytes are too many for a script: the limit is {LONGEST}", path.display());
+    // Devices and pipes have no size that could be asked for.
+    let bytes = read_at_most(path, LONGEST).with_context(named)?;
+    if bytes.len() > LONGEST {
+        bail!("{}: too long for a script: the limit is {LONGEST} bytes", path.display());
     }
-    let bytes = std::fs::read(path).with_context(named)?;
     let text = std::str::from_utf8(&bytes).map_err(|error| {
         let before = &bytes[..error.valid_up_to()];
         let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
