@@ -10,6 +10,7 @@
 //! board            the exchange between control loop and watchers; the loop never waits for them
 //! guard  token     access control: hosts, origins, and a token for other machines
 //! connections      the limit on connections, such that an emergency stop always gets through
+//! timed_body       the time that the body of a request may take
 //! server  stream   HTTP on a thread of its own; the event stream of one watcher
 //! read_only        calibrations and demonstrations, which take no commands
 //! routes           the paths of the interface
@@ -33,6 +34,7 @@ mod routes;
 mod server;
 mod spans;
 mod stream;
+mod timed_body;
 mod token;
 mod travelled_distance;
 

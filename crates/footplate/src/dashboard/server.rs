@@ -45,6 +45,7 @@ use super::model_picture::ModelPicture;
 use super::picture::LayoutPicture;
 use super::routes::Routes;
 use super::stream::events;
+use super::timed_body::in_time;
 use super::token::Token;
 use crate::clock::now;
 use crate::link::{LineTallies, SharedTallies};
@@ -52,6 +53,8 @@ use crate::standard_error::say;
 
 /// The largest request body, in bytes: longer than any command.
 const MAX_BODY: usize = 4 << 10;
+/// The longest time for it, as for a header: from the first part on that is read.
+const BODY_WITHIN: Duration = Duration::from_secs(10);
 /// The time in which the last answer reaches the browser, even on a busy machine.
 const LAST_ANSWER_TIME: Duration = Duration::from_millis(300);
 /// The default port.
@@ -220,6 +223,7 @@ fn router(guard: Guard, routes: Routes) -> Router {
         .route("/{file}", get(page))
         .merge(routes.into_router())
         .layer(DefaultBodyLimit::max(MAX_BODY))
+        .layer(from_fn_with_state(BODY_WITHIN, in_time))
         .layer(from_fn_with_state(guard, guarded))
 }
 

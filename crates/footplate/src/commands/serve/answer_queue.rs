@@ -34,7 +34,7 @@ pub(crate) struct AnswerQueue {
 
 /// Accepted requests; further ones are rejected.
 const MAX_REQUESTS: usize = 8;
-/// The longest pause between two parts of an uploaded recording.
+/// The longest time for an uploaded recording, from its turn on.
 const UPLOAD_TIMEOUT: Duration = Duration::from_secs(60);
 /// Parts of an uploaded recording that are buffered.
 const BUFFERED_PARTS: usize = 4;
