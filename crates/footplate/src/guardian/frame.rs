@@ -26,6 +26,8 @@ pub(super) enum Kind {
     Goodbye = b'g',
     /// Guardian: the line is open. One byte: state of the handshake line.
     Opened = b'O',
+    /// Guardian: answer to a heartbeat.
+    Here = b'A',
     /// Guardian: bytes from the station; one datagram where it sends datagrams.
     Heard = b'H',
     /// Guardian: the handshake line is up (1) or down (0).
@@ -35,13 +37,14 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 10] = [
         Self::Open,
         Self::Write,
         Self::Will,
         Self::Alive,
         Self::Goodbye,
         Self::Opened,
+        Self::Here,
         Self::Heard,
         Self::Cts,
         Self::Lost,

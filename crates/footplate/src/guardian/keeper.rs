@@ -159,10 +159,14 @@ fn watch(frames: &mut FrameReader, line: &mut HeldLine, ear: &Ear, watched: &mut
                 watched.will.extend_from_slice(payload);
                 watched.has_will = true;
             }
-            Kind::Alive => watched.runs = payload == [1],
+            Kind::Alive => {
+                watched.runs = payload == [1];
+                // From this thread, which would hang: the one that reads the line could go on without it.
+                tell(Kind::Here, &[]);
+            }
             Kind::Goodbye => (watched.has_will, watched.runs) = (false, false),
             // Only a guardian sends these.
-            Kind::Opened | Kind::Heard | Kind::Cts | Kind::Lost => return Left::Gone,
+            Kind::Opened | Kind::Here | Kind::Heard | Kind::Cts | Kind::Lost => return Left::Gone,
         }
         heard = Stopwatch::start();
     }

@@ -4,7 +4,7 @@
 //! and relays bytes in both directions; it reads no files, no commands and no HTTP. The child tells it in advance which
 //! bytes stop all trains: its last will. If the child dies, hangs or closes without a goodbye, the guardian sends these
 //! bytes, and retries until it reaches the station. If the guardian dies, the child opens the line itself, stops all trains
-//! and ends.
+//! and ends; one that answers no heartbeat is ended first.
 //!
 //! ```text
 //! frame     the protocol between the two

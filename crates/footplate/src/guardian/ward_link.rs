@@ -8,7 +8,7 @@ use std::time::Duration;
 use footplate_core::{TimeSpan, Timestamp};
 
 use super::frame::{FrameReader, FrameWriter, Kind, cts_of};
-use super::ward::connection;
+use super::ward::{connection, end_guardian};
 use crate::clock::Stopwatch;
 use crate::link::{Bequest, Cable, CableLink, Guardian, Heard, Link, Lost, PERSON_MS};
 use crate::runtime::{StopFlag, written};
@@ -16,6 +16,12 @@ use crate::standard_error::say;
 
 /// Period of the heartbeat: a fifth of what the guardian tolerates.
 const ALIVE_EVERY: Duration = Duration::from_millis(100);
+/// A guardian that leaves a heartbeat unanswered for this time hangs: as long as it allows its child.
+const UNANSWERED: Duration = Duration::from_millis(500);
+/// A guardian opens a line within this time, or hangs: connecting and agreeing on a protocol have 2 s each at most.
+const OPENED_WITHIN: Duration = Duration::from_secs(5);
+/// After this time between two looks, this process itself was suspended, and perhaps its guardian with it.
+const SUSPENDED: Duration = Duration::from_millis(300);
 
 /// A line that a guardian holds.
 pub(crate) struct WardLink {
@@ -28,6 +34,10 @@ pub(crate) struct WardLink {
     stopwatch: Stopwatch,
     /// Time since the last frame to the guardian.
     spoken: Stopwatch,
+    /// Time since the first heartbeat that is not answered yet.
+    asked: Option<Stopwatch>,
+    /// Time since this process looked for an answer.
+    looked: Stopwatch,
     runs: bool,
     is_orphan: bool,
     /// The line, which this process opens itself after the guardian's death.
@@ -55,6 +65,8 @@ impl WardLink {
             cts: None,
             stopwatch: Stopwatch::start(),
             spoken: Stopwatch::start(),
+            asked: None,
+            looked: Stopwatch::start(),
             runs: false,
             is_orphan: false,
             own: None,
@@ -69,6 +81,9 @@ impl WardLink {
             return Err(self.orphaned());
         }
         self.spoken = Stopwatch::start();
+        if kind == Kind::Alive {
+            self.asked.get_or_insert_with(Stopwatch::start);
+        }
         self.guardian.send(kind, bytes).map_err(|error| self.bereft(&error))
     }
 
@@ -76,8 +91,27 @@ impl WardLink {
         if error.kind() == ErrorKind::InvalidInput {
             return Lost("so much cannot be said to a guardian at once".to_owned());
         }
+        self.without_guardian()
+    }
+
+    /// Ends a guardian that answers nothing, so that this process can open the line itself.
+    fn silent(&mut self, waited: Duration) -> Lost {
+        say!("the guardian has answered nothing for {} ms; it is ended", waited.as_millis());
+        self.without_guardian()
+    }
+
+    fn without_guardian(&mut self) -> Lost {
         self.is_orphan = true;
+        end_guardian();
         self.orphaned()
+    }
+
+    /// Notes that this process looks for an answer. If it was suspended, its guardian has its whole time again.
+    fn look(&mut self) {
+        if self.looked.elapsed() > SUSPENDED {
+            self.asked = self.asked.as_ref().map(|_| Stopwatch::start());
+        }
+        self.looked = Stopwatch::start();
     }
 
     fn orphaned(&self) -> Lost {
@@ -88,15 +122,18 @@ impl WardLink {
     fn have_opened(&mut self) -> Result<(), Lost> {
         self.tell(Kind::Open, &[])?;
         self.bytes.clear();
+        let watch = Stopwatch::start();
         loop {
-            let answer = match self.frames.next(None) {
+            let answer = match self.frames.next(Some(OPENED_WITHIN.saturating_sub(watch.elapsed()))) {
+                Ok(None) if watch.elapsed() >= OPENED_WITHIN => return Err(self.silent(OPENED_WITHIN)),
                 Ok(Some((Kind::Opened, payload))) => Ok(payload.first().copied().and_then(cts_of)),
                 Ok(Some((Kind::Lost, why))) => Err(Lost(String::from_utf8_lossy(why).into_owned())),
                 // Arrivals of an earlier opening.
                 Ok(_) => continue,
                 Err(error) => return Err(self.bereft(&error)),
             };
-            self.spoken = Stopwatch::start();
+            // While it opened the line, it answered no heartbeat.
+            (self.spoken, self.asked) = (Stopwatch::start(), None);
             self.cts = answer?;
             return Ok(());
         }
@@ -118,6 +155,10 @@ impl WardLink {
                 Heard::Cts(up)
             }
             Some((Kind::Lost, why)) => Heard::Lost(Lost(String::from_utf8_lossy(why).into_owned())),
+            Some((Kind::Here, _)) => {
+                self.asked = None;
+                Heard::Nothing
+            }
             _ => Heard::Nothing,
         })
     }
@@ -154,7 +195,13 @@ impl Link for WardLink {
             }
             let left_s = ((until - self.now()).as_s() / self.cable.speed()).max(0.0);
             let due = ALIVE_EVERY.saturating_sub(self.spoken.elapsed());
+            self.look();
             match self.hear(Duration::from_secs_f64(left_s).min(due)) {
+                Ok(Heard::Nothing)
+                    if self.asked.as_ref().is_some_and(|asked| asked.elapsed() >= UNANSWERED) =>
+                {
+                    return Heard::Lost(self.silent(UNANSWERED));
+                }
                 Ok(Heard::Nothing) if left_s > 0.0 => {}
                 Ok(heard) => return heard,
                 Err(error) => return Heard::Lost(self.bereft(&error)),

@@ -323,6 +323,25 @@ fn a_guardian_that_dies_takes_its_program_with_it_and_no_train_runs() {
 }
 
 #[test]
+fn a_guardian_that_hangs_is_ended_by_its_program_and_no_train_runs() {
+    let (_board, line, mut driven, _) = running("guardian-hangs");
+    let child = driven.child();
+    let since = Instant::now();
+    signal("STOP", driven.guardian.id());
+    stopped(&line, since, "the guardian hangs");
+    let began = Instant::now();
+    while Path::new(&format!("/proc/{child}/exe")).exists() {
+        assert!(began.elapsed() < PATIENCE, "its child goes on: {}", driven.errors());
+        sleep(EVERY);
+    }
+    let errors = driven.errors();
+    assert!(errors.contains("the guardian has answered nothing for 500 ms; it is ended"), "{errors}");
+    assert!(errors.contains("without a guardian all trains are stopped"), "{errors}");
+    assert_eq!(driven.status(), None, "a signal ended it: {errors}");
+    assert_eq!(locked(&line.heard).connections, 2);
+}
+
+#[test]
 fn what_is_signalled_to_the_guardian_ends_the_program_in_order() {
     for (name, signals) in [("TERM", 1), ("INT", 1), ("QUIT", 0), ("TSTP", 0), ("HUP", 1)] {
         let (_board, line, mut driven, _) = running(&format!("guardian-told-{name}"));
