@@ -286,6 +286,10 @@ impl<P: Protocol> Session for P {
         self.continues_at()
     }
 
+    fn stop_all(&mut self) {
+        self.dialogue_mut().stop_all_next();
+    }
+
     fn close(&mut self, now: Timestamp) {
         if self.dialogue_mut().close(now, Self::STOPS_SET_DIRECTIONS) {
             self.end_begins(now);

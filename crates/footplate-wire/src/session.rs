@@ -44,6 +44,10 @@ pub trait Session {
     /// When the station has no such command, too many commands wait, or the session is closing. Nothing is sent then.
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError>;
 
+    /// Stops all locomotives of the station next, also those that this session does not know. No effect on a 6051, which has no such
+    /// command.
+    fn stop_all(&mut self) {}
+
     /// Keeps the line free for a command at this time: no poll begins that could still occupy it then. A later call replaces an
     /// earlier one; `None` cancels it. No effect on links that do not poll.
     fn hold_line(&mut self, _until: Option<Timestamp>) {}

@@ -101,6 +101,48 @@ fn a_session_without_an_end_is_unfinished_with_all_trains_that_may_run() {
     assert_eq!(journal.end().unfinished_session().unwrap(), None);
 }
 
+#[test]
+fn a_simulated_session_does_not_hide_one_over_a_real_line_that_has_no_end() {
+    let shelf = Shelf::new();
+    let mut real = journal(&shelf);
+    real.begin_machine(NewMachine { body: r#"{"train": 24}"#, ..DRIVE }, minute(0)).unwrap();
+    let mut simulated = Journal::begin(real.end(), "demo", "track-a", None, &[], minute(1)).unwrap();
+    let body = r#"{"train": 58, "is_simulated": true}"#;
+    simulated.begin_machine(NewMachine { body, ..DRIVE }, minute(1)).unwrap();
+    let end = Traced { kind: Cow::Borrowed("end"), ..traced(0) };
+    simulated.append_all(&[JournalEntry::Traced(end)], minute(1)).unwrap();
+    let unfinished = simulated.end().unfinished_session().unwrap().unwrap();
+    assert_eq!((unfinished.name.as_str(), unfinished.trains), ("evening", vec![TrainId(24)]));
+}
+
+#[test]
+fn trains_of_a_damaged_store_are_those_that_can_be_read() {
+    let shelf = Shelf::new();
+    let mut journal = journal(&shelf);
+    journal.begin_machine(NewMachine { body: r#"{"train": 77}"#, ..DRIVE }, minute(0)).unwrap();
+    let event = Event { time: Timestamp::ZERO, kind: EventKind::Reverse { train: TrainId(24) } };
+    journal.append(&[event], minute(0)).unwrap();
+    drop(journal);
+    let other = rusqlite::Connection::open(shelf.path()).unwrap();
+    other.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], |_| Ok(())).unwrap();
+    let place = |name| {
+        let page = "SELECT pageno FROM dbstat WHERE name = ?1";
+        other.query_row(page, [name], |row| row.get::<_, usize>(0)).unwrap()
+    };
+    let size: usize = other.pragma_query_value(None, "page_size", |row| row.get(0)).unwrap();
+    let whole = std::fs::read(shelf.path()).unwrap();
+    for (table, is_known, trains) in [("machines", false, [24].as_slice()), ("events", true, &[77])] {
+        let page = place(table);
+        let mut bytes = whole.clone();
+        bytes[(page - 1) * size..page * size].fill(0x55);
+        let damaged = shelf.file(&format!("{table}.db"));
+        std::fs::write(&damaged, bytes).unwrap();
+        let store = Store::open(&damaged).unwrap();
+        assert_eq!(store.known_trains(), trains.iter().copied().map(TrainId).collect::<Vec<_>>(), "{table}");
+        assert_eq!(store.unfinished_session().is_ok_and(|found| found.is_some()), is_known, "{table}");
+    }
+}
+
 /// Entries that fill a store until they move into archives.
 const FILLS: u64 = 1_024;
 

@@ -13,13 +13,14 @@ mod two_sensor;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
 use footplate_core::track::Layout;
 use footplate_core::{TimeSpan, TrainId};
 use footplate_store::{Batch, Findings, Import, Recording, Store, layout_named};
 
 use super::Outcome;
+use super::left_running::stop_left_running;
 use super::log_file::LogFile;
 use super::output_files::check_outputs;
 use super::plot::PictureFile;
@@ -129,17 +130,16 @@ impl Arguments {
     }
 
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        if let (Some(link), Some(train)) = (&self.link, self.train) {
+            return self.drive(link, train, output);
+        }
         if self.from.is_empty() && self.store.is_none() && self.link.is_none() {
             bail!(
                 "nothing to calibrate: drive a train with `--link URL --train N --layout LAYOUT`, read recordings with `--from \
                  LOG --layout LAYOUT`, or what a store keeps with `--store FILE --layout LAYOUT`"
             );
         }
-        let inputs = self.from.iter().chain(&self.store).map(PathBuf::as_path);
-        check_outputs(
-            inputs.chain(self.layout.as_deref().map(Path::new)),
-            &[("--out", self.out.as_deref()), ("--plot", self.plot.as_ref().map(PictureFile::path))],
-        )?;
+        self.check_outputs()?;
         match Given::read(&self.from)? {
             Given::Logs => {}
             Given::Positions(series) => {
@@ -153,30 +153,7 @@ impl Arguments {
                 return Ok(Outcome::Done);
             }
         }
-        let Some(layout) = &self.layout else {
-            bail!(
-                "which layout are the sensors on? Add `--layout`: a built-in one (track-a, track-b, oval-blocks) or a layout file"
-            );
-        };
-        if let (Some(link), Some(train)) = (&self.link, self.train) {
-            let session = live::Session {
-                link,
-                layout,
-                train: train.train,
-                decoder: train.decoder,
-                budget: self.budget,
-                is_afresh: self.afresh,
-                sets_turnouts: self.set_turnouts,
-                serve: self.serve.as_ref(),
-                set_up: self.set_up.as_ref(),
-                store: self.store.as_deref(),
-                out: self.out.as_deref(),
-                plot: self.plot.as_ref(),
-                is_json: self.json,
-            };
-            return session.run(output);
-        }
-        let layout = layout_named(layout)?.layout;
+        let layout = layout_named(self.layout()?)?.layout;
         let train = self.train.map(|named| named.train);
         let logs = LogFile::read_all(&self.from, &layout, train)?;
         let warning = check_runs(&layout, logs.iter().flat_map(|log| &log.recording.runs))?;
@@ -234,6 +211,42 @@ impl Arguments {
             None => table::write(&report, output)?,
         }
         Ok(outcome)
+    }
+
+    /// Calibrates a train over a link. What an earlier session left running is stopped before anything that can fail.
+    fn drive(&self, link: &Address, train: NamedTrain, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+        let opened = stop_left_running(link, self.store.as_deref(), &[train.train])?;
+        self.check_outputs()?;
+        let session = live::Session {
+            link,
+            layout: self.layout()?,
+            train: train.train,
+            decoder: train.decoder,
+            budget: self.budget,
+            is_afresh: self.afresh,
+            sets_turnouts: self.set_turnouts,
+            serve: self.serve.as_ref(),
+            set_up: self.set_up.as_ref(),
+            store: self.store.as_deref(),
+            out: self.out.as_deref(),
+            plot: self.plot.as_ref(),
+            is_json: self.json,
+        };
+        session.run(opened, output)
+    }
+
+    fn layout(&self) -> anyhow::Result<&str> {
+        self.layout.as_deref().context(
+            "which layout are the sensors on? Add `--layout`: a built-in one (track-a, track-b, oval-blocks) or a layout file",
+        )
+    }
+
+    fn check_outputs(&self) -> anyhow::Result<()> {
+        let inputs = self.from.iter().chain(&self.store).map(PathBuf::as_path);
+        check_outputs(
+            inputs.chain(self.layout.as_deref().map(Path::new)),
+            &[("--out", self.out.as_deref()), ("--plot", self.plot.as_ref().map(PictureFile::path))],
+        )
     }
 
     /// Where models of the batch's trains go: one train's to the file itself, several to a file each with the train's number

@@ -25,7 +25,7 @@ use std::sync::Arc;
 use anyhow::{anyhow, bail};
 use clap::Args;
 use footplate_core::track::{Layout, Leg};
-use footplate_core::{DecoderSteps, Timestamp, TurnoutId};
+use footplate_core::{DecoderSteps, Timestamp, TrainId, TurnoutId};
 use footplate_store::{Schedule, Store, layout_named, parse_layout};
 use footplate_wire::Session as _;
 
@@ -181,16 +181,14 @@ impl Arguments {
 
     pub(crate) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let address = self.railway.station()?;
+        let trains: Vec<TrainId> = self.railway.trains.iter().map(|named| named.train).collect();
+        let opened = stop_left_running(address, self.railway.store.as_deref(), &trains)?;
         let written = self.layout()?;
         let layout = &written.layout;
         // With an operator the session runs in real time; a simulated script need not.
         let is_watched = self.script.is_none() || self.serve.is_some();
         let pace = if is_watched { Speed::Times(1.0) } else { Speed::Unpaced };
         let mut store = self.railway.store.as_deref().map(Store::open_or_create).transpose()?;
-        let stop = |store: &Store| stop_left_running(address, layout, store, pace);
-        let opened = store.as_ref().map(stop).transpose()?.flatten();
-        // A damaged store is not written to: that could overwrite what can still be salvaged.
-        store.as_ref().map_or(Ok(()), Store::check)?;
         let named = address.decoders(&self.railway.trains).map_err(|error| anyhow!(error))?;
         let station = address.kind();
         let known = KnownTrains::gather(
@@ -275,6 +273,7 @@ impl Arguments {
             wait_limit_s: self.wait_limit,
             schedules,
             link: self.railway.station()?.time_model(self.railway.line()?.as_ref()),
+            is_simulated: self.railway.station()?.simulated().is_some(),
         })
     }
 

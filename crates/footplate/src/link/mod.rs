@@ -52,7 +52,9 @@ pub(crate) use line::{Bequest, Guardian, Heard, Link, Lost, PERSON_MS};
 pub(crate) use measured::MeasuredLine;
 pub(crate) use named_train::{NamedTrain, decoder_of, trains};
 pub(crate) use observed::{LineTallies, ObservedLink, SharedTallies};
-pub(crate) use open::{module_count, open, open_session, open_simulated, station};
+pub(crate) use open::{
+    module_count, open, open_cable, open_session, open_session_to_stop, open_simulated, station,
+};
 pub(crate) use rhythm::{PowerCommand, Rhythm};
 pub(crate) use served::{Incoming, Server, listen_for_datagrams, listen_on, open_pseudo_terminal};
 pub(crate) use simulated::SimulatedLink;

@@ -38,7 +38,7 @@ pub(crate) fn open<'l>(
 }
 
 /// Opens a line outside this process, or has this program's guardian open it.
-fn open_cable(cable: Cable) -> Result<Box<dyn Link>, Lost> {
+pub(crate) fn open_cable(cable: Cable) -> Result<Box<dyn Link>, Lost> {
     #[cfg(unix)]
     if let Some(link) = WardLink::open(&cable)? {
         return Ok(Box::new(link));
@@ -87,7 +87,11 @@ fn highest_input(layout: &Layout) -> u16 {
 
 /// How many modules the contacts of a layout are on.
 pub(crate) fn module_count(layout: &Layout) -> u8 {
-    let highest = highest_input(layout);
+    modules_up_to(highest_input(layout))
+}
+
+/// How many modules there are up to that of an input.
+fn modules_up_to(highest: u16) -> u8 {
     u8::try_from(highest / INPUTS_PER_MODULE + 1).unwrap_or(u8::MAX)
 }
 
@@ -100,15 +104,28 @@ pub(crate) fn open_session(
     link: &dyn Link,
     layout: &Layout,
 ) -> anyhow::Result<StationSession> {
-    let (now, modules) = (link.now(), module_count(layout));
-    let session: StationSession = match address {
+    Ok(session_with(address, link, highest_input(layout))?.with_blocks(layout))
+}
+
+/// The session over an open line that only stops trains: no layout is needed for that.
+///
+/// # Errors
+/// The address asks for more sensor modules than a bus has.
+pub(crate) fn open_session_to_stop(address: &Address, link: &dyn Link) -> anyhow::Result<StationSession> {
+    session_with(address, link, 0)
+}
+
+/// The session of an address whose station reports sensors up to this number.
+fn session_with(address: &Address, link: &dyn Link, highest: u16) -> anyhow::Result<StationSession> {
+    let (now, modules) = (link.now(), modules_up_to(highest));
+    Ok(match address {
         Address::Simulated(simulated) => match simulated.station {
             StationKind::Marklin => Interface::new(now, Settings::with_cts(modules))?.into(),
             StationKind::DccEx => dcc_ex::Client::new(now, dcc_ex::Settings::default()).into(),
             StationKind::Z21 => {
                 let feedback = simulated.quirks.z21.feedback;
                 let settings = z21::Settings { feedback, ..z21::Settings::default() };
-                z21::Client::new(now, z21_settings(settings, layout)).into()
+                z21::Client::new(now, z21_settings(settings, highest)).into()
             }
             StationKind::MarklinCan => {
                 let scan = simulated.quirks.can.scan;
@@ -117,37 +134,33 @@ pub(crate) fn open_session(
             }
             StationKind::LocoNet => loconet::Client::new(now, loconet::Settings::default()).into(),
             StationKind::Jmri => {
-                jmri::Client::new(now, jmri_settings(jmri::Settings::default(), layout)).into()
+                jmri::Client::new(now, jmri_settings(jmri::Settings::default(), highest)).into()
             }
         },
         Address::Serial(serial) => {
             Interface::new(now, serial_settings(serial, link.cts().is_some(), modules))?.into()
         }
         Address::Board(board) => dcc_ex::Client::new(now, board.settings).into(),
-        Address::Z21(z21) => z21::Client::new(now, z21_settings(z21.settings, layout)).into(),
-        Address::Can(can) => marklin_can::Client::new(now, can_settings(can, layout)).into(),
+        Address::Z21(z21) => z21::Client::new(now, z21_settings(z21.settings, highest)).into(),
+        Address::Can(can) => marklin_can::Client::new(now, can_settings(can, highest)).into(),
         Address::LocoNet(server) => loconet::Client::new(now, server.settings).into(),
-        Address::Jmri(jmri) => jmri::Client::new(now, jmri_settings(jmri.settings.clone(), layout)).into(),
-    };
-    Ok(session.with_blocks(layout))
+        Address::Jmri(jmri) => jmri::Client::new(now, jmri_settings(jmri.settings.clone(), highest)).into(),
+    })
 }
 
 /// Settings that know how many sensors the layout has.
-fn z21_settings(settings: z21::Settings, layout: &Layout) -> z21::Settings {
-    let highest = highest_input(layout);
+fn z21_settings(settings: z21::Settings, highest: u16) -> z21::Settings {
     z21::Settings { last_sensor: highest.saturating_add(settings.first_sensor), ..settings }
 }
 
 /// Settings that know how many sensors the layout has.
-fn jmri_settings(settings: jmri::Settings, layout: &Layout) -> jmri::Settings {
-    let highest = highest_input(layout);
+fn jmri_settings(settings: jmri::Settings, highest: u16) -> jmri::Settings {
     jmri::Settings { last_sensor: highest.saturating_add(settings.first_sensor), ..settings }
 }
 
 /// Settings that know which modules the layout's contacts are on.
-fn can_settings(address: &CanAddress, layout: &Layout) -> marklin_can::Settings {
+fn can_settings(address: &CanAddress, highest: u16) -> marklin_can::Settings {
     let CanAddress { settings, modules, .. } = address;
-    let highest = highest_input(layout);
     let last = highest.saturating_add(settings.first_input.max(1));
     let needed = u8::try_from(last.div_ceil(INPUTS_PER_MODULE)).unwrap_or(u8::MAX);
     marklin_can::Settings { modules: modules.unwrap_or(needed), ..*settings }

@@ -134,6 +134,9 @@ impl Session for StationSession {
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {
         self.station.any_mut().handle_command(now, command)
     }
+    fn stop_all(&mut self) {
+        self.station.any_mut().stop_all();
+    }
     fn hold_line(&mut self, until: Option<Timestamp>) {
         self.station.any_mut().hold_line(until);
     }

@@ -29,7 +29,6 @@ use self::watcher::Watcher;
 use super::picture;
 use crate::clock::{LATEST, now};
 use crate::commands::Outcome;
-use crate::commands::left_running::stop_left_running;
 use crate::commands::plot::PictureFile;
 use crate::commands::serve::{SetUpMode, SetUpRoute, open_dashboard};
 use crate::commands::written_layout::WrittenLayout;
@@ -93,8 +92,12 @@ struct Driven<'l> {
 }
 
 impl Session<'_> {
-    /// Drives, tells, keeps.
-    pub(super) fn run(&self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
+    /// Drives, tells, keeps. `opened` is the link, if it was opened to stop trains.
+    pub(super) fn run(
+        &self,
+        opened: Option<Box<dyn Link>>,
+        output: &mut dyn Write,
+    ) -> anyhow::Result<Outcome> {
         let written = WrittenLayout::named(self.layout)?;
         // A simulated railway is what its address says, whatever people believe it to be.
         let real = match self.link.simulated() {
@@ -117,7 +120,6 @@ impl Session<'_> {
         let pace = if self.serve.is_some() { Speed::Times(1.0) } else { Speed::Unpaced };
         match self.link {
             Address::Simulated(simulated) => {
-                self.check_store()?;
                 let mut link = open_simulated(simulated, &real, pace)?;
                 // All circuits of a layout share rails: one train learns, the others are off them meanwhile.
                 for other in simulated.trains.iter().filter(|other| **other != self.train) {
@@ -132,21 +134,10 @@ impl Session<'_> {
             | Address::Can(_)
             | Address::LocoNet(_)
             | Address::Jmri(_) => {
-                let store = self.store.filter(|path| path.exists()).map(Store::open).transpose()?;
-                let stop = |store: &Store| stop_left_running(self.link, &real, store, pace);
-                let opened = store.as_ref().map(stop).transpose()?.flatten();
-                drop(store);
-                self.check_store()?;
                 let link = opened.map_or_else(|| open(self.link, &real, pace), Ok)?;
                 self.drive(&written, link, output)
             }
         }
-    }
-
-    /// Nothing is written to a damaged store: it would bury what can still be salvaged.
-    fn check_store(&self) -> anyhow::Result<()> {
-        let Some(path) = self.store.filter(|path| path.exists()) else { return Ok(()) };
-        Ok(Store::open(path)?.check()?)
     }
 
     fn drive<L: Link>(&self, on: &WrittenLayout, link: L, output: &mut dyn Write) -> anyhow::Result<Outcome> {
@@ -169,7 +160,8 @@ impl Session<'_> {
             sets_turnouts: self.sets_turnouts,
             ..CalibratorSettings::default()
         };
-        let beginning = CalibrationBeginning::new(on, settings, fit, &turnouts);
+        let beginning =
+            CalibrationBeginning::new(on, settings, fit, &turnouts, self.link.simulated().is_some());
         let mut written = match self.store {
             Some(path) => Some(kept::begin(path, layout, self.train, self.link, link.now(), &beginning)?),
             None => None,

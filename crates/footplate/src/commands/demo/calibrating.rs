@@ -37,7 +37,8 @@ pub(super) fn calibrate(
     let highest = SpeedStep::new(HIGHEST_STEP).unwrap_or(SpeedStep::STAND);
     let settings = CalibratorSettings::default();
     let budget = settings.budget;
-    let beginning = CalibrationBeginning::new(written, settings, MotionFit::new(train, highest), turnouts);
+    let fit = MotionFit::new(train, highest);
+    let beginning = CalibrationBeginning::new(written, settings, fit, turnouts, true);
     let scribe = demo.begin_machine(CalibrationBeginning::KIND, &beginning)?;
     let layout = &written.layout;
     let mut calibrator = Recorded::new(beginning.calibrator(layout), scribe);

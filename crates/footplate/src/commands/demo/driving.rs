@@ -263,6 +263,9 @@ pub(crate) struct TourBeginning {
     model: MotionModel,
     /// The located train.
     locator: Locator,
+    /// As in the other machines: the demo has only a simulated railway.
+    #[serde(default)]
+    is_simulated: bool,
 }
 
 impl TourBeginning {
@@ -275,6 +278,7 @@ impl TourBeginning {
             turnouts: written.legs(&known.turnouts),
             model: known.fit.model().clone(),
             locator: known.locator.clone(),
+            is_simulated: true,
         }
     }
 

@@ -45,13 +45,16 @@ pub(crate) struct DriveBeginning {
     /// The delays of the link; sessions of older versions assumed the slowest link.
     #[serde(default)]
     pub(super) link: TimeModel,
+    /// Whether the railway is simulated and ends with its program; absent from sessions of older versions.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub(super) is_simulated: bool,
 }
 
 impl DriveBeginning {
     /// The kind of this machine in a store.
     pub(crate) const KIND: &'static str = "drive";
 
-    /// A session whose script arrives line by line, with trains as an earlier session handed them over.
+    /// A simulated session whose script arrives line by line, with trains as an earlier session handed them over.
     pub(crate) fn line_by_line(
         written: &WrittenLayout,
         turnouts: &TurnoutStates,
@@ -68,6 +71,7 @@ impl DriveBeginning {
             wait_limit_s: None,
             schedules: Vec::new(),
             link: TimeModel::default(),
+            is_simulated: true,
         }
     }
 

@@ -16,13 +16,14 @@ use std::thread;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
+use footplate_core::TrainId;
 
 use self::routes::Pages;
 #[cfg(test)]
 pub(crate) use self::routes::set_up_paths;
 pub(crate) use self::routes::{SetUpMode, SetUpRoute, fuzzed_set_up_routes};
 use self::set_up_file::{SetUp, StepResult, file_beside};
-use crate::commands::Outcome;
+use crate::commands::{Outcome, left_running};
 use crate::dashboard::{ServedAt, ServedPages, Token};
 use crate::runtime::StopFlag;
 use crate::standard_error::say;
@@ -47,6 +48,33 @@ enum Next {
 /// The address cannot be used, or a file cannot be read or written.
 pub(super) fn run(at: &ServedAt, store: Option<PathBuf>, restarts: bool) -> anyhow::Result<Outcome> {
     let store = store.unwrap_or_else(|| USUAL_STORE.into());
+    let begun = begin(at, store.clone(), restarts);
+    let set_up = SetUp::read(&file_beside(&store));
+    // A set-up that is complete is driven at once, by a process that stops trains first.
+    if begun.is_err() || !set_up.as_ref().is_ok_and(|set_up| set_up.is_complete) {
+        stop_left_running(&store, &set_up.unwrap_or_default())?;
+    }
+    let (mut session, shown) = begun?;
+    loop {
+        let set_up = SetUp::read(&session.file)?;
+        let next = if set_up.is_complete && session.problem.is_none() {
+            Some(Next::Drive)
+        } else {
+            session.serve_pages(set_up, &shown)?
+        };
+        let ended = match next {
+            None => Some(Outcome::Done),
+            Some(Next::Calibrate(train)) => session.calibrate(train)?,
+            Some(Next::Drive) => session.drive()?,
+        };
+        if let Some(outcome) = ended {
+            return Ok(outcome);
+        }
+    }
+}
+
+/// Begins a session at an address. Returns it with the end of the address that is printed, which has the token if that is new.
+fn begin(at: &ServedAt, store: PathBuf, restarts: bool) -> anyhow::Result<(Session, String)> {
     let file = file_beside(&store);
     // Children need the same token; it is printed once, with the address.
     let chosen = std::env::var("FOOTPLATE_TOKEN").ok().filter(|text| !text.is_empty());
@@ -58,22 +86,19 @@ pub(super) fn run(at: &ServedAt, store: Option<PathBuf>, restarts: bool) -> anyh
     // All steps are served at the same port.
     let at = at.with_port()?;
     let stop = StopFlag::install_saying("\nending");
-    let mut session = Session { at, store, file, token, restarts, stop, problem: None, is_announced: false };
-    loop {
-        let set_up = SetUp::read(&session.file)?;
-        let next = if set_up.is_complete && session.problem.is_none() {
-            Some(Next::Drive)
-        } else {
-            session.serve_pages(set_up, shown.as_deref().unwrap_or_default())?
-        };
-        let ended = match next {
-            None => Some(Outcome::Done),
-            Some(Next::Calibrate(train)) => session.calibrate(train)?,
-            Some(Next::Drive) => session.drive()?,
-        };
-        if let Some(outcome) = ended {
-            return Ok(outcome);
-        }
+    let session = Session { at, store, file, token, restarts, stop, problem: None, is_announced: false };
+    Ok((session, shown.unwrap_or_default()))
+}
+
+/// Stops trains that an earlier session left running, over the link of the set-up.
+///
+/// # Errors
+/// The store is damaged, or the link cannot be opened.
+fn stop_left_running(store: &Path, set_up: &SetUp) -> anyhow::Result<()> {
+    let trains: Vec<TrainId> = set_up.trains.iter().map(|train| TrainId(train.address)).collect();
+    match set_up.link().ok().and_then(|link| link.parse().ok()) {
+        Some(address) => left_running::stop_left_running(&address, Some(store), &trains).map(drop),
+        None => left_running::warn_of_left_running(store),
     }
 }
 

@@ -22,6 +22,9 @@ pub(crate) struct CalibrationBeginning {
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     sets_turnouts: bool,
     fit: MotionFit,
+    /// Whether the railway is simulated and ends with its program; absent from sessions of older versions.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    is_simulated: bool,
 }
 
 impl CalibrationBeginning {
@@ -33,10 +36,12 @@ impl CalibrationBeginning {
         settings: CalibratorSettings,
         fit: MotionFit,
         turnouts: &TurnoutStates,
+        is_simulated: bool,
     ) -> Self {
         let CalibratorSettings { budget, train_length, avoid, sets_turnouts } = settings;
         let turnouts = written.legs(turnouts);
-        Self { layout: written.text.clone(), turnouts, budget, train_length, avoid, sets_turnouts, fit }
+        let layout = written.text.clone();
+        Self { layout, turnouts, budget, train_length, avoid, sets_turnouts, fit, is_simulated }
     }
 
     /// The calibrator that begins so, on the layout that the text says.
