@@ -54,8 +54,8 @@ pub(crate) struct Arguments {
     /// in the environment variable FOOTPLATE_TOKEN (at least 16 characters), or one that is generated and printed.
     #[arg(value_name = "ADDRESS", default_value = "")]
     at: ServedAt,
-    /// If the program dies, stop its trains and start it again. It then knows what the store contains, and locates its
-    /// trains again.
+    /// If the program dies, stop its trains and start it again. It then knows what the store contains: models and schedules,
+    /// but not where trains are. Each is located by the first sensor that it passes, or by `place`.
     #[arg(long)]
     restart: bool,
     /// The set-up that this session runs; `footplate serve` without a link gives it.
