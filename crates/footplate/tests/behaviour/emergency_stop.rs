@@ -16,6 +16,7 @@ use std::time::{Duration, Instant};
 use crate::board::calibrated;
 use crate::guardian::{child_of, signal};
 use crate::station::Standing;
+use crate::uploads::upload;
 
 /// The command that takes the power from the track, which the stop sends.
 const POWER_OFF: &[u8] = b"<0>";
@@ -33,6 +34,8 @@ struct Load {
     slow: usize,
     /// Threads that give one order after another.
     orders: usize,
+    /// Threads that upload one recording after another: more than the queue takes.
+    uploads: usize,
 }
 
 /// Passes bytes between the program and a board, and knows what was said, and when the power was commanded off.
@@ -188,6 +191,31 @@ fn loaded(load: Load, host: &str, ends: &Arc<AtomicBool>, answered: &Arc<AtomicU
     }
 }
 
+/// Uploads in threads, until they are told to end. Counts those that were computed and those that were sent away.
+fn uploading(load: Load, host: &str, ends: &Arc<AtomicBool>) -> [Arc<AtomicUsize>; 2] {
+    /// An hour and a half of one tachometer.
+    const ROWS: usize = 100_000;
+    let rows = (1..=ROWS).map(|row| format!("{:.2},10,10\n", row as f64 * 0.05));
+    let recording: Arc<String> =
+        Arc::new(["t_s,pulses_1,pulses_2\n".to_owned()].into_iter().chain(rows).collect());
+    let [computed, refused] = [Arc::<AtomicUsize>::default(), Arc::default()];
+    for _ in 0..load.uploads {
+        let (place, over, recording) = (host.to_owned(), Arc::clone(ends), Arc::clone(&recording));
+        let (computed, refused) = (Arc::clone(&computed), Arc::clone(&refused));
+        thread::spawn(move || {
+            while !over.load(Ordering::Relaxed) {
+                let answer = upload(&place, "load.csv", recording.as_bytes()).unwrap_or_default();
+                computed.fetch_add(usize::from(answer.contains("200 OK")), Ordering::Relaxed);
+                if answer.contains("429") {
+                    refused.fetch_add(1, Ordering::Relaxed);
+                    sleep(SLOW);
+                }
+            }
+        });
+    }
+    [computed, refused]
+}
+
 /// How soon each of some emergency stops under a load was on the line.
 fn stops_under(load: Load, name: &str, count: usize) -> Vec<Duration> {
     let folder = calibrated(name, 7);
@@ -200,6 +228,7 @@ fn stops_under(load: Load, name: &str, count: usize) -> Vec<Duration> {
     let idle = opened(&served.address, load.idle);
     assert_eq!(idle.len(), load.idle, "raise the limit of descriptors: ulimit -n");
     loaded(load, &served.address, &ends, &answered);
+    let [computed, refused] = uploading(load, &served.address, &ends);
     // The idle ones are cut off after a while, and come again.
     let (place, over) = (served.address.clone(), Arc::clone(&ends));
     let coming = thread::spawn(move || {
@@ -230,6 +259,11 @@ fn stops_under(load: Load, name: &str, count: usize) -> Vec<Duration> {
     ends.store(true, Ordering::Relaxed);
     coming.join().expect("no panic");
     assert!(answered.load(Ordering::Relaxed) > 0 || load.orders == 0, "orders were answered meanwhile");
+    if load.uploads > 0 {
+        let [computed, refused] = [computed, refused].map(|count| count.load(Ordering::Relaxed));
+        println!("{computed} recordings were computed meanwhile, {refused} sent away from a full queue");
+        assert!(computed > 0 && refused > 0, "{computed} and {refused}");
+    }
     took.sort_unstable();
     took
 }
@@ -247,22 +281,25 @@ fn retried(ask: impl Fn() -> String) -> String {
 
 #[test]
 fn an_emergency_stop_is_on_the_line_though_a_thousand_connections_say_nothing() {
-    let load = Load { idle: 1_200, slow: 50, orders: 4 };
+    let load = Load { idle: 1_200, slow: 50, orders: 4, uploads: 0 };
     assert_eq!(stops_under(load, "emergency-stop", 2).len(), 2);
 }
 
 #[test]
 #[ignore = "a measurement: needs 12 000 descriptors and a machine of its own"]
 fn emergency_stop_under_full_load() {
-    for load in [Load { idle: 1, slow: 0, orders: 0 }, Load { idle: 5_000, slow: 500, orders: 100 }] {
+    let nothing = Load { idle: 1, slow: 0, orders: 0, uploads: 0 };
+    let full = Load { idle: 5_000, slow: 500, orders: 100, uploads: 12 };
+    for load in [nothing, Load { uploads: 12, ..nothing }, Load { uploads: 0, ..full }, full] {
         let took = stops_under(load, "emergency-stop-full", 40);
         let of = |part: usize| took[(took.len() - 1) * part / 100].as_secs_f64() * 1e3;
         println!(
-            "{} idle, {} slow, {} threads of orders: first byte on the line after {:.1} ms (median), {:.1} ms (95 %), \
+            "{} idle, {} slow, {} threads of orders, {} of uploads: first byte on the line after {:.1} ms (median), {:.1} ms (95 %), \
              {:.1} ms (longest of {})",
             load.idle,
             load.slow,
             load.orders,
+            load.uploads,
             of(50),
             of(95),
             of(100),

@@ -63,19 +63,23 @@ fn short_runs() -> Vec<u8> {
 }
 
 fn send(host: &str, name: &str, recording: &[u8]) -> String {
-    let mut stream = TcpStream::connect(host).expect("a connection");
-    stream.set_read_timeout(Some(PATIENCE)).expect("an option of sockets");
+    upload(host, name, recording).expect("sent")
+}
+
+/// Uploads a recording; returns the answer.
+pub(crate) fn upload(host: &str, name: &str, recording: &[u8]) -> std::io::Result<String> {
+    let mut stream = TcpStream::connect(host)?;
+    stream.set_read_timeout(Some(PATIENCE))?;
     let length = recording.len();
     write!(
         stream,
         "POST /api/odometry/{name} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\nContent-Type: application/octet-stream\r\nContent-Length: {length}\r\n\r\n"
-    )
-    .expect("sent");
+    )?;
     // A server that refuses need not read to the end.
     let _ = stream.write_all(recording);
     let mut answer = Vec::new();
     let _ = stream.read_to_end(&mut answer);
-    String::from_utf8_lossy(&answer).into_owned()
+    Ok(String::from_utf8_lossy(&answer).into_owned())
 }
 
 #[test]
