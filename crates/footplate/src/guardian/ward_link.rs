@@ -16,8 +16,9 @@ use crate::standard_error::say;
 
 /// Period of the heartbeat: a fifth of what the guardian tolerates.
 const ALIVE_EVERY: Duration = Duration::from_millis(100);
-/// A guardian that leaves a heartbeat unanswered for this time hangs: as long as it allows its child.
-const UNANSWERED: Duration = Duration::from_millis(500);
+/// A guardian that leaves a heartbeat unanswered for this time hangs. More than it allows its child, because its answer waits for what
+/// it writes to the line; less than a second less the time that opening the line takes (requirement).
+const UNANSWERED: Duration = Duration::from_millis(700);
 /// A guardian opens a line within this time, or hangs: connecting and agreeing on a protocol have 2 s each at most.
 const OPENED_WITHIN: Duration = Duration::from_secs(5);
 /// After this time between two looks, this process itself was suspended, and perhaps its guardian with it.

@@ -328,14 +328,16 @@ fn a_guardian_that_hangs_is_ended_by_its_program_and_no_train_runs() {
     let child = driven.child();
     let since = Instant::now();
     signal("STOP", driven.guardian.id());
-    stopped(&line, since, "the guardian hangs");
+    let stop = line.await_words(b"<t 24 0", since) - since;
+    println!("the guardian hangs: the stop was on the line after {stop:.2?}");
+    assert!(stop < WITHIN + Duration::from_millis(500), "{stop:?}");
     let began = Instant::now();
     while Path::new(&format!("/proc/{child}/exe")).exists() {
         assert!(began.elapsed() < PATIENCE, "its child goes on: {}", driven.errors());
         sleep(EVERY);
     }
     let errors = driven.errors();
-    assert!(errors.contains("the guardian has answered nothing for 500 ms; it is ended"), "{errors}");
+    assert!(errors.contains("the guardian has answered nothing for 700 ms; it is ended"), "{errors}");
     assert!(errors.contains("without a guardian all trains are stopped"), "{errors}");
     assert_eq!(driven.status(), None, "a signal ended it: {errors}");
     assert_eq!(locked(&line.heard).connections, 2);
