@@ -32,12 +32,18 @@ odometer. The [score's page](../formats/odometry-result.md) says what the figure
 ";
 
 const LEGEND: &str = "\
-Two figures are the median over runs and the worst run. *Inside* is the share of all periods whose true speed lies within
-the interval, rounded down, and the runs whose true distance never left its own. *ETCS* is the share of periods whose
+Two figures are the median over runs and the worst run. *Guaranteed* and *99.99 %* are the two intervals: the mean width of
+that of the speed, the share of all periods whose true speed lies within it, rounded down, and of the distance the runs that
+never left the guaranteed one, and the share of periods within the other. *ETCS* is the share of periods whose
 speed is off by more than ETCS allows, over all runs and in the worst. *Delay* is from the first real slip or slide to the
 flag on that wheelset; *false flags* is how often a wheelset is flagged that has rolled for two seconds, as part of all
 periods of such wheelsets.
 ";
+
+/// The columns of both intervals, as [`intervals`] fills them.
+const INTERVALS: &str =
+    "| guaranteed m/s | guaranteed % | distance inside | 99.99 % m/s | 99.99 % | distance 99.99 %";
+const INTERVAL_COLUMNS: &str = "| ---: | ---: | ---: | ---: | ---: | ---:";
 
 const OTHERS: &str = "\
 The same runs by the published algorithm (`paper`) and by what simpler software makes of the same counts, for the families
@@ -90,24 +96,22 @@ impl<'r> FamiliesPage<'r> {
     fn write_families(&self, output: &mut dyn Write) -> io::Result<()> {
         writeln!(
             output,
-            "| family | runs | speed rms m/s | speed max m/s | distance % | width m/s | speed inside % | distance inside \
-             | ETCS % out | delay s | false flags % |\n\
-             | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
+            "| family | runs | speed rms m/s | speed max m/s | distance % {INTERVALS} | ETCS % out | delay s \
+             | false flags % |\n\
+             | --- | ---: | ---: | ---: | ---: {INTERVAL_COLUMNS} | ---: | ---: | ---: |"
         )?;
         let last = [&self.all];
         for family in self.families.iter().chain(last.into_iter().filter(|_| self.families.len() > 1)) {
             let figures = family.figures(OURS);
             writeln!(
                 output,
-                "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+                "| {} | {} | {} | {} | {} | {} | {} | {} | {} |",
                 family.name,
                 family.runs(),
                 both(figures.speed_rms_m_s, 3),
                 both(figures.speed_max_m_s, 2),
                 both(figures.distance_end_pct, 3),
-                both(figures.speed_width_mean_m_s, 2),
-                rounded_down(figures.speed_inside_pct),
-                of_runs(&figures, family),
+                intervals(&figures, family),
                 etcs(&figures),
                 both(figures.detect_delay_s, 2),
                 one(family.false_flags_pct(), 3),
@@ -119,23 +123,21 @@ impl<'r> FamiliesPage<'r> {
     fn write_others(&self, output: &mut dyn Write) -> io::Result<()> {
         writeln!(
             output,
-            "| families | odometer | speed rms m/s | speed max m/s | distance % | width m/s | speed inside % \
-             | distance inside | ETCS % out |\n| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
+            "| families | odometer | speed rms m/s | speed max m/s | distance % {INTERVALS} | ETCS % out |\n\
+             | --- | --- | ---: | ---: | ---: {INTERVAL_COLUMNS} | ---: |"
         )?;
         for group in &self.groups {
             for odometer in Odometer::ALL {
                 let figures = group.figures(odometer);
                 writeln!(
                     output,
-                    "| {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+                    "| {} | {} | {} | {} | {} | {} | {} |",
                     group.name,
                     odometer.title(),
                     both(figures.speed_rms_m_s, 3),
                     both(figures.speed_max_m_s, 2),
                     both(figures.distance_end_pct, 3),
-                    both(figures.speed_width_mean_m_s, 2),
-                    rounded_down(figures.speed_inside_pct),
-                    of_runs(&figures, group),
+                    intervals(&figures, group),
                     etcs(&figures),
                 )?;
             }
@@ -147,8 +149,8 @@ impl<'r> FamiliesPage<'r> {
     #[must_use]
     pub fn falls_short(&self, least_inside_pct: f64) -> bool {
         let figures = self.all.figures(OURS);
-        figures.speed_inside_pct.is_some_and(|pct| pct < least_inside_pct)
-            || figures.distance_inside_runs.is_some_and(|held| held < self.all.runs())
+        figures.guaranteed_speed_inside_pct.is_some_and(|pct| pct < least_inside_pct)
+            || figures.guaranteed_distance_inside_runs.is_some_and(|held| held < self.all.runs())
     }
 
     /// Everything for machines: families, all together, and each run with the scores that `footplate odometry` gives it.
@@ -187,9 +189,12 @@ fn figures(figures: &Figures) -> Value {
         "speed_rms_m_s": spread(figures.speed_rms_m_s),
         "speed_max_m_s": spread(figures.speed_max_m_s),
         "distance_end_pct": spread(figures.distance_end_pct),
-        "speed_width_mean_m_s": spread(figures.speed_width_mean_m_s),
-        "speed_inside_pct": figures.speed_inside_pct,
-        "distance_inside_runs": figures.distance_inside_runs,
+        "guaranteed_speed_width_m_s": spread(figures.guaranteed_speed_width_m_s),
+        "guaranteed_speed_inside_pct": figures.guaranteed_speed_inside_pct,
+        "guaranteed_distance_inside_runs": figures.guaranteed_distance_inside_runs,
+        "confidence_speed_width_m_s": spread(figures.confidence_speed_width_m_s),
+        "confidence_speed_inside_pct": figures.confidence_speed_inside_pct,
+        "confidence_distance_inside_pct": figures.confidence_distance_inside_pct,
         "etcs_speed_violation_pct": figures.etcs_speed_violation_pct,
         "etcs_speed_violation_worst_pct": figures.etcs_speed_violation_worst_pct,
         "detect_delay_s": spread(figures.detect_delay_s),
@@ -212,8 +217,18 @@ pub(crate) fn rounded_down(pct: Option<f64>) -> String {
     one(pct.map(|pct| (pct * 1e4).floor() / 1e4), 4)
 }
 
-fn of_runs(figures: &Figures, family: &Family<'_>) -> String {
-    figures.distance_inside_runs.map_or_else(|| "–".to_owned(), |held| format!("{held} of {}", family.runs()))
+/// Each interval with its own width.
+fn intervals(figures: &Figures, family: &Family<'_>) -> String {
+    let runs_inside = figures.guaranteed_distance_inside_runs;
+    [
+        both(figures.guaranteed_speed_width_m_s, 2),
+        rounded_down(figures.guaranteed_speed_inside_pct),
+        runs_inside.map_or_else(|| "–".to_owned(), |held| format!("{held} of {}", family.runs())),
+        both(figures.confidence_speed_width_m_s, 2),
+        rounded_down(figures.confidence_speed_inside_pct),
+        rounded_down(figures.confidence_distance_inside_pct),
+    ]
+    .join(" | ")
 }
 
 fn etcs(figures: &Figures) -> String {

@@ -28,10 +28,15 @@ pub(crate) struct Figures {
     pub(crate) speed_max_m_s: Option<Spread>,
     /// Absolute error at the end of the run, in per cent of the distance.
     pub(crate) distance_end_pct: Option<Spread>,
-    pub(crate) speed_width_mean_m_s: Option<Spread>,
-    pub(crate) speed_inside_pct: Option<f64>,
-    /// Number of runs whose distance never left its interval; absent without one.
-    pub(crate) distance_inside_runs: Option<usize>,
+    /// Of the guaranteed interval.
+    pub(crate) guaranteed_speed_width_m_s: Option<Spread>,
+    pub(crate) guaranteed_speed_inside_pct: Option<f64>,
+    /// Number of runs whose distance never left its guaranteed interval; absent without one.
+    pub(crate) guaranteed_distance_inside_runs: Option<usize>,
+    /// Of the interval of the stated confidence.
+    pub(crate) confidence_speed_width_m_s: Option<Spread>,
+    pub(crate) confidence_speed_inside_pct: Option<f64>,
+    pub(crate) confidence_distance_inside_pct: Option<f64>,
     pub(crate) etcs_speed_violation_pct: Option<f64>,
     /// The same in the worst run.
     pub(crate) etcs_speed_violation_worst_pct: Option<f64>,
@@ -40,7 +45,7 @@ pub(crate) struct Figures {
 }
 
 impl Spread {
-    fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
+    pub(crate) fn of(values: impl Iterator<Item = f64>) -> Option<Self> {
         let mut values: Vec<f64> = values.collect();
         // NaN sorts last, as the worst.
         values.sort_unstable_by(f64::total_cmp);
@@ -85,9 +90,12 @@ impl<'r> Family<'r> {
             speed_rms_m_s: spread(|score| score.speed_rms_m_s),
             speed_max_m_s: spread(|score| score.speed_max_m_s),
             distance_end_pct: spread(|score| score.distance_end_pct.map(f64::abs)),
-            speed_width_mean_m_s: spread(|score| score.confidence_speed_width_m_s),
-            speed_inside_pct: whole.speed_inside_pct,
-            distance_inside_runs: (inside.count() > 0).then_some(held),
+            guaranteed_speed_width_m_s: spread(|score| score.speed_width_mean_m_s),
+            guaranteed_speed_inside_pct: whole.speed_inside_pct,
+            guaranteed_distance_inside_runs: (inside.count() > 0).then_some(held),
+            confidence_speed_width_m_s: spread(|score| score.confidence_speed_width_m_s),
+            confidence_speed_inside_pct: whole.confidence_speed_inside_pct,
+            confidence_distance_inside_pct: whole.confidence_distance_inside_pct,
             etcs_speed_violation_pct: whole.etcs_speed_violation_pct,
             etcs_speed_violation_worst_pct: spread(|score| score.etcs_speed_violation_pct)
                 .map(|spread| spread.worst),

@@ -137,6 +137,34 @@ fn the_table_is_the_same_however_many_work_on_it_and_counts_every_run() {
 }
 
 #[test]
+fn each_interval_stands_beside_its_own_width_and_what_it_held() {
+    let chosen = ["--score", "--scenario", "S1", "--seed", "7", "--teeth", "80"];
+    let family = json(&simulate(&[&["--json"], &chosen[..]].concat()).output);
+    let scores = &family["runs"][0]["scores"]["recommended"];
+    let score = |key: &str| scores[key].as_f64().unwrap();
+    assert!(score("confidence_speed_width_m_s") < 0.5 * score("guaranteed_speed_width_m_s"));
+    let width = |interval: &str| format!("{0:.2} / {0:.2}", score(&format!("{interval}_speed_width_m_s")));
+    let inside = |interval: &str, what: &str| {
+        format!("{:.4}", (score(&format!("{interval}_{what}_inside_pct")) * 1e4).floor() / 1e4)
+    };
+    let columns = [
+        width("guaranteed"),
+        inside("guaranteed", "speed"),
+        "1 of 1".to_owned(),
+        width("confidence"),
+        inside("confidence", "speed"),
+        inside("confidence", "distance"),
+    ]
+    .join(" | ");
+    let page = simulate(&[&["--markdown"], &chosen[..]].concat()).output;
+    let heads =
+        "| guaranteed m/s | guaranteed % | distance inside | 99.99 % m/s | 99.99 % | distance 99.99 % |";
+    assert_eq!(page.matches(heads).count(), 2, "{page}");
+    // The family, and both presets beside others: they share their intervals.
+    assert_eq!(page.matches(&format!("| {columns} |")).count(), 3, "{columns}\n{page}");
+}
+
+#[test]
 fn any_train_runs_on_any_line() {
     let folder = folder("line-service");
     let run = simulate_to(&folder, &["--train", TRAIN, "--line", LINE, "--json"]);
