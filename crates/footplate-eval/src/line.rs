@@ -2,6 +2,7 @@
 
 mod families_page;
 mod family;
+mod mechanism;
 mod scored_run;
 mod worlds_page;
 

@@ -1,13 +1,16 @@
-//! Random worlds through every odometer: tables by phase, and the worst ten with seed and notes.
+//! Random worlds through every odometer: tables by phase, and the worst ten with seed and mechanism.
 
+use std::collections::BTreeSet;
 use std::io::{self, Write};
 
 use footplate_core::TimeSpan;
 use footplate_sim::line::{LineLevel, LineWorld};
-use footplate_store::odometry::{OdometryScore, Phase, WorldOdometer, WorldScores, WorstMoment};
+use footplate_store::odometry::{OdometryScore, Phase, WorldOdometer, WorldScores};
 use serde_json::{Map, Value, json};
 
 use super::families_page::{one, rounded_down};
+use super::family::Spread;
+use super::mechanism::mechanism;
 use super::score_json;
 use crate::seeds::{FRESH, seeds_sentence};
 
@@ -15,6 +18,8 @@ use crate::seeds::{FRESH, seeds_sentence};
 const WORST: usize = 10;
 /// The interval should have its normal width so soon after both slipped.
 const NORMAL_WITHIN: TimeSpan = TimeSpan::from_ms(3000);
+/// The rms should be at most so many times that of the oracle ...
+const AT_MOST_ORACLE: f64 = 1.5;
 const OURS: WorldOdometer = WorldOdometer::Recommended;
 
 /// One world with the scores of every odometer.
@@ -23,6 +28,7 @@ pub struct ScoredWorld {
     level: LineLevel,
     notes: String,
     claims_hold: bool,
+    is_sound: bool,
     scores: WorldScores,
 }
 
@@ -35,7 +41,13 @@ impl ScoredWorld {
         let world = LineWorld::draw(seed);
         let run = world.run(level);
         let scores = WorldScores::of(&run)?;
-        Ok(Self { seed, level, notes: world.notes(), claims_hold: world.claims_hold(&run), scores })
+        let (notes, claims_hold) = (world.notes(), world.claims_hold(&run));
+        Ok(Self { seed, level, notes, claims_hold, is_sound: world.is_sound(), scores })
+    }
+
+    /// Whether its claims hold, and no sensor and no recorder has a fault.
+    const fn is_as_claimed(&self) -> bool {
+        self.is_sound && self.claims_hold
     }
 
     /// Whether the truth left a guaranteed interval although all claims hold.
@@ -68,9 +80,18 @@ drawn from ranges that the [simulator's page](../theory/line_simulator.md#random
 
 const LEGEND: &str = "\
 Shares are over all periods. *Guaranteed* and *99.99 %* are the shares whose true speed lies within the interval, rounded
-down. The *oracle* knows which wheelset slips, and when. *ETCS* is the share of periods whose speed is off by more than
-ETCS allows; *hindsight* is an odometer that knows the true speed but while both slip, and then the speed at which that began
-and the mean acceleration until one of them rolls again. A train rolls *again* for 20 s after a wheelset slipped.
+down. The *oracle* knows which wheelset slips and which sensor is wrong, and when. *Times oracle* and *times raw mean* are
+our rms divided by theirs, over all periods together and in the median world. The first is bold where it is more than asked:
+1.5 times the oracle; 1.05 times the raw mean where that is right (rolling, rolling again, standing), half of it where wheels
+slip. *ETCS* is the share of periods whose speed is off by more than ETCS allows; *hindsight* is an odometer that knows the
+true speed but while both slip, and then the speed at which that began and the mean acceleration until one of them rolls
+again. A train rolls *again* for 20 s after a wheelset slipped.
+";
+
+const PHASES: &str = "\
+| level | phase | periods | rms m/s | oracle | times oracle | raw mean | times raw mean | raw max | paper | guaranteed % | 99.99 % \
+| ETCS % | raw mean | hindsight |
+| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
 ";
 
 impl WorldsPage {
@@ -110,24 +131,25 @@ impl WorldsPage {
                 }
             }
         }
-        writeln!(
-            output,
-            "\n| level | phase | periods | rms m/s | oracle | raw mean | raw max | paper | guaranteed % | 99.99 % \
-             | ETCS % | raw mean | hindsight |\n\
-             | --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |"
-        )?;
+        write!(output, "\n## Worlds whose claims hold, without faults of sensors and recorder\n\n{PHASES}")?;
         for level in &levels {
-            if let Some(scores) = self.of(*level, |_| true) {
-                write_phases(output, *level, &scores)?;
-            }
+            write_phases(output, *level, &self.these(*level, ScoredWorld::is_as_claimed))?;
         }
+        write!(output, "\n## All worlds\n\n{PHASES}")?;
+        for level in &levels {
+            write_phases(output, *level, &self.these(*level, |_| true))?;
+        }
+        let names: Vec<&str> = levels.iter().map(|level| level.name()).collect();
         writeln!(
             output,
             "\n## The worst\n\nWhere the truth left a guaranteed interval although all claims hold, and then where the speed \
-             was farthest off.\n\n| level | seed | rms m/s | worst error m/s | at s | phase | guaranteed % | world |\n\
-             | --- | ---: | ---: | ---: | ---: | --- | ---: | --- |"
+             was farthest off, each world once with its worst level. The *mechanism* is what wheels, rail and train really did at \
+             that moment, and what they were taken for.\n\n\
+             | seed | rms m/s {} | level | worst error m/s | at s | phase | guaranteed % | mechanism | world |\n\
+             | ---: | ---: | --- | ---: | ---: | --- | ---: | --- | --- |",
+            names.join(" / ")
         )?;
-        self.worst().into_iter().try_for_each(|world| write_world(output, world))
+        self.worst().into_iter().try_for_each(|world| self.write_world(output, world))
     }
 
     /// Whether the truth left a guaranteed interval more often than it may, in worlds whose claims hold.
@@ -147,15 +169,38 @@ impl WorldsPage {
             let (mine, others) = (one.badness(), other.badness());
             others.0.cmp(&mine.0).then(others.1.total_cmp(&mine.1))
         });
+        let mut named = BTreeSet::new();
+        worlds.retain(|world| named.insert(world.seed));
         worlds.truncate(WORST);
         worlds
     }
 
-    fn of(&self, level: LineLevel, is_in: impl Fn(&ScoredWorld) -> bool) -> Option<WorldScores> {
-        let mut worlds = self.worlds.iter().filter(|world| world.level == level && is_in(world));
-        let mut all = worlds.next()?.scores.clone();
-        worlds.for_each(|world| all.merge(&world.scores));
-        Some(all)
+    fn write_world(&self, output: &mut dyn Write, world: &ScoredWorld) -> io::Result<()> {
+        let whole = world.scores.whole(OURS);
+        let Some(worst) = world.scores.worst() else { return Ok(()) };
+        let levels = self.worlds.iter().filter(|other| other.seed == world.seed);
+        let rms: Vec<String> = levels.map(|level| one(level.scores.whole(OURS).speed_rms_m_s, 2)).collect();
+        writeln!(
+            output,
+            "| {} | {} | {} | {:+.2} | {:.1} | {} | {} | {} | {} |",
+            world.seed,
+            rms.join(" / "),
+            world.level.name(),
+            worst.error_m_s,
+            worst.time.as_s(),
+            worst.phase.title(),
+            rounded_down(whole.speed_inside_pct),
+            mechanism(&worst),
+            world.notes,
+        )
+    }
+
+    fn these(&self, level: LineLevel, are_in: impl Fn(&ScoredWorld) -> bool) -> Vec<&ScoredWorld> {
+        self.worlds.iter().filter(|world| world.level == level && are_in(world)).collect()
+    }
+
+    fn of(&self, level: LineLevel, are_in: impl Fn(&ScoredWorld) -> bool) -> Option<WorldScores> {
+        together(&self.these(level, are_in))
     }
 
     /// Everything for machines.
@@ -163,6 +208,10 @@ impl WorldsPage {
     pub fn as_json(&self) -> Value {
         let levels = LineLevel::ALL.into_iter().filter_map(|level| {
             let scores = self.of(level, |_| true)?;
+            Some((level.name().to_owned(), as_json(&scores)))
+        });
+        let sound = LineLevel::ALL.into_iter().filter_map(|level| {
+            let scores = self.of(level, ScoredWorld::is_as_claimed)?;
             Some((level.name().to_owned(), as_json(&scores)))
         });
         let worlds = self.worlds.iter().map(|world| {
@@ -173,15 +222,21 @@ impl WorldsPage {
                     ("seed".to_owned(), json!(world.seed)),
                     ("level".to_owned(), json!(world.level.name())),
                     ("claims_hold".to_owned(), json!(world.claims_hold)),
+                    ("without_faults".to_owned(), json!(world.is_sound)),
                     ("world".to_owned(), json!(world.notes)),
                     ("worst_time_s".to_owned(), json!(worst.map(|worst| worst.time.as_s()))),
                     ("worst_error_m_s".to_owned(), json!(worst.map(|worst| worst.error_m_s))),
                     ("worst_phase".to_owned(), json!(worst.map(|worst| worst.phase.key()))),
+                    ("worst_mechanism".to_owned(), json!(worst.map(|worst| mechanism(&worst)))),
                 ]);
             }
             value
         });
-        json!({ "levels": levels.collect::<Map<_, _>>(), "worlds": worlds.collect::<Vec<_>>() })
+        json!({
+            "levels": levels.collect::<Map<_, _>>(),
+            "levels_without_faults": sound.collect::<Map<_, _>>(),
+            "worlds": worlds.collect::<Vec<_>>(),
+        })
     }
 }
 
@@ -210,7 +265,47 @@ fn write_intervals(
     )
 }
 
-fn write_phases(output: &mut dyn Write, level: LineLevel, scores: &WorldScores) -> io::Result<()> {
+/// ... and so many times that of the raw mean, by whether its wheels tell the truth.
+const fn at_most_raw_mean(phase: Phase) -> f64 {
+    match phase {
+        Phase::Rolling | Phase::RollingAgain | Phase::Standing => 1.05,
+        Phase::OneSlips | Phase::BothSlip => 0.5,
+    }
+}
+
+/// How many times the rms of another odometer ours is: over all periods together, bold where it is more than asked, and in the median
+/// world.
+fn times(
+    all: &WorldScores,
+    worlds: &[&ScoredWorld],
+    phase: Phase,
+    other: WorldOdometer,
+    at_most: f64,
+) -> String {
+    let ratio = |scores: &WorldScores| {
+        let rms = |odometer| scores.in_phase(phase, odometer).speed_rms_m_s;
+        Some(rms(OURS)? / rms(other).filter(|rms| *rms > 0.0)?)
+    };
+    let each = worlds.iter().filter_map(|world| ratio(&world.scores));
+    let median = Spread::of(each).map(|spread| spread.median);
+    beside_asked(ratio(all), median, at_most)
+}
+
+fn beside_asked(of_all: Option<f64>, median: Option<f64>, at_most: f64) -> String {
+    let bold = if of_all.is_some_and(|ratio| ratio > at_most) { "**" } else { "" };
+    format!("{bold}{}{bold} / {}", one(of_all, 2), one(median, 2))
+}
+
+/// The scores of several worlds together.
+fn together(worlds: &[&ScoredWorld]) -> Option<WorldScores> {
+    let (first, others) = worlds.split_first()?;
+    let mut all = first.scores.clone();
+    others.iter().for_each(|world| all.merge(&world.scores));
+    Some(all)
+}
+
+fn write_phases(output: &mut dyn Write, level: LineLevel, worlds: &[&ScoredWorld]) -> io::Result<()> {
+    let Some(scores) = together(worlds) else { return Ok(()) };
     for phase in Phase::ALL {
         let of = |odometer| scores.in_phase(phase, odometer);
         let rms = |odometer| one(of(odometer).speed_rms_m_s, 3);
@@ -218,13 +313,15 @@ fn write_phases(output: &mut dyn Write, level: LineLevel, scores: &WorldScores) 
         let etcs = |score: &OdometryScore| one(score.etcs_speed_violation_pct, 2);
         writeln!(
             output,
-            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
             level.name(),
             phase.title(),
             ours.scored,
             rms(OURS),
             rms(WorldOdometer::Oracle),
+            times(&scores, worlds, phase, WorldOdometer::Oracle, AT_MOST_ORACLE),
             rms(WorldOdometer::RawMean),
+            times(&scores, worlds, phase, WorldOdometer::RawMean, at_most_raw_mean(phase)),
             rms(WorldOdometer::RawMax),
             rms(WorldOdometer::Paper),
             rounded_down(ours.speed_inside_pct),
@@ -235,22 +332,6 @@ fn write_phases(output: &mut dyn Write, level: LineLevel, scores: &WorldScores) 
         )?;
     }
     Ok(())
-}
-
-fn write_world(output: &mut dyn Write, world: &ScoredWorld) -> io::Result<()> {
-    let whole = world.scores.whole(OURS);
-    let Some(WorstMoment { time, error_m_s, phase, .. }) = world.scores.worst() else { return Ok(()) };
-    writeln!(
-        output,
-        "| {} | {} | {} | {error_m_s:+.2} | {:.1} | {} | {} | {} |",
-        world.level.name(),
-        world.seed,
-        one(whole.speed_rms_m_s, 3),
-        time.as_s(),
-        phase.title(),
-        rounded_down(whole.speed_inside_pct),
-        world.notes,
-    )
 }
 
 fn as_json(scores: &WorldScores) -> Value {
@@ -276,4 +357,17 @@ fn as_json(scores: &WorldScores) -> Value {
         "whole": each(&|odometer| scores.whole(odometer)),
         "phases": phases.into_iter().collect::<Map<_, _>>(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_more_than_asked_is_bold() {
+        assert_eq!(beside_asked(Some(1.5), Some(0.9), 1.5), "1.50 / 0.90");
+        assert_eq!(beside_asked(Some(1.6), Some(1.7), 1.5), "**1.60** / 1.70");
+        assert_eq!(beside_asked(None, None, 1.5), "– / –");
+        assert_eq!(Phase::ALL.map(at_most_raw_mean), [1.05, 0.5, 0.5, 1.05, 1.05]);
+    }
 }

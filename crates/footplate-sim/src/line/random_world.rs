@@ -211,6 +211,12 @@ impl LineWorld {
         self.notes.join(", ")
     }
 
+    /// Whether its sensors and its recorder have no fault.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        self.setup.fault == Fault::None
+    }
+
     /// Whether the claims of every level are true in a run of it. They are not where rows are read late, where one burst of
     /// interference meets both sensors, where wheels slip on a train that rolls back against its traction, and where a train
     /// rolls back whose sensors report no direction.

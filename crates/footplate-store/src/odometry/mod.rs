@@ -14,6 +14,7 @@ mod score;
 mod simulated;
 mod summary;
 mod world_score;
+mod worst_moment;
 
 pub use counted_distances::{CountedDistances, DistanceCounter};
 pub use result_rows::{LiveResult, ResultWriter};
@@ -22,4 +23,5 @@ pub use run::{OdometryRun, Preset, RunContext, RunScores};
 pub use score::OdometryScore;
 pub use simulated::{simulated_columns, simulated_rows, simulated_vehicle};
 pub use summary::{FlagCounts, ModeCounts, RunSummary};
-pub use world_score::{Phase, WorldOdometer, WorldScores, WorstMoment};
+pub use world_score::{Phase, WorldOdometer, WorldScores};
+pub use worst_moment::WorstMoment;

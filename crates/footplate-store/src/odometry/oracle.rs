@@ -1,7 +1,8 @@
 //! References that know part of the truth.
 //!
-//! The *oracle* knows which wheelset turns with the train, and when: a Kalman filter of speed and acceleration takes the counts of
-//! the wheelsets that roll, and predicts where none does. *Hindsight* bounds what can be known while both slip.
+//! The *oracle* knows which wheelset turns with the train, and when, and which sensor reports that: a Kalman filter of speed and
+//! acceleration takes the true counts of the wheelsets that roll, and predicts where there is none. *Hindsight* bounds what can be
+//! known while both slip.
 
 use footplate_core::{Length, Speed};
 use footplate_sim::line::{LineRun, WheelTruth};
@@ -13,10 +14,11 @@ use super::score::Claim;
 const WANDERS: f64 = 0.4;
 /// Initial variances of speed and acceleration (m²/s², m²/s⁴).
 const UNKNOWN: [f64; 2] = [1e4, 1.0];
-/// A count that differs by more standard deviations is rejected ...
-const GATE: f64 = 6.0;
-/// ... unless none was accepted for so long (s).
-const LOST_S: f64 = 1.0;
+/// The count of a rolling wheel is wrong if it differs from the motion of the train by more than so many pulses (one at either edge of
+/// the period, one by the creepage of slow wheels that still roll) ...
+const WRONG_PULSES: f64 = 3.0;
+/// ... and this part of it: a rolling wheel creeps by up to 1 %, and diameters are known to 0.6 %.
+const WRONG_PART: f64 = 0.02;
 
 /// The odometer that knows which wheelset rolls.
 #[derive(Debug, Clone)]
@@ -26,7 +28,6 @@ pub(super) struct Oracle {
     acceleration: f64,
     /// Variance of the speed, covariance, variance of the acceleration.
     covariance: [f64; 3],
-    lost_for: f64,
     distance: f64,
 }
 
@@ -38,19 +39,21 @@ impl Oracle {
             speed: 0.0,
             acceleration: 0.0,
             covariance: [of_speed, 0.0, of_acceleration],
-            lost_for: f64::INFINITY,
             distance: 0.0,
         }
     }
 
-    /// Takes in a period: its counts, and which wheelsets roll and are read.
-    pub(super) fn step(&mut self, counted: &CountedDistances, rolls: [bool; 2]) -> Claim {
+    /// Takes in a period: its counts, which wheelsets roll and have a sensor that is alive, and how far the train really moved.
+    pub(super) fn step(&mut self, counted: &CountedDistances, rolls: [bool; 2], moved: Length) -> Claim {
         let t = counted.span.map_or(0.0, footplate_core::TimeSpan::as_s);
         if t > 0.0 {
             self.predict(t);
-            self.lost_for += t;
             for ((distance, rolls), pitch) in counted.distances.into_iter().zip(rolls).zip(self.pitches) {
-                if let (Some(distance), true) = (distance, rolls) {
+                let is_true = |distance: &Length| {
+                    let wrong_by = (*distance - moved).abs().as_m();
+                    rolls && wrong_by <= WRONG_PULSES * pitch + WRONG_PART * moved.abs().as_m()
+                };
+                if let Some(distance) = distance.filter(is_true) {
                     self.take(distance.as_m(), pitch, t);
                 }
             }
@@ -79,10 +82,6 @@ impl Oracle {
         let [pv, pa] = [vv + back * va, va + back * aa];
         let variance = pv + back * pa + noise;
         let surprise = distance / t - (self.speed + back * self.acceleration);
-        if surprise * surprise > GATE * GATE * variance && self.lost_for < LOST_S {
-            return;
-        }
-        self.lost_for = 0.0;
         let [kv, ka] = [pv / variance, pa / variance];
         self.speed += kv * surprise;
         self.acceleration += ka * surprise;
@@ -159,9 +158,28 @@ mod tests {
                 ],
                 span: (period > 0).then(|| TimeSpan::from_ms(50)),
             };
-            let claim = oracle.step(&counted, [time <= 8.0, time <= 16.0]);
+            let claim = oracle.step(&counted, [time <= 8.0, time <= 16.0], Length::from_m(train));
             last = [claim.speed.as_m_per_s(), 20.0 - 0.5 * time];
         }
         assert!((last[0] - last[1]).abs() < 0.3, "{last:?}");
+    }
+
+    #[test]
+    fn a_sensor_that_does_not_report_how_its_wheel_rolls_is_not_believed() {
+        // At 20 m/s; the only sensor that is left reports the other direction, or a hundred pulses more at times.
+        let ways: [fn(u32) -> f64; 2] = [|_| -1.0, |period| if period % 40 == 39 { 3.7 } else { 1.0 }];
+        for wrong in ways {
+            let mut oracle = Oracle::new([Length::from_mm(27.0); 2]);
+            for period in 0..400 {
+                let count = if period < 200 { 1.0 } else { wrong(period) };
+                let counted = CountedDistances {
+                    distances: [None, Some(Length::from_m(count))],
+                    span: (period > 0).then(|| TimeSpan::from_ms(50)),
+                };
+                let claim = oracle.step(&counted, [false, true], Length::from_m(1.0));
+                let speed = claim.speed.as_m_per_s();
+                assert!(period < 20 || (speed - 20.0).abs() < 0.01, "{period}: {speed}");
+            }
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! Scores of odometers on a random world, phase by phase.
 
+use footplate_core::odometry::Odometer;
 use footplate_core::odometry::wheels::VehicleError;
-use footplate_core::odometry::{Mode, MotionEstimate, Odometer};
-use footplate_core::{Speed, TimeSpan, Timestamp};
+use footplate_core::{Length, Speed, TimeSpan, Timestamp};
 use footplate_sim::line::{LineEventKind, LineRun, LineTruth, WheelTruth};
 
 use super::counted_distances::DistanceCounter;
@@ -11,6 +11,7 @@ use super::rival::{Rival, RivalOdometer};
 use super::run::{Preset, claim};
 use super::score::{Claim, OdometryScore, Scorer};
 use super::simulated::{simulated_rows, simulated_vehicle};
+use super::worst_moment::{WorstMoment, WorstWatch};
 use crate::tachometer::Truth;
 
 /// How long a train counts as rolling *again* after a slip (s): as long as the slowest odometer took to trust its wheels.
@@ -78,7 +79,7 @@ pub enum WorldOdometer {
     RawMean,
     /// The larger count.
     RawMax,
-    /// One that knows which wheelset slips, and when.
+    /// One that knows which wheelset slips, and which sensor is wrong, and when.
     Oracle,
     /// One that knows the truth but while both slip, and then the mean acceleration, in hindsight.
     Hindsight,
@@ -101,19 +102,6 @@ impl WorldOdometer {
             Self::Hindsight => "hindsight",
         }
     }
-}
-
-/// The moment of the largest speed error of the recommended preset.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WorstMoment {
-    /// When.
-    pub time: Timestamp,
-    /// Its speed less the true one (m/s).
-    pub error_m_s: f64,
-    /// The phase.
-    pub phase: Phase,
-    /// The mode of the estimate.
-    pub mode: Mode,
 }
 
 /// Scores of every odometer in every phase, on one world or on many.
@@ -146,8 +134,10 @@ impl WorldScores {
         let mut seen = Vec::with_capacity(run.samples.len());
         let mut events = run.events.iter().peekable();
         let mut is_faulty = false;
-        for (((period, known), truth), in_hindsight) in
-            simulated_rows(run).zip(&run.truth).zip(hindsight(run))
+        let mut worst = WorstWatch::default();
+        let mut distance = Length::ZERO;
+        for ((((period, known), sample), truth), in_hindsight) in
+            simulated_rows(run).zip(&run.samples).zip(&run.truth).zip(hindsight(run))
         {
             while let Some(event) = events.next_if(|event| event.time <= period.time) {
                 match event.what {
@@ -159,13 +149,15 @@ impl WorldScores {
             let phase = phases.see(period.time, truth);
             let estimate = ours.step(&period);
             let counted = counter.count(&period);
+            let moved = truth.distance - distance;
+            distance = truth.distance;
             let [first, second] = truth.wheels.map(|does| does == WheelTruth::Rolling);
             let claims = [
                 claim(&estimate),
                 claim(&paper.step(&period)),
                 rivals[0].step(&counted),
                 rivals[1].step(&counted),
-                oracle.step(&counted, [first, second && !is_faulty]),
+                oracle.step(&counted, [first, second && !is_faulty], moved),
                 Claim::plain(Speed::from_m_per_s(in_hindsight), truth.distance),
             ];
             let of_speed = Truth { distance: None, ..known };
@@ -175,7 +167,8 @@ impl WorldScores {
                 whole.see(claim, &known);
                 in_phase.see(claim, &of_speed);
             }
-            scores.find_worst(&estimate, truth, phase);
+            let faulty_count = sample.wheels[1].pulses.filter(|_| is_faulty);
+            worst.see(&estimate, truth, phase, period.effort, faulty_count);
             let width = |bounds: [f64; 2]| (bounds[1] - bounds[0]) as f32;
             let likely = estimate.confidence;
             let sure = estimate.guaranteed;
@@ -189,15 +182,9 @@ impl WorldScores {
         }
         let inside = scores.whole[0].score().distance_inside_pct;
         scores.left_distance = u64::from(inside.is_some_and(|pct| pct < 100.0));
+        scores.worst = worst.worst;
         scores.normal_after_s = back_to_normal(&seen, median(&scores.widths[0]));
         Ok(scores)
-    }
-
-    fn find_worst(&mut self, estimate: &MotionEstimate, truth: &LineTruth, phase: Phase) {
-        let error_m_s = (estimate.speed - truth.speed).as_m_per_s();
-        if self.worst.is_none_or(|worst| error_m_s.abs() > worst.error_m_s.abs()) {
-            self.worst = Some(WorstMoment { time: estimate.time, error_m_s, phase, mode: estimate.mode });
-        }
     }
 
     /// Adds the scores of another world.

@@ -1,5 +1,6 @@
 //! `footplate simulate line` writes recordings that give an odometer what the simulated run itself gives it.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -162,6 +163,39 @@ fn each_interval_stands_beside_its_own_width_and_what_it_held() {
     assert_eq!(page.matches(heads).count(), 2, "{page}");
     // The family, and both presets beside others: they share their intervals.
     assert_eq!(page.matches(&format!("| {columns} |")).count(), 3, "{columns}\n{page}");
+}
+
+#[test]
+fn the_worst_ten_worlds_are_ten_worlds_and_faults_have_a_table_of_their_own() {
+    let worlds = ["--score", "--worlds", "1..11"];
+    let page = simulate(&[&["--markdown"], &worlds[..]].concat()).output;
+    let (tables, worst) = page.split_once("## The worst").unwrap();
+    let seed = |line: &str| line.strip_prefix("| ")?.split(" | ").next()?.parse::<u64>().ok();
+    let seeds: BTreeSet<u64> = worst.lines().filter_map(seed).collect();
+    assert_eq!(seeds.len(), 10, "{worst}");
+    let scored = json(&simulate(&[&["--json"], &worlds[..]].concat()).output);
+    let of_all = scored["worlds"].as_array().unwrap();
+    assert!(of_all.iter().all(|world| world["worst_mechanism"].as_str().unwrap().contains("; train at ")));
+    let is = |world: &Value, key: &str| world[key].as_bool().unwrap();
+    let without =
+        of_all.iter().filter(|world| is(world, "without_faults") && is(world, "claims_hold")).count();
+    assert!((3..33).contains(&without), "some have faults, some have none: {without}");
+    let counted = scored["levels_without_faults"]["L1"]["worlds"].as_u64().unwrap();
+    assert_eq!(counted as usize, without / 3);
+    for (heading, levels) in
+        [("## Worlds whose claims hold", "levels_without_faults"), ("## All worlds", "levels")]
+    {
+        let rolling = &scored[levels]["L1"]["phases"]["rolling"];
+        let rms = |odometer: &str| rolling[odometer]["speed_rms_m_s"].as_f64().unwrap();
+        let row = format!(
+            "\n| L1 | rolling | {} | {:.3} | {:.3} |",
+            rolling["recommended"]["scored"],
+            rms("recommended"),
+            rms("oracle")
+        );
+        let (_, table) = tables.split_once(heading).unwrap();
+        assert!(table.contains(&row), "{row}\n{page}");
+    }
 }
 
 #[test]
