@@ -20,7 +20,7 @@
 #
 #   chaos        the whole program in one process under seeds, while the line, the disk and processes fail;
 #                ./ci.sh chaos --seeds 1..1000000 (docs/trust.md lists seeds that fail)
-#   fresh        every scorer on FRESH_SEEDS (64 unless set) fresh seeds
+#   fresh        every scorer on FRESH_SEEDS (64 unless set) fresh seeds, the odometer on 1000 random worlds a level
 #   mutants      a share of all small changes to the core's formulas and rules, each of which a test of the core should notice:
 #                MUTANTS=0/200 is every 200th from the first on, two hours (docs/trust.md lists what was not noticed)
 #
@@ -317,6 +317,9 @@ step_fresh() {
   echo
   # Status 1 says that something falls short, which the table shows.
   "$TARGET/debug/footplate" simulate line --score --seeds "fresh:${FRESH_SEEDS:-64}" --markdown || [[ $? -eq 1 ]]
+  # A thousand worlds a level of the odometer; the committed table has two hundred.
+  local worlds=$((1000 * ${FRESH_SEEDS:-64} / 64))
+  "$TARGET/debug/footplate" simulate line --score --worlds "fresh:$worlds" --markdown || [[ $? -eq 1 ]]
   if [[ -s $TARGET/fresh-failed.txt ]]; then
     echo
     echo "regression seeds to keep in testdata/seeds.txt:"
