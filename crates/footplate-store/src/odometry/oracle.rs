@@ -14,11 +14,13 @@ use super::score::Claim;
 const WANDERS: f64 = 0.4;
 /// Initial variances of speed and acceleration (m²/s², m²/s⁴).
 const UNKNOWN: [f64; 2] = [1e4, 1.0];
-/// The count of a rolling wheel is wrong if it differs from the motion of the train by more than so many pulses (one at either edge of
-/// the period, one by the creepage of slow wheels that still roll) ...
-const WRONG_PULSES: f64 = 3.0;
-/// ... and this part of it: a rolling wheel creeps by up to 1 %, and diameters are known to 0.6 %.
+/// The count of a rolling wheel is wrong if it differs from the motion of the train by more than one pulse, by teeth that are not quite
+/// even, ...
+const WRONG_PULSES: f64 = 1.1;
+/// ... and by more than this part of it (a rolling wheel creeps by up to 1 %, and diameters are known to 0.6 %) or this (m/s): a slow
+/// wheel rolls within it.
 const WRONG_PART: f64 = 0.02;
+const WRONG_M_PER_S: f64 = 0.1;
 
 /// The odometer that knows which wheelset rolls.
 #[derive(Debug, Clone)]
@@ -50,8 +52,8 @@ impl Oracle {
             self.predict(t);
             for ((distance, rolls), pitch) in counted.distances.into_iter().zip(rolls).zip(self.pitches) {
                 let is_true = |distance: &Length| {
-                    let wrong_by = (*distance - moved).abs().as_m();
-                    rolls && wrong_by <= WRONG_PULSES * pitch + WRONG_PART * moved.abs().as_m()
+                    let wrong_by = (*distance - moved).abs().as_m() - WRONG_PULSES * pitch;
+                    rolls && wrong_by <= (WRONG_PART * moved.abs().as_m()).max(WRONG_M_PER_S * t)
                 };
                 if let Some(distance) = distance.filter(is_true) {
                     self.take(distance.as_m(), pitch, t);
