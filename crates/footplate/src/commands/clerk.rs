@@ -12,8 +12,8 @@ use footplate_store::Store;
 use serde::{Deserialize, Serialize};
 
 use super::Outcome;
+use super::dashboard_routes::{AnswerForm, StoreQuery};
 use super::odometry::uploaded_page;
-use super::serve::{AnswerForm, StoreQuery};
 use super::written_layout::WrittenLayout;
 
 /// What it is called.

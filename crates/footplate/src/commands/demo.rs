@@ -18,7 +18,7 @@ use footplate_store::{Journal, MotionFile, Store, TrainAtStart};
 use serde_json::json;
 
 use super::Outcome;
-use super::serve::{SetUpRoute, open_dashboard};
+use super::dashboard_routes::{SetUpRoute, open_dashboard};
 use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
 use crate::dashboard::{ReadOnlyDashboard, ServedAt};

@@ -10,6 +10,7 @@ mod command;
 mod compare;
 mod completions;
 mod convert;
+mod dashboard_routes;
 mod demo;
 mod doctor;
 mod drive;
@@ -31,8 +32,8 @@ mod web_page;
 mod written_layout;
 
 pub(crate) use command::{Command, Outcome};
+#[cfg(test)]
+pub(crate) use dashboard_routes::{session_paths, set_up_paths};
 pub(crate) use drive::FuzzedSession;
 pub(crate) use left_running::{recall_directions, stop_all};
 pub(crate) use serve::answer_fuzzed;
-#[cfg(test)]
-pub(crate) use serve::{session_paths, set_up_paths};

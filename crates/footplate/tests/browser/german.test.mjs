@@ -11,7 +11,7 @@ import { logInGerman } from "../../assets/dashboard/german_log.js";
 
 const CRATES = fileURLToPath(new URL("../../../", import.meta.url));
 const DRIVE = "footplate/src/commands/drive";
-const SERVE = "footplate/src/commands/serve";
+const SERVE = "footplate/src/commands/dashboard_routes";
 /** The sources of lines of the log, of refusals, and of errors of a command. */
 const SOURCES = [
   `${DRIVE}/formatter.rs`, `${DRIVE}/script_runner.rs`, ...readdirSync(join(CRATES, DRIVE, "script_runner")).map((name) => `${DRIVE}/script_runner/${name}`),

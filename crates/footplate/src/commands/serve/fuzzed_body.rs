@@ -12,11 +12,10 @@ use hyper::service::Service as _;
 use hyper_util::service::TowerToHyperService;
 use serde_json::Value;
 
-use super::answer_queue::AnswerQueue;
-use super::archive::{Archive, archive_routes};
-use super::drawn_layout::drawn_layout_routes;
-use super::schedules::schedule_routes;
-use super::set_up::{SetUpRoute, fuzzed_set_up_routes};
+use crate::commands::dashboard_routes::{
+    AnswerQueue, Archive, SetUpRoute, archive_routes, drawn_layout_routes, fuzzed_set_up_routes,
+    schedule_routes,
+};
 use crate::commands::drive::FuzzedSession;
 use crate::dashboard::{Routes, answering, driving_routes};
 

@@ -52,7 +52,7 @@ enum ToRun {
 type Body<T> = Result<Json<T>, JsonRejection>;
 
 /// The routes; `archive` has the store, `board` leads to the control loop.
-pub(super) fn schedule_routes(archive: Archive, board: Arc<Board>) -> Routes {
+pub(in crate::commands) fn schedule_routes(archive: Archive, board: Arc<Board>) -> Routes {
     Routes::new(
         Schedules { archive, board, known: Arc::default() },
         [

@@ -41,14 +41,14 @@ const MAX_MARKED: usize = 1_000;
 
 /// The store of a session.
 #[derive(Clone)]
-pub(super) struct Archive {
+pub(in crate::commands) struct Archive {
     store: Option<Arc<PathBuf>>,
     layout: Arc<WrittenLayout>,
     answer_queue: AnswerQueue,
 }
 
 /// The routes; without a store they answer that there is none.
-pub(super) fn archive_routes(archive: Archive) -> Routes {
+pub(in crate::commands) fn archive_routes(archive: Archive) -> Routes {
     Routes::new(
         archive,
         [
@@ -62,7 +62,11 @@ pub(super) fn archive_routes(archive: Archive) -> Routes {
 }
 
 impl Archive {
-    pub(super) fn new(store: Option<PathBuf>, layout: &WrittenLayout, answer_queue: &AnswerQueue) -> Self {
+    pub(in crate::commands) fn new(
+        store: Option<PathBuf>,
+        layout: &WrittenLayout,
+        answer_queue: &AnswerQueue,
+    ) -> Self {
         Self {
             store: store.map(Arc::new),
             layout: Arc::new(layout.clone()),

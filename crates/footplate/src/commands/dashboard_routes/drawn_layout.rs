@@ -39,7 +39,7 @@ impl DrawnLayout {
 }
 
 /// The route that checks a layout.
-pub(super) fn drawn_layout_routes() -> Routes {
+pub(in crate::commands) fn drawn_layout_routes() -> Routes {
     Routes::new((), [("/api/layout/check", post(check).layer(DefaultBodyLimit::max(LARGEST_LAYOUT)))])
 }
 

@@ -46,7 +46,11 @@ enum Next {
 ///
 /// # Errors
 /// The address cannot be used, or a file cannot be read or written.
-pub(super) fn run(at: &ServedAt, store: Option<PathBuf>, restarts: bool) -> anyhow::Result<Outcome> {
+pub(in crate::commands) fn run(
+    at: &ServedAt,
+    store: Option<PathBuf>,
+    restarts: bool,
+) -> anyhow::Result<Outcome> {
     let store = store.unwrap_or_else(|| USUAL_STORE.into());
     let begun = begin(at, store.clone(), restarts);
     let set_up = SetUp::read(&file_beside(&store));
