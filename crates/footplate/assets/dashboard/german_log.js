@@ -49,6 +49,10 @@ const LINES = [
   // Why a train was stopped.
   [/^train (\d+) stopped: the track ahead is reserved for (.*)$/, (_, train, list) => `Zug ${train} angehalten: das Gleis voraus ist für ${trains(list)} reserviert`],
   [/^train (\d+) stopped: (.*); also stopped, because they could meet it: (.*)$/, (_, train, why, list) => `Zug ${train} angehalten: ${logInGerman(why)}; auch angehalten, weil sie ihm begegnen könnten: ${trains(list)}`],
+  [/^train (\d+) stopped: ((?:it|its|a sensor|several sensors|the stop command) .*)$/, (_, train, why) => `Zug ${train} angehalten: ${logInGerman(why)}`],
+  [/^train (\d+) is not calibrated, so its stops are uncertain: .*$/, "Zug $1 ist nicht kalibriert, daher sind seine Halte unsicher: erst `footplate calibrate` ausführen"],
+  [/^the last commands were not recorded: (.*)$/, (_, why) => `die letzten Befehle wurden nicht aufgezeichnet: ${logInGerman(why)}`],
+  [/^the reports are not of layout `(.*)`: (\d+) of (\d+) sensors cannot follow the one before: (.*); give the layout .*$/, (_, layout, times, reports, stray) => `die Meldungen sind nicht von der Anlage \`${layout}\`: ${times} von ${reports} Rückmeldern können nicht auf den vorigen folgen: ${stray.replace(/ after /g, " nach ").replace(/\bonce\b/g, "einmal").replace(/(\d+) times/g, "$1-mal").replace(/next is/g, "als Nächstes").replace(/ or /g, " oder ").replace(", and others", " und andere").replace(/sensor (\S+) is not on it/g, "Rückmelder $1 ist nicht darauf")}; die Anlage angeben, auf der aufgezeichnet wurde, oder ihre Kanten berichtigen`],
   [/^it runs slower than calibrated$/, "er fährt langsamer als kalibriert"], [/^it runs faster than calibrated$/, "er fährt schneller als kalibriert"], [/^its position is lost$/, "seine Position ist verloren"],
   [/^a sensor reported it where it cannot have run to$/, "ein Rückmelder hat ihn gemeldet, wohin er nicht gefahren sein kann"], [/^a sensor reported it at a time when .*$/, "ein Rückmelder hat ihn zu einer Zeit gemeldet, zu der er nicht dort gewesen sein kann"],
   [/^its decoder reports that it stands still$/, "sein Decoder meldet, dass er steht"],
@@ -73,6 +77,7 @@ const LINES = [
   [/^train (\d+) is in a deadlock: (.*) makes room$/, (_, train, others) => `Zug ${train} ist blockiert: ${trains(others)} macht Platz`],
   [/^train (\d+) is in a deadlock: (.*) make room$/, (_, train, others) => `Zug ${train} ist blockiert: ${trains(others)} machen Platz`],
   [/^train (\d+) moves to (\S+) to make room for train (\d+)$/, "Zug $1 fährt nach $2, um Zug $3 Platz zu machen"],
+  [/^train (\d+) moves to (\S+) first, so that .*$/, "Zug $1 fährt erst nach $2, damit die nächste Suche nach einem Weg von anderen Stellen ausgeht"],
   [/^train (\d+) has arrived after ([\d.]+) s$/, "Zug $1 ist nach $2 s angekommen"],
   [/^no train is sent onto track where train (\d+) may be$/, "kein Zug wird auf Gleis geschickt, auf dem Zug $1 sein kann"],
   [/^track power off: train (\d+) may not have stopped$/, "Fahrstrom aus: Zug $1 fährt vielleicht noch"],

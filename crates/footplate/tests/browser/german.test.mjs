@@ -91,6 +91,8 @@ const OF_LINE = [
   "not sent: step 8 for train 24: step 8 is beyond the decoder; steps are 0 to 7", "step 8 for train 24: train 24 has no address here; addresses are 1 to 80", "turnout 400 curved: turnout 400 has no address here; addresses are 1 to 256",
   "not sent: F9 on for train 24: F9 cannot be switched over this link; functions are F0 to F4", "train 24 has 126 speed steps, and this station commands 14: leave out its steps, or use another station",
   "turn around, train 24: the station has no such command", "power on: 256 commands already wait for the line; wait until some have been sent", "power off: the link is being closed; open it again to command trains", "train 24 reverse", "turnout 5 straight",
+  "train 58 stopped: its position is lost", "train 58 stopped: the stop command could not be sent", "train 24 is not calibrated, so its stops are uncertain: run `footplate calibrate` first",
+  "the last commands were not recorded: the reports are not of layout `track-a`: 12 of 63 sensors cannot follow the one before: B15 after C13 2 times (next is E7), C6 after B15 once (next is A3 or A1), and others; give the layout that was recorded with --layout, or correct its edges",
   "alarm 3 is over already", "`x` is not the number of an alarm; /api/picture lists them",
 ];
 

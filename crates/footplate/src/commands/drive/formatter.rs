@@ -209,6 +209,10 @@ impl NoticeFormatter<'_> {
                     _ => format!("train {train} is in a deadlock: {} make room", trains(&others)),
                 }
             }
+            Notice::StepsAside { train, makes_room_for, to } if train == makes_room_for => format!(
+                "train {train} moves to {} first, so that the next search for a path begins from other places",
+                self.place(*to)
+            ),
             Notice::StepsAside { train, makes_room_for, to } => {
                 format!("train {train} moves to {} to make room for train {makes_room_for}", self.place(*to))
             }
