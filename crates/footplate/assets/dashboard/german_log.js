@@ -84,6 +84,7 @@ const LINES = [
   [/^the track is clear; trains may run again$/, "das Gleis ist frei; Züge dürfen wieder fahren"],
   [/^track power on; all trains are commanded to stop$/, "Fahrstrom an; alle Züge erhalten den Haltbefehl"],
   [/^train (\d+) creeps at step (\d+) until two sensors confirm its position$/, "Zug $1 schleicht mit Stufe $2, bis zwei Rückmelder seine Position bestätigen"],
+  [/^train (\d+) was not found within (\S+) s: .*$/, "Zug $1 wurde in $2 s nicht gefunden: wenn er auf der Anlage ist, sagen, wo, zum Beispiel `place $1 at C13`"],
   [/^train (\d+) is located again$/, "Zug $1 ist wieder lokalisiert"], [/^train (\d+) is located first$/, "Zug $1 wird erst lokalisiert"],
   [/^train (\d+) resumes its command$/, "Zug $1 setzt seinen Befehl fort"],
   [/^the command of train (\d+) was cancelled; send it again$/, "der Befehl von Zug $1 wurde aufgehoben; noch einmal senden"],

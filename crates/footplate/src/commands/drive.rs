@@ -404,7 +404,11 @@ impl Arguments {
         }
         let at = runtime.link().now();
         let closing = runtime.close();
+        let wrecks = runtime.link().wrecks();
         drop(runtime);
+        for wreck in &wrecks {
+            say!("an accident on the simulated railway, at {wreck}");
+        }
         let length_warning = watch.lengths_doubted();
         if let Some(warning) = length_warning.as_ref().filter(|_| watch.warning().get().is_none()) {
             say!("{}", warning.english);
@@ -421,7 +425,7 @@ impl Arguments {
             KnownTrains::keep(store, layout, &script_runner.learnt())?;
         }
         match ending {
-            Ended::Finished if script_runner.fell_short() => Ok(Outcome::FallsShort),
+            Ended::Finished if script_runner.fell_short() || !wrecks.is_empty() => Ok(Outcome::FallsShort),
             Ended::Finished => match unwritten {
                 Some(error) => Err(error.into()),
                 None => Ok(LengthWarning::outcome(length_warning.as_ref())),

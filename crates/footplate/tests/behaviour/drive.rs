@@ -39,7 +39,7 @@ where
 stop 24 at C13+120mm
 stop 24 at E7+200mm at step 9
 move 24 60mm
-stop 24 at C13+120mm not-beyond 5%
+stop 24 at C13+400mm not-beyond 5%     # off the points before C13
 reverse 24
 stop 24 at C14+100mm
 ";
@@ -100,6 +100,24 @@ fn what_was_learnt_is_kept_in_the_store_and_known_the_next_time() {
             - line["promised_low_mm"].as_f64().expect("a number")
     };
     assert!(width(&again) < width(&first), "{} against {}", width(&again), width(&first));
+}
+
+#[test]
+fn a_speed_may_meet_an_unlocated_train_and_an_order_locates_it_first() {
+    let drive = |name: &str, order: &str| {
+        let script = format!("turnout all straight\n{order}\nwait 40s\nstop 24\nwait 24 at rest\n");
+        drive(name, "sim:track-a?seed=4", &script, &["--train", "24", "--train", "58"])
+    };
+    let accident = "an accident on the simulated railway, at 18.5 s: train 24 ran into train 58";
+    let warning = "train 24 cannot be kept clear of train 58, whose position is unknown";
+    let ran = drive("at-a-speed", "speed 24 9");
+    let said = ran.output.clone() + &ran.errors;
+    assert_eq!(ran.status, 1, "{said}");
+    assert!(said.contains(warning) && said.contains(accident), "{said}");
+    let ran = drive("held", "hold 24 250mm/s");
+    let said = ran.output.clone() + &ran.errors;
+    assert!(said.contains("train 58 is located first"), "{said}");
+    assert!(!said.contains("accident") && !said.contains(warning), "{said}");
 }
 
 #[test]

@@ -4,6 +4,7 @@
 mod outcomes;
 mod queue;
 mod schedules;
+mod unlocated;
 mod waiting;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -78,8 +79,10 @@ pub(crate) struct ScriptRunner {
     functions: BTreeMap<TrainId, u32>,
     /// The last stop of each train.
     rests: BTreeMap<TrainId, Finished>,
-    /// Trains that were located because another one is to be sent.
+    /// Trains that were searched for because another one is to be sent.
     sought: BTreeSet<TrainId>,
+    /// Trains that others were said not to be kept clear of.
+    warned: BTreeSet<TrainId>,
     /// What was last said of each train in a deadlock.
     deadlocks: BTreeMap<TrainId, String>,
     outputs: VecDeque<Output<SessionMessage>>,
@@ -113,6 +116,7 @@ impl ScriptRunner {
             functions: BTreeMap::new(),
             rests: BTreeMap::new(),
             sought: BTreeSet::new(),
+            warned: BTreeSet::new(),
             deadlocks: BTreeMap::new(),
             outputs: VecDeque::new(),
             began: None,
@@ -249,8 +253,10 @@ impl ScriptRunner {
             self.take_over(train);
         }
         match step.instruction {
+            Instruction::Order(order) if self.locates_before(now, &step, &order) => {}
             Instruction::Order(order) => match self.give_order(now, order) {
                 Ok(id) => {
+                    self.warn_of_unlocated(now, &step, &order);
                     if let (Order::Stop(_) | Order::Move { .. } | Order::Arrive { .. }, Some(train)) =
                         (order, order.train())
                     {
@@ -450,7 +456,7 @@ impl Machine for ScriptRunner {
         let ends = |wait: Wait| match wait.until {
             Until::Passed(span) => wait.since + span,
             Until::AtRest(_) => self.last_event + CHECK_INTERVAL,
-            Until::At(..) | Until::Located(_) => wait.since + self.wait_limit,
+            Until::At(..) | Until::Located(_) => wait.since + self.limit_of(&wait),
         };
         let waited_for = self.queues.iter().filter_map(|(_, queue)| queue.wait.map(ends)).min();
         let learns = self.learning.is_refitting().then(|| self.last_event + FIT_INTERVAL);

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use footplate_core::track::{Landmark, Layout, Position};
 use footplate_core::{EdgeId, Length, TrainId};
+use footplate_sim::{Incident, IncidentKind};
 use serde::Serialize;
 
 use super::session_message::{Ended, SessionMessage, Target};
@@ -48,6 +49,9 @@ pub(super) trait GroundTruth {
 
     /// How far beyond a place the train's pickup is, counted from where the sensor detects it.
     fn beyond(&self, layout: &Layout, train: TrainId, target: Target) -> Option<Length>;
+
+    /// What happened to trains that must not: those that touched, derailed or ran off the track, a line each.
+    fn wrecks(&self) -> Vec<String>;
 }
 
 /// A position as a place: a sensor behind it, and the distance past it. `under` are edges that the train came along.
@@ -103,6 +107,15 @@ impl GroundTruth for SimulatedLink<'_> {
         let sensor = layout.sensor_at(place.node)?;
         Some(self.station().world().truth().past(train, sensor)? - place.offset)
     }
+
+    fn wrecks(&self) -> Vec<String> {
+        let wrecked = |incident: &&Incident| match (incident.kind, incident.train) {
+            // Each of the two trains has an entry.
+            (IncidentKind::Collision { with }, Some(train)) => train < with,
+            (_, train) => train.is_some(),
+        };
+        self.station().world().incidents().iter().filter(wrecked).map(ToString::to_string).collect()
+    }
 }
 
 impl<L: Link + GroundTruth> GroundTruth for ObservedLink<L> {
@@ -117,6 +130,10 @@ impl<L: Link + GroundTruth> GroundTruth for ObservedLink<L> {
     fn beyond(&self, layout: &Layout, train: TrainId, target: Target) -> Option<Length> {
         self.inner().beyond(layout, train, target)
     }
+
+    fn wrecks(&self) -> Vec<String> {
+        self.inner().wrecks()
+    }
 }
 
 impl GroundTruth for Box<dyn Link + '_> {
@@ -130,6 +147,10 @@ impl GroundTruth for Box<dyn Link + '_> {
 
     fn beyond(&self, _: &Layout, _: TrainId, _: Target) -> Option<Length> {
         None
+    }
+
+    fn wrecks(&self) -> Vec<String> {
+        Vec::new()
     }
 }
 

@@ -112,6 +112,7 @@ impl ScriptRunner {
     /// Takes a line of an operator. It ends a wait, and a search if it is for the train that is searched for. What stops a train waits
     /// for nothing.
     pub(super) fn hear(&mut self, now: Timestamp, step: Step) {
+        let is_at_once = step.instruction.is_at_once() && !self.waits_for_others(now, &step.instruction);
         let Some(session) = self.queues.get_mut(QueueId::SESSION) else { return };
         let train = step.instruction.driven();
         let searched = session.wait.filter(|wait| wait.is_part).and_then(|wait| wait.until.train());
@@ -122,7 +123,7 @@ impl ScriptRunner {
         }
         if is_stop {
             self.carry_out(now, step);
-        } else if searched.is_some() && searched != train && step.instruction.is_at_once() {
+        } else if searched.is_some() && searched != train && is_at_once {
             // Not searched for in its turn: that would wait behind this search.
             self.carry_out(now, Step { is_retry: true, ..step });
         } else {
@@ -187,6 +188,16 @@ impl ScriptRunner {
             self.say(format!(
                 "train {train} has no command that would bring it to rest; the script goes \
                               on"
+            ));
+            return true;
+        } else if let Some(train) = self.searched_by(&wait)
+            && now - wait.since >= self.limit_of(&wait)
+        {
+            end(&mut self.queues);
+            self.say(format!(
+                "train {train} was not found within {:.0} s: if it is on the track, enter where it is, for example \
+                 `place {train} at C13`",
+                self.limit_of(&wait).as_s()
             ));
             return true;
         } else if !matches!(wait.until, Until::Passed(_)) && now - wait.since >= self.wait_limit {
