@@ -4,7 +4,7 @@
 #   ./ci.sh               every step below, in this order
 #   ./ci.sh lint test     only these
 #
-#   lint         formatting, and clippy without a warning
+#   lint         formatting, clippy without a warning, and subjects of new commits that fit in a line
 #   test         unit, behaviour, property and documentation tests
 #   bare-metal   core and wire link into a program that has no std
 #   docs         rustdoc without a warning; every relative link in the documentation leads somewhere
@@ -38,6 +38,7 @@ export PATH="${CARGO_HOME:-${HOME:-}/.cargo}/bin:$PATH"
 readonly ALL_STEPS=(lint test bare-metal docs examples scenarios browser stations fuzz)
 readonly EXPECTED_EXAMPLES=testdata/examples
 readonly TABLES=docs/tables
+readonly LONGEST_SUBJECT=72 # as CONTRIBUTING.md asks: `git log --oneline` on 80 columns
 readonly TARGET="${CARGO_TARGET_DIR:-$PWD/target}"
 
 if [[ -z ${FOOTPLATE_DATA:-} && -d ../shared/data ]]; then
@@ -74,8 +75,23 @@ need_nextest() {
 
 step_lint() {
   need_compiler
+  check_subjects
   cargo fmt --check
   cargo clippy --workspace --all-targets --quiet -- -D warnings
+}
+
+# The commits since the last tag, or since the branch left main.
+check_subjects() {
+  local LC_ALL=C.UTF-8 since subject status=0
+  since="$(git describe --tags --abbrev=0 2>/dev/null || git merge-base HEAD origin/main 2>/dev/null ||
+    git merge-base HEAD main 2>/dev/null)" || return 0 # a source archive, or a clone without history
+  while IFS= read -r subject; do
+    if ((${#subject} > LONGEST_SUBJECT)); then
+      echo "ci.sh: a commit subject of ${#subject} characters, at most $LONGEST_SUBJECT (CONTRIBUTING.md): $subject" >&2
+      status=1
+    fi
+  done < <(git log --no-merges --format=%s "$since..HEAD")
+  return "$status"
 }
 
 # Property tests draw the same cases every time here, so that what was green stays green; at home they draw others.
