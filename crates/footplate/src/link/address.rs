@@ -19,23 +19,20 @@ use super::can_address::{self, CanAddress};
 use super::jmri_address::{self, JmriAddress};
 use super::loconet_address::{self, LocoNetAddress};
 use super::named_train::{NamedTrain, decoder_of, trains};
-use super::port::Port;
+use super::parameters::{number, pair, times};
+use super::serial_address::{SERIAL, SerialAddress};
 use super::station_kind::StationKind;
 use super::z21_address::{QUIRKS, Z21Address, set_quirk};
 
 const SIMULATED: &str = "sim:";
-const SERIAL: &str = "marklin-serial:";
 const BOARD: &str = "dcc-ex:";
 const Z21: &str = "z21:";
 const CAN: &str = "marklin-can:";
 const LOCONET: &str = "loconet:";
 const JMRI: &str = "jmri:";
-/// The port that a served simulated 6051 is written with in examples.
-const EXAMPLE_PORT: u16 = 2400;
 
 /// The trains of the course's track that its reports are about.
 const TRAINS: [TrainId; 2] = [TrainId(24), TrainId(58)];
-const FASTEST: f64 = 1e6;
 
 /// Which station is meant.
 #[derive(Debug, Clone, PartialEq)]
@@ -171,30 +168,6 @@ pub(crate) enum Speed {
     Times(f64),
 }
 
-/// A 6050 or 6051.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct SerialAddress {
-    /// Where it is.
-    pub(crate) port: Port,
-    /// The pace without its hand-shake line; if left out, the hand-shake line sets it where there is one.
-    pub(crate) pace: Option<PaceChoice>,
-    /// Whether to use its hand-shake line; if left out, where it can be read.
-    pub(crate) cts: Option<bool>,
-    /// S88 modules on its bus; if left out, as many as the layout's sensors need.
-    pub(crate) modules: Option<u8>,
-    /// How many times faster than real time it runs; 1 for a real station.
-    pub(crate) speed: f64,
-}
-
-/// The gaps that are left without a hand-shake.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum PaceChoice {
-    /// Long gaps, which suit every interface.
-    Careful,
-    /// Short gaps, for a fast interface or adapter.
-    Fast,
-}
-
 impl FromStr for Address {
     type Err = String;
 
@@ -239,22 +212,6 @@ impl FromStr for Address {
             ))
         }
     }
-}
-
-fn pair(text: &str) -> Result<(&str, &str), String> {
-    text.split_once('=').ok_or_else(|| format!("`{text}` has no value; write {text}=…"))
-}
-
-pub(super) fn number<N: FromStr>(key: &str, value: &str, example: &str) -> Result<N, String> {
-    value.parse().map_err(|_| format!("`{value}` is no {key}; write {key}={example}"))
-}
-
-pub(super) fn times(value: &str) -> Result<f64, String> {
-    let times: f64 = number("speed", value, "20")?;
-    let runs = times > 0.0 && times <= FASTEST;
-    runs.then_some(times).ok_or_else(|| {
-        format!("speed {value} is not between 0 and {FASTEST}; write speed=20 for twenty times real time")
-    })
 }
 
 impl SimulatedAddress {
@@ -367,38 +324,10 @@ pub(crate) fn physics_named(value: &str) -> Result<PhysicsRange, String> {
     PhysicsRange::named(value).ok_or_else(|| format!("there is no world `{value}`; there are {}", names()))
 }
 
-impl SerialAddress {
-    fn of(port: &str) -> Result<Self, String> {
-        let port = Port::named(SERIAL, port, "/dev/ttyUSB0", EXAMPLE_PORT)?;
-        Ok(Self { port, pace: None, cts: None, modules: None, speed: 1.0 })
-    }
-
-    fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
-        match (key, value) {
-            ("pace", "careful") => self.pace = Some(PaceChoice::Careful),
-            ("pace", "fast") => self.pace = Some(PaceChoice::Fast),
-            ("pace", _) => return Err(format!("`{value}` is not a pace: use pace=careful or pace=fast")),
-            ("cts", "yes") => self.cts = Some(true),
-            ("cts", "no") => self.cts = Some(false),
-            ("cts", _) => return Err(format!("`{value}` is not a value of cts: use cts=yes or cts=no")),
-            ("modules", _) => {
-                let modules: u8 = number(key, value, "5")?;
-                if !(1..=31).contains(&modules) {
-                    return Err(format!("{modules} sensor modules; the bus has 1 to 31"));
-                }
-                self.modules = Some(modules);
-            }
-            ("speed", _) => self.speed = times(value)?,
-            _ => {
-                return Err(format!("a serial link has no `{key}`; it has pace, cts, modules and speed"));
-            }
-        }
-        Ok(())
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::port::Port;
+    use super::super::serial_address::PaceChoice;
     use super::*;
 
     fn refused(text: &str) -> String {

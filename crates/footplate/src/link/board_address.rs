@@ -3,7 +3,7 @@
 
 use footplate_wire::dcc_ex::{Settings, TurnoutRequests};
 
-use super::address::{number, times};
+use super::parameters::{number, times};
 use super::port::Port;
 
 /// The port at which a board with a network connection listens.

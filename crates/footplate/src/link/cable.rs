@@ -11,14 +11,15 @@ use std::time::Duration;
 use footplate_core::{TimeSpan, Timestamp};
 use serialport::StopBits;
 
-use super::address::SerialAddress;
 use super::board_address::BoardAddress;
+use super::cable_end::{Arrival, CableEnd};
 use super::can_address::{CanAddress, CanPlace};
 use super::datagrams::{Correspondent, exchange_datagrams};
 use super::jmri_address::JmriAddress;
 use super::line::PERSON_MS;
 use super::loconet_address::LocoNetAddress;
 use super::port::Port;
+use super::serial_address::SerialAddress;
 use super::stream::{SerialFormat, connect, open_device};
 use super::web_socket::connect_socket;
 use super::z21_address::Z21Address;
@@ -103,25 +104,6 @@ impl From<&JmriAddress> for Cable {
         let JmriAddress { host, port, speed, .. } = address.clone();
         Self { place: Place::WebSocket { host, port }, speed, has_answers: true }
     }
-}
-
-/// This computer's end of an open cable.
-pub(crate) struct CableEnd {
-    /// Where bytes are put on the line; with datagrams, each call of `write` sends one. Dropped, it closes the line.
-    pub(crate) writer: Box<dyn Write + Send>,
-    /// Whether the station's hand-shake line is up; `None` where there is none that could be read.
-    pub(crate) cts: Option<bool>,
-}
-
-/// What arrives over a cable.
-#[derive(Debug, Clone, Copy)]
-pub(crate) enum Arrival<'a> {
-    /// Bytes from the station: one whole datagram, where it sends datagrams.
-    Bytes(&'a [u8]),
-    /// The hand-shake line is up or down now.
-    Cts(bool),
-    /// The line is gone; why.
-    Lost(&'a str),
 }
 
 impl Cable {

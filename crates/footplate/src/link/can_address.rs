@@ -6,7 +6,7 @@ use footplate_core::{Ratio, TimeSpan};
 use footplate_sim::CanSwitches;
 use footplate_wire::marklin_can::{AccessoryProtocol, LocomotiveProtocol, Settings, Transport, Uid};
 
-use super::address::{number, times};
+use super::parameters::{number, times};
 use super::port::{Port, host_and_port};
 
 const SCHEME: &str = "marklin-can:";

@@ -11,7 +11,7 @@ use std::time::Duration;
 use footplate_wire::z21::LONGEST_DATAGRAM;
 
 use super::Lost;
-use super::cable::{Arrival, CableEnd};
+use super::cable_end::{Arrival, CableEnd};
 
 /// How soon the reading thread notices that its line is closed; so long at most a port is not free yet.
 const NOTICES_EVERY: Duration = Duration::from_millis(50);

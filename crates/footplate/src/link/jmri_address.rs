@@ -4,8 +4,8 @@
 use footplate_sim::JmriSwitches;
 use footplate_wire::jmri::Settings;
 
-use super::address::{number, times};
 use super::loconet_address::{is_closed_straight, sensor_delay};
+use super::parameters::{number, times};
 use super::port::host_and_port;
 
 const SCHEME: &str = "jmri:";

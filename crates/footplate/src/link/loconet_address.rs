@@ -5,7 +5,7 @@ use footplate_core::{Ratio, TimeSpan};
 use footplate_sim::LocoNetSwitches;
 use footplate_wire::loconet::Settings;
 
-use super::address::{number, times};
+use super::parameters::{number, times};
 use super::port::{Port, host_and_port};
 
 const SCHEME: &str = "loconet:";

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`; board_address  port
-//! can_address  jmri_address  loconet_address  z21_address   a station on Märklin's CAN bus; JMRI; a LocoNet server; a Z21
+//! can_address  jmri_address  loconet_address  serial_address  z21_address   a station on Märklin's CAN bus; JMRI; a LocoNet server; a 6051; a Z21
+//! parameters  what follows the `?` of an address
 //! named_train  station_kind   a train by its address; which addresses and decoders a station commands
 //! station_session   the session of any station, as one type
 //! line        what every link can do, and what is heard of it
@@ -15,13 +16,14 @@
 //! tapped      any of them, with every byte noted
 //! rhythm      what bytes tell of how often sensors are asked for
 //! observed    any of them, with its times counted while it is used
-//! cable       a line outside this process, read by a thread, with the clock of this computer
+//! cable       a line outside this process, read by a thread, with the clock of this computer; cable_end  our end of it
 //! stream  datagrams  web_socket   how it is opened: a serial port or a connection; a station behind UDP; JMRI
 //! ```
 
 mod address;
 mod board_address;
 mod cable;
+mod cable_end;
 mod can_address;
 mod datagrams;
 mod discovery;
@@ -32,8 +34,10 @@ mod measured;
 mod named_train;
 mod observed;
 mod open;
+mod parameters;
 mod port;
 mod rhythm;
+mod serial_address;
 mod served;
 mod simulated;
 mod simulated_station;
@@ -46,7 +50,8 @@ mod web_socket;
 mod z21_address;
 
 pub(crate) use address::{Address, Quirks, SimulatedAddress, Speed, law_named, quirks};
-pub(crate) use cable::{Arrival, Cable, CableLink};
+pub(crate) use cable::{Cable, CableLink};
+pub(crate) use cable_end::Arrival;
 pub(crate) use discovery::find_stations;
 pub(crate) use line::{Bequest, Guardian, Heard, Link, Lost, PERSON_MS};
 pub(crate) use measured::MeasuredLine;

@@ -5,7 +5,7 @@ use std::str::FromStr;
 use footplate_core::{DecoderSteps, TrainId};
 use footplate_wire::marklin_can::LocomotiveProtocol;
 
-use super::address::number;
+use super::parameters::number;
 
 /// Reads the steps of a decoder.
 pub(crate) fn decoder_of(value: &str) -> Result<DecoderSteps, String> {

@@ -6,8 +6,9 @@ use footplate_sim::living::{LivingLayout, LivingSwitches, StationSwitches};
 use footplate_wire::marklin_serial::{INPUTS_PER_MODULE, Interface, Pace, Settings};
 use footplate_wire::{dcc_ex, jmri, loconet, marklin_can, z21};
 
-use super::address::{Address, PaceChoice, SerialAddress, SimulatedAddress, Speed};
+use super::address::{Address, SimulatedAddress, Speed};
 use super::can_address::CanAddress;
+use super::serial_address::{PaceChoice, SerialAddress};
 use super::station_kind::StationKind;
 use super::{Cable, CableLink, Link, Lost, SimulatedLink, SimulatedStation, StationSession};
 #[cfg(unix)]

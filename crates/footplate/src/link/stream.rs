@@ -8,7 +8,7 @@ use std::time::Duration;
 use serialport::{DataBits, FlowControl, Parity, SerialPort, StopBits};
 
 use super::Lost;
-use super::cable::{Arrival, CableEnd};
+use super::cable_end::{Arrival, CableEnd};
 
 /// How often the hand-shake line is looked at: it is down for a millisecond or so after each byte.
 const CTS_EVERY: Duration = Duration::from_micros(500);

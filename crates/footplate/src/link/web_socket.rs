@@ -10,7 +10,7 @@ use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Message, WebSocket, accept_with_config, client::client_with_config};
 
 use super::Lost;
-use super::cable::{Arrival, CableEnd};
+use super::cable_end::{Arrival, CableEnd};
 use super::served::Incoming;
 use super::stream::dial;
 

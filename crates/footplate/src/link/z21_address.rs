@@ -5,8 +5,8 @@ use footplate_core::{Ratio, TimeSpan};
 use footplate_sim::{SpeedReports, Z21Switches};
 use footplate_wire::z21::{Feedback, Settings};
 
-use super::address::{number, times};
 use super::named_train::decoder_of;
+use super::parameters::{number, times};
 use super::port::host_and_port;
 
 /// The port at which stations listen.
