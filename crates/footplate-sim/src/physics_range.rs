@@ -32,7 +32,7 @@ pub enum PhysicsRange {
     Interface,
     /// A second train model with other equations: see [`ElectricEngine`].
     SecondModel,
-    /// All of these; every other world has the second train model.
+    /// All of these but the momentum of decoders, which is a law of its own; every other world has the second train model.
     All,
 }
 
