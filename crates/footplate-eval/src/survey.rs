@@ -34,8 +34,8 @@ pub fn score(
     let bare = without_lengths(layout, known, &truth)?;
     let prepared = PreparedTrains::prepare_on(layout, &bare, seed, &trains, &switches, budget)?;
     let sections = SectionIndex::of(&bare);
-    let models: Vec<_> = trains.iter().filter_map(|train| prepared.models.get(train)).collect();
-    let survey = TrackSurvey::of(&bare, &sections, &models).ok_or_else(|| anyhow!("no train ran"))?;
+    let fits: Vec<_> = trains.iter().filter_map(|train| prepared.fits.get(train)).collect();
+    let survey = TrackSurvey::of(&bare, &sections, &fits).ok_or_else(|| anyhow!("no train ran"))?;
     let mut surveyed = Surveyed {
         seed,
         distances: Vec::new(),

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use footplate_core::link::{PollTiming, PollTimingEstimator};
 use footplate_core::model::report::{Review, RunPassages};
-use footplate_core::model::survey::SectionIndex;
+use footplate_core::model::survey::{LayoutTest, SectionIndex, SurveyTest};
 use footplate_core::track::Layout;
 use footplate_core::{
     DecoderSteps, Estimate, Event, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId,
@@ -34,6 +34,13 @@ pub struct BatchRun {
     pub step: SpeedStep,
     /// Its events in order.
     pub events: Vec<BatchEvent>,
+}
+
+impl BatchRun {
+    /// Its events less those that a person has excluded.
+    fn accepted(&self) -> impl Iterator<Item = &Event> {
+        self.events.iter().filter(|event| !event.excluded).map(|event| &event.event)
+    }
 }
 
 /// An event and where it stands.
@@ -80,6 +87,8 @@ pub struct Batch {
     pub polling: Vec<Polling>,
     /// The stretches by which lengths are kept.
     pub sections: SectionIndex,
+    /// Whether the runs are of the layout.
+    pub layout_test: LayoutTest,
     /// The trains, by number.
     pub trains: Vec<BatchTrain>,
     /// Runs of live sessions in which several trains moved, whose contacts nobody has distinguished.
@@ -236,6 +245,11 @@ impl Batch {
 
     fn of_runs(layout: &Layout, runs: Vec<BatchRun>, left_out: Vec<LeftOut>) -> Result<Self, BatchError> {
         let sections = SectionIndex::of(layout);
+        let mut layout_test = LayoutTest::default();
+        for run in &runs {
+            layout_test.take_run(layout, &sections, 1, run.accepted());
+        }
+        let lengths = layout_test.lengths(&sections);
         let (mut polling, mut rhythms) = (Vec::new(), Vec::new());
         let mut passages: Vec<RunPassages> = Vec::new();
         for recording in runs.chunk_by(|one, next| one.recording == next.recording) {
@@ -260,11 +274,19 @@ impl Batch {
         numbers.sort_unstable();
         numbers.dedup();
         let trains = numbers.into_iter().map(|train| {
-            let replay = replayed(layout, &sections, train, &runs, &rhythms);
+            let replay = replayed(layout, &sections, train, &runs, &rhythms, &lengths);
             let review = Review::of(layout, &sections, replay.fit.model(), &passages);
             BatchTrain { replay, review }
         });
-        Ok(Self { trains: trains.collect(), runs, passages, polling, sections, left_out })
+        Ok(Self { trains: trains.collect(), runs, passages, polling, sections, layout_test, left_out })
+    }
+
+    /// What the lengths of the layout are worth after the runs: as all of them show it, or else the first train to contradict
+    /// them.
+    #[must_use]
+    pub fn survey_test(&self) -> SurveyTest {
+        let mut of_trains = self.trains.iter().map(|train| train.replay.fit.survey_test());
+        of_trains.find(|test| !test.is_passed()).cloned().unwrap_or_default()
     }
 
     /// The event that a review means by run and entry.
@@ -280,6 +302,7 @@ fn replayed(
     train: TrainId,
     runs: &[BatchRun],
     rhythms: &[PollTimingEstimator],
+    lengths: &SurveyTest,
 ) -> MotionReplay {
     let own = || runs.iter().zip(rhythms).filter(|(run, _)| run.train == train);
     let mut replay = MotionReplay::empty(train, highest(own().map(|(run, _)| run)));
@@ -290,10 +313,9 @@ fn replayed(
             step: run.step,
             began_at: run.began_at,
         };
-        let accepted = run.events.iter().filter(|event| !event.excluded).map(|event| &event.event);
-        replay.take_run(layout, sections, begin, accepted, rhythm);
+        replay.take_run(layout, sections, begin, run.accepted(), rhythm);
     }
-    replay.end(sections);
+    replay.end(sections, lengths);
     replay
 }
 

@@ -15,7 +15,7 @@ use fingerprint::Fingerprint;
 use footplate_core::link::PollTimingEstimator;
 use footplate_core::model::MotionFit;
 use footplate_core::model::StepUse;
-use footplate_core::model::survey::SectionIndex;
+use footplate_core::model::survey::{LayoutTest, SectionIndex, SurveyTest};
 use footplate_core::track::{Layout, Leg, TurnoutStates};
 use footplate_core::{Approach, Event, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use run_reader::RunReader;
@@ -96,7 +96,7 @@ impl MotionReplay {
         if !replay.is_empty() && gone < runs.len() {
             replay.keep(store, layout, fingerprint);
         }
-        replay.end(&sections);
+        replay.end(&sections, &lengths_of(layout, &sections, &runs));
         Ok(replay)
     }
 
@@ -114,10 +114,11 @@ impl MotionReplay {
     ) -> Result<Self, StoreError> {
         let mut replay = Self::beginning(train, highest, profile);
         let sections = SectionIndex::of(layout);
-        for stored in Self::stored_runs(layout, store, as_of)? {
-            replay.take_stored(layout, &sections, &stored);
+        let runs = Self::stored_runs(layout, store, as_of)?;
+        for stored in &runs {
+            replay.take_stored(layout, &sections, stored);
         }
-        replay.end(&sections);
+        replay.end(&sections, &lengths_of(layout, &sections, &runs));
         Ok(replay)
     }
 
@@ -145,9 +146,18 @@ impl MotionReplay {
         Ok(runs)
     }
 
-    /// Fits to all that was taken in.
-    pub(crate) fn end(&mut self, sections: &SectionIndex) {
+    /// Fits to all that was taken in, and believes the lengths of the layout no more than a test of them allows: by the times from
+    /// sensor to sensor, or by the path lengths of the train where those tell nothing.
+    pub(crate) fn end(&mut self, sections: &SectionIndex, lengths: &SurveyTest) {
+        self.fit.doubt(lengths.clone());
         self.fit.refit(sections);
+        if lengths.is_passed() {
+            let own = SurveyTest::of(sections, self.fit.model().sections());
+            if !own.is_passed() {
+                self.fit.doubt(own);
+                self.fit.refit(sections);
+            }
+        }
         self.note_steps();
     }
 
@@ -283,6 +293,15 @@ struct StoredReplayRun {
     is_live: bool,
     run: Run,
     rhythm: PollTimingEstimator,
+}
+
+/// How the lengths of a layout compare with the times from sensor to sensor in some runs.
+fn lengths_of(layout: &Layout, sections: &SectionIndex, runs: &[StoredReplayRun]) -> SurveyTest {
+    let mut test = LayoutTest::default();
+    for StoredReplayRun { run, .. } in runs {
+        test.take_run(layout, sections, run.moving().len(), run.events.iter().map(|raw| &raw.event));
+    }
+    test.lengths(sections)
 }
 
 /// How a run begins.

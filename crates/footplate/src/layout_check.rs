@@ -7,7 +7,7 @@ use anyhow::bail;
 use footplate_core::model::survey::{LayoutTest, SectionIndex, SurveyTest};
 use footplate_core::track::{HopId, Layout, SequenceVerdict, StrayReport};
 use footplate_core::{Event, EventKind, Length, SensorId};
-use footplate_store::{BUILT_IN, Direction, Run, built_in};
+use footplate_store::{BUILT_IN, Batch, Direction, Run, built_in};
 
 use crate::commands::Outcome;
 use crate::runtime::Recorder;
@@ -49,6 +49,11 @@ pub(crate) struct LengthWarning {
 }
 
 impl LengthWarning {
+    /// Whether it may be another layout.
+    pub(crate) const fn is_serious(&self) -> bool {
+        self.is_serious
+    }
+
     /// What a command comes to that has this warning, or none.
     pub(crate) fn outcome(warning: Option<&Self>) -> Outcome {
         if warning.is_some_and(|warning| warning.is_serious) { Outcome::FallsShort } else { Outcome::Done }
@@ -69,6 +74,21 @@ pub(crate) fn check_runs<'r>(
     Ok(lengths_doubted(layout, &sections, &lengths))
 }
 
+/// Checks what a model is made of against its layout: recordings of a store as well as files.
+///
+/// # Errors
+/// As for [`check_runs`], but for the unit of time.
+pub(crate) fn check_batch(layout: &Layout, batch: &Batch) -> anyhow::Result<Option<LengthWarning>> {
+    let lengths = batch.survey_test();
+    refuse_another_layout(layout, &batch.sections, &batch.layout_test.sequence(), &lengths)?;
+    Ok(lengths_doubted(layout, &batch.sections, &lengths))
+}
+
+/// What a person has to know of the lengths that trains were measured with.
+pub(crate) fn lengths_warning(layout: &Layout, lengths: &SurveyTest) -> Option<LengthWarning> {
+    lengths_doubted(layout, &SectionIndex::of(layout), lengths)
+}
+
 /// How the lengths of a layout compare with its runs.
 fn tested<'r>(
     layout: &Layout,
@@ -79,19 +99,30 @@ fn tested<'r>(
     let mut speeds = Vec::new();
     for run in runs {
         speeds.extend(mean_speeds(layout, run));
-        test.begin_run(run.moving().len());
-        for raw in &run.events {
-            test.take(layout, sections, &raw.event);
-        }
+        test.take_run(layout, sections, run.moving().len(), run.events.iter().map(|raw| &raw.event));
     }
-    if let Some(contradiction) = order_contradicts(layout, &test.sequence()) {
+    let (order, lengths) = (test.sequence(), test.lengths(sections));
+    // Times in another unit make no lengths of another layout.
+    if let Some(contradiction) = speeds_contradict(layout, speeds)
+        && order == SequenceVerdict::Fits
+    {
         bail!(contradiction);
     }
-    if let Some(contradiction) = speeds_contradict(layout, speeds) {
+    refuse_another_layout(layout, sections, &order, &lengths)?;
+    Ok(lengths)
+}
+
+/// Fails if sensors follow each other that no rails join, or if lengths are those of another built-in layout.
+fn refuse_another_layout(
+    layout: &Layout,
+    sections: &SectionIndex,
+    order: &SequenceVerdict,
+    lengths: &SurveyTest,
+) -> anyhow::Result<()> {
+    if let Some(contradiction) = order_contradicts(layout, order) {
         bail!(contradiction);
     }
-    let lengths = test.lengths(sections);
-    let odd = odd_hops(layout, sections, &lengths);
+    let odd = odd_hops(layout, sections, lengths);
     if let Some(other) = layout_with(layout, &odd) {
         let [said, ..] = lengths_said(layout, &odd);
         bail!(
@@ -99,7 +130,7 @@ fn tested<'r>(
             layout.name()
         );
     }
-    Ok(lengths)
+    Ok(())
 }
 
 /// The mean speeds of a run between neighbouring sensors, in mm/s; none on a layout with unknown lengths.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use anyhow::Context;
 use footplate_core::control::{Driver, Machine};
-use footplate_core::model::MotionModel;
+use footplate_core::model::{MotionFit, MotionModel};
 use footplate_core::track::{Layout, Leg, Position, TurnoutStates};
 use footplate_core::tracking::PathPoint;
 use footplate_core::{Approach, Length, NodeId, SpeedStep, TimeSpan, Timestamp, TrainId};
@@ -27,6 +27,8 @@ pub struct PreparedTrains<'l> {
     pub line: VirtualLine<'l>,
     /// The calibrated models.
     pub models: BTreeMap<TrainId, MotionModel>,
+    /// The fits that the models are of.
+    pub fits: BTreeMap<TrainId, MotionFit>,
     /// The turnout positions: all straight at first.
     pub turnouts: TurnoutStates,
     /// Where trains were put.
@@ -90,29 +92,31 @@ impl<'l> PreparedTrains<'l> {
             .collect();
         trains.iter().for_each(|train| station.world_mut().lift(*train));
         let mut line = VirtualLine::open(station)?;
-        let mut models = BTreeMap::new();
+        let (mut models, mut fits) = (BTreeMap::new(), BTreeMap::new());
         for (nth, train) in trains.iter().enumerate() {
             // The route ahead of a train is unknown at first. If it runs off the track, it starts again from another
             // train's place.
             let starts = starts_at.iter().cycle().skip(nth).take(trains.len()).flatten();
-            let mut model = None;
+            let mut calibrated = None;
             for (position, leads) in starts {
                 let faults = line.station.world().incidents().len();
                 line.station.world_mut().place(*train, *position, *leads)?;
-                model = Some(calibrate(assumed, &mut line, *train, budget).model);
+                calibrated = Some(calibrate(assumed, &mut line, *train, budget));
                 line.station.world_mut().lift(*train);
                 if line.station.world().incidents().len() == faults {
                     break;
                 }
             }
-            models.insert(*train, model.with_context(|| format!("there is no room for train {train}"))?);
+            let calibrated = calibrated.with_context(|| format!("there is no room for train {train}"))?;
+            models.insert(*train, calibrated.model);
+            fits.insert(*train, calibrated.fit);
         }
         let mut turnouts = TurnoutStates::unknown();
         for (turnout, _) in layout.turnouts() {
             line.station.world_mut().lay(turnout, Leg::Straight);
             turnouts.set(turnout, Leg::Straight);
         }
-        let mut prepared = Self { layout, line, models, turnouts, places: BTreeMap::new() };
+        let mut prepared = Self { layout, line, models, fits, turnouts, places: BTreeMap::new() };
         prepared.drain_commands();
         Ok(prepared)
     }

@@ -38,3 +38,4 @@ mod tachometer_recordings;
 mod tachometer_round_trip;
 mod trains_and_lines;
 mod vehicle_files;
+mod wrong_lengths;

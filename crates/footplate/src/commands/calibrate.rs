@@ -15,9 +15,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::{Args, ValueEnum};
+use footplate_core::model::MotionModel;
 use footplate_core::track::Layout;
 use footplate_core::{TimeSpan, TrainId};
-use footplate_store::{Batch, Findings, Import, Recording, Store, layout_named};
+use footplate_store::{
+    Batch, BatchTrain, Findings, Import, LeftOut, Recording, Store, StoredModel, layout_named,
+};
 
 use super::Outcome;
 use super::left_running::stop_left_running;
@@ -25,8 +28,9 @@ use super::log_file::LogFile;
 use super::output_files::check_outputs;
 use super::plot::PictureFile;
 use crate::clock::{LATEST, Moment, now};
+use crate::counted::counted;
 use crate::dashboard::ServedAt;
-use crate::layout_check::{LengthWarning, check_runs};
+use crate::layout_check::{LengthWarning, check_batch, check_runs};
 use crate::link::{Address, NamedTrain};
 use crate::standard_error::say;
 pub(super) use explain::Question;
@@ -34,6 +38,9 @@ pub(crate) use live::CalibrationBeginning;
 pub(super) use live::calibration_line;
 use measured_by_hand::Given;
 pub(super) use picture::draw_calibration;
+
+/// More runs that are left out tell a person nothing new.
+const MOST_NAMED: usize = 4;
 
 /// How a calibration from recordings finds out how trains change their speed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -156,11 +163,8 @@ impl Arguments {
         let layout = layout_named(self.layout()?)?.layout;
         let train = self.train.map(|named| named.train);
         let logs = LogFile::read_all(&self.from, &layout, train)?;
-        let warning = check_runs(&layout, logs.iter().flat_map(|log| &log.recording.runs))?;
-        let mut outcome = LengthWarning::outcome(warning.as_ref());
-        if let Some(warning) = warning.as_ref().filter(|_| !self.json) {
-            writeln!(output, "WARNING: {}\n", warning.english)?;
-        }
+        check_runs(&layout, logs.iter().flat_map(|log| &log.recording.runs))?;
+        let mut outcome = Outcome::Done;
         let (batch, mut store) = match &self.store {
             None => {
                 let recordings: Vec<Recording> = logs.into_iter().map(|log| log.recording).collect();
@@ -178,10 +182,27 @@ impl Arguments {
                 (Batch::of_store(&layout, &store, as_of, train)?, Some(store))
             }
         };
+        let warning = check_batch(&layout, &batch)?;
+        if LengthWarning::outcome(warning.as_ref()) == Outcome::FallsShort {
+            outcome = Outcome::FallsShort;
+        }
+        if let Some(warning) = warning.as_ref().filter(|_| !self.json) {
+            writeln!(output, "WARNING: {}\n", warning.english)?;
+        }
+        let left_out = runs_left_out(&batch.left_out);
+        if let Some(left_out) = left_out.as_ref().filter(|_| !self.json) {
+            writeln!(output, "{left_out}\n")?;
+        }
         if let Some(store) = store.as_mut().filter(|_| self.is_kept()) {
             let made = now();
             for train in &batch.trains {
-                train.file(&layout).keep(store, made, made)?;
+                match richer_model(&layout, store, &batch, train)? {
+                    Some(reports) => say!(
+                        "the stored model of train {} knows {reports} sensor reports, more than the runs that count here: it stays",
+                        train.replay.fit.model().train()
+                    ),
+                    None => train.file(&layout).keep(store, made, made)?,
+                }
             }
         }
         if let Some(path) = &self.out {
@@ -205,7 +226,11 @@ impl Arguments {
             Some(question) => question.answer(&layout, &batch, self.json, output)?,
             None if self.json => {
                 let mut value = serde_json::to_value(&report)?;
-                value["warnings"] = warning.iter().map(|warning| warning.english.as_str()).collect();
+                value["warnings"] = warning
+                    .iter()
+                    .map(|warning| warning.english.as_str())
+                    .chain(left_out.as_deref())
+                    .collect();
                 writeln!(output, "{}", serde_json::to_string_pretty(&value)?)?;
             }
             None => table::write(&report, output)?,
@@ -237,7 +262,8 @@ impl Arguments {
 
     fn layout(&self) -> anyhow::Result<&str> {
         self.layout.as_deref().context(
-            "which layout are the sensors on? Add `--layout`: a built-in one (track-a, track-b, oval-blocks) or a layout file",
+            "which layout are the sensors on? Add `--layout`: a built-in one (track-a, track-b, oval-blocks) or a layout file; \
+             positions from a video, which need none, have the columns t_s and position_mm",
         )
     }
 
@@ -283,6 +309,43 @@ impl Arguments {
     fn is_kept(&self) -> bool {
         self.as_of.is_none() && self.explain.is_none() && self.method == Method::Motion
     }
+}
+
+/// The sentence that names runs of a store that teach nothing.
+pub(super) fn runs_left_out(left_out: &[LeftOut]) -> Option<String> {
+    let named = left_out.iter().take(MOST_NAMED).map(|one| format!("{}, run {}", one.recording, one.run));
+    let named = named.collect::<Vec<_>>().join("; ");
+    let more = if left_out.len() > MOST_NAMED { "; and others" } else { "" };
+    (!left_out.is_empty()).then(|| {
+        format!(
+            "left out, because several trains moved and nobody has told their reports apart: {} ({named}{more})",
+            counted(left_out.len(), "run")
+        )
+    })
+}
+
+/// How many sensor reports the stored model of a train knows, if these are more than the new one knows because runs of the train
+/// were left out.
+fn richer_model(
+    layout: &Layout,
+    store: &Store,
+    batch: &Batch,
+    train: &BatchTrain,
+) -> anyhow::Result<Option<u32>> {
+    let new = train.replay.fit.model();
+    if batch.left_out.iter().all(|left_out| !left_out.trains.contains(&new.train())) {
+        return Ok(None);
+    }
+    let StoredModel::Model(stored) = StoredModel::of_store(layout, store, new.train(), LATEST)? else {
+        return Ok(None);
+    };
+    let reports = sensor_reports(&stored);
+    Ok((reports > sensor_reports(new)).then_some(reports))
+}
+
+/// The sensor reports that a model was fitted to.
+fn sensor_reports(model: &MotionModel) -> u32 {
+    model.numbers().counts.iter().flatten().map(|(reports, _)| reports).sum()
 }
 
 /// Imports logs into the store; falls short if the store keeps one otherwise than it was read now.

@@ -18,11 +18,13 @@ use footplate_core::track::Layout;
 use footplate_store::{Batch, Findings, Run, Store, layout_named, write_whole};
 
 use super::Outcome;
+use super::calibrate::runs_left_out;
 use super::log_file::LogFile;
 use super::output_files::check_outputs;
 use super::web_page::Language;
 use crate::clock::LATEST;
-use crate::layout_check::{LengthWarning, check_runs};
+use crate::layout_check::{LengthWarning, check_batch, check_runs};
+use crate::standard_error::say;
 use data::{ReportData, TrainReport};
 use german_law::german_law;
 
@@ -80,17 +82,17 @@ impl Arguments {
                 (recordings.into_iter().map(session).collect(), batch)
             }
         };
-        let warning = check_runs(&layout, sessions.iter().flat_map(|session| &session.runs))?;
+        check_runs(&layout, sessions.iter().flat_map(|session| &session.runs))?;
         let language = self.language;
+        let warning = check_batch(&layout, &batch)?;
         let outcome = LengthWarning::outcome(warning.as_ref());
-        let warning = warning.map(|warning| match language {
-            Language::English => warning.english,
-            Language::German => warning.german,
-        });
-        if let Some(warning) = &warning {
+        let data = gather(&layout, &sessions, &batch, warning.as_ref(), language)?;
+        if let Some(left_out) = runs_left_out(&batch.left_out) {
+            say!("{left_out}");
+        }
+        if let Some(warning) = &data.warning {
             writeln!(output, "{}: {warning}", language.pick("WARNING", "WARNUNG"))?;
         }
-        let data = ReportData { warning, ..gather(&layout, &sessions, &batch, language)? };
         write_whole(&self.out, page::page(&data, language)?.as_bytes())
             .with_context(|| format!("writing {}", self.out.display()))?;
         for train in &data.trains {
@@ -136,7 +138,8 @@ pub(super) fn store_report(
     language: Language,
 ) -> anyhow::Result<String> {
     let (sessions, batch) = of_store(layout, store, Some(train))?;
-    let data = gather(layout, &sessions, &batch, language)?;
+    let warning = check_batch(layout, &batch)?;
+    let data = gather(layout, &sessions, &batch, warning.as_ref(), language)?;
     let found = data.trains.into_iter().next();
     Ok(serde_json::to_string(&found.with_context(|| format!("nothing of train {train} was recorded yet"))?)?)
 }
@@ -145,6 +148,7 @@ fn gather(
     layout: &Layout,
     sessions: &[Session],
     batch: &Batch,
+    warning: Option<&LengthWarning>,
     language: Language,
 ) -> anyhow::Result<ReportData> {
     let findings = Findings::of(layout, batch);
@@ -157,7 +161,7 @@ fn gather(
         }
         let forecasts = forecasts::of_train(layout, sessions, form.train)?;
         Ok(TrainReport {
-            health: health::of(form, &forecasts, language),
+            health: health::of(form, &forecasts, warning, language),
             changes: charts::changes(batch, train),
             stop_curve: charts::stop_curve(form),
             calibration,
@@ -165,7 +169,10 @@ fn gather(
         })
     });
     Ok(ReportData {
-        warning: None,
+        warning: warning.map(|warning| match language {
+            Language::English => warning.english.clone(),
+            Language::German => warning.german.clone(),
+        }),
         trains: trains.collect::<anyhow::Result<_>>()?,
         layout: findings.layout,
         polling: findings.polling,

@@ -39,6 +39,7 @@ mod program;
 mod replay;
 mod report;
 mod seeds_that_failed;
+mod several_trains;
 mod short_moves;
 mod simulate;
 mod simulate_driving;

@@ -80,3 +80,36 @@ fn a_train_that_is_driven_on_another_layout_says_so_while_it_runs() {
         assert_eq!(said, usize::from(layout == "track-b"), "said once: {lines:#?}");
     }
 }
+
+#[test]
+fn a_store_of_another_layout_is_marked_as_its_files_are_and_no_train_is_called_good() {
+    let testdata = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/sensor-logs");
+    let log = testdata.join("choochoos_2020_track_a_train1_run.csv");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("stored_elsewhere");
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    let (store, page) = (folder.join("railway.db"), folder.join("train1.html"));
+    let [log, store, page] = [&log, &store, &page].map(|path| path.to_str().unwrap());
+    let import = footplate(&["store", "import", log, "--store", store, "--layout", "track-b"]);
+    assert_eq!(import.status, 0, "{}", import.errors);
+    let said = "lengths that are not those of layout `track-b`: D9 to E12 takes as long as 377 mm, not 282";
+    for command in [
+        vec!["calibrate", "--store", store],
+        vec!["report", "--store", store, "--out", page],
+        vec!["report", log, "--out", page],
+    ] {
+        let run = footplate(&[&command[..], &["--layout", "track-b"]].concat());
+        assert_eq!(run.status, 1, "{command:?}: {}", run.errors);
+        assert!(run.output.contains(said), "{command:?}: {}", run.output);
+        if command[0] == "report" {
+            let judged = "train 1: wrong, lengths of the layout: D9 → E12: 377 ≠ 282 mm";
+            assert!(run.output.contains(judged), "{command:?}: {}", run.output);
+            assert!(!run.output.contains("good"), "{command:?}: {}", run.output);
+        }
+    }
+    let script = folder.join("quit.txt");
+    std::fs::write(&script, "quit\n").unwrap();
+    let link = ["drive", "--link", "sim:track-a?seed=7", "--layout", "track-b", "--store", store];
+    let run = footplate(&[&link[..], &["--script", script.to_str().unwrap()]].concat());
+    assert!(run.errors.contains(said), "{}{}", run.output, run.errors);
+}

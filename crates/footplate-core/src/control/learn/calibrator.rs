@@ -141,10 +141,10 @@ impl<'l> Calibrator<'l> {
         self.fit
     }
 
-    /// The sections of the layout, with uncertainties corrected by the path lengths of the train.
+    /// The sections of the layout as surveyed.
     #[must_use]
-    pub const fn sections(&self) -> &SectionIndex {
-        &self.sections
+    pub const fn surveyed(&self) -> &SectionIndex {
+        &self.surveyed
     }
 
     /// The comparison of surveyed lengths with path lengths.

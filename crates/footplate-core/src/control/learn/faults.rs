@@ -169,12 +169,13 @@ impl Calibrator<'_> {
     /// Fits again and compares the layout's lengths with path lengths. Lengths that contradict each other count for
     /// less, and a notice names them whenever there are more than before.
     pub(super) fn refit(&mut self) {
-        self.fit.refit(&self.sections);
+        self.fit.refit(&self.surveyed);
         let test = SurveyTest::of(&self.surveyed, self.model().sections());
         if test != self.survey_test {
             self.sections = test.applied_to(&self.surveyed);
+            self.fit.doubt(test.clone());
             self.survey_test = test;
-            self.fit.refit(&self.sections);
+            self.fit.refit(&self.surveyed);
         }
         let hops: Vec<(HopId, Length, Length)> =
             self.survey_test.odd.iter().filter_map(|odd| self.odd_hop(odd)).collect();

@@ -32,7 +32,7 @@ use crate::model::parameters::{START_NODES, STOP_NODES};
 use crate::model::priors::{independent_nodes, section_variance};
 use crate::model::rescaled::ChangedNumbers;
 use crate::model::scatter::{Scatter, ScatterSums, WATCHED_FROM};
-use crate::model::survey::SectionIndex;
+use crate::model::survey::{SectionIndex, SurveyTest};
 use crate::time::Timestamp;
 use crate::track::{Layout, TurnoutStates};
 
@@ -67,6 +67,9 @@ pub struct MotionFit {
     /// Follows from the layout; made when first needed.
     #[cfg_attr(feature = "serde", serde(skip))]
     sections: Option<SectionIndex>,
+    /// How the lengths of the layout compare with what trains ran over; a fit believes them no more than that.
+    #[cfg_attr(feature = "serde", serde(default))]
+    survey_test: SurveyTest,
     date: Timestamp,
 }
 
@@ -120,6 +123,7 @@ impl MotionFit {
             chain: Chain::default(),
             steady: SteadyPasses::default(),
             sections: None,
+            survey_test: SurveyTest::default(),
             date: Timestamp::ZERO,
         }
     }

@@ -56,6 +56,20 @@ impl LayoutTest {
         (self.last, self.steady_from) = (None, Timestamp::from_ns(i64::MIN));
     }
 
+    /// Takes a whole run in which so many trains move, or may.
+    pub fn take_run<'e>(
+        &mut self,
+        layout: &Layout,
+        sections: &SectionIndex,
+        trains: usize,
+        events: impl Iterator<Item = &'e Event>,
+    ) {
+        self.begin_run(trains);
+        for event in events {
+            self.take(layout, sections, event);
+        }
+    }
+
     /// The next entry of the run.
     pub fn take(&mut self, layout: &Layout, sections: &SectionIndex, event: &Event) {
         self.sequence.take(layout, event);

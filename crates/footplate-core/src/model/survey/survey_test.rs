@@ -32,6 +32,7 @@ pub(in crate::model) const PER_MEDIAN: f64 = 1.4826;
 
 /// A section whose surveyed length contradicts what a train made of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct OddSection {
     /// By its number in the [`SectionIndex`].
     pub section: usize,
@@ -42,7 +43,8 @@ pub struct OddSection {
 }
 
 /// How a survey compares with what a train ran over.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SurveyTest {
     /// Sections whose lengths contradict, the farthest off first.
     pub odd: Vec<OddSection>,
@@ -53,11 +55,18 @@ pub struct SurveyTest {
     pub scale: f64,
 }
 
+impl Default for SurveyTest {
+    /// Nothing was compared.
+    fn default() -> Self {
+        Self { odd: Vec::new(), factor: 1.0, scale: 0.0 }
+    }
+}
+
 impl SurveyTest {
     /// Compares the lengths of a survey with a train's: by section, by how much it feels it longer (m), with the variance.
     #[must_use]
     pub fn of(sections: &SectionIndex, path_length: impl Iterator<Item = (usize, f64, f64)>) -> Self {
-        let fits = Self { odd: Vec::new(), factor: 1.0, scale: 0.0 };
+        let fits = Self::default();
         let known: Vec<Compared> = compared(sections, path_length);
         if known.len() < FEWEST {
             return fits;

@@ -13,7 +13,7 @@ use alloc::vec::Vec;
 
 use super::section_index::SectionIndex;
 use crate::linalg::{NormalEquations, Solution};
-use crate::model::{MotionModel, PATH_LENGTH_SPREAD, section_variance};
+use crate::model::{MotionFit, PATH_LENGTH_SPREAD, section_variance};
 use crate::track::{Hop, Layout, LayoutError, StretchLength, Survey, SurveyedDistance};
 use crate::units::Length;
 
@@ -57,12 +57,12 @@ struct Row {
 }
 
 impl TrackSurvey {
-    /// The survey that follows from what is known of trains on a layout; `sections` are what their models were fitted with.
-    /// `None` if no train has run over any section.
+    /// The survey that follows from what is known of trains on a layout with these sections. `None` if no train has run over any
+    /// section.
     #[must_use]
-    pub fn of(layout: &Layout, sections: &SectionIndex, models: &[&MotionModel]) -> Option<Self> {
+    pub fn of(layout: &Layout, sections: &SectionIndex, trains: &[&MotionFit]) -> Option<Self> {
         let rows: Vec<Row> =
-            models.iter().enumerate().flat_map(|(train, model)| rows_of(sections, train, model)).collect();
+            trains.iter().enumerate().flat_map(|(train, fit)| rows_of(sections, train, fit)).collect();
         if rows.is_empty() {
             return None;
         }
@@ -72,10 +72,10 @@ impl TrackSurvey {
         let terms = |row: &Row| {
             let mut terms = edges(row.section).map(terms_of).unwrap_or_default();
             terms.push((count + row.train, -row.path_length));
-            terms.push((count + models.len() + row.section, 1.0));
+            terms.push((count + trains.len() + row.section, 1.0));
             terms
         };
-        let mut known = prior(layout, models.len());
+        let mut known = prior(layout, trains.len());
         known.extend((0..sections.len()).map(|section| {
             let length = sections.surveyed_length(section);
             let path_length =
@@ -214,9 +214,10 @@ fn terms_of(hop: &Hop<'_>) -> Vec<(usize, f64)> {
 }
 
 /// What one train says, less what it was commanded beforehand.
-fn rows_of(sections: &SectionIndex, train: usize, model: &MotionModel) -> Vec<Row> {
+fn rows_of(sections: &SectionIndex, train: usize, fit: &MotionFit) -> Vec<Row> {
+    let fitted_with = fit.survey_test().applied_to(sections);
     let known: Vec<(usize, f64, f64)> =
-        model.sections().filter(|(section, ..)| sections.surveyed_length(*section) > 0.0).collect();
+        fit.model().sections().filter(|(section, ..)| sections.surveyed_length(*section) > 0.0).collect();
     let part = |section: usize, variance: f64| {
         let length = sections.surveyed_length(section);
         variance / (length * length)
@@ -225,7 +226,7 @@ fn rows_of(sections: &SectionIndex, train: usize, model: &MotionModel) -> Vec<Ro
     let shared = known.iter().map(|(section, _, v)| part(*section, *v)).fold(f64::INFINITY, f64::min);
     let rows = known.iter().filter_map(|(section, longer, variance)| {
         let length = sections.surveyed_length(*section);
-        let before = section_variance(sections, *section);
+        let before = section_variance(&fitted_with, *section);
         let own = ((part(*section, *variance) - shared) * length * length).max(LEAST * LEAST);
         // Posterior less prior: what the train itself has seen.
         let information = 1.0 / own - 1.0 / before;

@@ -211,7 +211,7 @@ impl Session<'_> {
         let Driven { calibrator, at, mishaps, why } = session;
         let took = calibrator.progress(at).elapsed;
         let accuracy = calibrator.accuracy();
-        let sections = calibrator.sections().clone();
+        let sections = calibrator.surveyed().clone();
         let mut fit = calibrator.into_fit();
         fit.refit(&sections);
         let made = now();

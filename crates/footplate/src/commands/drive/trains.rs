@@ -12,6 +12,8 @@ use footplate_core::{DecoderSteps, SpeedStep, TrainId};
 use footplate_store::{MotionFile, MotionReplay, Store, StoredModel};
 
 use crate::clock::{LATEST, now};
+use crate::counted::counted;
+use crate::layout_check::lengths_warning;
 use crate::link::StationKind;
 use crate::standard_error::say;
 
@@ -148,6 +150,15 @@ impl KnownTrains {
                 self.begin(MotionFit::new(train, highest));
             }
             return Ok(());
+        }
+        if !replay.left_out.is_empty() {
+            say!(
+                "left out of what train {train} learnt, because other trains moved, too: {}",
+                counted(replay.left_out.len(), "run")
+            );
+        }
+        if let Some(warning) = lengths_warning(layout, replay.fit.survey_test()) {
+            say!("WARNING: {}; so recordings of train {train} say", warning.english);
         }
         let mut fit = replay.fit;
         fit.begin_session(&SectionIndex::of(layout));

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
-use footplate_core::model::MotionModel;
+use footplate_core::model::MotionFit;
 use footplate_core::model::survey::{SectionIndex, TrackSurvey};
 use footplate_core::track::{Hop, Layout, Survey};
 use footplate_core::{HALF_95, Length, TrainId};
@@ -47,9 +47,9 @@ impl Arguments {
         check_outputs([Path::new(&self.layout), &self.store], &[("--out", self.out.as_deref())])?;
         let file = layout_named(&self.layout)?;
         let layout = &file.layout;
-        let models = models(layout, &self.store)?;
+        let fits = fits(layout, &self.store)?;
         let sections = SectionIndex::of(layout);
-        let known: Vec<&MotionModel> = models.iter().collect();
+        let known: Vec<&MotionFit> = fits.iter().collect();
         let survey = TrackSurvey::of(layout, &sections, &known).with_context(|| {
             format!(
                 "{}: no train has run on {} yet: calibrate one with `footplate calibrate --link … --store {}`",
@@ -60,7 +60,7 @@ impl Arguments {
         })?;
         let distances: Vec<Surveyed> = surveyed(layout, &sections, &survey);
         if let Some(path) = &self.out {
-            let text = written(&file, &survey, &sections, models.len())?;
+            let text = written(&file, &survey, &sections, fits.len())?;
             write_whole(path, text.as_bytes()).with_context(|| format!("writing {}", path.display()))?;
         }
         if self.json {
@@ -68,7 +68,7 @@ impl Arguments {
                 json!({ "from": one.from, "to": one.to, "mm": one.length.as_mm(), "uncertainty_mm": one.uncertainty.as_mm() })
             });
             let all = json!({
-                "layout": layout.name(), "trains": models.len(), "scale_uncertainty_percent": 100.0 * survey.scale(),
+                "layout": layout.name(), "trains": fits.len(), "scale_uncertainty_percent": 100.0 * survey.scale(),
                 "distances": distances.collect::<Vec<Value>>(),
             });
             writeln!(output, "{all:#}")?;
@@ -82,7 +82,7 @@ impl Arguments {
             output,
             "{} from {} (95 %); a common scale error of up to {:.1} % comes on top",
             counted(distances.len(), "distance"),
-            counted(models.len(), "train"),
+            counted(fits.len(), "train"),
             100.0 * HALF_95 * survey.scale()
         )?;
         Ok(Outcome::Done)
@@ -109,8 +109,8 @@ fn surveyed(layout: &Layout, sections: &SectionIndex, survey: &TrackSurvey) -> V
     found.collect()
 }
 
-/// The models of all trains that ran on the layout alone.
-fn models(layout: &Layout, path: &Path) -> anyhow::Result<Vec<MotionModel>> {
+/// The fits of all trains that ran on the layout alone.
+fn fits(layout: &Layout, path: &Path) -> anyhow::Result<Vec<MotionFit>> {
     let mut store = Store::open(path)?;
     let mut trains: BTreeSet<TrainId> = BTreeSet::new();
     for recording in
@@ -120,15 +120,15 @@ fn models(layout: &Layout, path: &Path) -> anyhow::Result<Vec<MotionModel>> {
             trains.extend(run.accepted().moving().iter().map(|at_start| at_start.train));
         }
     }
-    let mut models = Vec::new();
+    let mut fits = Vec::new();
     for train in trains {
         let decoder = StoredModel::of_store(layout, &store, train, LATEST)?.decoder(&store, train, LATEST)?;
         let replay = MotionReplay::of_store(layout, &mut store, train, decoder.highest(), LATEST)?;
         if !replay.is_empty() {
-            models.push(replay.fit.model().clone());
+            fits.push(replay.fit);
         }
     }
-    Ok(models)
+    Ok(fits)
 }
 
 /// The layout file with the estimated lengths.

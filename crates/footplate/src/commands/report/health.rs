@@ -5,6 +5,7 @@ use footplate_store::score::Coverage;
 
 use super::data::{Check, ForecastPoint, Health, State};
 use crate::commands::web_page::Language;
+use crate::layout_check::LengthWarning;
 
 /// So many forecasts are "now" (chosen: two laps of the usual loop).
 const NOW: usize = 20;
@@ -18,9 +19,15 @@ const SILENT: [f64; 2] = [0.2, 0.5];
 /// How far below 90 % the interval's share may lie before it is wrong and not only uncertain.
 const COVERAGE_WRONG: f64 = 0.8;
 
-pub(super) fn of(train: &TrainFindings, points: &[ForecastPoint], language: Language) -> Health {
+pub(super) fn of(
+    train: &TrainFindings,
+    points: &[ForecastPoint],
+    warning: Option<&LengthWarning>,
+    language: Language,
+) -> Health {
     let (silent, runs) = (train.silent_runs, train.runs);
     let checks = vec![
+        lengths(warning, language),
         error(points, language),
         coverage(points, language),
         drift(points, language),
@@ -51,6 +58,23 @@ pub(super) fn of(train: &TrainFindings, points: &[ForecastPoint], language: Lang
     let usual = language.pick("nothing out of the usual", "nichts Ungewöhnliches");
     let summary = if worst.is_empty() { usual.to_owned() } else { worst.join("; ") };
     Health { state, summary, checks }
+}
+
+fn lengths(warning: Option<&LengthWarning>, language: Language) -> Check {
+    let as_surveyed = language.pick("as in the layout", "wie in der Anlage");
+    Check {
+        name: language.pick("Lengths of the layout", "Längen der Anlage"),
+        found: warning.map_or_else(|| as_surveyed.to_owned(), |warning| warning.differences.clone()),
+        state: match warning.map(LengthWarning::is_serious) {
+            None => State::Green,
+            Some(false) => State::Amber,
+            Some(true) => State::Red,
+        },
+        says: language.pick(
+            "times from contact to contact against its lengths: where they differ, it may be another layout",
+            "Zeiten von Kontakt zu Kontakt gegen ihre Längen: wo sie nicht passen, ist es vielleicht eine andere Anlage",
+        ),
+    }
 }
 
 fn graded(value: f64, [amber, red]: [f64; 2]) -> State {

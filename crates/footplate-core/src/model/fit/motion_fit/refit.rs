@@ -10,7 +10,7 @@ use super::{
 use crate::model::MotionModel;
 use crate::model::fit::unknowns::Columns;
 use crate::model::parameters::{SPEEDS, knots};
-use crate::model::survey::SectionIndex;
+use crate::model::survey::{SectionIndex, SurveyTest};
 
 /// A fit in progress; see [`MotionFit::begin_refit`].
 #[derive(Debug, Clone)]
@@ -38,7 +38,8 @@ impl MotionFit {
         let columns = fit.prior.columns();
         let values = fit.start(&columns);
         fit.compare_promises(&columns, &values);
-        let survey = Survey::of(&columns, sections, &fit.model);
+        let doubted = (!fit.survey_test.is_passed()).then(|| fit.survey_test.applied_to(sections));
+        let survey = Survey::of(&columns, doubted.as_ref().unwrap_or(sections), &fit.model);
         Refit { fit, columns, values, survey, closed: None, iteration: 0, condensed: 0, is_over: false }
     }
 
@@ -53,6 +54,17 @@ impl MotionFit {
         }
         self.prior = fit.prior;
         self.model = fit.model;
+    }
+
+    /// From the next fit on, the lengths of the layout count for no more than a comparison with path lengths leaves of them.
+    pub fn doubt(&mut self, test: SurveyTest) {
+        self.survey_test = test;
+    }
+
+    /// The comparison by which the lengths of the layout count.
+    #[must_use]
+    pub const fn survey_test(&self) -> &SurveyTest {
+        &self.survey_test
     }
 
     /// Fits to all entries so far, at once. Takes milliseconds: not between two reports.
