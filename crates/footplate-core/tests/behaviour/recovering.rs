@@ -161,6 +161,30 @@ fn a_train_that_a_person_places_is_searched_no_more() {
 }
 
 #[test]
+fn a_train_that_a_person_places_while_it_is_measured_stops_and_waits_to_be_measured_again() {
+    // Given a train under a dispatcher that was located and runs to be measured,
+    let mut watched = Watched::asking();
+    watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
+    let is_located =
+        |watched: &Watched| watched.notices.iter().any(|notice| matches!(notice, Notice::Located { .. }));
+    assert!(watched.run_until(60.0, is_located), "{:#?}", watched.notices);
+    watched.run(1.0);
+    let from = watched.commanded.len();
+    // when a person says where it is, as of a train at rest,
+    let node = watched.world.layout.node_named("D1").expect("a node");
+    let at = PathPoint { node, distance: Length::from_mm(100.0) };
+    watched.dog.place(watched.world.now, FIRST, at, Length::from_mm(3.0));
+    watched.run(8.0);
+    // then it is stopped at once, and asks again before it moves.
+    let commanded: Vec<Command> = watched.commanded.iter().skip(from).map(|(_, command)| *command).collect();
+    let stop = Command::Speed { train: FIRST, step: SpeedStep::STAND };
+    assert!(!commanded.is_empty() && commanded.iter().all(|command| *command == stop), "{commanded:?}");
+    assert!(watched.world.trains[0].speed_mm_per_s < 1.0, "{:#?}", watched.notices);
+    let asked = watched.notices.iter().filter(|notice| matches!(notice, Notice::AsksToCreep { .. })).count();
+    assert_eq!(asked, 2, "{:#?}", watched.notices);
+}
+
+#[test]
 fn a_train_that_reversed_to_be_located_faces_as_before() {
     // Given a lost train that creeps back over the track that it came from,
     let mut watched = Watched::asking();

@@ -312,6 +312,8 @@ impl Dispatcher {
             Path::around(layout, turnouts, place, &train.occupied, envelope.behind, envelope.ahead);
         let mut trailed = path.trailed(layout, at - envelope.behind, at + envelope.ahead);
         trailed.any(|need| turnouts.get(need.turnout) != Some(need.leg))
+            // The legs behind a train that was placed are those that are set, which it may not have come from.
+            || self.watchdog.was_placed_on_points(id)
     }
 
     /// Releases the track that a train at rest at the end of its run certainly does not occupy. It keeps its whole

@@ -121,6 +121,20 @@ impl Watchdog {
         behind.trails_otherwise || reach.keys().any(|edge| self.lies_otherwise(*edge))
     }
 
+    /// What is behind a train that an operator places: the points that it may have pushed over, if it may stand on them at its
+    /// new place. Whoever says where its end is does not say over which leg it came.
+    pub(super) fn behind_placed(&self, now: Timestamp, train: TrainId, at: EdgeId) -> Option<Behind> {
+        let behind = self.behind.get(&train).filter(|_| self.has_pushed_over_points(now, train))?;
+        let reach = self.unheard_run(now, train) + BODY;
+        let reach = edges_within(self.driver.layout(), behind.sensor, reach, &Reservation::empty());
+        reach.contains_key(&at).then_some(Behind { trails_otherwise: true, was_placed: true, ..*behind })
+    }
+
+    /// Whether an operator placed a train where it may stand on points that it pushed over, and no sensor has reported it since.
+    pub(in crate::control) fn was_placed_on_points(&self, train: TrainId) -> bool {
+        self.behind.get(&train).is_some_and(|behind| behind.was_placed)
+    }
+
     /// Whether a turnout that is trailed on an edge lies for the other leg.
     fn lies_otherwise(&self, edge: EdgeId) -> bool {
         let is_other = |need: TurnoutNeed| {
@@ -148,7 +162,7 @@ impl Watchdog {
             });
             under.any(|edge| self.lies_otherwise(edge))
         });
-        self.behind.insert(train, Behind { sensor, trails_otherwise });
+        self.behind.insert(train, Behind { sensor, trails_otherwise, was_placed: false });
     }
 
     /// The longest distance that a train can have run since its last detection.

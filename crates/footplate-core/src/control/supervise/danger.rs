@@ -12,7 +12,7 @@ use crate::track::{Layout, Position};
 use crate::units::Length;
 
 use super::alarm::Alarm;
-use super::recovery::{Phase, Recovery, STOPPED_WITHIN, UNKNOWN_RATIO};
+use super::recovery::{Phase, Recovery, UNKNOWN_RATIO};
 use super::watchdog::{Power, Watchdog};
 use crate::control::{Notice, Outcome};
 
@@ -200,11 +200,17 @@ impl Watchdog {
         }
     }
 
-    /// An operator says where a train is: it is not searched any more, and trusted again if that was all that was wrong.
+    /// An operator says where a train is: it is not searched any more, and trusted again if that was all that was wrong. A train
+    /// that is measured is stopped, because it counts as at rest at that place; its recovery begins again.
     pub(super) fn end_search(&mut self, now: Timestamp, train: TrainId) {
-        if let Some(recovery) = self.dangers.get_mut(&train).filter(|recovery| recovery.is_searched()) {
-            let order = recovery.give_up();
-            self.rest_without(now, train, order);
+        if let Some(recovery) = self.dangers.get_mut(&train) {
+            if recovery.is_searched() {
+                let order = recovery.give_up();
+                self.rest_without(now, train, order);
+            } else if recovery.is_measuring() {
+                recovery.begin_again(now);
+                self.rest_without(now, train, None);
+            }
         }
         self.trust_again(train);
     }
@@ -240,8 +246,7 @@ impl Watchdog {
             if let Phase::Waiting { has_asked } = &mut recovery.phase {
                 *has_asked = false;
             } else if recovery.is_active() {
-                recovery.phase = Phase::Stopping;
-                recovery.by = now + STOPPED_WITHIN;
+                recovery.begin_again(now);
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Orders: which are carried out now, and those of recoveries.
 
-use crate::control::Refusal;
 use crate::control::drive::{Order, OrderId};
+use crate::control::{Notice, Refusal};
 use crate::ids::{SpeedStep, TrainId};
 use crate::time::Timestamp;
 
@@ -102,5 +102,16 @@ impl Watchdog {
             self.own.insert(id, train);
         }
         Some(id)
+    }
+
+    /// Carries out the order that a recovery had interrupted, or cancels it.
+    pub(super) fn resume(&mut self, now: Timestamp, train: TrainId, id: OrderId, order: Order) {
+        // The progress of a move or a reversal is unknown.
+        let can_go_on = self.resumes() && !matches!(order, Order::Move { .. } | Order::Reverse { .. });
+        let resumed = if can_go_on { self.order(now, order).ok() } else { None };
+        match resumed {
+            Some(order) => self.notify(Notice::Resumed { train, interrupted: Some(id), order }),
+            None => self.notify(Notice::Cancelled { train, order }),
+        }
     }
 }

@@ -132,6 +132,18 @@ impl Recovery {
         !matches!(self.phase, Phase::Stopping | Phase::Waiting { .. } | Phase::GivenUp)
     }
 
+    /// Whether the train was located and runs, or is about to, so that its speeds and stops are measured.
+    pub(super) const fn is_measuring(&self) -> bool {
+        let is_done = matches!(self.phase, Phase::Ending { .. } | Phase::Turning { .. });
+        self.is_active() && !self.is_searched() && !is_done
+    }
+
+    /// Begins again once the train is at rest; it was commanded to stop.
+    pub(super) fn begin_again(&mut self, now: Timestamp) {
+        self.phase = Phase::Stopping;
+        self.by = now + STOPPED_WITHIN;
+    }
+
     /// Whether its position was about right when the alarm came: its speed was not.
     const fn is_roughly_located(&self) -> bool {
         matches!(self.why, Alarm::Drift(_) | Alarm::Misses | Alarm::Distrusted)
@@ -479,16 +491,6 @@ impl Watchdog {
         } else {
             // Hold it until no other train is in danger.
             self.held.insert(train, own);
-        }
-    }
-
-    fn resume(&mut self, now: Timestamp, train: TrainId, id: OrderId, order: Order) {
-        // The progress of a move or a reversal is unknown.
-        let can_go_on = self.resumes() && !matches!(order, Order::Move { .. } | Order::Reverse { .. });
-        let resumed = if can_go_on { self.order(now, order).ok() } else { None };
-        match resumed {
-            Some(order) => self.notify(Notice::Resumed { train, interrupted: Some(id), order }),
-            None => self.notify(Notice::Cancelled { train, order }),
         }
     }
 }

@@ -36,4 +36,6 @@ pub(super) struct Behind {
     pub(super) sensor: NodeId,
     /// Whether the rear of a train that has just reached the sensor is on points that it pushed over.
     pub(super) trails_otherwise: bool,
+    /// Whether an operator has placed the train since, where it may still be on these points.
+    pub(super) was_placed: bool,
 }

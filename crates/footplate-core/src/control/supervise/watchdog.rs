@@ -157,15 +157,18 @@ impl Watchdog {
     }
 
     /// Sets the position of a train, as an operator entered it. A train that creeps to be located is stopped, and like one that
-    /// could not be recovered it is trusted again, with its earlier model. If no train is in danger any more, held trains are released and their orders
+    /// could not be recovered it is trusted again, with its earlier model. One that is measured is stopped, and measured again. If no train is in danger any more, held trains are released and their orders
     /// cancelled.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: PathPoint, uncertainty: Length) {
         self.end_search(now, train);
         self.driver.place(now, train, at, uncertainty);
         self.monitors.entry(train).or_default().place();
+        let place = self.driver.position(train, now);
+        let behind = place.and_then(|place| self.behind_placed(now, train, place.edge));
         self.note_place(now, train);
         self.note_detection(train, now);
         self.behind.remove(&train);
+        self.behind.extend(behind.map(|behind| (train, behind)));
         self.undirected.remove(&train);
         self.clear_intruder();
         self.release_held();
