@@ -42,8 +42,17 @@ impl Seeds {
     /// # Errors
     /// The text is none of these, or no commit is found.
     pub fn parse(text: &str) -> anyhow::Result<Self> {
+        Self::parse_in_rows(text, 1)
+    }
+
+    /// As [`parse`](Self::parse), with fresh seeds in rows of successive ones, which a scorer prepares once. A row begins at a
+    /// multiple of its length.
+    ///
+    /// # Errors
+    /// As those of [`parse`](Self::parse).
+    pub fn parse_in_rows(text: &str, row: u64) -> anyhow::Result<Self> {
         match text.trim().strip_prefix(FRESH) {
-            Some(fresh) => Self::fresh(fresh),
+            Some(fresh) => Self::fresh(fresh, row),
             None => Self::chosen(text),
         }
     }
@@ -74,7 +83,7 @@ impl Seeds {
         Ok(Self { all: seeds.collect(), written })
     }
 
-    fn fresh(text: &str) -> anyhow::Result<Self> {
+    fn fresh(text: &str, row: u64) -> anyhow::Result<Self> {
         let (count, commit) = match text.split_once('@') {
             Some((count, commit)) => (count, commit.to_owned()),
             None => (text, current_commit()?),
@@ -89,7 +98,8 @@ impl Seeds {
         let mut choice = Choice::new(hash);
         let mut drawn = BTreeSet::new();
         while (drawn.len() as u64) < count {
-            drawn.insert(choice.between(FRESH_SEEDS[0], FRESH_SEEDS[1]) as u64);
+            let first = choice.between(FRESH_SEEDS[0], FRESH_SEEDS[1]) as u64 / row * row;
+            drawn.extend((first..first + row).take((count - drawn.len() as u64) as usize));
         }
         let written = format!("{FRESH}{count}@{commit}");
         Ok(Self { all: drawn.into_iter().collect(), written })
@@ -179,6 +189,20 @@ mod tests {
         assert!(of_commit.iter().all(|seed| (1_000_000..10_000_000).contains(seed)), "{of_commit:?}");
         assert!(seeds("fresh:64@c6ca86b00000").iter().all(|seed| !of_commit.contains(seed)));
         assert_eq!(Seeds::parse("fresh:2@5731edca1f20").unwrap().written(), "fresh:2@5731edca1f20");
+    }
+
+    #[test]
+    fn fresh_seeds_in_rows_are_successive_and_as_many_as_asked_for() {
+        let all: Vec<u64> = Seeds::parse_in_rows("fresh:80@5731edca1f20", 32).unwrap().iter().collect();
+        assert_eq!(all.len(), 80);
+        let firsts: Vec<u64> = all.iter().copied().filter(|seed| seed % 32 == 0).collect();
+        assert_eq!(firsts.len(), 3, "{all:?}");
+        assert!(all.iter().all(|seed| firsts.iter().any(|first| (*first..first + 32).contains(seed))));
+        // A row of one is what all other scorers draw.
+        assert_eq!(
+            Seeds::parse_in_rows("fresh:9@5731edca1f20", 1).unwrap(),
+            Seeds::parse("fresh:9@5731edca1f20").unwrap()
+        );
     }
 
     #[test]

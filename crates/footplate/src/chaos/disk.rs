@@ -53,6 +53,7 @@ pub(super) struct FaultyDisk {
     recorded: Vec<Event>,
     acknowledged: usize,
     now: Timestamp,
+    is_closing: bool,
 }
 
 impl FaultyDisk {
@@ -86,7 +87,13 @@ impl FaultyDisk {
             recorded: Vec::new(),
             acknowledged: 0,
             now: began,
+            is_closing: false,
         })
+    }
+
+    /// The loop has ended: what a full disk does not take of the last commands is no news any more.
+    pub(super) const fn close(&mut self) {
+        self.is_closing = true;
     }
 
     fn age(&self, now: Timestamp) -> Timestamp {
@@ -182,11 +189,12 @@ impl FaultyDisk {
 impl Recorder for FaultyDisk {
     fn record(&mut self, events: &[Event]) -> anyhow::Result<()> {
         if !self.life.step() {
-            bail!("this program is dead");
+            ensure!(self.is_closing, "this program is dead");
+            return Ok(());
         }
         self.pending.extend(events.iter().copied().map(JournalEntry::Event));
         self.recorded.extend(events);
-        if self.is_in_trouble && self.if_unkept == IfUnkept::Stop {
+        if self.is_in_trouble && !self.is_closing && self.if_unkept == IfUnkept::Stop {
             bail!("the session cannot be written down: the disk is full");
         }
         Ok(())

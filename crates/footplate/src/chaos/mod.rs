@@ -12,13 +12,19 @@
 //! disk       the journal on a slow, full or failing disk, and what a power cut leaves of it
 //! people     the operator, who sends trains to places and helps them, and the checks of every step
 //! story      all lives of one seed, and their result
+//! failure    what must not happen in a story
+//! selection  some of the troubles of a story: the least with which it still fails
 //! ```
 
 mod disk;
+mod failure;
 mod life;
 mod line;
 mod people;
 mod plan;
+mod selection;
 mod story;
 
-pub(crate) use story::{Fate, Stage, story};
+pub(crate) use failure::FailureKind;
+pub(crate) use selection::Selection;
+pub(crate) use story::{Fate, STORIES_A_STAGE, Stage, story};

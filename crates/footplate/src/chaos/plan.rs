@@ -4,6 +4,7 @@ use footplate_core::{TimeSpan, Timestamp};
 use footplate_eval::seeds::Choice;
 
 use super::life::{Death, Spell};
+use super::selection::Selection;
 use crate::link::StationKind;
 use crate::session_journal::IfUnkept;
 
@@ -75,6 +76,31 @@ impl Plan {
         let lives = (1..=count).map(|nth| PlannedLife::draw(choice, nth == count)).collect();
         Self { station, lives }
     }
+
+    /// All troubles in words, by their numbers from 1 on; the death at the end of a life is its last one.
+    pub(super) fn troubles(&self) -> Vec<String> {
+        let of_life = |(nth, life): (usize, &PlannedLife)| {
+            let mut troubles: Vec<String> = life.troubles.iter().map(|one| one.in_words(nth)).collect();
+            troubles
+                .extend(life.ends.map(|(step, death)| format!("life {nth} ends at step {step}: {death:?}")));
+            troubles
+        };
+        (1..).zip(&self.lives).flat_map(of_life).collect()
+    }
+
+    /// Leaves out, or shortens, what is not selected.
+    pub(super) fn select(&mut self, selection: &Selection) {
+        let mut number = 0;
+        let mut part = || {
+            number += 1;
+            selection.part(number)
+        };
+        for life in &mut self.lives {
+            let kept = life.troubles.iter().filter_map(|one| part().map(|part| one.shortened(part)));
+            life.troubles = kept.collect();
+            life.ends = life.ends.filter(|_| part().is_some());
+        }
+    }
 }
 
 impl PlannedLife {
@@ -97,6 +123,22 @@ impl PlannedLife {
 }
 
 impl Planned {
+    fn lasts(&self) -> TimeSpan {
+        self.spell.until - self.spell.from
+    }
+
+    fn in_words(&self, life: usize) -> String {
+        let (from, lasts) = (self.spell.from.as_s(), self.lasts().as_s());
+        format!("life {life}, from {from:.1} s for {lasts:.2} s: {:?}", self.trouble)
+    }
+
+    fn shortened(&self, part: f64) -> Self {
+        let until = self.spell.from + TimeSpan::from_s(part * self.lasts().as_s());
+        // Not through seconds, whose last digit differs: the whole of it is as it was planned.
+        let until = if part < 1.0 { until } else { self.spell.until };
+        Self { spell: Spell { until, ..self.spell }, ..*self }
+    }
+
     fn draw(choice: &mut Choice, lasts_s: f64) -> Self {
         let from_s = choice.between(0.0, TROUBLES_WITHIN * lasts_s);
         let (trouble, for_s) = match below(choice, 10) {
@@ -122,4 +164,38 @@ fn ms(choice: &mut Choice, from: f64, to: f64) -> TimeSpan {
 
 fn below(choice: &mut Choice, count: usize) -> usize {
     (choice.between(0.0, count as f64) as usize).min(count - 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The plan of the first seed that draws three lives, a death at the end of each of the first two.
+    fn plan() -> Plan {
+        let plans = (1..).map(|seed| Plan::draw(&mut Choice::new(seed)));
+        plans.filter(|plan| plan.lives.len() == MOST_LIVES).find(|plan| plan.troubles().len() > 5).unwrap()
+    }
+
+    #[test]
+    fn a_plan_with_all_of_its_troubles_is_as_it_was() {
+        let whole = plan();
+        let mut selected = whole.clone();
+        selected.select(&Selection::all(whole.troubles().len()));
+        assert_eq!(selected, whole);
+    }
+
+    #[test]
+    fn what_is_not_selected_does_not_happen() {
+        let whole = plan();
+        let mut none = whole.clone();
+        none.select(&"none".parse().unwrap());
+        assert!(none.troubles().is_empty());
+        assert_eq!(none.lives.len(), MOST_LIVES);
+        // The last death alone.
+        let mut one = whole.clone();
+        let numbers = (1..).zip(whole.troubles());
+        let (number, words) = numbers.filter(|(_, words)| words.starts_with("life 2 ends")).last().unwrap();
+        one.select(&number.to_string().parse().unwrap());
+        assert_eq!(one.troubles(), [words]);
+    }
 }

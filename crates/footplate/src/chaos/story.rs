@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::rc::Rc;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use footplate_core::control::{Dispatcher, Driver};
 use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg, TurnoutStates};
@@ -17,10 +17,12 @@ use footplate_sim::{LivingLayout, LivingSwitches, StationSwitches};
 use footplate_store::Store;
 
 use super::disk::FaultyDisk;
+use super::failure::{Failure, FailureKind};
 use super::life::{Death, Life, Spell};
 use super::line::{FaultyLine, LATE, SharedStation};
 use super::people::{People, Seen, SharedDisk};
 use super::plan::{Plan, PlannedLife};
+use super::selection::Selection;
 use crate::commands::{recall_directions, stop_all};
 use crate::link::{Address, Link, Quirks, SimulatedStation, StationSession, open_session};
 use crate::runtime::{Ended, Runtime, carry_out};
@@ -30,7 +32,7 @@ const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(1)];
 /// Track time in which each was calibrated.
 const BUDGET: TimeSpan = TimeSpan::from_ms(120_000);
 /// The number of stories with the same trains and rails.
-const STORIES_A_STAGE: u64 = 32;
+pub(crate) const STORIES_A_STAGE: u64 = 32;
 /// The distance of a train beyond a sensor at the beginning.
 const PAST: Length = Length::from_mm(150.0);
 const TRIES: usize = 1_000;
@@ -86,18 +88,33 @@ pub(crate) struct Fate {
     /// From each death until all trains were stopped, in ms.
     pub(crate) stopped_ms: Vec<f64>,
     /// Violated invariants.
-    pub(crate) failures: Vec<String>,
+    pub(crate) failures: Vec<Failure>,
+    /// All troubles that the seed draws, in words; the first has number 1.
+    pub(crate) troubles: Vec<String>,
     /// The events of the story.
     pub(crate) notes: Vec<(Timestamp, String)>,
 }
 
-/// Runs the story of a seed. `store` is the path of its store, which does not exist yet.
+/// Runs the story of a seed, with all of its troubles or only some. `store` is the path of its store, which does not exist yet.
 ///
 /// # Errors
-/// When the store of a new session cannot be made, or there is no room for the trains.
-pub(crate) fn story(stage: &Stage<'_>, seed: u64, store: &Path) -> anyhow::Result<Fate> {
+/// When the store of a new session cannot be made, there is no room for the trains, or a selected trouble does not exist.
+pub(crate) fn story(
+    stage: &Stage<'_>,
+    seed: u64,
+    only: Option<&Selection>,
+    store: &Path,
+) -> anyhow::Result<Fate> {
     let mut choice = Choice::new(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
-    let plan = Plan::draw(&mut choice);
+    let mut plan = Plan::draw(&mut choice);
+    let troubles = plan.troubles();
+    if let Some(only) = only {
+        let unknown = only.numbers().find(|number| *number > troubles.len());
+        if let Some(number) = unknown {
+            bail!("--only: seed {seed} has no trouble {number}; it has {}", troubles.len());
+        }
+        plan.select(only);
+    }
     let mut world = stage.world.clone();
     put_trains(stage, &mut world, &mut choice)?;
     let mut teller = Teller {
@@ -112,7 +129,7 @@ pub(crate) fn story(stage: &Stage<'_>, seed: u64, store: &Path) -> anyhow::Resul
         ))),
         store,
         choice,
-        fate: Fate { seed, ..Fate::default() },
+        fate: Fate { seed, troubles, ..Fate::default() },
     };
     let began = teller.now();
     teller.note(format!("a {}", plan.station.key()));
@@ -214,9 +231,9 @@ impl<'l> Teller<'_, 'l> {
         self.note(format!("really: {}", truths.join(", ")));
     }
 
-    fn fail(&mut self, words: String) {
+    fn fail(&mut self, kind: FailureKind, words: String) {
         self.note(format!("FAILED: {words}"));
-        self.fate.failures.push(words);
+        self.fate.failures.push(Failure { kind, words });
     }
 
     /// The calendar of the computer.
@@ -242,7 +259,10 @@ impl<'l> Teller<'_, 'l> {
         let closing = stop_all(&mut line, session, unfinished.trains);
         if !line.all_stopped() {
             // The end of a session takes its time; stops come first in it.
-            self.fail(format!("trains of the session before were not stopped at the start: {closing}"));
+            self.fail(
+                FailureKind::RanOn,
+                format!("trains of the session before were not stopped at the start: {closing}"),
+            );
         }
         let took = (self.now() - began).as_ms();
         self.note(format!("the next start took {took:.0} ms: {closing}"));
@@ -292,6 +312,7 @@ impl<'l> Teller<'_, 'l> {
         let mut runtime = Runtime::new(&mut line, session, Some(&mut recorder), None);
         let ended = runtime.run(&mut dispatcher, &mut people);
         let began = self.station.borrow().now();
+        disk.borrow_mut().close();
         // A living program stops its trains, whatever ended its loop.
         let closing = runtime.close();
         drop(runtime);
@@ -309,7 +330,7 @@ impl<'l> Teller<'_, 'l> {
         let (death, steps) = (life.death(), life.steps());
         self.note(format!("the loop ended after {steps} steps ({death:?}): {ended}; {closing}"));
         if let Some(trouble) = trouble {
-            self.fail(format!("the journal failed: {trouble}"));
+            self.fail(FailureKind::NotKept, format!("the journal failed: {trouble}"));
         }
         let unreachable = line.unreachable();
         self.check_incidents(incidents, &unreachable);
@@ -323,7 +344,7 @@ impl<'l> Teller<'_, 'l> {
         self.fate.grants += seen.grants;
         self.fate.intrusions += seen.intrusions.len() as u32;
         if let Some(at) = seen.stuck {
-            self.fail(format!("stuck without an alarm at {:.2} s", at.as_s()));
+            self.fail(FailureKind::Stuck, format!("stuck without an alarm at {:.2} s", at.as_s()));
         }
     }
 
@@ -340,7 +361,8 @@ impl<'l> Teller<'_, 'l> {
                 self.fate.out_of_reach += 1;
                 continue;
             }
-            self.fail(format!("{:?} of {:?} at {:.2} s", incident.kind, incident.train, incident.at.as_s()));
+            let words = format!("{:?} of {:?} at {:.2} s", incident.kind, incident.train, incident.at.as_s());
+            self.fail(incident.kind.into(), words);
         }
     }
 
@@ -361,7 +383,7 @@ impl<'l> Teller<'_, 'l> {
             Some(Death::PowerCut(_)) => disk.lose_power(&mut self.choice),
         };
         if let Err(error) = kept {
-            self.fail(format!("{error:#}"));
+            self.fail(FailureKind::NotKept, format!("{error:#}"));
         }
         let allowed = STOPPED_WITHIN + HEARD_WITHIN;
         match death {
@@ -377,7 +399,7 @@ impl<'l> Teller<'_, 'l> {
             // The program has stopped its trains itself.
             Some(Death::GuardianKilled) => {
                 if !line.all_stopped() && !line.is_cut() {
-                    self.fail("trains run after their guardian was killed".to_owned());
+                    self.fail(FailureKind::RanOn, "trains run after their guardian was killed".to_owned());
                 }
                 return Ok(());
             }
@@ -403,10 +425,14 @@ impl<'l> Teller<'_, 'l> {
                 self.fate.stopped_ms.push(took.as_ms());
                 self.note(format!("all trains were stopped after {:.0} ms", took.as_ms()));
                 if took > allowed {
-                    self.fail(format!("trains were stopped only {:.0} ms after a death", took.as_ms()));
+                    self.fail(
+                        FailureKind::RanOn,
+                        format!("trains were stopped only {:.0} ms after a death", took.as_ms()),
+                    );
                 }
             }
-            None => self.fail(format!("trains were not stopped after a death (said: {is_said})")),
+            None => self
+                .fail(FailureKind::RanOn, format!("trains were not stopped after a death (said: {is_said})")),
         }
         Ok(())
     }
