@@ -203,6 +203,20 @@ mod tests {
     }
 
     #[test]
+    fn the_first_release_divides_its_innovation_between_length_and_delay() {
+        // Of 0.4 m ± 0.5 m and 1.0 s ± 0.6 s at 0.3 m/s 0.7 m are expected. Calculated by hand:
+        // r = 2 · 0.003² + 0.3² · (0.03² + 0.06²/12) = 0.000126, s = 0.25 + 0.3² · 0.36 + r = 0.282526,
+        // gains 0.25 / s = 0.884874 and 0.3 · 0.36 / s = 0.382266.
+        let mut length = TrainLength::default();
+        assert!(length.take(&release(600.0, 300.0)));
+        assert!((length.length().value.as_mm() - 311.5126).abs() < 1e-3, "{length:?}");
+        assert!((length.release_delay().value.as_s() - 0.961_773_4).abs() < 1e-6, "{length:?}");
+        // p₀₀ = 0.25 · (1 − 0.884874), by any form of the update.
+        let deviation = length.length().uncertainty.as_m();
+        assert!((deviation * deviation - 0.028_781_5).abs() < 1e-6, "{length:?}");
+    }
+
+    #[test]
     fn one_speed_does_not() {
         let mut length = TrainLength::default();
         (0..20).for_each(|_| assert!(length.take(&release(710.0, 300.0))));

@@ -140,3 +140,30 @@ impl SpeedTrial {
         Some(MeasuredRatio { step: self.step, ratio, deviation: libm::hypot(polling, RUN_DEVIATION) })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_speed_is_measured_over_three_hops_or_over_two_of_1200_mm_together() {
+        let step = SpeedStep::new(8).unwrap();
+        let over = |hops_mm: &[f64]| {
+            let mut trial = SpeedTrial::new(step, SpeedStep::STAND);
+            trial.settled = Some(Timestamp::ZERO);
+            let window = |second: u16| {
+                let after = Timestamp::from_s(f64::from(second));
+                DetectionWindow { after, until: after + TimeSpan::from_ms(60) }
+            };
+            trial.pass(NodeId(0), window(1), None);
+            for (second, mm) in (2..).zip(hops_mm) {
+                trial.pass(NodeId(second), window(second), Some(Length::from_mm(*mm)));
+            }
+            trial.is_over()
+        };
+        assert!(!over(&[1_300.0]));
+        assert!(!over(&[600.0, 599.0]));
+        assert!(over(&[600.0, 600.0]));
+        assert!(over(&[200.0, 200.0, 200.0]));
+    }
+}

@@ -84,3 +84,14 @@ impl Range {
         Self { low: -self.high, high: -self.low }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_range_of_one_number_is_not_empty_and_one_with_its_ends_swapped_is() {
+        assert!(!Range { low: 1.5, high: 1.5 }.is_empty());
+        assert!(Range { low: 1.5, high: 1.4 }.is_empty());
+    }
+}

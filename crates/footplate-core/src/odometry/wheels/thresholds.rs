@@ -90,3 +90,16 @@ impl Thresholds {
         within("least_sliding_deceleration_m_s2", self.least_sliding_deceleration.as_m_per_s2(), 5.0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wheelset_slips_or_slides_beyond_what_the_train_can_do_by_the_noise_of_the_filter() {
+        let derived = Thresholds::derived(Acceleration::from_m_per_s2(1.2), Acceleration::from_m_per_s2(1.4));
+        // 1.2 + 0.4 and 1.4 + 0.4 m/s².
+        assert!((derived.slip_acceleration.as_m_per_s2() - 1.6).abs() < 1e-12, "{derived:?}");
+        assert!((derived.slide_deceleration.as_m_per_s2() - 1.8).abs() < 1e-12, "{derived:?}");
+    }
+}
