@@ -18,12 +18,15 @@ use crate::commands::written_layout::WrittenLayout;
 
 /// A figure of the last quarter may differ from the second by this share (a requirement): the first quarter fills what is bounded.
 const FLAT: f64 = 0.05;
+/// Errors of some 40 arrivals and processor time differ more than that by chance, and by what else the machine does (seen: errors
+/// by 28 %, time by 12 %). A fault shows beyond: the longest yet multiplied the time by four.
+const ROUGHLY_FLAT: f64 = 0.5;
 
 /// Drive for hours with a store and a dashboard, or give an odometer hours of periods, and print what each hour came to: memory,
 /// descriptors, growth of the store, processor time, accuracy.
 ///
 /// Trains are sent to random places; after a collision, a derailment or an overrun a new session begins. Exit status 1 says
-/// that a figure of the last quarter differs from the second quarter by more than 5 %.
+/// that a figure of the last quarter differs from the second quarter by more than 5 %, errors and processor time by more than 50 %.
 #[derive(Args)]
 #[command(after_help = "\
 Examples:
@@ -117,10 +120,10 @@ impl Arguments {
                 shown(cpu_s, 1),
             )?;
             output.flush()?;
-            hours.add("median error", errors(0.5), Judged::No);
-            hours.add("promises kept", Some(kept), Judged::No);
-            hours.add("state", Some(hour.state_bytes as f64), Judged::Yes);
-            hours.add("growth of the store", Some(grown as f64), Judged::Yes);
+            hours.add("median error", errors(0.5), ROUGHLY_FLAT);
+            hours.add("promises kept", Some(kept), FLAT);
+            hours.add("state", Some(hour.state_bytes as f64), FLAT);
+            hours.add("growth of the store", Some(grown as f64), FLAT);
             hours.see(&load, cpu_s);
             Ok(())
         });
@@ -160,48 +163,40 @@ impl Arguments {
                 shown(load.descriptors, 0),
                 shown(cpu_s, 2),
             )?;
-            hours.add("speed rms", rms, Judged::Yes);
-            hours.add("width of the interval", width, Judged::Yes);
+            hours.add("speed rms", rms, FLAT);
+            hours.add("width of the interval", width, FLAT);
             hours.see(&load, cpu_s);
             Ok(())
         })
     }
 }
 
-/// Whether a figure decides the exit status.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Judged {
-    Yes,
-    /// It depends on chance, or on what else the machine does.
-    No,
-}
-
-/// The figures of all hours.
+/// The figures of all hours, each with the share by which its last quarter may differ from its second.
 #[derive(Default)]
-struct Hours(Vec<(&'static str, Judged, Vec<f64>)>);
+struct Hours(Vec<(&'static str, f64, Vec<f64>)>);
 
 impl Hours {
-    fn add(&mut self, name: &'static str, value: Option<f64>, judged: Judged) {
+    fn add(&mut self, name: &'static str, value: Option<f64>, flat: f64) {
         let Some(value) = value else { return };
         match self.0.iter_mut().find(|(known, ..)| *known == name) {
             Some((.., values)) => values.push(value),
-            None => self.0.push((name, judged, vec![value])),
+            None => self.0.push((name, flat, vec![value])),
         }
     }
 
     fn see(&mut self, load: &ProcessLoad, cpu_s: Option<f64>) {
-        self.add("memory", load.memory_kb, Judged::Yes);
-        self.add("descriptors", load.descriptors, Judged::Yes);
-        self.add("CPU", cpu_s, Judged::No);
+        self.add("memory", load.memory_kb, FLAT);
+        self.add("descriptors", load.descriptors, FLAT);
+        self.add("CPU", cpu_s, ROUGHLY_FLAT);
     }
 
     /// Prints how far the last quarter of the hours differs from the second.
     fn conclude(&self, output: &mut dyn Write) -> anyhow::Result<Outcome> {
         let mut is_flat = true;
         writeln!(output)?;
-        for (name, judged, values) in &self.0 {
+        for (name, flat, values) in &self.0 {
             let Some(change) = change(values) else { continue };
-            is_flat &= *judged == Judged::No || change.abs() <= FLAT;
+            is_flat &= change.abs() <= *flat;
             writeln!(output, "{name}: last quarter {:+.1} % of the second", 100.0 * change)?;
         }
         Ok(if is_flat { Outcome::Done } else { Outcome::FallsShort })
@@ -219,6 +214,23 @@ fn change(values: &[f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_run_whose_processor_time_doubles_falls_short_and_one_that_takes_a_tenth_more_does_not() {
+        let ends = |last: f64| {
+            let mut hours = Hours::default();
+            for cpu_s in [7.0, 7.0, 7.0, last] {
+                hours.add("CPU", Some(cpu_s), ROUGHLY_FLAT);
+                hours.add("memory", Some(48_000.0), FLAT);
+            }
+            let mut page = Vec::new();
+            let outcome = hours.conclude(&mut page).unwrap();
+            (matches!(outcome, Outcome::Done), String::from_utf8(page).unwrap())
+        };
+        let (is_flat, page) = ends(7.7);
+        assert!(is_flat && page.contains("CPU: last quarter +10.0 % of the second"), "{page}");
+        assert!(!ends(14.0).0);
+    }
 
     #[test]
     fn the_last_quarter_is_compared_with_the_second() {
