@@ -11,22 +11,27 @@
     reason = "a target panics where it finds something"
 )]
 
+mod column_mapping;
 mod command;
 mod dcc_ex;
 mod dcc_ex_session;
 mod jmri;
 mod layout_file;
 mod loconet;
+mod loconet_session;
 mod marklin_can;
 mod marklin_can_session;
 mod marklin_serial;
 mod marklin_serial_session;
+mod measurements;
 mod odometer;
+mod parquet;
 mod sensor_log;
 mod speed_profile;
 mod tachometer_recording;
 mod trains_and_lines;
 mod vehicle_file;
+mod withrottle;
 mod z21;
 mod z21_session;
 
@@ -124,6 +129,44 @@ const PROFILE: &[&[u8]] = &[
 ];
 const VEHICLE: &[&[u8]] =
     &[odometer::VEHICLE.as_bytes(), b"-1", b"1e309", b"nan", b"axle = ", b"[[wheelset]]\n", b"\""];
+const PHONE: &[&[u8]] = &[
+    b"NPhone\n",
+    b"HU1234\n",
+    b"*+\n",
+    b"M0+S24<;>S24\n",
+    b"M0+L3850<;>L3850\n",
+    b"M0A*<;>V63\n",
+    b"M0A*<;>R0\n",
+    b"M0A*<;>F12\n",
+    b"M0AS24<;>X\n",
+    b"M0-*<;>r\n",
+    b"PPA0\n",
+    b"PTAC2\n",
+    b"Q\n",
+    b"!A\n",
+    b"?\n",
+];
+const NAMES: &[&[u8]] = &[
+    b"t_s=t\nspeed_1_km_h=v1\nspeed_2_km_h=v2\n---\nt,v1,v2\n0.0,10,10\n0.05,10,10.5\n",
+    b"pulses_1 = \"a\"\npulses_2 = \"b\"\n",
+    b"counter_1=a\n",
+    b"run_id=run\n",
+    b"t_ms=t\n",
+    b"speed_1_m_s=v\n",
+    b"\n---\n",
+    b"1e309",
+    b"nan",
+    b",",
+    b"\"",
+];
+const ACCELERATION: &[&[u8]] = &[
+    b"t_s,ax_m_s2,ay_m_s2,az_m_s2\n0.0,0.1,0.0,9.81\n0.01,0.2,0.0,9.81\n",
+    b"t_s,accel_m_s2\n",
+    b"nan",
+    b"1e309",
+];
+const MODEL: &[&[u8]] =
+    &[b"model_version = ", b"[[steps]]\n", b"{\"train\":24,", b"null", b"-1", b"1e309", b"nan", b"["];
 const TACHOMETER: &[&str] = &["testdata/tachometer"];
 
 const fn target(
@@ -142,6 +185,8 @@ const TARGETS: &[Target] = &[
     target("dcc_ex_session", dcc_ex_session::fuzz, &[], BOARD),
     target("jmri", jmri::fuzz, &["testdata/wire/jmri.csv"], MESSAGES),
     target("loconet", loconet::fuzz, &["testdata/wire/loconet.csv"], LINES),
+    target("loconet_session", loconet_session::fuzz, &["testdata/wire/loconet.csv"], LINES),
+    target("withrottle", withrottle::fuzz, &[], PHONE),
     target("marklin_can", marklin_can::fuzz, &[], FRAMES),
     target("marklin_can_session", marklin_can_session::fuzz, &[], FRAMES),
     target("z21", z21::fuzz, &[], DATASETS),
@@ -152,6 +197,13 @@ const TARGETS: &[Target] = &[
     target("trains_and_lines", trains_and_lines::fuzz, &["testdata/trains", "testdata/lines"], TEXT),
     target("vehicle_file", vehicle_file::fuzz, &[], VEHICLE),
     target("tachometer_recording", tachometer_recording::fuzz, TACHOMETER, TEXT),
+    target("parquet", parquet::fuzz, &[], BYTES),
+    target("column_mapping", column_mapping::fuzz, &[], NAMES),
+    target("accelerometer", measurements::accelerometer, &[], ACCELERATION),
+    target("position_series", measurements::position_series, &["testdata/position-series"], TEXT),
+    target("short_moves", measurements::short_moves, &["testdata/short-moves"], TEXT),
+    target("published_table", measurements::published_table, &["testdata/published-tables"], TEXT),
+    target("motion_file", measurements::motion_file, &[], MODEL),
     target("orders", footplate::fuzzed::orders, &["testdata/orders"], ORDERS),
     target("http_body", footplate::fuzzed::http_body, &["testdata/http-bodies"], JSON),
     target("odometer", odometer::fuzz, TACHOMETER, TEXT),
@@ -251,12 +303,16 @@ fn trouble(target: &Target, input: &[u8]) -> Option<String> {
     }
 }
 
-/// The files of folders, short ones first; nothing that is not there.
-fn inputs(folders: &[&str]) -> Vec<Vec<u8>> {
+/// The files, and those of the folders, in the order of their bytes; nothing that is not there.
+fn inputs(begins: &[&str]) -> Vec<Vec<u8>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let entries = folders.iter().filter_map(|folder| std::fs::read_dir(root.join(folder)).ok());
-    let mut files: Vec<Vec<u8>> =
-        entries.flatten().filter_map(|entry| std::fs::read(entry.ok()?.path()).ok()).collect();
+    let paths = begins.iter().flat_map(|begin| {
+        let path = root.join(begin);
+        let inside = std::fs::read_dir(&path).into_iter().flatten().filter_map(Result::ok);
+        let inside: Vec<PathBuf> = inside.map(|entry| entry.path()).collect();
+        if path.is_file() { vec![path] } else { inside }
+    });
+    let mut files: Vec<Vec<u8>> = paths.filter_map(|path| std::fs::read(path).ok()).collect();
     files.sort();
     files.iter_mut().for_each(|file| file.truncate(LONGEST));
     files
