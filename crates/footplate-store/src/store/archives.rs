@@ -14,11 +14,10 @@ use rusqlite::{Connection, Error, ToSql, Transaction};
 
 use super::checksum;
 use super::decisions::{MachineKey, Side, Traced, loose};
+use super::packed_body::LEVEL;
 
 /// The inputs and decisions that are rows of their own, at most (chosen: six minutes of two trains, 0.1 MB).
 pub(super) const MOST_LOOSE: u64 = 1_024;
-/// The usual level of compression of zlib.
-const LEVEL: u8 = 6;
 /// The longest body, unpacked: 16 kB for each entry, where a long one has 1 kB. Somebody else's file may hold anything.
 const MOST_BYTES: usize = 16 << 20;
 
@@ -59,12 +58,8 @@ fn insert(transaction: &Transaction<'_>, machine: MachineKey, part: &[Traced]) -
     let body = packed(part).map_err(|error| Error::ToSqlConversionFailure(error.into()))?;
     let values: [&dyn ToSql; 7] =
         [&machine.0, &first.number, &last.number, &inputs, &(part.len() as u64 - inputs), &has_end, &body];
-    let sql = format!(
-        "INSERT INTO archives (machine, first, last, inputs, decisions, has_end, body, {}) \
-         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",
-        checksum::COLUMN
-    );
-    checksum::insert(&mut transaction.prepare(&sql)?, "archives", &values)
+    let columns = ["machine", "first", "last", "inputs", "decisions", "has_end", "body"];
+    checksum::append(transaction, "archives", &columns, &values)
 }
 
 /// The archived inputs and decisions of a machine, in order.

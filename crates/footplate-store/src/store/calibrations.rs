@@ -1,10 +1,13 @@
 //! Calibrations: models of trains, with the date of the events that they follow from.
 
 use footplate_core::{Timestamp, TrainId};
-use rusqlite::{ErrorCode, Row};
+use rusqlite::{ErrorCode, Row, ToSql};
+use serde::Deserialize;
 
+use super::checksum;
 use super::error::StoreError;
 use super::file::Store;
+use super::packed_body::PackedBody;
 
 /// A calibration to store.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,7 +37,21 @@ pub struct Calibration {
     pub body: String,
 }
 
-const COLUMNS: &str = "train, made_at_ns, as_of_ns, model_version, body";
+impl Calibration {
+    /// Whether its model is one of this layout.
+    fn is_on(&self, layout: &str) -> bool {
+        let on: Option<LayoutOfModel> = serde_json::from_str(&self.body).ok();
+        on.is_some_and(|on| on.layout == layout)
+    }
+}
+
+/// What a model says of the layout that it is of.
+#[derive(Deserialize)]
+struct LayoutOfModel {
+    layout: String,
+}
+
+const COLUMNS: &str = "train, made_at_ns, as_of_ns, model_version, body, packed";
 /// The value of the column `kind` for models. Older programs stored fits of another form as `recordings`: they stay in the
 /// table and are not read as models.
 const KIND: &str = "motion";
@@ -42,10 +59,12 @@ const KIND: &str = "motion";
 impl Store {
     /// Stores a calibration; earlier ones stay.
     pub fn keep_calibration(&mut self, new: NewCalibration<'_>, now: Timestamp) -> Result<(), StoreError> {
-        let sql = format!("INSERT INTO calibrations (kind, {COLUMNS}) VALUES (?1, ?2, ?3, ?4, ?5, ?6)");
-        let row = (KIND, new.train.0, now.as_ns(), new.as_of.as_ns(), new.model_version, new.body);
-        match self.connection.execute(&sql, row) {
-            Ok(_) => Ok(()),
+        let columns = ["train", "made_at_ns", "as_of_ns", "model_version", "body", "kind", "packed"];
+        let PackedBody { body, packed } = PackedBody::of(new.body);
+        let values: [&dyn ToSql; 7] =
+            [&new.train.0, &now.as_ns(), &new.as_of.as_ns(), &new.model_version, &body, &KIND, &packed];
+        match checksum::append(&self.connection, "calibrations", &columns, &values) {
+            Ok(()) => Ok(()),
             // The only constraint that these types can violate.
             Err(error) if error.sqlite_error_code() == Some(ErrorCode::ConstraintViolation) => {
                 Err(StoreError::NotJson { train: new.train })
@@ -73,9 +92,20 @@ impl Store {
     ) -> Result<Option<Calibration>, StoreError> {
         let sql = format!(
             "SELECT {COLUMNS} FROM calibrations WHERE kind = ?1 AND train = ?2 AND made_at_ns <= ?3 \
-             AND json_extract(body, '$.layout') = ?4 ORDER BY id DESC LIMIT 1"
+             ORDER BY id DESC"
         );
-        Ok(self.rows(&sql, (KIND, train.0, at.as_ns(), layout), read)?.pop())
+        let newest = || {
+            let mut statement = self.connection.prepare_cached(&sql)?;
+            let mut rows = statement.query((KIND, train.0, at.as_ns()))?;
+            while let Some(row) = rows.next()? {
+                let calibration = read(row)?;
+                if calibration.is_on(layout) {
+                    return Ok(Some(calibration));
+                }
+            }
+            Ok(None)
+        };
+        newest().map_err(|error| self.error(error))
     }
 
     /// All calibrations of a train in the order of their making, including older forms.
@@ -98,6 +128,6 @@ fn read(row: &Row<'_>) -> rusqlite::Result<Calibration> {
         made_at: Timestamp::from_ns(row.get(1)?),
         as_of: Timestamp::from_ns(row.get(2)?),
         model_version: row.get(3)?,
-        body: row.get(4)?,
+        body: PackedBody::text(row, 4)?,
     })
 }

@@ -4,10 +4,26 @@ use crc32fast::Hasher;
 use rusqlite::types::{ToSqlOutput, Value, ValueRef};
 use rusqlite::{Connection, Statement, ToSql, params_from_iter};
 
-/// The tables whose rows have a checksum. It is the last column of each; rows of older programs have none there.
-pub(super) const TABLES: [&str; 4] = ["events", "inputs", "decisions", "archives"];
+/// The tables whose rows have a checksum: all but `replays`, whose bodies have their own. It is the last column of each; rows of
+/// older programs have none there.
+pub(super) const TABLES: [&str; 14] = [
+    "recordings",
+    "runs",
+    "starts",
+    "events",
+    "gate_passes",
+    "marks",
+    "calibrations",
+    "profiles",
+    "schedules",
+    "directions",
+    "machines",
+    "inputs",
+    "decisions",
+    "archives",
+];
 /// The column of the checksum.
-pub(super) const COLUMN: &str = "crc32";
+const COLUMN: &str = "crc32";
 
 /// Returns the CRC-32 of a table's name and the values of a row, in the order of the table's columns, without the row's number and the
 /// checksum itself. Types and lengths are included, so that no two rows are the same bytes.
@@ -51,6 +67,18 @@ pub(super) fn changed_row(connection: &Connection, table: &str) -> rusqlite::Res
     Ok(None)
 }
 
+/// Appends a row with its checksum. `columns` are all columns of the table but its first and its last, in its order.
+pub(super) fn append(
+    connection: &Connection,
+    table: &str,
+    columns: &[&str],
+    values: &[&dyn ToSql],
+) -> rusqlite::Result<()> {
+    let places = vec!["?"; columns.len() + 1].join(", ");
+    let sql = format!("INSERT INTO {table} ({}, {COLUMN}) VALUES ({places})", columns.join(", "));
+    insert(&mut *connection.prepare_cached(&sql)?, table, values)
+}
+
 /// Inserts a row whose checksum is the last parameter of the statement. `values` are those before it, in the order of the table's
 /// columns.
 pub(super) fn insert(
@@ -70,14 +98,15 @@ pub(super) fn insert(
     Ok(())
 }
 
-/// Whether a row of a table matches its checksum; `values` begin with its number. Only whole rows of [`TABLES`] have one.
-pub(super) fn holds(table: &str, columns: &[String], values: &[Value]) -> bool {
+/// Whether a row of a table matches its checksum; `values` begin with its number. `None` if it has none: only whole rows of
+/// [`TABLES`] do.
+pub(super) fn matches(table: &str, columns: &[String], values: &[Value]) -> Option<bool> {
     match values {
         [_, values @ .., Value::Integer(written)]
             if TABLES.contains(&table) && columns.last().is_some_and(|last| last == COLUMN) =>
         {
-            i64::from(of(table, values.iter().map(ValueRef::from))) == *written
+            Some(i64::from(of(table, values.iter().map(ValueRef::from))) == *written)
         }
-        _ => true,
+        _ => None,
     }
 }

@@ -12,6 +12,7 @@ use super::archives::archived;
 use super::checksum;
 use super::error::StoreError;
 use super::file::Store;
+use super::packed_body::PackedBody;
 use super::recordings::RecordingKey;
 use crate::content_hash::ContentHash;
 
@@ -88,11 +89,13 @@ impl Store {
         new: NewMachine<'_>,
         now: Timestamp,
     ) -> Result<MachineKey, StoreError> {
-        let sql = "INSERT INTO machines (recording, stored_at_ns, kind, program, body, body_sha256) \
-                   VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
+        let columns = ["recording", "stored_at_ns", "kind", "program", "body", "body_sha256", "packed"];
         let hash = ContentHash::of(new.body.as_bytes()).to_string();
-        let row = (recording.0, now.as_ns(), new.kind, new.program, new.body, hash);
-        self.connection.execute(sql, row).map_err(|error| self.error(error))?;
+        let PackedBody { body, packed } = PackedBody::of(new.body);
+        let values: [&dyn ToSql; 7] =
+            [&recording.0, &now.as_ns(), &new.kind, &new.program, &body, &hash, &packed];
+        checksum::append(&self.connection, "machines", &columns, &values)
+            .map_err(|error| self.error(error))?;
         Ok(MachineKey(self.connection.last_insert_rowid()))
     }
 
@@ -101,7 +104,7 @@ impl Store {
     /// # Errors
     /// The store cannot be read.
     pub fn machines(&self) -> Result<Vec<StoredMachine>, StoreError> {
-        let sql = "SELECT id, recording, stored_at_ns, kind, program, body, body_sha256, \
+        let sql = "SELECT id, recording, stored_at_ns, kind, program, body, packed, body_sha256, \
                    (SELECT count(*) FROM inputs WHERE machine = machines.id) + \
                    (SELECT ifnull(sum(inputs), 0) FROM archives WHERE machine = machines.id), \
                    (SELECT count(*) FROM decisions WHERE machine = machines.id) + \
@@ -136,8 +139,9 @@ pub(super) fn loose(connection: &Connection, machine: MachineKey) -> rusqlite::R
 }
 
 fn machine(row: &Row<'_>) -> rusqlite::Result<StoredMachine> {
-    let body: String = row.get(5)?;
-    let hash: String = row.get(6)?;
+    // A body that does not unpack is not whole.
+    let body = PackedBody::text(row, 5).unwrap_or_default();
+    let hash: String = row.get(7)?;
     Ok(StoredMachine {
         key: MachineKey(row.get(0)?),
         recording: RecordingKey(row.get(1)?),
@@ -146,8 +150,8 @@ fn machine(row: &Row<'_>) -> rusqlite::Result<StoredMachine> {
         program: row.get(4)?,
         is_whole: ContentHash::of(body.as_bytes()).to_string() == hash,
         body,
-        inputs: row.get(7)?,
-        decisions: row.get(8)?,
+        inputs: row.get(8)?,
+        decisions: row.get(9)?,
     })
 }
 
@@ -171,12 +175,7 @@ pub(super) fn insert(
         Side::Input => "inputs",
         Side::Decision => "decisions",
     };
-    let sql = format!(
-        "INSERT INTO {table} (machine, number, time_ns, kind, text, {}) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
-        checksum::COLUMN
-    );
     let values: [&dyn ToSql; 5] =
         [&machine.0, &traced.number, &traced.time.as_ns(), &traced.kind.as_ref(), &traced.text];
-    let mut statement = transaction.prepare_cached(&sql)?;
-    checksum::insert(&mut statement, table, &values)
+    checksum::append(transaction, table, &["machine", "number", "time_ns", "kind", "text"], &values)
 }

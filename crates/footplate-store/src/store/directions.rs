@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use footplate_core::{Timestamp, TrainId};
 use rusqlite::Connection;
 
+use super::checksum;
 use super::error::StoreError;
 use super::file::Store;
 
@@ -20,8 +21,8 @@ pub struct Direction {
 /// Appends one.
 pub(super) fn insert(connection: &Connection, direction: Direction, now: Timestamp) -> rusqlite::Result<()> {
     let Direction { train, forward } = direction;
-    let sql = "INSERT INTO directions (train, forward, stored_at_ns) VALUES (?1, ?2, ?3)";
-    connection.prepare_cached(sql)?.execute((train.0, forward, now.as_ns())).map(drop)
+    let columns = ["train", "forward", "stored_at_ns"];
+    checksum::append(connection, "directions", &columns, &[&train.0, &forward, &now.as_ns()])
 }
 
 impl Store {

@@ -1,12 +1,16 @@
 //! The file of a store: opens, creates and migrates it, and grants write access.
 
+use std::ffi::OsStr;
+use std::fs::{self, OpenOptions};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use rusqlite::{Connection, OpenFlags, Transaction, TransactionBehavior};
+use tempfile::TempDir;
 
 use super::checksum;
 use super::error::StoreError;
+use super::write_ahead_log::{self, UnreadLog};
 
 /// Marks the file as a store for other tools: `Foot` in ASCII (`PRAGMA application_id`).
 const APPLICATION_ID: i64 = 0x466F_6F74;
@@ -23,6 +27,7 @@ const MIGRATIONS: &[&str] = &[
     include_str!("migrations/7_schedules.sql"),
     include_str!("migrations/8_archives.sql"),
     include_str!("migrations/9_directions.sql"),
+    include_str!("migrations/10_checksums_of_all.sql"),
 ];
 
 /// The longest wait for another process to finish writing (chosen: an import of a million events takes less).
@@ -36,6 +41,10 @@ const PATIENCE: Duration = Duration::from_secs(5);
 pub struct Store {
     path: PathBuf,
     pub(super) connection: Connection,
+    /// What acknowledged commits the log has lost.
+    lost_commits: Option<String>,
+    /// The folder of the copy that is read in place of the file at `path`.
+    _copy: Option<TempDir>,
 }
 
 impl Store {
@@ -47,18 +56,90 @@ impl Store {
         Self::open_with(path, OpenFlags::SQLITE_OPEN_READ_WRITE, MIGRATIONS)
     }
 
-    /// Opens the store at `path` read-only. If an older Footplate made it, it is migrated first.
+    /// Opens the store at `path` read-only, in a folder that cannot be written, too. One of an older version is read from a migrated
+    /// copy in a temporary folder.
     pub fn open_to_read(path: &Path) -> Result<Self, StoreError> {
         if !path.try_exists().unwrap_or(true) {
             return Err(StoreError::Missing { file: path.to_owned() });
         }
-        let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
-        let connection =
-            Connection::open_with_flags(path, flags).map_err(|error| StoreError::of(path, error))?;
-        let store = Self { path: path.to_owned(), connection };
-        store.set_up().map_err(|error| store.error(error))?;
+        let unread = UnreadLog::beside(path)?.filter(UnreadLog::is_loss);
+        let has_log = fs::metadata(write_ahead_log::path_of(path)).is_ok_and(|log| log.len() > 0);
+        // Nobody is writing to a store without a log that is ours only to read.
+        let is_fixed = !has_log && OpenOptions::new().write(true).open(path).is_err();
+        let opened = if is_fixed { Self::open_fixed(path) } else { Self::open_shared(path) };
+        let opened = match opened {
+            // SQLite shares a log through a file that it cannot make here.
+            Err(StoreError::ReadOnly { .. }) if has_log => Self::open_copy(path, |copy| {
+                let copied = fs::copy(path, copy)
+                    .and_then(|_| fs::copy(write_ahead_log::path_of(path), write_ahead_log::path_of(copy)));
+                let doing = "make a copy, to read it, of";
+                copied.map(drop).map_err(|source| StoreError::System { file: path.to_owned(), doing, source })
+            }),
+            Err(StoreError::ReadOnly { .. }) if !is_fixed => Self::open_fixed(path),
+            other => other,
+        };
         let known = MIGRATIONS.len() as i64;
-        if store.version(known)? == known { Ok(store) } else { Self::open(path) }
+        let mut store = opened?;
+        if store.version(known)? != known {
+            store = Self::open_copy(path, |copy| {
+                let copy = copy.to_string_lossy();
+                store
+                    .connection
+                    .execute("VACUUM INTO ?1", [copy])
+                    .map(drop)
+                    .map_err(|error| store.error(error))
+            })?;
+        }
+        store.lost_commits = unread.map(|unread| unread.to_string());
+        Ok(store)
+    }
+
+    /// Opens a file that others may be writing to.
+    fn open_shared(path: &Path) -> Result<Self, StoreError> {
+        Self::open_read_only(path, path.as_os_str(), OpenFlags::empty())
+    }
+
+    /// Opens a file that nobody writes to, without the files that SQLite makes beside one.
+    fn open_fixed(path: &Path) -> Result<Self, StoreError> {
+        let mut address = String::from("file:");
+        for byte in path.as_os_str().as_encoded_bytes() {
+            match byte {
+                b'/' | b'.' | b'-' | b'_' => address.push(char::from(*byte)),
+                byte if byte.is_ascii_alphanumeric() => address.push(char::from(*byte)),
+                byte => address.push_str(&format!("%{byte:02X}")),
+            }
+        }
+        address.push_str("?immutable=1");
+        Self::open_read_only(path, OsStr::new(&address), OpenFlags::SQLITE_OPEN_URI)
+    }
+
+    fn open_read_only(path: &Path, name: &OsStr, more: OpenFlags) -> Result<Self, StoreError> {
+        let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX | more;
+        let connection =
+            Connection::open_with_flags(name, flags).map_err(|error| StoreError::of(path, error))?;
+        let store = Self { path: path.to_owned(), connection, lost_commits: None, _copy: None };
+        store.set_up().map_err(|error| store.error(error))?;
+        store.version(MIGRATIONS.len() as i64)?;
+        Ok(store)
+    }
+
+    /// Opens a copy of the file at `path`, which `make` makes, migrated and to be read only.
+    fn open_copy(
+        path: &Path,
+        make: impl FnOnce(&Path) -> Result<(), StoreError>,
+    ) -> Result<Self, StoreError> {
+        let doing = "make a temporary folder to read";
+        let folder = tempfile::tempdir().map_err(|source| StoreError::System {
+            file: path.to_owned(),
+            doing,
+            source,
+        })?;
+        let copy = folder.path().join("copy.db");
+        make(&copy)?;
+        let mut store = Self::open_with(&copy, OpenFlags::SQLITE_OPEN_READ_WRITE, MIGRATIONS)?;
+        store.connection.pragma_update(None, "query_only", true).map_err(|error| store.error(error))?;
+        (store.path, store._copy) = (path.to_owned(), Some(folder));
+        Ok(store)
     }
 
     /// Opens the store at `path`, or creates an empty one.
@@ -93,6 +174,9 @@ impl Store {
 
     /// Checks every page, every reference and the checksum of every row. Takes as long as reading the file.
     pub fn check(&self) -> Result<(), StoreError> {
+        if let Some(what) = self.lost_commits.clone() {
+            return Err(StoreError::Damaged { file: self.path.clone(), what });
+        }
         let check = || {
             let mut statement = self.connection.prepare("PRAGMA integrity_check(1)")?;
             let found: String = statement.query_row([], |row| row.get(0))?;
@@ -119,15 +203,24 @@ impl Store {
     }
 
     fn open_with(path: &Path, flags: OpenFlags, migrations: &[&str]) -> Result<Self, StoreError> {
+        let unread = UnreadLog::beside(path)?;
+        // What is written next would take the place of what can still be salvaged.
+        if let Some(lost) = unread.as_ref().filter(|unread| unread.is_loss()) {
+            return Err(StoreError::Damaged { file: path.to_owned(), what: lost.to_string() });
+        }
         let connection = Connection::open_with_flags(path, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)
             .map_err(|error| StoreError::of(path, error))?;
-        let mut store = Self { path: path.to_owned(), connection };
+        let mut store = Self { path: path.to_owned(), connection, lost_commits: None, _copy: None };
         store.set_up().map_err(|error| store.error(error))?;
         store.migrate(migrations)?;
         // Only a file of ours is switched to a write-ahead log, a setting that stays in the file.
         let journal: Result<String, _> =
             store.connection.query_row("PRAGMA journal_mode = WAL", [], |row| row.get(0));
         journal.map_err(|error| store.error(error))?;
+        if unread.is_some() {
+            // Begins the log again, so that no rest of a commit that was cut off stays behind new ones.
+            let _ = store.connection.execute_batch("PRAGMA wal_checkpoint(TRUNCATE)");
+        }
         Ok(store)
     }
 
@@ -282,10 +375,26 @@ mod tests {
         assert!(store.write().is_err() || store.connection.execute("DELETE FROM replays", []).is_err());
         drop(store);
         assert_eq!(std::fs::read(&path).unwrap(), before);
-        // An older version has to be migrated before it can be read.
+        // One of an older version is not migrated where it is.
         let old = folder.path().join("old.db");
         drop(Store::open_with(&old, FLAGS, &MIGRATIONS[..2]).unwrap());
-        assert!(Store::open_to_read(&old).unwrap().check().is_ok());
+        let before = std::fs::read(&old).unwrap();
+        let mut store = Store::open_to_read(&old).unwrap();
+        store.check().unwrap();
+        assert_eq!((store.path(), version_of(&store.connection).unwrap()), (&*old, MIGRATIONS.len() as i64));
+        assert!(store.write().is_err() || store.connection.execute("DELETE FROM replays", []).is_err());
+        drop(store);
+        assert_eq!(std::fs::read(&old).unwrap(), before);
+    }
+
+    #[test]
+    fn a_file_that_nobody_writes_to_is_read_without_one_beside_it() {
+        let folder = folder();
+        let path = folder.path().join("evening 100%?.db");
+        drop(Store::open_or_create(&path).unwrap());
+        let store = Store::open_fixed(&path).unwrap();
+        store.check().unwrap();
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
     #[test]

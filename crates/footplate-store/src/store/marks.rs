@@ -4,6 +4,7 @@ use footplate_core::Timestamp;
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ToSql, ToSqlOutput, ValueRef};
 use rusqlite::{OptionalExtension, Transaction};
 
+use super::checksum;
 use super::error::StoreError;
 use super::file::Store;
 use super::recordings::EventKey;
@@ -84,10 +85,8 @@ impl Store {
             if let Some(objection) = objection(&transaction, *event, kind).map_err(error)? {
                 return Err(objection);
             }
-            let insert = "INSERT INTO marks (event, mark, reason, made_at_ns) VALUES (?1, ?2, ?3, ?4)";
-            transaction
-                .prepare_cached(insert)
-                .and_then(|mut statement| statement.execute((event.0, kind, reason, now.as_ns())))
+            let columns = ["event", "mark", "reason", "made_at_ns"];
+            checksum::append(&transaction, "marks", &columns, &[&event.0, &kind, &reason, &now.as_ns()])
                 .map_err(error)?;
         }
         transaction.commit().map_err(error)

@@ -18,7 +18,9 @@
 //! directions    the direction that each decoder was commanded in last
 //! replays       the state of a replay of all sessions, from which the next one continues
 //! checksum      checksums of rows, which detect changed values
+//! packed_body   long JSON texts, compressed
 //! unfinished    the session that was running when the program died
+//! write_ahead_log  what SQLite does not read of a damaged log
 //! salvage       copies the readable rows of a damaged file into a new one
 //! ```
 
@@ -32,6 +34,7 @@ mod file;
 mod history;
 mod journal;
 mod marks;
+mod packed_body;
 mod profiles;
 mod recordings;
 mod replays;
@@ -39,6 +42,7 @@ mod row;
 mod salvage;
 mod schedules;
 mod unfinished;
+mod write_ahead_log;
 
 pub use calibrations::{Calibration, NewCalibration};
 pub use decisions::{MachineKey, NewMachine, Side, StoredMachine, Traced};

@@ -4,6 +4,7 @@ use footplate_core::{Timestamp, TrainId};
 use rusqlite::Row;
 use rusqlite::types::Type;
 
+use super::checksum;
 use super::error::StoreError;
 use super::file::Store;
 use crate::speed_profile::SpeedProfile;
@@ -20,11 +21,9 @@ impl Store {
         let body =
             profile.map(serde_json::to_string).transpose().map_err(|_| StoreError::NotJson { train })?;
         let source = profile.map_or("withdrawn", |profile| profile.source.as_str());
-        let sql = "INSERT INTO profiles (train, stored_at_ns, source, body) VALUES (?1, ?2, ?3, ?4)";
-        self.connection
-            .execute(sql, (train.0, now.as_ns(), source, body))
-            .map_err(|error| self.error(error))?;
-        Ok(())
+        let columns = ["train", "stored_at_ns", "source", "body"];
+        checksum::append(&self.connection, "profiles", &columns, &[&train.0, &now.as_ns(), &source, &body])
+            .map_err(|error| self.error(error))
     }
 
     /// The profile in force for a train at a date.

@@ -3,8 +3,9 @@
 use std::fmt;
 
 use footplate_core::{Event, RunId, Timestamp};
-use rusqlite::{OptionalExtension, Transaction};
+use rusqlite::{Connection, OptionalExtension, ToSql, Transaction};
 
+use super::checksum;
 use super::error::StoreError;
 use super::file::Store;
 use super::row;
@@ -84,9 +85,7 @@ impl Store {
         layout: &str,
         now: Timestamp,
     ) -> Result<RecordingKey, StoreError> {
-        let insert = "INSERT INTO recordings (name, form, layout, stored_at_ns) VALUES (?1, ?2, ?3, ?4)";
-        self.connection
-            .execute(insert, (name, LIVE, layout, now.as_ns()))
+        insert_recording(&self.connection, name, LIVE, layout, None, now)
             .map_err(|error| self.error(error))?;
         Ok(RecordingKey(self.connection.last_insert_rowid()))
     }
@@ -141,10 +140,7 @@ fn import(
     if let Some((recording, stored_at)) = there {
         return Ok(Import::AlreadyThere { recording, stored_at });
     }
-    transaction.execute(
-        "INSERT INTO recordings (name, form, layout, content_sha256, stored_at_ns) VALUES (?1, ?2, ?3, ?4, ?5)",
-        (&recording.name, recording.form.name(), layout, content, now.as_ns()),
-    )?;
+    insert_recording(transaction, &recording.name, recording.form.name(), layout, Some(&content), now)?;
     let key = RecordingKey(transaction.last_insert_rowid());
     for run in &recording.runs {
         import_run(transaction, key, run, now)?;
@@ -163,12 +159,25 @@ fn import_run(
     for raw in &run.events {
         row::insert(&mut statement, key, Some(raw.line), now, raw.event)?;
     }
-    let insert = "INSERT INTO gate_passes (run, line, gate, time_ns) VALUES (?1, ?2, ?3, ?4)";
-    let mut statement = transaction.prepare_cached(insert)?;
     for pass in &run.gates {
-        statement.execute((key.0, i64::try_from(pass.line).ok(), pass.gate, pass.time.as_ns()))?;
+        let values: [&dyn ToSql; 4] =
+            [&key.0, &i64::try_from(pass.line).ok(), &pass.gate, &pass.time.as_ns()];
+        checksum::append(transaction, "gate_passes", &["run", "line", "gate", "time_ns"], &values)?;
     }
     Ok(())
+}
+
+/// Appends a recording; one of a live session has no content.
+fn insert_recording(
+    connection: &Connection,
+    name: &str,
+    form: &str,
+    layout: &str,
+    content: Option<&str>,
+    now: Timestamp,
+) -> rusqlite::Result<()> {
+    let columns = ["name", "form", "layout", "content_sha256", "stored_at_ns"];
+    checksum::append(connection, "recordings", &columns, &[&name, &form, &layout, &content, &now.as_ns()])
 }
 
 fn insert_run(
@@ -178,14 +187,12 @@ fn insert_run(
     began_at: Option<Timestamp>,
     trains: &[TrainAtStart],
 ) -> rusqlite::Result<RunKey> {
-    transaction
-        .prepare_cached("INSERT INTO runs (recording, number, began_at_ns) VALUES (?1, ?2, ?3)")?
-        .execute((recording.0, id.0, began_at.map(Timestamp::as_ns)))?;
+    let values: [&dyn ToSql; 3] = [&recording.0, &id.0, &began_at.map(Timestamp::as_ns)];
+    checksum::append(transaction, "runs", &["recording", "number", "began_at_ns"], &values)?;
     let run = RunKey(transaction.last_insert_rowid());
-    let mut statement =
-        transaction.prepare_cached("INSERT INTO starts (run, train, step) VALUES (?1, ?2, ?3)")?;
     for at_start in trains {
-        statement.execute((run.0, at_start.train.0, at_start.step.get()))?;
+        let values: [&dyn ToSql; 3] = [&run.0, &at_start.train.0, &at_start.step.get()];
+        checksum::append(transaction, "starts", &["run", "train", "step"], &values)?;
     }
     Ok(run)
 }

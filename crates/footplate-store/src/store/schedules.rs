@@ -5,6 +5,7 @@ use rusqlite::Row;
 use rusqlite::types::Type;
 use serde::{Deserialize, Serialize};
 
+use super::checksum;
 use super::error::StoreError;
 use super::file::Store;
 
@@ -54,9 +55,9 @@ impl Store {
     ) -> Result<(), StoreError> {
         // Text and whole numbers always have a form in JSON.
         let body = schedule.and_then(|schedule| serde_json::to_string(schedule).ok());
-        let sql = "INSERT INTO schedules (layout, name, stored_at_ns, body) VALUES (?1, ?2, ?3, ?4)";
-        self.connection.execute(sql, (layout, name, now.as_ns(), body)).map_err(|error| self.error(error))?;
-        Ok(())
+        let columns = ["layout", "name", "stored_at_ns", "body"];
+        checksum::append(&self.connection, "schedules", &columns, &[&layout, &name, &now.as_ns(), &body])
+            .map_err(|error| self.error(error))
     }
 
     /// The schedules of a layout, by name.

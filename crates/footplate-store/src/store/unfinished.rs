@@ -3,30 +3,26 @@
 use std::collections::BTreeSet;
 
 use footplate_core::TrainId;
-use rusqlite::{OptionalExtension, params};
+use rusqlite::params;
+use serde_json::Value;
 
 use super::error::StoreError;
 use super::file::Store;
+use super::packed_body::PackedBody;
 
-/// The newest machine that decided over a real line. What a simulated railway left running ended with its program, so a
-/// simulated session does not hide a real one that has no end.
-const NEWEST: &str = "SELECT machines.id, recordings.name FROM machines \
-     JOIN recordings ON recordings.id = machines.recording \
-     WHERE coalesce(json_extract(machines.body, '$.is_simulated'), 0) = 0 \
-     ORDER BY machines.id DESC LIMIT 1";
+/// Machines, the newest first, with the session of each.
+const MACHINES: &str = "SELECT machines.id, recordings.name, machines.body, machines.packed FROM machines \
+     JOIN recordings ON recordings.id = machines.recording ORDER BY machines.id DESC";
 
 /// Whether the machine `?1` has an end.
 const HAS_END: &str = "SELECT EXISTS (SELECT 1 FROM inputs WHERE machine = ?1 AND kind = 'end') \
      OR EXISTS (SELECT 1 FROM archives WHERE machine = ?1 AND has_end)";
 
 /// The trains of each part of a store, each read by itself so that damage of one leaves the others.
-const TRAINS: [&str; 4] = [
+const TRAINS: [&str; 3] = [
     "SELECT DISTINCT train FROM events WHERE train IS NOT NULL",
     "SELECT DISTINCT train FROM calibrations",
     "SELECT DISTINCT train FROM directions",
-    "SELECT part.value FROM json_tree((SELECT body FROM machines \
-     WHERE coalesce(json_extract(body, '$.is_simulated'), 0) = 0 ORDER BY id DESC LIMIT 1)) AS part \
-     WHERE part.key = 'train' AND part.type = 'integer' AND part.value BETWEEN 0 AND 65535",
 ];
 
 /// A session over a real line whose last machine has no end: its trains may still be running.
@@ -39,6 +35,14 @@ pub struct UnfinishedSession {
     pub trains: Vec<TrainId>,
 }
 
+/// The newest machine that decided over a real line. What a simulated railway left running ended with its program, so a
+/// simulated session does not hide a real one that has no end.
+struct NewestMachine {
+    id: i64,
+    session: String,
+    body: Value,
+}
+
 impl Store {
     /// The newest session with a machine over a real line, if it has no end.
     ///
@@ -46,11 +50,9 @@ impl Store {
     /// The store cannot be read.
     pub fn unfinished_session(&self) -> Result<Option<UnfinishedSession>, StoreError> {
         let read = || {
-            let row = |row: &rusqlite::Row<'_>| Ok((row.get(0)?, row.get(1)?));
-            let newest: Option<(i64, String)> = self.connection.query_row(NEWEST, [], row).optional()?;
-            let Some((machine, name)) = newest else { return Ok(None) };
-            let has_end: bool = self.connection.query_row(HAS_END, params![machine], |row| row.get(0))?;
-            Ok((!has_end).then_some(name))
+            let Some(NewestMachine { id, session, .. }) = self.newest_machine()? else { return Ok(None) };
+            let has_end: bool = self.connection.query_row(HAS_END, params![id], |row| row.get(0))?;
+            Ok((!has_end).then_some(session))
         };
         let name = read().map_err(|error| self.error(error))?;
         Ok(name.map(|name| UnfinishedSession { name, trains: self.known_trains() }))
@@ -68,6 +70,37 @@ impl Store {
                 trains.extend(row.get(0).ok().map(TrainId));
             }
         }
+        if let Ok(Some(machine)) = self.newest_machine() {
+            add_trains(&machine.body, &mut trains);
+        }
         trains.into_iter().collect()
+    }
+
+    fn newest_machine(&self) -> rusqlite::Result<Option<NewestMachine>> {
+        let mut statement = self.connection.prepare(MACHINES)?;
+        let mut rows = statement.query([])?;
+        while let Some(row) = rows.next()? {
+            // What cannot be read as JSON is checked elsewhere; here it is a machine whose trains are not known.
+            let body: Value = serde_json::from_str(&PackedBody::text(row, 2)?).unwrap_or_default();
+            if body.get("is_simulated").and_then(Value::as_bool) != Some(true) {
+                return Ok(Some(NewestMachine { id: row.get(0)?, session: row.get(1)?, body }));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// Adds the trains that a value names, at any depth.
+fn add_trains(value: &Value, trains: &mut BTreeSet<TrainId>) {
+    match value {
+        Value::Array(parts) => parts.iter().for_each(|part| add_trains(part, trains)),
+        Value::Object(parts) => {
+            for (key, part) in parts {
+                let number = part.as_u64().filter(|_| key == "train");
+                trains.extend(number.and_then(|number| u16::try_from(number).ok()).map(TrainId));
+                add_trains(part, trains);
+            }
+        }
+        _ => {}
     }
 }

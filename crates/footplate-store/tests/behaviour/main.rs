@@ -11,6 +11,7 @@ mod circuits;
 mod clearances;
 mod decisions;
 mod drawn_moments;
+mod every_row_counted;
 mod forecasts_of_real_logs;
 mod journal_survives;
 mod layout_tables;

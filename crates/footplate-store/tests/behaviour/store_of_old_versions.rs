@@ -4,13 +4,13 @@ use std::fs;
 use std::path::Path;
 
 use footplate_core::TrainId;
-use footplate_store::{MotionFile, MotionFileError, Run, Schedule, StoredRun};
+use footplate_store::{EventKey, MotionFile, MotionFileError, Run, Schedule, StoredRun};
 
 use crate::recordings::{ALL, real};
 use crate::stores::{Shelf, minute};
 
 /// The committed stores, one of every version. A new version adds its own and leaves these alone.
-const OLD: [&str; 8] = [
+const OLD: [&str; 9] = [
     "store-1.sqlite",
     "store-2.sqlite",
     "store-3.sqlite",
@@ -19,6 +19,7 @@ const OLD: [&str; 8] = [
     "store-6.sqlite",
     "store-7.sqlite",
     "store-8.sqlite",
+    "store-9.sqlite",
 ];
 
 fn copy_of(file: &str) -> Shelf {
@@ -35,15 +36,15 @@ fn every_old_store_opens_with_all_it_had() {
         let store = shelf.store();
         store.check().unwrap();
         // Decisions are kept from version 3 on.
-        assert_eq!(store.machines().unwrap().len(), [0, 0, 1, 2, 3, 0, 0, 3][number], "{file}");
+        assert_eq!(store.machines().unwrap().len(), [0, 0, 1, 2, 3, 0, 0, 3, 1][number], "{file}");
         let late = minute(1_000_000);
         let recordings = store.recordings(late).unwrap();
         let counts: Vec<_> =
             recordings.iter().map(|recording| (recording.events, recording.excluded)).collect();
         assert_eq!(counts[..2], [(91, 1), (580, 0)], "{file}");
-        // Live sessions: none, one, and those whose decisions are kept; the last three files come from the first.
-        let live = [0, 1, 2, 3, 4, 0, 0, 3][number];
-        let events = [0, 200, 200, 200, 200, 0, 0, 22][number];
+        // Live sessions: none, one, and those whose decisions are kept; the last four files come from the first.
+        let live = [0, 1, 2, 3, 4, 0, 0, 3, 1][number];
+        let events = [0, 200, 200, 200, 200, 0, 0, 22, 40][number];
         assert_eq!(counts.get(2), (live > 0).then_some(&(events, 0)), "{file}");
         assert_eq!(counts.len(), live + 2, "{file}");
         let light_gates = store.runs(recordings[1].key, late).unwrap();
@@ -111,4 +112,20 @@ fn an_archive_of_version_8_is_still_read_and_its_trains_have_no_direction() {
     assert_eq!(trace.last().map(|row| row.kind.as_ref()), Some("end"));
     assert!(trace.iter().any(|row| row.kind == "command" && row.text == "step 9 for train 24"));
     assert!(store.directions().unwrap().is_empty());
+}
+
+#[test]
+fn directions_of_version_9_are_still_read_and_what_is_added_has_checksums() {
+    let shelf = copy_of("store-9.sqlite");
+    let mut store = shelf.store();
+    // The session reversed the train once.
+    assert_eq!(store.directions().unwrap(), [(TrainId(24), false)].into());
+    store.exclude(&[EventKey(700)], "a child lifted the train", minute(1_000_000)).unwrap();
+    store.check().unwrap();
+    drop(store);
+    let connection = rusqlite::Connection::open(shelf.path()).unwrap();
+    let with_checksum = "SELECT count(crc32), count(*) FROM marks";
+    let counts: (i64, i64) =
+        connection.query_row(with_checksum, [], |row| Ok((row.get(0)?, row.get(1)?))).unwrap();
+    assert_eq!(counts, (1, 2), "a row of an older program has none");
 }

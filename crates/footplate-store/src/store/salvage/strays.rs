@@ -4,7 +4,8 @@ use rusqlite::types::Value;
 use rusqlite::{Connection, Transaction, params_from_iter};
 
 use super::leaf_pages::{FoundRow, Pages};
-use super::{Parent, SalvagedTable, TABLES, accepted, columns_of, stand_in};
+use super::table_copy::{TableCopy, columns_of};
+use super::{Parent, RENUMBERED, TABLES, accepted, stand_in};
 use crate::store::checksum;
 use crate::store::file::Store;
 
@@ -13,7 +14,8 @@ const REAL: &str = "REAL";
 
 /// All rows of a file by its pages, and an empty store to try them in.
 pub(super) struct Strays<'a> {
-    pages: Pages<'a>,
+    /// Of the file, and of the file with its log if they differ.
+    images: Vec<Pages<'a>>,
     /// Has the tables of a store, no rows, and checks no parents.
     trial: Connection,
     /// The columns of each of `TABLES`.
@@ -23,7 +25,7 @@ pub(super) struct Strays<'a> {
 }
 
 impl<'a> Strays<'a> {
-    pub(super) fn new(pages: Pages<'a>) -> rusqlite::Result<Self> {
+    pub(super) fn new(images: Vec<Pages<'a>>) -> rusqlite::Result<Self> {
         let trial = Connection::open_in_memory()?;
         for migration in Store::migrations() {
             trial.execute_batch(migration)?;
@@ -31,19 +33,19 @@ impl<'a> Strays<'a> {
         trial.pragma_update(None, "foreign_keys", false)?;
         let columns = TABLES.iter().map(|(name, _)| columns_of(&trial, name)).collect();
         let types = TABLES.iter().map(|(name, _)| types_of(&trial, name)).collect::<Result<_, _>>()?;
-        Ok(Self { pages, trial, columns, types })
+        Ok(Self { images, trial, columns, types })
     }
 
     /// Inserts those that can only be rows of this table and are not in it yet. Counts again what is lost.
     pub(super) fn bring_home(
         &self,
         into: &Transaction<'_>,
-        table: &mut SalvagedTable,
+        copy: &mut TableCopy,
         parent: Option<Parent>,
     ) -> rusqlite::Result<()> {
-        let Some(at) = TABLES.iter().position(|(name, _)| *name == table.name) else { return Ok(()) };
-        let mut last = i64::try_from(table.rows + table.lost).unwrap_or(i64::MAX);
-        for leaf in self.pages.leaves() {
+        let TableCopy { table, last_known, .. } = copy;
+        let Some(at) = at_of(table.name) else { return Ok(()) };
+        for leaf in self.images.iter().flat_map(|pages| pages.leaves()) {
             for row in self.homeless(into, at, &leaf)? {
                 let columns = self.columns_for(at, row);
                 let values = self.values_for(at, row);
@@ -56,11 +58,14 @@ impl<'a> Strays<'a> {
                 let mut insert = into.prepare_cached(&insertion(table.name, columns))?;
                 if accepted(&mut insert, &values)? {
                     table.rows += 1;
-                    last = last.max(row.id);
+                    *last_known = row.id.max(*last_known);
+                } else if RENUMBERED.contains(&table.name) {
+                    let unnumbered: Vec<Value> =
+                        std::iter::once(Value::Null).chain(values.into_iter().skip(1)).collect();
+                    table.rows += u64::from(accepted(&mut insert, &unnumbered)?);
                 }
             }
         }
-        table.lost = u64::try_from(last).unwrap_or(0).saturating_sub(table.rows);
         Ok(())
     }
 
@@ -75,6 +80,12 @@ impl<'a> Strays<'a> {
         let mut homeless = Vec::new();
         let mut of_leaf = None;
         for row in leaf.iter().filter(|row| could_be_ours(row)) {
+            if let Some(home) = self.home_by_checksum(row) {
+                if home == at && !self.is_there(into, at, row)? {
+                    homeless.push(row);
+                }
+                continue;
+            }
             if !self.fits(at, row)? || self.is_there(into, at, row)? {
                 continue;
             }
@@ -125,7 +136,10 @@ impl<'a> Strays<'a> {
     /// Rows that could belong to several tables and are in none of them now.
     pub(super) fn ambiguous(&self, into: &Transaction<'_>) -> rusqlite::Result<u64> {
         let mut count = 0;
-        for row in self.pages.rows().filter(could_be_ours) {
+        for row in self.images.iter().flat_map(|pages| pages.rows()).filter(could_be_ours) {
+            if self.home_by_checksum(&row).is_some() {
+                continue;
+            }
             let mut is_in_one = false;
             for at in 0..TABLES.len() {
                 let columns = self.columns_for(at, &row);
@@ -136,6 +150,13 @@ impl<'a> Strays<'a> {
             }
         }
         Ok(count)
+    }
+
+    /// Whether a row that a tree leads to belongs to no other table: by its checksum, or because no other would take it.
+    pub(super) fn is_only_home(&self, table: &str, id: i64, values: &[Value]) -> rusqlite::Result<bool> {
+        let values = std::iter::once(Value::Null).chain(values.iter().skip(1).cloned()).collect();
+        let candidates = self.candidates(&FoundRow { id, values })?;
+        Ok(at_of(table).is_some_and(|at| candidates == [at]))
     }
 
     /// The tables that would take a row.
@@ -163,7 +184,10 @@ impl<'a> Strays<'a> {
             return Ok(false);
         };
         let values = self.values_for(at, row);
-        if columns.len() != row.values.len() || !checksum::holds(name, columns, &values) {
+        if columns.len() != row.values.len() || checksum::matches(name, columns, &values) == Some(false) {
+            return Ok(false);
+        }
+        if self.home_by_checksum(row).is_some_and(|home| home != at) {
             return Ok(false);
         }
         // SQLite would take a number as text, but a row that it wrote into a text column has text there.
@@ -171,6 +195,15 @@ impl<'a> Strays<'a> {
             return Ok(false);
         }
         accepted(&mut *self.trial.prepare_cached(&insertion(name, columns))?, &values)
+    }
+
+    /// The table whose name is in the checksum of a row; `None` if it has none that holds.
+    fn home_by_checksum(&self, row: &FoundRow) -> Option<usize> {
+        TABLES.iter().enumerate().find_map(|(at, (name, _))| {
+            let columns = self.columns_for(at, row);
+            let is_home = checksum::matches(name, columns, &self.values_for(at, row)) == Some(true);
+            is_home.then_some(at)
+        })
     }
 
     /// The columns of a table that a row has; an older store has fewer.
@@ -199,7 +232,7 @@ impl<'a> Strays<'a> {
     /// Whether a table has another row of this number.
     fn is_taken(&self, into: &Transaction<'_>, at: usize, row: &FoundRow) -> rusqlite::Result<bool> {
         let Some((table, _)) = TABLES.get(at) else { return Ok(false) };
-        let of_number = format!("SELECT 1 FROM {table} WHERE id = ?1");
+        let of_number = format!("SELECT 1 FROM {table} WHERE id = ?1{}", but_stand_ins(table));
         Ok(into.prepare_cached(&of_number)?.exists([row.id])? && !self.is_there(into, at, row)?)
     }
 
@@ -210,6 +243,20 @@ impl<'a> Strays<'a> {
             self.columns_for(at, row).iter().map(|column| format!("{column} IS ?")).collect();
         let same = format!("SELECT 1 FROM {table} WHERE {}", same.join(" AND "));
         into.prepare_cached(&same)?.exists(params_from_iter(self.values_for(at, row)))
+    }
+}
+
+/// The place of a table among all.
+fn at_of(table: &str) -> Option<usize> {
+    TABLES.iter().position(|(name, _)| *name == table)
+}
+
+/// The condition that a row of a table is no placeholder for one that is lost.
+fn but_stand_ins(table: &str) -> &'static str {
+    match table {
+        "recordings" => " AND form NOT IN ('salvaged', 'salvaged runs')",
+        "runs" => " AND recording NOT IN (SELECT id FROM recordings WHERE form = 'salvaged runs')",
+        _ => "",
     }
 }
 

@@ -27,7 +27,7 @@ impl Arguments {
         let salvaged = salvage(store, &self.out)?;
         if self.json {
             let tables = salvaged.tables.iter().map(|table| {
-                let counts = json!({ "rows": table.rows, "lost": table.lost, "stand_ins": table.stand_ins });
+                let counts = json!({ "rows": table.rows, "lost": table.lost, "end_is_known": table.is_end_known, "stand_ins": table.stand_ins });
                 (table.name.to_owned(), counts)
             });
             let tables: Value = tables.collect::<serde_json::Map<_, _>>().into();
@@ -35,7 +35,8 @@ impl Arguments {
                 output,
                 "{}",
                 json!({
-                    "file": self.out, "tables": tables, "damage": salvaged.damage, "ambiguous": salvaged.ambiguous,
+                    "file": self.out, "tables": tables, "damage": salvaged.damage, "unread_log": salvaged.unread_log,
+                    "ambiguous": salvaged.ambiguous,
                 })
             )?;
         } else {
@@ -44,6 +45,9 @@ impl Arguments {
                 write!(output, "  {:<12} {:>9} rows", table.name, table.rows)?;
                 if table.lost > 0 {
                     write!(output, ", {} lost", table.lost)?;
+                }
+                if !table.is_end_known {
+                    write!(output, ", and perhaps more at its end: no index tells how many there were")?;
                 }
                 if table.stand_ins > 0 {
                     write!(output, ", {} stand-ins for what they belong to", table.stand_ins)?;
@@ -60,8 +64,14 @@ impl Arguments {
             if let Some(damage) = &salvaged.damage {
                 writeln!(
                     output,
-                    "  the file is damaged ({damage}): rows at the end of a table may be lost without being counted, and \
-                     values may have changed"
+                    "  the file is damaged ({damage}): values in rows without a checksum, which older versions wrote, may have \
+                     changed"
+                )?;
+            }
+            if let Some(unread) = &salvaged.unread_log {
+                writeln!(
+                    output,
+                    "  {unread}; the newest rows of every table may be lost without being counted"
                 )?;
             }
         }

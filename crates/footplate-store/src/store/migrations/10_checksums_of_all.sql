@@ -1,0 +1,16 @@
+-- A checksum of every row of every table, as migration 5 gave events, inputs and decisions. Rows of older programs have none.
+
+-- A long body is in `packed`, as a zlib stream, and `body` is then the JSON value null.
+ALTER TABLE calibrations ADD COLUMN packed BLOB;
+ALTER TABLE machines ADD COLUMN packed BLOB;
+
+ALTER TABLE recordings   ADD COLUMN crc32 INTEGER CHECK (crc32 BETWEEN 0 AND 4294967295);
+ALTER TABLE runs         ADD COLUMN crc32 INTEGER CHECK (crc32 BETWEEN 0 AND 4294967295);
+ALTER TABLE starts       ADD COLUMN crc32 INTEGER CHECK (crc32 BETWEEN 0 AND 4294967295);
+ALTER TABLE gate_passes  ADD COLUMN crc32 INTEGER CHECK (crc32 BETWEEN 0 AND 4294967295);
+ALTER TABLE marks        ADD COLUMN crc32 INTEGER CHECK (crc32 BETWEEN 0 AND 4294967295);
+ALTER TABLE calibrations ADD COLUMN crc32 INTEGER CHECK (crc32 BETWEEN 0 AND 4294967295);
+ALTER TABLE profiles     ADD COLUMN crc32 INTEGER CHECK (crc32 BETWEEN 0 AND 4294967295);
+ALTER TABLE schedules    ADD COLUMN crc32 INTEGER CHECK (crc32 BETWEEN 0 AND 4294967295);
+ALTER TABLE directions   ADD COLUMN crc32 INTEGER CHECK (crc32 BETWEEN 0 AND 4294967295);
+ALTER TABLE machines     ADD COLUMN crc32 INTEGER CHECK (crc32 BETWEEN 0 AND 4294967295);
