@@ -172,8 +172,11 @@ impl Arguments {
             }
             Some(path) => {
                 // Without logs to keep in it, a store that is not there is a mistyped one.
-                let mut store =
-                    if self.from.is_empty() { Store::open(path)? } else { Store::open_or_create(path)? };
+                let mut store = match (self.from.is_empty(), self.is_kept()) {
+                    (false, _) => Store::open_or_create(path)?,
+                    (true, true) => Store::open(path)?,
+                    (true, false) => Store::open_to_read(path)?,
+                };
                 store.check()?;
                 if import(&layout, &logs, &mut store)? == Outcome::FallsShort {
                     outcome = Outcome::FallsShort;

@@ -71,7 +71,7 @@ impl Arguments {
         let layout = layout_named(&self.layout)?.layout;
         let train = self.train.map(TrainId);
         let (sessions, batch) = match &self.store {
-            Some(path) => of_store(&layout, &Store::open(path)?, train)?,
+            Some(path) => of_store(&layout, &Store::open_to_read(path)?, train)?,
             None => {
                 let recordings = LogFile::recordings(&self.logs, &layout, train)?;
                 let batch = Batch::of_recordings(&layout, &recordings, train)?;

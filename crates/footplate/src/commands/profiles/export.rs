@@ -96,7 +96,7 @@ impl Arguments {
     }
 
     fn rows(&self, train: TrainId) -> anyhow::Result<Vec<ModelRow>> {
-        let store = Store::open(&self.store)?;
+        let store = Store::open_to_read(&self.store)?;
         let Some((file, layout)) = stored_model(&store, train, self.layout.as_deref())? else {
             bail!(
                 "train {train} has no motion model in {}; calibrate or drive it first",
