@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use footplate_store::ContentHash;
+use footplate_store::{ContentHash, Store};
 use rusqlite::Connection;
 use serde_json::Value;
 
