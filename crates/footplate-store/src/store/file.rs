@@ -64,7 +64,7 @@ impl Store {
         }
         let unread = UnreadLog::beside(path)?.filter(UnreadLog::is_loss);
         let has_log = fs::metadata(write_ahead_log::path_of(path)).is_ok_and(|log| log.len() > 0);
-        // Nobody is writing to a store without a log that is ours only to read.
+        // A store that has no log and may only be read is not being written.
         let is_fixed = !has_log && OpenOptions::new().write(true).open(path).is_err();
         let opened = if is_fixed { Self::open_fixed(path) } else { Self::open_shared(path) };
         let opened = match opened {
@@ -99,7 +99,7 @@ impl Store {
         Self::open_read_only(path, path.as_os_str(), OpenFlags::empty())
     }
 
-    /// Opens a file that nobody writes to, without the files that SQLite makes beside one.
+    /// Opens a file that is not being written, without the files that SQLite makes beside one.
     fn open_fixed(path: &Path) -> Result<Self, StoreError> {
         let mut address = String::from("file:");
         for byte in path.as_os_str().as_encoded_bytes() {
@@ -388,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_nobody_writes_to_is_read_without_one_beside_it() {
+    fn a_file_that_is_not_being_written_is_read_without_one_beside_it() {
         let folder = folder();
         let path = folder.path().join("evening 100%?.db");
         drop(Store::open_or_create(&path).unwrap());

@@ -272,11 +272,11 @@ fn copy_rows(
     let path = store.path().to_owned();
     let transaction = store.write()?;
     let most = fs::metadata(copy).map_or(0, |file| file.len() / LEAST_ROW_BYTES);
-    let doubts = is_list_replaced.then_some(strays);
+    let other_homes = is_list_replaced.then_some(strays);
     let copied = TABLES
         .iter()
         .map(|(name, parent)| {
-            let mut found = TableCopy::copy(&from, &transaction, name, *parent, most, doubts)?;
+            let mut found = TableCopy::copy(&from, &transaction, name, *parent, most, other_homes)?;
             strays.bring_home(&transaction, &mut found, *parent)?;
             found.count_in_indices(&from, &transaction)?;
             Ok(found.table)

@@ -251,7 +251,7 @@ fn a_commit_that_was_cut_off_is_no_damage_but_a_salvage_cannot_know() {
     opened.check().unwrap();
     drop(opened);
     assert!(rows_of(&store)["events"].len() >= truth["events"].len() - 1);
-    // Without the frame that ends it nobody was told that it is there.
+    // A commit without its last frame was never acknowledged.
     fs::write(shelf.file("cut.db-wal"), &log[..last]).unwrap();
     assert!(salvage(&store, &shelf.file("newer.db")).unwrap().is_all());
 }

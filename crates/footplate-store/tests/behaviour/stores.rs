@@ -59,7 +59,7 @@ pub(crate) fn long_json(seed: u64, numbers: u64) -> String {
     format!(r#"{{"layout":"track-a","train":24,"numbers":{numbers:?}}}"#)
 }
 
-/// What a machine was told, or decided, and the reports and directions between.
+/// The inputs and decisions of a machine, with the reports and directions between.
 fn entries(number: u64) -> Vec<JournalEntry> {
     let time = Timestamp::ZERO + TimeSpan::from_ms(number as i64);
     let (side, kind) =

@@ -26,10 +26,10 @@ impl TableCopy {
         name: &'static str,
         parent: Option<Parent>,
         most: u64,
-        doubts: Option<&'a Strays<'a>>,
+        other_homes: Option<&'a Strays<'a>>,
     ) -> rusqlite::Result<Self> {
         let table = SalvagedTable { name, rows: 0, lost: 0, is_end_known: false, stand_ins: 0 };
-        let is_doubtful = doubts.is_some();
+        let is_doubtful = other_homes.is_some();
         let nothing = Self { table: table.clone(), last_known: 0, is_doubtful };
         // An older store has fewer columns, and names in a damaged one may be wrong.
         let known = columns_of(into, name);
@@ -57,9 +57,9 @@ impl TableCopy {
             Err(_) => i64::try_from(most).unwrap_or(i64::MAX),
         };
 
-        let is_end_known = newest.is_ok() && doubts.is_none();
+        let is_end_known = newest.is_ok() && other_homes.is_none();
         let table = SalvagedTable { is_end_known, ..table };
-        let mut tree = TreeReader { select, columns, insert, into, parent, doubts, table };
+        let mut tree = TreeReader { select, columns, insert, into, parent, other_homes, table };
         let mut next = 1;
         let mut last_known = newest.ok().flatten().unwrap_or(0);
         while next <= last {
@@ -74,7 +74,7 @@ impl TableCopy {
                 None => tree.readable_after(next, last),
             };
         }
-        if doubts.is_some() {
+        if other_homes.is_some() {
             // The tree may be that of another table.
             let own = format!("SELECT ifnull(max(id), 0) FROM {name}");
             last_known = into.query_row(&own, [], |row| row.get(0))?;
@@ -120,7 +120,7 @@ struct TreeReader<'a> {
     /// The parent of its rows, and the column that refers to it.
     parent: Option<(Parent, usize)>,
     /// What tells whether a row belongs to another table, if the tree may.
-    doubts: Option<&'a Strays<'a>>,
+    other_homes: Option<&'a Strays<'a>>,
     table: SalvagedTable,
 }
 
@@ -184,7 +184,7 @@ impl TreeReader<'_> {
             if checksum::matches(self.table.name, &self.columns, &values) == Some(false) {
                 continue;
             }
-            if let Some(strays) = self.doubts
+            if let Some(strays) = self.other_homes
                 && !strays.is_only_home(self.table.name, *id, &values)?
             {
                 continue;
