@@ -24,11 +24,11 @@ pub(crate) fn mechanism(worst: &WorstMoment) -> String {
         parts.push(format!("adhesion {}", carried.join(" and ")));
     }
     parts.push(format!(
-        "train at {:.1} m/s with {} m/s², {}, believed {}",
+        "train at {:.1} m/s with {} m/s², {}, estimated {}",
         worst.truth.speed.as_m_per_s(),
         hundredths(worst.truth.acceleration),
         taken_for(worst.mode),
-        hundredths(worst.believed),
+        hundredths(worst.estimated),
     ));
     parts.join("; ")
 }
@@ -105,7 +105,7 @@ mod tests {
             error_m_s: 9.0,
             phase: Phase::BothSlip,
             mode: Mode::Correction,
-            believed: Acceleration::from_m_per_s2(-0.1),
+            estimated: Acceleration::from_m_per_s2(-0.1),
             truth: LineTruth {
                 speed: speed(20.0),
                 distance: Length::ZERO,
@@ -126,7 +126,7 @@ mod tests {
         assert_eq!(
             mechanism(&moment()),
             "both locked for 23.4 s; brake 0.80; adhesion 0.012 and 0.014; train at 20.0 m/s with -0.46 m/s², both taken to \
-             slip, believed -0.10"
+             slip, estimated -0.10"
         );
     }
 
@@ -140,7 +140,7 @@ mod tests {
         assert_eq!(
             mechanism(&moment),
             "first spinning +20 % for 0.5 s, second rolling; second sensor dead; command not recorded; adhesion 0.012; train \
-             at 20.0 m/s with -0.46 m/s², a sensor taken for dead, believed -0.10"
+             at 20.0 m/s with -0.46 m/s², a sensor taken for dead, estimated -0.10"
         );
         moment.truth.speed = Speed::ZERO;
         moment.faulty_count = Some(7);

@@ -167,10 +167,10 @@ mod tests {
     }
 
     #[test]
-    fn a_sensor_that_does_not_report_how_its_wheel_rolls_is_not_believed() {
+    fn a_sensor_that_does_not_report_how_its_wheel_rolls_is_left_out() {
         // At 20 m/s; the only sensor that is left reports the other direction, or a hundred pulses more at times.
-        let ways: [fn(u32) -> f64; 2] = [|_| -1.0, |period| if period % 40 == 39 { 3.7 } else { 1.0 }];
-        for wrong in ways {
+        let faults: [fn(u32) -> f64; 2] = [|_| -1.0, |period| if period % 40 == 39 { 3.7 } else { 1.0 }];
+        for wrong in faults {
             let mut oracle = Oracle::new([Length::from_mm(27.0); 2]);
             for period in 0..400 {
                 let count = if period < 200 { 1.0 } else { wrong(period) };

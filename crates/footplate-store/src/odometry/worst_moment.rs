@@ -17,8 +17,8 @@ pub struct WorstMoment {
     pub phase: Phase,
     /// The mode of the estimate.
     pub mode: Mode,
-    /// The acceleration that the odometer believed.
-    pub believed: Acceleration,
+    /// The acceleration that the odometer estimated.
+    pub estimated: Acceleration,
     /// What train, wheels and rail really did.
     pub truth: LineTruth,
     /// For how long each wheelset had not rolled.
@@ -58,7 +58,7 @@ impl WorstWatch {
             error_m_s,
             phase,
             mode: estimate.mode,
-            believed: estimate.acceleration,
+            estimated: estimate.acceleration,
             truth: *truth,
             slipping_for: self
                 .not_rolling_since
