@@ -69,6 +69,56 @@ fn a_train_faster_than_its_file_claims_is_reported() {
     assert!(run.status == 1 && run.output.contains("faster than max_speed_m_s"), "{}", run.output);
 }
 
+#[test]
+fn the_period_is_that_of_the_rows_where_the_file_claims_another() {
+    // 30 pulses of 33.77 mm in 100 ms: 10.13 m/s, 1 km after 1000 rows. A claimed period of 50 ms made it 2 km.
+    let recording = folder("odometry-period").join("slow-rows.csv");
+    let rows: String = (0..=1000).map(|row| format!("{:.1},30,30\n", 0.1 * f64::from(row))).collect();
+    std::fs::write(&recording, format!("t_s,pulses_1,pulses_2\n{rows}")).unwrap();
+    let run = odometry(&[&recording.display().to_string(), "--out", "-"]);
+    assert!(run.errors.contains("rows are 0.1000 s apart, and period_s says 0.0500"), "{}", run.errors);
+    let last = run.output.lines().next_back().unwrap();
+    let distance: f64 = last.split(',').nth(7).unwrap().parse().unwrap();
+    assert!((distance - 1013.2).abs() < 1.5, "{distance} m");
+}
+
+#[test]
+fn a_diameter_that_known_places_contradict_is_reported() {
+    // 15 pulses in 50 ms are 0.5066 m by the claimed diameter; the train runs 0.532 m in that time, as a wheel 1.05 times as large.
+    let recording = folder("odometry-diameter").join("places.csv");
+    let row = |row: u32| {
+        let place = (row % 1000 == 0).then(|| format!("{:.3}", f64::from(row) * 0.506_577 * 1.05));
+        format!("{:.2},15,15,{}\n", 0.05 * f64::from(row), place.unwrap_or_default())
+    };
+    let rows: String = (0..=6000).map(row).collect();
+    std::fs::write(&recording, format!("t_s,pulses_1,pulses_2,balise_m\n{rows}")).unwrap();
+    let run = odometry(&[&recording.display().to_string()]);
+    assert_eq!(run.status, 1, "{}", run.output);
+    for wheelset in [1, 2] {
+        let said = format!("wheelset {wheelset} is 1.05");
+        assert!(run.output.contains(&said), "{}", run.output);
+    }
+}
+
+#[test]
+fn a_reader_that_goes_ends_the_program() {
+    let recording = folder("odometry-pipe").join("long.csv");
+    // More blocks than are in hand at a time.
+    let rows: String = (0..40_000).map(|row| format!("{:.2},15,15\n", 0.05 * f64::from(row))).collect();
+    std::fs::write(&recording, format!("t_s,pulses_1,pulses_2\n{rows}")).unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_footplate"))
+        .args(["odometry", &recording.display().to_string(), "--out", "-", "--vehicle", VEHICLE])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    let mut first = String::new();
+    BufReader::new(child.stdout.take().unwrap()).read_line(&mut first).unwrap();
+    assert!(first.starts_with("t_s,"), "{first}");
+    // The pipe is closed now. Before, this waited for good.
+    child.wait().expect("it ends");
+}
+
 fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     let _ = std::fs::remove_dir_all(&folder);
