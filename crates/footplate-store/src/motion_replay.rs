@@ -149,12 +149,12 @@ impl MotionReplay {
     /// Fits to all that was taken in, and believes the lengths of the layout no more than a test of them allows: by the times from
     /// sensor to sensor, or by the path lengths of the train where those tell nothing.
     pub(crate) fn end(&mut self, sections: &SectionIndex, lengths: &SurveyTest) {
-        self.fit.doubt(lengths.clone());
+        self.fit.widen_by_lengths(lengths.clone());
         self.fit.refit(sections);
         if lengths.is_passed() {
             let own = SurveyTest::of(sections, self.fit.model().sections());
             if !own.is_passed() {
-                self.fit.doubt(own);
+                self.fit.widen_by_lengths(own);
                 self.fit.refit(sections);
             }
         }

@@ -44,8 +44,7 @@ pub trait Session {
     /// When the station has no such command, too many commands wait, or the session is closing. Nothing is sent then.
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError>;
 
-    /// Stops all locomotives of the station next, also those that this session does not know. No effect on a 6051, which has no such
-    /// command.
+    /// Stops all locomotives of the station next, also those that are unknown here. A 6051 has no such command.
     fn stop_all(&mut self) {}
 
     /// Keeps the line free for a command at this time: no poll begins that could still occupy it then. A later call replaces an
@@ -68,12 +67,10 @@ pub trait Session {
     /// Returns the next output, until `None`.
     fn poll_output(&mut self) -> Option<Transmit>;
 
-    /// Returns when to call [`handle_timeout`](Self::handle_timeout); later than the last `now` once all outputs are taken. `None`: only
-    /// when something arrives.
+    /// When to call [`handle_timeout`](Self::handle_timeout), once all outputs are taken; `None`: only when something arrives.
     fn next_timeout(&self) -> Option<Timestamp>;
 
-    /// Ends the session: stops every train that was driven, releases solenoids and switches the track power off. Waiting commands are
-    /// dropped. [`LinkNotice::Closed`] reports the end.
+    /// Ends the session with [`LinkNotice::Closed`]: driven trains stopped, solenoids released, power off, waiting commands dropped.
     fn close(&mut self, now: Timestamp);
 
     /// Returns how far the end has come; before [`close`](Self::close), everything that it would have to do.

@@ -64,7 +64,7 @@ fn speeds_of_a_layout_with_wrong_lengths_are_as_uncertain_as_they_are_wrong() {
             assert!((found - truth).abs() < HALF_95 * sigma, "{source}, step {step}: {found} ± {sigma}");
         }
     }
-    // Right lengths are believed as they say.
+    // Right lengths keep their stated uncertainty.
     let right = built_in("track-a").unwrap().layout;
     let batch = Batch::of_recordings(&right, &recordings, Some(TRAIN)).unwrap();
     assert!(batch.survey_test().is_passed());

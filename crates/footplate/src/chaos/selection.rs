@@ -1,4 +1,4 @@
-//! Some of the troubles that a seed draws: those that a story is told with.
+//! Some of the troubles that a seed draws: those that a story has.
 
 use std::collections::BTreeMap;
 use std::fmt;

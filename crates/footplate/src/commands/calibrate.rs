@@ -321,7 +321,7 @@ pub(super) fn runs_left_out(left_out: &[LeftOut]) -> Option<String> {
     let more = if left_out.len() > MOST_NAMED { "; and others" } else { "" };
     (!left_out.is_empty()).then(|| {
         format!(
-            "left out, because several trains moved and nobody has told their reports apart: {} ({named}{more})",
+            "left out, because several trains moved and their reports cannot be assigned: {} ({named}{more})",
             counted(left_out.len(), "run")
         )
     })

@@ -158,7 +158,7 @@ fn opened(host: &str, count: usize) -> Vec<TcpStream> {
     (0..count).filter_map(|_| TcpStream::connect(host).ok()).collect()
 }
 
-/// Slow connections and orders in threads, until they are told to end. Counts the orders.
+/// Slow connections and orders in threads, until they are to end. Counts the orders.
 fn loaded(load: Load, host: &str, ends: &Arc<AtomicBool>, answered: &Arc<AtomicUsize>) {
     let (place, over) = (host.to_owned(), Arc::clone(ends));
     thread::spawn(move || {
@@ -191,7 +191,7 @@ fn loaded(load: Load, host: &str, ends: &Arc<AtomicBool>, answered: &Arc<AtomicU
     }
 }
 
-/// Uploads in threads, until they are told to end. Counts those that were computed and those that were sent away.
+/// Uploads in threads, until they are to end. Counts those that were computed and those that were sent away.
 fn uploading(load: Load, host: &str, ends: &Arc<AtomicBool>) -> [Arc<AtomicUsize>; 2] {
     /// An hour and a half of one tachometer.
     const ROWS: usize = 100_000;

@@ -46,7 +46,8 @@ fn runs_of_several_trains_are_named_and_replace_no_model_that_knows_more() {
     assert_eq!(excluded.status, 0, "{}", excluded.errors);
 
     let beside = calibrate(&["--train", "24"]);
-    let named = "left out, because several trains moved and nobody has told their reports apart: 1 run (evening, run 1)";
+    let named =
+        "left out, because several trains moved and their reports cannot be assigned: 1 run (evening, run 1)";
     assert!(beside.output.contains(named), "{}", beside.output);
     assert!(beside.errors.contains("the stored model of train 24 knows"), "{}", beside.errors);
     assert_eq!(stored(), kept);

@@ -173,7 +173,7 @@ impl Calibrator<'_> {
         let test = SurveyTest::of(&self.surveyed, self.model().sections());
         if test != self.survey_test {
             self.sections = test.applied_to(&self.surveyed);
-            self.fit.doubt(test.clone());
+            self.fit.widen_by_lengths(test.clone());
             self.survey_test = test;
             self.fit.refit(&self.surveyed);
         }

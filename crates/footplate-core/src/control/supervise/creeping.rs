@@ -122,7 +122,7 @@ impl Watchdog {
     }
 
     /// What is behind a train that an operator places: the points that it may have pushed over, if it may stand on them at its
-    /// new place. Whoever says where its end is does not say over which leg it came.
+    /// new place. A person who enters where its end is does not say over which leg it came.
     pub(super) fn behind_placed(&self, now: Timestamp, train: TrainId, at: EdgeId) -> Option<Behind> {
         let behind = self.behind.get(&train).filter(|_| self.has_pushed_over_points(now, train))?;
         let reach = self.unheard_run(now, train) + BODY;

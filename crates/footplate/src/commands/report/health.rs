@@ -71,7 +71,7 @@ fn lengths(warning: Option<&LengthWarning>, language: Language) -> Check {
             Some(true) => State::Red,
         },
         says: language.pick(
-            "times from contact to contact against its lengths: where they differ, it may be another layout",
+            "times from sensor to sensor against its lengths: where they differ, it may be another layout",
             "Zeiten von Kontakt zu Kontakt gegen ihre Längen: wo sie nicht passen, ist es vielleicht eine andere Anlage",
         ),
     }

@@ -23,7 +23,7 @@ const MOST_MINIMISED: usize = 5;
 ///
 /// Three trains are sent to random places. A seed fails if trains touch, derail or run off the track, if an acknowledged
 /// measurement is lost, if trains are not stopped within a second after a death, or if nothing moves without an alarm. The
-/// first five failing seeds are told again with fewer and shorter troubles, as long as they fail alike.
+/// first five failing seeds are run again with fewer and shorter troubles, as long as they fail alike.
 #[derive(Args)]
 #[command(after_help = "Example: footplate simulate chaos --seeds 1..100")]
 pub(super) struct Arguments {
@@ -56,11 +56,11 @@ impl Arguments {
             }
         }
         let only = self.only.as_ref();
-        let told = each("chaos", &stages, self.threads, |(number, seeds)| {
+        let run = each("chaos", &stages, self.threads, |(number, seeds)| {
             let stage = Stage::set(&layout, *number)?;
             seeds.iter().map(|seed| tell(&stage, *seed, only)).collect::<anyhow::Result<Vec<Fate>>>()
         })?;
-        let fates: Vec<Fate> = told.into_iter().flatten().collect();
+        let fates: Vec<Fate> = run.into_iter().flatten().collect();
         if self.talk {
             for fate in &fates {
                 list_troubles(&mut *output, fate, only.unwrap_or(&Selection::all(fate.troubles.len())))?;
@@ -72,7 +72,7 @@ impl Arguments {
         write(&fates, output)?;
         let failed: Vec<FailedRun> = fates.iter().filter_map(failed).collect();
         let all_well = name_failed(&failed);
-        // Whoever follows one story, or tells a part of it, has its least one already.
+        // A person who follows one story, or runs a part of it, has its least one already.
         if only.is_none() && !self.talk {
             minimise(&layout, &fates, self.threads, output)?;
         }
@@ -112,8 +112,8 @@ fn minimise(
     let least = each("fewer troubles", &failed, threads, |(fate, kind)| {
         let stage = Stage::set(layout, Stage::number_of(fate.seed))?;
         Selection::minimised(fate.troubles.len(), |only| {
-            let told = tell(&stage, fate.seed, Some(only))?;
-            Ok::<_, anyhow::Error>(told.failures.iter().any(|failure| failure.kind == *kind))
+            let again = tell(&stage, fate.seed, Some(only))?;
+            Ok::<_, anyhow::Error>(again.failures.iter().any(|failure| failure.kind == *kind))
         })
     })?;
     for ((fate, _), least) in failed.iter().zip(&least) {

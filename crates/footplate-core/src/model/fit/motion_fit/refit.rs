@@ -57,7 +57,7 @@ impl MotionFit {
     }
 
     /// From the next fit on, the lengths of the layout count for no more than a comparison with path lengths leaves of them.
-    pub fn doubt(&mut self, test: SurveyTest) {
+    pub fn widen_by_lengths(&mut self, test: SurveyTest) {
         self.survey_test = test;
     }
 
