@@ -87,7 +87,7 @@ fn a_diameter_that_known_places_contradict_is_reported() {
     // 15 pulses in 50 ms are 0.5066 m by the claimed diameter; the train runs 0.532 m in that time, as a wheel 1.05 times as large.
     let recording = folder("odometry-diameter").join("places.csv");
     let row = |row: u32| {
-        let place = (row % 1000 == 0).then(|| format!("{:.3}", f64::from(row) * 0.506_577 * 1.05));
+        let place = row.is_multiple_of(1000).then(|| format!("{:.3}", f64::from(row) * 0.506_577 * 1.05));
         format!("{:.2},15,15,{}\n", 0.05 * f64::from(row), place.unwrap_or_default())
     };
     let rows: String = (0..=6000).map(row).collect();
