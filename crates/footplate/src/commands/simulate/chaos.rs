@@ -33,9 +33,10 @@ pub(super) struct Arguments {
     /// Only these troubles of the story, deaths among them, by their numbers: 3,7; 3:0.5 lasts half of its time; none.
     #[arg(long, value_name = "NUMBERS")]
     only: Option<Selection>,
-    /// Accept collisions, derailments and overruns in so many stories. All other failures are never accepted.
+    /// Accept collisions, derailments, overruns and railways that stand without an alarm in so many stories. All other failures are
+    /// never accepted.
     #[arg(long, value_name = "N", default_value_t = 0)]
-    accept_griefs: usize,
+    accept_known: usize,
     /// Tell everything that happens.
     #[arg(long)]
     talk: bool,
@@ -72,11 +73,11 @@ impl Arguments {
         write(&fates, output)?;
         let failed: Vec<FailedRun> = fates.iter().filter_map(failed).collect();
         let all_well = name_failed(&failed);
+        let is_accepted = failed.len() <= self.accept_known && fates.iter().all(|fate| !has_worse(fate));
         // A person who follows one story, or runs a part of it, has its least one already.
-        if only.is_none() && !self.talk {
+        if only.is_none() && !self.talk && !is_accepted {
             minimise(&layout, &fates, self.threads, output)?;
         }
-        let is_accepted = griefs(&fates) <= self.accept_griefs && fates.iter().all(|fate| !has_worse(fate));
         Ok(if is_accepted { Outcome::Done } else { all_well })
     }
 }
@@ -139,9 +140,9 @@ fn griefs(fates: &[Fate]) -> usize {
     fates.iter().filter(|fate| fate.failures.iter().any(|failure| failure.kind.is_grief())).count()
 }
 
-/// Whether a story failed otherwise than by grief.
+/// Whether a story failed as none may.
 fn has_worse(fate: &Fate) -> bool {
-    fate.failures.iter().any(|failure| !failure.kind.is_grief())
+    fate.failures.iter().any(|failure| !failure.kind.is_known())
 }
 
 fn write(fates: &[Fate], output: &mut dyn Write) -> std::io::Result<()> {
