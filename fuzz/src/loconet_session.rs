@@ -5,6 +5,7 @@ use footplate_wire::loconet::{Client, Line, Settings};
 use footplate_wire::{Session, Transmit};
 
 use crate::command::command;
+use crate::timeouts::passes_timeout;
 
 /// Between two pieces of input.
 const STEP: TimeSpan = TimeSpan::from_ms(3);
@@ -27,11 +28,7 @@ impl Witness {
     }
 
     fn wait_until(&mut self, end: Timestamp) {
-        while let Some(at) = self.client.next_timeout().filter(|at| *at <= end) {
-            self.now = self.now.max(at);
-            self.client.handle_timeout(self.now);
-            let next = self.client.next_timeout();
-            assert!(next.is_none_or(|next| next > self.now), "a session that is never done");
+        while passes_timeout(&mut self.client, &mut self.now, end) {
             self.take();
         }
         self.now = self.now.max(end);

@@ -29,6 +29,7 @@ mod parquet;
 mod sensor_log;
 mod speed_profile;
 mod tachometer_recording;
+mod timeouts;
 mod trains_and_lines;
 mod vehicle_file;
 mod withrottle;

@@ -6,6 +6,7 @@ use footplate_wire::marklin_can::{Client, Direction, Frame, Framing, Message, Se
 use footplate_wire::{Session, Transmit};
 
 use crate::command::command;
+use crate::timeouts::passes_timeout;
 
 /// Longer than any end takes: as many trains as bytes can name, at 100 frames a second.
 const END: TimeSpan = TimeSpan::from_ms(30_000);
@@ -57,11 +58,7 @@ impl Witness {
 
     fn wait_until(&mut self, end: Timestamp, answers: bool) {
         self.take();
-        while let Some(at) = self.client.next_timeout().filter(|at| *at <= end) {
-            self.now = self.now.max(at);
-            self.client.handle_timeout(self.now);
-            let next = self.client.next_timeout();
-            assert!(next.is_none_or(|next| next > self.now), "a session that is never done");
+        while passes_timeout(&mut self.client, &mut self.now, end) {
             self.take();
             if answers {
                 self.answer();

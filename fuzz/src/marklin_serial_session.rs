@@ -6,6 +6,7 @@ use footplate_wire::marklin_serial::{BYTE_TIME, Interface, Message, Pace, Settin
 use footplate_wire::{Session, Transmit};
 
 use crate::command::command;
+use crate::timeouts::passes_timeout;
 
 /// Longer than any end takes: eighty trains to be told with careful gaps, after a babble of a second.
 const END: TimeSpan = TimeSpan::from_ms(30_000);
@@ -41,11 +42,7 @@ impl Witness {
 
     fn wait_until(&mut self, end: Timestamp) {
         self.take();
-        while let Some(at) = self.session.next_timeout().filter(|at| *at <= end) {
-            self.now = self.now.max(at);
-            self.session.handle_timeout(self.now);
-            let next = self.session.next_timeout();
-            assert!(next.is_none_or(|next| next > self.now), "a session that is never done");
+        while passes_timeout(&mut self.session, &mut self.now, end) {
             self.take();
         }
         self.now = self.now.max(end);
