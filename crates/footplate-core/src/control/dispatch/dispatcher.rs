@@ -201,6 +201,13 @@ impl Dispatcher {
         self.reserve_standstill(now, train);
     }
 
+    /// Whether nothing is known of where a train is: neither its position, nor track that is reserved for it.
+    #[must_use]
+    pub fn is_nowhere(&self, now: Timestamp, train: TrainId) -> bool {
+        self.reservation(train).is_none_or(Reservation::is_empty)
+            && self.watchdog.driver().locate(train, now).is_none()
+    }
+
     /// Sends a train to a place as soon as a path is free. Replaces its present journey.
     ///
     /// # Errors
@@ -209,15 +216,14 @@ impl Dispatcher {
         let layout = self.watchdog.driver().layout();
         let place =
             layout.locate(journey.target, self.watchdog.driver().turnouts()).map_err(Refusal::Place)?;
-        let Some(known) = self.trains.get(&train) else { return Err(Refusal::UnknownTrain { train }) };
-        let is_lost = |known: &DispatchedTrain| {
-            known.reservation.is_empty() && self.watchdog.driver().locate(known.id, now).is_none()
-        };
-        if is_lost(known) {
+        if !self.trains.contains_key(&train) {
+            return Err(Refusal::UnknownTrain { train });
+        }
+        if self.is_nowhere(now, train) {
             return Err(Refusal::Lost { train });
         }
-        if let Some(other) = self.trains.values().find(|other| is_lost(other)) {
-            return Err(Refusal::OtherNowhere { train, other: other.id });
+        if let Some(other) = self.trains.keys().copied().find(|other| self.is_nowhere(now, *other)) {
+            return Err(Refusal::OtherNowhere { train, other });
         }
         self.set_unknown_turnouts(now)?;
         self.give_back(now, train);

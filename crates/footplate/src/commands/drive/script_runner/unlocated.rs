@@ -1,6 +1,6 @@
 //! Trains whose position is unknown: nothing keeps another train clear of them, so they are located before it is ordered anywhere.
 
-use footplate_core::control::{Order, Refusal, Reservation};
+use footplate_core::control::{Order, Refusal};
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::ScriptRunner;
@@ -13,16 +13,10 @@ use crate::commands::drive::script::Step;
 pub(super) const SEARCH_LIMIT: TimeSpan = TimeSpan::from_s(120.0);
 
 impl ScriptRunner {
-    /// Whether nothing is known of where a train is: neither its position, nor track that is reserved for it.
-    fn is_nowhere(&self, now: Timestamp, train: TrainId) -> bool {
-        self.driver().locate(train, now).is_none()
-            && self.dispatcher.reservation(train).is_none_or(Reservation::is_empty)
-    }
-
     /// Whether an instruction has to wait until all trains are located.
     pub(super) fn waits_for_others(&self, now: Timestamp, instruction: &Instruction) -> bool {
         let Instruction::Order(order) = instruction else { return false };
-        self.needs_all(order) && self.trains.keys().any(|train| self.is_nowhere(now, *train))
+        self.needs_all(order) && self.trains.keys().any(|train| self.dispatcher.is_nowhere(now, *train))
     }
 
     /// Whether a train is sent somewhere. What ends the run of a moving train is not delayed.
@@ -47,7 +41,7 @@ impl ScriptRunner {
             .train()
             .into_iter()
             .chain(others)
-            .find(|train| self.is_nowhere(now, *train) && !self.sought.contains(train));
+            .find(|train| self.dispatcher.is_nowhere(now, *train) && !self.sought.contains(train));
         let Some(train) = next else { return false };
         self.sought.insert(train);
         self.say(format!("train {train} is located first"));
@@ -72,7 +66,8 @@ impl ScriptRunner {
         };
         let Some(train) = order.train().filter(|_| sets_out && !step.is_part) else { return };
         let others = self.trains.keys().copied().filter(|other| *other != train);
-        let unlocated: Vec<TrainId> = others.filter(|other| self.is_nowhere(now, *other)).collect();
+        let unlocated: Vec<TrainId> =
+            others.filter(|other| self.dispatcher.is_nowhere(now, *other)).collect();
         for other in unlocated {
             if self.warned.insert(other) {
                 self.say(Refusal::OtherNowhere { train, other }.to_string());
@@ -83,7 +78,7 @@ impl ScriptRunner {
     /// Trains that are located are searched for, and warned of, anew once they are lost again.
     fn forget_located(&mut self, now: Timestamp) {
         let nowhere: Vec<TrainId> =
-            self.trains.keys().copied().filter(|train| self.is_nowhere(now, *train)).collect();
+            self.trains.keys().copied().filter(|train| self.dispatcher.is_nowhere(now, *train)).collect();
         self.sought.retain(|train| nowhere.contains(train));
         self.warned.retain(|train| nowhere.contains(train));
     }
