@@ -50,18 +50,26 @@ impl Store {
     /// The store cannot be read.
     pub fn unfinished_session(&self) -> Result<Option<UnfinishedSession>, StoreError> {
         let read = || {
-            let Some(NewestMachine { id, session, .. }) = self.newest_machine()? else { return Ok(None) };
-            let has_end: bool = self.connection.query_row(HAS_END, params![id], |row| row.get(0))?;
-            Ok((!has_end).then_some(session))
+            let Some(machine) = self.newest_machine()? else { return Ok(None) };
+            let has_end: bool = self.connection.query_row(HAS_END, params![machine.id], |row| row.get(0))?;
+            Ok((!has_end).then_some(machine))
         };
-        let name = read().map_err(|error| self.error(error))?;
-        Ok(name.map(|name| UnfinishedSession { name, trains: self.known_trains() }))
+        let newest = read().map_err(|error| self.error(error))?;
+        Ok(newest.map(|machine| UnfinishedSession {
+            trains: self.trains_with(Some(&machine)),
+            name: machine.session,
+        }))
     }
 
     /// Every train that the store names, by number. Of a damaged store those that can be read: trains are stopped with them,
     /// and some are better than none.
     #[must_use]
     pub fn known_trains(&self) -> Vec<TrainId> {
+        self.trains_with(self.newest_machine().ok().flatten().as_ref())
+    }
+
+    /// The trains of a machine, and those of all other parts that can be read.
+    fn trains_with(&self, machine: Option<&NewestMachine>) -> Vec<TrainId> {
         let mut trains = BTreeSet::new();
         for of_part in TRAINS {
             let Ok(mut statement) = self.connection.prepare(of_part) else { continue };
@@ -70,7 +78,7 @@ impl Store {
                 trains.extend(row.get(0).ok().map(TrainId));
             }
         }
-        if let Ok(Some(machine)) = self.newest_machine() {
+        if let Some(machine) = machine {
             add_trains(&machine.body, &mut trains);
         }
         trains.into_iter().collect()
