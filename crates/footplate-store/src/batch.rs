@@ -91,7 +91,7 @@ pub struct Batch {
     pub layout_test: LayoutTest,
     /// The trains, by number.
     pub trains: Vec<BatchTrain>,
-    /// Runs of live sessions in which several trains moved, whose contacts nobody has distinguished.
+    /// Runs of live sessions in which several trains moved, so that their detections cannot be assigned.
     pub left_out: Vec<LeftOut>,
 }
 

@@ -55,7 +55,7 @@ pub struct MotionReplay {
     pub events: usize,
     /// When the last of them was, since the Unix epoch, where the runs tell.
     pub newest: Option<Timestamp>,
-    /// Runs that were not used: other trains moved, too, and nobody has told their contacts apart.
+    /// Runs that were not used: other trains moved, too, so that their detections cannot be assigned.
     pub left_out: Vec<(String, RunId)>,
 }
 
@@ -146,7 +146,7 @@ impl MotionReplay {
         Ok(runs)
     }
 
-    /// Fits to all that was taken in, and believes the lengths of the layout no more than a test of them allows: by the times from
+    /// Fits to all that was taken in, and counts the lengths of the layout for no more than a test of them allows: by the times from
     /// sensor to sensor, or by the path lengths of the train where those tell nothing.
     pub(crate) fn end(&mut self, sections: &SectionIndex, lengths: &SurveyTest) {
         self.fit.widen_by_lengths(lengths.clone());

@@ -26,15 +26,20 @@ fn the_first_train_asked_waits_for_the_answer() {
     assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
 }
 
-#[test]
-fn a_train_lost_again_on_reserved_track_does_not_creep_on() {
-    // Given a train under a dispatcher that is located and measured again,
+/// A train under a dispatcher that was located and runs to be measured again.
+fn measured_again() -> Watched {
     let mut watched = Watched::asking();
     watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
     let is_located =
         |watched: &Watched| watched.notices.iter().any(|notice| matches!(notice, Notice::Located { .. }));
     assert!(watched.run_until(60.0, is_located), "{:#?}", watched.notices);
     watched.run(1.0);
+    watched
+}
+
+#[test]
+fn a_train_lost_again_on_reserved_track_does_not_creep_on() {
+    let mut watched = measured_again();
     let from = watched.commanded.len();
     // when its position is lost,
     watched.dog.lose(watched.world.now, FIRST);
@@ -162,13 +167,7 @@ fn a_train_that_a_person_places_is_searched_no_more() {
 
 #[test]
 fn a_train_that_a_person_places_while_it_is_measured_stops_and_waits_to_be_measured_again() {
-    // Given a train under a dispatcher that was located and runs to be measured,
-    let mut watched = Watched::asking();
-    watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
-    let is_located =
-        |watched: &Watched| watched.notices.iter().any(|notice| matches!(notice, Notice::Located { .. }));
-    assert!(watched.run_until(60.0, is_located), "{:#?}", watched.notices);
-    watched.run(1.0);
+    let mut watched = measured_again();
     let from = watched.commanded.len();
     // when a person says where it is, as of a train at rest,
     let node = watched.world.layout.node_named("D1").expect("a node");

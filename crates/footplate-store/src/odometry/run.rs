@@ -180,14 +180,13 @@ impl OdometryRun {
     pub fn implausible_claims(&self) -> ImplausibleClaims {
         let claims = self.odometer.implausible_claims();
         let Some(placed) = &self.placed else { return claims };
-        let mut diameters = placed.scales().into_iter().zip(self.context.vehicle.wheelsets).map(
-            |(scale, Wheelset { diameter_tolerance, .. })| {
-                let PlacedValue { value, deviation } = scale?;
-                let is_clear = (value - 1.0).abs() - CLEARLY * deviation > diameter_tolerance;
-                is_clear.then_some(value)
-            },
-        );
-        ImplausibleClaims { diameters: core::array::from_fn(|_| diameters.next().flatten()), ..claims }
+        let beyond = |scale: Option<PlacedValue>, wheelset: Wheelset| {
+            let PlacedValue { value, deviation } = scale?;
+            let is_clear = (value - 1.0).abs() - CLEARLY * deviation > wheelset.diameter_tolerance;
+            is_clear.then_some(value)
+        };
+        let ([one, other], [first, second]) = (placed.scales(), self.context.vehicle.wheelsets);
+        ImplausibleClaims { diameters: [beyond(one, first), beyond(other, second)], ..claims }
     }
 
     /// How good its estimates were, if that was asked for.

@@ -1,6 +1,6 @@
 //! `footplate clerk`: one answer to a browser, worked out from files within limits of memory and time.
 //!
-//! The dashboard starts it (`serve/answer_queue.rs`). It reads a question, a line of JSON, and what belongs to it, and writes the
+//! The dashboard starts it (`dashboard_routes/answer_queue.rs`). It reads a question, a line of JSON, and what belongs to it, and writes the
 //! answer. A recording that was made to be large ends this program and nothing else.
 
 use std::io::{BufRead, Read, Write};

@@ -1,6 +1,6 @@
 //! Gives the body of a request a time limit: a client that sends it byte by byte, or not at all, holds a connection.
 //!
-//! Recordings, which are large, have a limit of their own from their turn on (`commands/serve/answer_queue.rs`).
+//! Recordings, which are large, have a limit of their own from their turn on (`commands/dashboard_routes/answer_queue.rs`).
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

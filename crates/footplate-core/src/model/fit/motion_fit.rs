@@ -67,7 +67,7 @@ pub struct MotionFit {
     /// Follows from the layout; made when first needed.
     #[cfg_attr(feature = "serde", serde(skip))]
     sections: Option<SectionIndex>,
-    /// How the lengths of the layout compare with what trains ran over; a fit believes them no more than that.
+    /// How the lengths of the layout compare with what trains ran over; they count for no more than that in a fit.
     #[cfg_attr(feature = "serde", serde(default))]
     survey_test: SurveyTest,
     date: Timestamp,
