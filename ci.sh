@@ -197,7 +197,7 @@ each_table() {
   "$1" cross-check compare testdata/sensor-logs/*.csv --layout track-a --with testdata/published-tables/*.csv --markdown
   "$1" running-times example running_times
   "$1" driving simulate driving --seeds 1..5 --markdown
-  "$1" worlds simulate worlds --seeds fresh:5@5f0d1da82dacd6179edf87cb21bde476d3f34299 --markdown
+  "$1" worlds simulate worlds --seeds fresh:5@6cb4cd673897dd939a184ccb28f4d95ad77c3460 --markdown
   "$1" disasters simulate disasters --seeds 1..8 --markdown
   "$1" pacing simulate pacing --seeds 1..3 --markdown
   "$1" zones simulate zones --seeds 21..26 --markdown
