@@ -204,6 +204,24 @@ fn a_dispatched_train_arrives_and_another_makes_room() {
 }
 
 #[test]
+fn a_train_runs_once_round_to_a_place_just_behind_it() {
+    // Given a circuit that is free, a place 20 mm behind the train, and its overrun there, which ends beyond the train,
+    let mut traffic = Traffic::with(Dispatcher::new, [("D1", 500.0), ("EN1", 150.0)]);
+    let target = traffic.world.layout.landmark("D1+480mm").expect("a place");
+    // when it is sent there in the direction it faces,
+    let journey = Journey { faces: true, ..Journey::to(target) };
+    traffic.dispatcher.go(traffic.world.now, TRAINS[0], journey).expect("on the layout");
+    traffic.run(60.0);
+    // then it arrives after one lap, on the first route that is set for it.
+    assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
+    let set = |notice: &&Notice| matches!(notice, Notice::RouteSet { .. });
+    assert_eq!(traffic.notices.iter().filter(set).count(), 1, "{:#?}", traffic.notices);
+    let at = traffic.world.trains[0].at;
+    assert!((at.offset.as_mm() - 480.0).abs() < 15.0, "{at:?}");
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+}
+
+#[test]
 fn a_train_driven_by_hand_stops_before_the_track_of_another() {
     let mut traffic = Traffic::new();
     let speed = Order::Speed { train: TRAINS[0], step: step(10) };

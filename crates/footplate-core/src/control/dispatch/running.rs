@@ -195,13 +195,13 @@ impl Dispatcher {
         let found = located.zip(place).and_then(|(located, place)| {
             let at = run.path.find(place, from)?;
             let limit = run.path.place(run.limit)?;
-            let limit = self.watchdog.driver().path_point_ahead(id, located.at, limit)?;
+            let limit = self.watchdog.driver().path_point_ahead(id, located.at, limit, run.limit - at)?;
             let stop = run.path.place(run.stop)?;
             let direct =
                 self.watchdog.driver().path_point(id, located.at.node, stop)?.distance - located.at.distance;
             // The path may lead round a circuit to the present place.
             let next_round = direct > -AT_TARGET && run.stop - at > direct + SHORTEST_RUN;
-            (limit.distance > located.at.distance).then_some((at, limit, (stop, next_round)))
+            Some((at, limit, (stop, next_round)))
         });
         let run_begin = run.begin;
         let Some((at, limit, (stop, next_round))) = found else { return self.withdraw(now, id, None) };

@@ -110,16 +110,22 @@ impl Driver {
         place_of(self.track.context(), &self.trains.get(&train)?.model, at)
     }
 
-    /// A position on the layout as a point of a train's path ahead of another point; on a circuit, after one more lap
-    /// if need be.
+    /// A position on the layout as a point of a train's path ahead of another point, about `away` from it: a circuit may
+    /// lead past the position at once and again after a lap.
     #[must_use]
-    pub fn path_point_ahead(&self, train: TrainId, from: PathPoint, to: Position) -> Option<PathPoint> {
-        let found = self.path_point(train, from.node, to)?;
-        if found.distance > from.distance {
-            return Some(found);
-        }
-        let lap = circuit_length(self.track.context(), &self.trains.get(&train)?.model, from.node)?;
-        Some(PathPoint { distance: found.distance + lap, ..found })
+    pub fn path_point_ahead(
+        &self,
+        train: TrainId,
+        from: PathPoint,
+        to: Position,
+        away: Length,
+    ) -> Option<PathPoint> {
+        let first = self.path_point(train, from.node, to)?;
+        let lap = circuit_length(self.track.context(), &self.trains.get(&train)?.model, from.node);
+        let next = lap.map(|lap| PathPoint { distance: first.distance + lap, ..first });
+        let ahead = [Some(first), next].into_iter().flatten().filter(|found| found.distance > from.distance);
+        let error = |found: &PathPoint| (found.distance - from.distance - away).abs();
+        ahead.min_by(|a, b| error(a).as_m().total_cmp(&error(b).as_m()))
     }
 
     /// Where the leading end of the pickup will be once a train at rest has reversed. It is then measured from the
