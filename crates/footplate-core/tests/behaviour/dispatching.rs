@@ -29,7 +29,7 @@ pub(crate) const STRAYED: &str = "is on track that it does not hold";
 /// Positions are sums of lengths.
 const ROUNDING: Length = Length::from_mm(0.5);
 
-fn model(train: TrainId) -> MotionModel {
+pub(crate) fn model(train: TrainId) -> MotionModel {
     static MODELS: OnceLock<[MotionModel; 2]> = OnceLock::new();
     let models = MODELS.get_or_init(|| TRAINS.map(|train| known_model(train.0)));
     models.iter().find(|model| model.train() == train).expect("one of two").clone()
@@ -451,35 +451,4 @@ fn a_journey_ordered_without_power_waits_for_it() {
     traffic.dispatcher.switch_power(traffic.world.now, true);
     traffic.run(60.0);
     assert_eq!(traffic.arrivals(TRAINS[0]), 1, "{:#?}", traffic.notices);
-}
-
-#[test]
-fn a_train_before_points_that_are_set_against_it_is_not_reversed_by_hand() {
-    // Given a train before turnout 2, which it would trail, and which is set for its other leg,
-    let (train, turnout) = (TRAINS[1], TurnoutId(2));
-    let with_turnout = |leg: Leg| {
-        let set = |now, driver: Driver| {
-            let mut turnouts = straight();
-            turnouts.set(turnout, leg);
-            let mut other = Driver::new(driver.layout().clone(), turnouts);
-            for train in TRAINS {
-                let located = driver.locate(train, now).expect("placed");
-                other.add_train(model(train));
-                other.place(now, train, located.at, located.uncertainty);
-            }
-            Dispatcher::watched(now, other)
-        };
-        Traffic::with(set, STARTS)
-    };
-    let reverse = |traffic: &mut Traffic| {
-        traffic.dispatcher.order(traffic.world.now, Order::Reverse { train, then: SpeedStep::STAND })
-    };
-    // then it is not reversed: no path would lead to it from the sensor that is then behind it.
-    let mut traffic = with_turnout(Leg::Curved);
-    assert_eq!(reverse(&mut traffic), Err(Refusal::PositionLost { train, turnout, curved: false }));
-    // Set as the answer says, it is, and its position stays known.
-    let mut traffic = with_turnout(Leg::Straight);
-    reverse(&mut traffic).expect("set as was asked");
-    traffic.run(2.0);
-    assert!(traffic.dispatcher.driver().locate(train, traffic.world.now).is_some());
 }

@@ -21,6 +21,7 @@ mod paths_on_tracks;
 mod profiles;
 mod recovering;
 mod reserved_track;
+mod reversing_by_hand;
 mod short_moves;
 mod speed_change_laws;
 mod speed_zones;

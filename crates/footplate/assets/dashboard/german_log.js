@@ -97,6 +97,7 @@ const LINES = [
   // Reasons of refused commands.
   [/^something moved that Footplate does not drive: check the track, then enter `power on`, or `place` the train that it is$/, "etwas hat sich bewegt, das Footplate nicht fährt: die Gleise prüfen, dann `power on` eingeben, oder mit `place` sagen, welcher Zug es war"],
   [/^train (\d+) is stopped for safety until the incident is resolved$/, "Zug $1 steht zur Sicherheit, bis der Vorfall geklärt ist"],
+  [/^train (\d+) may be on turnout (\d+), which is set for another leg .*$/, "Zug $1 steht vielleicht auf Weiche $2, die nicht so liegt, wie er kam, und auf der er zurück entgleisen würde: erst vorwärts von ihr herunterfahren"],
   [/^the position of train (\d+) would be lost if it reversed here: set `(.+)` first$/, "die Position von Zug $1 ginge verloren, wenn er hier die Richtung wechselte: erst `$2` stellen"],
   [/^the station does not answer$/, "die Zentrale antwortet nicht"], [/^track power is off: enter `power on`$/, "der Fahrstrom ist aus: `power on` eingeben"],
   [/^step (\d+) does not move this train reliably: use a higher step$/, "Stufe $1 bewegt diesen Zug nicht sicher: eine höhere Stufe nehmen"],

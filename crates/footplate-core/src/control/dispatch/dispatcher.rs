@@ -279,6 +279,12 @@ impl Dispatcher {
         {
             return Err(Refusal::TurnoutOccupied { turnout, train: holder.id });
         }
+        if let Order::Reverse { train, .. } = order
+            && self.watchdog.driver().is_at_rest(train, now)
+            && let Some(turnout) = self.trailed_points(now, train)
+        {
+            return Err(Refusal::OnTrailedPoints { train, turnout });
+        }
         // A refused order ends no journey.
         self.watchdog.check(now, &order)?;
         if let Some(train) = order.train() {

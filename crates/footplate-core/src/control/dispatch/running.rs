@@ -3,7 +3,7 @@
 use crate::control::Notice;
 use crate::control::drive::AT_TARGET;
 use crate::control::drive::{Aim, Order, Refusal, StopOrder};
-use crate::ids::{SpeedStep, TrainId};
+use crate::ids::{SpeedStep, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Position, TurnoutNeed};
 use crate::units::Length;
@@ -302,18 +302,23 @@ impl Dispatcher {
         }
     }
 
-    /// Whether a train at rest is on a turnout that is set for another leg than it came from: it trailed the points.
+    /// Whether a train at rest may be on a turnout that is set for another leg than it came from.
     pub(super) fn is_on_trailed_points(&self, now: Timestamp, id: TrainId) -> bool {
-        let place = self.watchdog.driver().position(id, now);
-        let Some((train, place)) = self.trains.get(&id).zip(place) else { return false };
+        self.trailed_points(now, id).is_some()
+            // The legs behind a train that was placed are those that are set, which it may not have come from.
+            || self.watchdog.was_placed_on_points(id)
+    }
+
+    /// A turnout that a train at rest may be on, and that it trailed: it is set for another leg than the train came from.
+    pub(super) fn trailed_points(&self, now: Timestamp, id: TrainId) -> Option<TurnoutId> {
+        let place = self.watchdog.driver().position(id, now)?;
+        let train = self.trains.get(&id)?;
         let envelope = self.envelope(now, train);
         let (layout, turnouts) = (self.watchdog.driver().layout(), self.watchdog.driver().turnouts());
         let (path, at) =
             Path::around(layout, turnouts, place, &train.occupied, envelope.behind, envelope.ahead);
         let mut trailed = path.trailed(layout, at - envelope.behind, at + envelope.ahead);
-        trailed.any(|need| turnouts.get(need.turnout) != Some(need.leg))
-            // The legs behind a train that was placed are those that are set, which it may not have come from.
-            || self.watchdog.was_placed_on_points(id)
+        trailed.find(|need| turnouts.get(need.turnout) != Some(need.leg)).map(|need| need.turnout)
     }
 
     /// Releases the track that a train at rest at the end of its run certainly does not occupy. It keeps its whole

@@ -101,6 +101,13 @@ pub enum Refusal {
         /// The train.
         train: TrainId,
     },
+    /// The train may be on a turnout that it trailed: it is set for another leg, and would derail the train going back.
+    OnTrailedPoints {
+        /// The train.
+        train: TrainId,
+        /// The turnout.
+        turnout: TurnoutId,
+    },
     /// Where the train is could not be said if it reversed here, because a turnout behind it is set for another leg.
     PositionLost {
         /// The train.
@@ -290,6 +297,11 @@ impl fmt::Display for Refusal {
                 f,
                 "the position of train {train} is unknown: run it over a sensor, for example with \
                  `speed {train} 6`"
+            ),
+            Self::OnTrailedPoints { train, turnout } => write!(
+                f,
+                "train {train} may be on turnout {turnout}, which is set for another leg than it came from and would \
+                 derail it on its way back: run it ahead, off the turnout, first"
             ),
             Self::PositionLost { train, turnout, curved } => {
                 let leg = if *curved { "curved" } else { "straight" };
