@@ -3,7 +3,7 @@
 
 use footplate_core::link::{DetectionWindow, PollTiming};
 use footplate_core::model::STALE_WITHIN;
-use footplate_core::{Event, EventKind, Report, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 /// A train that runs and is told one step more when no contact and no command has been for so long was pushed: it had not come
 /// where it should, and the calibration took it for stuck. No trip of an experiment takes as long between two of either.
@@ -19,6 +19,8 @@ pub(super) struct RunReader {
     /// The last command to the train or report.
     last: Option<Timestamp>,
     last_report: Option<Timestamp>,
+    /// The sensor whose reports say nothing of when the train passed it, with its last one.
+    stale: Option<(SensorId, Timestamp)>,
     has_passed: bool,
     is_pushed: bool,
 }
@@ -40,6 +42,7 @@ impl RunReader {
             started: None,
             last: None,
             last_report: None,
+            stale: None,
             has_passed: false,
             is_pushed: false,
         }
@@ -59,7 +62,8 @@ impl RunReader {
             EventKind::Sensor(report) => {
                 let last = self.last_report.replace(time);
                 let window = DetectionWindow::of_report(time, report.poll_interval, last, timing);
-                if self.is_stale(time) {
+                if self.is_stale(time, report.sensor, last.is_none()) {
+                    self.stale = Some((report.sensor, time));
                     return None;
                 }
                 self.has_passed = true;
@@ -82,14 +86,42 @@ impl RunReader {
         self.step = step;
     }
 
-    /// Whether a report is of a contact that the station remembers from before the run.
-    fn is_stale(&self, time: Timestamp) -> bool {
+    /// Whether a report is of a contact that the station remembers from before the run, or that the train has been on since: the
+    /// first answer of a station reports all that closed since its last one, be that minutes ago.
+    fn is_stale(&self, time: Timestamp, sensor: SensorId, is_first: bool) -> bool {
         if self.has_passed {
             return false;
         }
+        if self.stale.is_some_and(|(stale, last)| stale == sensor && time - last < STALE_WITHIN) {
+            return true;
+        }
         match self.started {
             Some(started) => time - started < STALE_WITHIN,
-            None => self.step == SpeedStep::STAND,
+            None => is_first || self.step == SpeedStep::STAND,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use footplate_core::link::PollTiming;
+
+    use super::*;
+
+    #[test]
+    fn a_report_that_the_station_remembered_says_nothing_of_the_motion() {
+        // Given a recording that begins with the train running,
+        let train = TrainId(24);
+        let mut reader = RunReader::new(train, SpeedStep::new(5).unwrap());
+        let mut is_read = |at: f64, sensor| {
+            let report = Report { sensor: SensorId(sensor), poll_interval: Some(TimeSpan::from_ms(80)) };
+            let event = Event { time: Timestamp::from_s(at), kind: EventKind::Sensor(report) };
+            reader.take(&event, PollTiming::ASSUMED).is_some()
+        };
+        // then the first report, and what repeats it, is of a contact that may have closed long before; those behind it are not.
+        assert_eq!(
+            [is_read(0.02, 20), is_read(0.1, 20), is_read(3.8, 43), is_read(8.7, 3)],
+            [false, false, true, true]
+        );
     }
 }

@@ -42,7 +42,7 @@ fn link_lag(recording: &SimulatedRecording) -> TimeSpan {
 fn speeds_and_stops_are_true_within_their_uncertainty() {
     let layout = layout_named("track-a").expect("built in").layout;
     let (mut speeds, mut stops) = (Vec::new(), Vec::new());
-    for_each(&layout, "calibration", 2, |railway, recording| {
+    for_each(&layout, "calibration", 4, |railway, recording| {
         let batch = batch_of(&layout, recording);
         let model = batch.trains[0].replay.fit.model();
         let lag = link_lag(recording);

@@ -58,13 +58,18 @@ impl RunPassages {
         let mut tracker = PassageTracker::new(train, step, timing);
         let mut read = Self { train, run, passages: Vec::new(), stops: Vec::new() };
         let mut standing: Option<(Timestamp, SpeedStep)> = None;
+        let mut is_first = true;
         for (entry, (event, excluded)) in events.enumerate() {
             if excluded {
                 tracker.skip();
                 continue;
             }
             if let Some(Sighting::Passage(passage)) = tracker.take(layout, event) {
-                read.passages.push(passage);
+                // The first answer of a station reports all that closed since its last one, be that minutes ago.
+                let is_remembered = core::mem::take(&mut is_first) && passage.drive.commanded.is_none();
+                if !is_remembered {
+                    read.passages.push(passage);
+                }
             }
             match event.kind {
                 EventKind::Speed { train: told, step } if told == train => {
