@@ -43,6 +43,8 @@ pub(super) struct Pacing {
     /// Since when CTS is as it is.
     cts_since: Timestamp,
     written: Option<Written>,
+    /// Bytes for which CTS was not seen down before the next was written. On a line that delays it, it comes later.
+    owed: usize,
 }
 
 /// The byte that was written last, until the interface is known to be done with it.
@@ -51,28 +53,39 @@ struct Written {
     at: Timestamp,
     /// Whether CTS was seen down since.
     lowered: bool,
+    /// Whether a whole reply has come since.
+    answered: bool,
     ends_frame: bool,
 }
 
 impl Pacing {
     pub(super) fn new(now: Timestamp, pace: Pace) -> Self {
-        Self { pace, cts_up: false, cts_since: now, written: None }
+        Self { pace, cts_up: false, cts_since: now, written: None, owed: 0 }
     }
 
     pub(super) fn cts(&mut self, now: Timestamp, up: bool) {
         if up != self.cts_up {
             self.cts_since = now;
         }
+        let falls = self.cts_up && !up;
         self.cts_up = up;
         if let Some(written) = &mut self.written
             && !up
         {
-            written.lowered = true;
+            // The interface drops it once the whole byte has arrived: what falls sooner, falls for a byte before.
+            let is_earlier = self.owed > 0 || now < written.at + BYTE_TIME;
+            written.lowered |= !is_earlier;
+        }
+        if falls {
+            self.owed = self.owed.saturating_sub(1);
         }
     }
 
     pub(super) fn wrote(&mut self, now: Timestamp, ends_frame: bool) {
-        self.written = Some(Written { at: now, lowered: self.pace == Pace::Cts && !self.cts_up, ends_frame });
+        let is_unseen = self.written.is_some_and(|before| !before.lowered && !before.answered);
+        self.owed = self.owed.saturating_add(usize::from(self.pace == Pace::Cts && is_unseen));
+        let lowered = self.pace == Pace::Cts && !self.cts_up;
+        self.written = Some(Written { at: now, lowered, answered: false, ends_frame });
     }
 
     /// What was written last was one byte that the interface swallows or obeys at once, and a stop waits: it follows as
@@ -83,10 +96,14 @@ impl Pacing {
         }
     }
 
-    /// A whole reply has come, so the interface is done with what was written before.
+    /// A whole reply has come, so the interface is done with what was written before, and CTS is as late as the reply at most.
     pub(super) fn answered(&mut self) {
+        self.owed = 0;
         if self.pace != Pace::Cts {
             self.written = None;
+        }
+        if let Some(written) = &mut self.written {
+            written.answered = true;
         }
     }
 
@@ -163,6 +180,31 @@ mod tests {
         pacing.wrote(ms(0), true);
         assert!(!pacing.is_ready(ms(14)));
         assert!(pacing.is_ready(ms(15)), "a byte of 4.6 ms and 10 ms of guard");
+    }
+
+    #[test]
+    fn an_edge_that_comes_late_does_not_count_for_the_next_byte() {
+        let mut pacing = Pacing::new(ms(0), Pace::Cts);
+        pacing.cts(ms(0), true);
+        // CTS falls at 4.8 ms and rises a millisecond later, and both are seen 10 ms after that.
+        pacing.wrote(ms(0), false);
+        assert!(pacing.is_ready(ms(15)));
+        pacing.wrote(ms(15), false);
+        pacing.cts(ms(16), false);
+        pacing.cts(ms(17), true);
+        assert!(!pacing.is_ready(ms(29)), "the interface is busy with the second byte until 22 ms at least");
+        assert!(pacing.is_ready(ms(30)));
+        // The edges of the second byte come after the third has left.
+        pacing.wrote(ms(30), false);
+        pacing.cts(ms(35), false);
+        pacing.cts(ms(36), true);
+        assert!(!pacing.is_ready(ms(44)));
+        // A reply comes after all edges before it.
+        pacing.answered();
+        pacing.wrote(ms(50), false);
+        pacing.cts(ms(56), false);
+        pacing.cts(ms(57), true);
+        assert!(pacing.is_ready(ms(57)));
     }
 
     #[test]
