@@ -13,6 +13,7 @@ use crate::track::{Landmark, Position};
 use super::dispatched_train::{DispatchedTrain, Purpose};
 use super::dispatcher::Dispatcher;
 use super::granting::Proposal;
+use super::itinerary::SHORTEST_RUN;
 use super::movement_authority::{ClearanceEnvelope, PARKED, STOP_ERROR, Start, standstill_reservation};
 use super::path::OccupiedPath;
 use super::reservation::{Obstacles, Reservation};
@@ -196,7 +197,14 @@ impl Dispatcher {
         let obstacles = self.obstacles_of_others(id);
         let reached = self.search(&start, &obstacles).from(Some(start.place), self.reversed(&start));
         let train = self.trains.get(&id)?;
-        let places = train.parking.iter().filter_map(|(place, is_clear)| {
+        // The place that it is at gives the next search nothing new: it would be sent there again and again.
+        let is_here = |place: &Position| {
+            let near =
+                |here: Position| here.edge == place.edge && (here.offset - place.offset).abs() < SHORTEST_RUN;
+            self.both_directions(start.place).into_iter().any(near)
+        };
+        let places = train.parking.iter().filter(|(place, _)| !is_here(place));
+        let places = places.filter_map(|(place, is_clear)| {
             let itinerary =
                 reached.to(&self.both_directions(*place)).into_iter().next().filter(|_| *is_clear)?;
             let proposal = self.proposal(&start, itinerary)?;
