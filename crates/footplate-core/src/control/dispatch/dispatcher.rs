@@ -199,6 +199,9 @@ impl Dispatcher {
             known.occupied = OccupiedPath::default();
         }
         self.reserve_standstill(now, train);
+        // No train runs on to where another stands.
+        let under = self.trains.get(&train).map(|placed| self.track_under(now, placed));
+        under.into_iter().for_each(|under| drop(self.stop_on(now, train, &under)));
     }
 
     /// Whether nothing is known of where a train is: neither its position, nor track that is reserved for it.

@@ -5,12 +5,14 @@ use alloc::vec::Vec;
 use crate::control::Notice;
 use crate::control::drive::Refusal;
 use crate::control::supervise::Alarm;
-use crate::ids::TrainId;
+use crate::ids::{EdgeId, TrainId};
 use crate::time::{TimeSpan, Timestamp};
+use crate::tracking::PathPoint;
 use crate::units::Length;
 
-use super::dispatched_train::State;
+use super::dispatched_train::{DispatchedTrain, State};
 use super::dispatcher::Dispatcher;
+use super::movement_authority::standstill_reservation;
 use super::path::Path;
 use super::reservation::{Reservation, Span};
 
@@ -134,9 +136,7 @@ impl Dispatcher {
             ahead,
         );
         let taken = self.reserved(path.reservation(layout, at - envelope.behind, at + ahead));
-        let others = self.trains.values().filter(|other| other.id != id && other.reservation.meets(&taken));
-        let meets: Vec<TrainId> = others.map(|other| other.id).collect();
-        let mut reservation = taken;
+        let mut reservation = taken.clone();
         // Part of it may still be on track that it came over and that the turnouts no longer lead to.
         reservation.add(layout, &train.kept);
         self.reserve_anchors(now, id, place, &mut reservation);
@@ -145,6 +145,14 @@ impl Dispatcher {
             train.kept = reservation;
             train.state = State::Halting { confirmed: true, strayed: true };
         }
+        let stopped = self.stop_on(now, id, &taken);
+        self.notify(Notice::Diverged { train: id, stopped });
+    }
+
+    /// Stops every other train whose authority leads over this track, and returns those that ran.
+    pub(super) fn stop_on(&mut self, now: Timestamp, id: TrainId, taken: &Reservation) -> Vec<TrainId> {
+        let others = self.trains.values().filter(|other| other.id != id && other.reservation.meets(taken));
+        let meets: Vec<TrainId> = others.map(|other| other.id).collect();
         let mut stopped = Vec::new();
         for other in meets {
             match self.trains.get(&other).map(|train| train.state) {
@@ -156,7 +164,7 @@ impl Dispatcher {
                 _ => {}
             }
         }
-        self.notify(Notice::Diverged { train: id, stopped });
+        stopped
     }
 }
 
@@ -231,6 +239,7 @@ impl Dispatcher {
             };
             if !others.copied().any(|other| moves(&other)) {
                 self.awaiting_creep.remove(&id);
+                self.reserve_under_halted(now, id);
                 let free = self.free_track(id);
                 if let Some(train) = self.trains.get_mut(&id) {
                     train.reservation = free;
@@ -252,6 +261,48 @@ impl Dispatcher {
             }
         }
         false
+    }
+
+    /// The track under a train, wherever it may be by the turnouts whose position is known: over both legs of the others.
+    pub(super) fn track_under(&self, now: Timestamp, train: &DispatchedTrain) -> Reservation {
+        let driver = self.watchdog.driver();
+        let (layout, envelope) = (driver.layout(), self.envelope(now, train));
+        if let Some(place) = driver.position(train.id, now) {
+            let turnouts = driver.turnouts();
+            let taken = standstill_reservation(layout, turnouts, place, &train.occupied, envelope);
+            return self.reserved(taken);
+        }
+        let mut taken = Reservation::empty();
+        let Some(located) = driver.locate(train.id, now) else { return taken };
+        let PathPoint { node, distance } = located.at;
+        let from = |node, reach: Length| {
+            layout.outgoing(node).edges().map(move |edge| (edge, reach)).collect::<Vec<(EdgeId, Length)>>()
+        };
+        let mut open = from(node, distance + envelope.ahead);
+        open.extend(from(node.reverse(), envelope.behind - distance));
+        while let Some((id, left)) = open.pop() {
+            let Some(edge) = layout.edge(id).filter(|_| left > Length::ZERO) else { continue };
+            taken.take(layout, id, Length::ZERO, left);
+            open.extend(from(edge.to, left - edge.length));
+        }
+        self.reserved(taken)
+    }
+
+    /// Reserves, besides what it has, the track under each other train that was stopped: it may have run beyond its reservation
+    /// while no command reached it.
+    fn reserve_under_halted(&mut self, now: Timestamp, except: TrainId) {
+        let layout = self.watchdog.driver().layout();
+        let was_stopped = |train: &&DispatchedTrain| {
+            matches!(train.state, State::InDanger | State::Lost) && train.id != except
+        };
+        let stopped = self.trains.values().filter(was_stopped);
+        let under: Vec<(TrainId, Reservation)> =
+            stopped.map(|train| (train.id, self.track_under(now, train))).collect();
+        for (id, taken) in under {
+            if let Some(train) = self.trains.get_mut(&id) {
+                train.reservation.add(layout, &taken);
+            }
+        }
     }
 
     /// All track that no other train has reserved: a creeping train may enter any of it, and no other starts.

@@ -273,7 +273,9 @@ impl Dispatcher {
 
     /// A train that was commanded to stop is at rest.
     pub(super) fn halted(&mut self, now: Timestamp, id: TrainId, confirmed: bool) {
-        let is_certain = self.watchdog.driver().position(id, now).is_some();
+        // A turnout of unknown position ahead of it is set before any train starts.
+        let is_certain = self.watchdog.driver().position(id, now).is_some()
+            || self.unknown_turnout_ahead(now, id).is_some_and(|unknown| unknown.is_clear);
         if let Some(train) = self.trains.get_mut(&id) {
             train.authorities.clear();
             train.state = if is_certain { State::Resting } else { State::Lost };
