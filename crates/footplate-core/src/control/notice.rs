@@ -169,6 +169,10 @@ pub enum Notice {
     },
     /// The track is clear of what no session drove.
     TrackClear,
+    /// Sensors all over the layout report what no train explains: all trains are commanded to stop until none has for a while.
+    Noise,
+    /// No sensor has reported at random for a while.
+    NoiseOver,
     /// A command was not sent for a long time. A stop is commanded again.
     Unconfirmed {
         /// The command.

@@ -31,3 +31,24 @@ fn what_no_session_drives_stops_trains_until_an_operator_says_that_the_track_is_
     watched.dog.switch_power(watched.world.now, true);
     watched.go(FIRST, 5);
 }
+
+#[test]
+fn no_train_starts_while_sensors_report_at_random_and_for_three_seconds_after() {
+    let mut watched = Watched::two();
+    watched.run(10.0);
+    let said = |watched: &Watched, what: &Notice| watched.notices.iter().any(|notice| notice == what);
+    for name in ["E1", "E2", "C1", "C2"] {
+        assert!(!said(&watched, &Notice::Noise), "{:#?}", watched.notices);
+        let sensor = watched.world.layout.sensor_named(name).expect("a sensor");
+        watched.world.close(sensor);
+        watched.run(0.5);
+    }
+    assert!(said(&watched, &Notice::Noise), "{:#?}", watched.notices);
+    let order = Order::Speed { train: FIRST, step: step(5) };
+    assert_eq!(watched.dog.order(watched.world.now, order), Err(Refusal::NoAnswer));
+    watched.run(2.0);
+    assert!(!said(&watched, &Notice::NoiseOver), "{:#?}", watched.notices);
+    watched.run(1.0);
+    assert!(said(&watched, &Notice::NoiseOver), "{:#?}", watched.notices);
+    assert!(watched.dog.order(watched.world.now, order).is_ok());
+}

@@ -159,6 +159,8 @@ export const ENGLISH = {
   "alarm-deadlocked": "deadlock: no train can make room for another. Move one by hand, then place it",
   "alarm-unauthorised": "something moves from {0} to {1} that Footplate does not drive: check the track, then switch the power on, or place the train that it is",
   "alarm-track-clear": "the track is clear",
+  "alarm-noise": "sensors report at random: trains stop until none has for 3 s; check the line and the sensor modules",
+  "alarm-noise-over": "sensors no longer report at random",
   "alarm-unexplained": "{0} reported, but no train can be there",
   "alarm-unconfirmed": "not confirmed as sent: {0}",
   "alarm-stands-slower": "stopped: slower than its model",

@@ -160,6 +160,8 @@ export const GERMAN = {
   "alarm-deadlocked": "Züge blockieren sich: keiner kann ausweichen. Einen von Hand versetzen, dann mit `place` eingeben",
   "alarm-unauthorised": "von {0} nach {1} bewegt sich etwas, das Footplate nicht fährt: Gleis prüfen, dann Fahrstrom einschalten oder den Zug mit `place` eingeben",
   "alarm-track-clear": "das Gleis ist frei",
+  "alarm-noise": "Melder melden wahllos: die Züge stehen, bis 3 s lang keiner meldet; Leitung und Rückmeldemodule prüfen",
+  "alarm-noise-over": "die Melder melden nicht mehr wahllos",
   "alarm-unexplained": "{0} hat gemeldet, aber dort kann kein Zug sein",
   "alarm-unconfirmed": "Senden nicht bestätigt: {0}",
   "alarm-stands-slower": "angehalten: langsamer als sein Modell",

@@ -181,6 +181,7 @@ impl Alarm {
             "sensor-restored" => cause.family == "sensor" && alarm.blanks == self.blanks,
             "power-on" => cause.family == "power",
             "track-clear" => cause.family == "unauthorised",
+            "noise-over" => cause.family == "noise",
             _ => false,
         }
     }
@@ -324,6 +325,8 @@ impl Alarm {
                 (Grade::Danger, "unauthorised", None, vec![name(from), name(to)])
             }
             Notice::TrackClear => (Grade::Over, "track-clear", None, none),
+            Notice::Noise => (Grade::Danger, "noise", None, none),
+            Notice::NoiseOver => (Grade::Over, "noise-over", None, none),
             Notice::Unconfirmed { command } => {
                 (Grade::Danger, "unconfirmed", None, vec![command.to_string()])
             }

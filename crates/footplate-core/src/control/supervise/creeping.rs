@@ -9,6 +9,7 @@ use crate::ids::{EdgeId, NodeId, SpeedStep, TrainId};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Layout, MAX_MISSED, Position, TurnoutNeed, TurnoutStates};
+use crate::tracking::PathPoint;
 use crate::units::Length;
 
 use super::danger::{BODY, CERTAIN, CLEAR, LOST_REACH, rails_within};
@@ -66,12 +67,38 @@ impl Watchdog {
             let begin = edges.iter().enumerate().find_map(|(nth, edge)| {
                 let from = if nth == 0 { start } else { Length::ZERO };
                 Some(Position { edge: *edge, offset: closed.begins_on(layout, *edge, from)? })
-            })?;
-            let mut at = self.driver.path_point(train, located.at.node, begin)?;
+            });
+            let from = located.at.node;
+            let mut at = match begin {
+                Some(begin) => self.driver.path_point(train, from, begin)?,
+                None => self.closed_beyond_unknown_points(train, from, edges.last().copied(), &closed)?,
+            };
             at.distance += -(BODY + CLEAR);
             Some(at)
         });
         self.driver.set_end_of_authority(now, train, limit);
+    }
+
+    /// Where track begins that is closed to a train, if the path is known only to the end of an edge: behind that are points of unknown
+    /// position, and the nearest of such places over any of their legs counts.
+    fn closed_beyond_unknown_points(
+        &self,
+        train: TrainId,
+        from: NodeId,
+        last: Option<EdgeId>,
+        closed: &Reservation,
+    ) -> Option<PathPoint> {
+        let layout = self.driver.layout();
+        let (known_to, distance) = match last.and_then(|last| Some((last, layout.edge(last)?))) {
+            Some((last, edge)) => {
+                let end = Position { edge: last, offset: edge.length };
+                (edge.to, self.driver.path_point(train, from, end)?.distance)
+            }
+            None => (from, Length::ZERO),
+        };
+        let is_unknown = self.driver.context().hop_from(known_to).is_none();
+        let nearest = closed_within_hop(layout, self.driver.turnouts(), known_to, closed);
+        Some(PathPoint { node: from, distance: distance + nearest.filter(|_| is_unknown)? })
     }
 
     /// Whether a lost train may creep ahead. From its last detection, over the leg to which each turnout is set or over both if
@@ -196,6 +223,13 @@ impl Watchdog {
         self.unheard.insert(train, Unheard { run, step, since: sent, before });
     }
 
+    /// Whether a train was at rest at a time, however often it has been commanded to stop again since.
+    pub(super) fn has_rested_since(&self, train: TrainId, at: Timestamp) -> bool {
+        self.unheard
+            .get(&train)
+            .is_some_and(|known| known.step == SpeedStep::STAND && at - known.since >= REST_UNKNOWN)
+    }
+
     /// The station has been silent for a while: it may not have received the last command of any train or turnout.
     pub(super) fn distrust_last_commands(&mut self, now: Timestamp) {
         self.driver.forget_turnouts_changed(now, now - SILENT_FOR);
@@ -243,6 +277,48 @@ fn edges_within(
         open.extend(layout.outgoing(known.to).edges().map(|next| (next, left - known.length)));
     }
     best
+}
+
+/// The distance from a node to the nearest track that is closed, on any path that the turnouts allow as they are `set`, to the next
+/// sensor and the length that a train needs to stop behind it.
+fn closed_within_hop(
+    layout: &Layout,
+    set: &TurnoutStates,
+    from: NodeId,
+    closed: &Reservation,
+) -> Option<Length> {
+    let leads_from = |node: NodeId, until: Length, left: Option<Length>| {
+        let is_open = |edge: &EdgeId| {
+            layout
+                .needs_of(*edge)
+                .filter(|need| need.facing)
+                .all(|need| set.get(need.turnout).is_none_or(|leg| leg == need.leg))
+        };
+        let edges: Vec<EdgeId> = layout.outgoing(node).edges().filter(is_open).collect();
+        edges.into_iter().map(move |edge| (edge, until, left))
+    };
+    let mut open: Vec<(EdgeId, Length, Option<Length>)> = leads_from(from, Length::ZERO, None).collect();
+    let mut nearest: Option<Length> = None;
+    let mut known: BTreeMap<EdgeId, Length> = BTreeMap::new();
+    while let Some((id, until, left)) = open.pop() {
+        let Some(edge) = layout.edge(id) else { continue };
+        if left.is_none() && known.get(&id).is_some_and(|known| *known <= until) {
+            continue;
+        }
+        known.insert(id, until);
+        if let Some(at) = closed.begins_on(layout, id, Length::ZERO) {
+            if left.is_none_or(|left| at < left) {
+                nearest = Some(nearest.map_or(until + at, |nearest| nearest.min(until + at)));
+            }
+            continue;
+        }
+        let is_sensor = [edge.to, edge.to.reverse()].into_iter().any(|node| layout.sensor_at(node).is_some());
+        let left = left.map(|left| left - edge.length).or(is_sensor.then_some(BODY + CLEAR));
+        if left.is_none_or(|left| left > Length::ZERO) {
+            open.extend(leads_from(edge.to, until + edge.length, left));
+        }
+    }
+    nearest
 }
 
 /// What has to be free ahead of a place: the sensors of the distance that a train may have run from there already do
@@ -371,5 +447,31 @@ mod tests {
             BACK,
             &Reservation::empty()
         ));
+    }
+
+    #[test]
+    fn beyond_points_of_unknown_position_the_nearest_closed_track_over_either_leg_counts() {
+        let layout = oval();
+        let node = |name| layout.node_named(name).unwrap();
+        let edge = |from, to| layout.edge_between(node(from), node(to)).unwrap();
+        // From A1 the points BR1 lead to B1 or C1.
+        let to_points = layout.edge(edge("A1", "BR1")).unwrap().length;
+        let mut closed = Reservation::empty();
+        let on_leg = Length::from_mm(60.0);
+        closed.take_rails(&layout, edge("BR1", "C1"), on_leg, on_leg + Length::from_mm(100.0));
+        let nearest =
+            |set: &TurnoutStates, closed: &Reservation| closed_within_hop(&layout, set, node("A1"), closed);
+        assert_eq!(nearest(&TurnoutStates::unknown(), &Reservation::empty()), None);
+        assert_eq!(nearest(&TurnoutStates::unknown(), &closed), Some(to_points + on_leg));
+        // Track of others just behind the sensor is too near, too, and further on there is time for the sensor to report.
+        let behind = |mm: f64| {
+            let mut closed = Reservation::empty();
+            let from = Length::from_mm(mm);
+            closed.take_rails(&layout, edge("C1", "MR2"), from, from + Length::from_mm(10.0));
+            closed
+        };
+        let to_c1 = to_points + layout.edge(edge("BR1", "C1")).unwrap().length;
+        let within = nearest(&TurnoutStates::unknown(), &behind(100.0)).unwrap();
+        assert!((within - to_c1 - Length::from_mm(100.0)).abs() < Length::from_mm(0.01));
     }
 }

@@ -32,7 +32,7 @@ impl Intruder {
 }
 
 /// Whether a path leads from one sensor to the other, in either direction, with no other sensor between them.
-fn are_adjacent(layout: &Layout, one: SensorId, other: SensorId) -> bool {
+pub(super) fn are_adjacent(layout: &Layout, one: SensorId, other: SensorId) -> bool {
     let Some(node) = layout.sensor_node(one) else { return false };
     let hops = [node, node.reverse()].into_iter().flat_map(|node| layout.hops_from(node));
     one != other && hops.into_iter().any(|hop| hop.sensor == Some(other))

@@ -4,12 +4,13 @@ use alloc::vec::Vec;
 
 use crate::control::drive::Order;
 use crate::event::Command;
-use crate::ids::{FunctionNumber, SpeedStep, TrainId};
+use crate::ids::{FunctionNumber, SensorId, SpeedStep, TrainId};
 use crate::time::Timestamp;
 
 use super::alarm::Alarm;
 use super::creeping::SILENT_FOR;
 use super::watchdog::{Power, Watchdog};
+use crate::control::Notice;
 
 /// News of the link to the command station.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,38 +54,74 @@ impl Watchdog {
             // The station would run every train on at its last step when the power returns.
             LinkNews::PowerLost => self.switch_power(now, false),
             LinkNews::Silent if self.silent.is_none() => {
+                let is_known = self.is_silent();
                 self.silent = Some(now);
-                self.distrust_last_commands(now);
-                // What creeps to be located would pass the sensors that end it without a report.
-                let creeping = self.dangers.iter().filter(|(_, recovery)| recovery.is_active());
-                let creeping: Vec<TrainId> = creeping.map(|(train, _)| *train).collect();
-                self.interrupt_recoveries(now);
-                for train in creeping {
-                    self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
-                }
-                let trains: Vec<TrainId> = self.driver.trains().collect();
-                for train in trains {
-                    // A station that went off took the power with it: a train that was braking stands short of its stop.
-                    let rested = self.driver.is_at_rest(train, now - SILENT_FOR);
-                    if self.driver.commanded(train) > SpeedStep::STAND || !rested {
-                        self.raise(now, train, Alarm::LinkSilent);
-                    }
+                if !is_known {
+                    self.stop_unheard(now);
                 }
             }
             LinkNews::Silent => {}
             LinkNews::Answers => {
-                if let Some(since) = self.silent.take() {
-                    self.driver.forget_turnouts_changed(now, since);
-                    self.interrupt_recoveries(now);
-                    // Stop commands may have been lost: stop each train again.
-                    let trains: Vec<TrainId> = self.driver.trains().collect();
-                    for train in trains {
-                        self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
-                    }
+                let since = self.silent.take();
+                if let Some(since) = since.filter(|_| !self.is_silent()) {
+                    self.stop_again(now, since);
                 }
             }
         }
         self.act(now);
+    }
+
+    /// Nothing is heard of trains, or nothing that can be relied on: stops each that may move.
+    fn stop_unheard(&mut self, now: Timestamp) {
+        self.distrust_last_commands(now);
+        // What creeps to be located would pass the sensors that end it without a report.
+        let creeping = self.dangers.iter().filter(|(_, recovery)| recovery.is_active());
+        let creeping: Vec<TrainId> = creeping.map(|(train, _)| *train).collect();
+        self.interrupt_recoveries(now);
+        for train in creeping {
+            self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
+        }
+        let trains: Vec<TrainId> = self.driver.trains().collect();
+        for train in trains {
+            // A station that went off took the power with it: a train that was braking stands short of its stop.
+            let rested = self.driver.is_at_rest(train, now - SILENT_FOR)
+                || self.has_rested_since(train, now - SILENT_FOR);
+            if self.driver.commanded(train) > SpeedStep::STAND || !rested {
+                self.raise(now, train, Alarm::LinkSilent);
+            }
+        }
+    }
+
+    /// Trains are heard again: stop commands since a time may have been lost, so that each train is commanded to stop again.
+    fn stop_again(&mut self, now: Timestamp, since: Timestamp) {
+        self.driver.forget_turnouts_changed(now, since);
+        self.interrupt_recoveries(now);
+        let trains: Vec<TrainId> = self.driver.trains().collect();
+        for train in trains {
+            self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
+        }
+    }
+
+    /// Takes a detection that no train explains; returns whether it is noise. Trains stop when noise begins.
+    pub(super) fn is_noise(&mut self, now: Timestamp, sensor: SensorId) -> bool {
+        let is_known = self.is_silent();
+        if self.noise.take(now, self.driver.layout(), sensor) {
+            self.notify(Notice::Noise);
+            if !is_known {
+                self.stop_unheard(now);
+            }
+        }
+        self.noise.is_on()
+    }
+
+    /// Ends noise that is over.
+    pub(super) fn end_noise(&mut self, now: Timestamp) {
+        if let Some(since) = self.noise.end(now) {
+            self.notify(Notice::NoiseOver);
+            if !self.is_silent() {
+                self.stop_again(now, since);
+            }
+        }
     }
 
     /// Switches the track power off or on for an operator. It then stays off until an operator switches it on. An
@@ -128,7 +165,8 @@ impl Watchdog {
         self.power == Power::On
     }
 
+    /// Whether the station is silent, or what it reports is not to be relied on.
     pub(in crate::control) const fn is_silent(&self) -> bool {
-        self.silent.is_some()
+        self.silent.is_some() || self.noise.is_on()
     }
 }

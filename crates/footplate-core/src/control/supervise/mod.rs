@@ -13,7 +13,7 @@
 //! alarm                alarms, and the tests at every sensor that raise them
 //! danger  stops        trains that are stopped and held; stops that have to be confirmed
 //! creeping  unheard    where a train in recovery may go; how far it can have run
-//! intruder             movements that no session drives
+//! intruder  noise      movements that no session drives; detections at random
 //! strayed  facing      trains that are not where they were estimated, or in another direction
 //! line  orders         the link and the track power; which orders are carried out now
 //! recovery             the recovery of one train
@@ -26,6 +26,7 @@ mod danger;
 mod facing;
 mod intruder;
 mod line;
+mod noise;
 mod orders;
 mod recovery;
 mod remeasuring;

@@ -37,7 +37,10 @@ impl Watchdog {
     /// early, or that the report was spurious.
     pub(super) fn compare_with_unexplained(&mut self, now: Timestamp, train: TrainId, silent: SensorId) {
         let is_elsewhere = |(sensor, time): &(SensorId, Timestamp)| {
-            *sensor != silent && now - *time <= SAME_TRAIN_WITHIN && self.may_have_been_moved(train, *time)
+            *sensor != silent
+                && now - *time <= SAME_TRAIN_WITHIN
+                && !self.noise.covers(*time)
+                && self.may_have_been_moved(train, *time)
         };
         let found = self.driver.probably_elsewhere(now, train).find(is_elsewhere);
         if let Some((sensor, time)) = found {

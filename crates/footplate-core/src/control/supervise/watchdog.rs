@@ -16,6 +16,7 @@ use crate::units::Length;
 
 use super::alarm::{Alarm, ConsistencyMonitor};
 use super::intruder::Intruder;
+use super::noise::Noise;
 use super::recovery::{Phase, Recovery};
 use super::stops::Stops;
 use super::trials::Remeasured;
@@ -64,6 +65,7 @@ pub struct Watchdog {
     /// Whether an operator has switched the power off.
     pub(super) is_switched_off: bool,
     pub(super) intruder: Intruder,
+    pub(super) noise: Noise,
     /// Trains that may creep, with the track that is reserved for others.
     pub(super) permitted: BTreeMap<TrainId, Reservation>,
     /// The last time that it acted: timeouts up to then are handled.
@@ -94,6 +96,7 @@ impl Watchdog {
             is_watching: true,
             is_switched_off: false,
             intruder: Intruder::default(),
+            noise: Noise::default(),
             permitted: BTreeMap::new(),
             acted: now,
         };
@@ -160,7 +163,10 @@ impl Watchdog {
     /// could not be recovered it is trusted again, with its earlier model. One that is measured is stopped, and measured again. If no train is in danger any more, held trains are released and their orders
     /// cancelled.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: PathPoint, uncertainty: Length) {
+        // A recovery that was given up is forgotten, and what the train pushed over is not.
+        let behind = self.behind.get(&train).copied();
         self.end_search(now, train);
+        self.behind.extend(behind.map(|behind| (train, behind)));
         self.driver.place(now, train, at, uncertainty);
         self.monitors.entry(train).or_default().place();
         let place = self.driver.position(train, now);
@@ -262,6 +268,7 @@ impl Watchdog {
             self.power_off(now, train);
         }
         self.acted = now;
+        self.end_noise(now);
         self.power_on_again(now);
         self.advance_recoveries(now);
         if self.dangers.values().all(|danger| !danger.is_active()) {
@@ -300,6 +307,7 @@ impl Watchdog {
                 return self.lost(now, train, Alarm::Lost);
             }
             Notice::Unexplained { sensor, time } if self.refute(now, *sensor, *time) => {}
+            Notice::Unexplained { sensor, .. } if self.is_watching && self.is_noise(now, *sensor) => {}
             Notice::Unexplained { sensor, time } if self.is_watching => {
                 let stray = |train: &TrainId| {
                     self.stops.should_be_at_rest(*train, now)
@@ -322,7 +330,8 @@ impl Watchdog {
             }
             Notice::Ambiguous { sensor, time, likeliest, or } => {
                 let (train, is_spurious) = (*likeliest, or.is_none());
-                if !self.note_backward(now, *sensor, *time)
+                if !self.noise.is_on()
+                    && !self.note_backward(now, *sensor, *time)
                     && let Some(strayed) = self.driver.probably_strayed()
                 {
                     self.raise_elsewhere(now, strayed, *sensor, *time);
@@ -382,7 +391,7 @@ impl Watchdog {
         if let Some(node) = self.driver.node_passed(passed) {
             self.note_behind(train, node);
         }
-        if self.is_watching && self.stops.should_be_at_rest(train, now) {
+        if self.is_watching && !self.noise.is_on() && self.stops.should_be_at_rest(train, now) {
             self.raise(now, train, Alarm::DoesNotStop(passed.sensor));
             self.power_off(now, train);
         } else if self.dangers.contains_key(&train) {
@@ -447,7 +456,12 @@ impl Machine for Watchdog {
         let waits = self.dangers.keys().filter_map(|train| self.stops.at_rest(*train));
         let recovering = self.dangers.values().filter_map(Recovery::next_timeout);
         let repeats = self.stops.next_repeat(|train| self.is_held(train));
-        let own = recovering.chain(waits).chain(self.stops.next()).chain(repeats).chain(self.power_due());
+        let own = recovering
+            .chain(waits)
+            .chain(self.noise.next())
+            .chain(self.stops.next())
+            .chain(repeats)
+            .chain(self.power_due());
         own.filter(|at| *at > self.acted).chain(self.driver.next_timeout()).min()
     }
 }

@@ -322,6 +322,8 @@ fn supervised(notice: &Notice) -> Option<String> {
         ),
         Notice::PowerOff { train } => format!("track power off: train {train} may not have stopped"),
         Notice::TrackClear => "the track is clear; trains may run again".to_owned(),
+        Notice::Noise => "sensors report at random: trains stop until none has for 3 s; check the line and the sensor modules".to_owned(),
+        Notice::NoiseOver => "sensors no longer report at random".to_owned(),
         Notice::PowerOn => "track power on; all trains are commanded to stop".to_owned(),
         Notice::AsksToCreep { train } => format!("train {train} is waiting for clearance to creep"),
         Notice::Creeps { train, step } => {
