@@ -4,6 +4,7 @@
 
 #![warn(clippy::print_stderr)]
 
+mod accept_queue;
 mod chaos;
 mod clock;
 mod commands;

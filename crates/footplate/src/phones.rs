@@ -27,6 +27,7 @@ use tokio::sync::Semaphore;
 use tokio::time::{interval, sleep, timeout};
 
 use self::given_orders::{GivenOrders, line};
+use crate::accept_queue::listen;
 use crate::clock::Stopwatch;
 use crate::dashboard::{Board, Request};
 use crate::link::{PowerCommand, SharedTallies};
@@ -76,7 +77,7 @@ impl Phones {
     /// # Errors
     /// The address is in use.
     pub(crate) fn serve(at: PhonesAt, board: &Arc<Board>, line: &SharedTallies) -> anyhow::Result<Self> {
-        let listener = std::net::TcpListener::bind(at.0)
+        let listener = listen(at.0)
             .with_context(|| format!("phones cannot be served at {}: name another port", at.0))?;
         listener.set_nonblocking(true)?;
         let bound = listener.local_addr()?;

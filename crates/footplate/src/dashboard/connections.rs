@@ -4,6 +4,9 @@
 //! Each connection needs a file descriptor, and a process has few: 1100 idle connections once made an emergency stop
 //! time out. Idle connections are therefore closed after a while; beyond the limit the longest idle one is closed,
 //! first among those of the same address, so that one client cannot displace others.
+//!
+//! Connections are accepted a few at a time, and read in between: of thousands that wait to be accepted, the one with an
+//! emergency stop would be displaced by those behind it before its request is read.
 
 use std::collections::BTreeMap;
 use std::net::IpAddr;
@@ -11,12 +14,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use axum::{Extension, Router};
+use axum::Router;
+use hyper::Request;
+use hyper::body::Incoming;
 use hyper::server::conn::http1;
+use hyper::service::{Service, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
-use tokio::task::{AbortHandle, Id, JoinSet};
+use tokio::task::{AbortHandle, Id, JoinSet, yield_now};
 
 use crate::clock::Stopwatch;
 
@@ -35,6 +41,9 @@ impl Limits {
         Self { in_all: 512, of_an_address: 384, header_within: Duration::from_secs(10) };
 }
 
+/// Connections that are accepted before others have their turn. The runtime gives 61 turns before it looks at the network
+/// again (`event_interval`), and a new connection needs at most three to be closed.
+const ACCEPTED_AT_ONCE: usize = 16;
 /// The pause after a connection failed for lack of descriptors.
 const RETRY_PAUSE: Duration = Duration::from_millis(5);
 
@@ -107,10 +116,16 @@ pub(super) async fn serve(listener: TcpListener, router: Router, limits: Limits)
     let served = Stopwatch::start();
     let mut connections = Connections::default();
     let mut tasks = JoinSet::new();
+    let mut accepted_now = 0;
     loop {
+        if accepted_now == ACCEPTED_AT_ONCE {
+            accepted_now = 0;
+            yield_now().await;
+        }
         tokio::select! {
             accepted = listener.accept() => match accepted {
                 Ok((stream, from)) => {
+                    accepted_now += 1;
                     connections.make_room(from.ip(), limits);
                     let last = LastRequest::none_yet(served);
                     let answers = connection(stream, router.clone(), last.clone(), limits.header_within);
@@ -134,7 +149,11 @@ pub(super) async fn serve(listener: TcpListener, router: Router, limits: Limits)
 async fn connection(stream: TcpStream, router: Router, last: LastRequest, header_within: Duration) {
     // Short answers are sent at once instead of waiting for more data.
     let _ = stream.set_nodelay(true);
-    let service = TowerToHyperService::new(router.layer(Extension(last)));
+    let service = TowerToHyperService::new(router);
+    let service = service_fn(move |mut request: Request<Incoming>| {
+        request.extensions_mut().insert(last.clone());
+        service.call(request)
+    });
     // Errors of a connection concern its client only.
     let _ = http1::Builder::new()
         .timer(TokioTimer::new())
@@ -145,10 +164,12 @@ async fn connection(stream: TcpStream, router: Router, last: LastRequest, header
 
 #[cfg(test)]
 mod tests {
+    use axum::Extension;
     use axum::routing::get;
     use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
     use super::*;
+    use crate::accept_queue::listen;
 
     const FEW: Limits = Limits { in_all: 8, of_an_address: 8, header_within: Duration::from_secs(60) };
 
@@ -213,6 +234,42 @@ mod tests {
             assert!(is_closed(&mut greedy[0]).await);
             assert!(ask(greedy.last_mut().expect("twenty")).await);
         });
+    }
+
+    #[test]
+    fn a_request_among_a_thousand_that_wait_to_be_accepted_is_answered() {
+        let limits = Limits { in_all: 64, of_an_address: 64, ..FEW };
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
+        let listener = listen(([127, 0, 0, 1], 0).into()).expect("a free port");
+        let at = listener.local_addr().expect("an address");
+        let connect = || std::net::TcpStream::connect(at).expect("a connection");
+        let before: Vec<_> = (0..500).map(|_| connect()).collect();
+        let mut asking = connect();
+        std::io::Write::write_all(&mut asking, b"GET / HTTP/1.1\r\nHost: here\r\nConnection: close\r\n\r\n")
+            .expect("a request");
+        let behind: Vec<_> = (0..500).map(|_| connect()).collect();
+        listener.set_nonblocking(true).expect("an option of sockets");
+        asking.set_nonblocking(true).expect("an option of sockets");
+        let answer = runtime.block_on(async {
+            let listener = TcpListener::from_std(listener).expect("a listener");
+            let answers = async |Extension(last): Extension<LastRequest>| {
+                last.is_now();
+                "here"
+            };
+            let serving = serve(listener, Router::new().route("/", get(answers)), limits);
+            let mut answer = String::new();
+            let mut asking = TcpStream::from_std(asking).expect("a stream");
+            tokio::select! {
+                () = serving => {}
+                read = asking.read_to_string(&mut answer) => drop(read),
+            }
+            answer
+        });
+        assert!(
+            answer.starts_with("HTTP/1.1 200"),
+            "{} connections wait: {answer}",
+            before.len() + behind.len()
+        );
     }
 
     #[test]

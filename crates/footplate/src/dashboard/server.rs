@@ -47,6 +47,7 @@ use super::routes::Routes;
 use super::stream::events;
 use super::timed_body::in_time;
 use super::token::Token;
+use crate::accept_queue::listen;
 use crate::clock::now;
 use crate::link::{LineTallies, SharedTallies};
 use crate::standard_error::say;
@@ -93,7 +94,7 @@ impl ServedAt {
     }
 
     fn listen(&self) -> anyhow::Result<std::net::TcpListener> {
-        std::net::TcpListener::bind(self.0)
+        listen(self.0)
             .with_context(|| format!("{} cannot be served at: name another port, or 0 for any", self.0))
     }
 
