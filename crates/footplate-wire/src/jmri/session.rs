@@ -47,6 +47,8 @@ pub struct Client {
     sensors: Sensors,
     /// Trains whose throttles have to be asked for their state.
     unverified: Vec<TrainId>,
+    /// Trains whose throttles have obeyed over this connection: what JMRI says of them, its hardware does.
+    obeyed: Vec<TrainId>,
     identity: Option<String>,
     /// The last reason for which JMRI refused a request.
     refusal: Option<String>,
@@ -64,6 +66,7 @@ impl Client {
             system: System::default(),
             sensors: Sensors::default(),
             unverified: Vec::new(),
+            obeyed: Vec::new(),
             identity: None,
             refusal: None,
         };
@@ -133,7 +136,8 @@ impl Protocol for Client {
     fn begin_again(&mut self, _now: Timestamp) {
         self.lines = Lines::default();
         self.verify();
-        // JMRI stopped the trains when the connection ended, and has given up their throttles.
+        self.obeyed.clear();
+        // JMRI stopped the trains when the connection ended, and has given up their throttles. One that was restarted did not.
         for train in self.dialogue.directed() {
             self.lost_throttle(train);
         }
@@ -165,7 +169,9 @@ impl Protocol for Client {
         reverses: bool,
     ) -> (Request, Option<Awaited>) {
         let forward = self.dialogue.commanded(train, step, reverses);
-        let throttle = self.throttle(train, step);
+        // JMRI passes on what changes. After a restart it takes all trains to stand, and a plain stop changes nothing then.
+        let is_sure = step != SpeedStep::STAND || self.obeyed.contains(&train);
+        let throttle = if is_sure { self.throttle(train, step) } else { Throttle::EmergencyStop };
         let message = ThrottleMessage { throttle: Some(throttle), forward: Some(forward), ..asked_of(train) };
         (Request::Throttle(message), Some(Awaited::Driven(train, throttle, forward)))
     }

@@ -313,12 +313,18 @@ fn after_a_lost_connection_trains_are_at_rest_and_face_as_they_were_commanded() 
     desk.written.clear();
     desk.client.handle_reopened(desk.now);
     desk.run_for(500);
-    assert_eq!(desk.drives(), [(24, Throttle::Speed(0), false)]);
-    assert_eq!(desk.station.throttles["24"], (Throttle::Speed(0), false, 0));
+    // It passes on what changes, and so not a speed of 0, while its hardware drives on.
+    assert_eq!(desk.drives(), [(24, Throttle::EmergencyStop, false)]);
+    desk.run_for(500);
+    assert_eq!(desk.station.throttles["24"], (Throttle::EmergencyStop, false, 0));
     desk.command(speed(T24, 5));
     desk.run_for(100);
     assert_eq!(desk.station.throttles["24"], (Throttle::Speed(45), false, 0));
     assert_eq!(desk.notices, [LinkNotice::Answers]);
+    // A throttle that has obeyed is stopped in its usual way.
+    desk.command(speed(T24, 0));
+    desk.run_for(100);
+    assert_eq!(desk.station.throttles["24"], (Throttle::Speed(0), false, 0));
 }
 
 #[test]

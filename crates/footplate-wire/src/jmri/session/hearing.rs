@@ -177,9 +177,15 @@ impl Client {
         let wanted = self.throttle(train, step);
         let Some(locomotive) = self.dialogue.locomotive(train) else { return };
         if matches!(answered, Some(Awaited::Driven(..))) {
+            if !self.obeyed.contains(&train) {
+                self.obeyed.push(train);
+            }
             return self.dialogue.obeyed(train);
         }
-        let (throttle, faces) = driven;
+        let (throttle, faces) = match driven {
+            (Throttle::EmergencyStop, faces) => (Throttle::Speed(0), faces),
+            driven => driven,
+        };
         let Some(forward) = locomotive.forward else {
             // JMRI may have been restarted and not know: the direction is written with the next speed.
             let forward =
@@ -200,6 +206,7 @@ impl Client {
 
     /// JMRI has stopped a train and given up its throttle, which must be asked for again.
     pub(super) fn lost_throttle(&mut self, train: TrainId) {
+        self.obeyed.retain(|obeyed| *obeyed != train);
         let Some(locomotive) = self.dialogue.locomotives.get_mut(train) else { return };
         locomotive.forward = None;
         locomotive.step = SpeedStep::STAND;
