@@ -105,6 +105,15 @@ impl Seeds {
         Ok(Self { all: drawn.into_iter().collect(), written })
     }
 
+    /// The same seeds above another one, if they are fresh; seeds that a person wrote stay as they are.
+    #[must_use]
+    pub fn fresh_above(mut self, first: u64) -> Self {
+        if self.written.starts_with(FRESH) {
+            self.all.iter_mut().for_each(|seed| *seed += first);
+        }
+        self
+    }
+
     /// All seeds, in order.
     pub fn iter(&self) -> impl Iterator<Item = u64> + Clone + use<> {
         self.all.clone().into_iter()
@@ -203,6 +212,14 @@ mod tests {
             Seeds::parse_in_rows("fresh:9@5731edca1f20", 1).unwrap(),
             Seeds::parse("fresh:9@5731edca1f20").unwrap()
         );
+    }
+
+    #[test]
+    fn fresh_seeds_lie_above_another_one_if_wanted_and_chosen_ones_do_not() {
+        let above = |text| Seeds::parse(text).unwrap().fresh_above(20_000_000).iter().collect::<Vec<_>>();
+        let raised: Vec<u64> = seeds("fresh:9@5731edca1f20").iter().map(|seed| seed + 20_000_000).collect();
+        assert_eq!(above("fresh:9@5731edca1f20"), raised);
+        assert_eq!(above("7..9"), [7, 8, 9]);
     }
 
     #[test]

@@ -10,6 +10,7 @@ use footplate_eval::seeds::Choice;
 
 use super::life::{Death, Life, Spell};
 use super::plan::{Planned, Trouble};
+use super::transport::Transport;
 use crate::link::{Bequest, FromSimulated, Guardian, Heard, Link, Lost, SimulatedStation};
 use crate::runtime::{WillLine, written};
 
@@ -19,6 +20,9 @@ pub(super) const LATE: TimeSpan = TimeSpan::from_ms(500);
 const PATIENCE: TimeSpan = TimeSpan::from_ms(25);
 /// How often the true motion is checked while trains are stopped.
 const LOOK: TimeSpan = TimeSpan::from_ms(5);
+
+/// A segment that is lost or garbled on a connection is sent again after this time (the shortest of Linux, RFC 6298).
+const SENT_AGAIN_AFTER: TimeSpan = TimeSpan::from_ms(200);
 
 /// The station of a story, shared by all its lives.
 pub(super) type SharedStation<'l> = Rc<RefCell<SimulatedStation<'l>>>;
@@ -46,7 +50,7 @@ pub(super) struct FaultyLine<'l> {
     arrivals: VecDeque<(Timestamp, Heard)>,
     holder: Holder,
     is_open: bool,
-    has_datagrams: bool,
+    transport: Transport,
     has_answered: bool,
     after_death: Duration,
     /// What the guardian knows.
@@ -67,7 +71,9 @@ impl<'l> FaultyLine<'l> {
         choice: Choice,
     ) -> Self {
         let began = station.borrow().now();
-        let has_datagrams = matches!(&*station.borrow(), SimulatedStation::Z21(_) | SimulatedStation::Can(_));
+        let transport = Transport::of(&station.borrow());
+        // Each life has a connection of its own.
+        station.borrow_mut().connect();
         Self {
             station,
             life,
@@ -79,7 +85,7 @@ impl<'l> FaultyLine<'l> {
             arrivals: VecDeque::new(),
             holder: Holder::Guardian,
             is_open: true,
-            has_datagrams,
+            transport,
             has_answered: false,
             after_death: Duration::ZERO,
             will: None,
@@ -111,13 +117,9 @@ impl<'l> FaultyLine<'l> {
             .find_map(|planned| pick(planned.trouble))
     }
 
-    pub(super) fn is_cut(&self) -> bool {
-        self.now_in(|trouble| (trouble == Trouble::Cut).then_some(())).is_some()
-    }
-
     /// The spans of world time in which no command reaches the station.
     pub(super) fn unreachable(&self) -> Vec<Spell> {
-        let cuts = self.troubles.iter().filter(|planned| planned.trouble == Trouble::Cut);
+        let cuts = self.troubles.iter().filter(|planned| self.cuts_off(planned.trouble));
         let at = |time: Timestamp| self.began + (time - Timestamp::ZERO);
         cuts.map(|cut| Spell { from: at(cut.spell.from), until: at(cut.spell.until) }).collect()
     }
@@ -134,10 +136,8 @@ impl<'l> FaultyLine<'l> {
             match trouble {
                 Trouble::Cut => {
                     self.arrivals.clear();
-                    if !self.has_datagrams {
-                        self.is_open = false;
-                        self.arrivals
-                            .push_back((self.time(), Heard::Lost(Lost("the line is cut".to_owned()))));
+                    if self.transport != Transport::Datagrams {
+                        self.lose("the line is cut");
                     }
                 }
                 Trouble::StationOff => self.switch_station_off(spell.until - spell.from),
@@ -151,7 +151,27 @@ impl<'l> FaultyLine<'l> {
         }
     }
 
+    fn lose(&mut self, why: &str) {
+        self.is_open = false;
+        self.arrivals.push_back((self.time(), Heard::Lost(Lost(why.to_owned()))));
+    }
+
+    /// Whether no connection can be made.
+    pub(super) fn is_unreachable(&self) -> bool {
+        self.now_in(|trouble| self.cuts_off(trouble).then_some(())).is_some()
+    }
+
+    /// Whether no byte reaches the station in a trouble: the line is cut, or JMRI, which is a program, does not run.
+    fn cuts_off(&self, trouble: Trouble) -> bool {
+        let is_off = trouble == Trouble::StationOff;
+        trouble == Trouble::Cut || is_off && matches!(&*self.station.borrow(), SimulatedStation::Jmri(_))
+    }
+
     fn switch_station_off(&mut self, dark_for: TimeSpan) {
+        if matches!(&*self.station.borrow(), SimulatedStation::Jmri(_)) {
+            self.arrivals.clear();
+            self.lose("JMRI has ended");
+        }
         match &mut *self.station.borrow_mut() {
             SimulatedStation::Marklin(station) => station.restart(dark_for),
             SimulatedStation::DccEx(board) => board.restart(),
@@ -186,14 +206,17 @@ impl<'l> FaultyLine<'l> {
 
     /// Schedules the arrival of bytes from the station, unless they are lost.
     fn hear(&mut self, heard: FromSimulated) {
-        if self.is_cut() || !self.is_open {
+        if self.is_unreachable() || !self.is_open {
             return;
         }
         let delay = self.now_in(|trouble| match trouble {
             Trouble::Delay(delay) => Some(delay),
             _ => None,
         });
-        let at = self.time() + delay.unwrap_or(TimeSpan::ZERO);
+        let (noise, loss) = self.rates();
+        let is_late = self.transport == Transport::Connection && (self.happens(noise) || self.happens(loss));
+        let again = if is_late { SENT_AGAIN_AFTER } else { TimeSpan::ZERO };
+        let at = self.time() + delay.unwrap_or(TimeSpan::ZERO) + again;
         // Bytes keep their order.
         let at = self.arrivals.back().map_or(at, |(last, _)| at.max(*last));
         match heard {
@@ -232,6 +255,9 @@ impl<'l> FaultyLine<'l> {
 
     /// A byte as it arrives; `None` if it is lost.
     fn passed(&mut self, byte: u8) -> Option<u8> {
+        if self.transport == Transport::Connection {
+            return Some(byte);
+        }
         let (noise, loss) = self.rates();
         if self.happens(loss) {
             return None;
@@ -250,15 +276,15 @@ impl<'l> FaultyLine<'l> {
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<(), Lost> {
-        if self.has_datagrams {
-            if !self.is_cut()
+        if self.transport == Transport::Datagrams {
+            if !self.is_unreachable()
                 && let Some(bytes) = self.passed_datagram(bytes.to_vec())
             {
                 self.station.borrow_mut().write(&bytes);
             }
             return Ok(());
         }
-        if self.is_cut() || !self.is_open {
+        if self.is_unreachable() || !self.is_open {
             self.is_open = false;
             return Err(Lost("the line is cut".to_owned()));
         }
@@ -275,6 +301,17 @@ impl<'l> FaultyLine<'l> {
             world.truth().train(*train).is_none_or(|truth| truth.commanded.get() == 0 || truth.is_wrecked)
         };
         !world.is_powered() || self.trains.iter().all(stands)
+    }
+
+    /// Opens the line, anew if it is open.
+    fn connect(&mut self) -> Result<(), Lost> {
+        if self.is_unreachable() && self.transport != Transport::Datagrams {
+            return Err(Lost("the line is cut".to_owned()));
+        }
+        self.arrivals.clear();
+        self.is_open = true;
+        self.station.borrow_mut().connect();
+        Ok(())
     }
 
     fn dead() -> Lost {
@@ -317,7 +354,7 @@ impl Link for FaultyLine<'_> {
             {
                 return heard;
             }
-            if !self.is_open && !self.has_datagrams {
+            if !self.is_open && self.transport != Transport::Datagrams {
                 return Heard::Lost(Lost("the line is gone".to_owned()));
             }
             if now >= until {
@@ -350,12 +387,7 @@ impl Link for FaultyLine<'_> {
             self.holder = Holder::Program;
             self.life.orphan();
         }
-        if self.is_cut() && !self.has_datagrams {
-            return Err(Lost("the line is cut".to_owned()));
-        }
-        self.arrivals.clear();
-        self.is_open = true;
-        Ok(())
+        self.connect()
     }
 
     fn real_time(&self) -> Duration {
@@ -410,11 +442,7 @@ impl WillLine for FaultyLine<'_> {
     }
 
     fn open(&mut self) -> Result<(), Lost> {
-        if self.is_cut() && !self.has_datagrams {
-            return Err(Lost("the line is cut".to_owned()));
-        }
-        self.is_open = true;
-        Ok(())
+        self.connect()
     }
 
     fn close(&mut self) {
@@ -442,7 +470,7 @@ impl WillLine for FaultyLine<'_> {
     }
 
     fn has_answered(&self) -> bool {
-        !self.has_datagrams || self.has_answered
+        self.transport != Transport::Datagrams || self.has_answered
     }
 
     fn expect_answer(&mut self) {

@@ -8,9 +8,11 @@
 //! ```text
 //! plan       what a seed draws: a station, failures with their times, and how each life of the program ends
 //! life       one life of the program: its steps, and the step at which it dies
+//! transport  how the bytes of a station travel: singly, in datagrams, or over a connection
 //! line       the line to the station, which loses, delays, garbles and breaks; and what a guardian sees of the program
 //! disk       the journal on a slow, full or failing disk, and what a power cut leaves of it
 //! people     the operator, who sends trains to places and helps them, and the checks of every step
+//! promises   what was promised in a story, and how much of it was kept
 //! story      all lives of one seed, and their result
 //! failure    what must not happen in a story
 //! selection  some of the troubles of a story: the least with which it still fails
@@ -22,9 +24,13 @@ mod life;
 mod line;
 mod people;
 mod plan;
+mod promises;
 mod selection;
 mod story;
+mod transport;
 
 pub(crate) use failure::FailureKind;
+pub(crate) use plan::FOUR_STATIONS_UNTIL;
+pub(crate) use promises::Promises;
 pub(crate) use selection::Selection;
 pub(crate) use story::{Fate, STORIES_A_STAGE, Stage, story};

@@ -15,6 +15,7 @@ use footplate_wire::{CommandError, LinkNotice};
 use super::disk::FaultyDisk;
 use super::life::Life;
 use super::line::SharedStation;
+use super::promises::Promises;
 use crate::runtime::{Attendant, Recorder, Wish};
 
 /// How often true positions are compared with reservations.
@@ -36,6 +37,9 @@ pub(super) struct Seen {
     /// Entries of trains into track that was not reserved for them.
     pub(super) intrusions: Vec<(Timestamp, TrainId)>,
     pub(super) grants: u32,
+    /// Places of rest, and times of reports, that were promised with 95 %.
+    pub(super) stops: Promises,
+    pub(super) times: Promises,
     /// When the program was stuck without an alarm.
     pub(super) stuck: Option<Timestamp>,
     pub(super) notes: Vec<(Timestamp, String)>,
@@ -213,6 +217,10 @@ impl Attendant<Dispatcher> for People<'_, '_> {
                 self.has_sent = false;
             }
             Notice::RouteSet { .. } => self.seen.grants += 1,
+            Notice::Done(finished) => {
+                self.seen.stops.judge_stop(self.layout, self.station.borrow().world(), &finished);
+            }
+            Notice::Passed { passed, .. } => self.seen.times.judge_time(&passed),
             Notice::ReservedAsUnknown { train }
             | Notice::NeedsOperator { train, .. }
             | Notice::AsksToCreep { train }

@@ -19,6 +19,16 @@ const TROUBLES_WITHIN: f64 = 0.8;
 /// Steps of a life in which it may die: a loop makes some 100 a second.
 const STEPS_PER_S: f64 = 100.0;
 const MOST_TROUBLES: usize = 5;
+/// Seeds below this one draw one of the first four stations, so that the stories of seeds that failed once stay what they are.
+pub(crate) const FOUR_STATIONS_UNTIL: u64 = 20_000_000;
+const STATIONS: [StationKind; 6] = [
+    StationKind::Marklin,
+    StationKind::DccEx,
+    StationKind::Z21,
+    StationKind::MarklinCan,
+    StationKind::LocoNet,
+    StationKind::Jmri,
+];
 
 /// A failure of the line, the disk or a clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,10 +78,9 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    pub(super) fn draw(choice: &mut Choice) -> Self {
-        const KINDS: [StationKind; 4] =
-            [StationKind::Marklin, StationKind::DccEx, StationKind::Z21, StationKind::MarklinCan];
-        let station = choice.of(&KINDS).copied().unwrap_or_default();
+    pub(super) fn draw(seed: u64, choice: &mut Choice) -> Self {
+        let stations = if seed < FOUR_STATIONS_UNTIL { &STATIONS[..4] } else { &STATIONS };
+        let station = choice.of(stations).copied().unwrap_or_default();
         let count = 1 + below(choice, MOST_LIVES);
         let lives = (1..=count).map(|nth| PlannedLife::draw(choice, nth == count)).collect();
         Self { station, lives }
@@ -168,11 +177,13 @@ fn below(choice: &mut Choice, count: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     /// The plan of the first seed that draws three lives, a death at the end of each of the first two.
     fn plan() -> Plan {
-        let plans = (1..).map(|seed| Plan::draw(&mut Choice::new(seed)));
+        let plans = (1..).map(|seed| Plan::draw(seed, &mut Choice::new(seed)));
         plans.filter(|plan| plan.lives.len() == MOST_LIVES).find(|plan| plan.troubles().len() > 5).unwrap()
     }
 
@@ -182,6 +193,19 @@ mod tests {
         let mut selected = whole.clone();
         selected.select(&Selection::all(whole.troubles().len()));
         assert_eq!(selected, whole);
+    }
+
+    #[test]
+    fn later_seeds_draw_all_six_stations_and_earlier_ones_the_four_of_their_stories() {
+        let drawn = |first: u64| {
+            let seeds = first..first + 100;
+            let kinds: BTreeSet<_> =
+                seeds.map(|seed| Plan::draw(seed, &mut Choice::new(seed)).station.key()).collect();
+            kinds.into_iter().collect::<Vec<_>>()
+        };
+        assert_eq!(drawn(FOUR_STATIONS_UNTIL - 100), ["dcc-ex", "marklin", "marklin-can", "z21"]);
+        let all = ["dcc-ex", "jmri", "loconet", "marklin", "marklin-can", "z21"];
+        assert_eq!(drawn(FOUR_STATIONS_UNTIL), all);
     }
 
     #[test]

@@ -22,9 +22,10 @@ use super::life::{Death, Life, Spell};
 use super::line::{FaultyLine, LATE, SharedStation};
 use super::people::{People, Seen, SharedDisk};
 use super::plan::{Plan, PlannedLife};
+use super::promises::Promises;
 use super::selection::Selection;
 use crate::commands::{recall_directions, stop_all};
-use crate::link::{Address, Link, Quirks, SimulatedStation, StationSession, open_session};
+use crate::link::{Address, Link, Quirks, SimulatedStation, StationKind, StationSession, open_session};
 use crate::runtime::{Ended, Runtime, carry_out};
 
 /// Trains of every story.
@@ -75,6 +76,7 @@ impl<'l> Stage<'l> {
 #[derive(Debug, Default)]
 pub(crate) struct Fate {
     pub(crate) seed: u64,
+    pub(crate) station: StationKind,
     /// Track time, in s.
     pub(crate) seconds: f64,
     pub(crate) lives: u32,
@@ -83,6 +85,9 @@ pub(crate) struct Fate {
     pub(crate) alarms: u32,
     pub(crate) grants: u32,
     pub(crate) intrusions: u32,
+    /// Places of rest, and times of reports, that were promised with 95 %.
+    pub(crate) stops: Promises,
+    pub(crate) times: Promises,
     /// Incidents while no command could reach the station.
     pub(crate) out_of_reach: u32,
     /// From each death until all trains were stopped, in ms.
@@ -106,7 +111,7 @@ pub(crate) fn story(
     store: &Path,
 ) -> anyhow::Result<Fate> {
     let mut choice = Choice::new(seed.wrapping_mul(0x2545_f491_4f6c_dd1d));
-    let mut plan = Plan::draw(&mut choice);
+    let mut plan = Plan::draw(seed, &mut choice);
     let troubles = plan.troubles();
     if let Some(only) = only {
         let unknown = only.numbers().find(|number| *number > troubles.len());
@@ -129,7 +134,7 @@ pub(crate) fn story(
         ))),
         store,
         choice,
-        fate: Fate { seed, troubles, ..Fate::default() },
+        fate: Fate { seed, station: plan.station, troubles, ..Fate::default() },
     };
     let began = teller.now();
     teller.note(format!("a {}", plan.station.key()));
@@ -343,6 +348,8 @@ impl<'l> Teller<'_, 'l> {
         self.fate.alarms += seen.alarms;
         self.fate.grants += seen.grants;
         self.fate.intrusions += seen.intrusions.len() as u32;
+        self.fate.stops += seen.stops;
+        self.fate.times += seen.times;
         if let Some(at) = seen.stuck {
             self.fail(FailureKind::Stuck, format!("stuck without an alarm at {:.2} s", at.as_s()));
         }
@@ -398,7 +405,7 @@ impl<'l> Teller<'_, 'l> {
             Some(Death::Hangs) => wait(line, LATE),
             // The program has stopped its trains itself.
             Some(Death::GuardianKilled) => {
-                if !line.all_stopped() && !line.is_cut() {
+                if !line.all_stopped() && !line.is_unreachable() {
                     self.fail(FailureKind::RanOn, "trains run after their guardian was killed".to_owned());
                 }
                 return Ok(());
@@ -413,7 +420,7 @@ impl<'l> Teller<'_, 'l> {
         if line.all_stopped() {
             line.stopped_at = Some(since);
         }
-        while line.is_cut() {
+        while line.is_unreachable() {
             wait(line, TimeSpan::from_ms(50));
             since = self.now();
         }
