@@ -41,8 +41,8 @@ const PATIENCE: Duration = Duration::from_secs(5);
 pub struct Store {
     path: PathBuf,
     pub(super) connection: Connection,
-    /// What acknowledged commits the log has lost.
-    lost_commits: Option<String>,
+    /// What of the log is not read, when the store was opened to be read.
+    unread_log: Option<UnreadLog>,
     /// The folder of the copy that is read in place of the file at `path`.
     _copy: Option<TempDir>,
 }
@@ -62,7 +62,7 @@ impl Store {
         if !path.try_exists().unwrap_or(true) {
             return Err(StoreError::Missing { file: path.to_owned() });
         }
-        let unread = UnreadLog::beside(path)?.filter(UnreadLog::is_loss);
+        let unread_log = UnreadLog::beside(path)?;
         let has_log = fs::metadata(write_ahead_log::path_of(path)).is_ok_and(|log| log.len() > 0);
         // A store that has no log and may only be read is not being written.
         let is_fixed = !has_log && OpenOptions::new().write(true).open(path).is_err();
@@ -90,8 +90,15 @@ impl Store {
                     .map_err(|error| store.error(error))
             })?;
         }
-        store.lost_commits = unread.map(|unread| unread.to_string());
+        store.unread_log = unread_log;
         Ok(store)
+    }
+
+    /// What the last commit in the log beside a store that was opened to be read lacks: the power was cut in it, or it was damaged later,
+    /// which look alike. Without it the store is sound.
+    #[must_use]
+    pub fn cut_commit(&self) -> Option<String> {
+        self.unread_log.as_ref().filter(|unread| !unread.is_loss()).map(ToString::to_string)
     }
 
     /// Opens a file that others may be writing to.
@@ -117,7 +124,7 @@ impl Store {
         let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX | more;
         let connection =
             Connection::open_with_flags(name, flags).map_err(|error| StoreError::of(path, error))?;
-        let store = Self { path: path.to_owned(), connection, lost_commits: None, _copy: None };
+        let store = Self { path: path.to_owned(), connection, unread_log: None, _copy: None };
         store.set_up().map_err(|error| store.error(error))?;
         store.version(MIGRATIONS.len() as i64)?;
         Ok(store)
@@ -174,7 +181,9 @@ impl Store {
 
     /// Checks every page, every reference and the checksum of every row. Takes as long as reading the file.
     pub fn check(&self) -> Result<(), StoreError> {
-        if let Some(what) = self.lost_commits.clone() {
+        if let Some(what) =
+            self.unread_log.as_ref().filter(|unread| unread.is_loss()).map(ToString::to_string)
+        {
             return Err(StoreError::Damaged { file: self.path.clone(), what });
         }
         let check = || {
@@ -210,7 +219,7 @@ impl Store {
         }
         let connection = Connection::open_with_flags(path, flags | OpenFlags::SQLITE_OPEN_NO_MUTEX)
             .map_err(|error| StoreError::of(path, error))?;
-        let mut store = Self { path: path.to_owned(), connection, lost_commits: None, _copy: None };
+        let mut store = Self { path: path.to_owned(), connection, unread_log: None, _copy: None };
         store.set_up().map_err(|error| store.error(error))?;
         store.migrate(migrations)?;
         // Only a file of ours is switched to a write-ahead log, a setting that stays in the file.

@@ -246,10 +246,16 @@ fn a_commit_that_was_cut_off_is_no_damage_but_a_salvage_cannot_know() {
     let says = salvaged.unread_log.clone().unwrap();
     assert!(says.starts_with("the last commit in ") && says.contains(" is not whole: "), "{says}");
     assert!(!salvaged.is_all());
+    // Who looks at it is told, too; the store without it is sound.
+    let read = Store::open_to_read(&store).unwrap();
+    read.check().unwrap();
+    assert_eq!(read.cut_commit().as_ref(), Some(&says));
+    drop(read);
     // The railway runs on.
     let opened = Store::open(&store).unwrap();
     opened.check().unwrap();
     drop(opened);
+    assert_eq!(Store::open_to_read(&store).unwrap().cut_commit(), None);
     assert!(rows_of(&store)["events"].len() >= truth["events"].len() - 1);
     // A commit without its last frame was never acknowledged.
     fs::write(shelf.file("cut.db-wal"), &log[..last]).unwrap();

@@ -64,7 +64,8 @@ impl Arguments {
             }
             Question::Store { path, layout, query } => {
                 let layout = WrittenLayout::of("the session's layout", layout)?.layout;
-                query.answer(&layout, Store::open(&path)?)?
+                let store = if query.writes() { Store::open(&path)? } else { Store::open_to_read(&path)? };
+                query.answer(&layout, store)?
             }
         };
         output.write_all(answer.as_bytes())?;

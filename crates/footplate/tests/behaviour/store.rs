@@ -174,3 +174,34 @@ fn a_log_converts_to_the_own_form_and_that_to_itself() {
     let failed = footplate(&["convert", &own, "--out", nowhere.to_str().unwrap()]);
     assert!(failed.status == 2 && failed.errors.contains("writing "), "{failed:?}");
 }
+
+#[test]
+fn what_a_browser_reads_leaves_the_store_as_it_is() {
+    use std::io::Write;
+    use std::process::{Command, Stdio};
+    let folder = folder("store-clerk");
+    let file = folder.join("railway.db");
+    // One of an older version: a store that is opened to be written is migrated.
+    let compat = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/compat/store-2.sqlite");
+    fs::copy(compat, &file).unwrap();
+    let before = fs::read(&file).unwrap();
+    let track = concat!(env!("CARGO_MANIFEST_DIR"), "/../footplate-store/layouts/track-a.toml");
+    let layout = fs::read_to_string(track).unwrap();
+    let ask = |query: serde_json::Value| {
+        let mut clerk = Command::new(env!("CARGO_BIN_EXE_footplate"))
+            .arg("clerk")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let question = serde_json::json!({ "Store": { "path": &file, "layout": &layout, "query": query } });
+        writeln!(clerk.stdin.take().unwrap(), "{question}").unwrap();
+        let answer = clerk.wait_with_output().unwrap();
+        assert!(answer.status.success(), "{answer:?}");
+        serde_json::from_slice::<serde_json::Value>(&answer.stdout).unwrap()
+    };
+    assert!(ask("Recordings".into()).is_array() || ask("Recordings".into()).is_object());
+    assert_eq!(fs::read(&file).unwrap(), before);
+    ask(serde_json::json!({ "WithdrawSchedule": { "name": "Evening" } }));
+    assert_ne!(fs::read(&file).unwrap(), before, "a change is written");
+}

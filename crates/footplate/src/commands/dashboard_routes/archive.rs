@@ -116,6 +116,11 @@ pub(crate) enum StoreQuery {
 }
 
 impl StoreQuery {
+    /// Whether the answer changes the store.
+    pub(crate) const fn writes(&self) -> bool {
+        matches!(self, Self::Mark(_) | Self::KeepSchedule(_) | Self::WithdrawSchedule { .. })
+    }
+
     /// The answer as JSON text.
     ///
     /// # Errors

@@ -67,7 +67,7 @@ impl Arguments {
                 let list = json!({ "store": path, "as_of": date, "recordings": list });
                 writeln!(output, "{list:#}")?;
             } else {
-                write_list(path, &recordings, output)?;
+                write_list(path, &store, &recordings, output)?;
             }
             return Ok(Outcome::Done);
         };
@@ -112,7 +112,12 @@ impl Arguments {
     }
 }
 
-fn write_list(path: &Path, recordings: &[StoredRecording], output: &mut dyn Write) -> std::io::Result<()> {
+fn write_list(
+    path: &Path,
+    store: &Store,
+    recordings: &[StoredRecording],
+    output: &mut dyn Write,
+) -> std::io::Result<()> {
     let sum = |count: fn(&StoredRecording) -> u64| recordings.iter().map(count).sum::<u64>();
     let counts = [
         counted(recordings.len(), "recording"),
@@ -121,6 +126,9 @@ fn write_list(path: &Path, recordings: &[StoredRecording], output: &mut dyn Writ
     ];
     let excluded = sum(|recording| recording.excluded);
     writeln!(output, "{} is sound: {}, {excluded} excluded", path.display(), counts.join(", "))?;
+    if let Some(cut) = store.cut_commit() {
+        writeln!(output, "{cut}; `footplate store salvage` brings over what can be read of it")?;
+    }
     if recordings.is_empty() {
         return Ok(());
     }
