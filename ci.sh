@@ -414,7 +414,7 @@ print_summary() {
 
 steps=()
 CHAOS_SEEDS=fresh:1000
-FUZZ_SECONDS=4 # for each of 28 targets
+FUZZ_SECONDS=4 # for each of 30 targets
 while [[ $# -gt 0 ]]; do
   case $1 in
     --seeds) CHAOS_SEEDS=${2:?"--seeds needs a range, such as 1..1000"} && shift 2 ;;

@@ -168,6 +168,30 @@ const ACCELERATION: &[&[u8]] = &[
 ];
 const MODEL: &[&[u8]] =
     &[b"model_version = ", b"[[steps]]\n", b"{\"train\":24,", b"null", b"-1", b"1e309", b"nan", b"["];
+#[cfg(unix)]
+const WARD: &[&[u8]] = &[
+    b"w\x02\0\x07\x08",
+    b"a\x01\0\x01",
+    b"l\0\0",
+    b"o\0\0",
+    b"g\0\0",
+    b"H\xff\xff",
+    b"C\x01\0\x02",
+    b"?\0\0",
+];
+const SET_UP: &[&[u8]] = &[
+    br#"{"link":"sim","speed":5.0,"layout":"track-a","trains":[{"address":24,"name":"V 60"}]}"#,
+    br#"{"link":"z21:192.168.0.111","layout":"track-b","trains":[{"address":0}],"is_complete":true}"#,
+    br#""line":{"status":0,"report":"sound"},"#,
+    br#""calibrations":{"24":{"status":1,"report":""}},"#,
+    br#""speed":1e308"#,
+    br#""link":"dcc-ex:/dev/ttyUSB0""#,
+    b"null",
+    b"-1",
+    b"65536",
+    b"[[[[",
+    b"\"",
+];
 const TACHOMETER: &[&str] = &["testdata/tachometer"];
 
 const fn target(
@@ -207,6 +231,9 @@ const TARGETS: &[Target] = &[
     target("motion_file", measurements::motion_file, &[], MODEL),
     target("orders", footplate::fuzzed::orders, &["testdata/orders"], ORDERS),
     target("http_body", footplate::fuzzed::http_body, &["testdata/http-bodies"], JSON),
+    #[cfg(unix)]
+    target("guardian_frames", footplate::fuzzed::guardian_frames, &[], WARD),
+    target("set_up_file", footplate::fuzzed::set_up_file, &[], SET_UP),
     target("odometer", odometer::fuzz, TACHOMETER, TEXT),
 ];
 

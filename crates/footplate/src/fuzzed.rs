@@ -1,6 +1,6 @@
 //! What the fuzzer calls in its own process: bytes go in, and a panic is a finding.
 
-use crate::commands::{FuzzedSession, answer_fuzzed};
+use crate::commands::{FuzzedSession, answer_fuzzed, read_fuzzed_set_up};
 
 /// The most lines of one input: what lines do to each other is seen with few.
 const MOST_LINES: usize = 12;
@@ -23,4 +23,22 @@ pub fn orders(bytes: &[u8]) {
 /// The answer is none that a client may get, or a temporary file cannot be written.
 pub fn http_body(bytes: &[u8]) {
     answer_fuzzed(bytes).unwrap_or_else(|error| panic!("{error:#}"));
+}
+
+/// Takes the bytes as what a guardian or its child receives of the other.
+///
+/// # Panics
+/// A frame is not what was received, or the system has no sockets.
+#[cfg(unix)]
+pub fn guardian_frames(bytes: &[u8]) {
+    let again = crate::guardian::read_fuzzed(bytes).unwrap_or_else(|error| panic!("{error}"));
+    assert!(bytes.starts_with(&again), "frames that were not received: {again:?}");
+}
+
+/// Takes the bytes as the set-up file beside a store.
+///
+/// # Panics
+/// A set-up that was read cannot be written and read again, or a temporary file cannot be written.
+pub fn set_up_file(bytes: &[u8]) {
+    read_fuzzed_set_up(bytes).unwrap_or_else(|error| panic!("{error:#}"));
 }

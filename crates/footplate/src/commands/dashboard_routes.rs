@@ -26,7 +26,7 @@ use odometry_pages::odometry_routes;
 pub(super) use schedules::schedule_routes;
 #[cfg(test)]
 pub(crate) use set_up::set_up_paths;
-pub(crate) use set_up::{SetUpMode, SetUpRoute};
+pub(crate) use set_up::{SetUpMode, SetUpRoute, read_fuzzed_set_up};
 pub(super) use set_up::{fuzzed_set_up_routes, run as set_up_in_browser};
 use slides::slide_routes;
 

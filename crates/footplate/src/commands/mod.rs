@@ -32,6 +32,7 @@ mod web_page;
 mod written_layout;
 
 pub(crate) use command::{Command, Outcome};
+pub(crate) use dashboard_routes::read_fuzzed_set_up;
 #[cfg(test)]
 pub(crate) use dashboard_routes::{session_paths, set_up_paths};
 pub(crate) use drive::FuzzedSession;

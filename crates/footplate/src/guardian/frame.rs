@@ -169,6 +169,24 @@ fn is_readable(stream: &UnixStream, within: Option<Duration>) -> Result<bool> {
     }
 }
 
+/// Reads bytes as frames, up to the first that is none, and writes what it read again, for the fuzzer.
+///
+/// # Errors
+/// There are no sockets, or a frame that was read cannot be written.
+pub(crate) fn read_fuzzed(bytes: &[u8]) -> Result<Vec<u8>> {
+    let (mut here, there) = UnixStream::pair()?;
+    here.write_all(bytes)?;
+    drop(here);
+    let mut reader = FrameReader::new(there);
+    let mut again = Vec::new();
+    while let Ok(Some((kind, payload))) = reader.next(None) {
+        again.push(kind as u8);
+        again.extend(u16::try_from(payload.len()).map_err(|_| ErrorKind::InvalidData)?.to_le_bytes());
+        again.extend_from_slice(payload);
+    }
+    Ok(again)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

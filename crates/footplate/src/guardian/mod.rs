@@ -24,6 +24,7 @@ mod voice;
 mod ward;
 mod ward_link;
 
+pub(crate) use frame::read_fuzzed;
 pub(crate) use keeper::keep;
 pub(crate) use ward::{become_ward, is_ward};
 pub(crate) use ward_link::WardLink;

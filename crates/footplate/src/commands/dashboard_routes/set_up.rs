@@ -22,6 +22,7 @@ use self::routes::Pages;
 #[cfg(test)]
 pub(crate) use self::routes::set_up_paths;
 pub(crate) use self::routes::{SetUpMode, SetUpRoute, fuzzed_set_up_routes};
+pub(crate) use self::set_up_file::read_fuzzed_set_up;
 use self::set_up_file::{SetUp, StepResult, file_beside};
 use crate::commands::{Outcome, left_running};
 use crate::dashboard::{ServedAt, ServedPages, Token};

@@ -245,6 +245,24 @@ impl SetUp {
     }
 }
 
+/// Reads bytes as the file, for the fuzzer, asks what the set-up is asked at a start, and writes it again. Returns whether it is one.
+///
+/// # Errors
+/// A set-up that was read cannot be read again after it was written, or a temporary file cannot be written.
+pub(crate) fn read_fuzzed_set_up(bytes: &[u8]) -> anyhow::Result<bool> {
+    let file = std::env::temp_dir().join(format!("footplate-fuzz-{}.setup.json", std::process::id()));
+    std::fs::write(&file, bytes)?;
+    let read = SetUp::read(&file);
+    if let Ok(set_up) = &read {
+        let _ = (set_up.station(), set_up.link(), set_up.calibration_link(), set_up.layout());
+        let _ = set_up.clone().set_trains(set_up.trains.clone());
+        set_up.write(&file)?;
+        SetUp::read(&file)?;
+    }
+    std::fs::remove_file(&file)?;
+    Ok(read.is_ok())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
