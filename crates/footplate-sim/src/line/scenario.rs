@@ -96,7 +96,13 @@ impl LineScenario {
     /// conditions is the same train on the same line.
     #[must_use]
     pub fn run(&self, seed: u64, conditions: LineConditions) -> LineRun {
-        let mut draws = Draws::new(seed, Purpose::Scenario);
+        self.run_journey(seed, seed, conditions)
+    }
+
+    /// Runs it with the wheels of one seed on the journey of another: the same train, later.
+    #[must_use]
+    pub fn run_journey(&self, seed: u64, journey: u64, conditions: LineConditions) -> LineRun {
+        let mut draws = Draws::new(journey, Purpose::Scenario);
         let setup = match self.kind {
             Kind::Own(set_up) => set_up(&mut draws),
             Kind::Faulty(fault) => fault_runs::two_stops(fault, &mut draws),

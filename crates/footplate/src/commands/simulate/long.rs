@@ -232,6 +232,30 @@ mod tests {
         assert!(!ends(14.0).0);
     }
 
+    /// The resident memory that twelve minutes may add after as many of warm-up. An object of 100 bytes that each of 100 turns of the loop a
+    /// second leaves behind adds 7 MB; a day adds 1 MB (`docs/trust.md`).
+    const MOST_GROWN_KB: f64 = 3_000.0;
+
+    #[test]
+    fn a_session_keeps_its_descriptors_and_its_memory() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let written = WrittenLayout::named("track-a").expect("built in");
+        let minutes = |minutes: f64| TimeSpan::from_s(60.0 * minutes);
+        let store = folder.path().join("railway.db");
+        let long = LongDrive::new(&written, 1, 2, minutes(2.0), &store).expect("room for two trains");
+        let mut loads = Vec::new();
+        let keep = |_: &_| {
+            loads.push(ProcessLoad::now());
+            Ok(())
+        };
+        long.drive(minutes(24.0), minutes(6.0), keep).expect("driven");
+        let [_, second, _, last] = &loads[..] else { panic!("{} parts", loads.len()) };
+        assert_eq!(last.descriptors, second.descriptors);
+        if let (Some(before), Some(after)) = (second.memory_kb, last.memory_kb) {
+            assert!(after - before < MOST_GROWN_KB, "{before} to {after} kB");
+        }
+    }
+
     #[test]
     fn the_last_quarter_is_compared_with_the_second() {
         assert_eq!(change(&[9.0, 2.0, 7.0, 3.0]), Some(0.5));

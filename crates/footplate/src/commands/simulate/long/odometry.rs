@@ -1,10 +1,10 @@
-//! One odometer on one train for days: the run of a scenario again and again, each from where the one before ended.
+//! One odometer on one train for days: runs of a scenario, each drawn anew and from where the one before ended.
 
-use anyhow::ensure;
+use anyhow::{bail, ensure};
 use footplate_core::odometry::MotionEstimate;
 use footplate_core::odometry::wheels::{Period, WheelReading};
 use footplate_core::{Length, Speed, TimeSpan, Timestamp};
-use footplate_sim::line::{LineConditions, LineScenario, LineTruth};
+use footplate_sim::line::{LineConditions, LineScenario, LineTruth, LineVehicle};
 use footplate_store::Truth;
 use footplate_store::odometry::{OdometryRun, Preset, RunContext, simulated_rows, simulated_vehicle};
 
@@ -56,48 +56,69 @@ impl OdometerHour {
 
 /// An odometer that goes on for hours.
 pub(super) struct OdometerHours {
-    rows: Vec<(Period, Truth)>,
+    scenario: LineScenario,
+    seed: u64,
+    /// The journey that is drawn next.
+    journey: u64,
+    vehicle: LineVehicle,
     odometer: OdometryRun,
 }
 
+/// So many journeys in a row that do not end at rest are no chance.
+const TRIES: usize = 100;
+
 impl OdometerHours {
-    /// Draws the train and its run from a seed.
+    /// Draws the train from a seed.
     ///
     /// # Errors
-    /// The run begins or ends at speed, or the vehicle is one that no railway has.
+    /// The vehicle is one that no railway has.
     pub(super) fn new(scenario: LineScenario, seed: u64) -> anyhow::Result<Self> {
-        let run = scenario.run(seed, LineConditions::default());
+        let vehicle = scenario.run(seed, LineConditions::default()).vehicle;
+        let of_file = simulated_vehicle(&vehicle)?.vehicle;
+        let odometer = OdometryRun::new(&RunContext::new(of_file, Preset::Recommended, false))?;
+        Ok(Self { scenario, seed, journey: seed, vehicle, odometer })
+    }
+
+    /// The run from one stop to the next; one that begins or ends at speed is left out.
+    fn next_run(&mut self) -> anyhow::Result<Vec<(Period, Truth)>> {
+        let name = self.scenario.name();
         let at_rest = |truth: Option<&LineTruth>| truth.is_some_and(|truth| truth.speed == Speed::ZERO);
-        ensure!(
-            at_rest(run.truth.first()) && at_rest(run.truth.last()),
-            "a run of {0} begins or ends at speed, so that another one cannot follow it: choose one between two stops, such as N2",
-            scenario.name()
-        );
-        let vehicle = simulated_vehicle(&run.vehicle)?.vehicle;
-        let odometer = OdometryRun::new(&RunContext::new(vehicle, Preset::Recommended, false))?;
-        Ok(Self { rows: simulated_rows(&run).collect(), odometer })
+        for _ in 0..TRIES {
+            let run = self.scenario.run_journey(self.seed, self.journey, LineConditions::default());
+            self.journey = self.journey.wrapping_add(1);
+            ensure!(
+                run.vehicle == self.vehicle,
+                "each run of {name} is that of another train: choose a scenario with one train, such as N2"
+            );
+            if at_rest(run.truth.first()) && at_rest(run.truth.last()) {
+                return Ok(simulated_rows(&run).collect());
+            }
+        }
+        bail!(
+            "a run of {name} begins or ends at speed, so that another one cannot follow it: choose one between two stops, such as N2"
+        )
     }
 
     /// Goes on for so long, and reports each `part` of it.
     ///
     /// # Errors
-    /// Those of `report`.
+    /// A run cannot follow the one before, and those of `report`.
     pub(super) fn run(
         mut self,
         time: TimeSpan,
         part: TimeSpan,
         mut report: impl FnMut(&OdometerHour) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
-        let rows = std::mem::take(&mut self.rows);
-        let Some((last, last_truth)) = rows.last() else { return Ok(()) };
-        // The first row of a repetition is the last one of the repetition before: counters are read once at each moment.
-        let lasts = last.time - Timestamp::ZERO;
-        let leads = last_truth.distance.unwrap_or_default();
         let mut hour = OdometerHour::after(TimeSpan::ZERO);
         let (mut waited, mut ahead) = (TimeSpan::ZERO, Length::ZERO);
         let (mut error, mut place) = (Length::ZERO, Length::ZERO);
         let mut is_first = true;
         while waited < time {
+            let rows = self.next_run()?;
+            let Some((last, last_truth)) = rows.last() else { break };
+            let lasts = last.time - Timestamp::ZERO;
+            let leads = last_truth.distance.unwrap_or_default();
+            // The first row of a run is the last one of the run before: counters are read once at each moment.
             for (period, truth) in rows.iter().skip(usize::from(!is_first)) {
                 let period = later(period, waited, ahead);
                 let estimate = self.odometer.step(&period, Truth::default);
@@ -132,11 +153,33 @@ impl OdometerHour {
     }
 }
 
-/// A period of a later repetition.
+/// A period of a later run.
 fn later(period: &Period, by: TimeSpan, ahead: Length) -> Period {
     let wheels = period.wheels.map(|wheel| {
         let last_edge = wheel.last_edge.map(|edge| edge + by);
         WheelReading { last_edge, ..wheel }
     });
     Period { time: period.time + by, wheels, balise: period.balise.map(|place| place + ahead), ..*period }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The time and the length of each of the first runs.
+    fn runs(seed: u64) -> Vec<(i64, i64)> {
+        let mut hours = OdometerHours::new(LineScenario::by_name("N2").unwrap(), seed).unwrap();
+        let of_run = |_| {
+            let (last, truth) = hours.next_run().unwrap().pop().unwrap();
+            ((last.time - Timestamp::ZERO).as_s() as i64, truth.distance.unwrap().as_m() as i64)
+        };
+        (0..4).map(of_run).collect()
+    }
+
+    #[test]
+    fn the_same_train_runs_differently_from_stop_to_stop() {
+        let runs = runs(1);
+        let different: std::collections::BTreeSet<_> = runs.iter().collect();
+        assert_eq!(different.len(), runs.len(), "{runs:?}");
+    }
 }
