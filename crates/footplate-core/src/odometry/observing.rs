@@ -62,7 +62,12 @@ impl Odometer {
     }
 
     /// What the hypotheses have to explain.
-    pub(super) fn scene(&self, [first_counted, second_counted]: [f64; 2], allowed: &Allowed) -> Scene {
+    pub(super) fn scene(
+        &self,
+        [first_counted, second_counted]: [f64; 2],
+        allowed: &Allowed,
+        bounded: Range,
+    ) -> Scene {
         let of = |wheel: &WheelChannel, counted: f64| WheelScene {
             counted,
             late: wheel.late * wheel.pitch,
@@ -89,6 +94,7 @@ impl Odometer {
             slip: allowed.slip,
             inertial: self.inertia.as_ref().map(Inertia::acceleration),
             independent: self.vehicle.independent,
+            bounded,
             top_speed: self.vehicle.max_speed.as_m_per_s(),
         }
     }

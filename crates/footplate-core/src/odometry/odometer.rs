@@ -258,7 +258,7 @@ impl Odometer {
         let before = self.speed;
         let speed_before = self.bounds.speed();
         let bounded = self.narrow(period, &allowed, before, t);
-        let scene = self.scene(counted, &allowed);
+        let scene = self.scene(counted, &allowed, bounded);
         let too_fast =
             scene.wheels.iter().all(|wheel| wheel.read && wheel.speed > TOO_FAST * scene.top_speed);
         self.above_top += u64::from(too_fast);

@@ -320,9 +320,9 @@ impl Bank {
     /// Variance (m²/s²) that hypotheses begin with in addition, if their speed has to leap: the leap then costs likelihood once, not
     /// in every period. Of "both roll", and of those in which the first and the second wheel rolls.
     ///
-    /// A slide has lost the train where both wheels turn alike at quite another speed: they roll. A sensor that is taken for dead
-    /// may be the good one: its wheel rolls, and the other slips or has the dead sensor. So may a wheel that is taken to slip beside a
-    /// stuck count.
+    /// A slide has lost the train where both wheels turn alike at quite another speed: they
+    /// roll. A sensor that is taken for dead may be the good one: its wheel rolls, and the other slips or has the dead sensor. So may a
+    /// wheel that is taken to slip beside a stuck count, or to spin beside a silent one: no wheel is locked in traction.
     fn lost(&self, scene: &Scene, [one, other]: &[Compared; 2], pool: &Pool) -> [f64; 3] {
         let [_, first_slips, second_slips, slip, _, _, first_dead, second_dead] = self.probability.0;
         let [_, (most, part)] = CREEP_BY;
@@ -342,8 +342,12 @@ impl Bank {
             if wheel.counts() { leap(compared.speed, compared.variance, AWAY) } else { 0.0 }
         };
         let [first, second] = &scene.wheels;
-        let lost_first = first_dead > 0.9 || second.stuck && first_slips > 0.9;
-        let lost_second = second_dead > 0.9 || first.stuck && second_slips > 0.9;
+        let silent = |wheel: &WheelScene| wheel.read && wheel.speed.abs() < SILENT;
+        let beside = |wheel: &WheelScene, slips: f64| {
+            wheel.stuck && slips > 0.9 || self.side < 0.0 && silent(wheel) && slip > 0.9
+        };
+        let lost_first = first_dead > 0.9 || beside(second, first_slips);
+        let lost_second = second_dead > 0.9 || beside(first, second_slips);
         let of_first = if lost_first { of_wheel(first, one) } else { 0.0 };
         let of_second = if lost_second { of_wheel(second, other) } else { 0.0 };
         [alike, of_first, of_second]

@@ -7,7 +7,7 @@
 use super::filters::{Filters, State};
 use super::lanes::{Lanes, WIDTH, ln};
 use super::scene::{Scene, WheelScene};
-use crate::odometry::wheels::{larger, smaller};
+use crate::odometry::wheels::{Range, larger, smaller};
 
 /// Correlation time of the error of a tracked wheel speed (s).
 const FOLLOWED_S: f64 = 0.15;
@@ -50,6 +50,8 @@ const STUCK: f64 = 10.0;
 const IMPOSSIBLE: f64 = 15.0;
 /// Deviation of the train's acceleration beyond what it can be (m/s²).
 const BEYOND: f64 = 0.06;
+/// Squared deviation of a speed from the guaranteed bounds (m²/s²), and beyond how many of them it costs no more.
+const OUT_OF_BOUNDS: (f64, f64) = (0.25, 30.0);
 /// Variance of an acceleration that is known no better because a run or a hypothesis has just begun (m²/s⁴).
 const UNKNOWN: f64 = 0.15;
 /// Pulses that vibration gives at rest, and the cost of each further one (nats).
@@ -116,7 +118,7 @@ pub(super) fn evidence(
         Lanes([rolling.high, any.high, any.high, any.high, any.high, any.high, rolling.high, rolling.high]),
     ];
     let terms = [one.terms(), other.terms()];
-    let [rolls_1, rolls_2, usual] = costs(filters, surprise, &limits, &terms, followed);
+    let [rolls_1, rolls_2, usual] = costs(filters, surprise, &limits, scene.bounded, &terms, followed);
     let (
         [one_rolls, _, one_beside, .., one_rests, _, one_by_dead],
         [two_rolls, two_beside, .., two_rests, two_by_dead, _],
@@ -152,13 +154,14 @@ pub(super) fn evidence(
 }
 
 /// What it costs every hypothesis that the first and the second wheel roll, and what it costs it that its train accelerates beyond
-/// its `limits` and its place is surprising.
+/// its `limits`, its speed is out of the guaranteed bounds and its place is surprising.
 #[inline(never)]
 #[expect(clippy::indexing_slicing, reason = "below the width of all")]
 fn costs(
     filters: &Filters,
     surprise: &Lanes,
     [low, high]: &[Lanes; 2],
+    bounded: Range,
     [one, other]: &[Terms; 2],
     followed: f64,
 ) -> [Lanes; 3] {
@@ -171,7 +174,10 @@ fn costs(
         let beyond = larger(a - high.0[lane], 0.0) + smaller(a - low.0[lane], 0.0);
         let surprising = larger(surprise.0[lane] - SURPRISING, 0.0) * -0.5;
         let known = larger(paa - UNKNOWN, 0.0) + BEYOND * BEYOND;
-        usual.0[lane] = surprising - beyond * beyond * (1.0 / known) * (0.5 * followed);
+        let out = larger(v - bounded.high, 0.0) + smaller(v - bounded.low, 0.0);
+        let excluded = smaller(out * out * (1.0 / (pvv + OUT_OF_BOUNDS.0)), OUT_OF_BOUNDS.1);
+        let unlikely = beyond * beyond * (1.0 / known) + excluded;
+        usual.0[lane] = surprising - unlikely * (0.5 * followed);
     }
     [rolls_1, rolls_2, usual]
 }

@@ -47,6 +47,8 @@ pub(in super::super) struct Scene {
     pub(in super::super) inertial: Option<f64>,
     /// Both wheelsets sliding alike can be ruled out.
     pub(in super::super) independent: bool,
+    /// The guaranteed bounds of the speed (m/s).
+    pub(in super::super) bounded: Range,
     /// The highest speed of the train (m/s).
     pub(in super::super) top_speed: f64,
 }
@@ -87,6 +89,7 @@ impl Scene {
             slip: true,
             inertial: None,
             independent: false,
+            bounded: Range { low: -40.0, high: 40.0 },
             top_speed: 40.0,
         }
     }
