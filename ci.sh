@@ -204,7 +204,7 @@ each_table() {
   "$1" pacing-unseen simulate pacing --seeds 101..112 --markdown
   "$1" traffic simulate traffic --seeds 541..550 --hours 1 --baseline --markdown
   "$1" odometry simulate line --score --seeds 1..10 --teeth 80,100,200 --markdown
-  "$1" odometry-worlds simulate line --score --worlds fresh:200@14e7a919d8bd9b3efb53565205c99c71cb37227f --markdown
+  "$1" odometry-worlds simulate line --score --worlds fresh:200@7603b813c35dacc099cd4d1703fccaabd1099102 --markdown
   # Recordings that may not be copied: the table is made where they are.
   if [[ -n ${FOOTPLATE_DATA:-} ]]; then
     "$1" standstill odometry --imu "$FOOTPLATE_DATA"/paris-metro-accel/*_accel.csv --score --markdown
