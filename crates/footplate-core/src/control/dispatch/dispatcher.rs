@@ -284,7 +284,7 @@ impl Dispatcher {
         }
         if let Order::Reverse { train, .. } = order
             && self.watchdog.driver().is_at_rest(train, now)
-            && let Some(turnout) = self.trailed_points(now, train)
+            && let Some(turnout) = self.trailed_points_under(now, train)
         {
             return Err(Refusal::OnTrailedPoints { train, turnout });
         }

@@ -11,7 +11,7 @@ use crate::units::Length;
 use super::dispatched_train::{Purpose, State};
 use super::dispatcher::{ACT_EVERY, Dispatcher};
 use super::itinerary::SHORTEST_RUN;
-use super::movement_authority::{MovementAuthority, SLACK, Start};
+use super::movement_authority::{ClearanceEnvelope, MovementAuthority, SLACK, Start};
 use super::path::Path;
 use super::reservation::Reservation;
 
@@ -36,6 +36,9 @@ const NEAR_ENOUGH: Length = Length::from_mm(80.0);
 /// A run that ends this far from its destination was planned from a wrong position: the train has not arrived. The most cautious
 /// stop, five standard deviations of 5 cm before its target, is nearer.
 pub(super) const FAR: Length = Length::from_mm(500.0);
+
+/// Half of a 95 % interval, in standard deviations.
+const WITHIN_95: f64 = 1.96;
 
 impl Dispatcher {
     /// Advances every train.
@@ -306,20 +309,36 @@ impl Dispatcher {
 
     /// Whether a train at rest may be on a turnout that is set for another leg than it came from.
     pub(super) fn is_on_trailed_points(&self, now: Timestamp, id: TrainId) -> bool {
-        self.trailed_points(now, id).is_some()
+        let Some(train) = self.trains.get(&id) else { return false };
+        let ClearanceEnvelope { ahead, behind, .. } = self.envelope(now, train);
+        self.trailed_points(now, id, behind, ahead).is_some()
             // The legs behind a train that was placed are those that are set, which it may not have come from.
             || self.watchdog.was_placed_on_points(id)
     }
 
-    /// A turnout that a train at rest may be on, and that it trailed: it is set for another leg than the train came from.
-    pub(super) fn trailed_points(&self, now: Timestamp, id: TrainId) -> Option<TurnoutId> {
+    /// A turnout that a train at rest trailed and may be on, as far as its 95 % interval and its length go. A person who reverses it sees
+    /// it, and is not refused for less.
+    pub(super) fn trailed_points_under(&self, now: Timestamp, id: TrainId) -> Option<TurnoutId> {
+        let uncertainty = self.watchdog.driver().locate(id, now)?.uncertainty;
+        let margin = uncertainty * WITHIN_95;
+        let lengths = self.trains.get(&id)?.lengths;
+        self.trailed_points(now, id, lengths.behind() + margin, lengths.ahead() + margin)
+    }
+
+    /// A turnout within distances behind and ahead of a train at rest that it trailed: it is set for another leg than the train
+    /// came from.
+    fn trailed_points(
+        &self,
+        now: Timestamp,
+        id: TrainId,
+        behind: Length,
+        ahead: Length,
+    ) -> Option<TurnoutId> {
         let place = self.watchdog.driver().position(id, now)?;
         let train = self.trains.get(&id)?;
-        let envelope = self.envelope(now, train);
         let (layout, turnouts) = (self.watchdog.driver().layout(), self.watchdog.driver().turnouts());
-        let (path, at) =
-            Path::around(layout, turnouts, place, &train.occupied, envelope.behind, envelope.ahead);
-        let mut trailed = path.trailed(layout, at - envelope.behind, at + envelope.ahead);
+        let (path, at) = Path::around(layout, turnouts, place, &train.occupied, behind, ahead);
+        let mut trailed = path.trailed(layout, at - behind, at + ahead);
         trailed.find(|need| turnouts.get(need.turnout) != Some(need.leg)).map(|need| need.turnout)
     }
 

@@ -8,7 +8,7 @@ use crate::event::Approach;
 use crate::ids::{EdgeId, NodeId, SpeedStep, TrainId};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Layout, MAX_MISSED, Position, TurnoutNeed, TurnoutStates};
+use crate::track::{Layout, MAX_MISSED, NodeKind, Position, TurnoutNeed, TurnoutStates};
 use crate::tracking::PathPoint;
 use crate::units::Length;
 
@@ -17,7 +17,7 @@ use super::recovery::Recovery;
 use super::unheard::{Behind, Unheard};
 use super::watchdog::Watchdog;
 
-/// A lost train needs this many sensors ahead, one of them beyond all places where it may be: one may stay silent.
+/// A lost train needs so many sensors ahead, one beyond all places where it may be: one may stay silent.
 const SENSORS_AHEAD: usize = 2;
 /// A train that has run less than this since a sensor reported it may still be on it: a pickup shoe is 50 to 80 mm long.
 const HOLDS: Length = Length::from_mm(100.0);
@@ -150,11 +150,35 @@ impl Watchdog {
 
     /// What is behind a train that an operator places: the points that it may have pushed over, if it may stand on them at its
     /// new place. A person who enters where its end is does not say over which leg it came.
-    pub(super) fn behind_placed(&self, now: Timestamp, train: TrainId, at: EdgeId) -> Option<Behind> {
+    pub(super) fn behind_placed(
+        &self,
+        now: Timestamp,
+        train: TrainId,
+        place: Position,
+        uncertainty: Length,
+    ) -> Option<Behind> {
         let behind = self.behind.get(&train).filter(|_| self.has_pushed_over_points(now, train))?;
         let reach = self.unheard_run(now, train) + BODY;
         let reach = edges_within(self.driver.layout(), behind.sensor, reach, &Reservation::empty());
-        reach.contains_key(&at).then_some(Behind { trails_otherwise: true, was_placed: true, ..*behind })
+        let may_be =
+            reach.contains_key(&place.edge) && self.has_points_behind(place, BODY + uncertainty * CERTAIN);
+        may_be.then_some(Behind { trails_otherwise: true, was_placed: true, ..*behind })
+    }
+
+    /// Whether points that a train trails on its way to a place are within a distance behind it.
+    fn has_points_behind(&self, place: Position, within: Length) -> bool {
+        let layout = self.driver.layout();
+        let Some(back) = layout.reversed(place) else { return false };
+        let (mut edge, mut left) = (back.edge, within + back.offset);
+        while let Some(known) = layout.edge(edge).filter(|known| left >= known.length) {
+            left -= known.length;
+            if layout.node(known.to).is_some_and(|node| matches!(node.kind, NodeKind::Branch(_))) {
+                return true;
+            }
+            let Some(next) = layout.outgoing(known.to).edges().next() else { return false };
+            edge = next;
+        }
+        false
     }
 
     /// Whether an operator placed a train where it may stand on points that it pushed over, and no sensor has reported it since.

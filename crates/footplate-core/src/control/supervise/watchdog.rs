@@ -170,7 +170,7 @@ impl Watchdog {
         self.driver.place(now, train, at, uncertainty);
         self.monitors.entry(train).or_default().place();
         let place = self.driver.position(train, now);
-        let behind = place.and_then(|place| self.behind_placed(now, train, place.edge));
+        let behind = place.and_then(|place| self.behind_placed(now, train, place, uncertainty));
         self.note_place(now, train);
         self.note_detection(train, now);
         self.behind.remove(&train);

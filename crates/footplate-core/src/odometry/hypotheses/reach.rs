@@ -53,7 +53,7 @@ const RETURNS_FOR_S: f64 = 15.0;
 /// Beyond what its train can do, a wheel accelerates by no more than this while it rolls (m/s²).
 const STRAYS: f64 = 0.1;
 /// Locked wheels that begin to turn, at no more than this (m/s), have not come back to the train.
-const CRAWLS: f64 = 0.5;
+const SLOWLY: f64 = 0.5;
 /// Hypotheses that the guaranteed bounds exclude for so long (s) have lost the train.
 const REFUTED_S: f64 = 0.5;
 /// Least effort that makes wheels creep.
@@ -159,10 +159,10 @@ impl Reach {
         // Locked wheels turn alike until the brake has let go of them.
         let [since_brake, since_traction] = self.since;
         // They have not come back to the train when they begin to turn.
-        let slowest = if self.locked { CRAWLS } else { SILENT };
-        let crawls = |(wheel, seen): (&Compared, &WheelScene)| seen.stuck || wheel.speed.abs() < slowest;
-        let crawl = wheels.iter().zip(&scene.wheels).all(crawls);
-        self.locked = crawl && self.slipped && since_brake < RETURNS_FOR_S;
+        let slowest = if self.locked { SLOWLY } else { SILENT };
+        let is_slow = |(wheel, seen): (&Compared, &WheelScene)| seen.stuck || wheel.speed.abs() < slowest;
+        let are_slow = wheels.iter().zip(&scene.wheels).all(is_slow);
+        self.locked = are_slow && self.slipped && since_brake < RETURNS_FOR_S;
         let Range { low, high } = scene.acceleration;
         let strays = self.strays(scene, [first_dead, second_dead], t);
         // A train beside whose wheels one sensor is faulty may be taken to stand.
