@@ -86,7 +86,7 @@ impl RunReader {
         self.step = step;
     }
 
-    /// Whether a report is of a contact that the station remembers from before the run, or that the train has been on since: the
+    /// Whether a report is of a sensor that the station remembers from before the run, or that the train has been on since: the
     /// first answer of a station reports all that closed since its last one, be that minutes ago.
     fn is_stale(&self, time: Timestamp, sensor: SensorId, is_first: bool) -> bool {
         if self.has_passed {
@@ -118,7 +118,7 @@ mod tests {
             let event = Event { time: Timestamp::from_s(at), kind: EventKind::Sensor(report) };
             reader.take(&event, PollTiming::ASSUMED).is_some()
         };
-        // then the first report, and what repeats it, is of a contact that may have closed long before; those behind it are not.
+        // then the first report, and what repeats it, may be of a detection long before; those behind it are not.
         assert_eq!(
             [is_read(0.02, 20), is_read(0.1, 20), is_read(3.8, 43), is_read(8.7, 3)],
             [false, false, true, true]

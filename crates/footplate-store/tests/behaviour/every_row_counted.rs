@@ -246,7 +246,7 @@ fn a_commit_that_was_cut_off_is_no_damage_but_a_salvage_cannot_know() {
     let says = salvaged.unread_log.clone().unwrap();
     assert!(says.starts_with("the last commit in ") && says.contains(" is not whole: "), "{says}");
     assert!(!salvaged.is_all());
-    // Who looks at it is told, too; the store without it is sound.
+    // A check reports it, too; the store without it is sound.
     let read = Store::open_to_read(&store).unwrap();
     read.check().unwrap();
     assert_eq!(read.cut_commit().as_ref(), Some(&says));

@@ -321,7 +321,7 @@ fn after_a_lost_connection_trains_are_at_rest_and_face_as_they_were_commanded() 
     desk.run_for(100);
     assert_eq!(desk.station.throttles["24"], (Throttle::Speed(45), false, 0));
     assert_eq!(desk.notices, [LinkNotice::Answers]);
-    // A throttle that has obeyed is stopped in its usual way.
+    // A throttle that has obeyed is stopped as usual.
     desk.command(speed(T24, 0));
     desk.run_for(100);
     assert_eq!(desk.station.throttles["24"], (Throttle::Speed(0), false, 0));

@@ -301,7 +301,7 @@ impl fmt::Display for Refusal {
             Self::OnTrailedPoints { train, turnout } => write!(
                 f,
                 "train {train} may be on turnout {turnout}, which is set for another leg than it came from and would \
-                 derail it on its way back: run it ahead, off the turnout, first"
+                 derail it going back: run it ahead, off the turnout, first"
             ),
             Self::PositionLost { train, turnout, curved } => {
                 let leg = if *curved { "curved" } else { "straight" };

@@ -8,13 +8,13 @@ use crate::event::Approach;
 use crate::ids::{EdgeId, NodeId, SpeedStep, TrainId};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Layout, MAX_MISSED, NodeKind, Position, TurnoutNeed, TurnoutStates};
+use crate::track::{Layout, MAX_MISSED, Position, TurnoutNeed, TurnoutStates};
 use crate::tracking::PathPoint;
 use crate::units::Length;
 
 use super::danger::{BODY, CERTAIN, CLEAR, LOST_REACH, rails_within};
 use super::recovery::Recovery;
-use super::unheard::{Behind, Unheard};
+use super::unheard::{Behind, Unheard, has_points_behind};
 use super::watchdog::Watchdog;
 
 /// A lost train needs so many sensors ahead, one beyond all places where it may be: one may stay silent.
@@ -29,7 +29,7 @@ pub(super) const SILENT_FOR: TimeSpan = TimeSpan::from_ms(2_000);
 const REST_PART: f64 = 1.3;
 /// ... plus this.
 const REST_MORE: TimeSpan = TimeSpan::from_ms(700);
-/// The time to rest of a train without a valid model (the longest published stop).
+/// That of a train without a valid model (the longest published stop).
 const REST_UNKNOWN: TimeSpan = TimeSpan::from_s(5.0);
 
 impl Watchdog {
@@ -160,25 +160,9 @@ impl Watchdog {
         let behind = self.behind.get(&train).filter(|_| self.has_pushed_over_points(now, train))?;
         let reach = self.unheard_run(now, train) + BODY;
         let reach = edges_within(self.driver.layout(), behind.sensor, reach, &Reservation::empty());
-        let may_be =
-            reach.contains_key(&place.edge) && self.has_points_behind(place, BODY + uncertainty * CERTAIN);
-        may_be.then_some(Behind { trails_otherwise: true, was_placed: true, ..*behind })
-    }
-
-    /// Whether points that a train trails on its way to a place are within a distance behind it.
-    fn has_points_behind(&self, place: Position, within: Length) -> bool {
-        let layout = self.driver.layout();
-        let Some(back) = layout.reversed(place) else { return false };
-        let (mut edge, mut left) = (back.edge, within + back.offset);
-        while let Some(known) = layout.edge(edge).filter(|known| left >= known.length) {
-            left -= known.length;
-            if layout.node(known.to).is_some_and(|node| matches!(node.kind, NodeKind::Branch(_))) {
-                return true;
-            }
-            let Some(next) = layout.outgoing(known.to).edges().next() else { return false };
-            edge = next;
-        }
-        false
+        let within = BODY + uncertainty * CERTAIN;
+        (reach.contains_key(&place.edge) && has_points_behind(self.driver.layout(), place, within))
+            .then_some(Behind { trails_otherwise: true, was_placed: true, ..*behind })
     }
 
     /// Whether an operator placed a train where it may stand on points that it pushed over, and no sensor has reported it since.

@@ -4,6 +4,7 @@ use crate::event::Approach;
 use crate::ids::{NodeId, SpeedStep};
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
+use crate::track::{Layout, NodeKind, Position};
 use crate::units::Length;
 
 /// The distance that a train has run since its last detection, by its commands, whatever was heard of it.
@@ -38,4 +39,19 @@ pub(super) struct Behind {
     pub(super) trails_otherwise: bool,
     /// Whether an operator has placed the train since, where it may still be on these points.
     pub(super) was_placed: bool,
+}
+
+/// Whether points that a train trails before a place are within a distance behind it.
+pub(super) fn has_points_behind(layout: &Layout, place: Position, within: Length) -> bool {
+    let Some(back) = layout.reversed(place) else { return false };
+    let (mut edge, mut left) = (back.edge, within + back.offset);
+    while let Some(known) = layout.edge(edge).filter(|known| left >= known.length) {
+        left -= known.length;
+        if layout.node(known.to).is_some_and(|node| matches!(node.kind, NodeKind::Branch(_))) {
+            return true;
+        }
+        let Some(next) = layout.outgoing(known.to).edges().next() else { return false };
+        edge = next;
+    }
+    false
 }
