@@ -169,7 +169,7 @@ pub enum Notice {
     },
     /// The track is clear of what no session drove.
     TrackClear,
-    /// Sensors all over the layout report what no train explains: all trains are commanded to stop until none has for a while.
+    /// Sensors all over the layout report what no train explains: trains that may move are stopped until none has for a while.
     Noise,
     /// No sensor has reported at random for a while.
     NoiseOver,

@@ -27,6 +27,7 @@ impl Dispatcher {
     pub(super) fn handle_notice(&mut self, now: Timestamp, notice: &Notice) {
         match notice {
             Notice::TurnoutThrown { turnout, curved, .. } => self.turnout_commanded(now, *turnout, *curved),
+            Notice::Noise | Notice::NoiseOver => self.distrust_turnouts(),
             Notice::TurnoutMismatch { turnout, curved, train } => {
                 self.turnout_observed(now, *turnout, *curved);
                 if !self.watchdog.is_in_danger(*train) {

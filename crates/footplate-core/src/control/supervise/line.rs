@@ -9,6 +9,7 @@ use crate::time::Timestamp;
 
 use super::alarm::Alarm;
 use super::creeping::SILENT_FOR;
+use super::noise::Noise;
 use super::watchdog::{Power, Watchdog};
 use crate::control::Notice;
 
@@ -54,16 +55,12 @@ impl Watchdog {
             // The station would run every train on at its last step when the power returns.
             LinkNews::PowerLost => self.switch_power(now, false),
             LinkNews::Silent if self.silent.is_none() => {
-                let is_known = self.is_silent();
                 self.silent = Some(now);
-                if !is_known {
-                    self.stop_unheard(now);
-                }
+                self.stop_unheard(now);
             }
             LinkNews::Silent => {}
             LinkNews::Answers => {
-                let since = self.silent.take();
-                if let Some(since) = since.filter(|_| !self.is_silent()) {
+                if let Some(since) = self.silent.take() {
                     self.stop_again(now, since);
                 }
             }
@@ -104,12 +101,9 @@ impl Watchdog {
 
     /// Takes a detection that no train explains; returns whether it is noise. Trains stop when noise begins.
     pub(super) fn is_noise(&mut self, now: Timestamp, sensor: SensorId) -> bool {
-        let is_known = self.is_silent();
         if self.noise.take(now, self.driver.layout(), sensor) {
             self.notify(Notice::Noise);
-            if !is_known {
-                self.stop_unheard(now);
-            }
+            self.stop_unheard(now);
         }
         self.noise.is_on()
     }
@@ -118,9 +112,7 @@ impl Watchdog {
     pub(super) fn end_noise(&mut self, now: Timestamp) {
         if let Some(since) = self.noise.end(now) {
             self.notify(Notice::NoiseOver);
-            if !self.is_silent() {
-                self.stop_again(now, since);
-            }
+            self.stop_again(now, since);
         }
     }
 
@@ -134,6 +126,7 @@ impl Watchdog {
                 self.give_up_recoveries(now);
             }
             self.clear_intruder();
+            self.noise = Noise::default();
             if self.is_powered() {
                 self.release_held();
                 self.command(Command::PowerOn);

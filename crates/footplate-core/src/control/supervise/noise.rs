@@ -18,6 +18,8 @@ const MANY: usize = 4;
 const WITHIN: TimeSpan = TimeSpan::from_s(5.0);
 /// Noise is over when no such detection has come for this time, as on a line that garbles data.
 const CLEAN_FOR: TimeSpan = TimeSpan::from_s(3.0);
+/// Noise counts as over after this time even so: all stops are commanded again then, and a train that does not stop is noticed.
+const AT_MOST: TimeSpan = TimeSpan::from_s(10.0);
 
 /// A detection that no train explains.
 #[derive(Debug, Clone, Copy)]
@@ -43,15 +45,18 @@ impl Noise {
     /// Takes a detection that no train explains. Returns whether noise begins with it.
     pub(super) fn take(&mut self, now: Timestamp, layout: &Layout, sensor: SensorId) -> bool {
         self.recent.retain(|detection| now - detection.at <= WITHIN);
-        if let Some((_, until)) = &mut self.lasts {
-            *until = now + CLEAN_FOR;
-            return false;
-        }
         let is_near = |Detection { sensor: other, .. }: &Detection| {
             *other == sensor || are_adjacent(layout, *other, sensor) || are_adjacent(layout, sensor, *other)
         };
         let is_apart = !self.recent.iter().any(is_near);
         self.recent.push_back(Detection { sensor, at: now, is_apart });
+        if let Some((since, until)) = &mut self.lasts {
+            // One sensor that reports again and again is no noise, nor is something that moves.
+            if is_apart {
+                *until = (now + CLEAN_FOR).min(*since + AT_MOST).max(*until);
+            }
+            return false;
+        }
         let apart = self.recent.iter().filter(|detection| detection.is_apart);
         let since = apart.clone().next().map_or(now, |first| first.at);
         let begins = apart.count() >= MANY;
@@ -103,6 +108,20 @@ mod tests {
     }
 
     #[test]
+    fn noise_that_does_not_end_counts_as_over_after_ten_seconds() {
+        let mut noise = Noise::default();
+        for nth in 0..60_u16 {
+            let now = Timestamp::from_s(1.0 + 0.2 * f64::from(nth));
+            noise.take(now, &oval(), SensorId(1_001 + nth));
+            if let Some(since) = noise.end(now) {
+                assert_eq!((since, now), (Timestamp::from_s(1.0), Timestamp::from_s(11.0)));
+                return;
+            }
+        }
+        panic!("it has not ended");
+    }
+
+    #[test]
     fn noise_lasts_until_nothing_has_been_reported_for_three_seconds() {
         let mut noise = Noise::default();
         let at = Timestamp::from_s;
@@ -115,7 +134,8 @@ mod tests {
         assert!(!take(&mut noise, 3.0, 1_003));
         assert!(take(&mut noise, 4.0, 1_004));
         assert!(noise.covers(at(1.0)) && !noise.covers(at(0.9)));
-        assert!(!take(&mut noise, 6.0, 1_001));
+        assert!(!take(&mut noise, 6.0, 1_005));
+        assert!(!take(&mut noise, 8.5, 1_005), "one sensor that repeats itself prolongs nothing");
         assert_eq!(noise.end(at(8.9)), None);
         assert_eq!(noise.end(at(9.0)), Some(at(1.0)));
         assert!(!noise.is_on() && noise.covers(at(8.0)) && !noise.covers(at(9.1)));
