@@ -455,12 +455,13 @@ impl<A: Awaited> Dialogue<A> {
             self.farewell.begin(now);
             for train in self.waiting.stops() {
                 self.locomotives.know_driven(train);
-                self.stops_all |= directed && !self.locomotives.has_direction(train);
             }
             self.waiting.clear();
             self.outstanding.clear();
             self.locomotives.withdraw_reversals();
             self.stop_driven();
+            let is_blocked = |train: TrainId| directed && !self.locomotives.has_direction(train);
+            self.stops_all |= self.locomotives.driven(false).into_iter().any(is_blocked);
         }
         begins
     }

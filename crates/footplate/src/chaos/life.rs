@@ -82,3 +82,31 @@ impl Spell {
         (self.from..self.until).contains(&now)
     }
 }
+
+/// The longest stretch from one time to another that none of these spells interrupts.
+pub(super) fn longest_between(from: Timestamp, until: Timestamp, mut spells: Vec<Spell>) -> TimeSpan {
+    spells.sort_by_key(|spell| spell.from);
+    let (mut since, mut longest) = (from, TimeSpan::ZERO);
+    for spell in spells {
+        longest = longest.max(spell.from.min(until) - since);
+        since = since.max(spell.until);
+    }
+    longest.max(until - since)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_stretch_without_a_spell_is_found() {
+        let s = |s: f64| Timestamp::from_s(s);
+        let spell = |from: f64, until: f64| Spell { from: s(from), until: s(until) };
+        let between = |spells: &[Spell]| longest_between(s(10.0), s(20.0), spells.to_vec()).as_s();
+        assert_eq!(between(&[]), 10.0);
+        assert_eq!(between(&[spell(8.0, 12.0)]), 8.0);
+        assert_eq!(between(&[spell(13.0, 18.5), spell(12.0, 19.0)]), 2.0);
+        assert_eq!(between(&[spell(1.0, 2.0), spell(30.0, 40.0)]), 10.0);
+        assert_eq!(between(&[spell(9.0, 21.0)]), 0.0);
+    }
+}

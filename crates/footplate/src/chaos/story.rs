@@ -18,7 +18,7 @@ use footplate_store::Store;
 
 use super::disk::FaultyDisk;
 use super::failure::{Failure, FailureKind};
-use super::life::{Death, Life, Spell};
+use super::life::{Death, Life, Spell, longest_between};
 use super::line::{FaultyLine, LATE, SharedStation};
 use super::people::{People, Seen, SharedDisk};
 use super::plan::{Plan, PlannedLife};
@@ -415,22 +415,20 @@ impl<'l> Teller<'_, 'l> {
         let Some(will) = line.will.take() else { return Ok(()) };
         self.note(format!("the guardian begins with a last will of {} bytes", will.len()));
         self.tell_truth();
-        // While the line is cut no train can be stopped.
-        let mut since = began;
         if line.all_stopped() {
-            line.stopped_at = Some(since);
-        }
-        while line.is_unreachable() {
-            wait(line, TimeSpan::from_ms(50));
-            since = self.now();
+            line.stopped_at = Some(began);
         }
         let is_said = carry_out(line, &will);
         self.fate.notes.append(&mut line.notes);
         match line.stopped_at {
             Some(at) => {
-                let took = (at - since).max(TimeSpan::ZERO);
+                let took = longest_between(began, at, line.unreachable());
                 self.fate.stopped_ms.push(took.as_ms());
-                self.note(format!("all trains were stopped after {:.0} ms", took.as_ms()));
+                self.note(format!(
+                    "all trains were stopped {:.0} ms after the death, {:.0} ms of them over a line that was there",
+                    (at - began).as_ms(),
+                    took.as_ms()
+                ));
                 if took > allowed {
                     self.fail(
                         FailureKind::RanOn,
