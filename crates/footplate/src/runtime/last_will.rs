@@ -22,6 +22,10 @@ const MOST_PARTS: usize = 2_000;
 /// A power command leaves within this time, other commands before it included; until then a last will begins without power, which is safe.
 const POWER_LEAVES_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
 
+/// A last will repeats every stop within this time (the slowest, of JMRI, every 500 ms): a station that is heard so long before the end
+/// of it has received them all.
+const ROUND: Duration = Duration::from_secs(1);
+
 /// Between two attempts to open a line again.
 const REOPEN_EVERY: Duration = Duration::from_millis(250);
 /// How long a byte waits for the handshake. After that it is sent all the same.
@@ -173,23 +177,42 @@ pub(crate) fn carry_out(line: &mut impl WillLine, will: &[u8]) -> bool {
 
 fn try_to_carry_out(line: &mut impl WillLine, will: &[u8]) -> Result<(), Lost> {
     line.expect_answer();
-    let mut rest = will;
-    while let [a, b, c, d, low, high, more @ ..] = rest {
-        let pause = u32::from_le_bytes([*a, *b, *c, *d]);
-        let length = usize::from(u16::from_le_bytes([*low, *high]));
-        let (bytes, further) = more.split_at_checked(length).unwrap_or((more, &[]));
-        line.pause(Duration::from_micros(pause.into()));
+    let whole: Duration = Parts(will).map(|(pause, _)| pause).sum();
+    let (mut elapsed, mut hears) = (Duration::ZERO, None);
+    for (pause, bytes) in Parts(will) {
+        line.pause(pause);
+        elapsed += pause;
+        if elapsed + ROUND > whole && whole > ROUND {
+            hears.get_or_insert_with(|| line.has_answered());
+        }
         await_hand_shake(line);
         line.write(bytes)?;
-        rest = further;
     }
     // A line that went during the last bytes did not carry them.
     line.pause(REOPEN_EVERY);
     if !line.is_open() {
         return Err(Lost("the line is gone".to_owned()));
     }
-    // Datagrams vanish without notice, and so do bytes on a connection whose other end is gone.
-    if line.has_answered() { Ok(()) } else { Err(Lost("the station does not answer".to_owned())) }
+    // Datagrams vanish without notice, and so do bytes on a connection whose other end is gone. What a station says of itself after the
+    // last of them shows only that the line is back.
+    let hears = hears.unwrap_or_else(|| line.has_answered());
+    if hears { Ok(()) } else { Err(Lost("the station does not answer".to_owned())) }
+}
+
+/// The parts of a last will that was [`written`]: the pause before each, and its bytes.
+struct Parts<'w>(&'w [u8]);
+
+impl<'w> Iterator for Parts<'w> {
+    type Item = (Duration, &'w [u8]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let [a, b, c, d, low, high, more @ ..] = self.0 else { return None };
+        let pause = u32::from_le_bytes([*a, *b, *c, *d]);
+        let length = usize::from(u16::from_le_bytes([*low, *high]));
+        let (bytes, rest) = more.split_at_checked(length).unwrap_or((more, &[]));
+        self.0 = rest;
+        Some((Duration::from_micros(pause.into()), bytes))
+    }
 }
 
 /// Waits until the station takes the next byte, where its hand-shake line can be read.
@@ -321,6 +344,63 @@ mod tests {
             let mut line = Impatient { opens_after, attempts: 0, written: Vec::new() };
             assert_eq!(carry_out(&mut line, &will), sent);
             assert_eq!((line.attempts, line.written == b"stop"), (1, sent));
+        }
+    }
+
+    /// A line whose station is reached from a time on, and then says something of itself.
+    struct CutOff {
+        back: Duration,
+        now: Duration,
+        heard: bool,
+        arrived: Vec<Duration>,
+    }
+
+    impl WillLine for CutOff {
+        fn is_open(&self) -> bool {
+            true
+        }
+        fn open(&mut self) -> Result<(), Lost> {
+            Ok(())
+        }
+        fn close(&mut self) {}
+        fn write(&mut self, _: &[u8]) -> Result<(), Lost> {
+            if self.now >= self.back {
+                self.arrived.push(self.now);
+            }
+            Ok(())
+        }
+        fn cts(&self) -> Option<bool> {
+            None
+        }
+        fn pause(&mut self, span: Duration) {
+            self.now += span;
+            self.heard |= self.now > self.back;
+        }
+        fn has_answered(&self) -> bool {
+            self.heard
+        }
+        fn expect_answer(&mut self) {
+            self.heard = false;
+        }
+        fn gives_up(&self) -> bool {
+            false
+        }
+        fn say(&self, _: &str) {}
+    }
+
+    #[test]
+    fn a_station_that_is_heard_only_after_the_last_stop_is_stopped_again() {
+        // A stop every 100 ms for 5 s, as a session writes it on a line without answers.
+        let stop = |nth: i64| Bequest { after: TimeSpan::from_ms(100 * nth.min(1)), bytes: b"stop".to_vec() };
+        let will = written(&(0..=50).map(stop).collect::<Vec<_>>(), 1.0);
+        for (back_ms, ends_ms) in [(0, 5_250), (3_900, 5_250), (4_100, 10_750), (5_100, 10_750)] {
+            let back = Duration::from_millis(back_ms);
+            let mut line = CutOff { back, now: Duration::ZERO, heard: false, arrived: Vec::new() };
+            assert!(carry_out(&mut line, &will));
+            assert_eq!(line.now, Duration::from_millis(ends_ms), "back after {back_ms} ms");
+            let first = *line.arrived.first().expect("a stop");
+            assert!(first - back <= Duration::from_millis(500), "{first:?}");
+            assert!(line.arrived.len() >= 10, "{}", line.arrived.len());
         }
     }
 
