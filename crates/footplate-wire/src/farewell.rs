@@ -5,8 +5,9 @@ use footplate_core::{TimeSpan, Timestamp};
 use crate::locomotives::Locomotives;
 use crate::session::{Closing, Confirmation};
 
-/// The power goes off after this time even if stops are unconfirmed; long enough for several repeats.
-const STOPS_WITHIN: TimeSpan = TimeSpan::from_ms(1_500);
+/// The power goes off after this time even if stops are unconfirmed: a line may garble every repeat of them, and all trains have to be
+/// stopped within a second (a requirement).
+const STOPS_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
 
 /// How far the end has come.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
