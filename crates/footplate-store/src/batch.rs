@@ -13,7 +13,7 @@ use footplate_core::{
 
 use crate::motion_replay::{MotionReplay, RunBegin};
 use crate::poll_rhythm::poll_rhythm;
-use crate::recording::{Recording, Run};
+use crate::recording::{Recording, Run, TrainAtStart};
 use crate::recording_names::distinct_names;
 use crate::store::{Store, StoreError};
 
@@ -37,9 +37,23 @@ pub struct BatchRun {
 }
 
 impl BatchRun {
+    /// What a train did in a run of a recording.
+    fn of(recording: &str, is_live: bool, run: &Run, train: TrainAtStart, events: Vec<BatchEvent>) -> Self {
+        let TrainAtStart { train, step } = train;
+        Self {
+            recording: recording.to_owned(),
+            is_live,
+            id: run.id,
+            began_at: run.began_at,
+            train,
+            step,
+            events,
+        }
+    }
+
     /// Its events less those that a person has excluded.
-    fn accepted(&self) -> impl Iterator<Item = &Event> {
-        self.events.iter().filter(|event| !event.excluded).map(|event| &event.event)
+    fn accepted(&self) -> impl Iterator<Item = &BatchEvent> {
+        self.events.iter().filter(|event| !event.excluded)
     }
 }
 
@@ -54,6 +68,8 @@ pub struct BatchEvent {
     pub stored_as: Option<i64>,
     /// A person has excluded it.
     pub excluded: bool,
+    /// It is the first detection of its train after that was lost.
+    pub was_lost_before: bool,
 }
 
 /// The rhythm of the link of one recording.
@@ -91,7 +107,7 @@ pub struct Batch {
     pub layout_test: LayoutTest,
     /// The trains, by number.
     pub trains: Vec<BatchTrain>,
-    /// Runs of live sessions in which several trains moved, so that their detections cannot be assigned.
+    /// Runs of live sessions in which several trains moved, and of which the session has not said which detection was of which train.
     pub left_out: Vec<LeftOut>,
 }
 
@@ -187,6 +203,7 @@ impl Batch {
                     line: raw.line,
                     stored_as: None,
                     excluded: false,
+                    was_lost_before: false,
                 });
                 runs.extend(batch_run(name, false, run, events.collect(), train)?);
             }
@@ -218,21 +235,41 @@ impl Batch {
         }
         let names = distinct_names(recordings.iter().map(|stored| stored.name.as_str()));
         for (recording, name) in recordings.into_iter().zip(&names) {
+            let mut assigned = None;
             for stored in store.runs(recording.key, as_of)? {
                 let events = stored.events.iter().map(|event| BatchEvent {
                     event: event.raw.event,
                     line: event.raw.line,
                     stored_as: Some(event.key.0),
                     excluded: event.is_excluded(),
+                    was_lost_before: false,
                 });
                 let (accepted, is_live) = (stored.accepted(), recording.is_live());
                 known.extend(accepted.trains.iter().map(|at_start| at_start.train));
-                match batch_run(name, is_live, &accepted, events.collect(), train) {
-                    // A person who records trains one by one wants to know; a session goes as it goes.
-                    Err(BatchError::SeveralTrains { recording: name, run, trains }) if is_live => {
-                        left_out.push(LeftOut { recording: name, run, trains });
-                    }
-                    run => runs.extend(run?),
+                let moving = accepted.moving();
+                if !is_live || moving.len() < 2 {
+                    runs.extend(batch_run(name, is_live, &accepted, events.collect(), train)?);
+                    continue;
+                }
+                let events: Vec<BatchEvent> = events.collect();
+                let assigned = match &mut assigned {
+                    Some(assigned) => assigned,
+                    none => none.insert(store.assigned_detections(recording.key)?),
+                };
+                if assigned.is_empty() {
+                    let trains = moving.iter().map(|at_start| at_start.train).collect();
+                    left_out.push(LeftOut { recording: name.clone(), run: accepted.id, trains });
+                    continue;
+                }
+                for at_start in
+                    moving.iter().filter(|at_start| train.is_none_or(|train| train == at_start.train))
+                {
+                    let own = events.iter().filter(|event| assigned.concerns(at_start.train, &event.event));
+                    let own = own.map(|event| BatchEvent {
+                        was_lost_before: assigned.was_lost_before(&event.event),
+                        ..*event
+                    });
+                    runs.push(BatchRun::of(name, is_live, &accepted, *at_start, own.collect()));
                 }
             }
         }
@@ -247,7 +284,7 @@ impl Batch {
         let sections = SectionIndex::of(layout);
         let mut layout_test = LayoutTest::default();
         for run in &runs {
-            layout_test.take_run(layout, &sections, 1, run.accepted());
+            layout_test.take_run(layout, &sections, 1, run.accepted().map(|event| &event.event));
         }
         let lengths = layout_test.lengths(&sections);
         let (mut polling, mut rhythms) = (Vec::new(), Vec::new());
@@ -313,7 +350,8 @@ fn replayed(
             step: run.step,
             began_at: run.began_at,
         };
-        replay.take_run(layout, sections, begin, run.accepted(), rhythm);
+        let events = run.accepted().map(|event| (&event.event, event.was_lost_before));
+        replay.take_run(layout, sections, begin, events, rhythm);
     }
     replay.end(sections, lengths);
     replay
@@ -350,13 +388,7 @@ fn batch_run(
             });
         }
     };
-    Ok(wanted.is_none_or(|wanted| wanted == only.train).then(|| BatchRun {
-        recording: recording.to_owned(),
-        is_live,
-        id: run.id,
-        began_at: run.began_at,
-        train: only.train,
-        step: only.step,
-        events,
-    }))
+    Ok(wanted
+        .is_none_or(|wanted| wanted == only.train)
+        .then(|| BatchRun::of(recording, is_live, run, only, events)))
 }

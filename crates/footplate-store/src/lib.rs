@@ -74,9 +74,10 @@ pub use speed_profile::{
     write_roster_entry,
 };
 pub use store::{
-    Calibration, Change, Direction, EventKey, Import, Journal, JournalEntry, MachineKey, Mark, MarkKind,
-    NewCalibration, NewMachine, RecordingKey, RunKey, Salvaged, SalvagedTable, Schedule, Side, Store,
-    StoreError, StoredEvent, StoredMachine, StoredRecording, StoredRun, Traced, UnfinishedSession, salvage,
+    AssignedDetections, Calibration, Change, Direction, EventKey, Import, Journal, JournalEntry, MachineKey,
+    Mark, MarkKind, NewCalibration, NewMachine, RecordingKey, RunKey, Salvaged, SalvagedTable, Schedule,
+    Side, Store, StoreError, StoredEvent, StoredMachine, StoredRecording, StoredRun, Traced,
+    UnfinishedSession, salvage,
 };
 pub use table::{LONGEST_LINE, TableError};
 pub use tachometer::{

@@ -25,7 +25,7 @@ use crate::poll_rhythm::poll_rhythm;
 use crate::recording::Run;
 use crate::recording_names::distinct_names;
 use crate::speed_profile::SpeedProfile;
-use crate::store::{KeptReplay, Store, StoreError};
+use crate::store::{AssignedDetections, KeptReplay, RecordingKey, Store, StoreError};
 
 /// How often the model is fitted anew on the way, at starts from rest: what is thought of a command depends on whether the
 /// train stood, and so on how fast it is known to stop.
@@ -55,7 +55,7 @@ pub struct MotionReplay {
     pub events: usize,
     /// When the last of them was, since the Unix epoch, where the runs tell.
     pub newest: Option<Timestamp>,
-    /// Runs that were not used: other trains moved, too, so that their detections cannot be assigned.
+    /// Runs that were not used: other trains moved, too, and no session has said which detections were of which train.
     pub left_out: Vec<(String, RunId)>,
 }
 
@@ -90,9 +90,7 @@ impl MotionReplay {
             None => (Self::beginning(train, highest, profile.as_ref()), 0),
         };
         let sections = SectionIndex::of(layout);
-        for stored in runs.iter().skip(gone) {
-            replay.take_stored(layout, &sections, stored);
-        }
+        replay.take_all(layout, &sections, store, runs.get(gone..).unwrap_or_default())?;
         if !replay.is_empty() && gone < runs.len() {
             replay.keep(store, layout, fingerprint);
         }
@@ -115,9 +113,7 @@ impl MotionReplay {
         let mut replay = Self::beginning(train, highest, profile);
         let sections = SectionIndex::of(layout);
         let runs = Self::stored_runs(layout, store, as_of)?;
-        for stored in &runs {
-            replay.take_stored(layout, &sections, stored);
-        }
+        replay.take_all(layout, &sections, store, &runs)?;
         replay.end(&sections, &lengths_of(layout, &sections, &runs));
         Ok(replay)
     }
@@ -136,6 +132,7 @@ impl MotionReplay {
                 store.runs(recording.key, as_of)?.iter().map(crate::StoredRun::accepted).collect();
             let rhythm = poll_rhythm(accepted.iter().map(|run| run.events.iter().map(|raw| &raw.event)));
             let of = |run| StoredReplayRun {
+                key: recording.key,
                 recording: name.clone(),
                 is_live: recording.is_live(),
                 run,
@@ -220,19 +217,50 @@ impl MotionReplay {
         }
     }
 
-    fn take_stored(&mut self, layout: &Layout, sections: &SectionIndex, stored: &StoredReplayRun) {
-        let StoredReplayRun { recording, is_live, run, rhythm } = stored;
+    /// Takes in runs in order.
+    fn take_all(
+        &mut self,
+        layout: &Layout,
+        sections: &SectionIndex,
+        store: &Store,
+        runs: &[StoredReplayRun],
+    ) -> Result<(), StoreError> {
+        for of_recording in runs.chunk_by(|one, next| one.key == next.key) {
+            let mut assigned = AssignedDetections::default();
+            if of_recording.iter().any(|stored| stored.is_live && stored.run.moving().len() > 1) {
+                assigned = store
+                    .assigned_detections(of_recording.first().map_or(RecordingKey(0), |stored| stored.key))?;
+            }
+            of_recording.iter().for_each(|stored| self.take_stored(layout, sections, stored, &assigned));
+        }
+        Ok(())
+    }
+
+    fn take_stored(
+        &mut self,
+        layout: &Layout,
+        sections: &SectionIndex,
+        stored: &StoredReplayRun,
+        assigned: &AssignedDetections,
+    ) {
+        let StoredReplayRun { recording, is_live, run, rhythm, .. } = stored;
         let train = self.fit.model().train();
         let moving = run.moving();
         let events = || run.events.iter().map(|raw| &raw.event);
-        match moving.as_slice() {
-            [only] if only.train == train => {
-                let begin =
-                    RunBegin { recording, is_live: *is_live, step: only.step, began_at: run.began_at };
-                self.take_run(layout, sections, begin, events(), rhythm);
+        let begin = |step| RunBegin { recording, is_live: *is_live, step, began_at: run.began_at };
+        match (moving.as_slice(), moving.iter().find(|at_start| at_start.train == train)) {
+            ([_], Some(only)) => {
+                let events = events().map(|event| (event, false));
+                self.take_run(layout, sections, begin(only.step), events, rhythm);
             }
-            several => {
-                if several.iter().any(|at_start| at_start.train == train) {
+            (_, Some(own)) if !assigned.is_empty() => {
+                let events = events()
+                    .filter(|event| assigned.concerns(train, event))
+                    .map(|event| (event, assigned.was_lost_before(event)));
+                self.take_run(layout, sections, begin(own.step), events, rhythm);
+            }
+            (_, own) => {
+                if own.is_some() {
                     self.left_out.push((recording.clone(), run.id));
                 }
                 if *is_live {
@@ -242,14 +270,14 @@ impl MotionReplay {
         }
     }
 
-    /// Takes in a run in which no other train moves: how it began, its events in order less those that a person excluded,
-    /// and the rhythm of its link.
+    /// Takes in what the train did in a run: how that began, the events that concern the train, in order and less those that a person
+    /// excluded, each with whether the train was lost before it, and the rhythm of the link.
     pub(crate) fn take_run<'e>(
         &mut self,
         layout: &Layout,
         sections: &SectionIndex,
         begin: RunBegin<'_>,
-        events: impl Iterator<Item = &'e Event>,
+        events: impl Iterator<Item = (&'e Event, bool)>,
         rhythm: &PollTimingEstimator,
     ) {
         let train = self.fit.model().train();
@@ -266,7 +294,7 @@ impl MotionReplay {
         let turnouts = if begin.is_live { &mut self.turnouts } else { &mut self.turnouts_of_file };
         let mut reader = RunReader::new(train, begin.step);
         let mut fitted: Option<Timestamp> = None;
-        for event in events {
+        for (event, was_lost) in events {
             note_turnout(turnouts, event);
             let Some(read) = reader.take(event, rhythm.timing()) else { continue };
             let time = read.event.time;
@@ -274,6 +302,9 @@ impl MotionReplay {
             if starts && time - *fitted.get_or_insert(time) >= REFIT_AFTER {
                 fitted = Some(time);
                 self.fit.refit(sections);
+            }
+            if was_lost {
+                self.fit.lose_place();
             }
             if read.was_pushed {
                 // How long it was stuck says nothing of how it starts and runs.
@@ -289,6 +320,7 @@ impl MotionReplay {
 
 /// A run as a store keeps it, with the rhythm of the link of its recording.
 struct StoredReplayRun {
+    key: RecordingKey,
     recording: String,
     is_live: bool,
     run: Run,

@@ -11,6 +11,9 @@ use crate::motion_file::MOTION_MODEL_VERSION;
 use crate::recording::Run;
 use crate::speed_profile::SpeedProfile;
 
+/// What is read of stored runs. Whoever reads more or less of them raises it, so that all is replayed once.
+const READS: u32 = 2;
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Fingerprint(ContentHash);
 
@@ -26,7 +29,7 @@ impl Fingerprint {
         profile: Option<&SpeedProfile>,
     ) -> Self {
         let program = env!("CARGO_PKG_VERSION");
-        let all = format!("{MOTION_MODEL_VERSION} {program} {train} {highest} {layout:?}");
+        let all = format!("{MOTION_MODEL_VERSION} {READS} {program} {train} {highest} {layout:?}");
         let before = Self(ContentHash::of(all.as_bytes()));
         profile.map_or(before, |profile| Self(ContentHash::of(format!("{before} {profile:?}").as_bytes())))
     }

@@ -9,7 +9,7 @@ use footplate_core::{Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Ti
 /// where it should, and the calibration took it for stuck. No trip of an experiment takes as long between two of either.
 const PUSHED_AFTER: TimeSpan = TimeSpan::from_ms(4_000);
 
-/// Reads the events of one train in a run in which no other moves.
+/// Reads the events of one train in a run, without those that other trains caused.
 #[derive(Debug)]
 pub(super) struct RunReader {
     train: TrainId,

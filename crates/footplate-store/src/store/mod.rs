@@ -25,6 +25,7 @@
 //! ```
 
 mod archives;
+mod assigned;
 mod calibrations;
 mod checksum;
 mod decisions;
@@ -44,6 +45,7 @@ mod schedules;
 mod unfinished;
 mod write_ahead_log;
 
+pub use assigned::AssignedDetections;
 pub use calibrations::{Calibration, NewCalibration};
 pub use decisions::{MachineKey, NewMachine, Side, StoredMachine, Traced};
 pub use directions::Direction;
