@@ -9,6 +9,8 @@ use core::ops::{ControlFlow, RangeInclusive};
 
 use footplate_core::{FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
+use hearing::Driven;
+
 use super::framing::Framing;
 use super::opening::Opening;
 use super::outstanding::Awaited;
@@ -50,8 +52,8 @@ pub struct Client {
     sensors: Sensors,
     /// Locomotives whose state must be read again.
     unverified: Vec<TrainId>,
-    /// Whether each locomotive ran forward by a report that no other has confirmed yet.
-    reported_once: BTreeMap<TrainId, bool>,
+    /// How each locomotive was driven by its last reports, which were alike, and how many of them there were; too few yet to count.
+    unconfirmed: BTreeMap<TrainId, (Driven, u8)>,
 }
 
 impl Client {
@@ -65,7 +67,7 @@ impl Client {
             opening: Opening::begin(now, &settings),
             sensors: Sensors::default(),
             unverified: Vec::new(),
-            reported_once: BTreeMap::new(),
+            unconfirmed: BTreeMap::new(),
         };
         client.go_on(now);
         client

@@ -59,14 +59,21 @@ fn the_direction_is_read_back_and_then_absolute() {
 }
 
 #[test]
-fn a_direction_counts_once_two_reports_agree() {
+fn a_direction_counts_once_enough_reports_agree() {
     let mut desk = Desk::opened();
     desk.station.answers.retain(|(request, _)| *request != "<t 24>");
     desk.command(speed(T24, 8));
-    // `128`, forward at rest, without its first digit; then twice whole.
-    for (answer, drives) in
-        [("<l 24 0 28 0>\n", false), ("<l 24 0 128 0>\n", false), ("<l 24 0 128 0>\n", true)]
-    {
+    // `128`, forward at rest, without one of its digits, twice without the same; then twice whole.
+    let (first, second, whole) = ("<l 24 0 28 0>\n", "<l 24 0 18 0>\n", "<l 24 0 128 0>\n");
+    for (answer, drives) in [
+        (second, false),
+        (first, false),
+        (first, false),
+        (whole, false),
+        (first, false),
+        (whole, false),
+        (whole, true),
+    ] {
         desk.run_for(100);
         desk.hear(answer);
         desk.run_for(100);

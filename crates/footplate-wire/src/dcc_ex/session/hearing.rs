@@ -122,9 +122,9 @@ impl Client {
             if let Some(last) = last.filter(|_| driven.register < 0) {
                 return self.dialogue.faces(train, last);
             }
-            // Messages have no checksum, and `128`, forward, without its first digit is a speed backward: two have to agree.
-            let before = self.reported_once.insert(train, driven.forward).or(last);
-            if before == Some(driven.forward) {
+            let alike = self.count_alike(train, driven);
+            let known = u8::from(last == Some(driven.forward));
+            if alike + known >= driven.reports_needed() {
                 self.dialogue.faces(train, driven.forward);
             }
             return;
@@ -136,7 +136,7 @@ impl Client {
         if !locomotive.is_driven {
             // It is asked for again before it is used.
             locomotive.forward = None;
-            self.reported_once.insert(train, driven.forward);
+            self.count_alike(train, driven);
             return;
         }
         if driven.register < 0 {
@@ -149,6 +149,14 @@ impl Client {
         self.dialogue.faces(train, driven.forward);
         self.dialogue.stop_at_end(train);
         self.dialogue.notify(LinkNotice::OtherThrottle { train, reversed });
+    }
+
+    /// Counts the last reports of a locomotive that were all alike.
+    fn count_alike(&mut self, train: TrainId, driven: Driven) -> u8 {
+        let before = self.unconfirmed.get(&train).filter(|(before, _)| *before == driven);
+        let count = before.map_or(0, |(_, count)| *count).saturating_add(1);
+        self.unconfirmed.insert(train, (driven, count));
+        count
     }
 
     fn hear_of_turnout(&mut self, now: Timestamp, turnout: TurnoutId, thrown: bool, was_asked: bool) {
@@ -170,9 +178,17 @@ impl Client {
 }
 
 /// A locomotive's state on the board.
-#[derive(Clone, Copy)]
-struct Driven {
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Driven {
     register: i16,
     throttle: Throttle,
     forward: bool,
+}
+
+impl Driven {
+    /// How many reports alike are needed. Messages have no checksum, and `128`, forward and at rest, is a speed backward if any of its
+    /// digits is lost: two have to agree, and three where a locomotive is said to run that no one has driven here.
+    fn reports_needed(self) -> u8 {
+        if self.throttle == Throttle::Speed(0) { 2 } else { 3 }
+    }
 }
