@@ -4,6 +4,7 @@
 //! reserved for and recorded alike. The protocol has no token: everyone who can reach the port can drive.
 
 mod given_orders;
+mod places;
 
 use std::collections::BTreeMap;
 use std::net::{Ipv4Addr, SocketAddr};
@@ -23,10 +24,11 @@ use serde::Deserialize;
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader};
 use tokio::net::tcp::OwnedWriteHalf;
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::Semaphore;
+use tokio::sync::Notify;
 use tokio::time::{interval, sleep, timeout};
 
 use self::given_orders::{GivenOrders, line};
+use self::places::{Place, Places};
 use crate::accept_queue::listen;
 use crate::clock::Stopwatch;
 use crate::dashboard::{Board, Request};
@@ -35,8 +37,6 @@ use crate::standard_error::say;
 
 /// JMRI's port, at which phones look first.
 const USUAL_PORT: u16 = 12_090;
-/// Phones at the same time: more than a club has operators.
-const MOST_PHONES: usize = 32;
 /// How often a phone's display follows the railway.
 const DISPLAY_INTERVAL: Duration = Duration::from_millis(200);
 /// A phone that does not read for so long is gone.
@@ -146,18 +146,16 @@ struct ShownTrain {
 
 impl Station {
     async fn accept(self, listener: TcpListener) {
-        let room = Arc::new(Semaphore::new(MOST_PHONES));
-        loop {
+        let places = Arc::new(Places::new());
+        for number in 0.. {
             let Ok((stream, _)) = listener.accept().await else {
                 sleep(RETRY_PAUSE).await;
                 continue;
             };
-            // Without room the connection is closed at once.
-            let Ok(place) = Arc::clone(&room).try_acquire_owned() else { continue };
-            let station = self.clone();
+            let (station, places, leaves) = (self.clone(), Arc::clone(&places), places.add(number));
             tokio::spawn(async move {
-                station.converse(stream).await;
-                drop(place);
+                station.converse(stream, &leaves, || places.take(number)).await;
+                places.forget(number);
             });
         }
     }
@@ -207,14 +205,18 @@ impl Station {
         railway.trains.iter().map(of_train).collect()
     }
 
-    /// One phone, from its first to its last line. However it ends, its trains are stopped.
-    async fn converse(&self, stream: TcpStream) {
+    /// One phone, from its first to its last line; it takes its place with the first, and is closed if there is none. However it ends,
+    /// its trains are stopped.
+    async fn converse(&self, stream: TcpStream, leaves: &Notify, take_place: impl Fn() -> Option<Place>) {
         let _ = stream.set_nodelay(true);
         let (read, mut write) = stream.into_split();
         let mut read = BufReader::new(read);
         let mut display = interval(DISPLAY_INTERVAL);
         let (roster, railway) = loop {
-            display.tick().await;
+            tokio::select! {
+                _ = display.tick() => {}
+                () = leaves.notified() => return,
+            }
             let shown = self.railway().and_then(|railway| Some((self.roster(&railway)?, railway)));
             if let Some(shown) = shown {
                 break shown;
@@ -222,7 +224,7 @@ impl Station {
         };
         let mut phone = Phone::connected(self.now(), roster, railway);
         let (mut given, mut refusals) = (GivenOrders::default(), self.board.refusals());
-        let mut line = Vec::new();
+        let (mut line, mut place) = (Vec::new(), None);
         while self.carry_out(&mut phone, &mut given, &mut write).await {
             let silent_at = phone.next_timeout().map(|at| (at - self.now()).as_s().max(0.0));
             let silence = async {
@@ -233,7 +235,10 @@ impl Station {
             };
             tokio::select! {
                 ended = next_line(&mut read, &mut line) => {
-                    if ended.is_none() {
+                    if ended.is_some() && place.is_none() {
+                        place = take_place();
+                    }
+                    if ended.is_none() || place.is_none() {
                         break;
                     }
                     let text = String::from_utf8_lossy(&line).trim().to_owned();
@@ -250,6 +255,7 @@ impl Station {
                         phone.handle_refusal(self.now(), &refusal.why);
                     }
                 }
+                () = leaves.notified() => break,
                 () = silence => phone.handle_timeout(self.now()),
             }
         }
