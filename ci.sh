@@ -9,7 +9,7 @@
 #   test         unit, behaviour, property and documentation tests
 #   bare-metal   core and wire link into a program that has no std
 #   docs         rustdoc without a warning; every relative link in the documentation leads somewhere
-#   examples     the numbered examples print what is committed in testdata/examples
+#   examples     the numbered examples print what is committed in testdata/examples; those of README and guides what their pages show
 #   scenarios    the tables in docs/tables are what the program and its examples print
 #   browser      set-up, pages and reports in a browser: driven, drawn, dark and light, on a phone, in German, by keyboard, axe
 #   stations     programs of others drive trains behind our virtual stations
@@ -172,9 +172,15 @@ check_example() {
   echo "example $1 prints what is committed"
 }
 
+# The examples of README and guides; with the features of the whole workspace, in which the tests are built already.
+run_pages() {
+  cargo nextest run --workspace -E 'package(footplate) & binary(behaviour) & test(/^pages::/)'
+}
+
 step_examples() {
-  need_compiler
+  need_nextest
   each_example check_example
+  run_pages
   local expected name
   for expected in "$EXPECTED_EXAMPLES"/*.txt; do
     name=$(basename "$expected" .txt)
@@ -383,10 +389,11 @@ step_fresh() {
 }
 
 step_expected() {
-  need_compiler
+  need_nextest
   each_example refresh_example
+  FOOTPLATE_REWRITE_PAGES=1 run_pages
   each_table refresh_table
-  git status --short -- testdata "$TABLES"
+  git status --short -- testdata "$TABLES" README.md docs/guides
 }
 
 # ---- running them -------------------------------------------------------------------------------------------

@@ -30,6 +30,7 @@ mod odometry;
 mod odometry_report;
 mod other_layouts;
 mod other_stations;
+mod pages;
 mod phones;
 mod placed_rides;
 mod plot;
