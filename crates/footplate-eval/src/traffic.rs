@@ -4,4 +4,6 @@ mod page;
 mod session;
 
 pub use self::page::{LONGEST_NOWHERE_S, Page};
-pub use self::session::{Asked, HAND, LENGTHS, Session, Tally, is_on_reserved_track, place_by_hand, set_out};
+pub use self::session::{
+    Asked, HAND, LENGTHS, Session, Tally, is_on_reserved_track, place_by_hand, rest_error, set_out,
+};

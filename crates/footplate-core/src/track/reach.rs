@@ -3,6 +3,9 @@
 //! Detections are missed now and then: E11 reports after C15, and D12 between them was silent. A reach is one to
 //! [`MAX_MISSED`] + 1 hops in a row; all but its last sensor were missed.
 
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
+
 use crate::ids::{EdgeId, NodeId, SensorId};
 use crate::track::{Hop, HopId, Layout, Position, TurnoutStates};
 use crate::units::Length;
@@ -65,6 +68,25 @@ impl Layout {
         // No hop begins on an unknown edge.
         let from = self.edge(position.edge).map_or(NodeId(0), |edge| edge.from);
         Reaches::new(self, from, Some(position), turnouts, missed)
+    }
+
+    /// The edges that begin within distances from the starts of some edges, over both legs of every turnout, each with the longest
+    /// distance that is left where it begins.
+    #[must_use]
+    pub(crate) fn edges_within(
+        &self,
+        from: impl IntoIterator<Item = (EdgeId, Length)>,
+    ) -> BTreeMap<EdgeId, Length> {
+        let mut found: BTreeMap<EdgeId, Length> = BTreeMap::new();
+        let mut open = Vec::from_iter(from);
+        while let Some((id, left)) = open.pop() {
+            let Some(edge) = self.edge(id).filter(|_| left > Length::ZERO) else { continue };
+            if found.get(&id).is_none_or(|known| *known < left) {
+                found.insert(id, left);
+                open.extend(self.outgoing(edge.to).edges().map(|next| (next, left - edge.length)));
+            }
+        }
+        found
     }
 
     /// The edges of a reach in the order of travel.

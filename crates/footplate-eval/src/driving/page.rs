@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use footplate_core::HALF_95;
 use footplate_sim::LawFamily;
 use serde_json::{Value, json};
 
@@ -182,7 +183,8 @@ impl Page<'_> {
         let lengths: Vec<[f64; 2]> = self.trains.iter().filter_map(|train| train.length_error_mm).collect();
         let within = |part: f64| quantile(lengths.iter().map(|[error, _]| error.abs()), part);
         if let (Some(median), Some(high)) = (within(0.5), within(0.95)) {
-            let inside = lengths.iter().filter(|[error, deviation]| error.abs() <= 1.96 * deviation).count();
+            let inside =
+                lengths.iter().filter(|[error, deviation]| error.abs() <= HALF_95 * deviation).count();
             writeln!(
                 output,
                 "The length of {} trains was learnt from releases of blocks within {median:.1} mm (median), {high:.1} \

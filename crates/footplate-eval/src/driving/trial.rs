@@ -2,7 +2,7 @@
 
 use footplate_core::control::{Aim, Driver, Notice, Order, OrderId, Refusal, StopOrder};
 use footplate_core::track::{Landmark, Layout, TurnoutStates};
-use footplate_core::{Approach, Length, NodeId, Ratio, SpeedStep, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Approach, HALF_95, Length, NodeId, Ratio, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_sim::{LawFamily, LivingSwitches, TrainTruth, VirtualStation};
 
 use crate::seeds::Choice;
@@ -263,7 +263,7 @@ impl<'a, 'l> Trial<'a, 'l> {
         let Some(past) = self.line.station.world().truth().past(TRAIN, sensor) else { return };
         let off = (past - said.offset).as_mm();
         self.results.position_checks[0] += 1;
-        self.results.position_checks[1] += u32::from(off.abs() <= 1.96 * located.uncertainty.as_mm());
+        self.results.position_checks[1] += u32::from(off.abs() <= HALF_95 * located.uncertainty.as_mm());
     }
 
     /// Whether the driver knows where the train is, and no sensor that should have reported it is silent.

@@ -36,6 +36,15 @@ const TRAINS: [TrainId; 6] = [TrainId(24), TrainId(58), TrainId(1), TrainId(43),
 /// Places tried for a train at the start.
 const TRIES: usize = 1_000;
 
+/// How much further than estimated a train really is that has come to rest; `None` if its sensor does not tell.
+#[must_use]
+pub fn rest_error(layout: &Layout, world: &LivingLayout<'_>, finished: &Finished) -> Option<Length> {
+    let achieved = finished.achieved?;
+    let past = world.truth().past(finished.train, layout.sensor_at(achieved.at.node)?)?;
+    // A train that has reversed since does not come from that sensor.
+    Some(past - achieved.at.offset).filter(|error| error.abs() <= FAR)
+}
+
 /// The settings of a session.
 #[derive(Debug, Clone, Copy)]
 pub struct Asked {
@@ -279,15 +288,8 @@ impl<'l> Session<'l> {
 
     /// Compares the estimated position of a train at rest with the truth.
     fn check_position(&mut self, finished: &Finished) {
-        let truth = self.prepared.world().truth();
         let Some(achieved) = finished.achieved else { return };
-        let sensor = self.layout.sensor_at(achieved.at.node);
-        let Some(past) = sensor.and_then(|sensor| truth.past(finished.train, sensor)) else { return };
-        let error = past - achieved.at.offset;
-        // A train that has reversed since does not come from that sensor.
-        if error.abs() > FAR {
-            return;
-        }
+        let Some(error) = rest_error(self.layout, self.prepared.world(), finished) else { return };
         let sigmas = error / achieved.uncertainty;
         self.tally.rests += 1;
         if sigmas.abs() > CERTAIN {

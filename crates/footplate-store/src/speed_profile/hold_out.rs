@@ -4,12 +4,9 @@
 //! interval that contains the stated speed nineteen times in twenty if the stated uncertainty is true. Then the halves change places.
 
 use footplate_core::model::{MotionFit, StatedMotion, StatedSpeed};
-use footplate_core::{SpeedStep, TrainId};
+use footplate_core::{HALF_95, SpeedStep, TrainId};
 
 use super::profile::SpeedProfile;
-
-/// Half the width of the interval that contains 95 % of normal values, in standard deviations.
-const NORMAL_95: f64 = 1.96;
 
 /// The score of one profile.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -63,7 +60,7 @@ impl HoldOut {
             let fit = MotionFit::new(TrainId(0), highest);
             for compared in fit.compare_stated(&known, &asked).into_iter().flatten() {
                 score.predicted += 1;
-                score.inside += usize::from(compared.sigmas.abs() <= NORMAL_95);
+                score.inside += usize::from(compared.sigmas.abs() <= HALF_95);
                 score.gross += usize::from(compared.is_gross());
             }
         }

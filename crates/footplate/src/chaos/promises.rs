@@ -2,14 +2,12 @@
 
 use std::ops::AddAssign;
 
+use footplate_core::HALF_95;
 use footplate_core::control::Finished;
 use footplate_core::track::Layout;
 use footplate_core::tracking::PassedSensor;
-use footplate_core::{HALF_95, Length};
+use footplate_eval::traffic::rest_error;
 use footplate_sim::LivingLayout;
-
-/// A larger error is counted from a sensor that the train passed in the opposite direction, and says nothing.
-const FAR: Length = Length::from_mm(1_000.0);
 
 /// Intervals of 95 %, and those of them that held the truth.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -27,11 +25,8 @@ impl Promises {
     /// Judges the place of a stop, which was promised when it was commanded, by where the train really is.
     pub(super) fn judge_stop(&mut self, layout: &Layout, world: &LivingLayout<'_>, finished: &Finished) {
         let Some((promise, achieved)) = finished.promise.zip(finished.achieved) else { return };
-        let sensor = layout.sensor_at(achieved.at.node);
-        let past = sensor.and_then(|sensor| world.truth().past(finished.train, sensor));
-        let Some((past, error)) = past.zip(achieved.error) else { return };
-        let mistaken = past - achieved.at.offset;
-        if mistaken.abs() <= FAR {
+        let mistaken = rest_error(layout, world, finished);
+        if let Some((error, mistaken)) = achieved.error.zip(mistaken) {
             self.judge((promise.low..=promise.high).contains(&(error + mistaken)));
         }
     }

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use crate::control::Notice;
 use crate::control::drive::Refusal;
 use crate::control::supervise::Alarm;
-use crate::ids::{EdgeId, TrainId};
+use crate::ids::TrainId;
 use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::PathPoint;
 use crate::units::Length;
@@ -276,15 +276,10 @@ impl Dispatcher {
         let mut taken = Reservation::empty();
         let Some(located) = driver.locate(train.id, now) else { return taken };
         let PathPoint { node, distance } = located.at;
-        let from = |node, reach: Length| {
-            layout.outgoing(node).edges().map(move |edge| (edge, reach)).collect::<Vec<(EdgeId, Length)>>()
-        };
-        let mut open = from(node, distance + envelope.ahead);
-        open.extend(from(node.reverse(), envelope.behind - distance));
-        while let Some((id, left)) = open.pop() {
-            let Some(edge) = layout.edge(id).filter(|_| left > Length::ZERO) else { continue };
+        let from = |node, reach| layout.outgoing(node).edges().map(move |edge| (edge, reach));
+        let ahead = from(node, distance + envelope.ahead);
+        for (id, left) in layout.edges_within(ahead.chain(from(node.reverse(), envelope.behind - distance))) {
             taken.take(layout, id, Length::ZERO, left);
-            open.extend(from(edge.to, left - edge.length));
         }
         self.reserved(taken)
     }

@@ -3,6 +3,7 @@
 use crate::control::Notice;
 use crate::control::drive::AT_TARGET;
 use crate::control::drive::{Aim, Order, Refusal, StopOrder};
+use crate::estimate::HALF_95;
 use crate::ids::{SpeedStep, TrainId, TurnoutId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Landmark, Position, TurnoutNeed};
@@ -36,9 +37,6 @@ const NEAR_ENOUGH: Length = Length::from_mm(80.0);
 /// A run that ends this far from its destination was planned from a wrong position: the train has not arrived. The most cautious
 /// stop, five standard deviations of 5 cm before its target, is nearer.
 pub(super) const FAR: Length = Length::from_mm(500.0);
-
-/// Half of a 95 % interval, in standard deviations.
-const WITHIN_95: f64 = 1.96;
 
 impl Dispatcher {
     /// Advances every train.
@@ -320,7 +318,7 @@ impl Dispatcher {
     /// it, and is not refused for less.
     pub(super) fn trailed_points_under(&self, now: Timestamp, id: TrainId) -> Option<TurnoutId> {
         let uncertainty = self.watchdog.driver().locate(id, now)?.uncertainty;
-        let margin = uncertainty * WITHIN_95;
+        let margin = uncertainty * HALF_95;
         let lengths = self.trains.get(&id)?.lengths;
         self.trailed_points(now, id, lengths.behind() + margin, lengths.ahead() + margin)
     }

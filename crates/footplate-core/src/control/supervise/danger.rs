@@ -1,6 +1,6 @@
 //! Danger: the trains that are stopped and held, and when the power goes off.
 
-use alloc::collections::{BTreeMap, BTreeSet};
+use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
 
 use crate::control::drive::{Order, OrderId};
@@ -368,36 +368,14 @@ pub(super) fn rails_within(
     ahead: Length,
     behind: Length,
 ) -> BTreeSet<EdgeId> {
-    let mut rails = walk(layout, place, ahead);
-    if let Some(back) = layout.reversed(place) {
-        rails.extend(walk(layout, back, behind));
-    }
-    rails
+    let back = layout.reversed(place).map(|back| (back.edge, behind + back.offset));
+    let within = layout.edges_within([(place.edge, ahead + place.offset)].into_iter().chain(back));
+    within.into_keys().map(rails).collect()
 }
 
 /// The rails of an edge, the same for both directions.
 fn rails(edge: EdgeId) -> EdgeId {
     edge.min(edge.twin())
-}
-
-fn walk(layout: &Layout, from: Position, reach: Length) -> BTreeSet<EdgeId> {
-    let mut found = BTreeSet::new();
-    // The remaining distance at the start of each edge: a longer one may lead further.
-    let mut best: BTreeMap<EdgeId, Length> = BTreeMap::new();
-    let mut open = alloc::vec![(from.edge, reach + from.offset)];
-    while let Some((edge, left)) = open.pop() {
-        if best.get(&edge).is_some_and(|known| *known >= left) {
-            continue;
-        }
-        best.insert(edge, left);
-        found.insert(rails(edge));
-        let Some(known) = layout.edge(edge) else { continue };
-        let rest = left - known.length;
-        if rest > Length::ZERO {
-            open.extend(layout.outgoing(known.to).edges().map(|next| (next, rest)));
-        }
-    }
-    found
 }
 
 #[cfg(test)]
