@@ -118,10 +118,11 @@ impl LiveView {
                     script_runner.handle_word(now, &Input::EmergencyStop);
                     Answer::Taken
                 }
-                Request::Line(line) => match script_runner.machine().mistake(line) {
-                    Some(mistake) => Answer::Refused(mistake),
-                    None => {
-                        script_runner.handle_word(now, &Input::Line(line.clone()));
+                Request::Line(line) => match script_runner.machine().read_line(line) {
+                    Err(mistake) => Answer::Refused(mistake.to_string()),
+                    Ok(step) => {
+                        let line = Input::Line(line.clone());
+                        script_runner.ask(now, &line, |script_runner| script_runner.take(now, step));
                         Answer::Taken
                     }
                 },

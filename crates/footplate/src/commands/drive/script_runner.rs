@@ -28,6 +28,7 @@ use super::learning::Learning;
 use super::reader::Known;
 use super::script::{QueueId, Step, step};
 use super::session_message::SessionMessage;
+use super::words::Mistake;
 use crate::dashboard::{Painter, SchedulePicture, SessionState, TrainTask};
 use crate::recorded::{Input, Listener};
 
@@ -164,15 +165,30 @@ impl ScriptRunner {
 
     /// Takes in a line of the operator.
     fn handle_line(&mut self, now: Timestamp, line: &str) {
-        match step(line, self.known()) {
-            Ok(Some(Step { instruction: Instruction::Halt, .. })) => return self.halt(now),
-            Ok(Some(step)) if self.is_interactive() => self.hear(now, step),
-            Ok(heard) => {
+        match self.read_line(line) {
+            Ok(step) => self.take(now, step),
+            Err(mistake) => {
+                self.say(mistake.to_string());
+                self.advance(now);
+            }
+        }
+    }
+
+    /// Reads a line of the operator; an empty one is no step.
+    pub(super) fn read_line(&self, line: &str) -> Result<Option<Step>, Mistake> {
+        step(line, self.known())
+    }
+
+    /// Takes in what a line of the operator says.
+    pub(super) fn take(&mut self, now: Timestamp, step: Option<Step>) {
+        match step {
+            Some(Step { instruction: Instruction::Halt, .. }) => return self.halt(now),
+            Some(step) if self.is_interactive() => self.hear(now, step),
+            step => {
                 if let Some(session) = self.queues.get_mut(QueueId::SESSION) {
-                    session.steps.extend(heard);
+                    session.steps.extend(step);
                 }
             }
-            Err(mistake) => self.say(mistake.to_string()),
         }
         self.advance(now);
     }
@@ -374,11 +390,6 @@ impl ScriptRunner {
         self.forward_outputs(now);
         self.say("halt: all trains stopped, track power off; enter `power on` to switch it on".to_owned());
         self.advance(now);
-    }
-
-    /// The mistake in a line, if there is one.
-    pub(super) fn mistake(&self, line: &str) -> Option<String> {
-        step(line, self.known()).err().map(|mistake| mistake.to_string())
     }
 
     /// Paints the current state for dashboard and terminal.
