@@ -35,7 +35,7 @@ use crate::link::{Address, NamedTrain};
 use crate::standard_error::say;
 pub(super) use explain::Question;
 pub(crate) use live::CalibrationBeginning;
-pub(super) use live::calibration_line;
+pub(super) use live::{calibration_line, minutes};
 use measured_by_hand::Given;
 pub(super) use picture::draw_calibration;
 

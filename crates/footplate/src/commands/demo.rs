@@ -14,10 +14,12 @@ use std::path::PathBuf;
 use clap::Args;
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{SpeedStep, Timestamp, TrainId};
+use footplate_eval::seeds::Choice;
 use footplate_store::{Journal, MotionFile, Store, TrainAtStart};
 use serde_json::json;
 
 use super::Outcome;
+use super::calibrate::minutes;
 use super::dashboard_routes::{SetUpRoute, open_dashboard};
 use super::written_layout::WrittenLayout;
 use crate::clock::{local, now};
@@ -29,7 +31,6 @@ pub(crate) use driving::TourBeginning;
 use railway::{Railway, SharedRecord};
 use running_demo::Demo;
 use screen::{Manner, Screen};
-use targets::Dice;
 
 /// The trains of the recordings in `testdata`; the seed determines their properties.
 const TRAINS: [TrainId; 2] = [TrainId(24), TrainId(58)];
@@ -109,10 +110,10 @@ impl Arguments {
         let mut demo = Demo::new(railway, screen, speed, record, &TRAINS);
         demo.dashboard_view = dashboard_view;
         self.greet(&mut demo)?;
-        let mut dice = Dice::new(self.seed);
+        let mut choice = Choice::new(self.seed);
         let mut turnouts = TurnoutStates::unknown();
         for train in TRAINS {
-            turnouts = turn(&mut demo, &written, train, &turnouts, &mut dice)?;
+            turnouts = turn(&mut demo, &written, train, &turnouts, &mut choice)?;
         }
         demo.end()?;
         self.conclude(&mut demo)
@@ -164,7 +165,7 @@ impl Arguments {
         demo.screen.mention(&format!(
             "Errors are measured against the simulator's truth, hidden from everything else. {} of \
              track time took {wall:.0} s.",
-            outcome::minutes(demo.now() - Timestamp::ZERO)
+            minutes(demo.now() - Timestamp::ZERO)
         ))?;
         demo.screen.mention(
             "For another railway: footplate demo --seed 2. For all commands: footplate \
@@ -182,7 +183,7 @@ fn turn(
     written: &WrittenLayout,
     train: TrainId,
     turnouts: &TurnoutStates,
-    dice: &mut Dice,
+    choice: &mut Choice,
 ) -> anyhow::Result<TurnoutStates> {
     if train != TRAINS[0] {
         demo.begin_run(train);
@@ -191,7 +192,7 @@ fn turn(
     let known = calibrating::calibrate(demo, written, train, turnouts)?;
     if let Some(known) = &known {
         demo.models.push(MotionFile::of(&written.layout, known.fit.model(), Some(now())));
-        Tour::new(demo, written, train, known)?.run(demo, known, STOPS, dice)?;
+        Tour::new(demo, written, train, known)?.run(demo, known, STOPS, choice)?;
     }
     demo.railway.lift(train);
     demo.set_idle(train, "is done");

@@ -24,6 +24,7 @@ use footplate_wire::Session as _;
 
 pub(crate) use self::beginning::CalibrationBeginning;
 use self::ended::{Why, outcome_of};
+pub(in crate::commands) use self::figures::minutes;
 pub(in crate::commands) use self::printed::line as calibration_line;
 use self::watcher::Watcher;
 use super::picture;

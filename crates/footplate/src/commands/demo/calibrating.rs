@@ -1,17 +1,17 @@
 //! The first half of the demo: calibrates an unknown train.
 
 use footplate_core::control::learn::{
-    CalibrationNotice, CalibratorSettings, Ending, Fault, Phase, Progress, StepAccuracy,
+    CalibrationNotice, CalibratorSettings, Ending, Phase, Progress, StepAccuracy,
 };
 use footplate_core::model::MotionFit;
 use footplate_core::model::StepUse;
-use footplate_core::track::{Layout, TurnoutStates};
+use footplate_core::track::TurnoutStates;
 use footplate_core::tracking::Locator;
 use footplate_core::{Approach, SpeedStep, TimeSpan, TrainId};
 
-use super::outcome::{Learnt, LearntStep, minutes};
+use super::outcome::{Learnt, LearntStep};
 use super::running_demo::Demo;
-use crate::commands::calibrate::CalibrationBeginning;
+use crate::commands::calibrate::{CalibrationBeginning, calibration_line, minutes};
 use crate::commands::written_layout::WrittenLayout;
 use crate::recorded::Recorded;
 
@@ -47,14 +47,11 @@ pub(super) fn calibrate(
     while calibrator.machine().ending().is_none() {
         for notice in demo.advance(&mut calibrator)? {
             let now = demo.now();
+            let line = calibration_line(layout, &notice).unwrap_or_default();
             if let Some(dashboard_view) = &mut demo.dashboard_view {
-                let said = match &notice {
-                    CalibrationNotice::Mishap(fault) => what_happened(layout, fault),
-                    _ => String::new(),
-                };
-                dashboard_view.hear(now, train, &notice, &said);
+                dashboard_view.hear(now, train, &notice, &line);
             }
-            report(demo, layout, train, budget, &notice)?;
+            report(demo, train, budget, &notice, &line)?;
         }
         let now = demo.now();
         if let Some(dashboard_view) = &mut demo.dashboard_view {
@@ -108,31 +105,26 @@ pub(super) fn usable(fit: &MotionFit) -> Vec<SpeedStep> {
 
 fn report(
     demo: &mut Demo<'_, '_, '_>,
-    layout: &Layout,
     train: TrainId,
     budget: TimeSpan,
     notice: &CalibrationNotice,
+    line: &str,
 ) -> std::io::Result<()> {
     match notice {
-        CalibrationNotice::Found { node, step } => {
-            let node = layout.node_name(*node);
-            demo.screen.mention(&format!("  train {train}: found, it runs over {node} at step {step}"))
+        CalibrationNotice::Found { .. } | CalibrationNotice::TurnsAround { .. } => {
+            demo.screen.mention(&format!("  train {train}: {line}"))
         }
         CalibrationNotice::Circuit(circuit) => demo.screen.mention(&format!(
             "  train {train}: uses a circuit of {} sensors and {:.1} m",
             circuit.lap.len(),
             circuit.length.as_m()
         )),
-        CalibrationNotice::TurnsAround { node } => {
-            let node = layout.node_name(*node);
-            demo.screen.mention(&format!("  train {train}: reverses beyond {node}"))
-        }
         CalibrationNotice::Progress(progress) => {
             let detail = detail(progress, budget);
             demo.set_detail(train, &detail, Some(known(&progress.accuracy)));
             Ok(())
         }
-        CalibrationNotice::Mishap(fault) => demo.screen.fault(train, &what_happened(layout, fault)),
+        CalibrationNotice::Mishap(_) => demo.screen.fault(train, line.trim_start_matches("! ")),
         CalibrationNotice::Begins { .. }
         | CalibrationNotice::Done(_)
         | CalibrationNotice::Finished { .. } => Ok(()),
@@ -151,32 +143,4 @@ fn detail(progress: &Progress, budget: TimeSpan) -> String {
         Phase::Ending | Phase::Finished => "comes to rest".to_owned(),
     };
     format!("{about:<32} {bar} {} of {}", minutes(progress.elapsed), minutes(budget))
-}
-
-fn what_happened(layout: &Layout, fault: &Fault) -> String {
-    let sensor = |sensor| layout.sensor_name(sensor);
-    match fault {
-        Fault::Stalled { step } => format!("activity not move reliably at step {step}"),
-        Fault::Missed { count, before } => {
-            format!(
-                "{count} sensor{} before {} did not report",
-                if *count == 1 { "" } else { "s" },
-                sensor(*before)
-            )
-        }
-        Fault::Unexplained { sensor: of } => {
-            format!("{} reported, but it cannot have passed there", sensor(*of))
-        }
-        Fault::WrongLeg { turnout, .. } => {
-            format!("turnout {turnout} was not in the commanded position; commanded again")
-        }
-        Fault::Moved { to, .. } => format!("is at {}, where it cannot have run to", layout.node_name(*to)),
-        Fault::Lost { .. } => "lost its position; it stops and is located again".to_owned(),
-        Fault::OtherSpeeds { ratio } => {
-            format!("runs at {:.0} % of the speeds of before: it may be another engine", 100.0 * ratio)
-        }
-        Fault::LengthsDiffer { hops } => {
-            format!("takes times over {} hops that their lengths do not explain", hops.len())
-        }
-    }
 }

@@ -8,12 +8,13 @@ use footplate_core::model::survey::SectionIndex;
 use footplate_core::track::{Landmark, Layout, Leg};
 use footplate_core::tracking::{DueSensor, Locator, PassedSensor, TrackContext};
 use footplate_core::{Approach, Length, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_eval::seeds::Choice;
 use serde::{Deserialize, Serialize};
 
 use super::calibrating::{Calibrated, usable};
 use super::outcome::{MadeStop, signed};
 use super::running_demo::Demo;
-use super::targets::{Dice, steps_for_stops, target_ahead};
+use super::targets::{steps_for_stops, target_ahead};
 use crate::commands::drive::NoticeFormatter;
 use crate::commands::written_layout::WrittenLayout;
 use crate::dashboard::{Alarm, TrainPassed, TrainTask};
@@ -59,14 +60,14 @@ impl<'l> Tour<'l> {
         demo: &mut Demo<'_, '_, '_>,
         known: &Calibrated,
         stops: usize,
-        dice: &mut Dice,
+        choice: &mut Choice,
     ) -> anyhow::Result<()> {
-        let steps = steps_for_stops(dice, &usable(&known.fit), stops);
+        let steps = steps_for_stops(choice, &usable(&known.fit), stops);
         for step in steps {
             if demo.is_broken() {
                 break;
             }
-            let Some((order, target)) = self.ask(demo.now(), step, dice) else {
+            let Some((order, target)) = self.ask(demo.now(), step, choice) else {
                 demo.screen.fault(self.train, &format!("nowhere to stop from step {step}"))?;
                 continue;
             };
@@ -92,7 +93,7 @@ impl<'l> Tour<'l> {
     }
 
     /// Orders a stop from a step, at a place far enough ahead.
-    fn ask(&mut self, now: Timestamp, step: SpeedStep, dice: &mut Dice) -> Option<(OrderId, Landmark)> {
+    fn ask(&mut self, now: Timestamp, step: SpeedStep, choice: &mut Choice) -> Option<(OrderId, Landmark)> {
         let at = self.driver.machine().locate(self.train, now)?.at;
         let model = self.driver.machine().model(self.train)?;
         // Acceleration takes about as long as braking, and a steady run before the stop makes it more accurate: hence
@@ -104,7 +105,7 @@ impl<'l> Tour<'l> {
                 sections: &self.sections,
                 turnouts: self.driver.machine().turnouts(),
             };
-            let target = target_ahead(dice, context, at.node, least)?;
+            let target = target_ahead(choice, context, at.node, least)?;
             let order = StopOrder { step: Some(step), ..StopOrder::at(self.train, target) };
             match self.order(now, Order::Stop(order)) {
                 Ok(id) => return Some((id, target)),

@@ -3,6 +3,8 @@
 use footplate_core::{Length, SpeedStep, TimeSpan, TrainId};
 use serde_json::{Value, json};
 
+use crate::commands::calibrate::minutes;
+
 /// One stop: target, prediction and truth.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct MadeStop {
@@ -168,12 +170,6 @@ impl Learnt {
     }
 }
 
-/// `4:58`.
-pub(super) fn minutes(time: TimeSpan) -> String {
-    let seconds = time.as_s().max(0.0) as u64;
-    format!("{}:{:02}", seconds / 60, seconds % 60)
-}
-
 /// `+4`, `−12`, with a minus as wide as the plus.
 pub(super) fn signed(length: Length) -> String {
     let mm = length.as_mm().round();
@@ -214,6 +210,5 @@ mod tests {
     #[test]
     fn numbers_are_written_as_people_read_them() {
         assert_eq!([-0.4, 0.4, -1.6, 12.0].map(|mm| signed(Length::from_mm(mm))), ["+0", "+0", "−2", "+12"]);
-        assert_eq!([0.0, 59.9, 298.0].map(|s| minutes(TimeSpan::from_s(s))), ["0:00", "0:59", "4:58"]);
     }
 }

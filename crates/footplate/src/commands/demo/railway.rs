@@ -1,17 +1,17 @@
 //! The simulated railway of the demo, behind the bytes of a 6051, and its control loop.
 
 use std::cell::RefCell;
+use std::collections::BTreeMap;
 use std::rc::Rc;
-use std::time::Duration;
 
 use footplate_core::control::Machine;
 use footplate_core::track::{Layout, Position};
-use footplate_core::{Command, Event, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Command, Event, Timestamp, TrainId};
 use footplate_sim::living::{End, LivingLayout, LivingSwitches, VirtualStation};
 use footplate_wire::marklin_serial::{Interface, Settings};
 use footplate_wire::{CommandError, LinkNotice};
 
-use crate::link::{Heard, Link, Lost, SimulatedLink, Speed, module_count};
+use crate::link::{Link as _, SimulatedLink, Speed, module_count};
 use crate::runtime::{Attendant, Ended, Recorder, Runtime, StopFlag, Wish};
 use crate::session_journal::SessionJournal;
 use crate::standard_error::say;
@@ -38,49 +38,10 @@ impl Recorder for SharedRecord {
     }
 }
 
-/// A link that counts its bytes.
-pub(super) struct CountedLink<'l> {
-    line: SimulatedLink<'l>,
-    bytes: u64,
-}
-
-impl Link for CountedLink<'_> {
-    fn now(&self) -> Timestamp {
-        self.line.now()
-    }
-    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
-        self.bytes += bytes.len() as u64;
-        self.line.write(bytes)
-    }
-    fn wait(&mut self, until: Timestamp) -> Heard {
-        let heard = self.line.wait(until);
-        self.bytes += u64::from(matches!(heard, Heard::Byte(_)));
-        heard
-    }
-    fn cts(&self) -> Option<bool> {
-        self.line.cts()
-    }
-    fn patience(&self) -> TimeSpan {
-        self.line.patience()
-    }
-    fn reopen(&mut self) -> Result<(), Lost> {
-        self.line.reopen()
-    }
-    fn real_time(&self) -> Duration {
-        self.line.real_time()
-    }
-}
-
-/// A train off the rails, and where it was.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct LiftedTrain {
-    train: TrainId,
-    was_at: Option<(Position, End)>,
-}
-
 pub(super) struct Railway<'r, 'l> {
-    runtime: Runtime<'r, CountedLink<'l>>,
-    lifted: Vec<LiftedTrain>,
+    runtime: Runtime<'r, SimulatedLink<'l>>,
+    /// Trains off the rails, and where each was.
+    lifted: BTreeMap<TrainId, Option<(Position, End)>>,
 }
 
 impl<'r, 'l> Railway<'r, 'l> {
@@ -94,10 +55,10 @@ impl<'r, 'l> Railway<'r, 'l> {
     ) -> anyhow::Result<Self> {
         let switches = LivingSwitches { turnouts_set: true, ..LivingSwitches::well_kept() };
         let station = VirtualStation::draw(layout, seed, trains, &switches)?;
-        let line = CountedLink { line: SimulatedLink::new(station, speed), bytes: 0 };
+        let line = SimulatedLink::new(station, speed);
         let session = Interface::new(line.now(), Settings::with_cts(module_count(layout)))?;
         let runtime = Runtime::new(line, session, Some(record), Some(StopFlag::install()));
-        let mut railway = Self { runtime, lifted: Vec::new() };
+        let mut railway = Self { runtime, lifted: BTreeMap::new() };
         trains.iter().for_each(|train| railway.lift(*train));
         Ok(railway)
     }
@@ -106,28 +67,22 @@ impl<'r, 'l> Railway<'r, 'l> {
         self.runtime.link().now()
     }
 
-    /// Bytes in both directions.
-    pub(super) fn bytes(&self) -> u64 {
-        self.runtime.link().bytes
-    }
-
     /// The simulated world, with the truth.
     pub(super) fn world(&self) -> &LivingLayout<'l> {
-        self.runtime.link().line.station().world()
+        self.runtime.link().station().world()
     }
 
     /// Takes a train off the rails.
     pub(super) fn lift(&mut self, train: TrainId) {
         let was_at = self.world().truth().train(train).and_then(|truth| Some((truth.position?, truth.leads)));
-        self.lifted.push(LiftedTrain { train, was_at });
-        self.runtime.link_mut().line.station_mut().world_mut().lift(train);
+        self.lifted.insert(train, was_at);
+        self.runtime.link_mut().station_mut().world_mut().lift(train);
     }
 
     /// Puts a train back to where it was.
     pub(super) fn put_down(&mut self, train: TrainId) -> anyhow::Result<()> {
-        let Some(place) = self.lifted.iter().position(|lifted| lifted.train == train) else { return Ok(()) };
-        if let (_, Some((position, leads))) = (train, self.lifted.remove(place).was_at) {
-            self.runtime.link_mut().line.station_mut().world_mut().place(train, position, leads)?;
+        if let Some((position, leads)) = self.lifted.remove(&train).flatten() {
+            self.runtime.link_mut().station_mut().world_mut().place(train, position, leads)?;
         }
         Ok(())
     }

@@ -5,14 +5,15 @@ use std::time::Duration;
 
 use footplate_core::control::Machine;
 use footplate_core::{SpeedStep, Timestamp, TrainId};
-use footplate_sim::living::IncidentKind;
 use footplate_store::{Journal, MotionFile, TrainAtStart};
 use serde::Serialize;
+use serde_json::json;
 
 use super::outcome::{Learnt, LearntStep, MadeStop};
 use super::railway::{Railway, SharedRecord};
 use super::screen::{Screen, TrainPicture};
 use crate::clock::{Stopwatch, now};
+use crate::commands::calibrate::minutes;
 use crate::dashboard::ReadOnlyDashboard;
 use crate::link::Speed;
 use crate::session_journal::{Scribe, SessionJournal};
@@ -200,31 +201,21 @@ impl<'r, 'l, 'o> Demo<'r, 'l, 'o> {
         for fault in new {
             self.faults_reported += 1;
             self.broken = true;
-            let what = match fault.kind {
-                IncidentKind::Collision { with } => format!("ran into train {with}"),
-                IncidentKind::Derailment { turnout } => format!("derailed on turnout {turnout}"),
-                IncidentKind::Overrun => "ran past the end of its track".to_owned(),
-                IncidentKind::CoilBurnt { turnout } => format!("the coil of turnout {turnout} burnt"),
-            };
-            match fault.train {
-                Some(train) => self.screen.fault(train, &what)?,
-                None => self.screen.mention(&format!("  {what}"))?,
-            }
+            self.screen
+                .record(&json!({ "mishap": fault.to_string(), "train": fault.train.map(|train| train.0) }))?;
+            self.screen.mention(&format!("  {fault}"))?;
         }
         Ok(())
     }
 
     fn draw(&mut self) -> io::Result<()> {
-        let track = self.railway.now().as_s();
         let speed = match self.speed {
             Speed::Unpaced => "as fast as it goes".to_owned(),
             Speed::Times(times) => format!("{times:.0} × real time"),
         };
         let session = format!(
-            "{}:{:02} on the railway's clock, {speed}; {} bytes over the line, {} events",
-            track as u64 / 60,
-            track as u64 % 60,
-            self.railway.bytes(),
+            "{} on the railway's clock, {speed}; {} events",
+            minutes(self.now() - Timestamp::ZERO),
             self.record.0.borrow().events
         );
         self.screen.picture(&session, &self.pictures)

@@ -3,6 +3,7 @@
 use footplate_core::track::Landmark;
 use footplate_core::tracking::TrackContext;
 use footplate_core::{Length, NodeId, SpeedStep};
+use footplate_eval::seeds::Choice;
 
 /// The least distance between a target and the sensors before and after it (chosen: nearer targets would be named after
 /// the other sensor, or equal it).
@@ -10,45 +11,9 @@ const MARGIN: Length = Length::from_m(0.05);
 /// Hops ahead that a target is drawn from: a little more than one lap of track A.
 const LOOK_AHEAD: usize = 16;
 
-/// The random numbers of the demo, independent of the simulator's: SplitMix64 (Steele, Lea and Flood, 2014).
-#[derive(Debug, Clone)]
-pub(super) struct Dice(u64);
-
-impl Dice {
-    pub(super) const fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        mixed ^ (mixed >> 31)
-    }
-
-    /// Uniform in [0, 1).
-    fn share(&mut self) -> f64 {
-        // A double has 53 fraction bits.
-        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// A random element.
-    pub(super) fn pick<'a, T>(&mut self, of: &'a [T]) -> Option<&'a T> {
-        of.get((self.share() * of.len() as f64) as usize)
-    }
-
-    /// Shuffles (Fisher and Yates).
-    pub(super) fn shuffle<T>(&mut self, items: &mut [T]) {
-        for last in (1..items.len()).rev() {
-            items.swap(last, (self.share() * (last + 1) as f64) as usize);
-        }
-    }
-}
-
 /// A random place ahead of a train that left node `from`, at least `least` beyond that node.
 pub(super) fn target_ahead(
-    dice: &mut Dice,
+    choice: &mut Choice,
     context: TrackContext<'_>,
     from: NodeId,
     least: Length,
@@ -62,22 +27,25 @@ pub(super) fn target_ahead(
         distance += hop.length;
     }
     // Only sensors are named as targets: stops can be measured against them.
-    let (node, length) = *dice.pick(&places)?;
+    let (node, length) = *choice.of(&places)?;
     let free = length - MARGIN - MARGIN;
     // Whole millimetres, as an operator would enter it.
-    let offset = Length::from_mm((MARGIN + free * dice.share()).as_mm().round());
+    let offset = Length::from_mm((MARGIN + free * choice.between(0.0, 1.0)).as_mm().round());
     Some(Landmark { node, offset })
 }
 
 /// `count` of the usable steps, spread from low to high, in random order.
-pub(super) fn steps_for_stops(dice: &mut Dice, usable: &[SpeedStep], count: usize) -> Vec<SpeedStep> {
+pub(super) fn steps_for_stops(choice: &mut Choice, usable: &[SpeedStep], count: usize) -> Vec<SpeedStep> {
     let place = |nth: usize| {
         let last = usable.len().saturating_sub(1);
         // The lowest fifth is left out: those steps creep for a minute.
         last / 5 + (last - last / 5) * nth / count.saturating_sub(1).max(1)
     };
     let mut steps: Vec<SpeedStep> = (0..count).filter_map(|nth| usable.get(place(nth)).copied()).collect();
-    dice.shuffle(&mut steps);
+    // Shuffled as Fisher and Yates do.
+    for last in (1..steps.len()).rev() {
+        steps.swap(last, choice.between(0.0, (last + 1) as f64) as usize);
+    }
     steps
 }
 
@@ -98,22 +66,22 @@ mod tests {
         }
         let context = TrackContext { layout: &layout, sections: &sections, turnouts: &turnouts };
         let from = layout.node_named("C13").unwrap();
-        let mut dice = Dice::new(7);
+        let mut choice = Choice::new(7);
         for _ in 0..200 {
-            let target = target_ahead(&mut dice, context, from, Length::from_m(1.0)).unwrap();
+            let target = target_ahead(&mut choice, context, from, Length::from_m(1.0)).unwrap();
             let hop = context.hop_from(target.node).unwrap();
             assert!(layout.sensor_at(target.node).is_some());
             assert!(target.offset >= MARGIN && target.offset < hop.length);
         }
-        assert!(target_ahead(&mut dice, context, from, Length::from_m(900.0)).is_none());
+        assert!(target_ahead(&mut choice, context, from, Length::from_m(900.0)).is_none());
     }
 
     #[test]
     fn steps_are_spread_over_all_that_are_usable() {
         let usable: Vec<SpeedStep> = (3..=14).filter_map(SpeedStep::new).collect();
-        let mut steps = steps_for_stops(&mut Dice::new(1), &usable, 5);
+        let mut steps = steps_for_stops(&mut Choice::new(1), &usable, 5);
         steps.sort();
         assert_eq!(steps.iter().map(|step| step.get()).collect::<Vec<_>>(), [5, 7, 9, 11, 14]);
-        assert!(steps_for_stops(&mut Dice::new(1), &[], 5).is_empty());
+        assert!(steps_for_stops(&mut Choice::new(1), &[], 5).is_empty());
     }
 }

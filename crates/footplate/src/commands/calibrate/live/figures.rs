@@ -99,7 +99,7 @@ const fn approach(approach: Approach) -> &'static str {
 }
 
 /// A span as minutes and seconds.
-pub(super) fn minutes(span: TimeSpan) -> String {
+pub(in crate::commands) fn minutes(span: TimeSpan) -> String {
     let seconds = span.as_s().max(0.0).round() as u64;
     format!("{}:{:02}", seconds / 60, seconds % 60)
 }
