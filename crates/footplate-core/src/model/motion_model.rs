@@ -4,7 +4,7 @@ use alloc::collections::BTreeMap;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::parameters::{Answers, between_knots, knots, prior_means, speed_prior, stride};
+use super::parameters::{Answers, between_knots, knots, prior_means, stride};
 use super::priors::end_of_stop;
 use super::priors::section_variance;
 use super::scatter::{MEDIUM_SPEED, Scatter, WATCHED_FROM};
@@ -433,13 +433,6 @@ impl MotionModel {
     /// By how much a section's path length exceeds the surveyed length (m), with the variance.
     pub(crate) fn section(&self, section: usize) -> Option<(f64, f64)> {
         self.sections.get(&section).copied()
-    }
-
-    /// The speed of an unknown train at a step, one standard deviation above the usual (m/s).
-    #[must_use]
-    pub fn fastest_of_unknown(step: SpeedStep, highest: SpeedStep) -> Speed {
-        let (mean, deviation) = speed_prior(usize::from(step.get()).max(1), usize::from(highest.get()));
-        Speed::from_m_per_s(libm::exp(mean + deviation))
     }
 }
 

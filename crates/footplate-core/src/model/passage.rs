@@ -257,9 +257,4 @@ impl PassageTracker {
     pub const fn timing(&self) -> &PollTimingEstimator {
         &self.timing
     }
-
-    /// The rhythm of the link, to learn it from elsewhere.
-    pub const fn timing_mut(&mut self) -> &mut PollTimingEstimator {
-        &mut self.timing
-    }
 }

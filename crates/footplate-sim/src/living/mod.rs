@@ -2,10 +2,10 @@
 //!
 //! ```text
 //! station  cts             the virtual 6051: bytes in, bytes out, at the pace of its line
-//! board  board_switches    the virtual DCC-EX board: requests in, replies and sensors out, with its delays
+//! board                    the virtual DCC-EX board: requests in, replies and sensors out, with its delays
 //! speed_reports            what decoders report of the speed of their trains
-//! z21  z21_switches        the virtual Z21: datagrams of many clients in and out, over a network with faults
-//! central_station  can_switches  the virtual Central Station: frames of Märklin's CAN bus over datagrams, a stream or an adapter
+//! z21                      the virtual Z21: datagrams of many clients in and out, over a network with faults
+//! central_station          the virtual Central Station: frames of Märklin's CAN bus over datagrams, a stream or an adapter
 //! jmri                     JMRI and the hardware behind it: lines of JSON in and out
 //! loconet                  a command station on LocoNet behind a server: lines in and out, at the pace of its bus
 //! network  delivery        datagrams through a network; the portions of a stream
@@ -19,9 +19,7 @@
 //! ```
 
 mod board;
-mod board_switches;
 mod body;
-mod can_switches;
 mod central_station;
 mod cts;
 mod decoder;
@@ -45,12 +43,9 @@ mod switches;
 mod truth;
 mod world;
 mod z21;
-mod z21_switches;
 
-pub use board::VirtualBoard;
-pub use board_switches::BoardSwitches;
-pub use can_switches::{CanSwitches, CanTransport};
-pub use central_station::VirtualCentralStation;
+pub use board::{BoardSwitches, VirtualBoard};
+pub use central_station::{CanSwitches, CanTransport, VirtualCentralStation};
 pub use cts::CtsSwitch;
 pub use delivery::Delivery;
 pub use hands::HandError;
@@ -63,5 +58,4 @@ pub use station::{CoilAlarm, FromStation, StationSwitches, VirtualStation};
 pub use switches::LivingSwitches;
 pub use truth::{PassTruth, RestTruth, TrainTruth, Truth};
 pub use world::LivingLayout;
-pub use z21::VirtualZ21;
-pub use z21_switches::Z21Switches;
+pub use z21::{VirtualZ21, Z21Switches};

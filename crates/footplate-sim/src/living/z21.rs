@@ -9,7 +9,7 @@ mod obeying;
 use std::collections::VecDeque;
 
 use footplate_core::track::Leg;
-use footplate_core::{DecoderSteps, SensorId, TimeSpan, Timestamp, TrainId};
+use footplate_core::{DecoderSteps, Ratio, SensorId, TimeSpan, Timestamp, TrainId};
 use footplate_wire::z21::{
     Broadcasts, CanDetection, CentralState, Feedback, GROUP_INPUTS, GROUP_MODULES, LocoNetDetection, RailCom,
     Reply, Throttle, TurnoutPosition,
@@ -19,9 +19,8 @@ use crate::draws::{Draws, Purpose};
 use crate::living::due_queue::DueQueue;
 use crate::living::network::{Disturbances, Network};
 use crate::living::s88::Edge;
-use crate::living::speed_reports::Decoders;
+use crate::living::speed_reports::{Decoders, SpeedReports};
 use crate::living::world::LivingLayout;
-use crate::living::z21_switches::Z21Switches;
 
 /// All modules of the feedback bus are asked once in this time (the RS-bus: 130 pulses of 0.2 ms and a pause of 7 ms).
 const BUS_CYCLE: TimeSpan = TimeSpan::from_ms(33);
@@ -45,6 +44,57 @@ const MOST_SUBSCRIBED: usize = 16;
 const BOOT: TimeSpan = TimeSpan::from_ms(4_000);
 /// The interval of RailCom reports.
 const RAIL_COM_EVERY: TimeSpan = TimeSpan::from_ms(500);
+
+/// The properties of the station and its network.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Z21Switches {
+    /// How often a datagram is lost, in either direction.
+    pub lost: Ratio,
+    /// How often one is duplicated.
+    pub duplicated: Ratio,
+    /// How often one is overtaken by those that follow it.
+    pub overtaken: Ratio,
+    /// Whether datagrams take up to 60 ms, as in a busy wireless network.
+    pub is_slow: bool,
+    /// Whether the first request for broadcasts is lost, which left programs without any feedback.
+    pub loses_first_subscription: bool,
+    /// Whether it rejects a wrong XOR byte; most do not check it.
+    pub strict_xor: bool,
+    /// Whether its own XOR bytes are wrong, as those of one server program are.
+    pub wrong_xor: bool,
+    /// Whether the state of a locomotive ends with F28, as with firmware before 1.42.
+    pub short_states: bool,
+    /// Whether it reads only the first dataset of a datagram, as small clones do.
+    pub first_only: bool,
+    /// Whether it is a z21start without its unlock code: it ignores commands to locomotives and turnouts.
+    pub is_locked: bool,
+    /// The bus of its sensors.
+    pub feedback: Feedback,
+    /// Whether its decoders report by RailCom.
+    pub rail_com: bool,
+    /// What they report of their speed.
+    pub speeds: SpeedReports,
+}
+
+impl Default for Z21Switches {
+    fn default() -> Self {
+        Self {
+            lost: Ratio::ZERO,
+            duplicated: Ratio::ZERO,
+            overtaken: Ratio::ZERO,
+            is_slow: false,
+            loses_first_subscription: false,
+            strict_xor: false,
+            wrong_xor: false,
+            short_states: false,
+            first_only: false,
+            is_locked: false,
+            feedback: Feedback::RBus,
+            rail_com: true,
+            speeds: SpeedReports::None,
+        }
+    }
+}
 
 /// A client, by the number that the network knows it by.
 #[derive(Debug, Clone)]

@@ -9,8 +9,7 @@ use core::fmt;
 
 use libm::{log, sqrt};
 
-use super::balise_accuracy::BaliseAccuracy;
-use super::balise_passage::{PairedDistance, Passage, distances};
+use super::balise_passage::{BaliseAccuracy, PairedDistance, Passage, distances};
 use super::scale_filter::ScaleFilter;
 use super::scale_interval::{AgreedBeyond, ScaleInterval};
 use crate::estimate::Estimate;

@@ -5,7 +5,6 @@
 //! [`odometry`](crate::odometry).
 
 mod count_windows;
-mod loss;
 mod period;
 mod range;
 mod reported_direction;
@@ -17,7 +16,6 @@ mod wheel_tracker;
 mod wheelset;
 
 pub use count_windows::CountWindows;
-pub use loss::Loss;
 pub use period::{Count, Direction, Period, WheelReading};
 pub use range::{Range, larger, smaller};
 pub use reported_direction::ReportedDirection;
@@ -25,4 +23,4 @@ pub use tachometer::{Expected, Heading, Quality, Tachometer, Turn, unwrapped};
 pub use thresholds::Thresholds;
 pub use vehicle::{BrakeCommand, SlideProtection, Vehicle, VehicleError};
 pub use wheel_tracker::WheelTracker;
-pub use wheelset::{Axle, Wheelset};
+pub use wheelset::{Axle, Loss, Wheelset};

@@ -30,6 +30,15 @@ impl Axle {
     }
 }
 
+/// What a wheelset was seen to do other than roll.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Loss {
+    /// Traction turns it faster than the train moves.
+    Spin,
+    /// It slides: the brake turns it slower than the train.
+    Slide,
+}
+
 /// A wheelset whose revolutions are counted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wheelset {

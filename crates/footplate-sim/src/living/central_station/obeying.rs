@@ -6,8 +6,7 @@ use footplate_wire::marklin_can::{
 };
 use miniz_oxide::deflate::compress_to_vec_zlib;
 
-use super::{Slot, VirtualCentralStation};
-use crate::living::can_switches::CanTransport;
+use super::{CanTransport, Slot, VirtualCentralStation};
 
 /// The parts of a Central Station: its track processor and its screen.
 const PROCESSOR: Message = Message::Participant { uid: Uid(0x4353_0001), version: (4, 6), kind: 0x0000 };
