@@ -49,23 +49,21 @@ impl Anchor {
     }
 }
 
-/// What one wheel turned in a period, and from which side it bounds the distance.
+/// What one wheel turned in a period, and which bounds of the distance it can set.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Counted {
     /// Signed pulses in the direction of travel.
     pub(super) pulses: f64,
     /// How many of them may be wrong.
     pub(super) uncertainty: f64,
-    /// It may loosen the lower bound but not set it: traction may turn it faster.
-    pub(super) loosens_low: bool,
-    /// The same of the upper bound: the brake may turn it slower.
-    pub(super) loosens_high: bool,
+    /// Traction may turn it faster than the train: it may loosen the lower bound but not set it.
+    pub(super) may_slip: bool,
+    /// The brake may turn it slower: the same of the upper bound.
+    pub(super) may_slide: bool,
     /// Pitch (m).
     pub(super) pitch: Range,
-    /// The train moved at least as far.
-    pub(super) at_least: bool,
-    /// The train moved at most as far.
-    pub(super) at_most: bool,
+    /// Nothing shows that its sensor is wrong.
+    pub(super) sound: bool,
 }
 
 /// Bounds of the distance in the direction of travel, from the first period.
@@ -113,13 +111,13 @@ impl DistanceBounds {
             let off = PULSES_OFF * wheel.pitch.high;
             let uncertainty = wheel.uncertainty * wheel.pitch.high;
             if let Some(bound) =
-                low_anchor.bound(wheel.at_least, wheel.loosens_low, wheel.pulses * short - uncertainty, -off)
+                low_anchor.bound(wheel.sound, wheel.may_slip, wheel.pulses * short - uncertainty, -off)
             {
                 by_low = by_low.also(bound, low_anchor.only_loosens, smaller);
                 own[0] = Some(bound);
             }
             if let Some(bound) =
-                high_anchor.bound(wheel.at_most, wheel.loosens_high, wheel.pulses * long + uncertainty, off)
+                high_anchor.bound(wheel.sound, wheel.may_slide, wheel.pulses * long + uncertainty, off)
             {
                 by_high = by_high.also(bound, high_anchor.only_loosens, larger);
                 own[1] = Some(bound);
@@ -148,8 +146,8 @@ impl DistanceBounds {
         }
         self.distance = Range { low, high };
         for ((wheel, low_anchor), high_anchor) in wheels.iter().zip(&mut self.low).zip(&mut self.high) {
-            low_anchor.anchor(wheel.at_least, wheel.loosens_low, low);
-            high_anchor.anchor(wheel.at_most, wheel.loosens_high, high);
+            low_anchor.anchor(wheel.sound, wheel.may_slip, low);
+            high_anchor.anchor(wheel.sound, wheel.may_slide, high);
         }
         self.distance
     }
@@ -173,11 +171,10 @@ mod tests {
         Counted {
             pulses,
             uncertainty: 0.0,
-            loosens_low: false,
-            loosens_high: false,
+            may_slip: false,
+            may_slide: false,
             pitch: Range::around(0.027, 0.001),
-            at_least: true,
-            at_most: true,
+            sound: true,
         }
     }
 
@@ -207,8 +204,8 @@ mod tests {
 
     #[test]
     fn an_uncertain_wheel_loosens_and_does_not_set() {
-        let uncertain = Counted { loosens_low: true, loosens_high: true, ..counted(37.0) };
-        let alone = after([uncertain, Counted { at_least: false, at_most: false, ..counted(0.0) }], 2000);
+        let uncertain = Counted { may_slip: true, may_slide: true, ..counted(37.0) };
+        let alone = after([uncertain, Counted { sound: false, ..counted(0.0) }], 2000);
         assert!(alone.width() > 190.0, "the speeds alone: {alone:?}");
     }
 
@@ -216,13 +213,35 @@ mod tests {
     fn a_sensor_that_counts_at_rest_does_not_decide_once_the_other_is_not_asked() {
         let mut bounds = DistanceBounds::new(Range::exactly(0.0));
         let (speed, limits) = (Range { low: -0.3, high: 30.0 }, Range { low: -1.0, high: 1.0 });
-        let high = |pulses| Counted { at_most: false, ..counted(pulses) };
+        let high = |pulses| Counted { may_slide: true, ..counted(pulses) };
         for _ in 0..200 {
             bounds.moved(speed, speed, limits, &[high(0.0), high(24.0)], 0.05);
         }
         // Traction begins: the first wheel may slip and no longer bounds from below.
-        let slips = Counted { at_least: false, ..high(0.0) };
+        let slips = Counted { may_slip: true, ..high(0.0) };
         let distance = bounds.moved(speed, speed, limits, &[slips, high(24.0)], 0.05);
         assert!(distance.low < 1.0, "{distance:?}: the train is at rest");
+    }
+
+    #[test]
+    fn a_stuck_sensor_does_not_decide_beside_a_driven_wheel_that_turns_slower() {
+        // World 2909163: the trailing sensor repeats 14 pulses of 27.02 mm in 20 ms for ten seconds, and traction may turn the first
+        // wheel faster than the train. The train runs at 18.52 m/s, so the first wheel counts 13.71 pulses on average.
+        let mut bounds = DistanceBounds::new(Range::exactly(0.0));
+        let (speed, limits) = (Range { low: 18.3, high: 26.8 }, Range { low: -1.4, high: 1.2 });
+        let pitch = Range::around(0.02702, 0.0045);
+        let mut counted_before = 0.0;
+        for period in 1..=500 {
+            let sum = libm::floor(f64::from(period) * 18.52 * 0.02 / 0.02702);
+            let driven = Counted { may_slip: true, pitch, ..counted(sum - counted_before) };
+            counted_before = sum;
+            bounds.moved(speed, speed, limits, &[driven, Counted { pitch, ..counted(14.0) }], 0.02);
+        }
+        let distance = bounds.distance();
+        assert!(distance.low < 185.2 && 185.2 < distance.high, "{distance:?}: the train ran 185.2 m");
+        assert!(
+            distance.low > 184.0,
+            "{distance:?}: the driven wheel bounds it within its tolerance of 0.9 m"
+        );
     }
 }

@@ -124,16 +124,15 @@ impl Odometer {
         let [first, second] = &self.wheels;
         let [first_wrong, second_wrong] = self.bounds.wrong();
         let of = |wheel: &WheelChannel, wrong: bool| {
-            let good = wheel.uncertainty.is_finite() && !wrong && !wheel.stuck;
-            let (slides, slips) = wheel.may_differ(allowed);
+            let sound = wheel.uncertainty.is_finite() && !wrong && !wheel.stuck;
+            let (may_slide, may_slip) = wheel.may_differ(allowed);
             Counted {
                 pulses: wheel.pulses,
-                uncertainty: if good { wheel.uncertainty } else { 0.0 },
-                loosens_low: slips,
-                loosens_high: slides,
+                uncertainty: if sound { wheel.uncertainty } else { 0.0 },
+                may_slip,
+                may_slide,
                 pitch: wheel.pitch_range,
-                at_least: good && !slips,
-                at_most: good && !slides,
+                sound,
             }
         };
         [of(first, first_wrong), of(second, second_wrong)]
