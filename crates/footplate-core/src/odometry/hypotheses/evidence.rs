@@ -41,6 +41,9 @@ const RESTLESS_ACCELERATION: f64 = 0.04;
 const DEAD_COUNTS: f64 = 10.0;
 /// Cost of taking the spin of a wheel beside a dead sensor for the motion of the train (nats per second), and the slide of one.
 const BESIDE_DEAD: [f64; 2] = [1.0, 8.0];
+/// Cost of steady creepage of both without effort (nats per second), and the effort from which it costs none: rails that do not carry a
+/// gentle command are rare, and the wheels alone do not tell it from rolling.
+const GENTLE: (f64, f64) = (2.0, 0.3);
 /// Cost of a locked wheel (nats per second): it may come free. A slower train has none (m/s).
 const LOCKED: f64 = 0.1;
 const NEARLY_STANDING: f64 = 0.15;
@@ -359,7 +362,11 @@ fn beside_dead(one: &Shown, other: &Shown, [first_dead, second_dead]: [&State; 2
 
 /// Both wheels creep alike.
 fn alike(one: &Shown, other: &Shown, train: &State, wheels_a: f64) -> f64 {
-    let ruled_out = larger(one.ruled_out(), other.ruled_out());
+    let Scene { commanded, brake, traction, .. } = one.scene;
+    let (gentle, effort) = GENTLE;
+    let gentle =
+        if commanded.is_some() { gentle * larger(1.0 - (brake + traction) / effort, 0.0) } else { 0.0 };
+    let ruled_out = larger(one.ruled_out(), other.ruled_out()) + gentle;
     if !(one.wheel.read && other.wheel.read) {
         return -ruled_out * one.t;
     }

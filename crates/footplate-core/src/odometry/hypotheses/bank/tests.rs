@@ -1,4 +1,4 @@
-//! Which wheelset is called the first makes no difference.
+//! Which wheelset is called the first makes no difference; trains that are lost are found again.
 
 use super::*;
 use crate::odometry::wheels::Axle;
@@ -70,4 +70,37 @@ fn mirrored(periods: usize, spins: bool) {
             assert_near(found.high, expected.high);
         }
     }
+}
+
+/// The bank after `seconds` with these wheels (m/s) and this command (m/s²).
+fn after(mut bank: Bank, speeds: [f64; 2], commanded: f64, seconds: usize) -> Bank {
+    for _ in 0..20 * seconds {
+        bank.step(&Scene::of_test(speeds, Some(commanded)), 0.05);
+    }
+    bank
+}
+
+#[test]
+fn a_train_that_slid_with_locked_wheels_for_long_may_be_at_rest() {
+    let mut slides = bank(20.0);
+    slides.probability = Lanes([LEAST, LEAST, LEAST, 1.0, LEAST, LEAST, LEAST, LEAST]);
+    // From 20 m/s at 0.5 ± 0.2 m/s², by the normal distribution 6.7 and 20 % are at rest after 25 and 30 s. Both wheels of the
+    // others would have come free at 0.1 a second each, so those at rest count exp(0.2 t) times, t seconds after they came to rest:
+    // integrated numerically, 11 and 40 % after 25 and 30 s.
+    for (seconds, expected) in [(25, 0.109), (30, 0.402)] {
+        let bank = after(slides, [0.0, 0.0], -0.8, seconds);
+        let [_, _, _, slips, ..] = bank.probabilities();
+        assert!((1.0 - slips - expected).abs() < 0.07, "after {seconds} s: {}", 1.0 - slips);
+        assert!((bank.speed - slips * (20.0 - 0.5 * seconds as f64)).abs() < 1.0, "{}", bank.speed);
+    }
+}
+
+#[test]
+fn a_train_does_not_stand_because_a_sensor_died_beside_a_spinning_wheel() {
+    // World 4064714: the first wheel was taken to spin on a train at rest, because the second sensor was silent.
+    let mut stands = bank(0.0);
+    stands.probability = Lanes([LEAST, 1.0, LEAST, LEAST, LEAST, LEAST, LEAST, LEAST]);
+    stands.side = -1.0;
+    let found = after(stands, [15.0, 0.0], 0.4, 10);
+    assert!((found.speed - 15.0).abs() < 0.5, "{} {:?}", found.speed, found.probabilities());
 }

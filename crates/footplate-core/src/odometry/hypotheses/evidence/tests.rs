@@ -148,7 +148,11 @@ fn a_dead_sensor_does_not_count() {
 
 /// What two wheels at these speeds that creep alike cost a train at 20 m/s, in a slide (1) or a spin (−1).
 fn creeping(speeds: [f64; 2], side: f64, wheels_a: f64) -> f64 {
-    let scene = Scene::of_test(speeds, None);
+    creeping_under(None, speeds, side, wheels_a)
+}
+
+fn creeping_under(commanded: Option<f64>, speeds: [f64; 2], side: f64, wheels_a: f64) -> f64 {
+    let scene = Scene::of_test(speeds, commanded);
     let [a, b] = speeds.map(compared);
     let [one, other] = [&a, &b].map(|compared| shown(&scene, compared, side));
     let other = Shown { wheel: &scene.wheels[1], ..other };
@@ -177,6 +181,10 @@ fn wheels_that_creep_alike_keep_within_limits_and_near_each_other() {
     assert_near(creeping([18.0, 17.0], 1.0, 0.1), -0.5 * NEW * apart);
     // They accelerate with the train within 0.1 m/s² for a second: three deviations cost half of 9 − 1 a second.
     assert_near(creeping([18.0, 18.0], 1.0, 0.4), -T * 0.5 * 8.0);
+    // No effort costs two nats a second, three tenths of the full brake none.
+    for (commanded, cost) in [(0.0, 2.0), (-0.06, 1.6), (-0.3, 0.0), (-0.9, 0.0)] {
+        assert_near(creeping_under(Some(commanded), [18.0, 18.0], 1.0, 0.1), -T * cost);
+    }
     // Wheels that do not turn do not creep.
     let silent = creeping([0.0, 0.0], 1.0, 0.1);
     assert_near(silent, -0.5 * NEW * 15.0 * 15.0 / 0.1 - T * 15.0);
