@@ -37,8 +37,8 @@ impl LongestCircuit {
         from: PathPoint,
         far_mm: f64,
     ) -> Option<(Landmark, f64)> {
-        let mut at = self.nodes.iter().position(|node| *node == from.node)?;
-        let mut distance = -from.distance.as_mm();
+        let (mut at, past) = self.from_sensor(layout, from)?;
+        let mut distance = -past;
         loop {
             let node = *self.nodes.get(at)?;
             let length = layout.open_hops_from(node, turnouts).next()?.length.as_mm();
@@ -49,6 +49,24 @@ impl LongestCircuit {
             distance += length;
             at = (at + 1) % self.nodes.len();
         }
+    }
+
+    /// The sensor behind a position on it, and the distance (mm) from there: the position of a train at rest may be measured from a
+    /// turnout.
+    fn from_sensor(&self, layout: &Layout, from: PathPoint) -> Option<(usize, f64)> {
+        let mut behind = None;
+        for edge in &self.edges {
+            let known = layout.edge(*edge)?;
+            if let Some(at) = self.nodes.iter().position(|node| *node == known.from) {
+                behind = Some((at, 0.0));
+            }
+            let (at, past) = behind?;
+            if known.from == from.node {
+                return Some((at, past + from.distance.as_mm()));
+            }
+            behind = Some((at, past + known.length.as_mm()));
+        }
+        None
     }
 
     /// Finds the circuit with the most sensors; empty if there is none.
@@ -82,5 +100,31 @@ impl LongestCircuit {
             })
             .collect();
         Self { nodes, edges, beside }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use footplate_store::layout_named;
+
+    #[test]
+    fn a_place_ahead_of_a_train_is_the_same_if_its_position_is_measured_from_a_turnout() {
+        let layout = layout_named("track-a").expect("built in").layout;
+        let turnouts: TurnoutStates =
+            layout.turnouts().map(|(turnout, _)| (turnout, Leg::Straight)).collect();
+        let circuit = LongestCircuit::of(&layout);
+        let begins = |edge: &EdgeId| layout.edge(*edge).expect("an edge of the circuit").from;
+        let is_turnout = |edge: &&EdgeId| !circuit.nodes.contains(&begins(edge));
+        let turnout = circuit.edges.iter().position(|edge| is_turnout(&edge)).expect("a turnout");
+        let sensor = turnout - 1;
+        let before = layout.edge(circuit.edges[sensor]).expect("an edge of the circuit").length;
+        let at = |edge: usize, distance| PathPoint { node: begins(&circuit.edges[edge]), distance };
+        let ahead = |from| circuit.ahead(&layout, &turnouts, from, 2_000.0).expect("on the circuit");
+        let (past_turnout, far) = ahead(at(turnout, Length::from_mm(40.0)));
+        let (past_sensor, as_far) = ahead(at(sensor, before + Length::from_mm(40.0)));
+        assert_eq!(past_turnout.node, past_sensor.node);
+        assert!((past_turnout.offset - past_sensor.offset).abs() < Length::from_mm(0.01));
+        assert!((far - 2_000.0).abs() < 0.01 && (as_far - 2_000.0).abs() < 0.01, "{far} {as_far}");
     }
 }
