@@ -4,7 +4,7 @@
 use footplate_core::control::{Driver, Gap, Notice, Order, Refusal};
 use footplate_core::track::{Layout, LayoutPlan, Leg, Place, RailEnd, Stretch, Survey};
 use footplate_core::tracking::PathPoint;
-use footplate_core::{Length, SensorId, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{Command, Length, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 
 use crate::toy_railway::{ToyRailway, add_train, driver_of, step, straight};
@@ -247,5 +247,31 @@ fn a_follower_waits_at_the_end_of_its_authority_and_goes_on_when_it_is_extended(
     driver.set_end_of_authority(world.now, FOLLOWER, None);
     world.run(&mut driver, 3.0);
     assert!(follower(&world).travelled_mm > at + 200.0, "{} mm after {at} mm", follower(&world).travelled_mm);
+    assert_eq!(driver.leader(FOLLOWER), Some(LEADER));
+}
+
+#[test]
+fn behind_a_leader_that_stops_a_follower_is_commanded_one_stop_and_no_slower_step_before() {
+    // Given a follower that keeps its gap,
+    let (mut world, mut driver) = two_trains();
+    run_leader(&world, &mut driver, 10);
+    world.run(&mut driver, 2.0);
+    driver.order(world.now, follow(seconds(3.0))).expect("a safe gap");
+    world.run(&mut driver, 40.0);
+    // when its leader is commanded to stop,
+    let (since, speed) = (world.now, driver.commanded(FOLLOWER));
+    run_leader(&world, &mut driver, 0);
+    world.run(&mut driver, 15.0);
+    // then it is commanded nothing but a stop, rests behind its leader, and keeps its order.
+    let commanded: Vec<SpeedStep> = world
+        .commands
+        .iter()
+        .filter_map(|(at, command)| match command {
+            Command::Speed { train: FOLLOWER, step } if *at > since && *step != speed => Some(*step),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(commanded, [SpeedStep::STAND]);
+    assert!((50.0..900.0).contains(&between(&world)), "{} mm", between(&world));
     assert_eq!(driver.leader(FOLLOWER), Some(LEADER));
 }

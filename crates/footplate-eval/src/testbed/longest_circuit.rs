@@ -37,7 +37,7 @@ impl LongestCircuit {
         from: PathPoint,
         far_mm: f64,
     ) -> Option<(Landmark, f64)> {
-        let (mut at, past) = self.from_sensor(layout, from)?;
+        let (mut at, past) = self.past_sensor(layout, from)?;
         let mut distance = -past;
         loop {
             let node = *self.nodes.get(at)?;
@@ -53,7 +53,7 @@ impl LongestCircuit {
 
     /// The sensor behind a position on it, and the distance (mm) from there: the position of a train at rest may be measured from a
     /// turnout.
-    fn from_sensor(&self, layout: &Layout, from: PathPoint) -> Option<(usize, f64)> {
+    fn past_sensor(&self, layout: &Layout, from: PathPoint) -> Option<(usize, f64)> {
         let mut behind = None;
         for edge in &self.edges {
             let known = layout.edge(*edge)?;

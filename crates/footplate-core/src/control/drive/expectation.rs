@@ -1,11 +1,13 @@
 //! The next detection of a running train and the end of its authority, and what follows if the detection does not come.
 
+use crate::event::Approach;
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::tracking::{Located, PathPoint, TrackContext};
 use crate::units::{Length, Ratio, Speed};
 
 use super::command_time::{CommandTime, command_time};
+use super::detections::STALL_FREE_SPEED;
 use super::driven_train::DrivenTrain;
 use super::driver::Driver;
 use super::order::Aim;
@@ -80,6 +82,14 @@ impl DrivenTrain {
     /// The share of detections that sensors missed of it since its last one.
     pub(super) fn missed_share(&self, context: TrackContext<'_>, now: Timestamp) -> f64 {
         self.detections.missed_share(self.missed_at(context, now))
+    }
+
+    /// Whether it may have stalled on dirt since its last detection: it has set out since, or is slow, or is to be.
+    fn may_stall(&self, context: TrackContext<'_>, now: Timestamp) -> bool {
+        let commanded = self.model.steady_speed(self.commanded, Approach::Below);
+        self.passages.may_not_have_started()
+            || self.speed(context, now) < STALL_FREE_SPEED
+            || commanded < STALL_FREE_SPEED
     }
 
     /// Whether at most one detection was missed and the next is not late.
@@ -180,7 +190,9 @@ impl DrivenTrain {
                 self.expected.lost_by.get_or_insert(now + LOST.max(travel + travel));
                 self.expected.missed_sensor.get_or_insert(due.sensor);
                 self.expected.missed_in_a_row = self.expected.missed_in_a_row.saturating_add(1);
-                if self.expected.missed_in_a_row >= self.detections.lost_after(self.missed_at(context, now)) {
+                let missed_at = self.missed_at(context, now);
+                let may_stall = self.may_stall(context, now);
+                if self.expected.missed_in_a_row >= self.detections.lost_after(missed_at, may_stall) {
                     return self.lose(now, out);
                 }
                 let next = self.locator.next_sensor(context, &self.model, now);

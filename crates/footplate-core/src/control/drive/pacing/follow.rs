@@ -11,6 +11,7 @@
 use alloc::collections::BTreeMap;
 
 use crate::control::Notice;
+use crate::control::drive::detections::STALL_FREE_SPEED;
 use crate::control::drive::driven_train::DrivenTrain;
 use crate::control::drive::driver::Driver;
 use crate::control::drive::order::{Aim, Gap, OrderId};
@@ -50,9 +51,8 @@ const RECHECK_INTERVAL: f64 = 0.4;
 const WORTH_STARTING: Length = Length::from_mm(150.0);
 /// A follower that will no longer be able to stop after this time slows down: a longer time would slow down trains in no danger.
 const LOOKAHEAD: TimeSpan = TimeSpan::from_ms(500);
-/// Below the first speed a train may stall; above the second it does not.
+/// Below this speed a train may stall at any time.
 const CREEP_SPEED: Speed = Speed::from_mm_per_s(60.0);
-const STALL_FREE_SPEED: Speed = Speed::from_mm_per_s(150.0);
 /// A train has run without a stop since its last detection if the time exceeds distance over speed by at most this
 /// factor.
 const MAX_TIME_RATIO: f64 = 1.5;
@@ -354,6 +354,7 @@ impl DrivenTrain {
         });
         let commanded = self.commanded;
         let has_shown = self.locator.has_change_shown(&self.model, now);
+        let stops_ahead = commanded > SpeedStep::STAND && self.has_stopping_ahead(others);
         let Some(Pacing { pace: Pace::Follow(following), next_update, .. }) = &mut self.pacing else {
             return true;
         };
@@ -362,6 +363,9 @@ impl DrivenTrain {
         (following.rear, following.fastest) = (rear, fastest);
         if is_free {
             following.is_stopped = false;
+            if stops_ahead {
+                return false;
+            }
             let slower = fastest.filter(|step| *step < commanded);
             if let Some(step) = slower.filter(|_| has_shown) {
                 self.command_step(context, now, step, out);
@@ -370,6 +374,15 @@ impl DrivenTrain {
         }
         self.hold_back(now, out);
         false
+    }
+
+    /// Whether a train ahead, up to the first of the chain, was commanded to stop. Its follower will have to stop as well: one stop
+    /// from a steady speed ends where it is expected to, one after several slower steps does not.
+    fn has_stopping_ahead(&self, others: &Others) -> bool {
+        let ahead = |train: &Self| others.get(&train.followed()?.leader);
+        core::iter::successors(ahead(self), |train| ahead(train))
+            .take(MAX_CHAIN)
+            .any(|train| train.commanded == SpeedStep::STAND)
     }
 
     /// Stops a follower until the track ahead is free again. Returns whether the train follows another.

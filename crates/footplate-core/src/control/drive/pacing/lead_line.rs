@@ -155,7 +155,7 @@ impl Passages {
     }
 
     /// Whether it may still stand where it was commanded to set out: no sensor has reported it since.
-    pub(super) const fn may_not_have_started(&self) -> bool {
+    pub(in crate::control::drive) const fn may_not_have_started(&self) -> bool {
         self.has_set_out
     }
 
