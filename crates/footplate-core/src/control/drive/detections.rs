@@ -26,7 +26,7 @@ pub(super) const STALL_FREE_SPEED: Speed = Speed::from_mm_per_s(150.0);
 /// One missed detection alone never means that a train is lost, ...
 const LEAST_MISSED: u8 = 2;
 /// ... and of a train too fast to stall on dirt, two do not: it is still running, and the next sensor is no farther than a stop would
-/// take (chosen: of the rows of trains that two silent sensors in a row stopped, in simulations, all were where they were estimated).
+/// take (chosen: the train of the row that was looked at was where it was estimated).
 const LEAST_MISSED_FAST: u8 = 3;
 
 /// The detections of a train in this session.
