@@ -210,7 +210,7 @@ each_table() {
   "$1" pacing-unseen simulate pacing --seeds 101..112 --markdown
   "$1" traffic simulate traffic --seeds 541..550 --hours 1 --baseline --markdown
   "$1" odometry simulate line --score --seeds 1..10 --teeth 80,100,200 --markdown
-  "$1" odometry-worlds simulate line --score --worlds fresh:200@7603b813c35dacc099cd4d1703fccaabd1099102 --markdown
+  "$1" odometry-worlds simulate line --score --worlds fresh:200@d011264320e377956cf9c4d297b78a69cf795a0c --markdown
   # Recordings that may not be copied: the table is made where they are.
   if [[ -n ${FOOTPLATE_DATA:-} ]]; then
     "$1" standstill odometry --imu "$FOOTPLATE_DATA"/paris-metro-accel/*_accel.csv --score --markdown
