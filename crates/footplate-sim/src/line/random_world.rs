@@ -21,7 +21,7 @@ use super::resistance::GRAVITY;
 use super::run::{LineConditions, run};
 use super::setup::{Lay, Setup};
 use super::slide_protection::ProtectionStyle;
-use super::true_claims::claim;
+use super::true_claims::{claim, releases_as_claimed};
 use super::vehicle::LOOSE_BRAKE_TOLERANCE;
 use crate::draws::{Draws, Purpose};
 
@@ -218,8 +218,8 @@ impl LineWorld {
     }
 
     /// Whether the claims of every level are true in a run of it. They are not where rows are read late, where one burst of
-    /// interference meets both sensors, where wheels slip on a train that rolls back against its traction, and where a train
-    /// rolls back whose sensors report no direction.
+    /// interference meets both sensors, where wheels slip on a train that rolls back against its traction, where a train rolls
+    /// back whose sensors report no direction, and where wheels slip longer after a command than the claimed release.
     #[must_use]
     pub fn claims_hold(&self, run: &LineRun) -> bool {
         let signed = run
@@ -231,7 +231,9 @@ impl LineWorld {
             truth.speed.as_m_per_s() < 0.0
                 && (!signed || truth.wheels.iter().any(|does| *does != WheelTruth::Rolling))
         };
-        !matches!(self.setup.fault, Fault::Clock | Fault::Bursts) && !run.truth.iter().any(rolls_back)
+        !matches!(self.setup.fault, Fault::Clock | Fault::Bursts)
+            && !run.truth.iter().any(rolls_back)
+            && releases_as_claimed(run)
     }
 
     /// Runs it, with the vehicle as an operator of a level knows it. The same seed gives the same bytes on every machine.

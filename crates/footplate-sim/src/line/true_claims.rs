@@ -90,8 +90,19 @@ fn fades(times: &BrakeTimes) -> TimeSpan {
     TimeSpan::from_s((times.dead[1] + COMMAND_FADES_S + 4.0 * times.empty).ceil())
 }
 
-/// How long after the end of a command a wheel turned otherwise than the train, at most, with a margin.
+/// What an operator claims of the release: what the run shows with a margin.
 fn release(run: &LineRun) -> TimeSpan {
+    TimeSpan::from_s((shown_release_s(run) * MARGIN + MARGIN_S).ceil().min(LONGEST_RELEASE_S))
+}
+
+/// Whether all wheels turned with the train once the claimed release was over. Converters take wheels away under a command of less than
+/// 2 %, and no operator claims as long a release as that would take.
+pub(crate) fn releases_as_claimed(run: &LineRun) -> bool {
+    run.vehicle.brake_command.release.is_none_or(|claimed| shown_release_s(run) <= claimed.as_s())
+}
+
+/// How long after the end of a command a wheel turned otherwise than the train, at most (s).
+fn shown_release_s(run: &LineRun) -> f64 {
     let (mut since, mut longest) = ([f64::INFINITY; 2], 0.0_f64);
     let mut before = 0.0;
     for (sample, truth) in run.samples.iter().zip(&run.truth) {
@@ -118,7 +129,7 @@ fn release(run: &LineRun) -> TimeSpan {
             longest = of.filter(|of| of.is_finite()).map_or(longest, |of| longest.max(of));
         }
     }
-    TimeSpan::from_s((longest * MARGIN + MARGIN_S).ceil().min(LONGEST_RELEASE_S))
+    longest
 }
 
 /// By how much more than claimed the train decelerated at most within a second, with a margin: a converter that takes its

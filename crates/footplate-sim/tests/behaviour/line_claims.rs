@@ -1,6 +1,6 @@
 //! What a vehicle file says of a simulated train is true of it: an odometer may build on that.
 
-use footplate_sim::line::{LineConditions, LineRun, LineScenario, WheelTruth};
+use footplate_sim::line::{LineConditions, LineLevel, LineRun, LineScenario, LineWorld, WheelTruth};
 
 const SEEDS: u64 = 4;
 
@@ -141,4 +141,12 @@ fn wheels_roll_where_nothing_else_is_said() {
             assert!(!rolls, "{name} {seed}");
         }
     });
+}
+
+#[test]
+fn a_release_longer_than_any_operator_claims_does_not_hold() {
+    // World 4155708: a converter takes wheels away under a command of less than 2 %, more than 120 s after the last brake.
+    let world = LineWorld::draw(4_155_708);
+    let holds = LineLevel::ALL.map(|level| world.claims_hold(&world.run(level)));
+    assert_eq!(holds, [true, false, false], "without a command, brakes may always act");
 }
