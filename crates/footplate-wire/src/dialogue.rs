@@ -95,11 +95,11 @@ impl<A: Awaited> Dialogue<A> {
     }
 
     /// Resets what was on the line after it was opened again.
-    pub(crate) fn reopened(&mut self) {
+    pub(crate) fn reopened(&mut self, directed: bool) {
         self.silence = Silence::new(self.checks);
         self.outstanding.clear();
         if self.farewell.has_begun() {
-            self.stop_driven();
+            self.stop_driven(directed);
         }
     }
 
@@ -459,16 +459,16 @@ impl<A: Awaited> Dialogue<A> {
             self.waiting.clear();
             self.outstanding.clear();
             self.locomotives.withdraw_reversals();
-            self.stop_driven();
-            let is_blocked = |train: TrainId| directed && !self.locomotives.has_direction(train);
-            self.stops_all |= self.locomotives.driven(false).into_iter().any(is_blocked);
+            self.stop_driven(directed);
         }
         begins
     }
 
     /// Stops every train that was driven.
-    fn stop_driven(&mut self) {
+    fn stop_driven(&mut self, directed: bool) {
         self.locomotives.stop_driven(&mut self.waiting);
+        let is_blocked = |train: TrainId| directed && !self.locomotives.has_direction(train);
+        self.stops_all |= self.locomotives.driven(false).into_iter().any(is_blocked);
         self.farewell.begin_again(self.now);
     }
 

@@ -238,7 +238,7 @@ impl<P: Protocol> Session for P {
         let dialogue = self.dialogue_mut();
         dialogue.blind_since.get_or_insert(dialogue.heard);
         self.begin_again(now);
-        self.dialogue_mut().reopened();
+        self.dialogue_mut().reopened(Self::STOPS_SET_DIRECTIONS);
         self.go_on(now);
     }
 

@@ -255,7 +255,7 @@ impl Station {
                         phone.handle_refusal(self.now(), &refusal.why);
                     }
                 }
-                () = leaves.notified() => break,
+                () = leaves.notified(), if place.is_none() => break,
                 () = silence => phone.handle_timeout(self.now()),
             }
         }

@@ -16,6 +16,7 @@ const TAILS = [
   [/, (\d+) missed before/, ", $1 davor ausgelassen"], [/; next (\S+) at/, "; als Nächstes $1 um"], [/, ([+−-]?[\d.]+) mm from the target/, ", $1 mm neben dem Ziel"],
   [/\(predicted (\S+) mm to (\S+) mm\)/, "(vorhergesagt $1 mm bis $2 mm)"], [/; starts at step (\S+) at (\S+ s)/, "; fährt um $2 mit Stufe $1 an"],
   [/, with minimum jerk/, ", mit kleinstem Ruck"], [/, through a steady speed/, ", über ein gleichmäßiges Tempo"], [/ from (\S+) to (\S+) mm\/s, and stops from step (\S+)/, " von $1 auf $2 mm/s, und hält aus Stufe $3"],
+  [/; (\S+) should have reported it and did not/, "; $1 hätte ihn melden müssen und hat nicht"],
   [/, reversing once/, ", einmal wenden"], [/, reversing (\d+) times/, ", $1-mal wenden"], [/, ([\d.]+) s after (\S+?);/, ", $1 s nach $2;"], [/; rests at (\S+) mm to (\S+) mm/, "; hält bei $1 mm bis $2 mm"],
 ];
 

@@ -5,7 +5,6 @@
 //! a line that was reopened and stays silent. So every station that has a session has a last will.
 
 use std::collections::BTreeSet;
-use std::time::Duration;
 
 use footplate_core::{Command, Event, EventKind, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_wire::{Session, Transmit};
@@ -21,19 +20,6 @@ const MOST_PARTS: usize = 2_000;
 
 /// A power command leaves within this time, other commands before it included; until then a last will begins without power, which is safe.
 const POWER_LEAVES_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
-
-/// A last will repeats every stop within this time (the slowest, of JMRI, every 500 ms): a station that is heard so long before the end
-/// of it has received them all.
-const ROUND: Duration = Duration::from_secs(1);
-
-/// Between two attempts to open a line again.
-const REOPEN_EVERY: Duration = Duration::from_millis(250);
-/// How long a byte waits for the handshake. After that it is sent all the same.
-const HAND_SHAKE_WITHIN: Duration = Duration::from_millis(100);
-/// How often the handshake line is read meanwhile.
-const HAND_SHAKE_EVERY: Duration = Duration::from_micros(500);
-/// How long the handshake line may take to go down after a byte; before that, "up" means nothing.
-const HAND_SHAKE_FALLS: Duration = Duration::from_millis(10);
 
 /// Keeps the guardian's last will up to date.
 #[derive(Debug, Default)]
@@ -123,111 +109,6 @@ pub(crate) fn written(will: &[Bequest], speed: f64) -> Vec<u8> {
     bytes
 }
 
-/// A line over which a last will is sent.
-pub(crate) trait WillLine {
-    fn is_open(&self) -> bool;
-
-    /// Opens it, anew if it is open.
-    fn open(&mut self) -> Result<(), Lost>;
-
-    /// Closes it, because it is gone.
-    fn close(&mut self);
-
-    /// Puts bytes on the line now.
-    fn write(&mut self, bytes: &[u8]) -> Result<(), Lost>;
-
-    /// The station's hand-shake line; `None` where there is none that could be read.
-    fn cts(&self) -> Option<bool>;
-
-    fn pause(&mut self, span: Duration);
-
-    /// Whether the station has answered anything since [`expect_answer`](Self::expect_answer); `true` for one that does not answer
-    /// commands.
-    fn has_answered(&self) -> bool;
-
-    fn expect_answer(&mut self);
-
-    /// Whether a person does not want to wait any longer.
-    fn gives_up(&self) -> bool;
-
-    fn say(&self, words: &str);
-}
-
-/// Sends a last will. Starts again each time the line has to be reopened, until all of it is sent or a person gives up; it is tried at
-/// least once. Returns whether it was sent.
-pub(crate) fn carry_out(line: &mut impl WillLine, will: &[u8]) -> bool {
-    let mut was_gone = false;
-    loop {
-        let said = if line.is_open() { Ok(()) } else { line.open() };
-        if said.is_ok() && std::mem::take(&mut was_gone) {
-            line.say("the line is open again");
-        }
-        let Err(lost) = said.and_then(|()| try_to_carry_out(line, will)) else { return true };
-        if !was_gone {
-            line.say(&format!("{lost}; trying for ever (Ctrl-C gives up, and leaves trains running)"));
-        }
-        was_gone = true;
-        line.close();
-        line.pause(REOPEN_EVERY);
-        if line.gives_up() {
-            return false;
-        }
-    }
-}
-
-fn try_to_carry_out(line: &mut impl WillLine, will: &[u8]) -> Result<(), Lost> {
-    line.expect_answer();
-    let whole: Duration = Parts(will).map(|(pause, _)| pause).sum();
-    let (mut elapsed, mut hears) = (Duration::ZERO, None);
-    for (pause, bytes) in Parts(will) {
-        line.pause(pause);
-        elapsed += pause;
-        if elapsed + ROUND > whole && whole > ROUND {
-            hears.get_or_insert_with(|| line.has_answered());
-        }
-        await_hand_shake(line);
-        line.write(bytes)?;
-    }
-    // A line that went during the last bytes did not carry them.
-    line.pause(REOPEN_EVERY);
-    if !line.is_open() {
-        return Err(Lost("the line is gone".to_owned()));
-    }
-    // Datagrams vanish without notice, and so do bytes on a connection whose other end is gone. What a station says of itself after the
-    // last of them shows only that the line is back.
-    let hears = hears.unwrap_or_else(|| line.has_answered());
-    if hears { Ok(()) } else { Err(Lost("the station does not answer".to_owned())) }
-}
-
-/// The parts of a last will that was [`written`]: the pause before each, and its bytes.
-struct Parts<'w>(&'w [u8]);
-
-impl<'w> Iterator for Parts<'w> {
-    type Item = (Duration, &'w [u8]);
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let [a, b, c, d, low, high, more @ ..] = self.0 else { return None };
-        let pause = u32::from_le_bytes([*a, *b, *c, *d]);
-        let length = usize::from(u16::from_le_bytes([*low, *high]));
-        let (bytes, rest) = more.split_at_checked(length).unwrap_or((more, &[]));
-        self.0 = rest;
-        Some((Duration::from_micros(pause.into()), bytes))
-    }
-}
-
-/// Waits until the station takes the next byte, where its hand-shake line can be read.
-fn await_hand_shake(line: &mut impl WillLine) {
-    let mut waited = Duration::ZERO;
-    while line.cts() == Some(true) && waited < HAND_SHAKE_FALLS {
-        line.pause(HAND_SHAKE_EVERY);
-        waited += HAND_SHAKE_EVERY;
-    }
-    while line.cts() == Some(false) && waited < HAND_SHAKE_WITHIN {
-        line.pause(HAND_SHAKE_EVERY);
-        waited += HAND_SHAKE_EVERY;
-    }
-}
-
 /// What a session sends at its end on a line that was reopened and is silent.
 fn farewell_of(session: &StationSession, began: Timestamp, has_cts: bool) -> Vec<Bequest> {
     let mut copy = session.clone();
@@ -301,107 +182,6 @@ mod tests {
             session.handle_timeout(at);
         }
         session
-    }
-
-    /// A line that is open from its nth attempt on, and a person who does not wait.
-    struct Impatient {
-        opens_after: usize,
-        attempts: usize,
-        written: Vec<u8>,
-    }
-
-    impl WillLine for Impatient {
-        fn is_open(&self) -> bool {
-            self.attempts > self.opens_after
-        }
-        fn open(&mut self) -> Result<(), Lost> {
-            self.attempts += 1;
-            if self.is_open() { Ok(()) } else { Err(Lost("it is gone".to_owned())) }
-        }
-        fn close(&mut self) {}
-        fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
-            self.written.extend(bytes);
-            Ok(())
-        }
-        fn cts(&self) -> Option<bool> {
-            None
-        }
-        fn pause(&mut self, _: Duration) {}
-        fn has_answered(&self) -> bool {
-            true
-        }
-        fn expect_answer(&mut self) {}
-        fn gives_up(&self) -> bool {
-            true
-        }
-        fn say(&self, _: &str) {}
-    }
-
-    #[test]
-    fn a_will_is_tried_once_even_if_a_person_gives_up() {
-        let will = written(&[Bequest { after: TimeSpan::ZERO, bytes: b"stop".to_vec() }], 1.0);
-        for (opens_after, sent) in [(0, true), (1, false)] {
-            let mut line = Impatient { opens_after, attempts: 0, written: Vec::new() };
-            assert_eq!(carry_out(&mut line, &will), sent);
-            assert_eq!((line.attempts, line.written == b"stop"), (1, sent));
-        }
-    }
-
-    /// A line whose station is reached from a time on, and then says something of itself.
-    struct CutOff {
-        back: Duration,
-        now: Duration,
-        heard: bool,
-        arrived: Vec<Duration>,
-    }
-
-    impl WillLine for CutOff {
-        fn is_open(&self) -> bool {
-            true
-        }
-        fn open(&mut self) -> Result<(), Lost> {
-            Ok(())
-        }
-        fn close(&mut self) {}
-        fn write(&mut self, _: &[u8]) -> Result<(), Lost> {
-            if self.now >= self.back {
-                self.arrived.push(self.now);
-            }
-            Ok(())
-        }
-        fn cts(&self) -> Option<bool> {
-            None
-        }
-        fn pause(&mut self, span: Duration) {
-            self.now += span;
-            self.heard |= self.now > self.back;
-        }
-        fn has_answered(&self) -> bool {
-            self.heard
-        }
-        fn expect_answer(&mut self) {
-            self.heard = false;
-        }
-        fn gives_up(&self) -> bool {
-            false
-        }
-        fn say(&self, _: &str) {}
-    }
-
-    #[test]
-    fn a_station_that_is_heard_only_after_the_last_stop_is_stopped_again() {
-        // A stop every 100 ms for 5 s, as a session writes it on a line without answers.
-        let stop = |nth: i64| Bequest { after: TimeSpan::from_ms(100 * nth.min(1)), bytes: b"stop".to_vec() };
-        let will = written(&(0..=50).map(stop).collect::<Vec<_>>(), 1.0);
-        for (back_ms, ends_ms) in [(0, 5_250), (3_900, 5_250), (4_100, 10_750), (5_100, 10_750)] {
-            let back = Duration::from_millis(back_ms);
-            let mut line = CutOff { back, now: Duration::ZERO, heard: false, arrived: Vec::new() };
-            assert!(carry_out(&mut line, &will));
-            assert_eq!(line.now, Duration::from_millis(ends_ms), "back after {back_ms} ms");
-            let first = *line.arrived.first().expect("a stop");
-            assert!(first - back <= Duration::from_millis(500), "{first:?}");
-            assert!(line.arrived.len() >= 10, "{}", line.arrived.len());
-        }
     }
 
     #[test]

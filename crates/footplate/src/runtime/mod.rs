@@ -5,6 +5,7 @@
 //! attendant   interfaces to the record and to people
 //! ending      how a run ends
 //! last_will   what a guardian sends to the station if this program dies
+//! will_line   the line over which it does, until the station has heard it
 //! stop_flag   Ctrl-C and the signals that end a program
 //! ```
 
@@ -13,6 +14,7 @@ mod ending;
 mod last_will;
 mod run;
 mod stop_flag;
+mod will_line;
 
 #[cfg(test)]
 mod over_a_board;
@@ -25,6 +27,7 @@ mod over_a_simulation;
 
 pub(crate) use attendant::{Attendant, Recorder, Wish};
 pub(crate) use ending::Ended;
-pub(crate) use last_will::{WillLine, carry_out, written};
+pub(crate) use last_will::written;
 pub(crate) use run::Runtime;
 pub(crate) use stop_flag::StopFlag;
+pub(crate) use will_line::{WillLine, carry_out};

@@ -306,6 +306,9 @@ impl NoticeFormatter<'_> {
             line +=
                 &format!(" (predicted {:+.0} mm to {:+.0} mm)", promise.low.as_mm(), promise.high.as_mm());
         }
+        if let Some(sensor) = finished.unseen {
+            line += &format!("; {} should have reported it and did not", self.sensor(sensor));
+        }
         Some(line)
     }
 }

@@ -250,7 +250,12 @@ mod tests {
         };
         long.drive(minutes(24.0), minutes(6.0), keep).expect("driven");
         let [_, second, _, last] = &loads[..] else { panic!("{} parts", loads.len()) };
-        assert_eq!(last.descriptors, second.descriptors);
+        assert!(
+            last.descriptors <= second.descriptors,
+            "{:?}, then {:?}",
+            second.descriptors,
+            last.descriptors
+        );
         if let (Some(before), Some(after)) = (second.memory_kb, last.memory_kb) {
             assert!(after - before < MOST_GROWN_KB, "{before} to {after} kB");
         }
