@@ -1,7 +1,7 @@
 //! Recordings in, motion models out: gathers the runs of recordings, or of a store at a date, and fits every train.
 
 use core::fmt;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use footplate_core::link::{PollTiming, PollTimingEstimator};
 use footplate_core::model::report::{Review, RunPassages};
@@ -11,11 +11,11 @@ use footplate_core::{
     DecoderSteps, Estimate, Event, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId,
 };
 
-use crate::motion_replay::{MotionReplay, RunBegin};
+use crate::motion_replay::{MotionReplay, RunBegin, own_events};
 use crate::poll_rhythm::poll_rhythm;
 use crate::recording::{Recording, Run, TrainAtStart};
 use crate::recording_names::distinct_names;
-use crate::store::{Store, StoreError};
+use crate::store::{AssignedDetections, Store, StoreError};
 
 /// A run as a batch keeps it: with the place of every event, so that each number can be traced back.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +24,8 @@ pub struct BatchRun {
     pub recording: String,
     /// Whether that is a live session.
     pub is_live: bool,
+    /// Whether other trains moved in it, too; its events are then those of its train.
+    pub is_shared: bool,
     /// Its number there.
     pub id: RunId,
     /// When its clock stood at zero, since the Unix epoch, where the recording tells.
@@ -39,10 +41,11 @@ pub struct BatchRun {
 impl BatchRun {
     /// What a train did in a run of a recording.
     fn of(recording: &str, is_live: bool, run: &Run, train: TrainAtStart, events: Vec<BatchEvent>) -> Self {
-        let TrainAtStart { train, step } = train;
+        let (TrainAtStart { train, step }, is_shared) = (train, false);
         Self {
             recording: recording.to_owned(),
             is_live,
+            is_shared,
             id: run.id,
             began_at: run.began_at,
             train,
@@ -212,7 +215,7 @@ impl Batch {
             let there = recordings.iter().flat_map(Recording::trains).collect();
             return Err(BatchError::NoRunOfTrain { train, there });
         }
-        Self::of_runs(layout, runs, Vec::new())
+        Self::of_runs(layout, runs, Vec::new(), BTreeMap::new())
     }
 
     /// Calibrates from everything a store held at a date of one layout, less what was excluded at that date.
@@ -226,6 +229,8 @@ impl Batch {
         train: Option<TrainId>,
     ) -> Result<Self, BatchError> {
         let (mut runs, mut left_out) = (Vec::new(), Vec::new());
+        // Of recordings whose runs come here as parts: each part lacks the polls of the others.
+        let mut rhythms: BTreeMap<String, PollTimingEstimator> = BTreeMap::new();
         let mut known: BTreeSet<TrainId> = BTreeSet::new();
         let all = store.recordings(as_of)?;
         let recordings: Vec<_> = all.iter().filter(|stored| stored.layout == layout.name()).collect();
@@ -235,8 +240,8 @@ impl Batch {
         }
         let names = distinct_names(recordings.iter().map(|stored| stored.name.as_str()));
         for (recording, name) in recordings.into_iter().zip(&names) {
-            let mut assigned = None;
-            for stored in store.runs(recording.key, as_of)? {
+            let (mut assigned, stored_runs) = (None, store.runs(recording.key, as_of)?);
+            for stored in &stored_runs {
                 let events = stored.events.iter().map(|event| BatchEvent {
                     event: event.raw.event,
                     line: event.raw.line,
@@ -256,20 +261,20 @@ impl Batch {
                     Some(assigned) => assigned,
                     none => none.insert(store.assigned_detections(recording.key)?),
                 };
-                if assigned.is_empty() {
-                    let trains = moving.iter().map(|at_start| at_start.train).collect();
-                    left_out.push(LeftOut { recording: name.clone(), run: accepted.id, trains });
-                    continue;
+                let wanted = |at_start: &&TrainAtStart| train.is_none_or(|train| train == at_start.train);
+                let (known, unknown): (Vec<TrainAtStart>, Vec<TrainAtStart>) =
+                    moving.iter().filter(wanted).partition(|at_start| assigned.knows(at_start.train));
+                if !known.is_empty() {
+                    let all = stored_runs.iter().map(|run| run.events.iter().map(|event| &event.raw.event));
+                    rhythms.entry(name.clone()).or_insert_with(|| poll_rhythm(all));
                 }
-                for at_start in
-                    moving.iter().filter(|at_start| train.is_none_or(|train| train == at_start.train))
-                {
-                    let own = events.iter().filter(|event| assigned.concerns(at_start.train, &event.event));
-                    let own = own.map(|event| BatchEvent {
-                        was_lost_before: assigned.was_lost_before(&event.event),
-                        ..*event
-                    });
-                    runs.push(BatchRun::of(name, is_live, &accepted, *at_start, own.collect()));
+                runs.extend(known.into_iter().map(|at_start| {
+                    let own = own_batch_events(assigned, at_start.train, &events);
+                    BatchRun { is_shared: true, ..BatchRun::of(name, is_live, &accepted, at_start, own) }
+                }));
+                if !unknown.is_empty() {
+                    let trains = unknown.iter().map(|at_start| at_start.train).collect();
+                    left_out.push(LeftOut { recording: name.clone(), run: accepted.id, trains });
                 }
             }
         }
@@ -277,10 +282,15 @@ impl Batch {
         if let Some(train) = train.filter(|train| runs.is_empty() && !known.contains(train)) {
             return Err(BatchError::NoRunOfTrain { train, there: known });
         }
-        Self::of_runs(layout, runs, left_out)
+        Self::of_runs(layout, runs, left_out, rhythms)
     }
 
-    fn of_runs(layout: &Layout, runs: Vec<BatchRun>, left_out: Vec<LeftOut>) -> Result<Self, BatchError> {
+    fn of_runs(
+        layout: &Layout,
+        runs: Vec<BatchRun>,
+        left_out: Vec<LeftOut>,
+        mut whole: BTreeMap<String, PollTimingEstimator>,
+    ) -> Result<Self, BatchError> {
         let sections = SectionIndex::of(layout);
         let mut layout_test = LayoutTest::default();
         for run in &runs {
@@ -291,8 +301,9 @@ impl Batch {
         let mut passages: Vec<RunPassages> = Vec::new();
         for recording in runs.chunk_by(|one, next| one.recording == next.recording) {
             // An excluded report still shows when polls were.
-            let rhythm = poll_rhythm(recording.iter().map(|run| run.events.iter().map(|event| &event.event)));
             let name = recording.first().map_or_else(String::new, |run| run.recording.clone());
+            let events = recording.iter().map(|run| run.events.iter().map(|event| &event.event));
+            let rhythm = whole.remove(&name).unwrap_or_else(|| poll_rhythm(events));
             polling.push(Polling { recording: name, timing: rhythm.timing(), period: rhythm.period() });
             for run in recording {
                 let place = passages.len();
@@ -347,6 +358,7 @@ fn replayed(
         let begin = RunBegin {
             recording: &run.recording,
             is_live: run.is_live,
+            is_shared: run.is_shared,
             step: run.step,
             began_at: run.began_at,
         };
@@ -355,6 +367,20 @@ fn replayed(
     }
     replay.end(sections, lengths);
     replay
+}
+
+/// What a train did among the events of a run that others moved in, too, with those that a person has excluded.
+fn own_batch_events(assigned: &AssignedDetections, train: TrainId, events: &[BatchEvent]) -> Vec<BatchEvent> {
+    let accepted = events.iter().filter(|event| !event.excluded).map(|event| &event.event);
+    let lost: Vec<Timestamp> = own_events(assigned, train, accepted)
+        .filter_map(|(event, was_lost)| was_lost.then_some(event.time))
+        .collect();
+    let own = events.iter().filter(|event| assigned.concerns(train, &event.event));
+    own.map(|event| BatchEvent {
+        was_lost_before: !event.excluded && lost.contains(&event.event.time),
+        ..*event
+    })
+    .collect()
 }
 
 /// The highest step of the train's decoder: of the kinds there are the smallest that has all steps seen.

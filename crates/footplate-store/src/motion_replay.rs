@@ -13,9 +13,9 @@ mod run_reader;
 
 use fingerprint::Fingerprint;
 use footplate_core::link::PollTimingEstimator;
-use footplate_core::model::MotionFit;
 use footplate_core::model::StepUse;
 use footplate_core::model::survey::{LayoutTest, SectionIndex, SurveyTest};
+use footplate_core::model::{MOST_STEP_CHANGES, MotionFit};
 use footplate_core::track::{Layout, Leg, TurnoutStates};
 use footplate_core::{Approach, Event, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use run_reader::RunReader;
@@ -225,12 +225,13 @@ impl MotionReplay {
         store: &Store,
         runs: &[StoredReplayRun],
     ) -> Result<(), StoreError> {
+        let train = self.fit.model().train();
         for of_recording in runs.chunk_by(|one, next| one.key == next.key) {
-            let mut assigned = AssignedDetections::default();
-            if of_recording.iter().any(|stored| stored.is_live && stored.run.moving().len() > 1) {
-                assigned = store
-                    .assigned_detections(of_recording.first().map_or(RecordingKey(0), |stored| stored.key))?;
-            }
+            let shared = of_recording.iter().find(|stored| stored.is_live && stored.is_shared(train));
+            let assigned = match shared {
+                Some(shared) => store.assigned_detections(shared.key)?,
+                None => AssignedDetections::default(),
+            };
             of_recording.iter().for_each(|stored| self.take_stored(layout, sections, stored, &assigned));
         }
         Ok(())
@@ -245,21 +246,25 @@ impl MotionReplay {
     ) {
         let StoredReplayRun { recording, is_live, run, rhythm, .. } = stored;
         let train = self.fit.model().train();
-        let moving = run.moving();
+        let own = run.moving().into_iter().find(|at_start| at_start.train == train);
         let events = || run.events.iter().map(|raw| &raw.event);
-        let begin = |step| RunBegin { recording, is_live: *is_live, step, began_at: run.began_at };
-        match (moving.as_slice(), moving.iter().find(|at_start| at_start.train == train)) {
-            ([_], Some(only)) => {
+        let begin = |step, is_shared| RunBegin {
+            recording,
+            is_live: *is_live,
+            is_shared,
+            step,
+            began_at: run.began_at,
+        };
+        match own {
+            Some(own) if !stored.is_shared(train) => {
                 let events = events().map(|event| (event, false));
-                self.take_run(layout, sections, begin(only.step), events, rhythm);
+                self.take_run(layout, sections, begin(own.step, false), events, rhythm);
             }
-            (_, Some(own)) if !assigned.is_empty() => {
-                let events = events()
-                    .filter(|event| assigned.concerns(train, event))
-                    .map(|event| (event, assigned.was_lost_before(event)));
-                self.take_run(layout, sections, begin(own.step), events, rhythm);
+            Some(own) if assigned.knows(train) => {
+                let own_events = own_events(assigned, train, events());
+                self.take_run(layout, sections, begin(own.step, true), own_events, rhythm);
             }
-            (_, own) => {
+            own => {
                 if own.is_some() {
                     self.left_out.push((recording.clone(), run.id));
                 }
@@ -294,9 +299,13 @@ impl MotionReplay {
         let turnouts = if begin.is_live { &mut self.turnouts } else { &mut self.turnouts_of_file };
         let mut reader = RunReader::new(train, begin.step);
         let mut fitted: Option<Timestamp> = None;
+        let mut changes = 0;
         for (event, was_lost) in events {
             note_turnout(turnouts, event);
             let Some(read) = reader.take(event, rhythm.timing()) else { continue };
+            if begin.is_shared && has_too_many_changes(&mut self.fit, &read.event, &mut changes) {
+                continue;
+            }
             let time = read.event.time;
             let starts = matches!(read.event.kind, EventKind::Speed { step, .. } if step != SpeedStep::STAND);
             if starts && time - *fitted.get_or_insert(time) >= REFIT_AFTER {
@@ -318,6 +327,38 @@ impl MotionReplay {
     }
 }
 
+/// Whether an event is left out because the train changes its step too often; that breaks the chain of what it did, as it does while a
+/// session learns.
+fn has_too_many_changes(fit: &mut MotionFit, event: &Event, changes: &mut usize) -> bool {
+    let was_over = *changes > MOST_STEP_CHANGES;
+    match event.kind {
+        EventKind::Speed { step, .. } => {
+            *changes = if step == SpeedStep::STAND { 0 } else { *changes + 1 };
+            let is_over = was_over || *changes > MOST_STEP_CHANGES;
+            if is_over {
+                fit.interrupt();
+            }
+            is_over
+        }
+        EventKind::Sensor(_) => was_over,
+        _ => false,
+    }
+}
+
+/// What a train did among the events of a run that others moved in, too, each event with whether the train was lost before it.
+pub(crate) fn own_events<'e>(
+    assigned: &AssignedDetections,
+    train: TrainId,
+    events: impl Iterator<Item = &'e Event>,
+) -> impl Iterator<Item = (&'e Event, bool)> {
+    let mut last = Timestamp::from_ns(i64::MIN);
+    events.filter(move |event| assigned.concerns(train, event)).map(move |event| {
+        let is_report = matches!(event.kind, EventKind::Sensor(_));
+        let before = if is_report { std::mem::replace(&mut last, event.time) } else { event.time };
+        (event, assigned.was_lost(train, before, event.time))
+    })
+}
+
 /// A run as a store keeps it, with the rhythm of the link of its recording.
 struct StoredReplayRun {
     key: RecordingKey,
@@ -325,6 +366,14 @@ struct StoredReplayRun {
     is_live: bool,
     run: Run,
     rhythm: PollTimingEstimator,
+}
+
+impl StoredReplayRun {
+    /// Whether a train moved in it, and others, too.
+    fn is_shared(&self, train: TrainId) -> bool {
+        let moving = self.run.moving();
+        moving.len() > 1 && moving.iter().any(|at_start| at_start.train == train)
+    }
 }
 
 /// How the lengths of a layout compare with the times from sensor to sensor in some runs.
@@ -343,6 +392,8 @@ pub(crate) struct RunBegin<'r> {
     pub(crate) recording: &'r str,
     /// Whether that is a live session, after which turnouts lie as they lay.
     pub(crate) is_live: bool,
+    /// Whether other trains moved in it, too.
+    pub(crate) is_shared: bool,
     /// The step at which the train had been running for long; 0 at rest.
     pub(crate) step: SpeedStep,
     /// When the clock of the run stood at zero, since the Unix epoch.

@@ -1,7 +1,7 @@
 //! Which train a session took each detection to be of.
 //!
-//! A station reports sensors, not trains. The machine of a session says with its decisions which train it took a report to be of, and
-//! why is not to be decided twice: who learns from the session afterwards reads it there.
+//! A station reports sensors, not trains. The machine of a session says with its decisions which train it took a report to be of. Whoever
+//! learns from the session later reads it there, instead of deciding it once more with less knowledge.
 
 use std::collections::BTreeMap;
 
@@ -16,26 +16,38 @@ use super::recordings::RecordingKey;
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct AssignedDetections {
     /// By time and sensor of the report: the train, and whether it had been lost before.
-    of_reports: BTreeMap<(Timestamp, SensorId), (TrainId, bool)>,
+    of_reports: BTreeMap<ReportKey, (TrainId, bool)>,
 }
 
 impl AssignedDetections {
-    /// Those that decisions tell.
+    /// Those that decisions tell, in order; a later one may withdraw what an earlier one has assigned.
     pub fn of<'t>(trace: impl IntoIterator<Item = &'t Traced>) -> Self {
-        Self { of_reports: trace.into_iter().filter_map(assigned_by).collect() }
+        let mut assigned = Self::default();
+        for decision in
+            trace.into_iter().filter(|traced| traced.side == Side::Decision && traced.kind == "notice")
+        {
+            if let Some((report, of)) = assigned_by(&decision.text) {
+                assigned.of_reports.insert(report, of);
+            } else if let Some(report) = withdrawn_by(&decision.text) {
+                assigned.of_reports.remove(&report);
+            }
+        }
+        assigned
     }
 
-    /// Whether nothing was assigned, or nothing is known of it.
+    /// Whether any report was assigned to a train.
     #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.of_reports.is_empty()
+    pub fn knows(&self, train: TrainId) -> bool {
+        self.of_reports.values().any(|(of, _)| *of == train)
     }
 
     /// Whether an event is part of what a train did: a command to it, a report that was assigned to it, or a turnout on its path.
     #[must_use]
     pub fn concerns(&self, train: TrainId, event: &Event) -> bool {
         match event.kind {
-            EventKind::Sensor(_) => self.of_report(event).is_some_and(|(of, _)| of == train),
+            EventKind::Sensor(report) => {
+                self.of_reports.get(&(event.time, report.sensor)).is_some_and(|(of, _)| *of == train)
+            }
             EventKind::Speed { train: of, .. }
             | EventKind::Reverse { train: of }
             | EventKind::Stopped { train: of, .. } => of == train,
@@ -45,46 +57,60 @@ impl AssignedDetections {
         }
     }
 
-    /// Whether a report is the first of its train after that was lost: where it came from is unknown.
+    /// Whether a train was lost between two times, the second included, so that where it came from is unknown. Its first report after that
+    /// may be one that a person has excluded.
     #[must_use]
-    pub fn was_lost_before(&self, event: &Event) -> bool {
-        self.of_report(event).is_some_and(|(_, was_lost)| was_lost)
-    }
-
-    fn of_report(&self, event: &Event) -> Option<(TrainId, bool)> {
-        let EventKind::Sensor(report) = event.kind else { return None };
-        self.of_reports.get(&(event.time, report.sensor)).copied()
+    pub fn was_lost(&self, train: TrainId, after: Timestamp, until: Timestamp) -> bool {
+        let between = (after, SensorId(u16::MAX))..=(until, SensorId(u16::MAX));
+        after < until && self.of_reports.range(between).any(|(_, of)| *of == (train, true))
     }
 }
 
 impl Store {
-    /// The detections of a session that its machines assigned to trains.
+    /// The detections of a session that its machines assigned to trains. Nothing where decisions are missing or cannot be read: what is
+    /// left of them would join places between which a train was reported elsewhere.
     ///
     /// # Errors
     /// The store cannot be read.
     pub fn assigned_detections(&self, recording: RecordingKey) -> Result<AssignedDetections, StoreError> {
         let machines = || {
-            let mut statement = self.connection.prepare("SELECT id FROM machines WHERE recording = ?1")?;
+            let mut statement =
+                self.connection.prepare("SELECT id FROM machines WHERE recording = ?1 ORDER BY id")?;
             let keys = statement.query_map([recording.0], |row| Ok(MachineKey(row.get(0)?)))?;
             keys.collect::<rusqlite::Result<Vec<MachineKey>>>()
         };
-        let mut trace = Vec::new();
+        let mut all = Vec::new();
         for machine in machines().map_err(|error| self.error(error))? {
-            trace.extend(self.trace(machine)?);
+            let Ok(trace) = self.trace(machine) else { return Ok(AssignedDetections::default()) };
+            if (0..).zip(&trace).any(|(number, traced)| traced.number != number) {
+                return Ok(AssignedDetections::default());
+            }
+            all.extend(trace);
         }
-        Ok(AssignedDetections::of(&trace))
+        Ok(AssignedDetections::of(&all))
     }
 }
 
+/// A report of a sensor: when, and which.
+type ReportKey = (Timestamp, SensorId);
+
 /// What a decision assigns: the notice that a train has passed a sensor, in the form that sessions write it down.
-fn assigned_by(traced: &Traced) -> Option<((Timestamp, SensorId), (TrainId, bool))> {
-    let text = Some(traced.text.as_str()).filter(|text| {
-        traced.side == Side::Decision && traced.kind == "notice" && text.starts_with("Passed")
-    })?;
+fn assigned_by(text: &str) -> Option<(ReportKey, (TrainId, bool))> {
+    let text = Some(text).filter(|text| text.starts_with("Passed"))?;
     let train = TrainId(number_after(text, "train: TrainId(")?.try_into().ok()?);
+    Some((report_of(text, "until: Timestamp(")?, (train, text.contains("late: None"))))
+}
+
+/// What a decision withdraws: the notice that a report has no explanation, which may come after it was assigned.
+fn withdrawn_by(text: &str) -> Option<ReportKey> {
+    Some(text)
+        .filter(|text| text.contains("Unexplained {"))
+        .and_then(|text| report_of(text, "time: Timestamp("))
+}
+
+fn report_of(text: &str, time: &str) -> Option<ReportKey> {
     let sensor = SensorId(number_after(text, "sensor: SensorId(")?.try_into().ok()?);
-    let time = Timestamp::from_ns(number_after(text, "until: Timestamp(")?);
-    Some(((time, sensor), (train, text.contains("late: None"))))
+    Some((Timestamp::from_ns(number_after(text, time)?), sensor))
 }
 
 /// The number that stands behind the first of these words.
@@ -125,6 +151,8 @@ mod tests {
             traced(3, Side::Input, EXPECTED),
             traced(4, Side::Decision, "Done(Finished { train: TrainId(24), until: Timestamp(1) })"),
             traced(5, Side::Decision, "Passed(TrainPassed { train: TrainId(99999999), passed: "),
+            traced(6, Side::Decision, &EXPECTED.replace("SensorId(46)", "SensorId(47)")),
+            traced(7, Side::Decision, "Unexplained { sensor: SensorId(47), time: Timestamp(192461751140) }"),
         ];
         let assigned = AssignedDetections::of(&trace);
         assert_eq!(assigned.of_reports.len(), 2);
@@ -138,7 +166,14 @@ mod tests {
         let stops = event(1, EventKind::Speed { train: TrainId(58), step: SpeedStep::STAND });
         let of = |event: &Event| [24, 58].map(|train| assigned.concerns(TrainId(train), event));
         assert_eq!([of(&found), of(&expected)], [[true, false], [false, true]]);
-        assert_eq!([&found, &expected].map(|event| assigned.was_lost_before(event)), [true, false]);
+        let lost = |train, after, until: &Event| {
+            assigned.was_lost(TrainId(train), Timestamp::from_ns(after), until.time)
+        };
+        assert_eq!(
+            [lost(24, 0, &found), lost(24, 0, &expected), lost(58, 0, &expected)],
+            [true, true, false]
+        );
+        assert!(!lost(24, 6_194_770_729, &expected), "its own report is the first of the next stretch");
         // A report that was assigned to no train is of none.
         assert_eq!(of(&unassigned), [false, false]);
         assert_eq!(of(&stops), [false, true]);

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use footplate_core::control::{Driver, Remeasured};
 use footplate_core::model::MotionModel;
 use footplate_core::model::survey::SectionIndex;
-use footplate_core::model::{MotionFit, Refit};
+use footplate_core::model::{MOST_STEP_CHANGES, MotionFit, Refit};
 use footplate_core::track::Layout;
 use footplate_core::tracking::PassedSensor;
 use footplate_core::{Event, EventKind, Report, SpeedStep, TrainId};
@@ -20,10 +20,6 @@ pub(super) struct Learning {
     /// Commanded steps of a train since its last standstill.
     changes: BTreeMap<TrainId, usize>,
 }
-
-/// Runs with more step changes than this are not fitted. A train that holds a speed between two steps changes every
-/// second; the cost of a fit is changes times detections, and such a run adds little information.
-const MAX_STEP_CHANGES: usize = 16;
 
 impl Learning {
     pub(super) fn new(layout: &Layout, fits: Vec<MotionFit>) -> Self {
@@ -41,9 +37,9 @@ impl Learning {
         match event.kind {
             EventKind::Speed { train, step } => {
                 let changes = self.changes.entry(train).or_default();
-                let was_over_limit = *changes > MAX_STEP_CHANGES;
+                let was_over_limit = *changes > MOST_STEP_CHANGES;
                 *changes = if step == SpeedStep::STAND { 0 } else { *changes + 1 };
-                if *changes > MAX_STEP_CHANGES || was_over_limit {
+                if *changes > MOST_STEP_CHANGES || was_over_limit {
                     self.interrupt(train);
                 } else {
                     self.learn(train, driver, event);
@@ -66,7 +62,7 @@ impl Learning {
         {
             fit.lose_place();
         }
-        if self.changes.get(&train).is_some_and(|changes| *changes > MAX_STEP_CHANGES) {
+        if self.changes.get(&train).is_some_and(|changes| *changes > MOST_STEP_CHANGES) {
             return;
         }
         let report = Report { sensor: passed.sensor, poll_interval: Some(passed.window.width()) };
