@@ -1,7 +1,7 @@
 //! Which train a session took each detection to be of.
 //!
-//! A station reports sensors, not trains. The machine of a session says with its decisions which train it took a report to be of. Whoever
-//! learns from the session later reads it there, instead of deciding it once more with less knowledge.
+//! A station reports sensors, not trains. The machine of a session says with its decisions which train it took a report to be of. A program
+//! that learns from the session later reads it there, instead of deciding it once more with less knowledge.
 
 use std::collections::BTreeMap;
 

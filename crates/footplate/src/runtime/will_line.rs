@@ -202,7 +202,7 @@ mod tests {
     /// A line whose station is reached from a time on, and then says something of itself.
     struct CutOff {
         back: Duration,
-        /// When something is heard that was on its way when the line was cut.
+        /// When something is heard that was sent before the line was cut.
         in_flight: Option<Duration>,
         now: Duration,
         heard: bool,
@@ -251,7 +251,7 @@ mod tests {
         // A stop every 100 ms for 5 s, as a session writes it on a line without answers.
         let stop = |nth: i64| Bequest { after: TimeSpan::from_ms(100 * nth.min(1)), bytes: b"stop".to_vec() };
         let will = written(&(0..=50).map(stop).collect::<Vec<_>>(), 1.0);
-        // When the line is back, whether something was on its way, when the end comes, and how often the line is closed.
+        // When the line is back, whether something was sent before it was cut, when the end comes, and how often the line is closed.
         let cases = [
             (0, false, 5_250, 0),
             (3_900, false, 5_250, 0),
