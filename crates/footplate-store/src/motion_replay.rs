@@ -15,14 +15,14 @@ use fingerprint::Fingerprint;
 use footplate_core::link::PollTimingEstimator;
 use footplate_core::model::StepUse;
 use footplate_core::model::survey::{LayoutTest, SectionIndex, SurveyTest};
-use footplate_core::model::{MOST_STEP_CHANGES, MotionFit};
+use footplate_core::model::{MotionFit, StepChanges};
 use footplate_core::track::{Layout, Leg, TurnoutStates};
 use footplate_core::{Approach, Event, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use run_reader::RunReader;
 use serde::{Deserialize, Serialize};
 
 use crate::poll_rhythm::poll_rhythm;
-use crate::recording::Run;
+use crate::recording::{Run, TrainAtStart};
 use crate::recording_names::distinct_names;
 use crate::speed_profile::SpeedProfile;
 use crate::store::{AssignedDetections, KeptReplay, RecordingKey, Store, StoreError};
@@ -131,10 +131,11 @@ impl MotionReplay {
             let accepted: Vec<Run> =
                 store.runs(recording.key, as_of)?.iter().map(crate::StoredRun::accepted).collect();
             let rhythm = poll_rhythm(accepted.iter().map(|run| run.events.iter().map(|raw| &raw.event)));
-            let of = |run| StoredReplayRun {
+            let of = |run: Run| StoredReplayRun {
                 key: recording.key,
                 recording: name.clone(),
                 is_live: recording.is_live(),
+                moving: run.moving(),
                 run,
                 rhythm: rhythm.clone(),
             };
@@ -244,9 +245,9 @@ impl MotionReplay {
         stored: &StoredReplayRun,
         assigned: &AssignedDetections,
     ) {
-        let StoredReplayRun { recording, is_live, run, rhythm, .. } = stored;
+        let StoredReplayRun { recording, is_live, moving, run, rhythm, .. } = stored;
         let train = self.fit.model().train();
-        let own = run.moving().into_iter().find(|at_start| at_start.train == train);
+        let own = moving.iter().find(|at_start| at_start.train == train);
         let events = || run.events.iter().map(|raw| &raw.event);
         let begin = |step, is_shared| RunBegin {
             recording,
@@ -299,11 +300,11 @@ impl MotionReplay {
         let turnouts = if begin.is_live { &mut self.turnouts } else { &mut self.turnouts_of_file };
         let mut reader = RunReader::new(train, begin.step);
         let mut fitted: Option<Timestamp> = None;
-        let mut changes = 0;
+        let mut changes = StepChanges::default();
         for (event, was_lost) in events {
             note_turnout(turnouts, event);
             let Some(read) = reader.take(event, rhythm.timing()) else { continue };
-            if begin.is_shared && has_too_many_changes(&mut self.fit, &read.event, &mut changes) {
+            if begin.is_shared && is_left_out(&mut self.fit, &read.event, &mut changes) {
                 continue;
             }
             let time = read.event.time;
@@ -329,18 +330,16 @@ impl MotionReplay {
 
 /// Whether an event is left out because the train changes its step too often; that breaks the chain of what it did, as it does while a
 /// session learns.
-fn has_too_many_changes(fit: &mut MotionFit, event: &Event, changes: &mut usize) -> bool {
-    let was_over = *changes > MOST_STEP_CHANGES;
+fn is_left_out(fit: &mut MotionFit, event: &Event, changes: &mut StepChanges) -> bool {
     match event.kind {
         EventKind::Speed { step, .. } => {
-            *changes = if step == SpeedStep::STAND { 0 } else { *changes + 1 };
-            let is_over = was_over || *changes > MOST_STEP_CHANGES;
-            if is_over {
+            let is_left_out = changes.take(step);
+            if is_left_out {
                 fit.interrupt();
             }
-            is_over
+            is_left_out
         }
-        EventKind::Sensor(_) => was_over,
+        EventKind::Sensor(_) => changes.are_too_many(),
         _ => false,
     }
 }
@@ -364,6 +363,7 @@ struct StoredReplayRun {
     key: RecordingKey,
     recording: String,
     is_live: bool,
+    moving: Vec<TrainAtStart>,
     run: Run,
     rhythm: PollTimingEstimator,
 }
@@ -371,16 +371,15 @@ struct StoredReplayRun {
 impl StoredReplayRun {
     /// Whether a train moved in it, and others, too.
     fn is_shared(&self, train: TrainId) -> bool {
-        let moving = self.run.moving();
-        moving.len() > 1 && moving.iter().any(|at_start| at_start.train == train)
+        self.moving.len() > 1 && self.moving.iter().any(|at_start| at_start.train == train)
     }
 }
 
 /// How the lengths of a layout compare with the times from sensor to sensor in some runs.
 fn lengths_of(layout: &Layout, sections: &SectionIndex, runs: &[StoredReplayRun]) -> SurveyTest {
     let mut test = LayoutTest::default();
-    for StoredReplayRun { run, .. } in runs {
-        test.take_run(layout, sections, run.moving().len(), run.events.iter().map(|raw| &raw.event));
+    for StoredReplayRun { moving, run, .. } in runs {
+        test.take_run(layout, sections, moving.len(), run.events.iter().map(|raw| &raw.event));
     }
     test.lengths(sections)
 }

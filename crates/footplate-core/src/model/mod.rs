@@ -42,7 +42,7 @@ mod variation;
 
 pub(crate) use change_deviations::OTHER_SHAPES;
 pub use expected_information::ExpectedInformation;
-pub use fit::{MOST_STEP_CHANGES, MotionFit, Refit, StatedFit, StatedMotion, StatedSpeed};
+pub use fit::{MotionFit, Refit, StatedFit, StatedMotion, StatedSpeed, StepChanges};
 pub use motion_model::{MotionModel, StepUse, StopForecast};
 pub use numbers::{MotionNumbers, NumbersError};
 pub use objective::Objective;

@@ -11,9 +11,7 @@ const MOST_PHONES: usize = 32;
 const MOST_SILENT: usize = 32;
 
 /// The place of a phone, as long as it is kept.
-pub(super) struct Place {
-    _permit: OwnedSemaphorePermit,
-}
+pub(super) type Place = OwnedSemaphorePermit;
 
 /// All places, and the connections without one.
 pub(super) struct Places {
@@ -44,7 +42,7 @@ impl Places {
     /// A place for a connection that has said something; `None` if all are taken.
     pub(super) fn take(&self, number: u64) -> Option<Place> {
         self.forget(number);
-        Arc::clone(&self.free).try_acquire_owned().ok().map(|_permit| Place { _permit })
+        Arc::clone(&self.free).try_acquire_owned().ok()
     }
 
     /// A connection is no longer silent, or has ended.

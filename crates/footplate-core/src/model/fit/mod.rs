@@ -17,12 +17,10 @@ mod robust;
 mod rows;
 mod stated;
 mod steady_passes;
+mod step_changes;
 mod trip;
 mod unknowns;
 
 pub use motion_fit::{MotionFit, Refit};
 pub use stated::{StatedFit, StatedMotion, StatedSpeed};
-
-/// Runs with more step changes than this are not fitted. A train that holds a speed between two steps changes every
-/// second; the cost of a fit is changes times detections, and such a run adds little information.
-pub const MOST_STEP_CHANGES: usize = 16;
+pub use step_changes::StepChanges;

@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use footplate_core::control::{Driver, Remeasured};
 use footplate_core::model::MotionModel;
 use footplate_core::model::survey::SectionIndex;
-use footplate_core::model::{MOST_STEP_CHANGES, MotionFit, Refit};
+use footplate_core::model::{MotionFit, Refit, StepChanges};
 use footplate_core::track::Layout;
 use footplate_core::tracking::PassedSensor;
-use footplate_core::{Event, EventKind, Report, SpeedStep, TrainId};
+use footplate_core::{Event, EventKind, Report, TrainId};
 
 /// The fits of all trains, continued from those that the session began with.
 #[derive(Debug)]
@@ -18,7 +18,7 @@ pub(super) struct Learning {
     /// Refits that are being computed, a part at a time.
     in_progress: BTreeMap<TrainId, Refit>,
     /// Commanded steps of a train since its last standstill.
-    changes: BTreeMap<TrainId, usize>,
+    changes: BTreeMap<TrainId, StepChanges>,
 }
 
 impl Learning {
@@ -36,10 +36,7 @@ impl Learning {
     pub(super) fn take(&mut self, driver: &Driver, event: &Event) {
         match event.kind {
             EventKind::Speed { train, step } => {
-                let changes = self.changes.entry(train).or_default();
-                let was_over_limit = *changes > MOST_STEP_CHANGES;
-                *changes = if step == SpeedStep::STAND { 0 } else { *changes + 1 };
-                if *changes > MOST_STEP_CHANGES || was_over_limit {
+                if self.changes.entry(train).or_default().take(step) {
                     self.interrupt(train);
                 } else {
                     self.learn(train, driver, event);
@@ -62,7 +59,7 @@ impl Learning {
         {
             fit.lose_place();
         }
-        if self.changes.get(&train).is_some_and(|changes| *changes > MOST_STEP_CHANGES) {
+        if self.changes.get(&train).is_some_and(|changes| changes.are_too_many()) {
             return;
         }
         let report = Report { sensor: passed.sensor, poll_interval: Some(passed.window.width()) };
