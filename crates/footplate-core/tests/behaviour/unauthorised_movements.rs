@@ -45,7 +45,7 @@ fn no_train_starts_while_sensors_report_at_random_and_for_three_seconds_after() 
     }
     assert!(said(&watched, &Notice::Noise), "{:#?}", watched.notices);
     let order = Order::Speed { train: FIRST, step: step(5) };
-    assert_eq!(watched.dog.order(watched.world.now, order), Err(Refusal::NoAnswer));
+    assert_eq!(watched.dog.order(watched.world.now, order), Err(Refusal::Noise));
     watched.run(2.0);
     assert!(!said(&watched, &Notice::NoiseOver), "{:#?}", watched.notices);
     watched.run(1.0);

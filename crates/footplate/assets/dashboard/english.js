@@ -172,6 +172,7 @@ export const ENGLISH = {
   "alarm-speed-reports-ignored": "the speeds that its decoder reports contradict the sensors: they are ignored; check its RailCom settings",
   "alarm-stands-misses": "stopped: several sensors in a row did not report it",
   "alarm-stands-silent": "stopped: the station does not answer",
+  "alarm-stands-noise": "stopped: sensors report at random",
   "alarm-stands-unconfirmed": "the stop command was not confirmed",
   "alarm-does-not-stop": "was commanded to stop but still triggers sensors",
   "alarm-stands-distrusted": "stopped: its model no longer matches its motion",

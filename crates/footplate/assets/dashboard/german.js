@@ -173,6 +173,7 @@ export const GERMAN = {
   "alarm-speed-reports-ignored": "die Geschwindigkeiten, die sein Decoder meldet, widersprechen den Rückmeldern: sie werden nicht mehr verwendet; RailCom-Einstellungen prüfen",
   "alarm-stands-misses": "angehalten: mehrere Rückmelder hintereinander haben ihn nicht gemeldet",
   "alarm-stands-silent": "angehalten: die Zentrale antwortet nicht",
+  "alarm-stands-noise": "angehalten: Melder melden wahllos",
   "alarm-stands-unconfirmed": "der Haltbefehl wurde nicht bestätigt",
   "alarm-does-not-stop": "soll halten und löst noch immer Rückmelder aus",
   "alarm-stands-distrusted": "angehalten: sein Modell passt nicht mehr zur Bewegung",

@@ -103,6 +103,7 @@ const LINES = [
   [/^train (\d+) is stopped for safety until the incident is resolved$/, "Zug $1 steht zur Sicherheit, bis der Vorfall geklärt ist"],
   [/^train (\d+) may be on turnout (\d+), which is set for another leg .*$/, "Zug $1 steht vielleicht auf Weiche $2, die nicht so liegt, wie er kam, und auf der er zurück entgleisen würde: erst vorwärts von ihr herunterfahren"],
   [/^the position of train (\d+) would be lost if it reversed here: set `(.+)` first$/, "die Position von Zug $1 ginge verloren, wenn er hier die Richtung wechselte: erst `$2` stellen"],
+  [/^sensors report at random$/, "Melder melden wahllos"], [/^sensors report at random: wait until none has for 3 s, then enter it again$/, "Melder melden wahllos: warten, bis 3 s lang keiner meldet, dann noch einmal eingeben"],
   [/^the station does not answer$/, "die Zentrale antwortet nicht"], [/^track power is off: enter `power on`$/, "der Fahrstrom ist aus: `power on` eingeben"],
   [/^step (\d+) does not move this train reliably: use a higher step$/, "Stufe $1 bewegt diesen Zug nicht sicher: eine höhere Stufe nehmen"],
   [/^no known path from `(.*)` to `(.*)`: the position of turnout (\d+) is unknown; throw it first$/, "kein bekannter Weg von `$1` nach `$2`: die Stellung von Weiche $3 ist unbekannt; erst stellen"],

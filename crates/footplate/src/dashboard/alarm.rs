@@ -121,6 +121,7 @@ impl Alarm {
             | "overshoots" => of_train("route"),
             "stands-unconfirmed" | "does-not-stop" => of_train("stopping"),
             "line-silent" | "line-garbled" | "line-not-ready" | "stands-silent" => of_link("link"),
+            "stands-noise" => of_link("noise"),
             "line-reply-lost" | "line-unexpected" | "line-repeated" => of_link("line noise"),
             "power-off" | "line-power-lost" | "line-restarted" => of_link("power"),
             "lies-curved" | "lies-straight" => about("turnout"),
@@ -145,8 +146,8 @@ impl Alarm {
             }),
             "lost" | "needs-person" | "held-as-unknown" | "stands-lost" | "stands-elsewhere"
             | "stands-untimely" | "stands-misses" | "stands-stalled" | "stands-slower" | "stands-faster"
-            | "stands-distrusted" | "stands-silent" | "stands-unconfirmed" | "does-not-stop" | "moved"
-            | DIRECTION_UNKNOWN => Resolution::Located,
+            | "stands-distrusted" | "stands-silent" | "stands-noise" | "stands-unconfirmed"
+            | "does-not-stop" | "moved" | DIRECTION_UNKNOWN => Resolution::Located,
             "diverged"
             | "diverged-and-others"
             | "track-ends"
@@ -389,6 +390,7 @@ const fn stop_reason(why: Noticed) -> &'static str {
         Noticed::Misses => "stands-misses",
         Noticed::Stalled => "stands-stalled",
         Noticed::LinkSilent => "stands-silent",
+        Noticed::Noise => "stands-noise",
         Noticed::StopUnconfirmed => "stands-unconfirmed",
         Noticed::DoesNotStop(_) => "does-not-stop",
         _ => "stands-distrusted",

@@ -378,7 +378,11 @@ impl Dispatcher {
             let is_held = matches!(
                 why,
                 Some(
-                    Refusal::NoPower | Refusal::NoAnswer | Refusal::InDanger { .. } | Refusal::TrackNotClear
+                    Refusal::NoPower
+                        | Refusal::NoAnswer
+                        | Refusal::Noise
+                        | Refusal::InDanger { .. }
+                        | Refusal::TrackNotClear
                 )
             );
             train.withdrawn = train.withdrawn.saturating_add(u8::from(!is_held));

@@ -94,6 +94,8 @@ pub enum Refusal {
     TrackNotClear,
     /// The station does not answer: no command can be sent.
     NoAnswer,
+    /// Sensors report at random: no train could be located by them.
+    Noise,
     /// Track power is off.
     NoPower,
     /// The position of the train is unknown.
@@ -242,6 +244,7 @@ impl fmt::Display for Refusal {
                 "something moved that Footplate does not drive: check the track, then enter `power on`, or `place` the train that it is",
             ),
             Self::NoAnswer => f.write_str("the station does not answer"),
+            Self::Noise => f.write_str("sensors report at random: wait until none has for 3 s, then enter it again"),
             Self::NoPower => f.write_str("track power is off: enter `power on`"),
             Self::UnknownTrain { train } => write!(f, "train {train} is not part of this session"),
             Self::UnknownTurnout { turnout } => write!(f, "the layout has no turnout {turnout}"),

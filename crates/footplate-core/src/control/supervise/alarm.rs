@@ -44,6 +44,8 @@ pub enum Alarm {
     Misses,
     /// The station does not answer.
     LinkSilent,
+    /// Sensors report at random.
+    Noise,
     /// A stop command was not sent in time.
     StopUnconfirmed,
     /// The train was commanded to stop, and sensors still report it.
@@ -63,6 +65,7 @@ impl fmt::Display for Alarm {
             Self::Stalled => "its decoder reports that it stands still",
             Self::Misses => "several sensors in a row did not report it",
             Self::LinkSilent => "the station does not answer",
+            Self::Noise => "sensors report at random",
             Self::StopUnconfirmed => "the stop command could not be sent",
             Self::DoesNotStop(_) => "it was commanded to stop and sensors still report it",
             Self::Distrusted => "its model no longer fits",

@@ -56,7 +56,7 @@ impl Watchdog {
             LinkNews::PowerLost => self.switch_power(now, false),
             LinkNews::Silent if self.silent.is_none() => {
                 self.silent = Some(now);
-                self.stop_unheard(now);
+                self.stop_unheard(now, Alarm::LinkSilent);
             }
             LinkNews::Silent => {}
             LinkNews::Answers => {
@@ -69,7 +69,7 @@ impl Watchdog {
     }
 
     /// Nothing is heard of trains, or nothing that can be relied on: stops each that may move.
-    fn stop_unheard(&mut self, now: Timestamp) {
+    fn stop_unheard(&mut self, now: Timestamp, alarm: Alarm) {
         self.distrust_last_commands(now);
         // What creeps to be located would pass the sensors that end it without a report.
         let creeping = self.dangers.iter().filter(|(_, recovery)| recovery.is_active());
@@ -84,7 +84,7 @@ impl Watchdog {
             let rested = self.driver.is_at_rest(train, now - SILENT_FOR)
                 || self.has_rested_since(train, now - SILENT_FOR);
             if self.driver.commanded(train) > SpeedStep::STAND || !rested {
-                self.raise(now, train, Alarm::LinkSilent);
+                self.raise(now, train, alarm);
             }
         }
     }
@@ -103,7 +103,7 @@ impl Watchdog {
     pub(super) fn is_noise(&mut self, now: Timestamp, sensor: SensorId) -> bool {
         if self.noise.take(now, self.driver.layout(), sensor) {
             self.notify(Notice::Noise);
-            self.stop_unheard(now);
+            self.stop_unheard(now, Alarm::Noise);
         }
         self.noise.is_on()
     }

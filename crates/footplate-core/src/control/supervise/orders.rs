@@ -49,6 +49,9 @@ impl Watchdog {
             let is_moved = (is_trusted || self.dangers.is_empty()) && self.has_intruder();
             return Err(if is_moved { Refusal::TrackNotClear } else { Refusal::InDanger { train } });
         }
+        if self.noise.is_on() {
+            return Err(Refusal::Noise);
+        }
         if self.is_silent() {
             return Err(Refusal::NoAnswer);
         }
