@@ -6,7 +6,7 @@ use super::evidence::{CREEP as CREEP_BY, Compared, SILENT, STEADY_S, evidence};
 use super::filters::{Filters, Pool, State};
 use super::interval::interval;
 use super::lanes::{Lanes, WIDTH, likelihood};
-use super::rates::{RESTS_AFTER_SLIDE, Transitions, transitions};
+use super::rates::{Transitions, transitions};
 use super::reach::{Reach, Shown};
 use super::scene::{Scene, WheelScene};
 use super::touch::Touch;
@@ -43,7 +43,8 @@ const SIDE_S: f64 = 1.0;
 /// Speed at which slips begin half as often as at high speed (m/s); the same for steady creep.
 const SLIPS_ABOVE: f64 = 0.5;
 const CREEPS_ABOVE: f64 = 5.0;
-/// The hypotheses that both slip, independently and alike.
+/// The hypotheses that both roll, and that both slip, independently and alike.
+const ROLL: usize = 0;
 const SLIP: usize = 3;
 const CREEP: usize = 4;
 /// Wheels have not come back to the train while they differ from it by more (m/s, part of its speed) ...
@@ -281,7 +282,14 @@ impl Bank {
     fn transitions(&self, scene: &Scene, t: f64) -> Transitions {
         let Transitions { ends, after_rolling, after_others } = transitions(scene, self.found_dead, t);
         let may = self.may_begin();
-        Transitions { ends, after_rolling: after_rolling * may, after_others: after_others * may }
+        let State { v, pvv, .. } = self.filters.state(ROLL);
+        let after_rolling = with_stands(after_rolling * may, |stands| stands * may_stop(v, pvv));
+        // Wheels that roll show how fast the train is. Those of a slide do not.
+        let ending = larger((ends * self.probability).sum(), LEAST);
+        let after_others = with_stands(after_others * may, |stands| {
+            larger(stands * may_stop(self.speed, self.variance), self.slides_that_stop() * t / ending)
+        });
+        Transitions { ends, after_rolling, after_others }
     }
 
     /// What ends in a period.
@@ -359,21 +367,12 @@ impl Bank {
         [alike, of_first, of_second]
     }
 
-    /// How easily each hypothesis begins at the speed of the train, 0 to 1: nothing slips at rest, and only a slow train comes to
-    /// rest.
+    /// How easily each hypothesis but that of a train at rest begins at the speed of the train, 0 to 1: nothing slips at rest.
     fn may_begin(&self) -> Lanes {
         let moves = self.speed * self.speed;
         let moving = |above: f64| moves / (moves + above * above);
         let (slips, creeps) = (moving(SLIPS_ABOVE), moving(CREEPS_ABOVE) * moving(CREEPS_ABOVE));
-        let slow = self.variance + STOPS_BELOW * STOPS_BELOW;
-        // At speed this is less than the least number there is.
-        let stops = if moves > NEVER_STOPS * slow {
-            0.0
-        } else {
-            libm::exp(-0.5 * moves / slow) * STOPS_BELOW / libm::sqrt(slow)
-        };
-        let stops = larger(stops, self.slides_that_stop() / RESTS_AFTER_SLIDE);
-        Lanes([1.0, slips, slips, slips, creeps, stops, 1.0, 1.0])
+        Lanes([1.0, slips, slips, slips, creeps, 1.0, 1.0, 1.0])
     }
 
     /// How often a slide of both comes to rest now (1/s), times its probability: as often as its speed passes zero. Silent wheels do not
@@ -450,6 +449,23 @@ impl Bank {
         let differ = larger((measured + self.ratio).abs() - most, 0.0);
         self.beyond += (differ - self.beyond) * smaller(t / BEYOND_S, 1.0);
     }
+}
+
+/// How easily a train of this speed (m/s) and variance (m²/s²) comes to rest, 0 to 1.
+fn may_stop(v: f64, variance: f64) -> f64 {
+    let slow = variance + STOPS_BELOW * STOPS_BELOW;
+    // At speed this is less than the least number there is.
+    if v * v > NEVER_STOPS * slow {
+        return 0.0;
+    }
+    libm::exp(-0.5 * v * v / slow) * STOPS_BELOW / libm::sqrt(slow)
+}
+
+/// The same rates with another one for a train that comes to rest.
+fn with_stands(mut rates: Lanes, of: impl Fn(f64) -> f64) -> Lanes {
+    let [.., stands, _, _] = &mut rates.0;
+    *stands = of(*stands);
+    rates
 }
 
 /// The shares of both wheels where both roll.

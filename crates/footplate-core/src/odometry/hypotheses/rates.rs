@@ -53,8 +53,6 @@ const STAYS_DEAD: f64 = 0.1;
 const ENDS: Lanes = Lanes([0.0, 0.5, 0.5, 0.4, 0.15, 0.2, 0.02, 0.02]);
 /// What follows when another hypothesis than "both roll" ends; the rest stays with it.
 const FOLLOWS: Lanes = Lanes([0.58, 0.12, 0.12, 0.09, 0.04, 0.05, 1e-5, 1e-5]);
-/// How often a slide of both ends at rest (1/s), of those that end.
-pub(super) const RESTS_AFTER_SLIDE: f64 = 0.4 * 0.05;
 /// A train at rest ends a run of both wheels this often (1/s), where its speed allows.
 const STOPS: f64 = 0.5;
 /// Effort that counts where none is recorded.

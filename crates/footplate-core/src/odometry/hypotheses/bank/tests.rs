@@ -104,3 +104,15 @@ fn a_train_does_not_stand_because_a_sensor_died_beside_a_spinning_wheel() {
     let found = after(stands, [15.0, 0.0], 0.4, 10);
     assert!((found.speed - 15.0).abs() < 0.5, "{} {:?}", found.speed, found.probabilities());
 }
+
+#[test]
+fn no_hypothesis_leaps_where_a_slide_may_end_at_rest() {
+    let mut bank = bank(0.05);
+    bank.filters.a = Lanes::all(-0.6);
+    bank.filters.pvv = Lanes::all(0.02);
+    bank.probability = Lanes([0.1, 1e-6, 1e-6, 0.85, 1e-6, 0.05, 1e-9, 1e-9]);
+    bank.step(&Scene::of_test([0.0, 0.0], Some(-0.6)), 0.2);
+    let fastest = bank.filters.v.0.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    assert!(fastest < 0.2, "{:?}", bank.filters.v);
+    assert!(bank.speed.abs() < 0.05, "{}", bank.speed);
+}
