@@ -338,7 +338,7 @@ impl Bank {
     /// roll. A sensor that is taken for dead may be the good one: its wheel rolls, and the other slips or has the dead sensor. So may a
     /// wheel that is taken to slip beside a stuck count, or to spin beside a silent one: no wheel is locked in traction.
     fn lost(&self, scene: &Scene, [one, other]: &[Compared; 2], pool: &Pool) -> [f64; 3] {
-        let [_, first_slips, second_slips, slip, _, _, first_dead, second_dead] = self.probability.0;
+        let [_, first_slips, second_slips, slip, creep, _, first_dead, second_dead] = self.probability.0;
         let [_, (most, part)] = CREEP_BY;
         let leap = |speed: f64, variance: f64, least: f64| {
             let leap = (speed - pool.v).abs();
@@ -346,9 +346,11 @@ impl Bank {
             if leap > far { leap * leap } else { 0.0 }
         };
         let turn = scene.wheels.iter().all(|wheel| wheel.read && wheel.speed.abs() > SILENT);
-        // A smaller leap may be creep. Spinning wheels turn alike, too.
-        let alike = if self.side > 0.0 && turn && slip > 0.9 {
-            leap(0.5 * (one.speed + other.speed), one.variance, most + part * pool.v.abs())
+        // After slides of each, a smaller leap may be creep; wheels that are taken to creep may roll at any speed below. Spinning wheels turn
+        // alike, too.
+        let alike = if self.side > 0.0 && turn && larger(slip, creep) > 0.9 {
+            let least = if creep > slip { AWAY } else { most + part * pool.v.abs() };
+            leap(0.5 * (one.speed + other.speed), one.variance, least)
         } else {
             0.0
         };

@@ -30,6 +30,9 @@ const JERKS: f64 = 4.0;
 /// Least and largest creepage of wheels that creep alike (m/s, part of the speed), and by how much they differ.
 pub(super) const CREEP: [(f64, f64); 2] = [(0.2, 0.02), (1.0, 0.2)];
 const CREEP_APART: f64 = 0.02;
+/// The same of wheels that roll, under effort too (part of the speed), and how long a difference of wheels that creep lasts (s).
+const ALIKE: f64 = 0.003;
+const APART_S: f64 = 1.0;
 /// How closely they accelerate with the train (m/s²), over so long (s).
 const STEADY: f64 = 0.1;
 pub(super) const STEADY_S: f64 = 1.0;
@@ -384,8 +387,11 @@ fn alike(one: &Shown, other: &Shown, train: &State, wheels_a: f64) -> f64 {
     let outside = smaller(u - least_part * v - least, 0.0) + larger(u - most_part * v - most, 0.0);
     let outside = outside * outside / (train.pvv + 0.5 * variance);
     let b = (wheels_a - train.a) / STEADY;
+    // Wheels that roll agree more closely: that they agree says less for creepage.
+    let rolling = v * v * (ALIKE * ALIKE) + variance;
+    let spread = (v * v * (CREEP_APART * CREEP_APART) + variance) / rolling;
     -0.5 * one.followed * (differs + outside + one.unsteady(train) + other.unsteady(train))
-        - one.t * (ruled_out + silent + 0.5 / STEADY_S * unusual(b * b))
+        - one.t * (ruled_out + silent + 0.5 / STEADY_S * unusual(b * b) + 0.5 / APART_S * ln(spread))
 }
 
 /// Heavy-tailed cost of a squared innovation of the acceleration of a slipping wheel: the rail grips and lets go in jerks.

@@ -116,3 +116,35 @@ fn no_hypothesis_leaps_where_a_slide_may_end_at_rest() {
     assert!(fastest < 0.2, "{:?}", bank.filters.v);
     assert!(bank.speed.abs() < 0.05, "{}", bank.speed);
 }
+
+/// A train that is taken to creep at 24 m/s, whose wheels brake from 20 m/s by 0.8 m/s² and differ by a share of their speed that changes its
+/// sign each second. Returns the bank and the speed of the wheels after 8 s.
+fn taken_to_creep(apart: f64) -> (Bank, f64) {
+    let mut bank = bank(24.0);
+    bank.filters.a = Lanes::all(-0.8);
+    bank.probability = Lanes([1e-9, LEAST, LEAST, 1e-3, 1.0, LEAST, LEAST, LEAST]);
+    let mut speed = 20.0;
+    for period in 0..160 {
+        speed -= 0.8 * 0.05;
+        let half = if period / 20 % 2 == 0 { 0.5 * apart } else { -0.5 * apart };
+        let mut scene = Scene::of_test([speed * (1.0 + half), speed * (1.0 - half)], Some(-0.8));
+        for wheel in &mut scene.wheels {
+            wheel.acceleration = -0.8;
+        }
+        bank.step(&scene, 0.05);
+    }
+    (bank, speed)
+}
+
+#[test]
+fn wheels_that_agree_for_long_roll_again() {
+    let (bank, speed) = taken_to_creep(0.0);
+    assert!((bank.speed - speed).abs() < 0.1, "{} instead of {speed}: {:?}", bank.speed, bank.probability);
+}
+
+#[test]
+fn wheels_that_differ_by_three_percent_creep_on() {
+    let (bank, speed) = taken_to_creep(0.03);
+    let train = 24.0 - 0.8 * 8.0;
+    assert!((bank.speed - train).abs() < 1.5, "{}, wheels {speed}: {:?}", bank.speed, bank.probability);
+}
