@@ -390,16 +390,17 @@ fn a_journey_goes_on_after_a_person_switched_the_power_off_and_on() {
 }
 
 /// The same two trains with all turnouts unknown.
-fn with_unknown_turnouts(starts: [(&str, f64); 2]) -> Traffic {
+/// A watched dispatcher to which only these turnout positions are known.
+pub(crate) fn knowing(turnouts: &TurnoutStates, starts: [(&str, f64); 2]) -> Traffic {
     Traffic::with(
         |now, driver| {
-            let mut unknown = Driver::new(driver.layout().clone(), TurnoutStates::unknown());
+            let mut knowing = Driver::new(driver.layout().clone(), turnouts.clone());
             for train in TRAINS {
                 let located = driver.locate(train, now).expect("placed");
-                unknown.add_train(model(train));
-                unknown.place(now, train, located.at, located.uncertainty);
+                knowing.add_train(model(train));
+                knowing.place(now, train, located.at, located.uncertainty);
             }
-            Dispatcher::watched(now, unknown)
+            Dispatcher::watched(now, knowing)
         },
         starts,
     )
@@ -407,7 +408,7 @@ fn with_unknown_turnouts(starts: [(&str, f64); 2]) -> Traffic {
 
 #[test]
 fn unknown_turnouts_are_set_for_a_journey() {
-    let mut traffic = with_unknown_turnouts([("A1", 50.0), ("B1", 300.0)]);
+    let mut traffic = knowing(&TurnoutStates::unknown(), [("A1", 50.0), ("B1", 300.0)]);
     traffic.go(TRAINS[0], "C1+100mm");
     traffic.run(60.0);
     assert!(traffic.wrongs.is_empty(), "{:?}", traffic.wrongs);
@@ -416,7 +417,7 @@ fn unknown_turnouts_are_set_for_a_journey() {
 
 #[test]
 fn a_journey_is_refused_while_a_train_may_be_on_a_turnout_of_unknown_position() {
-    let mut traffic = with_unknown_turnouts([("D1", 500.0), ("A1", 250.0)]);
+    let mut traffic = knowing(&TurnoutStates::unknown(), [("D1", 500.0), ("A1", 250.0)]);
     let journey = Journey::to(traffic.world.layout.landmark("C1").expect("a place"));
     let refused = traffic.dispatcher.go(traffic.world.now, TRAINS[0], journey);
     assert_eq!(refused, Err(Refusal::TurnoutUnknown { turnout: TurnoutId(1), train: TRAINS[1] }));

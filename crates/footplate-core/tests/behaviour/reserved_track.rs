@@ -1,12 +1,12 @@
 //! A dispatched train keeps the track on which it may be, and no more: when it stalls, is placed by hand, or when a report is
 //! ambiguous. A journey whose turnouts cannot be set is given up.
 
-use footplate_core::control::{Dispatcher, Machine, Notice, Order, Refusal};
-use footplate_core::track::Position;
+use footplate_core::control::{Dispatcher, LinkNews, Machine, Notice, Order, Refusal};
+use footplate_core::track::{Leg, Position};
 use footplate_core::tracking::PathPoint;
-use footplate_core::{Length, TurnoutId};
+use footplate_core::{Length, Timestamp, TurnoutId};
 
-use crate::dispatching::{LENGTHS, STARTS, TRAINS, Traffic, is_held};
+use crate::dispatching::{LENGTHS, STARTS, TRAINS, Traffic, is_held, knowing};
 use crate::toy_railway::{step, straight};
 
 #[test]
@@ -35,6 +35,66 @@ fn a_train_that_stalls_while_it_is_driven_by_hand_keeps_the_track_under_it() {
     traffic.run(60.0);
     assert_eq!(traffic.wrongs, Vec::<String>::new());
     assert_eq!(traffic.arrivals(train), 1, "{:#?}", traffic.notices);
+}
+
+#[test]
+fn a_train_that_stalls_as_it_starts_keeps_its_track_until_a_sensor_reports_it() {
+    // Given a train that does not move at all on a run past no sensor,
+    let mut traffic = Traffic::with(Dispatcher::new, [("D1", 100.0), ("E1", 300.0)]);
+    let [train, _] = TRAINS;
+    traffic.world.trains.iter_mut().filter(|toy| toy.id == train).for_each(|toy| toy.wheels = 0.0);
+    traffic.go(train, "D1+600mm");
+    traffic.run(20.0);
+    assert_eq!(traffic.arrivals(train), 1, "{:#?}", traffic.notices);
+    // when two journeys are given up one after the other, because no path leads there,
+    for given_up in 1..=2 {
+        traffic.go(train, "E1+100mm");
+        traffic.run(4.0);
+        let is_given_up =
+            |notice: &&Notice| matches!(notice, Notice::GivenUp { why: Refusal::Unreachable { .. }, .. });
+        assert_eq!(traffic.notices.iter().filter(is_given_up).count(), given_up, "{:#?}", traffic.notices);
+    }
+    // then the track on which it stands is still reserved for it, and released once a sensor has reported it.
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+    let place = traffic.world.trains.iter().find(|toy| toy.id == train).expect("on the rails").at;
+    let is_reserved = |traffic: &Traffic| {
+        is_held(&traffic.world.layout, place, traffic.dispatcher.reservation(train).expect("dispatched"))
+    };
+    assert!(is_reserved(&traffic));
+    traffic.world.trains.iter_mut().for_each(|toy| toy.wheels = 1.0);
+    traffic.go(train, "B1+250mm");
+    traffic.run(60.0);
+    assert_eq!((traffic.arrivals(train), is_reserved(&traffic)), (2, false), "{:#?}", traffic.notices);
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+}
+
+#[test]
+fn a_train_in_danger_that_is_placed_before_points_of_unknown_position_occupies_the_track_there() {
+    // Given a train that is measured again, and points whose position nobody has entered,
+    let points_1 = [(TurnoutId(1), Leg::Straight)].into_iter().collect();
+    let mut traffic = knowing(&points_1, [STARTS[0], ("E1", 300.0)]);
+    let [train, _] = TRAINS;
+    traffic.go(train, "B1+100mm");
+    traffic.run(2.5);
+    traffic.dispatcher.handle_link(traffic.world.now, LinkNews::Silent);
+    traffic.run(3.0);
+    traffic.dispatcher.handle_link(traffic.world.now, LinkNews::Answers);
+    let is_located =
+        |traffic: &Traffic| traffic.notices.iter().any(|notice| matches!(notice, Notice::Located { .. }));
+    while !is_located(&traffic) && traffic.world.now < Timestamp::from_s(60.0) {
+        traffic.run(0.5);
+    }
+    assert!(is_located(&traffic), "{:#?}", traffic.notices);
+    // when a person puts it down before them,
+    let d2 = traffic.world.layout.node_named("D2").expect("a node");
+    let at = PathPoint { node: d2, distance: Length::from_mm(70.0) };
+    traffic.dispatcher.place(traffic.world.now, train, at, Length::from_mm(2.0));
+    assert!(traffic.dispatcher.is_in_danger(train));
+    // then the track there is reserved for it, although it depends on them what is ahead.
+    assert_eq!(traffic.dispatcher.driver().position(train, traffic.world.now), None);
+    let edge = traffic.world.layout.outgoing(d2).edges().next().expect("track");
+    let reserved = traffic.dispatcher.reservation(train).expect("dispatched");
+    assert!(is_held(&traffic.world.layout, Position { edge, offset: at.distance }, reserved), "{reserved:?}");
 }
 
 #[test]

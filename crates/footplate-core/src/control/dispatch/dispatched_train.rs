@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use crate::control::drive::{Aim, OrderId};
 use crate::ids::{TrainId, TurnoutId};
 use crate::time::Timestamp;
-use crate::track::{Landmark, Position};
+use crate::track::{Landmark, Layout, Position};
 use crate::units::Length;
 
 use super::movement_authority::{MovementAuthority, TrainLengths};
@@ -89,7 +89,7 @@ pub(super) struct DispatchedTrain {
     pub(super) state: State,
     /// Its reservation.
     pub(super) reservation: Reservation,
-    /// Its earlier reservation, on which it may still be.
+    /// Track that it had reserved before, on which it may still be: see [`reserve`](Self::reserve).
     pub(super) kept: Reservation,
     /// Turnouts that it trails on its present run, because they cannot be thrown under it.
     pub(super) skipped: BTreeSet<TurnoutId>,
@@ -156,6 +156,15 @@ impl DispatchedTrain {
             withdrawn: 0,
             waiting_reported: false,
         }
+    }
+
+    /// Reserves track for it at rest, and the track of its runs since a sensor reported it last: it may have stalled on any of that.
+    pub(super) fn reserve(&mut self, layout: &Layout, standstill: Reservation) {
+        if self.detected_since_start {
+            self.kept = Reservation::empty();
+        }
+        self.reservation = standstill;
+        self.reservation.add(layout, &self.kept);
     }
 
     /// The train that it steps aside for.

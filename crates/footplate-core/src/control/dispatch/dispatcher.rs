@@ -198,9 +198,12 @@ impl Dispatcher {
             known.reservation = Reservation::empty();
             known.occupied = OccupiedPath::default();
         }
-        self.reserve_standstill(now, train);
         // No train runs on to where another stands.
         let under = self.trains.get(&train).map(|placed| self.track_under(now, placed));
+        if is_in_danger && let (Some(known), Some(under)) = (self.trains.get_mut(&train), &under) {
+            known.reservation = under.clone();
+        }
+        self.reserve_standstill(now, train);
         under.into_iter().for_each(|under| drop(self.stop_on(now, train, &under)));
     }
 
@@ -327,8 +330,7 @@ impl Dispatcher {
         let is_free = self.is_free_for(id, &reservation);
         if let Some(train) = self.trains.get_mut(&id).filter(|train| is_free || train.reservation.is_empty())
         {
-            train.reservation = reservation;
-            train.kept = Reservation::empty();
+            train.reserve(layout, reservation);
         }
         self.has_changed = true;
     }

@@ -97,14 +97,14 @@ impl Dispatcher {
             let (Some(targets), Some(start)) = (self.targets(id), self.start(now, id)) else { continue };
             let unobstructed = self.unobstructed(now, id, &start, &targets);
             let Some(unobstructed) = unobstructed else {
-                if self.watchdog.driver().missed_sensor(id, now).is_some() {
-                    if !self.look_back(id) && !self.look_ahead(now, id, &start) {
-                        self.lose(now, id);
-                    }
-                } else if self.only_uncertainty_bars(id, &start, &targets) {
-                    self.lose(now, id);
-                } else {
+                let is_missed = self.watchdog.driver().missed_sensor(id, now).is_some();
+                let is_unseen =
+                    is_missed || self.trains.get(&id).is_some_and(|train| !train.detected_since_start);
+                if !is_missed && !self.only_uncertainty_bars(id, &start, &targets) {
                     self.cannot_go(now, id, self.unreachable(id));
+                } else if !(is_missed && self.look_back(id) || is_unseen && self.look_ahead(now, id, &start))
+                {
+                    self.lose(now, id);
                 }
                 continue;
             };
@@ -177,10 +177,11 @@ impl Dispatcher {
         seconds
     }
 
-    /// Whether the position of a train is very uncertain, and nothing else bars its path: it has to be located first.
+    /// Whether the position of a train is very uncertain, or no sensor has reported it since it started, and nothing else bars its
+    /// path: it has to be located first.
     fn only_uncertainty_bars(&self, id: TrainId, start: &Start, targets: &[Position]) -> bool {
         let Some(train) = self.trains.get(&id).filter(|_| self.watchdog.is_watching()) else { return false };
-        if start.envelope.ahead - start.envelope.front <= FAR {
+        if train.detected_since_start && start.envelope.ahead - start.envelope.front <= FAR {
             return false;
         }
         let envelope = ClearanceEnvelope::of(train.lengths, Length::ZERO, self.overrun(id, Length::ZERO));

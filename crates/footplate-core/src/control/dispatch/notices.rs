@@ -194,9 +194,10 @@ impl Dispatcher {
             }
             Notice::Recovered { train, .. } => {
                 self.awaiting_creep.remove(train);
-                if let Some(known) = self.trains.get_mut(train) {
-                    // It is no longer on the track of its authority.
-                    known.reservation = Reservation::empty();
+                // It is no longer on the track of its authority, and perhaps before points of unknown position.
+                let under = self.trains.get(train).map(|known| self.track_under(now, known));
+                if let (Some(known), Some(under)) = (self.trains.get_mut(train), under) {
+                    known.reservation = under;
                     known.kept = Reservation::empty();
                     known.detected_since_start = true;
                 }

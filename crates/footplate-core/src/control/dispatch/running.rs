@@ -343,10 +343,14 @@ impl Dispatcher {
     /// Releases the track that a train at rest at the end of its run certainly does not occupy. It keeps its whole
     /// reservation if no sensor has confirmed the run.
     fn rest(&mut self, now: Timestamp, id: TrainId, rear: Length, ended: Option<MovementAuthority>) {
-        if ended.is_some() {
-            self.release_anchors(now, id);
-        }
-        let Some((train, run)) = self.trains.get(&id).zip(ended) else { return };
+        let Some(run) = ended else {
+            if let Some(train) = self.trains.get_mut(&id) {
+                train.kept = train.reservation.clone();
+            }
+            return;
+        };
+        self.release_anchors(now, id);
+        let Some(train) = self.trains.get(&id) else { return };
         let Some(place) = self.watchdog.driver().position(id, now) else { return };
         let envelope = self.envelope(now, train);
         // The path may lead round a circuit to its start.
@@ -410,7 +414,7 @@ impl Dispatcher {
 
     /// Restores the reservation of a train that does not start, with the track under it, as it may have reversed.
     pub(super) fn restore_reservation(&mut self, now: Timestamp, id: TrainId) {
-        let kept = self.trains.get_mut(&id).map(|train| core::mem::take(&mut train.kept));
+        let kept = self.trains.get(&id).map(|train| train.kept.clone());
         self.reserve_standstill(now, id);
         let layout = self.watchdog.driver().layout();
         if let (Some(train), Some(kept)) = (self.trains.get_mut(&id), kept) {
