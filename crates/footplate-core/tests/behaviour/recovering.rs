@@ -54,12 +54,21 @@ fn a_train_lost_again_on_reserved_track_does_not_creep_on() {
 
 #[test]
 fn a_train_whose_rear_is_on_points_that_it_pushed_over_does_not_creep_back() {
-    for is_curved in [false, true] {
-        // Given a train under a dispatcher, and turnout 2, whose points it trails 100 mm before D1, set for its leg or not,
+    for lies in [Some(Leg::Straight), Some(Leg::Curved), None] {
+        // Given a train under a dispatcher, and turnout 2, whose points it trails 200 mm before D1, set for its leg or not, or in an
+        // unknown position, because the station was silent when they were to move,
         let mut watched = Watched::asking();
         watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
         assert!(watched.run_until(200.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
         watched.run(5.0);
+        let throw = Order::Turnout { turnout: TurnoutId(2), curved: lies != Some(Leg::Straight) };
+        if lies.is_none() {
+            watched.dog.handle_link(watched.world.now, LinkNews::Silent);
+            watched.dog.order(watched.world.now, throw).expect("a turnout");
+            watched.run(1.0);
+            watched.dog.handle_link(watched.world.now, LinkNews::Answers);
+            watched.run(1.0);
+        }
         watched.go(FIRST, 4);
         let [a1, d1] = [0, 6].map(SensorId);
         let reaches = |watched: &mut Watched, sensor: SensorId| {
@@ -69,8 +78,11 @@ fn a_train_whose_rear_is_on_points_that_it_pushed_over_does_not_creep_back() {
             })
         };
         assert!(reaches(&mut watched, a1), "{:#?}", watched.notices);
-        let throw = Order::Turnout { turnout: TurnoutId(2), curved: is_curved };
-        watched.dog.order(watched.world.now, throw).expect("a turnout");
+        if lies.is_some() {
+            watched.dog.order(watched.world.now, throw).expect("a turnout");
+            watched.run(1.0);
+        }
+        assert_eq!(watched.dog.driver().turnouts().get(TurnoutId(2)), lies);
         let from = watched.commanded.len();
         assert!(reaches(&mut watched, d1), "{:#?}", watched.notices);
         watched.run(0.2);
@@ -81,7 +93,8 @@ fn a_train_whose_rear_is_on_points_that_it_pushed_over_does_not_creep_back() {
         watched.run(12.0);
         // then it reverses only if the points lie for the leg that it came from.
         let reverses = |(_, command): &(_, Command)| matches!(command, Command::Reverse { .. });
-        assert_eq!(watched.commanded.iter().skip(from).any(reverses), !is_curved, "{:#?}", watched.notices);
+        let is_reversed = watched.commanded.iter().skip(from).any(reverses);
+        assert_eq!(is_reversed, lies == Some(Leg::Straight), "{lies:?}: {:#?}", watched.notices);
     }
 }
 

@@ -2,7 +2,7 @@
 //! another train or off its track.
 #![expect(clippy::expect_used, clippy::indexing_slicing, reason = "a test may stop at the first surprise")]
 
-use footplate_core::control::{Alarm, Notice, Outcome};
+use footplate_core::control::{Alarm, LinkNews, Notice, Outcome, Reservation};
 use footplate_core::{Command, SensorId};
 
 use crate::watching::{FIRST, Watched};
@@ -76,6 +76,29 @@ fn a_report_elsewhere_sooner_than_a_hand_can_move_a_train_is_not_of_it() {
     assert_eq!(watched.alarm(), None, "{:#?}", watched.notices);
     // Were it there later, a hand may have.
     assert!(matches!(spurious_and_missed(2.4).alarm(), Some(Alarm::Elsewhere(_))));
+}
+
+#[test]
+fn a_report_where_a_train_cannot_have_run_leaves_a_lost_train_to_a_person() {
+    for name in ["F1", "A1"] {
+        // Given a train under a dispatcher that the silence of the station stops between `D1` and `A1`,
+        let mut watched = running_past_d1(1.0);
+        watched.dog.ask_before_creeping();
+        watched.dog.handle_link(watched.world.now, LinkNews::Silent);
+        // when a sensor reports it as it stops, or on a siding to which no track leads,
+        let sensor = watched.world.layout.sensor_named(name).expect("a sensor");
+        watched.world.dead.insert(sensor);
+        watched.run(0.3);
+        watched.world.close(sensor);
+        watched.dog.handle_link(watched.world.now, LinkNews::Answers);
+        watched.run(10.0);
+        watched.dog.permit(watched.world.now, FIRST, Reservation::empty());
+        watched.run(1.0);
+        // then it creeps to be located from where it can be, and nowhere if that is not known.
+        let creeps = watched.notices.iter().any(|notice| matches!(notice, Notice::Creeps { .. }));
+        let asks = watched.notices.iter().any(|notice| matches!(notice, Notice::NeedsOperator { .. }));
+        assert_eq!((creeps, asks), (name == "A1", name == "F1"), "{name}: {:#?}", watched.notices);
+    }
 }
 
 #[test]

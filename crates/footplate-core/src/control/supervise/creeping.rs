@@ -170,10 +170,10 @@ impl Watchdog {
         self.behind.get(&train).is_some_and(|behind| behind.was_placed)
     }
 
-    /// Whether a turnout that is trailed on an edge lies for the other leg.
+    /// Whether a turnout that is trailed on an edge lies for the other leg, or may.
     fn lies_otherwise(&self, edge: EdgeId) -> bool {
         let is_other = |need: TurnoutNeed| {
-            !need.facing && self.driver.turnouts().get(need.turnout).is_some_and(|leg| leg != need.leg)
+            !need.facing && self.driver.turnouts().get(need.turnout).is_none_or(|leg| leg != need.leg)
         };
         self.driver.layout().needs_of(edge).any(is_other)
     }
@@ -201,7 +201,7 @@ impl Watchdog {
     }
 
     /// The longest distance that a train can have run since its last detection.
-    fn unheard_run(&self, now: Timestamp, train: TrainId) -> Length {
+    pub(super) fn unheard_run(&self, now: Timestamp, train: TrainId) -> Length {
         let known = self.unheard.get(&train).copied().unwrap_or_default();
         let Some(model) = self.base_model(train) else { return LOST_REACH };
         known.after(now, model).run * FASTER

@@ -6,6 +6,7 @@ use crate::track::Position;
 use crate::units::Length;
 
 use super::alarm::Alarm;
+use super::danger::BODY;
 use super::recovery::{Phase, Recovery};
 use super::unheard::Behind;
 use super::watchdog::Watchdog;
@@ -54,15 +55,37 @@ impl Watchdog {
         passed.is_none_or(|passed| time - passed >= HANDLED_IN)
     }
 
-    /// A detection that no train explains while a lost train comes to rest is of that train.
+    /// A detection that no train explains while a lost train comes to rest is of that train, if it can have run there. From anywhere
+    /// else it is of a train that a hand has moved, or of none: nothing is known then of where this one is.
     pub(super) fn note_stopping(&mut self, sensor: SensorId, time: Timestamp) {
         let stops = |(train, danger): (&TrainId, &Recovery)| {
             (danger.is_searched() && danger.phase == Phase::Stopping).then_some(*train)
         };
         let mut stopping = self.dangers.iter().filter_map(stops);
         if let (Some(train), None) = (stopping.next(), stopping.next()) {
-            self.note_elsewhere(train, sensor, time);
+            if self.permits_all || self.can_have_run_to(time, train, sensor) {
+                self.note_elsewhere(train, sensor, time);
+            } else {
+                self.seen.remove(&train);
+                self.undirected.insert(train);
+            }
         }
+    }
+
+    /// Whether a train can have run to a sensor since its last detection, over either leg of any turnout.
+    fn can_have_run_to(&self, now: Timestamp, train: TrainId, sensor: SensorId) -> bool {
+        let layout = self.driver.layout();
+        let run = self.unheard_run(now, train) + BODY;
+        let Some(seen) = self.seen.get(&train) else { return false };
+        let back = layout.reversed(*seen).filter(|_| self.undirected.contains(&train));
+        let from = core::iter::once(*seen).chain(back).map(|place| (place.edge, run + place.offset));
+        let reached = layout.edges_within(from);
+        reached.into_iter().any(|(id, left)| {
+            layout.edge(id).is_some_and(|edge| {
+                let ends = [edge.to, edge.to.reverse()];
+                left >= edge.length && ends.into_iter().any(|end| layout.sensor_at(end) == Some(sensor))
+            })
+        })
     }
 
     /// Searches for a train from a sensor. One that reports both directions of travel does not show the direction.
