@@ -8,7 +8,7 @@ use footplate_core::{Command, FunctionNumber, SpeedStep, TrainId};
 use crate::dialogue::Dialogue;
 use crate::outstanding::Awaited;
 use crate::queue::Queue;
-use crate::session::Transmit;
+use crate::session::{LinkNotice, Transmit};
 
 /// What the station has reported of a locomotive's functions. Sets have F0 in the lowest bit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -170,6 +170,22 @@ impl<A: Awaited> Dialogue<A> {
         locomotive.is_stopped = locomotive.step == SpeedStep::STAND;
         if let Some(forward) = locomotive.forward {
             self.keep_direction(train, forward);
+        }
+    }
+
+    /// The station has forgotten how trains run, and is asked again. A reversal that it had not confirmed may have been lost.
+    pub(crate) fn forget_directions(&mut self) {
+        let trains: Vec<TrainId> = self.locomotives.iter().map(|known| known.train).collect();
+        trains.into_iter().for_each(|train| self.forget_direction(train));
+    }
+
+    /// The same of one train.
+    pub(crate) fn forget_direction(&mut self, train: TrainId) {
+        let confirmed = self.locomotives.last_direction(train);
+        let Some(locomotive) = self.locomotives.get_mut(train) else { return };
+        let commanded = locomotive.forward.take();
+        if commanded.is_some() && commanded != confirmed {
+            self.notify(LinkNotice::ReverseInDoubt { train });
         }
     }
 

@@ -1,12 +1,12 @@
 //! In which direction a train runs next, whatever its station has forgotten.
 
 use footplate_core::{Command, DecoderSteps};
-use footplate_wire::Session;
 use footplate_wire::z21::{LocomotiveState, Request, Throttle};
+use footplate_wire::{LinkNotice, Session};
 
 use crate::desk::{T24, T58, speed};
 use crate::z21_desk::state;
-use crate::{dcc_ex_desk, z21_desk};
+use crate::{dcc_ex_desk, loconet_session, z21_desk};
 
 fn z21_drive(address: u16, throttle: Throttle, forward: bool) -> Request {
     Request::Drive { address, steps: DecoderSteps::All, throttle, forward }
@@ -73,4 +73,25 @@ fn a_station_that_has_forgotten_a_direction_is_commanded_the_one_of_the_session_
     desk.station.answers = true;
     desk.run_for(2_000);
     assert_eq!(desk.directions.last(), Some(&(T24, false)));
+}
+
+#[test]
+fn a_reversal_that_a_station_may_have_forgotten_is_in_doubt() {
+    let mut desk = loconet_session::Desk::opened();
+    desk.command(speed(T24, 8));
+    desk.run_for(300);
+    desk.command(speed(T24, 0));
+    desk.run_for(600);
+    // Given a command station that loses its power before it reverses a train,
+    desk.station.is_on = false;
+    desk.command(Command::Reverse { train: T24 });
+    desk.run_for(300);
+    // when it is back, and has given the slot to nobody,
+    desk.station.slots.clear();
+    (desk.station.is_on, desk.station.power) = (true, false);
+    desk.run_for(4_000);
+    // then the train faces as before, and that is said.
+    assert!(desk.notices.contains(&LinkNotice::Restarted), "{:?}", desk.notices);
+    assert!(desk.notices.contains(&LinkNotice::ReverseInDoubt { train: T24 }), "{:?}", desk.notices);
+    assert!(desk.station.slots[&1].forward);
 }

@@ -12,8 +12,8 @@ use crate::desk::{Station, T24, T58, function, ms, speed};
 
 /// A server and a command station that answer as the protocols say.
 pub(crate) struct Server {
-    slots: BTreeMap<u8, SlotData>,
-    power: bool,
+    pub(crate) slots: BTreeMap<u8, SlotData>,
+    pub(crate) power: bool,
     occupied: Vec<u16>,
     /// How many slots there are.
     room: u8,
@@ -21,7 +21,7 @@ pub(crate) struct Server {
     loses: fn(usize) -> bool,
     /// Whether the server answers, whether the command station has power, and whether the server echoes.
     answers: bool,
-    is_on: bool,
+    pub(crate) is_on: bool,
     echoes: bool,
     count: usize,
 }
@@ -133,7 +133,7 @@ impl Desk {
         Self::with(Client::new(ms(0), settings), station)
     }
 
-    fn opened() -> Self {
+    pub(crate) fn opened() -> Self {
         let mut desk = Self::new(Settings::default());
         desk.run_until(ms(3_000));
         assert_eq!(desk.notices.last(), Some(&LinkNotice::Answers), "{:?}", desk.written);
@@ -359,6 +359,7 @@ fn a_station_that_was_restarted_gets_everything_again() {
     assert!(desk.station.power);
     let slot = desk.station.slots[&1];
     assert_eq!((slot.address, slot.speed, slot.forward), (24, 0, false), "it stands, in its own direction");
+    assert!(!desk.notices.contains(&LinkNotice::ReverseInDoubt { train: T24 }), "{:?}", desk.notices);
 }
 
 #[test]

@@ -207,8 +207,8 @@ impl Client {
     /// JMRI has stopped a train and given up its throttle, which must be asked for again.
     pub(super) fn lost_throttle(&mut self, train: TrainId) {
         self.obeyed.retain(|obeyed| *obeyed != train);
+        self.dialogue.forget_direction(train);
         let Some(locomotive) = self.dialogue.locomotives.get_mut(train) else { return };
-        locomotive.forward = None;
         locomotive.step = SpeedStep::STAND;
         if locomotive.is_driven {
             self.dialogue.stop(train);

@@ -173,9 +173,7 @@ impl Client {
         }
         self.dialogue.restarted();
         self.unused.clear();
-        for locomotive in self.dialogue.locomotives.iter_mut() {
-            locomotive.forward = None;
-        }
+        self.dialogue.forget_directions();
         self.verify();
     }
 
