@@ -82,9 +82,14 @@ pub(crate) trait Protocol {
     /// Returns the request that switches the power of the track.
     fn switch_power(&self, on: bool) -> Confirmed<Self>;
 
-    /// Returns the next request to write again. A turnout is not thrown again while a coil is powered: its pulse would not end.
+    /// Whether a turnout may be thrown now. While a coil is powered, its pulse would not end.
+    fn may_throw(&self) -> bool {
+        self.release_at().is_none()
+    }
+
+    /// Returns the next request to write again.
     fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Next<Self>> {
-        let may_throw = self.release_at().is_none();
+        let may_throw = self.may_throw();
         self.dialogue_mut().next_again(now, only_urgent, may_throw)
     }
 
@@ -216,7 +221,7 @@ pub(crate) trait Protocol {
         if let Some(train) = self.dialogue().undirected(|train| self.is_asked(train)) {
             return Some(self.query(train));
         }
-        let may_throw = self.release_at().is_none();
+        let may_throw = self.may_throw();
         if let Some(command) = self.dialogue_mut().next_command(may_throw) {
             return Some(self.outgoing(now, command));
         }

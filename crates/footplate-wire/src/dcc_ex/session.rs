@@ -31,10 +31,6 @@ const KEEP_ALIVE: TimeSpan = TimeSpan::from_ms(500);
 /// 9.1 ms.
 const PACING: Pacing = Pacing::new(TimeSpan::from_ms(50), 3, TimeSpan::from_ms(10));
 
-/// While messages are garbled, a request that the board does not confirm is written this often at once. Three of the longest,
-/// `<a 2044 1>`, fill 30 of the board's 64 bytes; where two of five are garbled, one of 240 pairs of such commands is lost.
-const TIMES_IN_NOISE: usize = 3;
-
 /// What the user should check.
 const CHECKS: Checks = Checks {
     nothing_heard: "check its power, the cable and the port",
@@ -113,9 +109,7 @@ impl Protocol for Client {
             Request::Function { cab, .. } if next.tries.is_multiple_of(2) => Request::Locomotive { cab },
             request => request,
         };
-        let is_unconfirmed = matches!(request, Request::Accessory { .. });
-        let times = if is_unconfirmed && self.dialogue.is_noisy() { TIMES_IN_NOISE } else { 1 };
-        let mut text = request.to_string().repeat(times);
+        let mut text = request.to_string();
         let is_ending = self.dialogue.farewell.has_begun();
         // A train of unknown direction has to stop now: the stop of all may have been lost as well.
         if matches!(request, Request::Locomotive { .. }) && next.tries > 1 && is_ending {
@@ -128,6 +122,11 @@ impl Protocol for Client {
     fn may_write(&self, now: Timestamp) -> bool {
         let is_ending = self.dialogue.farewell.has_begun();
         self.dialogue.may_write(now) && (is_ending || !self.opening.awaits_banner())
+    }
+
+    /// `<a 153 0>` that loses a digit throws turnout 15, under whatever train is there, and the board says nothing of it.
+    fn may_throw(&self) -> bool {
+        !self.dialogue.is_noisy()
     }
 
     fn addresses(&self, _train: TrainId) -> RangeInclusive<u16> {

@@ -211,7 +211,7 @@ impl Protocol for Client {
     }
 
     fn next_again(&mut self, now: Timestamp, only_urgent: bool) -> Option<Outgoing<Awaited>> {
-        let may_throw = self.release_at().is_none();
+        let may_throw = self.may_throw();
         loop {
             match self.dialogue.next_repeat(now, only_urgent, may_throw)? {
                 // Inputs are polled anyway.
