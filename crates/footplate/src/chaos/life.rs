@@ -83,15 +83,15 @@ impl Spell {
     }
 }
 
-/// The longest stretch from one time to another that none of these spells interrupts.
-pub(super) fn longest_between(from: Timestamp, until: Timestamp, mut spells: Vec<Spell>) -> TimeSpan {
+/// How much of the time from one time to another no spell covers.
+pub(super) fn time_outside(from: Timestamp, until: Timestamp, mut spells: Vec<Spell>) -> TimeSpan {
     spells.sort_by_key(|spell| spell.from);
-    let (mut since, mut longest) = (from, TimeSpan::ZERO);
+    let (mut since, mut outside) = (from, TimeSpan::ZERO);
     for spell in spells {
-        longest = longest.max(spell.from.min(until) - since);
+        outside = outside + (spell.from.min(until) - since).max(TimeSpan::ZERO);
         since = since.max(spell.until);
     }
-    longest.max(until - since)
+    outside + (until - since).max(TimeSpan::ZERO)
 }
 
 #[cfg(test)]
@@ -99,13 +99,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_longest_stretch_without_a_spell_is_found() {
+    fn the_time_without_a_spell_is_added_up() {
         let s = |s: f64| Timestamp::from_s(s);
         let spell = |from: f64, until: f64| Spell { from: s(from), until: s(until) };
-        let between = |spells: &[Spell]| longest_between(s(10.0), s(20.0), spells.to_vec()).as_s();
+        let between = |spells: &[Spell]| time_outside(s(10.0), s(20.0), spells.to_vec()).as_s();
         assert_eq!(between(&[]), 10.0);
         assert_eq!(between(&[spell(8.0, 12.0)]), 8.0);
-        assert_eq!(between(&[spell(13.0, 18.5), spell(12.0, 19.0)]), 2.0);
+        assert_eq!(between(&[spell(13.0, 18.5), spell(12.0, 19.0)]), 3.0);
+        assert_eq!(between(&[spell(15.0, 16.0), spell(11.0, 12.0)]), 8.0);
         assert_eq!(between(&[spell(1.0, 2.0), spell(30.0, 40.0)]), 10.0);
         assert_eq!(between(&[spell(9.0, 21.0)]), 0.0);
     }

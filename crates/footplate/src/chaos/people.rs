@@ -25,6 +25,9 @@ const HELP_AFTER: TimeSpan = TimeSpan::from_ms(15_000);
 /// The program is stuck if all trains are at rest for this long, one has a journey, and no alarm is active. Twice the time
 /// that the dispatcher takes to resolve a deadlock.
 const STUCK_AFTER: TimeSpan = TimeSpan::from_ms(120_000);
+/// Nobody says which way a train faces that was commanded to reverse less than this ago: its decoder has not heard it, and the
+/// person has not seen it.
+const SEEN_AFTER: TimeSpan = TimeSpan::from_ms(1_000);
 /// A turnout that was commanded lies as commanded after this time.
 const MOVES_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
 const TRIES: usize = 100;
@@ -59,6 +62,8 @@ pub(super) struct People<'p, 'l> {
     /// Turnouts that lie otherwise than the program assumes, since when, and whether that was noted.
     misjudged: BTreeMap<TurnoutId, (Timestamp, bool)>,
     moves: BTreeMap<TrainId, bool>,
+    /// Whether each train has reversed, by the program's commands, and since when.
+    reversed: BTreeMap<TrainId, (bool, Timestamp)>,
     /// Trains with an active alarm, and since when.
     troubled: BTreeMap<TrainId, Timestamp>,
     without_power: Option<Timestamp>,
@@ -95,6 +100,7 @@ impl<'p, 'l> People<'p, 'l> {
             is_inside: BTreeMap::new(),
             misjudged: BTreeMap::new(),
             moves: BTreeMap::new(),
+            reversed: BTreeMap::new(),
             troubled: BTreeMap::new(),
             without_power: None,
             is_silent: false,
@@ -176,8 +182,14 @@ impl<'p, 'l> People<'p, 'l> {
                     ),
                 );
             }
+            let is_reversed = dispatcher.driver().is_reversed(*train);
+            let (before, since) = self.reversed.entry(*train).or_insert((is_reversed, now));
+            if *before != is_reversed {
+                (*before, *since) = (is_reversed, now);
+            }
+            let is_seen = now - *since >= SEEN_AFTER;
             // The operator enters the true position.
-            if self.troubled.get(train).is_some_and(|since| now - *since >= HELP_AFTER) {
+            if is_seen && self.troubled.get(train).is_some_and(|since| now - *since >= HELP_AFTER) {
                 let stands = world.truth().train(*train).is_some_and(|truth| truth.at_rest_since.is_some());
                 if stands && let Some(at) = place_by_hand(self.layout, world, *train) {
                     self.troubled.remove(train);

@@ -18,7 +18,7 @@ use footplate_store::Store;
 
 use super::disk::FaultyDisk;
 use super::failure::{Failure, FailureKind};
-use super::life::{Death, Life, Spell, longest_between};
+use super::life::{Death, Life, Spell, time_outside};
 use super::line::{FaultyLine, LATE, SharedStation};
 use super::people::{People, Seen, SharedDisk};
 use super::plan::{Plan, PlannedLife};
@@ -422,7 +422,7 @@ impl<'l> Teller<'_, 'l> {
         self.fate.notes.append(&mut line.notes);
         match line.stopped_at {
             Some(at) => {
-                let took = longest_between(began, at, line.unreachable());
+                let took = time_outside(began, at, line.unreachable());
                 self.fate.stopped_ms.push(took.as_ms());
                 self.note(format!(
                     "all trains were stopped {:.0} ms after the death, {:.0} ms of them over a line that was there",
