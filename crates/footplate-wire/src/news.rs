@@ -5,7 +5,7 @@ use footplate_core::control::LinkNews;
 use crate::session::LinkNotice;
 
 impl LinkNotice {
-    /// Whether the station has fallen silent or answers again, whether the power was lost, or which train may face either way; most of
+    /// Whether the station has fallen silent or answers again, whether the power was lost, or which train may face in either direction; most of
     /// what is heard says nothing of the kind.
     #[must_use]
     pub const fn news(&self) -> Option<LinkNews> {

@@ -70,7 +70,7 @@ fn a_train_that_stalls_as_it_starts_keeps_its_track_until_a_sensor_reports_it() 
 
 #[test]
 fn a_train_in_danger_that_is_placed_before_points_of_unknown_position_occupies_the_track_there() {
-    // Given a train that is measured again, and points whose position nobody has entered,
+    // Given a train that is measured again, and points whose position is unknown,
     let points_1 = [(TurnoutId(1), Leg::Straight)].into_iter().collect();
     let mut traffic = knowing(&points_1, [STARTS[0], ("E1", 300.0)]);
     let [train, _] = TRAINS;

@@ -38,7 +38,7 @@ pub(crate) struct Desk<C, S: Station> {
     pub(crate) client: C,
     pub(crate) now: Timestamp,
     pub(crate) station: S,
-    /// Answers that are on their way, and when they arrive.
+    /// Answers that have not arrived yet, and when they arrive.
     pub(crate) coming: Vec<(Timestamp, Vec<u8>)>,
     /// What was written, and when (ms).
     pub(crate) written: Vec<(i64, S::Written)>,

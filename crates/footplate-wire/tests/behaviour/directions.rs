@@ -76,7 +76,7 @@ fn a_station_that_has_forgotten_a_direction_is_commanded_the_one_of_the_session_
 }
 
 #[test]
-fn a_reversal_that_a_station_may_have_forgotten_is_in_doubt() {
+fn a_reversal_that_a_station_may_have_forgotten_leaves_the_direction_unknown() {
     let mut desk = loconet_session::Desk::opened();
     desk.command(speed(T24, 8));
     desk.run_for(300);
@@ -86,7 +86,7 @@ fn a_reversal_that_a_station_may_have_forgotten_is_in_doubt() {
     desk.station.is_on = false;
     desk.command(Command::Reverse { train: T24 });
     desk.run_for(300);
-    // when it is back, and has given the slot to nobody,
+    // when it is back, and its slots are empty,
     desk.station.slots.clear();
     (desk.station.is_on, desk.station.power) = (true, false);
     desk.run_for(4_000);

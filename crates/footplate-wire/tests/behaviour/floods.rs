@@ -18,7 +18,7 @@ fn next(state: &mut u32) -> u32 {
 }
 
 /// Lets a flood come down on a session within a second; returns how many notices it made of it, and what it wrote when it was then
-/// told to stop a train and to end.
+/// commanded to stop a train and to end.
 fn flooded(mut session: impl Session, message: impl Fn(&mut u32) -> Vec<u8>) -> (usize, Vec<u8>) {
     let (mut state, mut notices, mut written) = (0x9E37_79B9, 0, Vec::new());
     let mut now = ms(0);

@@ -363,7 +363,7 @@ fn a_station_that_was_restarted_gets_everything_again() {
 }
 
 #[test]
-fn silence_and_noise_are_told_with_what_to_check() {
+fn silence_and_noise_are_reported_with_what_to_check() {
     let mut desk = Desk::opened();
     desk.station.answers = false;
     desk.run_for(4_000);

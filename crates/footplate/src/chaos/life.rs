@@ -88,7 +88,7 @@ pub(super) fn time_outside(from: Timestamp, until: Timestamp, mut spells: Vec<Sp
     spells.sort_by_key(|spell| spell.from);
     let (mut since, mut outside) = (from, TimeSpan::ZERO);
     for spell in spells {
-        outside = outside + (spell.from.min(until) - since).max(TimeSpan::ZERO);
+        outside += (spell.from.min(until) - since).max(TimeSpan::ZERO);
         since = since.max(spell.until);
     }
     outside + (until - since).max(TimeSpan::ZERO)

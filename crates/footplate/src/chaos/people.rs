@@ -25,8 +25,8 @@ const HELP_AFTER: TimeSpan = TimeSpan::from_ms(15_000);
 /// The program is stuck if all trains are at rest for this long, one has a journey, and no alarm is active. Twice the time
 /// that the dispatcher takes to resolve a deadlock.
 const STUCK_AFTER: TimeSpan = TimeSpan::from_ms(120_000);
-/// Nobody says which way a train faces that was commanded to reverse less than this ago: its decoder has not heard it, and the
-/// person has not seen it.
+/// The operator enters the position of a train at the earliest this long after it was commanded to reverse: before that its decoder has
+/// not heard the command, and the operator has not seen its effect.
 const SEEN_AFTER: TimeSpan = TimeSpan::from_ms(1_000);
 /// A turnout that was commanded lies as commanded after this time.
 const MOVES_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
