@@ -13,8 +13,11 @@ use crate::odometry::wheels::{Range, larger, smaller};
 /// creepage of converters and of proportional protection reaches 0.2; all beyond this begins visibly. (0.2 of the speed of the train is
 /// 0.25 of that of the wheels: that much made S4 and S5 wider by 7 %, and no draw of a thousand worlds needs it for its 99.98 %.)
 const UNSEEN: [f64; 2] = [0.2, 0.155];
-/// The same where no command is recorded: most of the time that the wheels' acceleration is taken for, nothing acts.
-const UNSEEN_WITHOUT_COMMAND: [f64; 2] = [0.15, 0.1];
+/// The same where no command is recorded: most of the time that the wheels' acceleration is taken for, nothing acts. Creepage of the brake
+/// costs no width there, because the train is no faster than its wheels were (`RUNS_AWAY`).
+const UNSEEN_WITHOUT_COMMAND: [f64; 2] = [0.22, 0.1];
+/// By how much a gradient accelerates a train that is braked, or slows one that is driven, while its wheels creep unseen (m/s²).
+const RUNS_AWAY: f64 = 0.1;
 /// Wheels that begin to creep faster than this are seen to (m/s²), and sooner after one of them was turned up to the train. What they
 /// decelerate by beyond the command comes on top.
 const UNSEEN_RATE: f64 = 0.8;
@@ -75,6 +78,10 @@ pub(super) struct Reach {
     locked: bool,
     /// Smoothed acceleration of each wheel (m/s²).
     own: [f64; 2],
+    /// Wheels spun and have been slowing down since, without a recorded command.
+    spun: bool,
+    /// Without a recorded command: what the speed can be by that of the wheels since they had to roll (m/s).
+    since_rolling: Range,
     /// Time since brake and traction acted (s).
     since: [f64; 2],
     /// One sensor is dead, and the wheel of the other accelerated as no train does since.
@@ -113,6 +120,8 @@ impl Reach {
             alike_for: 0.0,
             locked: false,
             own: [0.0; 2],
+            spun: false,
+            since_rolling: Range::ANY,
             since: [f64::INFINITY; 2],
             strayed: false,
             crept: f64::INFINITY,
@@ -125,6 +134,7 @@ impl Reach {
     /// The train has turned round.
     pub(super) fn reverse(&mut self) {
         self.speed = self.speed.reversed();
+        self.since_rolling = self.since_rolling.reversed();
     }
 
     /// Widens the interval `likely` of a period of `t` seconds by what the wheels have `shown`.
@@ -174,7 +184,9 @@ impl Reach {
         // Wheels that slipped and still accelerate towards the train beyond the command are returning.
         if slip + creep > SEEN {
             self.side = side;
+            self.spun |= side < 0.0 && scene.commanded.is_none();
         }
+        self.spun &= self.slipped && wheels_a < -RETURNS;
         let beyond = self.side * (wheels_a - scene.commanded.unwrap_or(0.0));
         let (since, opposite) =
             if self.side > 0.0 { (since_brake, traction) } else { (since_traction, brake) };
@@ -237,8 +249,10 @@ impl Reach {
             low: likely.low - towards_low * of_traction,
             high: likely.high + larger(towards_high * of_brake, held),
         };
+        let about = self.no_faster_than_they_were(about, likely, scene, free, t);
         // Wheels that spin alike spin at any speed. Where a command is recorded, slip control acts in time.
-        let creeps_alike = alike && (self.side > 0.0 || !self.slipped || scene.commanded.is_some());
+        let creeps_alike =
+            alike && !self.spun && (self.side > 0.0 || !self.slipped || scene.commanded.is_some());
         // Beside one that slips alone, the other creeps unseen at most.
         let one_slips = first_slips + second_slips > ONE && slip + creep + dead < ALIKE && !self.slipped;
         let near = creeps_alike || one_slips || free && !self.slipped;
@@ -254,6 +268,26 @@ impl Reach {
             }
         }
         self.speed
+    }
+
+    /// `about`, without a recorded command limited by what the wheels ran since they had to roll: those that creep away under the brake
+    /// slow down, and the train is no faster than they were; in traction no slower.
+    fn no_faster_than_they_were(
+        &mut self,
+        about: Range,
+        likely: Range,
+        scene: &Scene,
+        free: bool,
+        t: f64,
+    ) -> Range {
+        let off = RUNS_AWAY * t;
+        let Range { low, high } = self.since_rolling;
+        self.since_rolling = match () {
+            () if scene.commanded.is_some() || self.slipped => Range::ANY,
+            () if free => likely,
+            () => likely.or(Range { low: low - off, high: high + off }),
+        };
+        about.and(self.since_rolling)
     }
 
     /// Whether a wheel that counts accelerates as its train cannot. The acceleration of both would take the fall to zero of a sensor
@@ -337,111 +371,4 @@ fn turn_alike(scene: &Scene, [one, other]: &[Compared; 2], [first_dead, second_d
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn wheel(speed: f64) -> WheelScene {
-        WheelScene {
-            counted: 0.05 * speed,
-            late: 0.0,
-            read: true,
-            stuck: false,
-            speed,
-            speed_deviation: 0.05,
-            acceleration: 0.0,
-            acceleration_deviation: 0.5,
-            pitch: 0.03,
-            tolerance: 0.002,
-            braked: true,
-            driven: false,
-        }
-    }
-
-    /// The width above the wheels after so many seconds of a command (m/s²) with wheels at 20 m/s that slip with this
-    /// probability.
-    fn above(reach: &mut Reach, commanded: f64, slip: f64, seconds: f64) -> f64 {
-        let p = [1.0 - slip, 0.0, 0.0, slip, 0.0, 0.0, 0.0, 0.0];
-        widened(reach, &scene([20.0; 2], commanded), p, seconds)
-    }
-
-    fn scene(speeds: [f64; 2], commanded: f64) -> Scene {
-        Scene {
-            wheels: speeds.map(wheel),
-            acceleration: Range { low: -1.5, high: 0.4 },
-            rolling: Range { low: -1.5, high: 0.4 },
-            commanded: Some(commanded),
-            brake: 0.0,
-            traction: 0.0,
-            slide: true,
-            slip: true,
-            inertial: None,
-            independent: false,
-            bounded: Range { low: -40.0, high: 40.0 },
-            top_speed: 40.0,
-        }
-    }
-
-    /// The width above a train that hypotheses of these probabilities put at 20 m/s.
-    fn widened(reach: &mut Reach, scene: &Scene, p: [f64; 8], seconds: f64) -> f64 {
-        let compared =
-            scene.wheels.map(|wheel| Compared { speed: wheel.speed, variance: 0.0025, dead: false });
-        let likely = Range { low: 19.8, high: 20.2 };
-        let mut high = 0.0;
-        for _ in 0..(seconds / 0.05) as usize {
-            let never = f64::INFINITY;
-            let shown = Shown { p, since_touch: never, since_lone_touch: never, wheels_a: 0.0, side: 1.0 };
-            high = reach.widen(likely, scene, &compared, &shown, 0.05).high;
-        }
-        high - likely.high
-    }
-
-    #[test]
-    fn brakes_widen_it_by_unseen_creepage_and_coasting_ends_that() {
-        let mut reach = Reach::new();
-        assert!(above(&mut reach, 0.0, 0.0, 10.0) < 1e-9, "coasting");
-        let soon = above(&mut reach, -0.5, 0.0, 1.5);
-        assert!(soon > 0.1 && soon < 0.8 * 1.6, "{soon}: no more than the reach and the rate allow");
-        let long = above(&mut reach, -0.5, 0.0, 60.0);
-        assert!((long - 0.2 * 20.2).abs() < 1e-9, "{long}: a fifth of the speed");
-        assert!(above(&mut reach, 0.0, 0.0, 6.0) < 1e-9, "coasting again");
-    }
-
-    #[test]
-    fn after_a_slip_of_both_it_lasts_as_long_as_the_brake() {
-        let mut reach = Reach::new();
-        above(&mut reach, 0.0, 0.0, 10.0);
-        let slides = above(&mut reach, -0.5, 0.9, 10.0);
-        assert!((slides - 0.35 * 10.0).abs() < 0.2, "{slides}: what gradients add");
-        let alike = above(&mut reach, -0.5, 0.0, 10.0);
-        assert!(alike > 5.0 && alike <= 0.25 * 20.2 + 1.0 + 1e-9, "{alike}");
-        assert!(above(&mut reach, 0.0, 0.0, 6.0) < 1e-9, "they roll");
-    }
-
-    #[test]
-    fn traction_right_after_the_brake_does_not_show_whether_they_return() {
-        let mut reach = Reach::new();
-        above(&mut reach, 0.0, 0.0, 10.0);
-        above(&mut reach, -0.5, 0.0, 60.0);
-        let after = above(&mut reach, 0.4, 0.0, 8.0);
-        assert!((after - (0.2 * 20.2 - RETURNS * 8.0)).abs() < 0.02, "{after}: they return slowly");
-    }
-
-    #[test]
-    fn beside_one_that_slips_alone_it_reaches_as_far_as_the_other_may_creep() {
-        let mut reach = Reach::new();
-        above(&mut reach, 0.0, 0.0, 10.0);
-        let first_slips = [0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-        let locked = widened(&mut reach, &scene([0.0, 20.0], -0.5), first_slips, 60.0);
-        assert!((locked - 0.2 * 20.2).abs() < 1e-9, "{locked}");
-    }
-
-    #[test]
-    fn hypotheses_that_the_guaranteed_bounds_exclude_have_lost_the_train() {
-        let mut reach = Reach::new();
-        above(&mut reach, 0.0, 0.0, 10.0);
-        let faster = Scene { bounded: Range { low: 25.0, high: 30.0 }, ..scene([20.0; 2], -0.5) };
-        let rolling = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
-        assert!(widened(&mut reach, &faster, rolling, 0.4) < 1.0, "one row may be faulty");
-        assert!(widened(&mut reach, &faster, rolling, 0.3) > 9.0, "all that the bounds allow");
-    }
-}
+mod tests;

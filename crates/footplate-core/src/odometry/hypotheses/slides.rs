@@ -46,7 +46,7 @@ impl Bank {
         let wanted = scene.commanded.unwrap_or(-side * SLIDES_BY);
         // Wheels that spun and are braked carry less than those that roll, but they brake.
         let slides = larger(smaller(wanted, SPINS_BY), -SLIDES_BY);
-        let usual = lasting(SLIDES_WITHIN.0 + SLIDES_WITHIN.1 * slides.abs(), SLIDES_FOR_S, t);
+        let usual = lasting(slides_within(slides.abs()), SLIDES_FOR_S, t);
         let mut slip = self.filters.state(SLIPS);
         slip.acceleration(slides - slip.a, usual);
         self.touch(&mut slip, scene, t);
@@ -137,6 +137,17 @@ fn creep_alike(train: &mut State, scene: &Scene, [a, b]: &[Compared; 2], side: f
     if out != 0.0 {
         train.speed(-out * side, lasting(CREEP_EDGE * v, CREEPS_FOR_S, t));
     }
+}
+
+/// Standard deviation of that deceleration (m/s²).
+fn slides_within(by: f64) -> f64 {
+    SLIDES_WITHIN.0 + SLIDES_WITHIN.1 * by
+}
+
+/// By how much the variance of the speed grows in a second of a slide that is commanded to decelerate `by` so much (m/s²).
+pub(super) fn slides_spread(by: f64) -> f64 {
+    let within = slides_within(smaller(by, SLIDES_BY));
+    2.0 * SLIDES_FOR_S * within * within
 }
 
 /// Information from a period of `t` seconds on a quantity with this standard deviation and correlation time (s).

@@ -111,10 +111,10 @@ fn a_wheel_that_slips_costs_its_width_and_more_on_the_wrong_side() {
 fn a_silent_wheel_is_locked_unless_the_train_hardly_moves() {
     let scene = Scene::of_test([0.1, 20.0], Some(-0.5));
     let slips = |speed: f64| shown(&scene, &compared(0.1), 1.0).slips(&filters(speed).state(0));
-    // 0.1 nats a second, and 15 at rest; at 0.15 m/s a quarter of those.
-    assert_near(slips(0.0), -T * (0.1 + 15.0));
-    assert_near(slips(0.15), -T * (0.1 + 15.0 / 4.0));
-    assert_near(slips(0.3), -T * (0.1 + 15.0 / 25.0));
+    // 0.05 nats a second, and 15 at rest; at 0.15 m/s a quarter of those.
+    assert_near(slips(0.0), -T * (0.05 + 15.0));
+    assert_near(slips(0.15), -T * (0.05 + 15.0 / 4.0));
+    assert_near(slips(0.3), -T * (0.05 + 15.0 / 25.0));
     // 0.11 m/s is no longer silent.
     let turning = Scene::of_test([0.11, 20.0], Some(-0.5));
     let slow = shown(&turning, &compared(0.11), 1.0).slips(&filters(0.0).state(0));
