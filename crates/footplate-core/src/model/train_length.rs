@@ -120,11 +120,11 @@ impl TrainLength {
         let (v, deviation) = (speed.as_m_per_s(), deviation.as_m());
         let late = DELAY_SCATTER * DELAY_SCATTER + window.variance_s2();
         let r = deviation * deviation + BOUNDARY_SCATTER * BOUNDARY_SCATTER + v * v * late;
-        let h = [1.0, v];
+        // The front is ahead of the block by the length, and by what the train runs during the delay: h = [1 v].
         let [[p00, p01], [p10, p11]] = self.p;
-        let ph = [p00 * h[0] + p01 * h[1], p10 * h[0] + p11 * h[1]];
-        let s = h[0] * ph[0] + h[1] * ph[1] + r;
-        let innovation = beyond.as_m() - (h[0] * self.x[0] + h[1] * self.x[1]);
+        let ph = [p00 + p01 * v, p10 + p11 * v];
+        let s = ph[0] + v * ph[1] + r;
+        let innovation = beyond.as_m() - (self.x[0] + v * self.x[1]);
         if innovation * innovation > GATE * GATE * s {
             self.rejected += 1;
             if self.rejected >= ANOTHER_TRAIN {
@@ -136,7 +136,7 @@ impl TrainLength {
         let k = [ph[0] / s, ph[1] / s];
         self.x = [self.x[0] + k[0] * innovation, self.x[1] + k[1] * innovation];
         // (I − k h) p (I − k h)ᵀ + k r kᵀ, which stays positive with a rounded gain (Bucy and Joseph, 1968).
-        let a = [[1.0 - k[0] * h[0], -k[0] * h[1]], [-k[1] * h[0], 1.0 - k[1] * h[1]]];
+        let a = [[1.0 - k[0], -k[0] * v], [-k[1], 1.0 - k[1] * v]];
         let ap = |i: usize, j: usize| -> f64 {
             let row: [f64; 2] = if i == 0 { a[0] } else { a[1] };
             let column = if j == 0 { [p00, p10] } else { [p01, p11] };
@@ -247,5 +247,30 @@ mod tests {
         }
         let length = driven.known().expect("it was measured");
         assert!((length.value.as_mm() - 1_300.0).abs() < 20.0, "{length:?}");
+    }
+
+    /// Least squares over all releases at once, by information (inverse covariance): no gain, no recursion.
+    #[test]
+    fn releases_one_by_one_give_what_least_squares_over_all_of_them_give() {
+        let releases = [(565.0, 90.0), (645.0, 210.0), (712.0, 300.0), (834.0, 480.0), (585.0, 120.0)];
+        // Prior of 0.4 m ± 0.5 m and 1.0 s ± 0.6 s.
+        let ([mut a, mut b, mut c], mut y) = ([1.0 / 0.25, 0.0, 1.0 / 0.36], [0.4 / 0.25, 1.0 / 0.36]);
+        let mut length = TrainLength::default();
+        for (mm, mm_per_s) in releases {
+            assert!(length.take(&release(mm, mm_per_s)), "{mm} mm at {mm_per_s} mm/s");
+            let (v, beyond) = (mm_per_s / 1e3, mm / 1e3);
+            // 3 mm of the place and of the boundary, 30 ms of the detector and a window of 60 ms.
+            let weight = 1.0 / (2.0 * 0.003 * 0.003 + v * v * (0.03 * 0.03 + 0.06 * 0.06 / 12.0));
+            (a, b, c) = (a + weight, b + weight * v, c + weight * v * v);
+            y = [y[0] + weight * beyond, y[1] + weight * v * beyond];
+            let determinant = a * c - b * b;
+            let (metres, seconds) =
+                ((c * y[0] - b * y[1]) / determinant, (a * y[1] - b * y[0]) / determinant);
+            let (found, delay) = (length.length(), length.release_delay());
+            assert!((found.value.as_m() - metres).abs() < 1e-9, "{found:?}, not {metres}");
+            assert!((delay.value.as_s() - seconds).abs() < 1e-9, "{delay:?}, not {seconds}");
+            assert!((found.uncertainty.as_m() - libm::sqrt(c / determinant)).abs() < 1e-9, "{found:?}");
+            assert!((delay.uncertainty.as_s() - libm::sqrt(a / determinant)).abs() < 1e-9, "{delay:?}");
+        }
     }
 }

@@ -136,3 +136,83 @@ fn time_slopes(values: &[f64], first: usize, nodes: usize) -> Vec<(usize, f64)> 
     let falls = (first == DOWN).then(|| (FRICTION, -value(FRICTION)));
     grows.chain(falls).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use alloc::collections::BTreeMap;
+
+    use super::super::parameters::count;
+    use super::*;
+
+    const HIGHEST: usize = 14;
+
+    /// The covariances that one deviation alone makes.
+    fn of(set: impl Fn(&mut Variation)) -> BTreeMap<(usize, usize), f64> {
+        let mut variation = Variation::per_hour().over(0.0);
+        set(&mut variation);
+        let mut found = BTreeMap::new();
+        let values = alloc::vec![0.0; count(HIGHEST)];
+        variation.each(&values, HIGHEST, |one, other, by| *found.entry((one, other)).or_insert(0.0) += by);
+        found.retain(|_, by| *by != 0.0);
+        found
+    }
+
+    #[test]
+    fn every_deviation_varies_its_own_numbers() {
+        // The four numbers of acceleration begin at 1 and those of deceleration at 5: two delays, κ and one more each.
+        let squares = |numbers: &[usize]| numbers.iter().map(|n| ((*n, *n), 0.25)).collect();
+        assert_eq!(of(|v| v.delay = 0.5), squares(&[1, 2, 5, 6]));
+        assert_eq!(of(|v| v.kappa = 0.5), squares(&[3, 7]));
+        assert_eq!(of(|v| v.start_delay = 0.5), squares(&[9]));
+        assert_eq!(of(|v| v.friction = 0.5), squares(&[10]));
+    }
+
+    #[test]
+    fn speeds_vary_each_by_itself_and_all_together() {
+        let speeds = of(|v| (v.own_speed, v.common_speed) = (0.3, 0.4));
+        assert_eq!(speeds.len(), 14 * 15 / 2, "each pair once");
+        for one in 1..=HIGHEST {
+            for other in 1..=one {
+                // 0.3² + 0.4² on the diagonal, 0.4² beside it.
+                let wanted = if one == other { 0.25 } else { 0.16 };
+                let found = speeds[&(speed_at(one), speed_at(other))];
+                assert!((found - wanted).abs() < 1e-12, "{one} {other}: {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_laws_leave_over_varies_as_a_part_of_the_speed() {
+        // Nodes lie 0.1 m/s apart: of 0.3 m/s 0.02 are 6 mm.
+        let nodes = of(|v| v.residual = 0.02);
+        assert_eq!(nodes.len(), 2 * NODES);
+        for first in [STOP_NODES, START_NODES] {
+            let third = nodes[&(first + 2, first + 2)];
+            assert!((third - 0.006 * 0.006).abs() < 1e-15, "{third}");
+        }
+    }
+
+    #[test]
+    fn after_four_hours_a_random_walk_is_twice_as_far() {
+        let all = |variation: Variation| {
+            let Variation { common_speed, own_speed, hysteresis, delay, start_delay, .. } = variation;
+            let Variation { kappa, friction, residual, acceleration_time, load, .. } = variation;
+            [
+                common_speed,
+                own_speed,
+                hysteresis,
+                delay,
+                start_delay,
+                kappa,
+                friction,
+                residual,
+                acceleration_time,
+                load,
+            ]
+        };
+        let four = all(Variation::between_sessions().over(4.0));
+        for (one, four) in all(Variation::between_sessions()).into_iter().zip(four) {
+            assert!((four - 2.0 * one).abs() < 1e-12, "{one} {four}");
+        }
+    }
+}

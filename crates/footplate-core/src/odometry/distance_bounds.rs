@@ -244,4 +244,55 @@ mod tests {
             "{distance:?}: the driven wheel bounds it within its tolerance of 0.9 m"
         );
     }
+
+    /// One period of half a second, from 1 … 3 m/s to 2 … 4 m/s, with an acceleration of ±2 m/s².
+    fn one_period(wheels: [Counted; 2]) -> Range {
+        let mut bounds = DistanceBounds::new(Range { low: 9.0, high: 11.0 });
+        let (before, now) = (Range { low: 1.0, high: 3.0 }, Range { low: 2.0, high: 4.0 });
+        bounds.moved(before, now, Range { low: -2.0, high: 2.0 }, &wheels, 0.5)
+    }
+
+    fn assert_range(found: Range, low: f64, high: f64) {
+        assert!((found.low - low).abs() < 1e-12 && (found.high - high).abs() < 1e-12, "{found:?}");
+    }
+
+    #[test]
+    fn speeds_bound_the_distance_by_their_mean_and_the_greatest_bend() {
+        // (b − a) t² / 8 = 4 · 0.25 / 8 = 0.125; 9 + 1.5 · 0.5 − 0.125 and 11 + 3.5 · 0.5 + 0.125.
+        let faulty = Counted { sound: false, ..counted(0.0) };
+        assert_range(one_period([faulty; 2]), 9.625, 12.875);
+    }
+
+    #[test]
+    fn a_wheel_bounds_the_distance_by_its_counts_a_phase_and_its_tolerance() {
+        let faulty = Counted { sound: false, ..counted(0.0) };
+        let wheel = Counted { pitch: Range { low: 0.02, high: 0.03 }, uncertainty: 2.0, ..counted(50.0) };
+        let mut bounds = DistanceBounds::new(Range { low: 9.0, high: 11.0 });
+        let (speed, limits) = (Range { low: 0.0, high: 10.0 }, Range { low: -1.0, high: 1.0 });
+        // The first period sets the anchor, at bounds that come from the speeds: bend 2 · 0.25 / 8 = 0.0625.
+        assert_range(bounds.moved(speed, speed, limits, &[wheel, faulty], 0.5), 8.9375, 16.0625);
+        // From 8.9375: 50 of the shortest, less two and two and a half of the longest. From 16.0625: 50 and 2 and 2.5 of the longest.
+        assert_range(bounds.moved(speed, speed, limits, &[wheel, faulty], 0.5), 9.8025, 17.6975);
+        // Backward the longest pitch bounds from below and the shortest from above: 9.8025 − 0.6 − 0.06, 17.6975 − 0.4 + 0.06.
+        let back = Counted { pulses: -20.0, ..wheel };
+        let slow = Range { low: -9.0, high: 9.0 };
+        assert_range(bounds.moved(slow, slow, limits, &[back, faulty], 0.5), 9.1425, 17.3575);
+    }
+
+    /// Claims that contradict each other: the counts say more than any speed allows.
+    #[test]
+    fn speeds_alone_are_left_where_counts_contradict_each_other() {
+        let (speed, limits) = (Range { low: 1.0, high: 2.0 }, Range { low: 0.0, high: 0.0 });
+        let mut bounds = DistanceBounds::new(Range::exactly(0.0));
+        let wheels = [counted(37.0), counted(1.0)];
+        let mut last = Range::exactly(0.0);
+        for _ in 0..40 {
+            let before = last;
+            last = bounds.moved(speed, speed, limits, &wheels, 0.05);
+            assert!(last.low <= last.high, "{last:?}");
+            assert!(last.low >= before.low && last.high >= last.low, "{last:?} after {before:?}");
+        }
+        // One metre in a second at least, and two at most.
+        assert!(last.low <= 4.0 && last.high >= 2.0, "{last:?}");
+    }
 }

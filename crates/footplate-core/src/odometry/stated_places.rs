@@ -375,4 +375,66 @@ mod tests {
             }
         }
     }
+
+    /// The inverse of a positive definite matrix (Gauss and Jordan), and its product with a vector.
+    fn solved(mut m: [[f64; 3]; 3], y: [f64; 3]) -> ([[f64; 3]; 3], [f64; 3]) {
+        let mut inverse = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        for pivot in 0..3 {
+            let by = m[pivot][pivot];
+            (m[pivot], inverse[pivot]) = (m[pivot].map(|x| x / by), inverse[pivot].map(|x| x / by));
+            for row in (0..3).filter(|row| *row != pivot) {
+                let times = m[row][pivot];
+                for column in 0..3 {
+                    m[row][column] -= times * m[pivot][column];
+                    inverse[row][column] -= times * inverse[pivot][column];
+                }
+            }
+        }
+        let x = inverse.map(|row| row.iter().zip(y).map(|(a, b)| a * b).sum());
+        (inverse, x)
+    }
+
+    proptest! {
+        /// The filter and its smoother give what least squares over both places at once gives: for the error `c` at the first and
+        /// at the second and for the logarithm `k` of the scale.
+        #[test]
+        fn the_smoother_is_least_squares_over_all_places(
+            (z0, z1) in (-5.0..5.0_f64, -5.0..5.0_f64),
+            (r0, r1) in (0.1..4.0_f64, 0.1..4.0_f64),
+            (dx, walked) in (1.0..9.0_f64, 0.01..2.0_f64),
+            (vc, vk) in (0.5..9.0_f64, 0.01..1.0_f64),
+        ) {
+            let prior = Known { c: 0.0, k: 0.0, p: [vc, 0.0, vk] };
+            let first = prior.measured(z0, r0);
+            let predicted = first.moved(dx, walked);
+            let second = predicted.measured(z1, r1);
+            let smooth = smoothed(&first, &predicted, &second, dx);
+            // Unknowns c₀, c₁, k. Rows: c₀ ~ 0, k ~ 0, c₀ ~ z₀, c₁ ~ z₁, c₁ − c₀ − k Δx ~ 0.
+            let w = 1.0 / walked;
+            let information = [
+                [1.0 / vc + 1.0 / r0 + w, -w, w * dx],
+                [-w, 1.0 / r1 + w, -w * dx],
+                [w * dx, -w * dx, 1.0 / vk + w * dx * dx],
+            ];
+            let (covariance, x) = solved(information, [z0 / r0, z1 / r1, 0.0]);
+            let near = |one: f64, other: f64| (one - other).abs() < 1e-9 * (1.0 + other.abs());
+            prop_assert!(near(second.c, x[1]) && near(second.k, x[2]), "{second:?} {x:?}");
+            prop_assert!(near(smooth.c, x[0]) && near(smooth.k, x[2]), "{smooth:?} {x:?}");
+            for (found, [one, other]) in smooth.p.into_iter().zip([[0, 0], [0, 2], [2, 2]]) {
+                prop_assert!(near(found, covariance[one][other]), "{smooth:?} {covariance:?}");
+            }
+            for (found, [one, other]) in second.p.into_iter().zip([[1, 1], [1, 2], [2, 2]]) {
+                prop_assert!(near(found, covariance[one][other]), "{second:?} {covariance:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_place_is_right_as_often_as_bayes_says() {
+        // Nine of ten are right, the others anywhere within 30 m on either side. At its own place a place with a variance of 1 m²
+        // has a density of 1/√(2π) = 0.398942: 0.9 · 0.398942 / (0.9 · 0.398942 + 0.1 / 60) = 0.995380.
+        assert!((right(0.0, 1.0) - 0.995_380).abs() < 1e-6, "{}", right(0.0, 1.0));
+        // Three deviations off, e^−4.5 = 0.011109 of it: 0.705293.
+        assert!((right(9.0, 1.0) - 0.705_293).abs() < 1e-6, "{}", right(9.0, 1.0));
+    }
 }

@@ -330,4 +330,26 @@ mod tests {
         let begins = beside.begins_on(&layout, main, Length::ZERO).map(Length::as_mm);
         assert!(begins.is_some_and(|mm| (mm - 50.0).abs() < 1e-9), "{begins:?}");
     }
+
+    #[test]
+    fn an_interval_is_covered_if_no_more_than_the_tolerance_is_outside_at_either_end() {
+        let layout = oval();
+        let node = |name: &str| layout.node_named(name).unwrap();
+        let edge = layout.edge_between(node("D1"), node("A1")).unwrap();
+        let mm = Length::from_mm;
+        let mut reservation = Reservation::empty();
+        reservation.take(&layout, edge, mm(100.0), mm(400.0));
+        let covers = |from, to| {
+            let span = Span::on(&layout, edge, mm(from), mm(to)).unwrap();
+            reservation.covers(edge.stretch(), span, mm(10.0))
+        };
+        assert!(covers(100.0, 400.0) && covers(91.0, 409.0) && covers(200.0, 300.0));
+        assert!(!covers(89.0, 300.0), "11 mm before it");
+        assert!(!covers(200.0, 411.0), "11 mm beyond it");
+        assert!(!Reservation::empty().covers(
+            edge.stretch(),
+            Span::on(&layout, edge, mm(1.0), mm(2.0)).unwrap(),
+            mm(10.0)
+        ));
+    }
 }

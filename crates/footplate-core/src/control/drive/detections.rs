@@ -131,4 +131,28 @@ mod tests {
         }
         assert_eq!(detections.lost_after(SLOW, true), 2);
     }
+
+    /// The likelihood of every length as a plain product: no logarithms, nothing scaled.
+    #[test]
+    fn the_share_of_missed_detections_is_the_mean_over_all_lengths_by_bayes() {
+        let history = [(2, 0.5, 0.4), (0, 0.1, 0.2), (1, 0.3, 0.3), (3, 0.6, 0.5), (0, 0.5, 0.6)];
+        let mut detections = Detections::default();
+        let mut products = CLOSED_MM.map(|closed| if closed.is_finite() { 0.001 / 6.0 } else { 0.999 });
+        // Of a poll every 128 ms a sensor that is closed for 35 mm, say, is seen by 35 mm over what the train runs in 128 ms.
+        let seen = |closed_mm: f64, metres_per_s: f64| 0.997 * (closed_mm / (128.0 * metres_per_s)).min(1.0);
+        for (missed, missed_at, speed) in history {
+            detections.take((missed, Speed::from_m_per_s(missed_at)), Speed::from_m_per_s(speed), POLL);
+            for (product, closed) in products.iter_mut().zip(CLOSED_MM) {
+                *product *= seen(closed, speed);
+                (0..missed).for_each(|_| *product *= 1.0 - seen(closed, missed_at));
+            }
+        }
+        for speed in [0.1, 0.3, 0.5, 0.8] {
+            let all: f64 = products.iter().sum();
+            let missed: f64 =
+                products.iter().zip(CLOSED_MM).map(|(p, closed)| p * (1.0 - seen(closed, speed))).sum();
+            let found = detections.missed_share(Speed::from_m_per_s(speed));
+            assert!((found - missed / all).abs() < 1e-9, "{found}, not {} at {speed} m/s", missed / all);
+        }
+    }
 }

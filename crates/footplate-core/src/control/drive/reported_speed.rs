@@ -231,4 +231,22 @@ mod tests {
         assert!(!learn(&mut reported, 0.4, &[63], 1));
         assert_eq!(reported.known_scale(), None);
     }
+
+    /// Two measurements of one number's scale, weighed by their inverse variances.
+    #[test]
+    fn hops_at_one_number_are_weighed_by_their_variances() {
+        let mut reported = ReportedSpeed::default();
+        for (speed, deviation) in [(0.200, 0.004), (0.202, 0.002)] {
+            reported.hop = Numbers::default();
+            (0..400).for_each(|_| reported.hop.take(63));
+            assert!(!reported.learn(Gaussian { mean: libm::log(speed), variance: deviation * deviation }));
+        }
+        let local = reported.hop.local_variance();
+        let [one, other] = [0.004, 0.002].map(|deviation: f64| 1.0 / (deviation * deviation + local));
+        let scales = [0.200, 0.202].map(|speed| libm::log(63.0 / speed));
+        let known = reported.scales[&63];
+        let mean = (one * scales[0] + other * scales[1]) / (one + other);
+        assert!((known.mean - mean).abs() < 1e-12, "{known:?}, not {mean}");
+        assert!((known.variance * (one + other) - 1.0).abs() < 1e-9, "{known:?}");
+    }
 }

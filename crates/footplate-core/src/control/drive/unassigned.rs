@@ -84,4 +84,12 @@ mod tests {
         assert!(!caused_with(0.05).is_probably_of(TrainId(58), SILENT, 0.9));
         assert!(!caused_with(0.05).may_be_of(TrainId(58)));
     }
+
+    #[test]
+    fn a_silent_sensor_counts_by_how_often_it_is_silent() {
+        // Of 100 such reports 50 are of the train, which leaves the sensor silent each time; of the other 50 it is silent 25 times.
+        // 50 of 75 are 0.667.
+        assert!(caused_with(0.5).is_probably_of(TRAIN, 0.5, 0.66));
+        assert!(!caused_with(0.5).is_probably_of(TRAIN, 0.5, 0.67));
+    }
 }

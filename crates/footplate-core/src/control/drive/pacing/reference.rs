@@ -141,3 +141,71 @@ pub(super) fn surveyed_distance(context: TrackContext<'_>, from: NodeId, to: Nod
     }
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::TurnoutId;
+    use crate::model::survey::SectionIndex;
+    use crate::time::TimeSpan;
+    use crate::track::example::oval;
+    use crate::track::{Leg, TurnoutStates};
+
+    #[test]
+    fn a_path_length_is_surveyed_hop_by_hop_and_beyond_the_last_as_within_it() {
+        let mut path = SurveyedPath::unscaled();
+        assert_eq!(path.surveyed(0.3), 0.3);
+        // Hops of 100 and 100 mm that were surveyed with 110 and 80 mm.
+        path.ends[0] = [0.1, 0.11];
+        path.ends[1] = [0.2, 0.19];
+        path.count = 2;
+        for (length, surveyed) in
+            [(0.0, 0.0), (0.05, 0.055), (0.1, 0.11), (0.15, 0.15), (0.2, 0.19), (0.3, 0.27)]
+        {
+            assert!((path.surveyed(length) - surveyed).abs() < 1e-12, "{length}: {}", path.surveyed(length));
+        }
+        // Before the sensor as within the first hop.
+        assert!((path.surveyed(-0.1) + 0.11).abs() < 1e-12, "{}", path.surveyed(-0.1));
+    }
+
+    #[test]
+    fn a_reference_is_where_its_function_says_and_runs_on_before_its_first_point() {
+        let reference = Reference::of(|time| 3.0 + 0.5 * time, [0.5, 0.5]);
+        assert!((reference.now() - 3.0).abs() < 1e-12 && (reference.last() - 4.2).abs() < 1e-12);
+        assert!((Reference::SPAN - 2.4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_line_is_measured_from_another_sensor_near_the_train() {
+        let layout = oval();
+        let sections = SectionIndex::of(&layout);
+        let mut turnouts = TurnoutStates::unknown();
+        [1, 2].into_iter().for_each(|turnout| turnouts.set(TurnoutId(turnout), Leg::Straight));
+        let context = TrackContext { layout: &layout, sections: &sections, turnouts: &turnouts };
+        let node = |name: &str| layout.node_named(name).unwrap();
+        // A lap is A1 -300- B1 -300- D1 -500- A1.
+        let distance = |from, to| surveyed_distance(context, node(from), node(to)).map(Length::as_mm);
+        let near = |found: Option<f64>, mm: f64| found.is_some_and(|found| (found - mm).abs() < 1e-9);
+        assert!(near(distance("A1", "D1"), 600.0) && near(distance("A1", "A1"), 1100.0));
+        assert_eq!(distance("A1", "E1"), None);
+        let start = Timestamp::from_s(10.0);
+        let line = IdealLine {
+            node: node("A1"),
+            distance: Length::from_mm(50.0),
+            time: start,
+            speed: Speed::from_mm_per_s(100.0),
+        };
+        let at = |sensor, seconds| {
+            let now = start + TimeSpan::from_s(seconds);
+            Some(line.recount_from(context, node(sensor), now)?.distance.as_mm())
+        };
+        // After 3 s it is 350 mm past A1: 50 past B1, which it began 250 mm short of.
+        assert!(near(at("B1", 3.0), -250.0), "{:?}", at("B1", 3.0));
+        // At once it is 550 mm past D1, or 550 mm short of it; a second earlier the latter is farther.
+        assert!(near(at("D1", -1.0), 550.0), "{:?}", at("D1", -1.0));
+        assert!(near(at("D1", 1.0), -550.0), "{:?}", at("D1", 1.0));
+        // The same sensor: two laps later it is 50 mm past it again.
+        assert!(near(at("A1", 22.0), 50.0 - 2200.0), "{:?}", at("A1", 22.0));
+        assert!(near(at("A1", 3.0), 50.0) && at("E1", 3.0).is_none());
+    }
+}
