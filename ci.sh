@@ -26,8 +26,8 @@
 # derailed or ran off the track. It takes hours; FRESH_SEEDS=4 makes it short.
 #
 #   fresh        every scorer on FRESH_SEEDS (64 unless set) fresh seeds, the odometer on 1000 random worlds a level
-#   mutants      a share of all small changes to the core's formulas and rules, each of which a test of the core should notice:
-#                MUTANTS=0/200 is every 200th from the first on, two hours (docs/trust.md lists what was not noticed)
+#   mutants      a share of all small changes to the core's formulas and rules, each of which a quick test should notice:
+#                MUTANTS=0/200 is every 200th from the first on, hours (docs/tables/mutants.md lists what was not noticed)
 #
 # The other changes files:
 #
@@ -313,7 +313,8 @@ step_chaos() {
 
 # Tests that take minutes without optimisation are left out, so what is missed here may be noticed by them or by other crates.
 readonly SLOW_UNOPTIMISED='/many_seeds|every_train_stays_on|no_follower_touches|stops_downhill|command_budget|other_laws|three_hundred/'
-# Tests of the store that run the core on recordings of real trains, within seconds.
+# Tests of the store that run the core on recordings of real trains, within seconds. Those of the scorers on known seeds stand for the
+# tables, which every run of all steps compares.
 readonly ON_RECORDINGS='/^(replays_go_on|forecasts_of_real_logs|models_of_logs|running_times|real_logs|surveyed_layouts|scored_loop|tachometer_recordings|metro_trips)/'
 
 step_mutants() {
@@ -323,9 +324,10 @@ step_mutants() {
   local -a files=()
   for part in model tracking odometry control; do files+=(--file "crates/footplate-core/src/$part/**"); done
   PROPTEST_CASES=16 cargo mutants --package footplate-core "${files[@]}" --sharding round-robin --shard "${MUTANTS:-0/200}" \
-    --test-package footplate-core --test-package footplate-store --test-tool nextest --profile mutants --timeout 300 \
-    --output "$TARGET" -- --lib --test behaviour \
-    -E "(package(footplate-core) and not test($SLOW_UNOPTIMISED)) or (package(footplate-store) and test($ON_RECORDINGS))"
+    --test-package footplate-core --test-package footplate-store --test-package footplate-eval --test-tool nextest \
+    --profile mutants --timeout 900 --output "$TARGET" -- --lib --test behaviour \
+    -E "(package(footplate-core) and not test($SLOW_UNOPTIMISED)) or (package(footplate-store) and test($ON_RECORDINGS)) \
+      or (package(footplate-eval) and test(/^same_seed::/))"
 }
 
 step_fuzz() {
@@ -392,6 +394,7 @@ step_expected() {
   need_nextest
   each_example refresh_example
   FOOTPLATE_REWRITE_PAGES=1 run_pages
+  FOOTPLATE_REWRITE_PINS=1 cargo nextest run --workspace -E 'package(footplate-eval) & test(/^same_seed::/)'
   each_table refresh_table
   git status --short -- testdata "$TABLES" README.md docs/guides
 }

@@ -2,3 +2,4 @@
 
 mod blocks;
 mod reported_speeds;
+mod same_seed;
