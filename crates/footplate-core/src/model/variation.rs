@@ -215,4 +215,28 @@ mod tests {
             assert!((four - 2.0 * one).abs() < 1e-12, "{one} {four}");
         }
     }
+
+    /// A heavier load by hand: one per cent more time makes lag, ramps and what the law leaves over one per cent greater, friction less.
+    #[test]
+    fn a_load_varies_all_that_takes_time_by_its_own_size() {
+        let mut values = alloc::vec![0.0; count(HIGHEST)];
+        (values[DOWN + 1], values[FRICTION], values[STOP_NODES + 1], values[UP + 3]) = (0.2, 0.05, 0.03, 0.4);
+        // What takes no time, or is a delay of the command, does not change.
+        (values[HYSTERESIS], values[UP], values[DOWN], values[START_DELAY]) = (0.01, 0.1, 0.3, 0.2);
+        let mut load = Variation::per_hour().over(0.0);
+        load.load = 0.1;
+        let mut found = BTreeMap::new();
+        load.each(&values, HIGHEST, |one, other, by| {
+            *found.entry((one.min(other), one.max(other))).or_insert(0.0) += by;
+        });
+        found.retain(|_, by| *by != 0.0);
+        let slopes = [(UP + 3, 0.4), (DOWN + 1, 0.2), (FRICTION, -0.05), (STOP_NODES + 1, 0.03)];
+        assert_eq!(found.len(), 10, "{found:?}");
+        for (nth, (one, slope)) in slopes.iter().enumerate() {
+            for (other, by) in slopes.iter().skip(nth) {
+                let covariance = found[&(*one, *other)];
+                assert!((covariance - 0.01 * slope * by).abs() < 1e-15, "{one} {other}: {covariance}");
+            }
+        }
+    }
 }

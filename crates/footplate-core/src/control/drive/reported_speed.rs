@@ -249,4 +249,17 @@ mod tests {
         assert!((known.mean - mean).abs() < 1e-12, "{known:?}, not {mean}");
         assert!((known.variance * (one + other) - 1.0).abs() < 1e-9, "{known:?}");
     }
+
+    #[test]
+    fn a_train_that_reports_zero_for_a_second_has_stalled_if_it_should_report_three() {
+        let mut reported = ReportedSpeed::default();
+        learn(&mut reported, 0.2, &[63, 64], 5);
+        let at = |seconds| Timestamp::from_s(100.0 + seconds);
+        // The scale is about 315 a m/s: 3 at 9.5 mm/s.
+        assert!(!reported.take_zero(at(0.0), 0.1) && !reported.take_zero(at(0.9), 0.1));
+        assert!(reported.take_zero(at(1.1), 0.1));
+        assert!(!reported.take_zero(at(1.2), 0.008), "2.5 are no stall");
+        reported.take(at(1.3), 60);
+        assert!(!reported.take_zero(at(1.4), 0.1), "it ran in between");
+    }
 }

@@ -375,4 +375,13 @@ mod tests {
         let pulses: Vec<f64> = turns(&[Count::Pulses(0); 6]).iter().map(|turn| turn.pulses).collect();
         assert_eq!(pulses, [20.0, -20.0, 0.0, 0.0, 0.0, 0.0]);
     }
+
+    #[test]
+    fn a_counter_wraps_only_where_both_readings_have_so_many_bits() {
+        assert_eq!(unwrapped(65_530, 4, 60.0), Some(10.0));
+        assert_eq!(unwrapped(4, 65_530, 60.0), Some(-10.0));
+        assert_eq!(unwrapped(65_536, 10, 60.0), None, "no counter of 16 bits reads 65 536");
+        assert_eq!(unwrapped(-1, 65_530, 60.0), None, "none that wraps is negative");
+        assert_eq!([unwrapped(100, 160, 60.0), unwrapped(160, 100, 60.0)], [Some(60.0), Some(-60.0)]);
+    }
 }
