@@ -16,7 +16,7 @@ mod supervise;
 
 pub use dispatch::{CLEARANCE, Dispatcher, Journey, Reservation, Span, TrainLengths};
 pub use drive::{Aim, ArrivalProfile, Driver, Gap, Order, OrderId, Refusal, StopOrder};
-pub use learn::{CalibrationNotice, Calibrator, CalibratorSettings};
+pub use learn::{CalibrationNotice, Calibrator, CalibratorSettings, Learning};
 pub use machine::{Machine, Output};
 pub use notice::{Achieved, Finished, Notice, Outcome, PacedLine, PlannedArrival, PlannedStop, Promise};
 pub use supervise::{Alarm, LinkNews, Remeasured, Watchdog};

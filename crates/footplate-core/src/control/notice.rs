@@ -255,6 +255,8 @@ pub enum Notice {
     Cancelled {
         /// The train.
         train: TrainId,
+        /// The number of the order.
+        interrupted: OrderId,
         /// The order.
         order: Order,
     },

@@ -10,7 +10,9 @@ use footplate_core::control::{
 use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg, Position, TurnoutStates};
 use footplate_core::tracking::PathPoint;
-use footplate_core::{Command, EdgeId, Length, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
+use footplate_core::{
+    Command, EdgeId, Length, SensorId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId,
+};
 use proptest::collection::vec;
 use proptest::prelude::{ProptestConfig, prop_assert, proptest};
 
@@ -334,6 +336,31 @@ fn a_journey_interrupted_by_a_silent_station_is_completed_after_recovery() {
     assert!(traffic.wrongs.is_empty(), "{:?}", traffic.wrongs);
     assert_eq!(watched(|notice| matches!(notice, Notice::Recovered { .. })), 1);
     assert_eq!(traffic.arrivals(TRAINS[0]), 1);
+}
+
+#[test]
+fn an_order_that_a_recovery_interrupts_goes_on_after_it() {
+    // A train that holds a speed, with another far ahead, is stopped because the station is silent.
+    let mut traffic = Traffic::with(Dispatcher::watched, [("D1", 500.0), ("C1", 150.0)]);
+    let hold = Order::Hold { train: TRAINS[0], speed: Speed::from_mm_per_s(200.0) };
+    let order = traffic.dispatcher.order(traffic.world.now, hold).expect("the track ahead is free");
+    traffic.run(2.5);
+    traffic.dispatcher.handle_link(traffic.world.now, LinkNews::Silent);
+    traffic.run(4.0);
+    assert_eq!(traffic.dispatcher.interrupted(TRAINS[0]), Some(order), "{:#?}", traffic.notices);
+    traffic.dispatcher.handle_link(traffic.world.now, LinkNews::Answers);
+    traffic.run(200.0);
+    // Its order goes on once it is located, and is not said to have ended.
+    let resumed = |notice: &&Notice| matches!(notice, Notice::Resumed { interrupted, .. } if *interrupted == Some(order));
+    assert_eq!(traffic.notices.iter().filter(resumed).count(), 1, "{:#?}", traffic.notices);
+    let ended = |notice: &&Notice| match notice {
+        Notice::GivenUp { order: ended, .. } | Notice::Replaced { order: ended, .. } => *ended == order,
+        Notice::Cancelled { .. } => true,
+        _ => false,
+    };
+    assert_eq!(traffic.notices.iter().find(ended), None);
+    assert_eq!(traffic.dispatcher.interrupted(TRAINS[0]), None);
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
 }
 
 #[test]

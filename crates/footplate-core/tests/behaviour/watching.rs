@@ -320,7 +320,7 @@ fn orders_waiting_for_a_placed_train_are_reported_as_cancelled() {
     assert!(
         watched.notices.iter().skip(from).any(|notice| matches!(
             notice,
-            Notice::Cancelled { train: SECOND, order: Order::Speed { train: SECOND, .. } }
+            Notice::Cancelled { train: SECOND, order: Order::Speed { train: SECOND, .. }, .. }
         )),
         "{:#?}",
         watched.notices

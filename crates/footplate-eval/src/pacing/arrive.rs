@@ -3,9 +3,9 @@
 use anyhow::Context;
 use footplate_core::control::{Notice, Order, OrderId, Refusal, StopOrder};
 use footplate_core::track::{Landmark, Layout};
-use footplate_core::{Length, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use super::counted::{By, Counted, cut_short};
+use super::counted::{By, Counted, RESUMES_WITHIN, cut_short, interrupts};
 use super::hold::oracle_model;
 use super::tracked::LOOK;
 use crate::seeds::Choice;
@@ -86,15 +86,16 @@ pub(super) fn arrive(
             let model = oracle_model(layout, &prepared, circuit, train)?;
             prepared.models.insert(train, model);
         }
-        let mut trip = Trip {
-            layout,
-            circuit,
-            train,
-            by,
-            choice: Choice::new(seed),
-            counted: Counted::dispatched(prepared.line.now(), prepared.driver()),
-            prepared,
-        };
+        let mut counted = Counted::dispatched(prepared.line.now(), prepared.driver());
+        if by == By::Footplate {
+            let fit = prepared.fits.get(&train).cloned().map(|mut fit| {
+                // It was put elsewhere since.
+                fit.interrupt();
+                fit
+            });
+            counted = counted.learning(layout, fit.into_iter().collect());
+        }
+        let mut trip = Trip { layout, circuit, train, by, choice: Choice::new(seed), counted, prepared };
         for nth in 0..ASKED_EACH {
             let arrived = trip.ask(nth % 2 == 0);
             let is_over = arrived.trouble.is_some();
@@ -145,6 +146,7 @@ impl Trip<'_, '_> {
             commands: 0,
             trouble: None,
         };
+        self.find();
         if !from_rest {
             let run =
                 Order::Speed { train: self.train, step: self.prepared.nearest_step(self.train, RUNS_AT) };
@@ -190,6 +192,28 @@ impl Trip<'_, '_> {
         arrived
     }
 
+    /// Runs a train that a sensor should have reported and did not to the next one, as a session does before such an order.
+    fn find(&mut self) {
+        let is_known = |trip: &Self| {
+            let driver = trip.counted.driver();
+            driver.locate(trip.train, trip.now()).is_some()
+                && driver.missed_sensor(trip.train, trip.now()).is_none()
+        };
+        if is_known(self) {
+            return;
+        }
+        let patience = self.now() + RESUMES_WITHIN;
+        for step in [self.counted.driver().finding_step(self.train), SpeedStep::STAND] {
+            let _ = self.counted.order(self.now(), Order::Speed { train: self.train, step });
+            while step > SpeedStep::STAND && self.now() < patience && !is_known(self) {
+                let look = self.now() + LOOK;
+                while self.counted.drive(&mut self.prepared.line, look).is_some() {}
+            }
+        }
+        let until = self.now() + TimeSpan::from_s(STANDS_WITHIN);
+        while self.counted.drive(&mut self.prepared.line, until).is_some() {}
+    }
+
     fn order(&mut self, target: Landmark, within: TimeSpan, mean: f64) -> Result<OrderId, Refusal> {
         let train = self.train;
         let order = match self.by {
@@ -202,10 +226,18 @@ impl Trip<'_, '_> {
         self.counted.order(self.prepared.line.now(), order)
     }
 
-    fn until_done(&mut self, order: OrderId, patience: Timestamp) -> Result<(), String> {
+    fn until_done(&mut self, mut order: OrderId, mut patience: Timestamp) -> Result<(), String> {
         while self.now() < patience {
             let look = patience.min(self.now() + LOOK);
             let notice = self.counted.drive(&mut self.prepared.line, look);
+            if notice.as_ref().is_some_and(|notice| interrupts(notice, self.train)) {
+                patience = self.now() + RESUMES_WITHIN;
+            }
+            if let Some(Notice::Resumed { interrupted: Some(before), order: now, .. }) = notice
+                && before == order
+            {
+                order = now;
+            }
             if let Some((_, ended, why)) = notice.as_ref().and_then(cut_short)
                 && ended.is_none_or(|ended| ended == order)
             {

@@ -3,9 +3,11 @@
 use std::collections::BTreeMap;
 
 use footplate_core::control::{
-    Dispatcher, Driver, Machine, Notice, Order, OrderId, Output, Refusal, TrainLengths,
+    Dispatcher, Driver, Learning, Machine, Notice, Order, OrderId, Output, Refusal, TrainLengths,
 };
-use footplate_core::{Command, Event, Timestamp, TrainId};
+use footplate_core::model::MotionFit;
+use footplate_core::track::Layout;
+use footplate_core::{Command, Event, TimeSpan, Timestamp, TrainId};
 use footplate_wire::LinkNotice;
 
 use crate::testbed::VirtualLine;
@@ -35,8 +37,8 @@ impl By {
 
 /// What is above the driver.
 enum Control {
-    /// The dispatcher with its watchdog, as in operation.
-    Dispatched(Box<Dispatcher>),
+    /// The dispatcher with its watchdog, and with what a session learns if fits are given, as in operation.
+    Dispatched(Box<Dispatcher>, Option<Box<Learning>>),
     /// The driver alone, for simpler methods.
     Bare(Box<Driver>),
 }
@@ -50,8 +52,19 @@ pub(super) struct Counted {
 impl Counted {
     /// Drives through the dispatcher and its watchdog.
     pub(super) fn dispatched(now: Timestamp, driver: Driver) -> Self {
-        let control = Control::Dispatched(Box::new(Dispatcher::watched(now, driver)));
+        let control = Control::Dispatched(Box::new(Dispatcher::watched(now, driver)), None);
         Self { control, steps: BTreeMap::new() }
+    }
+
+    /// The same, learning from what the trains do as a session does.
+    pub(super) fn learning(self, layout: &Layout, fits: Vec<MotionFit>) -> Self {
+        let control = match self.control {
+            Control::Dispatched(dispatcher, _) => {
+                Control::Dispatched(dispatcher, Some(Box::new(Learning::new(layout, fits))))
+            }
+            bare @ Control::Bare(_) => bare,
+        };
+        Self { control, ..self }
     }
 
     /// Drives with the driver alone.
@@ -61,7 +74,7 @@ impl Counted {
 
     pub(super) const fn driver(&self) -> &Driver {
         match &self.control {
-            Control::Dispatched(dispatcher) => dispatcher.driver(),
+            Control::Dispatched(dispatcher, _) => dispatcher.driver(),
             Control::Bare(driver) => driver,
         }
     }
@@ -69,14 +82,14 @@ impl Counted {
     /// Sets the lengths of a train.
     pub(super) fn set_lengths(&mut self, now: Timestamp, train: TrainId, lengths: TrainLengths) {
         match &mut self.control {
-            Control::Dispatched(dispatcher) => dispatcher.set_lengths(now, train, lengths),
+            Control::Dispatched(dispatcher, _) => dispatcher.set_lengths(now, train, lengths),
             Control::Bare(driver) => driver.set_reach(train, lengths.ahead(), lengths.behind()),
         }
     }
 
     pub(super) fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
         match &mut self.control {
-            Control::Dispatched(dispatcher) => dispatcher.order(now, order),
+            Control::Dispatched(dispatcher, _) => dispatcher.order(now, order),
             Control::Bare(driver) => driver.order(now, order),
         }
     }
@@ -89,7 +102,7 @@ impl Counted {
     /// Drives until a notice or a time.
     pub(super) fn drive(&mut self, line: &mut VirtualLine<'_>, until: Timestamp) -> Option<Notice> {
         line.drive_hearing(self, until, |counted, now, notice: &LinkNotice| {
-            if let (Control::Dispatched(dispatcher), Some(news)) = (&mut counted.control, notice.news()) {
+            if let (Control::Dispatched(dispatcher, _), Some(news)) = (&mut counted.control, notice.news()) {
                 dispatcher.handle_link(now, news);
             }
         })
@@ -107,26 +120,67 @@ pub(super) fn cut_short(notice: &Notice) -> Option<(TrainId, Option<OrderId>, St
     }
 }
 
+/// How long an interrupted order may take to go on: as long as a script waits.
+pub(super) const RESUMES_WITHIN: TimeSpan = TimeSpan::from_s(600.0);
+
+/// Whether a notice says that a train is stopped to be recovered, or because of another one that is.
+pub(super) fn interrupts(notice: &Notice, train: TrainId) -> bool {
+    matches!(notice, Notice::Danger { train: lost, stopped, .. } if *lost == train || stopped.contains(&train))
+}
+
+/// Learns from a notice as a session does; a train at rest gets its new model at once.
+fn learn(dispatcher: &mut Dispatcher, learning: &mut Learning, notice: &Notice) {
+    match notice {
+        Notice::Passed { train, passed, .. } => learning.passed(*train, dispatcher.driver(), passed),
+        Notice::Lost { train } | Notice::TurnoutMismatch { train, .. } | Notice::Danger { train, .. } => {
+            learning.interrupt(*train);
+        }
+        Notice::Recovered { train, .. } => {
+            if let Some(remeasured) = dispatcher.take_remeasured(*train) {
+                learning.go_on(*train, remeasured);
+            }
+        }
+        Notice::Done(finished) => {
+            if finished.unseen.is_some() {
+                learning.interrupt(finished.train);
+            }
+            learning.model(finished.train).into_iter().for_each(|model| dispatcher.set_model(model));
+        }
+        _ => {}
+    }
+}
+
 impl Machine for Counted {
     type Notice = Notice;
 
     fn handle_event(&mut self, now: Timestamp, event: &Event) {
         match &mut self.control {
-            Control::Dispatched(dispatcher) => dispatcher.handle_event(now, event),
+            Control::Dispatched(dispatcher, learning) => {
+                dispatcher.handle_event(now, event);
+                if let Some(learning) = learning {
+                    learning.take(dispatcher.driver(), event);
+                }
+            }
             Control::Bare(driver) => driver.handle_event(now, event),
         }
     }
 
     fn handle_timeout(&mut self, now: Timestamp) {
         match &mut self.control {
-            Control::Dispatched(dispatcher) => dispatcher.handle_timeout(now),
+            Control::Dispatched(dispatcher, _) => dispatcher.handle_timeout(now),
             Control::Bare(driver) => driver.handle_timeout(now),
         }
     }
 
     fn poll_output(&mut self) -> Option<Output<Notice>> {
         let output = match &mut self.control {
-            Control::Dispatched(dispatcher) => dispatcher.poll_output()?,
+            Control::Dispatched(dispatcher, learning) => {
+                let output = dispatcher.poll_output()?;
+                if let (Output::Notice(notice), Some(learning)) = (&output, learning) {
+                    learn(dispatcher, learning, notice);
+                }
+                output
+            }
             Control::Bare(driver) => driver.poll_output()?,
         };
         if let Output::Command(Command::Speed { train, .. }) = output {
@@ -137,7 +191,7 @@ impl Machine for Counted {
 
     fn next_timeout(&self) -> Option<Timestamp> {
         match &self.control {
-            Control::Dispatched(dispatcher) => dispatcher.next_timeout(),
+            Control::Dispatched(dispatcher, _) => dispatcher.next_timeout(),
             Control::Bare(driver) => driver.next_timeout(),
         }
     }

@@ -8,7 +8,7 @@ use footplate_core::track::Layout;
 use footplate_core::tracking::TrackContext;
 use footplate_core::{Length, NodeId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use super::counted::{By, Counted, cut_short};
+use super::counted::{By, Counted, RESUMES_WITHIN, cut_short, interrupts};
 use super::tracked::{LOOK, Odometer, TruePath};
 use crate::driving::known;
 use crate::seeds::Choice;
@@ -147,7 +147,16 @@ fn held(layout: &Layout, mut prepared: PreparedTrains<'_>, train: TrainId, by: B
             held.trouble = Some(why);
             break;
         }
+        if notice.as_ref().is_some_and(|notice| interrupts(notice, train)) {
+            until = prepared.line.now() + RESUMES_WITHIN;
+        }
         let found = match notice {
+            Some(Notice::Resumed { .. }) => {
+                // It begins anew.
+                (ideal, until) = (None, prepared.line.now() + TimeSpan::from_s(PATIENCE));
+                estimated.clear();
+                None
+            }
             Some(Notice::Paced(PacedLine { node, way: distance, time, .. })) => {
                 Some(Ideal { node, distance, time })
             }

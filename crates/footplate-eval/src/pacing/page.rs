@@ -38,7 +38,8 @@ const ARRIVE: &str = "\
 Places 1.8 to 6 m ahead, each to be reached after a time that needs a mean speed of 170 to 320 mm/s; every other train runs
 when it is ordered. *Near by* are places that turn out to lie less than 1.8 m ahead of a train at rest, as those a round and a
 little ahead do: it waits, and moves up. Who cannot be in time is asked again for the time that it offers. True times and places
-of rest (asked: 0.3 s and 25 mm at the 95th percentile), median / 95th percentile. The *oracle* is the same driver with a
+of rest (asked: 0.3 s and 25 mm at the 95th percentile), median / 95th percentile. As in a session, the driver learns from every
+arrival, and first runs a train over a sensor that a sensor has missed. The *oracle* is the same driver with a
 model made of the truth. The *step of the mean speed* stops at the same place.
 ";
 

@@ -5,7 +5,6 @@ mod console;
 mod formatter;
 mod fuzzed_session;
 mod instruction;
-mod learning;
 mod long_drive;
 mod parse;
 mod reader;

@@ -3,7 +3,7 @@
 use alloc::collections::{BTreeSet, VecDeque};
 use alloc::vec::Vec;
 
-use crate::control::drive::{Aim, OrderId};
+use crate::control::drive::{Aim, Order, OrderId};
 use crate::ids::{TrainId, TurnoutId};
 use crate::time::Timestamp;
 use crate::track::{Landmark, Layout, Position};
@@ -43,6 +43,16 @@ pub(super) struct Assignment {
     pub(super) queued_at: Timestamp,
 }
 
+/// An order that a recovery interrupted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct InterruptedOrder {
+    pub(super) id: OrderId,
+    pub(super) order: Order,
+    /// When its train was recovered, and when it was given again last.
+    pub(super) since: Timestamp,
+    pub(super) tried: Option<Timestamp>,
+}
+
 /// Why a train runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
@@ -80,6 +90,10 @@ pub(super) struct DispatchedTrain {
     pub(super) lengths: TrainLengths,
     pub(super) assigned: Option<Assignment>,
     pub(super) purpose: Purpose,
+    /// The order that a recovery interrupted and that is given again.
+    pub(super) interrupted: Option<InterruptedOrder>,
+    /// When it shall be at rest by its last order to arrive.
+    pub(super) arrives_by: Option<Timestamp>,
     /// The journey that its authorities are for; another may have been ordered since.
     pub(super) authorised_for: Option<OrderId>,
     /// The last run to its destination, if it was stopped before its end.
@@ -133,6 +147,8 @@ impl DispatchedTrain {
             lengths,
             assigned: None,
             purpose: Purpose::Journey,
+            interrupted: None,
+            arrives_by: None,
             authorised_for: None,
             last_run: None,
             authorities: VecDeque::new(),
@@ -165,6 +181,11 @@ impl DispatchedTrain {
         }
         self.reservation = standstill;
         self.reservation.add(layout, &self.kept);
+    }
+
+    /// Whether it has a journey, or an order that is given again.
+    pub(super) const fn has_order(&self) -> bool {
+        self.assigned.is_some() || self.interrupted.is_some()
     }
 
     /// The train that it steps aside for.

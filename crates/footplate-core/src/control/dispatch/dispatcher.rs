@@ -29,6 +29,9 @@ pub(super) const ACT_EVERY: TimeSpan = TimeSpan::from_ms(200);
 /// Waiting trains are examined again after this time, even if nothing has changed.
 const RECONSIDER_AFTER: TimeSpan = TimeSpan::from_s(1.0);
 
+/// How long an interrupted order is tried again, unless that is set: as long as a script waits.
+const WAIT_LIMIT: TimeSpan = TimeSpan::from_s(600.0);
+
 /// The most rounds of consequences at one time; the rest waits for the next call.
 const MAX_ROUNDS: usize = 50;
 
@@ -44,6 +47,8 @@ pub struct Dispatcher {
     /// Turnouts whose command was not sent yet, with the train and the time of the request.
     pub(super) throwing: BTreeMap<TurnoutId, (TrainId, Timestamp)>,
     pub(super) outputs: VecDeque<Output<Notice>>,
+    /// How long an interrupted order is tried again.
+    pub(super) wait_limit: TimeSpan,
     /// Whether anything has changed since trains at rest were last examined.
     pub(super) has_changed: bool,
     /// How often a train was moved only to give the next search other places to begin from.
@@ -91,6 +96,7 @@ impl Dispatcher {
             commanded,
             throwing: BTreeMap::new(),
             outputs: VecDeque::new(),
+            wait_limit: WAIT_LIMIT,
             has_changed: true,
             shuffled: 0,
             searches: 0,
@@ -182,6 +188,7 @@ impl Dispatcher {
 
     /// Sets the position of a train, as an operator entered it.
     pub fn place(&mut self, now: Timestamp, train: TrainId, at: PathPoint, uncertainty: Length) {
+        self.drop_interrupted(train);
         self.watchdog.place(now, train, at, uncertainty);
         // A train whose speed or direction is in danger is measured again, wherever it was placed.
         let is_in_danger = self.watchdog.is_in_danger(train);
@@ -233,6 +240,7 @@ impl Dispatcher {
         }
         self.set_unknown_turnouts(now)?;
         self.give_back(now, train);
+        self.drop_interrupted(train);
         let order = self.watchdog.driver_mut().number();
         if let Some(known) = self.trains.get_mut(&train) {
             known.assigned = Some(Assignment { order, journey, place, since: now, queued_at: now });
@@ -280,6 +288,14 @@ impl Dispatcher {
     /// # Errors
     /// As [`Driver::order`], and if the turnout is reserved.
     pub fn order(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
+        let taken = self.give(now, order)?;
+        order.train().into_iter().for_each(|train| self.drop_interrupted(train));
+        self.act(now);
+        Ok(taken)
+    }
+
+    /// Passes an order on to the driver.
+    pub(super) fn give(&mut self, now: Timestamp, order: Order) -> Result<OrderId, Refusal> {
         if let Order::Turnout { turnout, .. } = order
             && let Some(holder) = self.trains.values().find(|train| train.keeps(turnout))
         {
@@ -300,7 +316,6 @@ impl Dispatcher {
         if let (Order::Reverse { train, .. }, Ok(_)) = (order, &taken) {
             self.note_reversal(train);
         }
-        self.act(now);
         taken
     }
 
@@ -405,7 +420,7 @@ impl Dispatcher {
                 }
             }
             self.advance_trains(now);
-            if self.permit_creeping(now) {
+            if self.permit_creeping(now) || self.resume_interrupted(now) {
                 continue;
             }
             if core::mem::take(&mut self.has_changed) && !self.watchdog.has_danger() {
@@ -418,7 +433,7 @@ impl Dispatcher {
         let report_waiting = self
             .trains
             .values()
-            .any(|train| !matches!(train.state, State::Resting | State::Lost) || train.assigned.is_some());
+            .any(|train| !matches!(train.state, State::Resting | State::Lost) || train.has_order());
         self.next_check = report_waiting.then_some(now + ACT_EVERY);
     }
 

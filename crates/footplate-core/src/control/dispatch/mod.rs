@@ -9,6 +9,7 @@ mod deadlock;
 mod dispatched_train;
 mod dispatcher;
 mod granting;
+mod interrupted_order;
 mod itinerary;
 mod movement_authority;
 mod notices;

@@ -79,6 +79,11 @@ impl Dispatcher {
                 }
                 _ => {}
             },
+            Notice::Arrives(planned) => {
+                if let Some(train) = self.trains.get_mut(&planned.train) {
+                    train.arrives_by = Some(planned.by);
+                }
+            }
             Notice::Lost { train } => {
                 self.set_halting(now, *train);
                 self.set_state(*train, State::Lost);

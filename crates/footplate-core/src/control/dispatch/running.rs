@@ -379,16 +379,7 @@ impl Dispatcher {
             train.state = State::Resting;
             train.purpose = Purpose::Journey;
             // What holds all trains for a while says nothing against its path.
-            let is_held = matches!(
-                why,
-                Some(
-                    Refusal::NoPower
-                        | Refusal::NoAnswer
-                        | Refusal::Noise
-                        | Refusal::InDanger { .. }
-                        | Refusal::TrackNotClear
-                )
-            );
+            let is_held = why.as_ref().is_some_and(Refusal::is_passing);
             train.withdrawn = train.withdrawn.saturating_add(u8::from(!is_held));
             train.not_before = now + if blocks_itself { ACT_EVERY } else { PAUSE };
         }

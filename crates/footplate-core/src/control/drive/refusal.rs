@@ -225,6 +225,14 @@ pub enum Refusal {
 }
 
 impl Refusal {
+    /// Whether it holds all trains for a while, and says nothing against the order.
+    pub(in crate::control) const fn is_passing(&self) -> bool {
+        matches!(
+            self,
+            Self::NoPower | Self::NoAnswer | Self::Noise | Self::InDanger { .. } | Self::TrackNotClear
+        )
+    }
+
     /// The train that occupies a turnout, if that is the reason.
     pub(in crate::control) const fn occupier(&self) -> Option<TrainId> {
         match self {

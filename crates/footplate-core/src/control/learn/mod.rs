@@ -6,6 +6,7 @@
 //! - `planner.rs`: chooses the next experiment by its expected [`gain`] for its time;
 //! - `running.rs`: carries it out: run, stop short of a sensor, creep on to it;
 //! - `tracker.rs`: finds the reports that the train caused; `faults.rs`: handles a train that stalls, is lifted or lost;
+//! - `learning.rs`: goes on learning while a session drives;
 //! - `circuits.rs`: chooses circuits, and finds the turnouts and track ends around the train.
 
 mod accuracy;
@@ -16,6 +17,7 @@ mod experiment;
 mod faults;
 mod finding;
 mod identity;
+mod learning;
 mod notice;
 mod planner;
 #[cfg(test)]
@@ -29,5 +31,6 @@ mod tracker;
 pub use accuracy::{StepAccuracy, usable_steps};
 pub use calibrator::Calibrator;
 pub use experiment::{Experiment, Why, gain, objective};
+pub use learning::Learning;
 pub use notice::{CalibrationNotice, Done, Ending, Fault, Phase, Progress};
 pub use settings::CalibratorSettings;

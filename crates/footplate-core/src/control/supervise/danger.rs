@@ -233,8 +233,8 @@ impl Watchdog {
 
     /// Cancels the order that a recovery had interrupted, and stops the train.
     fn rest_without(&mut self, now: Timestamp, train: TrainId, interrupted: Option<(OrderId, Order)>) {
-        if let Some((_, order)) = interrupted {
-            self.notify(Notice::Cancelled { train, order });
+        if let Some((id, order)) = interrupted {
+            self.cancel(train, id, order);
         }
         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
@@ -353,8 +353,8 @@ impl Watchdog {
             return;
         }
         for (train, order) in core::mem::take(&mut self.held) {
-            if let Some((_, order)) = order {
-                self.notify(Notice::Cancelled { train, order });
+            if let Some((id, order)) = order {
+                self.cancel(train, id, order);
             }
         }
     }

@@ -1,5 +1,7 @@
 //! Orders: which are carried out now, and those of recoveries.
 
+use alloc::vec::Vec;
+
 use crate::control::drive::{Order, OrderId};
 use crate::control::{Notice, Refusal};
 use crate::ids::{SpeedStep, TrainId};
@@ -78,8 +80,8 @@ impl Watchdog {
         if let Some(train) = order.train() {
             if matches!(order, Order::Speed { step: SpeedStep::STAND, .. }) {
                 self.unfinished.remove(&train);
-                if let Some(held) = self.held.get_mut(&train) {
-                    *held = None;
+                if let Some((order, _)) = self.held.get_mut(&train).and_then(Option::take) {
+                    self.notify(Notice::Replaced { order, train });
                 }
             } else {
                 self.unfinished.insert(train, (id, order));
@@ -107,14 +109,49 @@ impl Watchdog {
         Some(id)
     }
 
-    /// Carries out the order that a recovery had interrupted, or cancels it.
+    /// The order of a train that a recovery has interrupted and that may go on after it.
+    pub(in crate::control) fn interrupted(&self, train: TrainId) -> Option<(OrderId, Order)> {
+        let of_recovery = self.dangers.get(&train).and_then(|recovery| recovery.interrupted);
+        let order = of_recovery.or_else(|| self.held.get(&train).copied().flatten());
+        order.filter(|(_, order)| self.goes_on(order))
+    }
+
+    /// Whether an order that was interrupted will be given again.
+    pub(super) fn will_resume(&self, train: TrainId, order: OrderId) -> bool {
+        self.interrupted(train).is_some_and(|(interrupted, _)| interrupted == order)
+    }
+
+    /// Whether an order goes on by itself after a recovery. An operator who drives with a dispatcher starts other trains again.
+    const fn goes_on(&self, order: &Order) -> bool {
+        self.is_watching()
+            && match order {
+                Order::Hold { .. } | Order::Follow { .. } | Order::Arrive { .. } => true,
+                // The progress of a move or a reversal is unknown.
+                Order::Move { .. } | Order::Reverse { .. } => false,
+                Order::Speed { .. } | Order::Stop(_) | Order::Turnout { .. } => self.permits_all,
+            }
+    }
+
+    /// Carries out the order that a recovery had interrupted, leaves that to the dispatcher, or cancels it.
     pub(super) fn resume(&mut self, now: Timestamp, train: TrainId, id: OrderId, order: Order) {
-        // The progress of a move or a reversal is unknown.
-        let can_go_on = self.resumes() && !matches!(order, Order::Move { .. } | Order::Reverse { .. });
+        let can_go_on = self.goes_on(&order);
+        if can_go_on && !self.permits_all {
+            return self.interrupted.push((train, (id, order)));
+        }
         let resumed = if can_go_on { self.order(now, order).ok() } else { None };
         match resumed {
             Some(order) => self.notify(Notice::Resumed { train, interrupted: Some(id), order }),
-            None => self.notify(Notice::Cancelled { train, order }),
+            None => self.cancel(train, id, order),
         }
+    }
+
+    /// Says that an interrupted order does not go on.
+    pub(super) fn cancel(&mut self, train: TrainId, interrupted: OrderId, order: Order) {
+        self.notify(Notice::Cancelled { train, interrupted, order });
+    }
+
+    /// The orders that recoveries interrupted, for the dispatcher to give again.
+    pub(in crate::control) fn take_interrupted(&mut self) -> Vec<(TrainId, (OrderId, Order))> {
+        core::mem::take(&mut self.interrupted)
     }
 }

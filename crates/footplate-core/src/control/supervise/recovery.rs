@@ -477,9 +477,9 @@ impl Watchdog {
             .faced
             .zip(faces)
             .is_some_and(|(before, faces)| was_turned(self.driver.layout(), before, faces));
-        if let Some((_, order)) = recovery.interrupted.filter(|_| is_turned) {
+        if let Some((id, order)) = recovery.interrupted.filter(|_| is_turned) {
             // It was meant for the other direction.
-            self.notify(Notice::Cancelled { train, order });
+            self.cancel(train, id, order);
         }
         let own = recovery.interrupted.filter(|_| !is_turned);
         if self.dangers.is_empty() {

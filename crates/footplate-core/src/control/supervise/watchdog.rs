@@ -46,6 +46,8 @@ pub struct Watchdog {
     pub(super) remeasured: BTreeMap<TrainId, Remeasured>,
     /// Trains that are held until the danger is over, with their interrupted orders.
     pub(super) held: BTreeMap<TrainId, Option<(OrderId, Order)>>,
+    /// The orders that recoveries interrupted and that a dispatcher gives again.
+    pub(super) interrupted: Vec<(TrainId, (OrderId, Order))>,
     /// The last order of each train that has not ended.
     pub(super) unfinished: BTreeMap<TrainId, (OrderId, Order)>,
     /// The position at which each train was last detected or placed, in its direction.
@@ -86,6 +88,7 @@ impl Watchdog {
             dangers: BTreeMap::new(),
             remeasured: BTreeMap::new(),
             held: BTreeMap::new(),
+            interrupted: Vec::new(),
             unfinished: BTreeMap::new(),
             seen: BTreeMap::new(),
             behind: BTreeMap::new(),
@@ -217,8 +220,8 @@ impl Watchdog {
         self.is_silent() || may_end && (self.is_held(train) || self.could_meet(now, train))
     }
 
-    /// For a dispatcher: from now on a train in danger waits for [`permit`](Self::permit) before it creeps, and no
-    /// interrupted order resumes by itself.
+    /// For a dispatcher: from now on a train in danger waits for [`permit`](Self::permit) before it creeps, and interrupted orders
+    /// are given again by the dispatcher, if at all.
     pub const fn ask_before_creeping(&mut self) {
         self.permits_all = false;
     }
@@ -361,13 +364,13 @@ impl Watchdog {
                     return self.recovery_order_ended(now, *train, *order, Some(why));
                 }
                 // Its order resumes once the train is located.
-                if self.resumes() && matches!(why, Refusal::Lost { .. }) {
+                if matches!(why, Refusal::Lost { .. }) && self.will_resume(*train, *order) {
                     return;
                 }
                 self.unfinished.remove(train);
             }
             Notice::Replaced { order, train }
-                if self.own.contains_key(order) || self.resumes() && self.is_held(*train) =>
+                if self.own.contains_key(order) || self.will_resume(*train, *order) =>
             {
                 self.own.remove(order);
                 return;
@@ -403,11 +406,6 @@ impl Watchdog {
             let stopped = self.hold_endangered(now);
             debug_assert!(stopped.iter().all(|train| self.is_held(*train)));
         }
-    }
-
-    /// Whether interrupted orders resume by themselves.
-    pub(super) const fn resumes(&self) -> bool {
-        self.permits_all && self.is_watching
     }
 
     /// Whether it monitors and recovers trains.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Context;
-use footplate_core::control::Driver;
+use footplate_core::control::{Driver, Learning};
 use footplate_core::link::TimeModel;
 use footplate_core::model::MotionFit;
 use footplate_core::model::MotionModel;
@@ -12,7 +12,6 @@ use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 use footplate_store::{Journal, NewMachine, Schedule, Store};
 use serde::{Deserialize, Serialize};
 
-use super::learning::Learning;
 use super::reader::Known;
 use super::script::step;
 use super::script_runner::{CommandSource, ScriptRunner};

@@ -10,10 +10,9 @@ mod waiting;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use footplate_core::control::{
-    Dispatcher, Driver, Finished, Journey, Machine, Order, OrderId, Output, Promise, Refusal,
+    Dispatcher, Driver, Finished, Journey, Learning, Machine, Order, OrderId, Output, Promise, Refusal,
 };
-use footplate_core::model::MotionFit;
-use footplate_core::model::MotionModel;
+use footplate_core::model::{MotionFit, MotionModel};
 use footplate_core::track::Landmark;
 use footplate_core::tracking::PathPoint;
 use footplate_core::{Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
@@ -24,7 +23,6 @@ use self::queue::{Queues, StepQueue};
 use self::waiting::{CHECK_INTERVAL, Wait, is_open_ended};
 use super::formatter::NoticeFormatter;
 use super::instruction::{HELP, Instruction, Until};
-use super::learning::Learning;
 use super::reader::Known;
 use super::script::{QueueId, Step, step};
 use super::session_message::SessionMessage;
@@ -200,6 +198,7 @@ impl ScriptRunner {
 
     pub(super) const fn set_wait_limit(&mut self, limit: TimeSpan) {
         self.wait_limit = limit;
+        self.dispatcher.set_wait_limit(limit);
     }
 
     /// States that no more lines will come: the session ends when its orders have ended.

@@ -120,6 +120,16 @@ impl ScriptRunner {
                     self.cancelled(now, step, &Refusal::InDanger { train: *train });
                 }
             }
+            Notice::Resumed { interrupted: Some(interrupted), order, .. } => {
+                if let Some(step) = self.pending.remove(interrupted) {
+                    self.pending.insert(*order, step);
+                }
+            }
+            Notice::Cancelled { train, interrupted, .. } => {
+                if let Some(step) = self.pending.remove(interrupted) {
+                    self.cancelled(now, step, &Refusal::InDanger { train: *train });
+                }
+            }
             Notice::Recovered { train, .. } => {
                 if let Some(remeasured) = self.dispatcher.take_remeasured(*train) {
                     // What is being fitted is the train as it was before.

@@ -232,13 +232,12 @@ impl ScriptRunner {
 #[cfg(test)]
 pub(super) mod tests {
     use footplate_core::SpeedStep;
-    use footplate_core::control::{Driver, Machine as _};
+    use footplate_core::control::{Driver, Learning, Machine as _};
     use footplate_core::model::MotionModel;
     use footplate_core::track::TurnoutStates;
     use footplate_store::layout_named;
 
     use super::*;
-    use crate::commands::drive::learning::Learning;
     use crate::commands::drive::session_message::SessionMessage;
     use crate::recorded::{Input, Listener as _};
 

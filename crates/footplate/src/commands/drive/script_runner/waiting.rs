@@ -156,14 +156,16 @@ impl ScriptRunner {
 
     /// Whether a train carries out something that ends by itself.
     fn has_finite_order(&self, train: TrainId) -> bool {
-        let order = self.driver().busy(train);
+        let order = self.dispatcher.interrupted(train).or_else(|| self.driver().busy(train));
         let is_open_ended = order.and_then(|order| self.pending.get(&order)).is_some_and(is_open_ended);
         self.dispatcher.journey(train).is_some() || order.is_some() && !is_open_ended
     }
 
-    /// Whether a train has neither an order nor a journey.
+    /// Whether a train has neither an order nor a journey, nor one that a recovery interrupted.
     pub(super) fn is_idle(&self, train: TrainId) -> bool {
-        self.driver().busy(train).is_none() && self.dispatcher.journey(train).is_none()
+        self.driver().busy(train).is_none()
+            && self.dispatcher.journey(train).is_none()
+            && self.dispatcher.interrupted(train).is_none()
     }
 
     /// Whether the steps of a queue need not wait; a wait that is over is removed.

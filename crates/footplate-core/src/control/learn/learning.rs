@@ -1,18 +1,20 @@
 //! Fits motion models to the events of the session while trains run.
 
-use std::collections::BTreeMap;
+use alloc::collections::BTreeMap;
+use alloc::vec::Vec;
 
-use footplate_core::control::{Driver, Remeasured};
-use footplate_core::model::MotionModel;
-use footplate_core::model::survey::SectionIndex;
-use footplate_core::model::{MotionFit, Refit, StepChanges};
-use footplate_core::track::Layout;
-use footplate_core::tracking::PassedSensor;
-use footplate_core::{Event, EventKind, Report, TrainId};
+use crate::control::drive::Driver;
+use crate::control::supervise::Remeasured;
+use crate::event::{Event, EventKind, Report};
+use crate::ids::TrainId;
+use crate::model::survey::SectionIndex;
+use crate::model::{MotionFit, MotionModel, Refit, StepChanges};
+use crate::track::Layout;
+use crate::tracking::PassedSensor;
 
 /// The fits of all trains, continued from those that the session began with.
-#[derive(Debug)]
-pub(super) struct Learning {
+#[derive(Debug, Clone)]
+pub struct Learning {
     fits: BTreeMap<TrainId, MotionFit>,
     sections: SectionIndex,
     /// Refits that are being computed, a part at a time.
@@ -22,7 +24,9 @@ pub(super) struct Learning {
 }
 
 impl Learning {
-    pub(super) fn new(layout: &Layout, fits: Vec<MotionFit>) -> Self {
+    /// Continues from the fits that a session begins with.
+    #[must_use]
+    pub fn new(layout: &Layout, fits: Vec<MotionFit>) -> Self {
         let fits = fits.into_iter().map(|fit| (fit.model().train(), fit)).collect();
         Self {
             fits,
@@ -33,7 +37,7 @@ impl Learning {
     }
 
     /// Takes in a command that has left for a train.
-    pub(super) fn take(&mut self, driver: &Driver, event: &Event) {
+    pub fn take(&mut self, driver: &Driver, event: &Event) {
         match event.kind {
             EventKind::Speed { train, step } => {
                 if self.changes.entry(train).or_default().take(step) {
@@ -53,7 +57,7 @@ impl Learning {
     }
 
     /// Takes in a detection of a train. A train that has only just been located has no known earlier position.
-    pub(super) fn passed(&mut self, train: TrainId, driver: &Driver, passed: &PassedSensor) {
+    pub fn passed(&mut self, train: TrainId, driver: &Driver, passed: &PassedSensor) {
         if passed.late.is_none()
             && let Some(fit) = self.fits.get_mut(&train)
         {
@@ -74,14 +78,14 @@ impl Learning {
     }
 
     /// Ends the current run of a train: its next events do not follow from known ones.
-    pub(super) fn interrupt(&mut self, train: TrainId) {
+    pub fn interrupt(&mut self, train: TrainId) {
         if let Some(fit) = self.fits.get_mut(&train) {
             fit.interrupt();
         }
     }
 
     /// Goes on from what a recovery found of a train that is no longer as it was.
-    pub(super) fn go_on(&mut self, train: TrainId, from: Remeasured) {
+    pub fn go_on(&mut self, train: TrainId, from: Remeasured) {
         self.in_progress.remove(&train);
         match from {
             Remeasured::Changed(numbers) => {
@@ -97,7 +101,8 @@ impl Learning {
     }
 
     /// All fits, with their current runs ended: what the trains do between sessions is unknown.
-    pub(super) fn handed_over(&self) -> Vec<MotionFit> {
+    #[must_use]
+    pub fn handed_over(&self) -> Vec<MotionFit> {
         let fits = self.fits.values().cloned();
         fits.map(|mut fit| {
             fit.interrupt();
@@ -107,24 +112,26 @@ impl Learning {
     }
 
     /// Starts a refit to all events of a train so far.
-    pub(super) fn begin_refit(&mut self, train: TrainId) {
+    pub fn begin_refit(&mut self, train: TrainId) {
         if let Some(fit) = self.fits.get(&train) {
             self.in_progress.insert(train, fit.begin_refit(&self.sections));
         }
     }
 
     /// Whether any refit is being computed.
-    pub(super) fn is_refitting(&self) -> bool {
+    #[must_use]
+    pub fn is_refitting(&self) -> bool {
         !self.in_progress.is_empty()
     }
 
     /// Whether a refit of this train is being computed.
-    pub(super) fn is_refitting_to(&self, train: TrainId) -> bool {
+    #[must_use]
+    pub fn is_refitting_to(&self, train: TrainId) -> bool {
         self.in_progress.contains_key(&train)
     }
 
     /// Computes the next part of a refit, which takes milliseconds; returns the model after the last part.
-    pub(super) fn advance_refit(&mut self) -> Option<MotionModel> {
+    pub fn advance_refit(&mut self) -> Option<MotionModel> {
         let mut first = self.in_progress.first_entry()?;
         first.get_mut().go_on();
         if !first.get().is_over() {
@@ -137,7 +144,7 @@ impl Learning {
     }
 
     /// The model fitted to all events of a train. Too slow to run between two reports.
-    pub(super) fn model(&mut self, train: TrainId) -> Option<MotionModel> {
+    pub fn model(&mut self, train: TrainId) -> Option<MotionModel> {
         self.in_progress.remove(&train);
         let fit = self.fits.get_mut(&train)?;
         fit.refit(&self.sections);
