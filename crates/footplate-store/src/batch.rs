@@ -215,7 +215,7 @@ impl Batch {
             let there = recordings.iter().flat_map(Recording::trains).collect();
             return Err(BatchError::NoRunOfTrain { train, there });
         }
-        Self::of_runs(layout, runs, Vec::new(), BTreeMap::new())
+        Self::of_runs(layout, LayoutTest::default(), runs, Vec::new(), BTreeMap::new())
     }
 
     /// Calibrates from everything a store held at a date of one layout, less what was excluded at that date.
@@ -229,6 +229,7 @@ impl Batch {
         train: Option<TrainId>,
     ) -> Result<Self, BatchError> {
         let (mut runs, mut left_out) = (Vec::new(), Vec::new());
+        let (mut layout_test, sections) = (LayoutTest::default(), SectionIndex::of(layout));
         // Of recordings whose runs come here as parts: each part lacks the polls of the others.
         let mut rhythms: BTreeMap<String, PollTimingEstimator> = BTreeMap::new();
         let mut known: BTreeSet<TrainId> = BTreeSet::new();
@@ -259,8 +260,11 @@ impl Batch {
                 let events: Vec<BatchEvent> = events.collect();
                 let assigned = match &mut assigned {
                     Some(assigned) => assigned,
-                    none => none.insert(store.assigned_detections(recording.key)?),
+                    none => none.insert(store.assigned_detections(layout, recording.key)?),
                 };
+                // As a replay does: which train a report was of is decided by the layout that is tested.
+                let accepted_events = accepted.events.iter().map(|raw| &raw.event);
+                layout_test.take_run(layout, &sections, moving.len(), accepted_events);
                 let wanted = |at_start: &&TrainAtStart| train.is_none_or(|train| train == at_start.train);
                 let (known, unknown): (Vec<TrainAtStart>, Vec<TrainAtStart>) =
                     moving.iter().filter(wanted).partition(|at_start| assigned.knows(at_start.train));
@@ -269,7 +273,7 @@ impl Batch {
                     rhythms.entry(name.clone()).or_insert_with(|| poll_rhythm(all));
                 }
                 runs.extend(known.into_iter().map(|at_start| {
-                    let own = own_batch_events(assigned, at_start.train, &events);
+                    let own = own_batch_events(layout, assigned, at_start.train, &events);
                     BatchRun { is_shared: true, ..BatchRun::of(name, is_live, &accepted, at_start, own) }
                 }));
                 if !unknown.is_empty() {
@@ -282,18 +286,18 @@ impl Batch {
         if let Some(train) = train.filter(|train| runs.is_empty() && !known.contains(train)) {
             return Err(BatchError::NoRunOfTrain { train, there: known });
         }
-        Self::of_runs(layout, runs, left_out, rhythms)
+        Self::of_runs(layout, layout_test, runs, left_out, rhythms)
     }
 
     fn of_runs(
         layout: &Layout,
+        mut layout_test: LayoutTest,
         runs: Vec<BatchRun>,
         left_out: Vec<LeftOut>,
         mut whole: BTreeMap<String, PollTimingEstimator>,
     ) -> Result<Self, BatchError> {
         let sections = SectionIndex::of(layout);
-        let mut layout_test = LayoutTest::default();
-        for run in &runs {
+        for run in runs.iter().filter(|run| !run.is_shared) {
             layout_test.take_run(layout, &sections, 1, run.accepted().map(|event| &event.event));
         }
         let lengths = layout_test.lengths(&sections);
@@ -362,7 +366,7 @@ fn replayed(
             step: run.step,
             began_at: run.began_at,
         };
-        let events = run.accepted().map(|event| (&event.event, event.was_lost_before));
+        let events = run.accepted().map(|event| (event.event, event.was_lost_before));
         replay.take_run(layout, sections, begin, events, rhythm);
     }
     replay.end(sections, lengths);
@@ -370,15 +374,20 @@ fn replayed(
 }
 
 /// What a train did among the events of a run that others moved in, too, with those that a person has excluded.
-fn own_batch_events(assigned: &AssignedDetections, train: TrainId, events: &[BatchEvent]) -> Vec<BatchEvent> {
+fn own_batch_events(
+    layout: &Layout,
+    assigned: &AssignedDetections,
+    train: TrainId,
+    events: &[BatchEvent],
+) -> Vec<BatchEvent> {
     let accepted = events.iter().filter(|event| !event.excluded).map(|event| &event.event);
-    let lost: Vec<Timestamp> = own_events(assigned, train, accepted)
-        .filter_map(|(event, was_lost)| was_lost.then_some(event.time))
-        .collect();
-    let own = events.iter().filter(|event| assigned.concerns(train, &event.event));
+    let mut lost = own_events(layout, assigned, train, accepted).map(|(_, was_lost)| was_lost);
+    let own = events
+        .iter()
+        .filter_map(|event| Some(BatchEvent { event: assigned.own(layout, train, &event.event)?, ..*event }));
     own.map(|event| BatchEvent {
-        was_lost_before: !event.excluded && lost.contains(&event.event.time),
-        ..*event
+        was_lost_before: !event.excluded && lost.next().unwrap_or_default(),
+        ..event
     })
     .collect()
 }

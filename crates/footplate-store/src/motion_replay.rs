@@ -230,7 +230,7 @@ impl MotionReplay {
         for of_recording in runs.chunk_by(|one, next| one.key == next.key) {
             let shared = of_recording.iter().find(|stored| stored.is_live && stored.is_shared(train));
             let assigned = match shared {
-                Some(shared) => store.assigned_detections(shared.key)?,
+                Some(shared) => store.assigned_detections(layout, shared.key)?,
                 None => AssignedDetections::default(),
             };
             of_recording.iter().for_each(|stored| self.take_stored(layout, sections, stored, &assigned));
@@ -258,11 +258,11 @@ impl MotionReplay {
         };
         match own {
             Some(own) if !stored.is_shared(train) => {
-                let events = events().map(|event| (event, false));
+                let events = events().map(|event| (*event, false));
                 self.take_run(layout, sections, begin(own.step, false), events, rhythm);
             }
             Some(own) if assigned.knows(train) => {
-                let own_events = own_events(assigned, train, events());
+                let own_events = own_events(layout, assigned, train, events());
                 self.take_run(layout, sections, begin(own.step, true), own_events, rhythm);
             }
             own => {
@@ -278,12 +278,12 @@ impl MotionReplay {
 
     /// Takes in what the train did in a run: how that began, the events that concern the train, in order and less those that a person
     /// excluded, each with whether the train was lost before it, and the rhythm of the link.
-    pub(crate) fn take_run<'e>(
+    pub(crate) fn take_run(
         &mut self,
         layout: &Layout,
         sections: &SectionIndex,
         begin: RunBegin<'_>,
-        events: impl Iterator<Item = (&'e Event, bool)>,
+        events: impl Iterator<Item = (Event, bool)>,
         rhythm: &PollTimingEstimator,
     ) {
         let train = self.fit.model().train();
@@ -302,8 +302,8 @@ impl MotionReplay {
         let mut fitted: Option<Timestamp> = None;
         let mut changes = StepChanges::default();
         for (event, was_lost) in events {
-            note_turnout(turnouts, event);
-            let Some(read) = reader.take(event, rhythm.timing()) else { continue };
+            note_turnout(turnouts, &event);
+            let Some(read) = reader.take(&event, rhythm.timing()) else { continue };
             if begin.is_shared && is_left_out(&mut self.fit, &read.event, &mut changes) {
                 continue;
             }
@@ -346,12 +346,13 @@ fn is_left_out(fit: &mut MotionFit, event: &Event, changes: &mut StepChanges) ->
 
 /// What a train did among the events of a run that others moved in, too, each event with whether the train was lost before it.
 pub(crate) fn own_events<'e>(
+    layout: &Layout,
     assigned: &AssignedDetections,
     train: TrainId,
     events: impl Iterator<Item = &'e Event>,
-) -> impl Iterator<Item = (&'e Event, bool)> {
+) -> impl Iterator<Item = (Event, bool)> {
     let mut last = Timestamp::from_ns(i64::MIN);
-    events.filter(move |event| assigned.concerns(train, event)).map(move |event| {
+    events.filter_map(move |event| assigned.own(layout, train, event)).map(move |event| {
         let is_report = matches!(event.kind, EventKind::Sensor(_));
         let before = if is_report { std::mem::replace(&mut last, event.time) } else { event.time };
         (event, assigned.was_lost(train, before, event.time))

@@ -3,9 +3,10 @@
 //! A station reports sensors, not trains. The machine of a session says with its decisions which train it took a report to be of. A program
 //! that learns from the session later reads it there, instead of deciding it once more with less knowledge.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use footplate_core::{Event, EventKind, SensorId, Timestamp, TrainId};
+use footplate_core::track::Layout;
+use footplate_core::{Event, EventKind, Report, SensorId, Timestamp, TrainId};
 
 use super::decisions::{MachineKey, Side, Traced};
 use super::error::StoreError;
@@ -15,21 +16,36 @@ use super::recordings::RecordingKey;
 /// The detections of a session that were assigned to trains.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct AssignedDetections {
-    /// By time and sensor of the report: the train, and whether it had been lost before.
-    of_reports: BTreeMap<ReportKey, (TrainId, bool)>,
+    /// By time of the report and input of the station.
+    of_reports: BTreeMap<ReportKey, Assigned>,
+    /// When an operator said where a train is.
+    placed: BTreeSet<(TrainId, Timestamp)>,
+}
+
+/// What a report was taken for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Assigned {
+    train: TrainId,
+    /// The sensor that the train passed. The detector of a block reports trains that come in at any of its ends.
+    sensor: SensorId,
+    /// Whether the train had been lost before.
+    was_lost: bool,
 }
 
 impl AssignedDetections {
     /// Those that decisions tell, in order; a later one may withdraw what an earlier one has assigned.
-    pub fn of<'t>(trace: impl IntoIterator<Item = &'t Traced>) -> Self {
+    pub fn of<'t>(layout: &Layout, trace: impl IntoIterator<Item = &'t Traced>) -> Self {
         let mut assigned = Self::default();
         for decision in
             trace.into_iter().filter(|traced| traced.side == Side::Decision && traced.kind == "notice")
         {
-            if let Some((report, of)) = assigned_by(&decision.text) {
-                assigned.of_reports.insert(report, of);
-            } else if let Some(report) = withdrawn_by(&decision.text) {
-                assigned.of_reports.remove(&report);
+            let key = |time, sensor| (time, layout.input(sensor));
+            if let Some((time, of)) = assigned_by(&decision.text) {
+                assigned.of_reports.insert(key(time, of.sensor), of);
+            } else if let Some((time, sensor)) = withdrawn_by(&decision.text) {
+                assigned.of_reports.remove(&key(time, sensor));
+            } else if let Some(train) = placed_by(&decision.text) {
+                assigned.placed.insert((train, decision.time));
             }
         }
         assigned
@@ -38,15 +54,18 @@ impl AssignedDetections {
     /// Whether any report was assigned to a train.
     #[must_use]
     pub fn knows(&self, train: TrainId) -> bool {
-        self.of_reports.values().any(|(of, _)| *of == train)
+        self.of_reports.values().any(|of| of.train == train)
     }
 
-    /// Whether an event is part of what a train did: a command to it, a report that was assigned to it, or a turnout on its path.
+    /// An event as part of what a train did: a command to it, a report that was assigned to it, of the sensor that it was taken to have
+    /// passed, or a turnout on its path. `None` if the event is not part of that.
     #[must_use]
-    pub fn concerns(&self, train: TrainId, event: &Event) -> bool {
-        match event.kind {
+    pub fn own(&self, layout: &Layout, train: TrainId, event: &Event) -> Option<Event> {
+        let is_own = match event.kind {
             EventKind::Sensor(report) => {
-                self.of_reports.get(&(event.time, report.sensor)).is_some_and(|(of, _)| *of == train)
+                let assigned = self.of_reports.get(&(event.time, layout.input(report.sensor)));
+                let sensor = assigned.filter(|of| of.train == train)?.sensor;
+                return Some(Event { kind: EventKind::Sensor(Report { sensor, ..report }), ..*event });
             }
             EventKind::Speed { train: of, .. }
             | EventKind::Reverse { train: of }
@@ -54,15 +73,18 @@ impl AssignedDetections {
             EventKind::Turnout { .. } => true,
             // A detector of a block does not say whose end has left it.
             EventKind::Freed(_) => false,
-        }
+        };
+        is_own.then_some(*event)
     }
 
-    /// Whether a train was lost between two times, the second included, so that where it came from is unknown. Its first report after that
-    /// may be one that a person has excluded.
+    /// Whether a train was lost, or put elsewhere by an operator, between two times, the second included, so that where it came from is
+    /// unknown. Its first report after that may be one that a person has excluded.
     #[must_use]
     pub fn was_lost(&self, train: TrainId, after: Timestamp, until: Timestamp) -> bool {
         let between = (after, SensorId(u16::MAX))..=(until, SensorId(u16::MAX));
-        after < until && self.of_reports.range(between).any(|(_, of)| *of == (train, true))
+        after < until
+            && (self.of_reports.range(between).any(|(_, of)| of.train == train && of.was_lost)
+                || self.placed.range((train, after)..=(train, until)).next().is_some())
     }
 }
 
@@ -72,7 +94,11 @@ impl Store {
     ///
     /// # Errors
     /// The store cannot be read.
-    pub fn assigned_detections(&self, recording: RecordingKey) -> Result<AssignedDetections, StoreError> {
+    pub fn assigned_detections(
+        &self,
+        layout: &Layout,
+        recording: RecordingKey,
+    ) -> Result<AssignedDetections, StoreError> {
         let machines = || {
             let mut statement =
                 self.connection.prepare("SELECT id FROM machines WHERE recording = ?1 ORDER BY id")?;
@@ -87,28 +113,35 @@ impl Store {
             }
             all.extend(trace);
         }
-        Ok(AssignedDetections::of(&all))
+        Ok(AssignedDetections::of(layout, &all))
     }
 }
 
-/// A report of a sensor: when, and which.
+/// A report: when, and of which input of the station.
 type ReportKey = (Timestamp, SensorId);
 
 /// What a decision assigns: the notice that a train has passed a sensor, in the form that sessions write it down.
-fn assigned_by(text: &str) -> Option<(ReportKey, (TrainId, bool))> {
+fn assigned_by(text: &str) -> Option<(Timestamp, Assigned)> {
     let text = Some(text).filter(|text| text.starts_with("Passed"))?;
     let train = TrainId(number_after(text, "train: TrainId(")?.try_into().ok()?);
-    Some((report_of(text, "until: Timestamp(")?, (train, text.contains("late: None"))))
+    let (time, sensor) = report_of(text, "until: Timestamp(")?;
+    Some((time, Assigned { train, sensor, was_lost: text.contains("late: None") }))
+}
+
+/// The train whose place an operator said, by a decision.
+fn placed_by(text: &str) -> Option<TrainId> {
+    let text = Some(text).filter(|text| text.starts_with("Placed("))?;
+    Some(TrainId(number_after(text, "TrainId(")?.try_into().ok()?))
 }
 
 /// What a decision withdraws: the notice that a report has no explanation, which may come after it was assigned.
-fn withdrawn_by(text: &str) -> Option<ReportKey> {
+fn withdrawn_by(text: &str) -> Option<(Timestamp, SensorId)> {
     Some(text)
         .filter(|text| text.contains("Unexplained {"))
         .and_then(|text| report_of(text, "time: Timestamp("))
 }
 
-fn report_of(text: &str, time: &str) -> Option<ReportKey> {
+fn report_of(text: &str, time: &str) -> Option<(Timestamp, SensorId)> {
     let sensor = SensorId(number_after(text, "sensor: SensorId(")?.try_into().ok()?);
     Some((Timestamp::from_ns(number_after(text, time)?), sensor))
 }
@@ -126,6 +159,7 @@ mod tests {
     use footplate_core::{Report, SpeedStep, TimeSpan};
 
     use super::*;
+    use crate::layout_named;
 
     /// As a session has written them down.
     const FOUND: &str = "Passed(TrainPassed { train: TrainId(24), passed: PassedSensor { sensor: SensorId(61), window: \
@@ -154,7 +188,8 @@ mod tests {
             traced(6, Side::Decision, &EXPECTED.replace("SensorId(46)", "SensorId(47)")),
             traced(7, Side::Decision, "Unexplained { sensor: SensorId(47), time: Timestamp(192461751140) }"),
         ];
-        let assigned = AssignedDetections::of(&trace);
+        let layout = layout_named("track-a").unwrap().layout;
+        let assigned = AssignedDetections::of(&layout, &trace);
         assert_eq!(assigned.of_reports.len(), 2);
         let event = |ns, kind| Event { time: Timestamp::from_ns(ns), kind };
         let report = |ns, sensor| {
@@ -164,7 +199,7 @@ mod tests {
         let (found, expected) = (report(6_194_770_729, 61), report(192_461_751_140, 46));
         let unassigned = report(192_461_751_140, 61);
         let stops = event(1, EventKind::Speed { train: TrainId(58), step: SpeedStep::STAND });
-        let of = |event: &Event| [24, 58].map(|train| assigned.concerns(TrainId(train), event));
+        let of = |event: &Event| [24, 58].map(|train| assigned.own(&layout, TrainId(train), event).is_some());
         assert_eq!([of(&found), of(&expected)], [[true, false], [false, true]]);
         let lost = |train, after, until: &Event| {
             assigned.was_lost(TrainId(train), Timestamp::from_ns(after), until.time)
@@ -177,5 +212,32 @@ mod tests {
         // A report that was assigned to no train is of none.
         assert_eq!(of(&unassigned), [false, false]);
         assert_eq!(of(&stops), [false, true]);
+    }
+
+    #[test]
+    fn a_train_is_taken_to_have_passed_the_end_of_its_block_that_the_session_found() {
+        let layout = layout_named("oval-blocks").unwrap().layout;
+        let block = layout.blocks().iter().find(|block| block.entries.len() > 1).unwrap();
+        let (reported, found) = (block.entries[0], block.entries[1]);
+        let text = FOUND.replace("SensorId(61)", &format!("SensorId({})", found.0));
+        let traced = |number, text: String| Traced {
+            number,
+            time: Timestamp::from_s(8.0),
+            side: Side::Decision,
+            kind: Cow::Borrowed("notice"),
+            text,
+        };
+        let trace = [traced(0, text), traced(1, "Placed(TrainId(24))".to_owned())];
+        let assigned = AssignedDetections::of(&layout, &trace);
+        let event = |sensor| {
+            let report = Report { sensor, poll_interval: Some(TimeSpan::from_ms(60)) };
+            Event { time: Timestamp::from_ns(6_194_770_729), kind: EventKind::Sensor(report) }
+        };
+        assert_eq!(assigned.own(&layout, TrainId(24), &event(reported)), Some(event(found)));
+        // Put elsewhere after 8 s, it did not come from there.
+        let lost = |train, [after, until]: [f64; 2]| {
+            assigned.was_lost(TrainId(train), Timestamp::from_s(after), Timestamp::from_s(until))
+        };
+        assert_eq!([lost(24, [7.0, 9.0]), lost(24, [9.0, 10.0]), lost(58, [7.0, 9.0])], [true, false, false]);
     }
 }

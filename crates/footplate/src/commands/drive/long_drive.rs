@@ -288,7 +288,7 @@ impl Attendant<Recorded<ScriptRunner>> for Operator {
             SessionMessage::Passed(passed) => self.painter.passed(passed),
             SessionMessage::Alarm(alarm) => self.alarm(now, &alarm),
             SessionMessage::Begun(_) | SessionMessage::Ended(_) => self.for_scoring.push(notice),
-            SessionMessage::Over => {}
+            SessionMessage::Placed(_) | SessionMessage::Over => {}
         }
     }
 

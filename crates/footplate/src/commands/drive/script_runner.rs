@@ -421,6 +421,7 @@ impl ScriptRunner {
             let at = PathPoint { node: at.node, distance: at.offset };
             self.dispatcher.place(now, train, at, READ_OFF_BY_HAND);
             self.learning.interrupt(train);
+            self.outputs.push_back(Output::Notice(SessionMessage::Placed(train)));
             let line = self.formatter().whereabouts(train, now);
             self.say(line);
         } else {

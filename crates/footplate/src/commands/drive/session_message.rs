@@ -20,6 +20,8 @@ pub(crate) enum SessionMessage {
     Passed(TrainPassed),
     /// An alarm: for the displays.
     Alarm(Alarm),
+    /// An operator said where a train is: what it did before does not lead there.
+    Placed(TrainId),
     /// A train begins an order that ends at a place: the time to note its true position in a simulation.
     Begun(TrainId),
     /// An order has ended.
