@@ -42,8 +42,8 @@ impl TurnoutCommand {
 const POINTS_MOVE: TimeSpan = TimeSpan::from_ms(350);
 /// A turnout command is sent within this time: two polls, and the solenoids of a dozen others before it.
 const SENT_WITHIN: TimeSpan = TimeSpan::from_s(5.0);
-/// A journey is given up if the commands to a turnout were not sent for this long, although the station answers: the link
-/// has no such turnout address. That is three commands.
+/// A journey is given up if the commands to a turnout were not sent for this long, although the station answers: the line
+/// garbles data, or the link has no such turnout address. That is three commands.
 const NEVER_SENT: TimeSpan = TimeSpan::from_s(15.0);
 /// An authority is withdrawn if a turnout cannot be thrown for this long: a train is nearer to it than estimated.
 const PATIENCE: TimeSpan = TimeSpan::from_s(8.0);

@@ -334,8 +334,8 @@ impl fmt::Display for Refusal {
             ),
             Self::TurnoutNotSent { turnout } => write!(
                 f,
-                "the commands to turnout {turnout} could not be sent: check its address in the layout and the turnout \
-                 addresses of this link, or choose a place that needs no turnout {turnout}"
+                "the commands to turnout {turnout} were not sent: the line garbles data, or this link does not have its address; \
+                 check cable and adapter, then the address in the layout, or choose a place that needs no turnout {turnout}"
             ),
             Self::NotArrived { train, within } => write!(
                 f,
