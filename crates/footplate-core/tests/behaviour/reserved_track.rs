@@ -185,3 +185,36 @@ fn a_journey_over_a_turnout_that_the_link_cannot_address_is_given_up() {
     traffic.run(60.0);
     assert_eq!((traffic.arrivals(TRAINS[0]), traffic.wrongs.len()), (1, 0), "{:#?}", traffic.notices);
 }
+
+#[test]
+fn a_train_that_one_report_puts_on_another_leg_keeps_both_until_a_sensor_decides() {
+    // Given a train whose position is known to 40 mm, and which runs over the straight leg of turnout 1 towards `B1`,
+    let mut traffic = Traffic::with(Dispatcher::new, [("A1", 60.0), ("E1", 300.0)]);
+    let [train, _] = TRAINS;
+    let [a1, b1, br1] =
+        ["A1", "B1", "BR1"].map(|name| traffic.world.layout.node_named(name).expect("a node"));
+    let at = PathPoint { node: a1, distance: Length::from_mm(100.0) };
+    traffic.dispatcher.place(traffic.world.now, train, at, Length::from_mm(40.0));
+    traffic.go(train, "B1+250mm");
+    let leg = traffic.world.layout.edge_between(br1, b1).expect("an edge");
+    let is_near = |at: Position| at.edge == leg && at.offset >= Length::from_mm(360.0);
+    while !is_near(traffic.world.trains[0].at) && traffic.world.now < Timestamp::from_s(60.0) {
+        traffic.run(0.05);
+    }
+    // when the sensor on the other leg reports 140 mm before `B1`, which no train caused,
+    let elsewhere = traffic.world.layout.sensor_named("C1").expect("a sensor");
+    traffic.world.close(elsewhere);
+    traffic.run(0.1);
+    let showed = |curved| Notice::TurnoutMismatch { turnout: TurnoutId(1), curved, train };
+    assert!(traffic.notices.contains(&showed(true)), "{:#?}", traffic.notices);
+    // and the train is stopped before it, and at rest for 20 s,
+    traffic.dispatcher.order(traffic.world.now, Order::Speed { train, step: step(0) }).expect("a stop");
+    traffic.run(20.0);
+    assert!(!traffic.notices.contains(&showed(false)), "{:#?}", traffic.notices);
+    // then it keeps the track where it really is, and is located there as it starts again.
+    traffic.go(train, "D1+300mm");
+    traffic.run(60.0);
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+    assert!(traffic.notices.contains(&showed(false)), "{:#?}", traffic.notices);
+    assert_eq!(traffic.arrivals(train), 1, "{:#?}", traffic.notices);
+}

@@ -288,6 +288,11 @@ impl Dispatcher {
         self.watchdog.set_end_of_authority(now, id, None);
         if !is_certain {
             self.notify(Notice::ReservedAsUnknown { train: id });
+        } else if confirmed && self.watchdog.driver().is_position_ambiguous(id, now) {
+            // It may be on another leg than it was estimated on, or short of there.
+            if let Some(train) = self.trains.get_mut(&id) {
+                train.ambiguous_at_rest = true;
+            }
         } else if confirmed {
             self.reserve_standstill(now, id);
         }

@@ -12,7 +12,8 @@ use super::driven_train::DrivenTrain;
 use super::ends::Ends;
 use super::hypotheses::{Detection, Explanation, Hypothesis, hypotheses};
 
-/// An ambiguity that lasts longer is never resolved: even a creeping train reaches two more sensors in this time.
+/// An ambiguity that lasts longer is never resolved: even a creeping train reaches two more sensors in this time. One about the leg that a
+/// train took lasts until a sensor decides it: the train is stopped because of it, and would start from the wrong leg.
 const RESOLVE_WITHIN: TimeSpan = TimeSpan::from_s(15.0);
 /// The number of alternatives kept: two for each train of a layout.
 const MAX_BRANCHES: usize = 8;
@@ -56,7 +57,8 @@ pub(super) struct Ambiguity {
     /// The probability of that.
     pub(super) probability: f64,
     pub(super) branches: Vec<Branch>,
-    until: Timestamp,
+    /// `None`: until a sensor decides it.
+    until: Option<Timestamp>,
 }
 
 impl Ambiguity {
@@ -67,7 +69,7 @@ impl Ambiguity {
         probability: f64,
         branches: Vec<Branch>,
     ) -> Self {
-        Self { detection, is_assigned: false, probability, branches, until: now + RESOLVE_WITHIN }
+        Self { detection, is_assigned: false, probability, branches, until: Some(now + RESOLVE_WITHIN) }
     }
 
     /// A detection that was assigned to a train, with the branch in which that train did not cause it. Branches of an
@@ -83,11 +85,12 @@ impl Ambiguity {
         }
         branches.sort_by(|one, other| other.probability.total_cmp(&one.probability));
         branches.truncate(MAX_BRANCHES);
-        Self { detection, is_assigned: true, probability, branches, until: now + RESOLVE_WITHIN }
+        let until = branches.iter().all(|branch| branch.legs.is_empty()).then_some(now + RESOLVE_WITHIN);
+        Self { detection, is_assigned: true, probability, branches, until }
     }
 
     pub(super) fn is_over(&self, now: Timestamp) -> bool {
-        now >= self.until
+        self.until.is_some_and(|until| now >= until)
     }
 }
 
