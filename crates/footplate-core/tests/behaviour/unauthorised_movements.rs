@@ -1,6 +1,7 @@
 //! What no session drives is noticed, and stops the trains that could meet it.
 
 use footplate_core::control::{Notice, Order, Refusal};
+use footplate_core::{Command, SpeedStep};
 
 use crate::toy_railway::step;
 use crate::watching::{FIRST, Watched};
@@ -51,4 +52,26 @@ fn no_train_starts_while_sensors_report_at_random_and_for_three_seconds_after() 
     watched.run(1.0);
     assert!(said(&watched, &Notice::NoiseOver), "{:#?}", watched.notices);
     assert!(watched.dog.order(watched.world.now, order).is_ok());
+}
+
+#[test]
+fn stops_are_repeated_as_long_as_sensors_report_at_random() {
+    // Given a train that runs,
+    let mut watched = Watched::two();
+    watched.go(FIRST, 3);
+    watched.run(1.0);
+    // when there is noise,
+    for name in ["E1", "E2", "C1", "C2"] {
+        let sensor = watched.world.layout.sensor_named(name).expect("a sensor");
+        watched.world.close(sensor);
+        watched.run(0.1);
+    }
+    assert!(watched.notices.contains(&Notice::Noise), "{:#?}", watched.notices);
+    let before = watched.commanded.len();
+    watched.run(2.7);
+    // then its stop is commanded again every 0.3 s, also after the two repeats of any alarm: one that is garbled may be step 8.
+    assert!(!watched.notices.contains(&Notice::NoiseOver), "{:#?}", watched.notices);
+    let stop = Command::Speed { train: FIRST, step: SpeedStep::STAND };
+    let stops = watched.commanded[before..].iter().filter(|(_, command)| *command == stop);
+    assert_eq!(stops.count(), 8, "{:?}", watched.commanded);
 }
