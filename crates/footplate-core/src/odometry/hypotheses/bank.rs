@@ -364,9 +364,8 @@ impl Bank {
             if wheel.counts() { leap(compared.speed, compared.variance, AWAY) } else { 0.0 }
         };
         let [first, second] = &scene.wheels;
-        let silent = |wheel: &WheelScene| wheel.read && wheel.speed.abs() < SILENT;
         let beside = |wheel: &WheelScene, slips: f64| {
-            wheel.stuck && slips > 0.9 || self.side < 0.0 && silent(wheel) && larger(slips, slip) > 0.9
+            wheel.stuck && slips > 0.9 || self.side < 0.0 && wheel.is_silent() && larger(slips, slip) > 0.9
         };
         let lost_first = first_dead > 0.9 || beside(second, first_slips);
         let lost_second = second_dead > 0.9 || beside(first, second_slips);

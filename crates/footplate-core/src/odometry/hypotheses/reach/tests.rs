@@ -3,20 +3,7 @@
 use super::*;
 
 fn wheel(speed: f64) -> WheelScene {
-    WheelScene {
-        counted: 0.05 * speed,
-        late: 0.0,
-        read: true,
-        stuck: false,
-        speed,
-        speed_deviation: 0.05,
-        acceleration: 0.0,
-        acceleration_deviation: 0.5,
-        pitch: 0.03,
-        tolerance: 0.002,
-        braked: true,
-        driven: false,
-    }
+    WheelScene { driven: false, ..WheelScene::of_test(speed) }
 }
 
 /// The width above the wheels after so many seconds of a command (m/s²) with wheels at 20 m/s that slip with this
@@ -27,19 +14,14 @@ fn above(reach: &mut Reach, commanded: f64, slip: f64, seconds: f64) -> f64 {
 }
 
 fn scene(speeds: [f64; 2], commanded: f64) -> Scene {
+    let acceleration = Range { low: -1.5, high: 0.4 };
     Scene {
         wheels: speeds.map(wheel),
-        acceleration: Range { low: -1.5, high: 0.4 },
-        rolling: Range { low: -1.5, high: 0.4 },
-        commanded: Some(commanded),
+        acceleration,
+        rolling: acceleration,
         brake: 0.0,
         traction: 0.0,
-        slide: true,
-        slip: true,
-        inertial: None,
-        independent: false,
-        bounded: Range { low: -40.0, high: 40.0 },
-        top_speed: 40.0,
+        ..Scene::of_test(speeds, Some(commanded))
     }
 }
 
