@@ -61,12 +61,12 @@ impl Points {
     /// Powers its solenoid.
     pub(crate) fn power(&mut self, turnout: TurnoutId, leg: Leg, now: Timestamp) {
         let Some(Some(found)) = self.by_number.get_mut(usize::from(turnout.0)) else { return };
-        found.moving = None;
-        found.powered_at = now;
         let obeys = !self.draws.chance(self.failure.as_parts()) && !found.is_burnt;
         let takes = self.draws.uniform(THROW_S);
-        if obeys && found.lies != leg {
-            found.moving = Some((leg, now + TimeSpan::from_s(takes)));
+        // What it does not obey leaves an earlier movement going on.
+        if obeys {
+            found.powered_at = now;
+            found.moving = (found.lies != leg).then_some((leg, now + TimeSpan::from_s(takes)));
         }
         self.look_ahead();
     }

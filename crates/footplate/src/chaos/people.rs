@@ -27,7 +27,7 @@ const HELP_AFTER: TimeSpan = TimeSpan::from_ms(15_000);
 const STUCK_AFTER: TimeSpan = TimeSpan::from_ms(120_000);
 /// The operator enters the position of a train at the earliest this long after it was commanded to reverse: before that its decoder has
 /// not heard the command, and the operator has not seen its effect.
-const SEEN_AFTER: TimeSpan = TimeSpan::from_ms(1_000);
+pub(super) const SEEN_AFTER: TimeSpan = TimeSpan::from_ms(1_000);
 /// A turnout that was commanded lies as commanded after this time.
 const MOVES_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
 const TRIES: usize = 100;

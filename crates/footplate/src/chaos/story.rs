@@ -20,7 +20,7 @@ use super::disk::FaultyDisk;
 use super::failure::{Failure, FailureKind};
 use super::life::{Death, Life, Spell, time_outside};
 use super::line::{FaultyLine, LATE, SharedStation};
-use super::people::{People, Seen, SharedDisk};
+use super::people::{People, SEEN_AFTER, Seen, SharedDisk};
 use super::plan::{Plan, PlannedLife};
 use super::promises::Promises;
 use super::selection::Selection;
@@ -456,15 +456,16 @@ impl<'l> Teller<'_, 'l> {
         }
     }
 
-    /// The operator waits for standstill before the next life begins.
+    /// The operator waits for standstill before the next life begins, and sees only after a moment what a last stop, which may set a
+    /// direction, has made of a train.
     fn await_rest(&mut self) {
         let mut station = self.station.borrow_mut();
-        let until = station.now() + TimeSpan::from_s(20.0);
+        let (seen, until) = (station.now() + SEEN_AFTER, station.now() + TimeSpan::from_s(20.0));
         loop {
             let rests = |train: &TrainId| {
                 station.world().truth().train(*train).is_none_or(|truth| truth.at_rest_since.is_some())
             };
-            if TRAINS.iter().all(rests) || station.now() >= until {
+            if station.now() >= seen && TRAINS.iter().all(rests) || station.now() >= until {
                 return;
             }
             let next = station.now() + TimeSpan::from_ms(50);

@@ -94,7 +94,7 @@ impl Watchdog {
     pub(super) fn repeat_stops(&mut self, now: Timestamp) {
         let due: Vec<TrainId> = self.stops.repeats_due(now).filter(|train| self.is_held(*train)).collect();
         for train in due {
-            self.stops.repeat(train, self.noise.is_on());
+            self.stops.repeat(train, self.is_silent());
             self.command(Command::Speed { train, step: SpeedStep::STAND });
         }
     }

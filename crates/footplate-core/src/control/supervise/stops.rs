@@ -14,8 +14,8 @@ pub(super) const WATCHED_FOR: TimeSpan = TimeSpan::from_s(10.0);
 /// The stop of an alarm is commanded again this long after it was sent (chosen: a train at 400 mm/s runs 120 mm), ...
 const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(300);
 /// ... this often: a line that confirms nothing may garble a command without a trace. Of two bytes of which 5 in 100 are
-/// garbled, three arrive once with a probability of 999 in 1000. The last one counts, though: a bit makes step 8 of step 0. While there
-/// is noise it is always repeated.
+/// garbled, three arrive once with a probability of 999 in 1000. The last one counts, though: a bit makes step 8 of step 0. While the
+/// line garbles data or the station is silent it is always repeated.
 const REPEATS: u8 = 2;
 
 /// A stop command to a train.
@@ -61,11 +61,11 @@ impl Stops {
         due.map(|(train, _)| *train)
     }
 
-    /// A stop is commanded again, as one of those that are always, or in noise.
-    pub(super) fn repeat(&mut self, train: TrainId, in_noise: bool) {
+    /// A stop is commanded again, as one of those that are always, or over a line that is not to be relied on.
+    pub(super) fn repeat(&mut self, train: TrainId, unreliable: bool) {
         if let Some(stop) = self.stops.get_mut(&train) {
             stop.sent = None;
-            stop.repeats = if in_noise { REPEATS } else { stop.repeats.saturating_sub(1) };
+            stop.repeats = if unreliable { REPEATS } else { stop.repeats.saturating_sub(1) };
         }
     }
 
