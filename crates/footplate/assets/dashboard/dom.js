@@ -10,8 +10,14 @@ export function make(name, properties = {}, ...inside) {
     else if (key.includes("-")) made.setAttribute(key, value);
     else made[key] = value;
   }
-  made.append(...inside);
+  made.append(...inside.flatMap(prose));
   return made;
+}
+
+/** The nodes of a text, in which commands and names of buttons stand between backticks; other nodes as they are. */
+function prose(text) {
+  if (typeof text !== "string") return [text];
+  return text.split("`").map((part, at) => (at % 2 ? make("code", {}, part) : part));
 }
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -26,7 +32,8 @@ export function svg(name, attributes, parent) {
 
 /** Replaces the text of an element, unless it is the same. */
 export function put(element, text) {
-  if (element.textContent !== text) element.textContent = text;
+  const nodes = prose(String(text ?? ""));
+  if (element.textContent !== nodes.map((node) => node.textContent ?? node).join("")) element.replaceChildren(...nodes);
 }
 
 /** A number in the reader's language, with a true minus. */

@@ -79,7 +79,7 @@ export function editorPage(root, live) {
     $("#draft-says").replaceChildren(...problems.map(({ word, blanks, isError }) => make("li", { class: isError ? "danger" : word === "draft-gap" ? "warning" : "over" }, say(word, ...blanks))));
     $("#draft-save").disabled = !toml;
     $("#draft-use").disabled = !toml;
-    put($("#draft-toml"), toml ?? "");
+    $("#draft-toml").textContent = toml ?? "";
     $("#draft-written").hidden = !toml;
     $("#draft-undo").disabled = !draft.canUndo;
     $("#draft-redo").disabled = !draft.canRedo;

@@ -1,5 +1,6 @@
 // The texts of the pages, in the reader's language.
 
+import { put } from "./dom.js";
 import { ENGLISH } from "./english.js";
 import { GERMAN } from "./german.js";
 import { logInGerman } from "./german_log.js";
@@ -24,7 +25,7 @@ export const logged = (line) => (isGerman ? logInGerman(line) : line);
 /** Fills in all texts of a part of the page. */
 export function translate(root) {
   document.documentElement.lang = LANGUAGE;
-  for (const element of root.querySelectorAll("[data-word]")) element.textContent = say(element.dataset.word);
+  for (const element of root.querySelectorAll("[data-word]")) put(element, say(element.dataset.word));
   for (const element of root.querySelectorAll("[data-label]")) {
     element.setAttribute("aria-label", say(element.dataset.label));
   }
