@@ -1,6 +1,6 @@
 // Alarms on every page, in the reader's language: the server keeps one for each cause until it is over or the operator ends it.
 
-import { make, put } from "./dom.js";
+import { make, put, shown } from "./dom.js";
 import { ask, order } from "./server.js";
 import { logged, say } from "./words.js";
 
@@ -18,10 +18,13 @@ const OF_MODEL = new Set(["promises-broken", "drifts-slower", "drifts-faster", "
 /** Alarms whose values are sentences of the server, or commands. */
 const OF_SENTENCES = new Set(["line-says", "not-sent", "unconfirmed"]);
 
+/** A value of an alarm: numbers with decimals in the reader's language. */
+const ofReader = (blank) => (/^-?\d+\.\d+$/.test(blank) ? shown(Number(blank), blank.split(".")[1].length) : blank);
+
 /** Whether the pages have a sentence for an alarm; otherwise its text is shown as in the log. */
 const sentence = ({ what, blanks, text }) => {
   const word = `alarm-${what}`;
-  const said = say(word, ...(OF_SENTENCES.has(what) ? blanks.map(logged) : blanks));
+  const said = say(word, ...(OF_SENTENCES.has(what) ? blanks.map(logged) : blanks.map(ofReader)));
   return said === word ? logged(text) : said;
 };
 

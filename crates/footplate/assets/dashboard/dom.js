@@ -10,14 +10,15 @@ export function make(name, properties = {}, ...inside) {
     else if (key.includes("-")) made.setAttribute(key, value);
     else made[key] = value;
   }
-  made.append(...inside.flatMap(prose));
+  made.append(...inside.map(prose));
   return made;
 }
 
-/** The nodes of a text, in which commands and names of buttons stand between backticks; other nodes as they are. */
+/** A text, in which commands and names of buttons stand between backticks, as one node; other nodes as they are. */
 function prose(text) {
-  if (typeof text !== "string") return [text];
-  return text.split("`").map((part, at) => (at % 2 ? make("code", {}, part) : part));
+  const parts = typeof text === "string" ? text.split("`") : [];
+  if (parts.length < 2) return text;
+  return make("span", {}, ...parts.map((part, at) => (at % 2 ? make("code", {}, part) : part)));
 }
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -32,8 +33,8 @@ export function svg(name, attributes, parent) {
 
 /** Replaces the text of an element, unless it is the same. */
 export function put(element, text) {
-  const nodes = prose(String(text ?? ""));
-  if (element.textContent !== nodes.map((node) => node.textContent ?? node).join("")) element.replaceChildren(...nodes);
+  const node = prose(String(text ?? ""));
+  if (element.textContent !== (node.textContent ?? node)) element.replaceChildren(node);
 }
 
 /** A number in the reader's language, with a true minus. */
