@@ -21,6 +21,7 @@ impl LinkNotice {
             Self::ReverseInDoubt { train } | Self::OtherThrottle { train, reversed: true } => {
                 Some(LinkNews::ReverseInDoubt { train: *train })
             }
+            Self::OtherThrottle { train, reversed: false } => Some(LinkNews::OtherThrottle { train: *train }),
             _ => None,
         }
     }

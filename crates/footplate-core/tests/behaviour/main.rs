@@ -15,6 +15,7 @@ mod integer_stops;
 mod lasting_fits;
 mod motion_checks;
 mod motion_models;
+mod news_of_the_line;
 mod odometer;
 mod pacing;
 mod paths_on_tracks;

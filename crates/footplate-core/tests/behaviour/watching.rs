@@ -242,45 +242,6 @@ fn power_is_switched_off_when_a_train_does_not_stop() {
 }
 
 #[test]
-fn after_a_silent_station_every_train_is_located_again() {
-    let mut watched = Watched::one();
-    watched.go(FIRST, 9);
-    watched.run(8.0);
-    watched.dog.handle_link(watched.world.now, LinkNews::Silent);
-    watched.run(4.0);
-    assert_eq!(watched.alarm(), Some(Alarm::LinkSilent));
-    assert_eq!(
-        watched.dog.order(watched.world.now, Order::Speed { train: FIRST, step: step(5) }),
-        Err(Refusal::InDanger { train: FIRST })
-    );
-    watched.dog.handle_link(watched.world.now, LinkNews::Answers);
-    assert!(watched.run_until(120.0, |watched| watched.recovered().is_some()), "{:#?}", watched.notices);
-    assert_eq!(watched.recovered(), Some(Outcome::AsBefore));
-}
-
-#[test]
-fn stops_are_repeated_as_long_as_the_line_is_not_to_be_relied_on() {
-    // Given a train that runs when its line begins to garble data,
-    let mut watched = Watched::one();
-    watched.go(FIRST, 9);
-    watched.run(8.0);
-    let before = watched.commanded.len();
-    watched.dog.handle_link(watched.world.now, LinkNews::Silent);
-    watched.run(3.1);
-    // then its stop is commanded at once and every 0.3 s after that: the last of a few may be garbled to another step,
-    let stop = Command::Speed { train: FIRST, step: SpeedStep::STAND };
-    let stops = |watched: &Watched, from: usize| {
-        watched.commanded[from..].iter().filter(|(_, command)| *command == stop).count()
-    };
-    assert_eq!(stops(&watched, before), 10, "{:?}", watched.commanded);
-    // and three times more once the station answers.
-    let before = watched.commanded.len();
-    watched.dog.handle_link(watched.world.now, LinkNews::Answers);
-    watched.run(3.1);
-    assert_eq!(stops(&watched, before), 3, "{:?}", watched.commanded);
-}
-
-#[test]
 fn a_removed_train_needs_an_operator_and_is_trusted_once_placed() {
     let mut watched = Watched::one();
     watched.go(FIRST, 8);

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use footplate_core::control::LinkNews;
 use footplate_core::{Command, EventKind, SensorId, TimeSpan, TrainId, TurnoutId};
 use footplate_wire::loconet::{
     Client, FunctionGroup, FunctionPacket, LAST_WILL, Line, Lines, Message, Settings, SlotData, SlotUse,
@@ -316,6 +317,7 @@ fn another_throttle_is_noticed() {
     desk.hear(drives(1, 20));
     desk.run_for(300);
     assert_eq!(desk.notices, [LinkNotice::OtherThrottle { train: T24, reversed: false }]);
+    assert_eq!(desk.notices[0].news(), Some(LinkNews::OtherThrottle { train: T24 }));
 }
 
 #[test]

@@ -5,8 +5,9 @@ use footplate_core::{Event, TrainId};
 use footplate_store::Schedule;
 use serde::de::DeserializeOwned;
 
-/// Prefix of the train number.
+/// Prefixes of the train number.
 const REVERSE_IN_DOUBT: &str = "reverse-in-doubt ";
+const OTHER_THROTTLE: &str = "other-throttle ";
 /// Prefix of a number that a decoder reported, and of its train.
 const REPORTED_SPEED: &str = "reported-speed ";
 
@@ -73,6 +74,7 @@ impl Input {
             Self::Link(LinkNews::Answers) => ("link", "answers".to_owned()),
             Self::Link(LinkNews::PowerLost) => ("link", "power-lost".to_owned()),
             Self::Link(LinkNews::ReverseInDoubt { train }) => ("link", format!("{REVERSE_IN_DOUBT}{train}")),
+            Self::Link(LinkNews::OtherThrottle { train }) => ("link", format!("{OTHER_THROTTLE}{train}")),
             Self::Link(LinkNews::ReportedSpeed { train, number }) => {
                 ("link", format!("{REPORTED_SPEED}{number} {train}"))
             }
@@ -95,28 +97,11 @@ impl Input {
         Ok(match kind {
             "event" => Self::Event(of_json(kind, text)?),
             "order" => Self::Order(of_json(kind, text)?),
-            "link" => match text {
-                "silent" => Self::Link(LinkNews::Silent),
-                "answers" => Self::Link(LinkNews::Answers),
-                "power-lost" => Self::Link(LinkNews::PowerLost),
-                _ => {
-                    let news = text.strip_prefix(REPORTED_SPEED).map_or_else(
-                        || {
-                            let train = text.strip_prefix(REVERSE_IN_DOUBT)?.parse().ok()?;
-                            Some(LinkNews::ReverseInDoubt { train: TrainId(train) })
-                        },
-                        |reported| {
-                            let (number, train) = reported.split_once(' ')?;
-                            let train = TrainId(train.parse().ok()?);
-                            Some(LinkNews::ReportedSpeed { train, number: number.parse().ok()? })
-                        },
-                    );
-                    Self::Link(news.ok_or_else(|| {
-                        let why = "it should be `silent`, `answers`, `power-lost`, `reverse-in-doubt 24` or `reported-speed 63 24`";
-                        InputError::Wrong { kind: kind.to_owned(), text: text.to_owned(), why: why.to_owned() }
-                    })?)
-                }
-            },
+            "link" => Self::Link(news(text).ok_or_else(|| {
+                let why = "it should be `silent`, `answers`, `power-lost`, `reverse-in-doubt 24`, `other-throttle 24` or \
+                           `reported-speed 63 24`";
+                InputError::Wrong { kind: kind.to_owned(), text: text.to_owned(), why: why.to_owned() }
+            })?),
             "timeout" => Self::Timeout,
             "line" => Self::Line(text.to_owned()),
             "schedule" => Self::Schedule(of_json(kind, text)?),
@@ -127,6 +112,28 @@ impl Input {
             "end" => Self::End,
             _ => return Err(InputError::Unknown { kind: kind.to_owned() }),
         })
+    }
+}
+
+/// News of the link.
+fn news(text: &str) -> Option<LinkNews> {
+    let train = |number: &str| number.parse().ok().map(TrainId);
+    if let Some(number) = text.strip_prefix(REVERSE_IN_DOUBT) {
+        return Some(LinkNews::ReverseInDoubt { train: train(number)? });
+    }
+    if let Some(number) = text.strip_prefix(OTHER_THROTTLE) {
+        return Some(LinkNews::OtherThrottle { train: train(number)? });
+    }
+    if let Some((number, of)) =
+        text.strip_prefix(REPORTED_SPEED).and_then(|reported| reported.split_once(' '))
+    {
+        return Some(LinkNews::ReportedSpeed { train: train(of)?, number: number.parse().ok()? });
+    }
+    match text {
+        "silent" => Some(LinkNews::Silent),
+        "answers" => Some(LinkNews::Answers),
+        "power-lost" => Some(LinkNews::PowerLost),
+        _ => None,
     }
 }
 
@@ -186,6 +193,7 @@ mod tests {
             Input::Link(LinkNews::Answers),
             Input::Link(LinkNews::PowerLost),
             Input::Link(LinkNews::ReverseInDoubt { train }),
+            Input::Link(LinkNews::OtherThrottle { train }),
             Input::Link(LinkNews::ReportedSpeed { train, number: 63 }),
             Input::Order(Order::Stop(StopOrder {
                 aim: Aim::NotBeyond(Ratio::from_parts(0.001)),

@@ -29,6 +29,11 @@ pub enum LinkNews {
         /// The number.
         number: u16,
     },
+    /// Another throttle has changed the speed of a train: where it runs or rests is unknown.
+    OtherThrottle {
+        /// The train.
+        train: TrainId,
+    },
     /// It is unknown whether a train has received a command to reverse: its direction is unknown.
     ReverseInDoubt {
         /// The train.
@@ -44,6 +49,7 @@ impl Watchdog {
                 self.undirected.insert(train);
                 self.lose(now, train);
             }
+            LinkNews::OtherThrottle { train } => self.lose(now, train),
             LinkNews::ReportedSpeed { train, number } => {
                 let has_stalled = self.driver.take_reported_speed(now, train, number);
                 if has_stalled && self.is_watching() && !self.dangers.contains_key(&train) {
