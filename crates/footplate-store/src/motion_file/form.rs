@@ -9,7 +9,7 @@ use crate::quantity::Quantity;
 /// change of the fit in `model::fit` of core, or of the events that [`MotionReplay`](crate::MotionReplay)
 /// feeds it. Stored models and replays are then computed again from the events. A test pins the numbers of every
 /// version.
-pub const MOTION_MODEL_VERSION: &str = "12";
+pub const MOTION_MODEL_VERSION: &str = "13";
 
 /// The motion model of one train on one layout.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

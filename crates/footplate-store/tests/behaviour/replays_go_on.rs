@@ -117,7 +117,7 @@ fn the_version_of_the_model_is_raised_with_its_formulas() {
         import_new(store, STOP, minute(2));
     });
     // Printed by this test when it fails: whoever changed the numbers raises MOTION_MODEL_VERSION, and writes down both here.
-    let known = [("12", "9df8b594fa79422f0a01644a23f2b74554eb8bea7bca7e8187e8b6780358a36b")];
+    let known = [("13", "9df8b594fa79422f0a01644a23f2b74554eb8bea7bca7e8187e8b6780358a36b")];
     let found = ContentHash::of(said.as_bytes()).to_string();
     assert_eq!(known.last(), Some(&(MOTION_MODEL_VERSION, found.as_str())));
 }

@@ -17,9 +17,12 @@ const FEWEST: usize = 4;
 /// Beyond this many standard deviations a length is not that of the layout: chance alone does it once in 15 000 sections.
 const ODD: f64 = 4.0;
 
-/// A survey is doubted as a whole if it is off by this many times what it says of itself: with ten sections chance alone does
-/// it once in a hundred layouts.
+/// A survey is doubted as a whole if it is off by so many times what it says of itself, ...
 const DOUBTED: f64 = 1.8;
+
+/// ... and of `n` sections by `1.36 + 11.2/n`: chance alone does that once in a thousand layouts (quantiles of 20 000 draws each of 4
+/// to 50 sections).
+const DOUBTED_BY_CHANCE: [f64; 2] = [1.36, 11.2];
 
 /// As many lengths as one in so many may be wrong each by itself.
 const PARTS: usize = 4;
@@ -51,7 +54,7 @@ pub struct SurveyTest {
     /// How many times farther than it says of itself the survey is off; 1 if it is not.
     pub factor: f64,
     /// One standard deviation of the factor that all lengths may have in common, as a part, if the survey is worse than it
-    /// says: it may be off in common by as much as its lengths are off each by itself. Else zero.
+    /// says: it may be off in common by as much as its lengths are off each by itself beyond chance. Else zero.
     pub scale: f64,
 }
 
@@ -72,9 +75,14 @@ impl SurveyTest {
             return fits;
         }
         let Some(usual) = Usual::agreed(&known) else { return fits };
-        let factor = if usual.factor > DOUBTED { usual.factor } else { 1.0 };
+        let [of_many, of_one] = DOUBTED_BY_CHANCE;
+        let doubted = DOUBTED.max(of_many + of_one / known.len() as f64);
+        let is_doubted = usual.factor > doubted;
         let part =
             PER_MEDIAN * median(known.iter().map(|one| usual.off(one).abs() / one.surveyed)).unwrap_or(0.0);
+        // What chance may do is no sign of anything in common: the scale is as sure as before where doubt begins.
+        let chance = doubted / usual.factor;
+        let scale = if is_doubted { part * libm::sqrt(1.0 - chance * chance) } else { 0.0 };
         let mut odd: Vec<&Compared> = known.iter().filter(|one| !usual.agrees(one)).collect();
         odd.sort_by(|one, other| usual.z(other).total_cmp(&usual.z(one)));
         let odd = odd.into_iter().map(|one| OddSection {
@@ -82,7 +90,7 @@ impl SurveyTest {
             surveyed: one.surveyed,
             path_length: one.path_length / usual.ratio,
         });
-        Self { odd: odd.collect(), factor, scale: if factor > 1.0 { part } else { 0.0 } }
+        Self { odd: odd.collect(), factor: if is_doubted { usual.factor } else { 1.0 }, scale }
     }
 
     /// Whether nothing speaks against the survey.
@@ -191,4 +199,62 @@ pub(in crate::model) fn median(values: impl Iterator<Item = f64>) -> Option<f64>
     let mut values: Vec<f64> = values.collect();
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::example::oval;
+
+    /// By how much a train may feel a section longer than surveyed (m), one standard deviation.
+    fn sd(sections: &SectionIndex, section: usize) -> f64 {
+        let feels = PATH_LENGTH_SPREAD * sections.surveyed_length(section);
+        libm::sqrt(sections.survey_variance(section) + feels * feels)
+    }
+
+    /// Ten values as a normal distribution of deviation 1 has them.
+    const NORMAL: [f64; 10] = [0.13, -0.39, 0.67, -1.04, 1.64, -0.13, 0.39, -0.67, 1.04, -1.64];
+
+    /// A train that feels the sections of the oval longer or shorter by so many standard deviations of the survey.
+    fn off_by(deviations: f64) -> SurveyTest {
+        let sections = SectionIndex::of(&oval());
+        let off = |(section, normal)| (section, deviations * normal * sd(&sections, section), 0.0);
+        SurveyTest::of(&sections, NORMAL.into_iter().enumerate().map(off))
+    }
+
+    #[test]
+    fn the_common_scale_is_as_unsure_as_the_lengths_are_off_beyond_chance() {
+        assert_eq!((off_by(2.0).factor, off_by(2.0).scale), (1.0, 0.0));
+        // Of ten sections doubt begins at 2.48: the scale is as sure as before there, and as unsure as the lengths where they are far off.
+        for (by, factor, scale) in [(2.2, 2.501, 0.0085), (2.5, 2.840, 0.0365), (8.0, 8.946, 0.2270)] {
+            let test = off_by(by);
+            assert!(
+                (test.factor - factor).abs() < 0.001 && (test.scale - scale).abs() < 0.0001,
+                "{by}: {test:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn chance_alone_doubts_one_survey_in_a_thousand_however_few_sections_there_are() {
+        let sections = SectionIndex::of(&oval());
+        let mut draws = 1_u64;
+        // The sum of twelve uniform values has deviation 1 (Knuth's generator MMIX).
+        let mut normal = || {
+            let mut uniform = || {
+                draws = draws.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (draws >> 11) as f64 / (1_u64 << 53) as f64
+            };
+            (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+        };
+        for known in FEWEST..=sections.len() {
+            let mut doubted = 0;
+            for _ in 0..2_000 {
+                let felt: Vec<_> =
+                    (0..known).map(|section| (section, normal() * sd(&sections, section), 0.0)).collect();
+                doubted += u32::from(SurveyTest::of(&sections, felt.into_iter()).factor > 1.0);
+            }
+            assert!(doubted <= 8, "{doubted} of 2000 with {known} sections");
+        }
+    }
 }
