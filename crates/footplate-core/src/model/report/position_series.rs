@@ -189,6 +189,8 @@ impl SeriesFit {
 
 /// Positions in m and s, turned so that the train runs towards larger ones.
 struct Series {
+    /// When it begins, on its own clock; all times count from there.
+    begins: TimeSpan,
     times: Vec<f64>,
     positions: Vec<f64>,
     change: SeriesChange,
@@ -241,7 +243,7 @@ impl Series {
                 last: Speed::from_m_per_s(sense * end),
             });
         };
-        Ok(Self { times, positions, change, speed })
+        Ok(Self { begins: first.time, times, positions, change, speed })
     }
 
     fn unknowns(&self) -> &'static [usize] {
@@ -340,7 +342,7 @@ impl Series {
                 count,
                 date: Timestamp::ZERO,
             },
-            effect: span((x[EFFECT], libm::hypot(deviation(EFFECT), shape_time))),
+            effect: span((self.begins.as_s() + x[EFFECT], libm::hypot(deviation(EFFECT), shape_time))),
             lag: span((lag, lag * deviation(LAG))),
             ramp: span((ramp, ramp * deviation(RAMP))),
             friction: is_stop.then(|| Estimate {
@@ -385,4 +387,109 @@ fn spread(residuals: &[f64]) -> (f64, f64) {
     let products: f64 = residuals.iter().zip(residuals.iter().skip(1)).map(|(one, next)| one * next).sum();
     let correlation = if squares > 0.0 { (products / squares).clamp(0.0, MOST_CORRELATED) } else { 0.0 };
     (libm::sqrt(squares / residuals.len().max(1) as f64), correlation)
+}
+
+#[cfg(test)]
+mod tests {
+    use alloc::string::ToString as _;
+
+    use super::*;
+
+    fn points(count: u32, every_s: f64, position: impl Fn(f64) -> f64) -> Vec<PositionPoint> {
+        let point =
+            |time| PositionPoint { time: TimeSpan::from_s(time), position: Length::from_m(position(time)) };
+        (0..count).map(|n| point(every_s * f64::from(n))).collect()
+    }
+
+    /// From rest at `t = 1` to 0.25 m/s with a lag of 0.4 s: the integral of `v (1 − e^−t/θ)`.
+    fn lagging(time: f64) -> f64 {
+        let since = (time - 1.0).max(0.0);
+        0.25 * (since - 0.4 * (1.0 - libm::exp(-since / 0.4)))
+    }
+
+    /// From 0.3 m/s at `t = 1.2` towards rest with a lag of 0.5 s: 0.15 m.
+    fn stopping(time: f64) -> f64 {
+        let since = (time - 1.2).max(0.0);
+        0.3 * time.min(1.2) + 0.15 * (1.0 - libm::exp(-since / 0.5))
+    }
+
+    fn assert_near(found: f64, expected: f64, tolerance: f64) {
+        assert!((found - expected).abs() < tolerance, "{found}, not {expected} ± {tolerance}");
+    }
+
+    #[test]
+    fn a_start_with_a_lag_gives_its_numbers_on_any_clock_and_in_either_direction() {
+        for (clock, origin, sense) in [(0.0, 0.0, 1.0), (100.0, -7.0, -1.0)] {
+            let mut series = points(150, 0.04, |time| origin + sense * lagging(time));
+            series.iter_mut().for_each(|point| point.time += TimeSpan::from_s(clock));
+            let fit = SeriesFit::of(&series).expect("a start");
+            assert_eq!(fit.change, SeriesChange::Start);
+            assert_near(fit.speed.value.as_m_per_s(), 0.25, 1e-3);
+            assert_near(fit.lag.value.as_s(), 0.4, 0.02);
+            assert_near(fit.effect.value.as_s(), clock + 1.0, 0.02);
+            assert!(fit.ramp.value.as_s() < 0.1, "{:?}", fit.ramp);
+            assert!(fit.residual < Length::from_mm(0.1), "{:?}", fit.residual);
+            // An even change of 0.25 m/s is off by millimetres.
+            assert!(fit.even_residual > Length::from_mm(1.0), "{:?}", fit.even_residual);
+            assert_eq!((fit.friction, fit.stopping_distance, fit.stopping_time), (None, None, None));
+            assert_eq!(fit.speed.count, 150);
+        }
+    }
+
+    #[test]
+    fn a_stop_is_as_long_as_it_was() {
+        let fit = SeriesFit::of(&points(200, 0.04, stopping)).expect("a stop");
+        assert_eq!(fit.change, SeriesChange::Stop);
+        assert_near(fit.speed.value.as_m_per_s(), 0.3, 1e-3);
+        assert_near(fit.lag.value.as_s(), 0.5, 0.02);
+        assert_near(fit.effect.value.as_s(), 1.2, 0.03);
+        assert!(fit.residual < Length::from_mm(0.2) && fit.even_residual > fit.residual, "{fit:?}");
+        // The law's shape is off by 4 % of its delay of half a second: at least 6 mm, and 20 ms.
+        let distance = fit.stopping_distance.expect("a stop");
+        assert_near(distance.value.as_mm(), 150.0, 8.0);
+        assert!(
+            distance.uncertainty > Length::from_mm(6.0) && distance.uncertainty < Length::from_mm(20.0),
+            "{fit:?}"
+        );
+        assert!(
+            fit.effect.uncertainty > TimeSpan::from_ms(20) && fit.effect.uncertainty < TimeSpan::from_ms(80),
+            "{fit:?}"
+        );
+        assert!(fit.stopping_time.is_some_and(|time| time.value > TimeSpan::from_s(2.0)), "{fit:?}");
+        assert!(
+            fit.friction.is_some_and(|friction| friction.value < Acceleration::from_mm_per_s2(5.0)),
+            "{fit:?}"
+        );
+    }
+
+    #[test]
+    fn what_is_no_change_of_speed_is_refused_with_its_numbers() {
+        let refused = |points: &[PositionPoint]| SeriesFit::of(points).expect_err("nothing").to_string();
+        let start = points(150, 0.04, lagging);
+        assert!(refused(&start[..9]).starts_with("9 positions are too few"));
+        assert!(refused(&[]).starts_with("0 positions"));
+        let mut twice = start.clone();
+        twice[5].time = twice[4].time;
+        assert!(refused(&twice).starts_with("the time of position 6 is not after"), "{}", refused(&twice));
+        // To and fro: 3 mm at most.
+        let shaken = points(40, 0.1, |time| 0.003 * libm::sin(time));
+        assert!(refused(&shaken).starts_with("the train moved only 3.0 mm"), "{}", refused(&shaken));
+        let even = points(40, 0.1, |time| -0.2 * time);
+        assert!(refused(&even).contains("runs at -200 mm/s at the beginning and -200 mm/s at the end"));
+    }
+
+    #[test]
+    fn residuals_that_are_alike_say_less() {
+        assert_near(slope(&[0.0, 1.0, 2.0], &[0.0, 2.0, 4.5]), 2.25, 1e-12);
+        // Σ r² = 9 and Σ r r′ = 6.
+        let (rms, correlation) = spread(&[1.0, 2.0, 2.0]);
+        assert_near(rms, libm::sqrt(3.0), 1e-12);
+        assert_near(correlation, 2.0 / 3.0, 1e-12);
+        // Twelve residuals of 2 mm with six unknowns: 8 mm² where each has the other sign than the one before, 23 times that
+        // where all are alike: ρ = 11/12.
+        let alternating: Vec<f64> = (0..12).map(|n| if n % 2 == 0 { 0.002 } else { -0.002 }).collect();
+        assert_near(noise(&alternating), 8e-6, 1e-12);
+        assert_near(noise(&[0.002; 12]), 23.0 * 8e-6, 1e-10);
+        assert_near(noise(&[0.0; 12]), LEAST_NOISE * LEAST_NOISE, 1e-20);
+    }
 }
