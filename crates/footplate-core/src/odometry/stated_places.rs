@@ -430,6 +430,31 @@ mod tests {
     }
 
     #[test]
+    fn before_any_place_the_distance_is_as_uncertain_as_pulses_creepage_scale_and_slides_make_it() {
+        let off = |places: &StatedPlaces| places.distance(Length::from_m(1000.0)).deviation;
+        // 0.05 m at the start, 0.3 m² of creepage over a kilometre, and a scale known to 1e-4 at best: 0.1 m.
+        let mut exact = StatedPlaces::new(0.0);
+        assert!((off(&exact) - (0.0025 + 0.3 + 0.01_f64).sqrt()).abs() < 1e-9, "{}", off(&exact));
+        exact.slid(Length::from_m(-2.0));
+        assert!((off(&exact) - (0.0025 + 0.3 + 0.01 + 4.0_f64).sqrt()).abs() < 1e-9, "{}", off(&exact));
+        // A scale anywhere within 1.2 %: its deviation is that over the root of three, 6.93 m in a kilometre.
+        let scaled = StatedPlaces::new(0.012);
+        assert!((off(&scaled) - (0.0025 + 0.3 + 144.0 / 3.0_f64).sqrt()).abs() < 1e-9, "{}", off(&scaled));
+        assert!((scaled.scale().deviation - (4.8e-5 + 1e-8_f64).sqrt()).abs() < 1e-12);
+        // A place known to 1 m leaves the product of both variances over their sum, the place's enlarged because it may be wrong:
+        // with a residual of 0.9 m it is right with 0.9 · 0.398942 e^−0.408 / (0.9 · 0.398942 e^−0.408 + 0.1 / 60) = 0.993066.
+        pass(&mut exact, 1000.0, 1000.0, 1.0);
+        let stated = 1.0 / 0.993_066;
+        let left = 4.3125 * stated / (4.3125 + stated);
+        assert!((off(&exact) - f64::sqrt(left)).abs() < 1e-5, "{}", off(&exact));
+        let before = exact.distance(Length::from_m(900.0)).deviation;
+        assert!(
+            before > off(&exact) && before < exact.distance(Length::from_m(1200.0)).deviation,
+            "{before}"
+        );
+    }
+
+    #[test]
     fn a_place_is_right_as_often_as_bayes_says() {
         // Nine of ten are right, the others anywhere within 30 m on either side. At its own place a place with a variance of 1 m²
         // has a density of 1/√(2π) = 0.398942: 0.9 · 0.398942 / (0.9 · 0.398942 + 0.1 / 60) = 0.995380.

@@ -228,7 +228,13 @@ fn a_train_driven_by_hand_stops_before_the_track_of_another() {
     let mut traffic = Traffic::new();
     let speed = Order::Speed { train: TRAINS[0], step: step(10) };
     traffic.dispatcher.order(traffic.world.now, speed).expect("a step");
-    traffic.run(30.0);
+    let ends = |traffic: &Traffic| traffic.notices.contains(&Notice::AuthorityEnds { train: TRAINS[0] });
+    while !ends(&traffic) && traffic.world.now < Timestamp::from_s(30.0) {
+        traffic.run(0.01);
+    }
+    let holders = TRAINS.map(|train| traffic.dispatcher.holders_beyond(train, traffic.world.now));
+    assert_eq!(holders, [vec![TRAINS[1]], vec![]], "a person reads whose the track ahead is");
+    traffic.run(25.0);
     assert_eq!(traffic.wrongs, Vec::<String>::new());
     assert!(traffic.world.trains.iter().all(|train| train.speed_mm_per_s < 1.0));
     let throw = Order::Turnout { turnout: TurnoutId(1), curved: true };

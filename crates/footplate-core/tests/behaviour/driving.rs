@@ -159,6 +159,49 @@ fn a_lost_train_is_located_and_then_stopped_at_its_target() {
 }
 
 #[test]
+fn a_plan_is_reported_again_only_when_it_has_changed() {
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = driver_of(&world, "D1", 300.0);
+    driver.order(world.now, Order::Stop(stop_at(&driver, "D1+100mm"))).expect("a place that can be reached");
+    assert!(world.run_until(&mut driver, 60.0, is_done));
+    let mut plans = Vec::new();
+    for notice in &world.notices {
+        if let Notice::Planned(plan) = notice {
+            plans.push(*plan);
+        }
+    }
+    assert!(plans.len() >= 2, "{plans:?}");
+    for pair in plans.windows(2) {
+        let moved = (pair[1].leaves - pair[0].leaves).abs();
+        assert!(moved >= TimeSpan::from_ms(1) || pair[0].trigger != pair[1].trigger, "{pair:?}");
+    }
+    // The last plan was carried out: its stop left the line at the time that it names, within a poll of this world.
+    let stop = world.commands.iter().rfind(|(_, command)| speed_of_stop(command)).expect("it stopped").0;
+    let planned = plans[plans.len() - 1].leaves;
+    assert!((stop - planned).abs() <= TimeSpan::from_ms(12), "{stop:?} {planned:?}");
+}
+
+#[test]
+fn a_search_that_no_sensor_answers_is_given_up_after_a_minute() {
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = Driver::new(world.layout.clone(), straight());
+    driver.add_train(known_model(24));
+    world.dead = (0..12).map(SensorId).collect();
+    driver
+        .order(world.now, Order::Stop(stop_at(&driver, "B1+100mm")))
+        .expect("a lost train is located first");
+    let given_up =
+        |world: &ToyRailway| world.notices.iter().any(|notice| matches!(notice, Notice::GivenUp { .. }));
+    assert!(world.run_until(&mut driver, 90.0, given_up), "{:#?}", world.notices);
+    assert!((world.now.as_s() - 60.0).abs() < 0.1, "{:?}", world.now);
+    let why = world.notices.iter().find_map(|notice| match notice {
+        Notice::GivenUp { why, .. } => Some(why.clone()),
+        _ => None,
+    });
+    assert_eq!(why, Some(Refusal::NotFound { train: TRAIN, within: TimeSpan::from_s(60.0) }));
+}
+
+#[test]
 fn a_vanished_train_is_given_up_and_commanded_to_stop() {
     let mut world = ToyRailway::new(24, "D1", 300.0);
     let mut driver = driver_of(&world, "D1", 300.0);

@@ -218,3 +218,44 @@ fn a_train_that_one_report_puts_on_another_leg_keeps_both_until_a_sensor_decides
     assert!(traffic.notices.contains(&showed(false)), "{:#?}", traffic.notices);
     assert_eq!(traffic.arrivals(train), 1, "{:#?}", traffic.notices);
 }
+
+#[test]
+fn by_blocks_a_train_reserves_all_track_between_sensors_with_its_turnouts() {
+    // Given a train between D1 and A1, and one beyond B1, on a layout that is reserved by blocks,
+    let by_blocks = |now, driver| {
+        let mut dispatcher = Dispatcher::new(now, driver);
+        dispatcher.reserve_blocks();
+        dispatcher
+    };
+    let mut traffic = Traffic::with(by_blocks, STARTS);
+    traffic.run(1.0);
+    let layout = traffic.world.layout.clone();
+    // Block by block of the drawing: the stretches, and the turnout between them.
+    let blocks = [
+        (vec![("D1", "A1")], vec![]),
+        (vec![("B1", "MR2"), ("C1", "MR2"), ("MR2", "D1")], vec![TurnoutId(2)]),
+    ];
+    for (train, (stretches, turnouts)) in TRAINS.into_iter().zip(blocks) {
+        let reserved = traffic.dispatcher.reservation(train).expect("known");
+        assert_eq!(reserved.turnouts().collect::<Vec<_>>(), turnouts, "{train}");
+        let node = |name: &str| layout.node_named(name).expect("a node");
+        let of_block: Vec<_> =
+            stretches.iter().filter_map(|(from, to)| layout.edge_between(node(from), node(to))).collect();
+        assert_eq!(of_block.len(), stretches.len());
+        for (id, edge) in layout.edges() {
+            let is_of_block = of_block.iter().any(|edge| edge.stretch() == id.stretch());
+            for part in [0.02, 0.5, 0.98] {
+                let place = Position { edge: id, offset: part * edge.length };
+                assert_eq!(is_held(&layout, place, reserved), is_of_block, "train {train}: {place:?}");
+            }
+        }
+    }
+    // A train drives on by whole blocks: no turnout of another's block moves.
+    let throw = Order::Turnout { turnout: TurnoutId(2), curved: true };
+    let taken = traffic.dispatcher.order(traffic.world.now, throw);
+    assert!(matches!(taken, Err(Refusal::TurnoutOccupied { turnout: TurnoutId(2), .. })), "{taken:?}");
+    traffic.go(TRAINS[1], "D1");
+    traffic.run(60.0);
+    assert_eq!(traffic.wrongs, Vec::<String>::new());
+    assert_eq!(traffic.arrivals(TRAINS[1]), 1, "{:#?}", traffic.notices);
+}

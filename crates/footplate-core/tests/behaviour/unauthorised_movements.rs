@@ -4,7 +4,7 @@ use footplate_core::control::{Notice, Order, Refusal};
 use footplate_core::{Command, SpeedStep};
 
 use crate::toy_railway::step;
-use crate::watching::{FIRST, Watched};
+use crate::watching::{FIRST, SECOND, Watched};
 
 #[test]
 fn what_no_session_drives_stops_trains_until_an_operator_says_that_the_track_is_clear() {
@@ -20,8 +20,14 @@ fn what_no_session_drives_stops_trains_until_an_operator_says_that_the_track_is_
     watched.run(6.0);
     assert!(!is_raised(&watched), "{:#?}", watched.notices);
     // one at the next sensor is a movement: a train that could meet it stops and stays.
+    let before = watched.commanded.len();
     watched.world.close(other);
     assert!(watched.run_until(10.0, is_raised), "{:#?}", watched.notices);
+    // A train at rest may have missed its stop: it is commanded again.
+    for train in [FIRST, SECOND] {
+        let stop = Command::Speed { train, step: SpeedStep::STAND };
+        assert!(watched.commanded[before..].iter().any(|(_, command)| *command == stop), "{train}");
+    }
     watched.run(5.0);
     assert!(watched.world.trains.iter().all(|train| train.speed_mm_per_s < 1.0));
     let order = Order::Speed { train: FIRST, step: step(5) };

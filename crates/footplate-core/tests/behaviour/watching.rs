@@ -227,6 +227,22 @@ fn power_is_switched_off_when_a_stop_is_not_sent() {
 }
 
 #[test]
+fn power_returns_two_seconds_after_it_went_off() {
+    let mut watched = Watched::one();
+    watched.go(FIRST, 10);
+    watched.run(5.0);
+    watched.world.is_silent = true;
+    watched.go(FIRST, 0);
+    assert!(watched.run_until(3.0, |watched| watched.power_off().is_some()));
+    watched.world.is_silent = false;
+    let off = watched.power_off().expect("it is off");
+    let on = |watched: &Watched| watched.commanded.iter().any(|(_, command)| *command == Command::PowerOn);
+    assert!(watched.run_until(5.0, on), "{:#?}", watched.notices);
+    let without = watched.world.now - off;
+    assert!((without - TimeSpan::from_s(2.0)).abs() <= TimeSpan::from_ms(2), "{without:?}");
+}
+
+#[test]
 fn power_is_switched_off_when_a_train_does_not_stop() {
     let mut watched = Watched::one();
     watched.go(FIRST, 10);

@@ -63,3 +63,50 @@ impl Identity {
         ((ratio - 1.0).abs() > SAME_TRAIN).then_some(ratio)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use alloc::vec;
+
+    use super::*;
+
+    fn step(step: u8) -> SpeedStep {
+        SpeedStep::new(step).expect("a step")
+    }
+
+    fn known() -> Identity {
+        Identity { before: vec![(step(4), Speed::from_mm_per_s(160.0))], ..Identity::default() }
+    }
+
+    #[test]
+    fn the_median_of_six_ratios_beyond_a_tenth_is_another_train_and_is_said_once() {
+        // Sorted 1.0, 1.02, 1.1, 1.11, 1.3, 9: the upper of the middle two.
+        for (ratios, expected) in [
+            ([9.0, 1.0, 1.11, 1.3, 1.02, 1.1], Some(1.11)),
+            ([0.5, 1.0, 0.89, 0.4, 0.88, 0.95], Some(0.89)),
+            ([9.0, 1.0, 1.09, 1.3, 1.02, 1.05], None),
+            ([0.5, 1.0, 0.91, 0.4, 0.90, 0.95], None),
+        ] {
+            let mut identity = known();
+            let [first @ .., last] = ratios;
+            assert!(first.into_iter().all(|ratio| identity.compare(ratio).is_none()));
+            assert_eq!(identity.compare(last), expected, "{ratios:?}");
+            let passage = Some((NodeId(1), Timestamp::ZERO, step(4)));
+            assert!(identity.advance(passage).is_none() && identity.advance(passage).is_none(), "it is over");
+        }
+    }
+
+    #[test]
+    fn two_passages_in_a_row_at_one_known_step_are_compared() {
+        let at = |node, seconds, number| Some((NodeId(node), Timestamp::from_s(seconds), step(number)));
+        let mut identity = known();
+        assert_eq!(identity.advance(at(1, 1.0, 4)), None, "the first");
+        let found = identity.advance(at(2, 2.0, 4));
+        assert_eq!(found, Some((NodeId(1), Timestamp::from_s(1.0), Speed::from_mm_per_s(160.0))));
+        assert_eq!(identity.advance(at(3, 3.0, 5)), None, "not known");
+        assert_eq!(identity.advance(at(4, 4.0, 4)), None, "the step has changed");
+        assert!(identity.advance(at(5, 5.0, 4)).is_some());
+        assert_eq!(identity.advance(None), None, "not steady");
+        assert_eq!(identity.advance(at(6, 6.0, 4)), None);
+    }
+}

@@ -1,10 +1,12 @@
 //! Promises of the calibrator, whatever the train does.
 
+use alloc::vec::Vec;
+
 use super::calibrator::Calibrator;
 use super::notice::{CalibrationNotice, Ending, Fault};
 use super::scripted_train::ScriptedTrain;
 use super::settings::CalibratorSettings;
-use crate::event::Command;
+use crate::event::{Approach, Command};
 use crate::ids::{SpeedStep, TrainId, TurnoutId};
 use crate::model::MotionFit;
 use crate::time::TimeSpan;
@@ -168,4 +170,32 @@ fn a_person_can_pause_it_and_end_it() {
     train.run(&mut machine, 20.0);
     assert_eq!(machine.ending(), Some(&Ending::Told));
     assert!(train.is_at_rest());
+}
+
+#[test]
+fn a_train_that_runs_otherwise_than_in_earlier_sessions_is_noticed() {
+    let layout = large_oval();
+    let mut train = ScriptedTrain::new(&layout, "D1", "A1", 200.0);
+    let mut machine = calibrator(&layout, 240.0);
+    train.run(&mut machine, 250.0);
+    // Every step from either side, but the highest, which is reached from below only.
+    let lines: Vec<_> = machine.accuracy().iter().map(|line| (line.step, line.approach)).collect();
+    let (highest, others) = lines.split_last().unwrap();
+    assert_eq!(highest.1, Approach::Below);
+    assert!(!others.is_empty() && others.chunks(2).all(|pair| {
+        matches!(pair, [(one, Approach::Below), (other, Approach::Above)] if one == other && *one < highest.0)
+    }), "{lines:?}");
+    // In the next session it runs a fifth faster; polls of 62 ms leave two per cent of a hop.
+    let mut train = ScriptedTrain::new(&layout, "D1", "A1", 200.0);
+    train.speed_of = |step| 48.0 * f64::from(step);
+    let settings = machine.settings.clone();
+    let mut machine = Calibrator::new(&layout, settings, machine.into_fit());
+    machine.settings.budget = TimeSpan::from_s(400.0);
+    train.run(&mut machine, 410.0);
+    let ratios = train.notices.iter().filter_map(|(_, notice)| match fault(notice) {
+        Some(Fault::OtherSpeeds { ratio }) => Some(*ratio),
+        _ => None,
+    });
+    let ratios: Vec<f64> = ratios.collect();
+    assert!(matches!(ratios[..], [ratio] if (ratio - 1.2).abs() < 0.03), "{ratios:?}");
 }

@@ -247,3 +247,86 @@ impl Finder<'_> {
 fn deviation(variance_s2: f64) -> TimeSpan {
     TimeSpan::from_s(libm::sqrt(variance_s2))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A change in a run with an acceleration and its standard deviation (m/s²), known since a date (s).
+    fn change(run: usize, steps: [u8; 2], acceleration: f64, deviation: f64, date: f64) -> TwoSensorChange {
+        let one = |value: f64, uncertainty: f64| Estimate {
+            value: Acceleration::from_m_per_s2(value),
+            uncertainty: Acceleration::from_m_per_s2(uncertainty),
+            count: 1,
+            date: Timestamp::from_s(date),
+        };
+        fn nothing<Q>(value: Q, uncertainty: Q) -> Estimate<Q> {
+            Estimate { value, uncertainty, count: 1, date: Timestamp::ZERO }
+        }
+        let time = nothing(TimeSpan::ZERO, TimeSpan::ZERO);
+        let speed = nothing(Speed::ZERO, Speed::ZERO);
+        TwoSensorChange {
+            run,
+            commanded: Timestamp::ZERO,
+            steps: steps.map(|step| SpeedStep::new(step).expect("a step")),
+            sensors: [SensorId(0), SensorId(2)],
+            entry: 0,
+            measured: TwoSensorRun {
+                distance: nothing(Length::ZERO, Length::ZERO),
+                before_command: time,
+                time,
+                from: speed,
+                to: speed,
+                command_delay: time,
+            },
+            verdict: Ok(TwoSensorVerdict::Completed {
+                acceleration: one(acceleration, deviation),
+                duration: TimeSpan::ZERO,
+            }),
+        }
+    }
+
+    #[test]
+    fn means_are_of_times_and_never_better_known_than_one_change() {
+        let means = TwoSensorMean::of(&[
+            change(0, [8, 12], 0.1, 0.01, 5.0),
+            change(1, [4, 8], 0.1, 0.001, 1.0),
+            change(2, [8, 12], 0.125, 0.03125, 3.0),
+            change(3, [4, 8], 0.25, 0.00625, 2.0),
+            change(4, [4, 8], 0.1, 0.001, 3.0),
+        ]);
+        let found: Vec<_> = means
+            .iter()
+            .map(|mean| {
+                let Estimate { value, uncertainty, count, date } = mean.acceleration;
+                (
+                    mean.steps.map(SpeedStep::get),
+                    1.0 / value.as_m_per_s2(),
+                    uncertainty.as_m_per_s2(),
+                    count,
+                    date,
+                )
+            })
+            .collect();
+        let [differ, agree] = &found[..] else { panic!("{found:?}") };
+        // 10, 10 and 4 s²/m, each known to 0.1: 8 in the mean, off by 2, 2 and 4, which is √(24 / (3 · 2)) = 2.
+        assert_eq!((differ.0, differ.3, differ.4), ([4, 8], 3, Timestamp::from_s(3.0)));
+        assert!((differ.1 - 8.0).abs() < 1e-9 && (differ.2 - 2.0 / 64.0).abs() < 1e-9, "{differ:?}");
+        // 10 ± 1 and 8 ± 2 s²/m weigh 1 and 1/4: 9.6 in the mean and 1.2 by what they say of themselves, more than √0.64.
+        assert_eq!((agree.0, agree.3, agree.4), ([8, 12], 2, Timestamp::from_s(5.0)));
+        assert!((agree.1 - 9.6).abs() < 1e-9 && (agree.2 - 1.2 / 92.16).abs() < 1e-9, "{agree:?}");
+    }
+
+    #[test]
+    fn of_one_change_the_pair_of_sensors_counts_that_tells_most_of_its_time() {
+        // 0.004 / 0.2² = 0.1 s²/m is better known than 0.002 / 0.1² = 0.2 s²/m.
+        let undecided =
+            TwoSensorChange { verdict: Ok(TwoSensorVerdict::NotNoticed), ..change(0, [4, 8], 0.1, 0.0, 0.0) };
+        let worse = change(0, [4, 8], 0.1, 0.002, 0.0);
+        let better = change(0, [4, 8], 0.2, 0.004, 0.0);
+        let of_next_run = change(1, [4, 8], 0.3, 0.3, 0.0);
+        let best = TwoSensorChange::best(&[worse, undecided, better, of_next_run]);
+        assert_eq!(best, [better, of_next_run]);
+        assert!(TwoSensorChange::best(&[undecided]).is_empty() && TwoSensorMean::of(&[undecided]).is_empty());
+    }
+}

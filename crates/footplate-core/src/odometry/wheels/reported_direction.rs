@@ -67,4 +67,24 @@ mod tests {
         reported.read(&WheelReading::pulses(0), 1.0, 0.0, 1.1);
         assert_eq!(reported.direction(), 0.0, "forgotten after a second");
     }
+    #[test]
+    fn a_reading_without_a_pulse_says_nothing_of_the_direction() {
+        let mut reported = ReportedDirection::default();
+        let reading = |direction, pulses| WheelReading { direction, ..WheelReading::pulses(pulses) };
+        reported.read(&reading(Direction::Backward, 3), -1.0, 0.0, 0.05);
+        for direction in [Direction::Forward, Direction::Backward, Direction::Unknown] {
+            reported.read(&reading(direction, 0), -1.0, 0.0, 0.3);
+            assert!(reported.convincing() && reported.direction() == 1.0, "wired in reverse");
+        }
+        reported.read(&reading(Direction::Forward, 0), -1.0, 0.0, 0.3);
+        assert!(!reported.convincing() && reported.direction() == 0.0, "1.2 s old");
+        // A counter shows its direction by itself, however its lines are wired.
+        let counter = WheelReading { count: Count::Counter(5), ..WheelReading::pulses(0) };
+        reported.read(&counter, -1.0, 0.0, 0.05);
+        assert_eq!(reported.direction(), 0.0);
+        reported.read(&counter, -1.0, -2.0, 0.05);
+        assert!(reported.direction() == -1.0 && !reported.convincing());
+        reported.read(&counter, -1.0, -1.0, 0.05);
+        assert!(reported.convincing());
+    }
 }

@@ -137,3 +137,27 @@ fn wheels_that_spun_and_slow_down_alike_show_no_speed_without_a_command() {
     let steady = low(0.0, 0.0, 1.0, 60);
     assert!(steady > 12.0, "{steady}: they turn alike and steadily");
 }
+
+#[test]
+fn a_wheel_that_counts_strays_once_it_is_steadily_beyond_what_its_train_can_do() {
+    let strays_after = |acceleration: f64, dead: f64, read: bool| {
+        let mut reach = Reach::new();
+        let mut scene = scene([20.0; 2], -0.5);
+        scene.wheels[1] = WheelScene { acceleration, read, ..scene.wheels[1] };
+        (1..400).find(|_| reach.strays(&scene, [0.0, dead], 0.05)).map(|n| f64::from(n) * 0.05)
+    };
+    // From −1.5 to 0.4 m/s², and 0.1 beyond. A mean over `STEADY_S` gets to 0.5 of 1.0 after ln 2 of it.
+    for (acceleration, expected) in
+        [(1.0, Some(1.0_f64 / 2.0)), (-2.0, Some(0.4 / 2.0)), (0.45, None), (-1.55, None)]
+    {
+        let found = strays_after(acceleration, 0.0, true);
+        let expected = expected.map(|left| -left.ln() * STEADY_S);
+        assert!(
+            found.is_some() == expected.is_some()
+                && found.zip(expected).is_none_or(|(a, b)| (a - b).abs() < 0.1),
+            "{acceleration}: {found:?}, not {expected:?}"
+        );
+    }
+    assert_eq!(strays_after(1.0, 0.5, true), None, "its sensor is probably dead");
+    assert_eq!(strays_after(1.0, 0.0, false), None, "it was not read");
+}
