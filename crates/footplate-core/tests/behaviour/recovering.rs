@@ -384,3 +384,32 @@ fn a_permission_to_creep_ends_with_the_danger_that_it_was_for() {
     let creeps = |(_, command): &(_, Command)| matches!(command, Command::Speed { step, .. } if *step > SpeedStep::STAND);
     assert!(!watched.commanded.iter().skip(since).any(creeps));
 }
+
+#[test]
+fn a_train_whose_decoder_reports_zero_has_stalled_before_any_sensor_can_tell() {
+    // Given a decoder that reports 0.315 a mm/s, twice a second, for some laps,
+    let mut watched = Watched::one();
+    watched.go(FIRST, 8);
+    let report = |watched: &mut Watched, number: u16| {
+        watched.dog.handle_link(watched.world.now, LinkNews::ReportedSpeed { train: FIRST, number });
+        watched.run(0.5);
+    };
+    for _ in 0..80 {
+        let number = (0.315 * watched.world.train().speed_mm_per_s).round() as u16;
+        report(&mut watched, number);
+    }
+    assert_eq!(watched.alarm(), None, "{:#?}", watched.notices);
+    // when it stalls just behind a sensor, nearly three seconds before the next one,
+    let passes = watched.world.passes.len();
+    assert!(watched.run_until(10.0, |watched| watched.world.passes.len() > passes));
+    watched.run(0.2);
+    watched.world.trains[0].wheels = 0.0;
+    let stalled = watched.world.now;
+    // then a second of zeros is enough.
+    while watched.alarm().is_none() && watched.world.now - stalled < TimeSpan::from_s(10.0) {
+        report(&mut watched, 0);
+    }
+    assert_eq!(watched.alarm(), Some(Alarm::Stalled));
+    let within = watched.world.now - stalled;
+    assert!(within <= TimeSpan::from_s(1.6) && within >= TimeSpan::from_s(1.0), "{within:?}");
+}

@@ -90,6 +90,25 @@ fn changes_of_speed_are_seen_as_they_were() {
             let ran = distance(point.since_command) - distance(first.since_command);
             assert_near(1e3 * point.distance, ran, 30.0, "distance (mm)");
         }
+        // The curve that is drawn through it begins and ends at these speeds, and residuals are what is beyond it.
+        let times = [0.0, 8.0, 9.0].into_iter().chain(change.points.iter().map(|point| point.since_command));
+        let times: Vec<TimeSpan> = times.map(TimeSpan::from_s).collect();
+        let fitted = review.fitted_change(model, change, &times).unwrap();
+        let [begin, settled, later, at_points @ ..] = &fitted.states[..] else { panic!("{fitted:?}") };
+        assert_near(begin.speed.as_mm_per_s(), from, 0.01 * from, "speed at the command");
+        assert_near(settled.speed.as_mm_per_s(), to, 0.01 * to, "speed at its end");
+        assert_near((later.distance - settled.distance).as_mm(), to, 0.01 * to, "distance in a second");
+        assert!(begin.acceleration.as_mm_per_s2() == 0.0 && later.acceleration.as_mm_per_s2().abs() < 1.0);
+        assert_eq!(fitted.residuals.len(), change.points.len());
+        for ((state, point), residual) in at_points.iter().zip(&change.points).zip(&fitted.residuals) {
+            assert_near(
+                1e3 * point.distance - state.distance.as_mm(),
+                residual.as_mm(),
+                0.01,
+                "residual (mm)",
+            );
+            assert!(residual.as_mm().abs() < 25.0, "{residual:?}");
+        }
     }
     // and two sensors each measure its acceleration.
     let changes =

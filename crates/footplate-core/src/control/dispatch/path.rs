@@ -246,3 +246,152 @@ fn fewest_edges(layout: &Layout, from: EdgeId, to: EdgeId) -> Option<Vec<EdgeId>
     }
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::TurnoutId;
+    use crate::track::example::oval;
+
+    fn mm(mm: f64) -> Length {
+        Length::from_mm(mm)
+    }
+
+    fn edge(layout: &Layout, from: &str, to: &str) -> EdgeId {
+        let node = |name: &str| layout.node_named(name).unwrap();
+        layout.edge_between(node(from), node(to)).unwrap()
+    }
+
+    fn set(leg: Leg) -> TurnoutStates {
+        [1, 2].map(|turnout| (TurnoutId(turnout), leg)).into_iter().collect()
+    }
+
+    /// From D1 a lap over the straight legs and on to A1: begins at 0, 500, 600, 800, 1000 and 1100 mm, 1600 mm long.
+    fn lap(layout: &Layout) -> Path {
+        let mut path = Path::default();
+        path.push(layout, edge(layout, "D1", "A1"));
+        path.reach(layout, &set(Leg::Straight), mm(1590.0));
+        path
+    }
+
+    fn near(found: Option<Length>, expected: f64) -> bool {
+        found.is_some_and(|found| (found - mm(expected)).abs() < mm(1e-6))
+    }
+
+    #[test]
+    fn places_and_nodes_are_found_from_a_distance_on_lap_by_lap() {
+        let layout = oval();
+        let path = lap(&layout);
+        assert!(near(Some(path.length()), 1600.0), "{path:?}");
+        let at = |offset: f64| Position { edge: edge(&layout, "D1", "A1"), offset: mm(offset) };
+        assert!(near(path.find(at(30.0), mm(0.0)), 30.0));
+        // A centimetre before still counts, and no more.
+        assert!(near(path.find(at(30.0), mm(39.0)), 30.0) && near(path.find(at(30.0), mm(41.0)), 1130.0));
+        assert_eq!(path.find(at(30.0), mm(1141.0)), None);
+        let node = |name: &str| layout.node_named(name).unwrap();
+        for (name, from, expected) in [
+            ("D1", 0.0, Some(0.0)),
+            ("D1", 1.0, Some(1100.0)),
+            ("B1", 0.0, Some(800.0)),
+            ("A1", 501.0, Some(1600.0)),
+            ("C1", 0.0, None),
+        ] {
+            let found = path.find_node(&layout, node(name), mm(from));
+            assert!(expected.map_or(found.is_none(), |mm| near(found, mm)), "{name} {found:?}");
+        }
+        for (at, from, to, offset) in [
+            (550.0, "A1", "BR1", 50.0),
+            (-10.0, "D1", "A1", 0.0),
+            (1100.0, "D1", "A1", 0.0),
+            (1600.0, "D1", "A1", 500.0),
+        ] {
+            let place = path.place(mm(at)).unwrap();
+            assert!(
+                place.edge == edge(&layout, from, to) && near(Some(place.offset), offset),
+                "{at}: {place:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_path_is_cut_behind_the_last_time_that_it_runs_over_an_edge() {
+        let layout = oval();
+        let mut path = lap(&layout);
+        path.cut_after(edge(&layout, "D1", "A1"));
+        assert!(near(Some(path.length()), 1600.0), "it ends on it");
+        path.cut_after(edge(&layout, "BR1", "B1"));
+        assert!(near(Some(path.length()), 800.0) && path.edges().count() == 3, "{path:?}");
+        path.cut_after(edge(&layout, "BR1", "C1"));
+        assert!(near(Some(path.length()), 500.0) && path.edges().count() == 1, "all but its first");
+    }
+
+    #[test]
+    fn the_track_behind_is_that_which_a_train_came_over_and_that_ahead_as_turnouts_lie() {
+        let layout = oval();
+        let place =
+            |from: &str, to: &str, offset| Position { edge: edge(&layout, from, to), offset: mm(offset) };
+        // 260 mm before A1 are on one edge; 500 mm ahead end behind MR2, at 1000 of 1100 mm.
+        let at = place("A1", "BR1", 40.0);
+        let came = OccupiedPath::default();
+        let (path, distance) = Path::around(&layout, &set(Leg::Straight), at, &came, mm(300.0), mm(500.0));
+        assert!(near(Some(distance), 540.0) && near(Some(path.length()), 1100.0), "{path:?}");
+        assert!(path.edges().any(|id| id == edge(&layout, "BR1", "B1")));
+        // Over the curved legs 220 + 150 mm instead of twice 200.
+        let (path, _) = Path::around(&layout, &set(Leg::Curved), at, &came, mm(300.0), mm(500.0));
+        assert!(near(Some(path.length()), 500.0 + 100.0 + 220.0 + 150.0 + 100.0), "{path:?}");
+        // It came over C1, wherever MR2 lies now: 10 + 150 + 220 mm reach 200 mm back.
+        let mut came = OccupiedPath::default();
+        came.record(&layout, place("C1", "MR2", 20.0));
+        came.record(&layout, place("MR2", "D1", 10.0));
+        let at = place("MR2", "D1", 10.0);
+        let (path, distance) = Path::around(&layout, &set(Leg::Straight), at, &came, mm(200.0), mm(0.0));
+        assert!(near(Some(distance), 380.0), "{distance:?} {path:?}");
+        assert!(path.edges().any(|id| id == edge(&layout, "C1", "MR2")));
+        // Elsewhere nothing is known of where it came from.
+        assert_eq!(came.before(edge(&layout, "D1", "A1")).count(), 0);
+    }
+
+    #[test]
+    fn a_train_that_runs_round_is_ahead_and_one_that_turns_is_on_its_own_track() {
+        let layout = oval();
+        let place = |from: &str, to: &str| Position { edge: edge(&layout, from, to), offset: mm(10.0) };
+        let mut came = OccupiedPath::default();
+        for (from, to) in [("D1", "A1"), ("BR1", "B1"), ("B1", "MR2")] {
+            came.record(&layout, place(from, to));
+        }
+        // The edge between D1 and the turnout was passed between two calls.
+        let before: Vec<EdgeId> = came.before(edge(&layout, "B1", "MR2")).collect();
+        let expected = [("BR1", "B1"), ("A1", "BR1"), ("D1", "A1")].map(|(from, to)| edge(&layout, from, to));
+        assert_eq!(before, expected);
+        // Reversed behind B1, it came over what lies behind its other end.
+        let back = edge(&layout, "BR1", "B1").twin();
+        came.record(&layout, Position { edge: back, offset: mm(10.0) });
+        assert_eq!(came.before(back).collect::<Vec<_>>(), [edge(&layout, "B1", "MR2").twin()]);
+        // A lap is a path ahead, not a reversal.
+        let mut round = OccupiedPath::default();
+        round.record(&layout, place("D1", "A1"));
+        round.record(&layout, place("MR2", "D1"));
+        assert_eq!(round.before(edge(&layout, "MR2", "D1")).count(), 4, "{round:?}");
+        // On other rails it is known nowhere else.
+        round.record(&layout, place("E1", "EX2"));
+        assert_eq!(round, OccupiedPath { edges: alloc::vec![edge(&layout, "E1", "EX2")] });
+    }
+
+    #[test]
+    fn an_interval_needs_the_turnouts_whose_toes_it_passes() {
+        let layout = oval();
+        let path = lap(&layout);
+        let needs = |from: f64, to: f64| -> Vec<(TurnoutId, bool)> {
+            path.needs(&layout, mm(from), mm(to)).iter().map(|need| (need.turnout, need.facing)).collect()
+        };
+        // Turnout 1 lies at 600 mm and is faced, turnout 2 at 1000 mm and is trailed.
+        assert_eq!(needs(0.0, 590.0), []);
+        assert_eq!(needs(550.0, 700.0), [(TurnoutId(1), true)]);
+        assert_eq!(needs(610.0, 990.0), []);
+        assert_eq!(needs(550.0, 1010.0), [(TurnoutId(1), true), (TurnoutId(2), false)]);
+        let trailed: Vec<TurnoutId> =
+            path.trailed(&layout, mm(550.0), mm(1010.0)).map(|need| need.turnout).collect();
+        assert_eq!(trailed, [TurnoutId(2)]);
+        assert_eq!(path.trailed(&layout, mm(550.0), mm(990.0)).count(), 0);
+    }
+}

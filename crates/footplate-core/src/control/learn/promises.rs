@@ -185,6 +185,11 @@ fn a_train_that_runs_otherwise_than_in_earlier_sessions_is_noticed() {
     assert!(!others.is_empty() && others.chunks(2).all(|pair| {
         matches!(pair, [(one, Approach::Below), (other, Approach::Above)] if one == other && *one < highest.0)
     }), "{lines:?}");
+    let line = machine.accuracy()[0];
+    // 95 % of a normal distribution are within 1.96 deviations.
+    let within = 1.96 * line.speed.uncertainty.as_mm_per_s() / line.speed.value.as_mm_per_s();
+    assert!((line.speed_within().as_parts() / within - 1.0).abs() < 1e-4, "{line:?}");
+    assert!((line.stop_within().as_mm() / (1.96 * line.stop.deviation().as_mm()) - 1.0).abs() < 1e-4);
     // In the next session it runs a fifth faster; polls of 62 ms leave two per cent of a hop.
     let mut train = ScriptedTrain::new(&layout, "D1", "A1", 200.0);
     train.speed_of = |step| 48.0 * f64::from(step);
