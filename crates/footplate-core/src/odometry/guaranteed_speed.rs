@@ -176,3 +176,116 @@ impl GuaranteedSpeed {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::TimeSpan;
+
+    fn wheel(axle: Axle, low: f64, high: f64) -> WheelBounds {
+        WheelBounds { turns: Range { low, high }, axle }
+    }
+
+    fn allowed(slide: bool, slip: bool) -> Allowed {
+        let acceleration = Range { low: -1.0, high: 0.5 };
+        let (traction, brake) = (0.0, 0.0);
+        Allowed { slide, slip, acceleration, rolling: acceleration, commanded: None, traction, brake }
+    }
+
+    fn narrowed(
+        bounds: &mut GuaranteedSpeed,
+        wheels: [WheelBounds; 2],
+        allowed: &Allowed,
+        t: f64,
+    ) -> [f64; 2] {
+        let Range { low, high } = bounds.narrow(&wheels, allowed, None, 0.0, t);
+        [low, high]
+    }
+
+    fn assert_near(found: [f64; 2], expected: [f64; 2]) {
+        assert!(
+            found.iter().zip(expected).all(|(one, other)| (one - other).abs() < 1e-9),
+            "{found:?}, not {expected:?}"
+        );
+    }
+
+    #[test]
+    fn the_looser_bound_of_wheels_that_may_set_it_counts() {
+        let found = |wheels, allowed: &Allowed| {
+            narrowed(&mut GuaranteedSpeed::new(Range { low: 0.0, high: 40.0 }, 40.0), wheels, allowed, 0.05)
+        };
+        let rolling = [wheel(Axle::Powered, 19.9, 20.1), wheel(Axle::Trailing, 19.5, 19.8)];
+        assert_near(found(rolling, &allowed(false, false)), [19.5, 20.1]);
+        // Braked wheels may all slide: what the train can do is left, 40 m/s and no more.
+        assert_near(found(rolling, &allowed(true, false)), [19.5, 40.0]);
+        // One that is not braked bounds it from above.
+        let one_slides = [wheel(Axle::Powered, 15.0, 15.2), wheel(Axle::Unbraked, 20.0, 20.2)];
+        assert_near(found(one_slides, &allowed(true, true)), [15.0, 20.2]);
+        // One that is driven spins: the other bounds it from below.
+        let one_spins = [wheel(Axle::Powered, 25.0, 25.2), wheel(Axle::Trailing, 20.0, 20.2)];
+        assert_near(found(one_spins, &allowed(false, true)), [20.0, 25.2]);
+        // Where both are driven, neither does.
+        let both_spin = [wheel(Axle::Powered, 25.0, 25.2), wheel(Axle::Powered, 20.0, 20.2)];
+        assert_near(found(both_spin, &allowed(false, true)), [0.0, 25.2]);
+    }
+
+    #[test]
+    fn without_wheels_it_widens_by_what_the_train_can_do() {
+        let mut bounds = GuaranteedSpeed::new(Range { low: 10.0, high: 12.0 }, 12.8);
+        let unknown = [Axle::Powered, Axle::Trailing].map(|axle| WheelBounds { turns: Range::ANY, axle });
+        assert_near(narrowed(&mut bounds, unknown, &allowed(false, false), 1.0), [9.0, 12.5]);
+        assert_near(narrowed(&mut bounds, unknown, &allowed(false, false), 1.0), [8.0, 12.8]);
+        let Range { low, high } = bounds.narrow(&unknown, &allowed(true, true), None, 7.5, 1.0);
+        assert_near([low, high], [7.5, 12.8]);
+        bounds.reverse();
+        assert_near([bounds.speed().low, bounds.speed().high], [-12.8, -7.5]);
+    }
+
+    #[test]
+    fn a_sensor_that_reports_what_no_wheel_can_do_is_disregarded_for_three_seconds() {
+        let mut bounds = GuaranteedSpeed::new(Range { low: 19.8, high: 20.2 }, 40.0);
+        let (sound, rolls) = (wheel(Axle::Trailing, 19.9, 20.1), allowed(false, false));
+        for wrong in [wheel(Axle::Powered, 10.0, 10.1), wheel(Axle::Powered, 30.0, 30.1)] {
+            assert_near(narrowed(&mut bounds, [wrong, sound], &rolls, 0.5), [19.9, 20.1]);
+            assert_eq!(bounds.wrong(), [true, false]);
+            // It is right again, and counts after three seconds.
+            let right = wheel(Axle::Powered, 19.7, 20.3);
+            for _ in 0..5 {
+                assert_near(narrowed(&mut bounds, [right, sound], &rolls, 0.5), [19.9, 20.1]);
+                assert_eq!(bounds.wrong(), [true, false]);
+            }
+            narrowed(&mut bounds, [right, sound], &rolls, 0.5);
+            assert_eq!(bounds.wrong(), [false, false]);
+        }
+        // If the brake may act, the slow one slides, and the fast one of a driven axle spins.
+        let mut sliding = bounds.clone();
+        narrowed(&mut sliding, [wheel(Axle::Powered, 10.0, 10.1), sound], &allowed(true, false), 0.5);
+        narrowed(&mut sliding, [wheel(Axle::Powered, 30.0, 30.1), sound], &allowed(false, true), 0.5);
+        assert_eq!((sliding.wrong(), sliding.contradictions()), ([false, false], 0));
+        // If both are wrong at once, neither is to blame: a claim does not hold, and its limits of acceleration are left.
+        let before = bounds.speed();
+        let both = [wheel(Axle::Powered, 10.0, 10.1), wheel(Axle::Trailing, 10.0, 10.1)];
+        assert_near(narrowed(&mut bounds, both, &rolls, 0.5), [before.low - 0.5, before.high + 0.25]);
+        assert_eq!((bounds.wrong(), bounds.contradictions()), ([false, false], 1));
+    }
+
+    #[test]
+    fn slide_protection_bounds_it_by_one_wheel_within_its_creepage_and_what_happens_meanwhile() {
+        let protection = SlideProtection { creepage: 0.1, longest: TimeSpan::from_s(1.0) };
+        let mut bounds = GuaranteedSpeed::new(Range { low: 0.0, high: 40.0 }, 40.0);
+        let wheels = [wheel(Axle::Powered, 17.9, 18.1), wheel(Axle::Powered, 19.9, 20.1)];
+        let mut found = Range::ANY;
+        for _ in 0..10 {
+            found = bounds.narrow(&wheels, &allowed(true, true), Some(protection), 0.0, 0.5);
+        }
+        // The faster within a tenth of the train, and two seconds of 0.5 m/s²; the slower likewise, and of −1 m/s².
+        assert_near([found.low, found.high], [17.9 * 0.9 - 2.0, 20.1 / 0.9 + 1.0]);
+        // A wheel that locks for half a second loosens it from below only.
+        let locked = [wheel(Axle::Powered, 0.0, 0.1), wheel(Axle::Powered, 19.9, 20.1)];
+        let found = bounds.narrow(&locked, &allowed(true, true), Some(protection), 0.0, 0.5);
+        assert_near([found.low, found.high], [17.9 * 0.9 - 2.5, 20.1 / 0.9 + 1.0]);
+        // Without the claim nothing bounds it but the train itself.
+        let mut without = GuaranteedSpeed::new(Range { low: 0.0, high: 40.0 }, 40.0);
+        assert_near(narrowed(&mut without, wheels, &allowed(true, true), 0.5), [0.0, 40.0]);
+    }
+}
