@@ -258,3 +258,40 @@ impl PassageTracker {
         &self.timing
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::event::Report;
+    use crate::track::example::oval;
+
+    #[test]
+    fn commands_before_a_poll_push_it_and_its_sensor_may_have_closed_since_the_last_one() {
+        let layout = oval();
+        let seen_since = |last_report: f64, reported: f64| {
+            let mut tracker =
+                PassageTracker::new(TrainId(24), SpeedStep::STAND, PollTimingEstimator::default());
+            let mut take =
+                |seconds: f64, kind| tracker.take(&layout, &Event { time: Timestamp::from_s(seconds), kind });
+            let sensor = |number| EventKind::Sensor(Report { sensor: SensorId(number), poll_interval: None });
+            take(last_report, sensor(0));
+            for (seconds, number) in [(20.0, 4), (20.2, 6)] {
+                let step = SpeedStep::new(number).expect("a step");
+                take(seconds, EventKind::Speed { train: TrainId(24), step });
+            }
+            match take(reported, sensor(2)) {
+                Some(Sighting::Passage(passage)) => passage.window.after.as_s(),
+                other => panic!("{other:?}"),
+            }
+        };
+        // Polls are 70 ms apart: one at 19.93 s is the last before both commands.
+        let is =
+            |found: f64, expected: f64| assert!((found - expected).abs() < 1e-6, "{found}, not {expected}");
+        is(seen_since(10.0, 20.4), 19.93);
+        // A quarter of a second and two polls after the last of them, they push nothing any more.
+        is(seen_since(10.0, 20.58), 19.93);
+        assert!(seen_since(10.0, 20.60) > 20.4);
+        // What was reported later than that poll was not yet closed then.
+        is(seen_since(19.97, 20.4), 19.97);
+    }
+}

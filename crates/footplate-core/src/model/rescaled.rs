@@ -297,6 +297,24 @@ mod tests {
     }
 
     #[test]
+    fn a_measured_step_is_as_uncertain_as_its_measurement_and_others_by_what_they_have_in_common_and_each_to_itself()
+     {
+        let before = known();
+        let change = Rescaling::of(vec![ratio(5, 0.8), ratio(8, 0.8), ratio(11, 0.8)]);
+        let after = before.rescaled(&change);
+        let part = |model: &MotionModel, number: u8| {
+            let speed = model.speed(step(number), Approach::Below);
+            speed.uncertainty / speed.value
+        };
+        // The highest step has a number of its own and was not measured.
+        let others = libm::hypot(core::f64::consts::SQRT_2 * change.deviation, part(&before, 14));
+        assert!((part(&after, 14) / others - 1.0).abs() < 0.05, "{}, not {others}", part(&after, 14));
+        for number in [5, 8, 11] {
+            assert!(part(&after, number) > 0.004 && part(&after, number) < 0.5 * others, "{number}");
+        }
+    }
+
+    #[test]
     fn a_stop_that_was_measured_narrows_what_is_not_known_of_stops() {
         let mut change = Rescaling::of(vec![ratio(8, 0.8)]);
         let before = change.stops_deviation;

@@ -327,6 +327,26 @@ mod tests {
         assert!((speed / wanted - 1.0).abs() < 0.01, "{speed} m/s instead of {wanted} m/s");
     }
 
+    #[test]
+    fn the_letter_of_the_step_met_longest_ago_is_used_again_and_none_that_is_in_use() {
+        let mut filter: MotionFilter = MotionFilter::at_rest(0.0, Gaussian { mean: 0.0, variance: 1e-6 });
+        let state = &mut filter.course;
+        let nothing = [0; 2];
+        let letters: alloc::vec::Vec<usize> = (1..=6).map(|step| state.meet(step, false, nothing)).collect();
+        assert!((0..6).all(|one| (0..one).all(|other| letters[one] != letters[other])), "{letters:?}");
+        assert_eq!(state.meet(3, false, nothing), letters[2], "it is known");
+        assert_eq!(
+            state.meet(3, true, nothing),
+            letters[0],
+            "from above it is another, and the first is the oldest"
+        );
+        assert_eq!(state.meet(7, false, [letters[1], letters[2]]), letters[3], "two are in use");
+        assert_eq!(state.kept(4, false), None);
+        assert_eq!((state.kept(7, false), state.kept(2, false)), (Some(letters[3]), Some(letters[1])));
+        assert_eq!(state.meet(8, false, nothing), letters[4]);
+        assert_eq!(state.steps_met().count(), 6);
+    }
+
     fn model() -> MotionModel {
         MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"))
     }

@@ -337,3 +337,25 @@ fn a_sensor_that_repeats_its_count_is_found_though_the_wheels_differ_little() {
     });
     assert!(worst < 1.0 && outside < 30, "{worst} {outside}");
 }
+
+#[test]
+fn over_a_gap_the_train_may_have_run_as_far_as_its_top_speed_takes_it_either_direction() {
+    let mut odometer = Odometer::new(vehicle(), OdometrySettings::recommended()).expect("settings");
+    let mut rolling = Rolling { time: 0.0, place: 0.0, counted: [0; 2] };
+    let mut before = odometer.step(&rolling.next(20.0, 0.0));
+    for _ in 0..200 {
+        before = odometer.step(&rolling.next(20.0, 0.0));
+    }
+    assert!((before.distance.as_m() - 200.0).abs() < 1.0, "{before:?}");
+    // Half a minute at 70 m/s are 2100 m.
+    rolling.time += 30.0;
+    let after = odometer.step(&rolling.next(20.0, 0.0));
+    let [low, high] = [after.guaranteed.distance_low, after.guaranteed.distance_high].map(Length::as_m);
+    let reach = 70.0 * (30.0 + PERIOD_S);
+    assert!((low - (before.guaranteed.distance_low.as_m() - reach)).abs() < 5.0, "{low}");
+    assert!((high - (before.guaranteed.distance_high.as_m() + reach)).abs() < 5.0, "{high}");
+    assert_eq!(after.mode, Mode::Degraded);
+    assert_eq!(after.distance, before.distance, "nothing was counted");
+    let next = odometer.step(&rolling.next(20.0, 0.0));
+    assert!((next.distance - after.distance).as_m() > 0.5, "it goes on");
+}
