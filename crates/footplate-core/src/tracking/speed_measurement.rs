@@ -82,4 +82,43 @@ mod tests {
         assert!((libm::log(place) - 0.1).abs() < 0.002, "{place}");
         assert!(!filter.take_speed(&model, 12.0, 1.5, Gaussian { mean: ln + 0.2, ..report }), "an outlier");
     }
+    #[test]
+    fn a_report_beyond_four_deviations_or_while_the_speed_changes_is_not_taken() {
+        let model = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));
+        let start = Gaussian { mean: 0.0, variance: 1e-6 };
+        let running: MotionFilter = MotionFilter::running(&model, 0.0, 8, start);
+        let now = running.at(&model, 10.0);
+        let (ln, known) = (libm::log(now.course.speed(10.0)), now.ln_speed_variance());
+        let report = |deviations: f64, variance: f64| Gaussian {
+            mean: ln + deviations * libm::sqrt(known + variance),
+            variance,
+        };
+        let taken = |filter: &MotionFilter, time: f64, report: Gaussian| {
+            let mut filter = *filter;
+            filter.take_speed(&model, time, 1.5, report).then_some(filter)
+        };
+        let variance = 0.01 * known;
+        assert!(taken(&running, 10.0, report(3.9, variance)).is_some(), "it may be chance");
+        for deviations in [2.0, -2.0] {
+            let filter = taken(&running, 10.0, report(deviations, variance)).expect("it is likely");
+            // What is known of the speed is as good as the report, and as near to it as both variances say.
+            assert!(
+                (filter.ln_speed_variance() / variance - 1.0).abs() < 0.01,
+                "{}",
+                filter.ln_speed_variance()
+            );
+            let by = libm::log(filter.course.speed(10.0)) - ln;
+            let expected = deviations * libm::sqrt(known + variance) * (1.0 - variance / known);
+            assert!((by / expected - 1.0).abs() < 0.01, "{by}, not {expected}");
+        }
+        for refused in [report(4.1, variance), report(-4.1, variance), report(0.1, 1.1 * known)] {
+            assert!(taken(&running, 10.0, refused).is_none(), "{refused:?}");
+        }
+        // A command was sent just before, or it gets faster, or it is at rest.
+        let mut changing = running;
+        changing.command(&model, 9.9, 12);
+        assert!(taken(&changing, 10.0, report(0.1, variance)).is_none());
+        assert!(taken(&changing, 11.5, report(0.1, variance)).is_none());
+        assert!(taken(&MotionFilter::at_rest(0.0, start), 10.0, report(0.1, variance)).is_none());
+    }
 }

@@ -2,13 +2,14 @@
 
 use std::sync::OnceLock;
 
+use footplate_core::control::{Learning, Notice, Order};
 use footplate_core::link::DetectionWindow;
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::model::{MotionFit, MotionModel};
 use footplate_core::tracking::{Locator, PathPoint, TrackContext};
-use footplate_core::{Approach, Command, EventKind, Length, Speed, TimeSpan, TrainId};
+use footplate_core::{Approach, Command, EventKind, Length, Speed, SpeedStep, TimeSpan, TrainId};
 
-use crate::toy_railway::{ToyRailway, known_model, step, straight};
+use crate::toy_railway::{ToyRailway, driver_of, known_model, step, straight};
 
 const TRAIN: TrainId = TrainId(24);
 
@@ -238,4 +239,55 @@ fn a_train_that_is_driven_on_while_it_brakes_was_not_at_rest() {
     assert_eq!(stop.count, 11);
     let start = model.short_move(step(8), TimeSpan::from_s(2.0)).distance.as_mm();
     assert!((start - 512.0).abs() < 25.0, "{start}");
+}
+
+#[test]
+fn a_session_learns_a_train_while_it_runs() {
+    // Given a session that drives a known train, and learns it anew from its commands and detections,
+    let mut world = ToyRailway::new(24, "D1", 300.0);
+    let mut driver = driver_of(&world, "D1", 300.0);
+    let mut learning = Learning::new(&world.layout, vec![MotionFit::new(TRAIN, step(14))]);
+    let (mut events, mut notices, mut model) = (0, 0, None);
+    for number in [9, 0, 12, 0, 9, 0, 6, 0, 9, 0, 12, 0] {
+        driver
+            .order(world.now, Order::Speed { train: TRAIN, step: SpeedStep::new(number).unwrap() })
+            .unwrap();
+        for _ in 0..if number > 0 { 1600 } else { 600 } {
+            world.run(&mut driver, 0.01);
+            for event in &world.events[events..] {
+                learning.take(&driver, event);
+            }
+            for notice in &world.notices[notices..] {
+                if let Notice::Passed { train, passed, .. } = notice {
+                    learning.passed(*train, &driver, passed);
+                }
+            }
+            (events, notices) = (world.events.len(), world.notices.len());
+        }
+        // when its model is fitted at every standstill, part by part,
+        if number == 0 {
+            assert!(learning.advance_refit().is_none() && !learning.is_refitting());
+            learning.begin_refit(TRAIN);
+            assert!(learning.is_refitting() && learning.is_refitting_to(TRAIN));
+            assert!(!learning.is_refitting_to(TrainId(25)));
+            model = (0..100).find_map(|_| learning.advance_refit());
+        }
+    }
+    let model = model.expect("it ends");
+    // then it has the true speeds and stops, as it has if it is fitted at once, and so has the fit that is kept.
+    let kept = learning.handed_over();
+    let at_once = learning.model(TRAIN).unwrap();
+    assert_eq!(kept.len(), 1);
+    for model in [&model, &at_once, kept[0].model()] {
+        for (number, mm_per_s) in [(6, 192.0), (9, 288.0), (12, 384.0)] {
+            let speed = model.speed(step(number), Approach::Below);
+            let off = speed.value.as_mm_per_s() - mm_per_s;
+            assert!(off.abs() < 0.015 * mm_per_s && speed.count >= 3, "step {number}: {speed:?}");
+        }
+        let stop = model.stop(step(9), Approach::Below);
+        let off = stop.distance - true_stopping_distance(Speed::from_mm_per_s(288.0));
+        assert!(off.abs() < 2.0 * stop.deviation() && off.abs() < Length::from_mm(60.0), "{stop:?}");
+        assert!(stop.count >= 2, "{stop:?}");
+    }
+    assert!(learning.model(TrainId(25)).is_none());
 }
