@@ -46,14 +46,6 @@ pub struct MotionBounds {
     pub distance_high: Length,
 }
 
-impl MotionEstimate {
-    /// Whether it may be used: only a mode that knows what it does not know is refused.
-    #[must_use]
-    pub fn is_valid(&self) -> bool {
-        self.mode != Mode::Ambiguous
-    }
-}
-
 /// What a wheelset does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "lowercase"))]
