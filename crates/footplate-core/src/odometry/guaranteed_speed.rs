@@ -271,19 +271,19 @@ mod tests {
 
     #[test]
     fn slide_protection_bounds_it_by_one_wheel_within_its_creepage_and_what_happens_meanwhile() {
-        let protection = SlideProtection { creepage: 0.1, longest: TimeSpan::from_s(1.0) };
+        let protection = SlideProtection { creepage: 0.1, longest: TimeSpan::from_s(0.8) };
         let mut bounds = GuaranteedSpeed::new(Range { low: 0.0, high: 40.0 }, 40.0);
         let wheels = [wheel(Axle::Powered, 17.9, 18.1), wheel(Axle::Powered, 19.9, 20.1)];
         let mut found = Range::ANY;
         for _ in 0..10 {
             found = bounds.narrow(&wheels, &allowed(true, true), Some(protection), 0.0, 0.5);
         }
-        // The faster within a tenth of the train, and two seconds of 0.5 m/s²; the slower likewise, and of −1 m/s².
-        assert_near([found.low, found.high], [17.9 * 0.9 - 2.0, 20.1 / 0.9 + 1.0]);
+        // The faster within a tenth of the train, and twice 0.8 s of 0.5 m/s²; the slower likewise, and of −1 m/s².
+        assert_near([found.low, found.high], [17.9 * 0.9 - 1.6, 20.1 / 0.9 + 0.8]);
         // A wheel that locks for half a second loosens it from below only.
         let locked = [wheel(Axle::Powered, 0.0, 0.1), wheel(Axle::Powered, 19.9, 20.1)];
         let found = bounds.narrow(&locked, &allowed(true, true), Some(protection), 0.0, 0.5);
-        assert_near([found.low, found.high], [17.9 * 0.9 - 2.5, 20.1 / 0.9 + 1.0]);
+        assert_near([found.low, found.high], [17.9 * 0.9 - 2.1, 20.1 / 0.9 + 0.8]);
         // Without the claim nothing bounds it but the train itself.
         let mut without = GuaranteedSpeed::new(Range { low: 0.0, high: 40.0 }, 40.0);
         assert_near(narrowed(&mut without, wheels, &allowed(true, true), 0.5), [0.0, 40.0]);

@@ -73,6 +73,19 @@ mod tests {
     }
 
     #[test]
+    fn its_level_is_the_part_of_an_alarm_that_has_come_together_on_either_side() {
+        for sign in [1.0, -1.0] {
+            let mut test = DriftTest::default();
+            assert_eq!(test.level(), 0.0);
+            // 1.2 − 0.5 of 8 for each.
+            for n in 1..=11 {
+                assert_eq!(test.take(sign * 1.2), None);
+                assert!((test.level() - 0.7 * f64::from(n) / 8.0).abs() < 1e-9, "{}", test.level());
+            }
+        }
+    }
+
+    #[test]
     fn one_wild_error_and_balanced_scatter_are_no_drift() {
         let mut test = DriftTest::default();
         assert_eq!(test.take(1e9), None);
