@@ -14,7 +14,7 @@ mod machine;
 mod notice;
 mod supervise;
 
-pub use dispatch::{CLEARANCE, Dispatcher, Journey, Reservation, Span, TrainLengths};
+pub use dispatch::{CLEARANCE, Dispatcher, Journey, Reservation, Span, TrainLengths, WAIT_LIMIT};
 pub use drive::{Aim, ArrivalProfile, Driver, Gap, Order, OrderId, Refusal, StopOrder};
 pub use learn::{CalibrationNotice, Calibrator, CalibratorSettings, Learning};
 pub use machine::{Machine, Output};

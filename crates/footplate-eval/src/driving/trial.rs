@@ -266,23 +266,17 @@ impl<'a, 'l> Trial<'a, 'l> {
         self.results.position_checks[1] += u32::from(off.abs() <= HALF_95 * located.uncertainty.as_mm());
     }
 
-    /// Whether the driver knows where the train is, and no sensor that should have reported it is silent.
-    fn is_found(&self) -> bool {
-        let now = self.line.now();
-        self.driver.locate(TRAIN, now).is_some() && self.driver.missed_sensor(TRAIN, now).is_none()
-    }
-
     /// Relocates a lost train as an operator would: runs it to a sensor, faster each time that it does not come to one,
     /// as a train that stalled on a dirty spot needs a higher step; then stops it.
     fn halt(&mut self) {
         for step in self.plan.mid.clone() {
             let _ = self.driver.order(self.line.now(), Order::Speed { train: TRAIN, step });
             let found_by = self.line.now() + FIND_WITHIN;
-            while self.line.now() < found_by && !self.is_found() {
+            while self.line.now() < found_by && !self.driver.is_found(TRAIN, self.line.now()) {
                 let until = found_by.min(self.line.now() + CHECK_INTERVAL);
                 let _ = self.line.drive(&mut self.driver, until);
             }
-            if self.is_found() {
+            if self.driver.is_found(TRAIN, self.line.now()) {
                 break;
             }
         }

@@ -1,11 +1,11 @@
 //! Arriving at a place in time, compared with running there at the step with the mean speed.
 
 use anyhow::Context;
-use footplate_core::control::{Notice, Order, OrderId, Refusal, StopOrder};
+use footplate_core::control::{Notice, Order, OrderId, Refusal, StopOrder, WAIT_LIMIT};
 use footplate_core::track::{Landmark, Layout};
 use footplate_core::{Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use super::counted::{By, Counted, RESUMES_WITHIN, cut_short, interrupts};
+use super::counted::{By, Counted, cut_short, interrupts};
 use super::hold::oracle_model;
 use super::tracked::LOOK;
 use crate::seeds::Choice;
@@ -194,18 +194,14 @@ impl Trip<'_, '_> {
 
     /// Runs a train that a sensor should have reported and did not to the next one, as a session does before such an order.
     fn find(&mut self) {
-        let is_known = |trip: &Self| {
-            let driver = trip.counted.driver();
-            driver.locate(trip.train, trip.now()).is_some()
-                && driver.missed_sensor(trip.train, trip.now()).is_none()
-        };
-        if is_known(self) {
+        let is_found = |trip: &Self| trip.counted.driver().is_found(trip.train, trip.now());
+        if is_found(self) {
             return;
         }
-        let patience = self.now() + RESUMES_WITHIN;
+        let patience = self.now() + WAIT_LIMIT;
         for step in [self.counted.driver().finding_step(self.train), SpeedStep::STAND] {
             let _ = self.counted.order(self.now(), Order::Speed { train: self.train, step });
-            while step > SpeedStep::STAND && self.now() < patience && !is_known(self) {
+            while step > SpeedStep::STAND && self.now() < patience && !is_found(self) {
                 let look = self.now() + LOOK;
                 while self.counted.drive(&mut self.prepared.line, look).is_some() {}
             }
@@ -231,7 +227,7 @@ impl Trip<'_, '_> {
             let look = patience.min(self.now() + LOOK);
             let notice = self.counted.drive(&mut self.prepared.line, look);
             if notice.as_ref().is_some_and(|notice| interrupts(notice, self.train)) {
-                patience = self.now() + RESUMES_WITHIN;
+                patience = self.now() + WAIT_LIMIT;
             }
             if let Some(Notice::Resumed { interrupted: Some(before), order: now, .. }) = notice
                 && before == order

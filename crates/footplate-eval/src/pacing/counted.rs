@@ -7,7 +7,7 @@ use footplate_core::control::{
 };
 use footplate_core::model::MotionFit;
 use footplate_core::track::Layout;
-use footplate_core::{Command, Event, TimeSpan, Timestamp, TrainId};
+use footplate_core::{Command, Event, Timestamp, TrainId};
 use footplate_wire::LinkNotice;
 
 use crate::testbed::VirtualLine;
@@ -120,34 +120,9 @@ pub(super) fn cut_short(notice: &Notice) -> Option<(TrainId, Option<OrderId>, St
     }
 }
 
-/// How long an interrupted order may take to go on: as long as a script waits.
-pub(super) const RESUMES_WITHIN: TimeSpan = TimeSpan::from_s(600.0);
-
 /// Whether a notice says that a train is stopped to be recovered, or because of another one that is.
 pub(super) fn interrupts(notice: &Notice, train: TrainId) -> bool {
     matches!(notice, Notice::Danger { train: lost, stopped, .. } if *lost == train || stopped.contains(&train))
-}
-
-/// Learns from a notice as a session does; a train at rest gets its new model at once.
-fn learn(dispatcher: &mut Dispatcher, learning: &mut Learning, notice: &Notice) {
-    match notice {
-        Notice::Passed { train, passed, .. } => learning.passed(*train, dispatcher.driver(), passed),
-        Notice::Lost { train } | Notice::TurnoutMismatch { train, .. } | Notice::Danger { train, .. } => {
-            learning.interrupt(*train);
-        }
-        Notice::Recovered { train, .. } => {
-            if let Some(remeasured) = dispatcher.take_remeasured(*train) {
-                learning.go_on(*train, remeasured);
-            }
-        }
-        Notice::Done(finished) => {
-            if finished.unseen.is_some() {
-                learning.interrupt(finished.train);
-            }
-            learning.model(finished.train).into_iter().for_each(|model| dispatcher.set_model(model));
-        }
-        _ => {}
-    }
 }
 
 impl Machine for Counted {
@@ -177,7 +152,14 @@ impl Machine for Counted {
             Control::Dispatched(dispatcher, learning) => {
                 let output = dispatcher.poll_output()?;
                 if let (Output::Notice(notice), Some(learning)) = (&output, learning) {
-                    learn(dispatcher, learning, notice);
+                    learning.take_notice(dispatcher, notice);
+                    if let Notice::Done(finished) = notice {
+                        // A train at rest gets its new model at once.
+                        learning
+                            .model(finished.train)
+                            .into_iter()
+                            .for_each(|model| dispatcher.set_model(model));
+                    }
                 }
                 output
             }

@@ -1,14 +1,14 @@
 //! Holding a speed between those of two steps, compared with the nearest step.
 
 use anyhow::Context;
-use footplate_core::control::{Notice, Order, PacedLine};
+use footplate_core::control::{Notice, Order, PacedLine, WAIT_LIMIT};
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::model::{MotionModel, StepUse};
 use footplate_core::track::Layout;
 use footplate_core::tracking::TrackContext;
 use footplate_core::{Length, NodeId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use super::counted::{By, Counted, RESUMES_WITHIN, cut_short, interrupts};
+use super::counted::{By, Counted, cut_short, interrupts};
 use super::tracked::{LOOK, Odometer, TruePath};
 use crate::driving::known;
 use crate::seeds::Choice;
@@ -148,7 +148,7 @@ fn held(layout: &Layout, mut prepared: PreparedTrains<'_>, train: TrainId, by: B
             break;
         }
         if notice.as_ref().is_some_and(|notice| interrupts(notice, train)) {
-            until = prepared.line.now() + RESUMES_WITHIN;
+            until = prepared.line.now() + WAIT_LIMIT;
         }
         let found = match notice {
             Some(Notice::Resumed { .. }) => {

@@ -29,8 +29,9 @@ pub(super) const ACT_EVERY: TimeSpan = TimeSpan::from_ms(200);
 /// Waiting trains are examined again after this time, even if nothing has changed.
 const RECONSIDER_AFTER: TimeSpan = TimeSpan::from_s(1.0);
 
-/// How long an interrupted order is tried again, unless that is set: as long as a script waits.
-const WAIT_LIMIT: TimeSpan = TimeSpan::from_s(600.0);
+/// How long a script waits, and how long an interrupted order is tried again, unless that is set: a creeping train completes
+/// one round of a layout within it.
+pub const WAIT_LIMIT: TimeSpan = TimeSpan::from_s(600.0);
 
 /// The most rounds of consequences at one time; the rest waits for the next call.
 const MAX_ROUNDS: usize = 50;

@@ -19,6 +19,6 @@ mod route_setting;
 mod running;
 
 pub use dispatched_train::Journey;
-pub use dispatcher::Dispatcher;
+pub use dispatcher::{Dispatcher, WAIT_LIMIT};
 pub use movement_authority::TrainLengths;
 pub use reservation::{CLEARANCE, Reservation, Span};

@@ -64,6 +64,12 @@ impl Driver {
         train.missed_sensor().or_else(|| train.sensor_missed_before(context, &train.located(context, now)?))
     }
 
+    /// Whether it is known where a train is, and no sensor that should have reported it is silent.
+    #[must_use]
+    pub fn is_found(&self, train: TrainId, now: Timestamp) -> bool {
+        self.locate(train, now).is_some() && self.missed_sensor(train, now).is_none()
+    }
+
     /// The share of detections that sensors miss of a train at its speed, as learnt in this session.
     #[must_use]
     pub fn missed_share(&self, train: TrainId, now: Timestamp) -> f64 {

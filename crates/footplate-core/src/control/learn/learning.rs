@@ -3,6 +3,8 @@
 use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
+use crate::control::Notice;
+use crate::control::dispatch::Dispatcher;
 use crate::control::drive::Driver;
 use crate::control::supervise::Remeasured;
 use crate::event::{Event, EventKind, Report};
@@ -56,8 +58,26 @@ impl Learning {
         }
     }
 
+    /// Takes in what the dispatcher reports of a train. Returns the train if a recovery found it changed.
+    pub fn take_notice(&mut self, dispatcher: &mut Dispatcher, notice: &Notice) -> Option<TrainId> {
+        match notice {
+            Notice::Passed { train, passed, .. } => self.passed(*train, dispatcher.driver(), passed),
+            Notice::Lost { train } | Notice::TurnoutMismatch { train, .. } | Notice::Danger { train, .. } => {
+                self.interrupt(*train);
+            }
+            Notice::Done(finished) if finished.unseen.is_some() => self.interrupt(finished.train),
+            Notice::Recovered { train, .. } => {
+                // What is being fitted is the train as it was before.
+                self.go_on(*train, dispatcher.take_remeasured(*train)?);
+                return Some(*train);
+            }
+            _ => {}
+        }
+        None
+    }
+
     /// Takes in a detection of a train. A train that has only just been located has no known earlier position.
-    pub fn passed(&mut self, train: TrainId, driver: &Driver, passed: &PassedSensor) {
+    fn passed(&mut self, train: TrainId, driver: &Driver, passed: &PassedSensor) {
         if passed.late.is_none()
             && let Some(fit) = self.fits.get_mut(&train)
         {
@@ -85,7 +105,7 @@ impl Learning {
     }
 
     /// Goes on from what a recovery found of a train that is no longer as it was.
-    pub fn go_on(&mut self, train: TrainId, from: Remeasured) {
+    fn go_on(&mut self, train: TrainId, from: Remeasured) {
         self.in_progress.remove(&train);
         match from {
             Remeasured::Changed(numbers) => {

@@ -11,6 +11,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use footplate_core::control::{
     Dispatcher, Driver, Finished, Journey, Learning, Machine, Order, OrderId, Output, Promise, Refusal,
+    WAIT_LIMIT,
 };
 use footplate_core::model::{MotionFit, MotionModel};
 use footplate_core::track::Landmark;
@@ -30,8 +31,6 @@ use super::words::Mistake;
 use crate::dashboard::{Painter, SchedulePicture, SessionState, TrainTask};
 use crate::recorded::{Input, Listener};
 
-/// The default limit of a wait: a creeping train completes one round of a layout within it.
-pub(super) const WAIT_LIMIT: TimeSpan = TimeSpan::from_s(600.0);
 /// The pause between two parts of a refit, in which reports and commands are handled.
 const FIT_INTERVAL: TimeSpan = TimeSpan::from_ms(5);
 /// The standard deviation of a position that an operator reads off: the end of the shoe beside a sensor, whose own

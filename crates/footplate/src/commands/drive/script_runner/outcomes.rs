@@ -78,6 +78,10 @@ impl ScriptRunner {
                 self.say(line);
             }
         }
+        if let Some(changed) = self.learning.take_notice(&mut self.dispatcher, notice) {
+            self.refitted.remove(&changed);
+            self.changed.insert(changed);
+        }
         match notice {
             Notice::Planned(plan) => {
                 self.promises.insert(plan.order, plan.promise);
@@ -85,17 +89,14 @@ impl ScriptRunner {
             Notice::Passed { train, passed, next } => {
                 let passed_by = TrainPassed { train: *train, passed: *passed, next: *next };
                 self.outputs.push_back(Output::Notice(SessionMessage::Passed(passed_by)));
-                self.learning.passed(*train, self.dispatcher.driver(), passed);
                 for wait in self.queues.waits_mut() {
                     wait.is_met |= wait.until == Until::At(*train, passed.sensor);
                 }
             }
             Notice::Done(finished) => {
                 self.done(finished);
-                self.learn(finished);
-            }
-            Notice::Lost { train } | Notice::TurnoutMismatch { train, .. } | Notice::Danger { train, .. } => {
-                self.learning.interrupt(*train);
+                // Later orders use its result.
+                self.learning.begin_refit(finished.train);
             }
             Notice::TurnoutThrown { order: Some(order), .. } => {
                 if let Some(step) = self.pending.remove(order).filter(|step| !step.is_part) {
@@ -128,14 +129,6 @@ impl ScriptRunner {
             Notice::Cancelled { train, interrupted, .. } => {
                 if let Some(step) = self.pending.remove(interrupted) {
                     self.cancelled(now, step, &Refusal::InDanger { train: *train });
-                }
-            }
-            Notice::Recovered { train, .. } => {
-                if let Some(remeasured) = self.dispatcher.take_remeasured(*train) {
-                    // What is being fitted is the train as it was before.
-                    self.learning.go_on(*train, remeasured);
-                    self.refitted.remove(train);
-                    self.changed.insert(*train);
                 }
             }
             Notice::NeedsOperator { .. } => self.fell_short = true,
@@ -214,14 +207,6 @@ impl ScriptRunner {
             unseen: rest.unseen.map(|sensor| self.formatter().sensor(sensor).to_owned()),
             ..ended
         }
-    }
-
-    /// Starts a refit to what the train just did; later orders use its result.
-    fn learn(&mut self, finished: &Finished) {
-        if finished.unseen.is_some() {
-            self.learning.interrupt(finished.train);
-        }
-        self.learning.begin_refit(finished.train);
     }
 
     /// Computes the next part of a refit unless something is due, and replaces the models of trains at rest. A moving
