@@ -43,9 +43,6 @@ impl Recording {
 }
 
 impl Form {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::SensorLog, Self::SinceCommand, Self::LightGate];
-
     /// Its name in files and messages.
     #[must_use]
     pub const fn name(self) -> &'static str {

@@ -179,18 +179,6 @@ impl StoppingLaw<FromBraking> {
 }
 
 impl StoppingLaw<FromCommand> {
-    /// Of a train that starts to brake `command_delay` (τ₂) after the command.
-    ///
-    /// # Errors
-    ///
-    /// If the law has less delay than that.
-    pub fn counted_from_braking(
-        &self,
-        command_delay: TimeSpan,
-    ) -> Result<StoppingLaw<FromBraking>, StoppingError> {
-        self.earlier(-command_delay)
-    }
-
     /// On average, if the command follows at once on a report that is stamped `to_stamp` (φ) after a reading, and
     /// `poll_interval` (π) lies between that reading and the previous one.
     ///
@@ -203,20 +191,5 @@ impl StoppingLaw<FromCommand> {
         poll_interval: TimeSpan,
     ) -> Result<StoppingLaw<FromReport>, StoppingError> {
         self.earlier(mean_report_delay(to_stamp, poll_interval))
-    }
-}
-
-impl StoppingLaw<FromReport> {
-    /// The inverse of [`counted_from_report`](StoppingLaw::<FromCommand>::counted_from_report).
-    ///
-    /// # Errors
-    ///
-    /// If the law has less delay than the report.
-    pub fn counted_from_command(
-        &self,
-        to_stamp: TimeSpan,
-        poll_interval: TimeSpan,
-    ) -> Result<StoppingLaw<FromCommand>, StoppingError> {
-        self.earlier(-mean_report_delay(to_stamp, poll_interval))
     }
 }

@@ -107,17 +107,6 @@ impl PassageTracker {
         }
     }
 
-    /// A new run begins: another clock, and nothing is known of where the train is.
-    pub fn begin_run(&mut self, step: SpeedStep) {
-        self.drive = Drive { step, from: step, commanded: None };
-        self.at = None;
-        self.last_sensor = None;
-        self.last_report = None;
-        self.burst = None;
-        self.entries = 0;
-        self.timing.restart();
-    }
-
     /// The next entry of the run; the sighting where it is a report.
     #[inline]
     pub fn take(&mut self, layout: &Layout, event: &Event) -> Option<Sighting> {
@@ -228,22 +217,10 @@ impl PassageTracker {
         }
     }
 
-    /// The train followed.
-    #[must_use]
-    pub const fn train(&self) -> TrainId {
-        self.train
-    }
-
     /// What it was commanded last.
     #[must_use]
     pub const fn drive(&self) -> Drive {
         self.drive
-    }
-
-    /// The node of the contact it passed last.
-    #[must_use]
-    pub const fn at(&self) -> Option<NodeId> {
-        self.at
     }
 
     /// How the turnouts lie, as far as the run told.

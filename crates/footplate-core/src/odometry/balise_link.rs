@@ -43,48 +43,19 @@ pub enum BaliseVerdict {
     Contradicts(DistanceInterval),
 }
 
-/// A linked balise that the train passed without reading it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MissedBalise {
-    /// Its expected position.
-    pub place: Length,
-    /// The least distance of the train.
-    pub low: Length,
-}
-
 /// Compares balises with the odometer. Positions are measured from where the distance is 0.
 #[derive(Debug, Clone)]
 pub struct BaliseLink {
     accuracy: BaliseAccuracy,
-    linked: Option<Length>,
     /// The latest unexpected balise since the last accepted one, and the bounds when the train passed it.
     unexpected: Option<(Length, DistanceInterval)>,
 }
 
 impl BaliseLink {
-    /// Without a linked balise.
+    /// For balises of this accuracy.
     #[must_use]
     pub fn new(accuracy: BaliseAccuracy) -> Self {
-        Self { accuracy, linked: None, unexpected: None }
-    }
-
-    /// Sets the position of the next balise, ahead of the train.
-    pub fn link(&mut self, place: Length) {
-        self.linked = Some(place);
-    }
-
-    /// The least and largest distance from here to the linked balise.
-    #[must_use]
-    pub fn due(&self, now: &DistanceInterval) -> Option<[Length; 2]> {
-        let place = self.linked?;
-        Some([place - self.accuracy.bound - now.high, place + self.accuracy.bound - now.low])
-    }
-
-    /// The linked balise, once the train is certainly past it. Call it every period; it reports each balise once.
-    pub fn missed(&mut self, now: &DistanceInterval) -> Option<MissedBalise> {
-        let place = self.linked.filter(|place| now.low > *place + self.accuracy.bound)?;
-        self.linked = None;
-        Some(MissedBalise { place, low: now.low })
+        Self { accuracy, unexpected: None }
     }
 
     /// Checks a balise that the train passed within the last period, and returns the distance at the end of that period. The
@@ -95,13 +66,13 @@ impl BaliseLink {
         let [least, most] = [place - bound + ran.min(Length::ZERO), place + bound + ran.max(Length::ZERO)];
         let (low, high) = (now.low.max(least), now.high.min(most));
         if place.is_finite() && ran.is_finite() && low <= high {
-            self.heard(place);
+            self.unexpected = None;
             let middle = place + ran * 0.5;
             return BaliseVerdict::Accepted(self.between(middle, ran, now, [low, high]));
         }
         match self.unexpected {
             Some((before, then)) if agree(place - before, bound + ran.abs(), &then, now) => {
-                self.heard(place);
+                self.unexpected = None;
                 BaliseVerdict::Contradicts(DistanceInterval {
                     estimate: place + ran * 0.5,
                     low: least,
@@ -114,11 +85,6 @@ impl BaliseLink {
                 BaliseVerdict::Unexpected { place, low, high }
             }
         }
-    }
-
-    fn heard(&mut self, place: Length) {
-        self.unexpected = None;
-        self.linked = self.linked.filter(|linked| (place - *linked).abs() > 2.0 * self.accuracy.bound);
     }
 
     /// Combines the position with the estimate, whose error is taken as uniform within its bounds.
@@ -201,30 +167,6 @@ mod tests {
         link.pass(Length::from_m(1800.0), Length::ZERO, &then);
         let apart = link.pass(Length::from_m(9000.0), Length::ZERO, &now);
         assert!(matches!(apart, BaliseVerdict::Unexpected { .. }), "they are too far apart");
-    }
-
-    #[test]
-    fn a_linked_balise_is_due_in_a_window_and_missed_after_it() {
-        let mut link = link();
-        link.link(Length::from_m(2000.0));
-        let due = link.due(&interval(1500.0, 1490.0, 1510.0)).unwrap();
-        assert_eq!(due.map(Length::as_m), [488.0, 512.0]);
-        assert_eq!(link.missed(&interval(2010.0, 2002.0, 2018.0)), None);
-        let low = Length::from_m(2002.5);
-        let missed = link.missed(&interval(2010.0, 2002.5, 2018.0));
-        assert_eq!(missed, Some(MissedBalise { place: Length::from_m(2000.0), low }));
-        assert_eq!(link.missed(&interval(2010.0, 2002.5, 2018.0)), None, "said once");
-    }
-
-    #[test]
-    fn a_linked_balise_that_was_heard_is_not_missed() {
-        let mut link = link();
-        link.link(Length::from_m(2000.0));
-        // Another balise before it is not the expected one.
-        link.pass(Length::from_m(1990.0), Length::ZERO, &interval(1992.0, 1980.0, 2005.0));
-        assert!(link.due(&interval(1990.0, 1988.0, 1992.0)).is_some());
-        link.pass(Length::from_m(2001.0), Length::ZERO, &interval(2000.0, 1990.0, 2010.0));
-        assert_eq!(link.missed(&interval(3000.0, 2990.0, 3010.0)), None);
     }
 
     proptest! {

@@ -29,7 +29,7 @@ mod wheel_channel;
 pub mod wheels;
 
 pub use accuracy_monitor::{AccuracyMonitor, OdometerAccuracy};
-pub use balise_link::{BaliseLink, BaliseVerdict, DistanceInterval, MissedBalise};
+pub use balise_link::{BaliseLink, BaliseVerdict, DistanceInterval};
 pub use hypotheses::{HYPOTHESES, Hypothesis};
 pub use implausible_claims::ImplausibleClaims;
 pub use motion_estimate::{Mode, MotionBounds, MotionEstimate, WheelState};

@@ -5,7 +5,7 @@
 //! layout files do; [`Layout::build`] checks it. A [`Layout`] uses small integers:
 //! - [`Layout::hops_from`]: the sensors that a train may reach next, in nanoseconds, from a table made once;
 //! - [`Layout::reaches`]: the same if up to [`MAX_MISSED`] sensors on the path stay silent;
-//! - [`Layout::route`]: the shortest path between two nodes; [`Layout::circuit_from`]: a path that leads back;
+//! - [`Layout::circuit_from`]: a path that leads back;
 //! - [`Layout::blocks`]: sections with an occupancy detector, and where trains enter them;
 //! - [`Occupancy`]: from reports of their detectors to these entries;
 //! - [`Layout::crossings`]: where two tracks cross without a connection;
@@ -45,7 +45,6 @@ pub use plan::{
 };
 pub use position::{PathError, Position};
 pub use reach::{MAX_MISSED, Reach, Reaches};
-pub use route::{Route, RouteError};
 pub use sequence_test::{SequenceTest, SequenceVerdict, StrayReport};
 pub use survey::{StretchLength, Survey, SurveyedDistance};
 pub use turnout::{Leg, TurnoutNeed, TurnoutStates};

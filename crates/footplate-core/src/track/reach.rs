@@ -7,7 +7,7 @@ use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
 use crate::ids::{EdgeId, NodeId, SensorId};
-use crate::track::{Hop, HopId, Layout, Position, TurnoutStates};
+use crate::track::{HopId, Layout, TurnoutStates};
 use crate::units::Length;
 
 /// Most missed sensors in a row. Where sensors do not latch, two of five passages at a high speed are missed, and eight in a row
@@ -52,22 +52,7 @@ impl Layout {
     #[inline]
     #[must_use]
     pub fn reaches<'l>(&'l self, from: NodeId, turnouts: &'l TurnoutStates, missed: usize) -> Reaches<'l> {
-        Reaches::new(self, from, None, turnouts, missed)
-    }
-
-    /// The same for a train at a position, with distances from there. The edge of its position shows how the turnout
-    /// at the start of that edge was set. A position of another layout gives no reaches.
-    #[inline]
-    #[must_use]
-    pub fn reaches_ahead<'l>(
-        &'l self,
-        position: Position,
-        turnouts: &'l TurnoutStates,
-        missed: usize,
-    ) -> Reaches<'l> {
-        // No hop begins on an unknown edge.
-        let from = self.edge(position.edge).map_or(NodeId(0), |edge| edge.from);
-        Reaches::new(self, from, Some(position), turnouts, missed)
+        Reaches::new(self, from, turnouts, missed)
     }
 
     /// The edges that begin within distances from the starts of some edges, over both legs of every turnout, each with the longest
@@ -88,13 +73,6 @@ impl Layout {
         }
         found
     }
-
-    /// The edges of a reach in the order of travel.
-    pub fn edges_of(&self, reach: Reach) -> impl Iterator<Item = EdgeId> {
-        (0..usize::from(reach.count))
-            .filter_map(move |place| self.hop(*reach.hops.get(place)?))
-            .flat_map(|hop| hop.edges.iter().copied())
-    }
 }
 
 /// The iterator of [`Layout::reaches`].
@@ -104,8 +82,6 @@ pub struct Reaches<'l> {
     turnouts: &'l TurnoutStates,
     /// The level of the last hop that may be added.
     deepest: usize,
-    /// The edge on which every reach begins, if it is given.
-    first_edge: Option<EdgeId>,
     levels: [Level; MAX_HOPS],
     level: usize,
 }
@@ -123,34 +99,15 @@ struct Level {
 
 impl<'l> Reaches<'l> {
     #[inline]
-    fn new(
-        layout: &'l Layout,
-        from: NodeId,
-        position: Option<Position>,
-        turnouts: &'l TurnoutStates,
-        missed: usize,
-    ) -> Self {
+    fn new(layout: &'l Layout, from: NodeId, turnouts: &'l TurnoutStates, missed: usize) -> Self {
         let open = layout.hops.range_from(from);
-        let length = position.map_or(Length::ZERO, |position| -position.offset);
         Self {
             layout,
             turnouts,
             deepest: missed.min(MAX_MISSED),
-            first_edge: position.map(|position| position.edge),
-            levels: [Level { open, length, last: HopId::default() }; MAX_HOPS],
+            levels: [Level { open, length: Length::ZERO, last: HopId::default() }; MAX_HOPS],
             level: 0,
         }
-    }
-
-    /// Whether a hop at the present level can be taken.
-    #[inline]
-    fn is_open(&self, hop: &Hop<'_>) -> bool {
-        let Some(first) = self.first_edge.filter(|_| self.level == 0) else {
-            return hop.is_open(self.turnouts);
-        };
-        let is_decided = self.layout.edge(first).is_some_and(|edge| edge.leg.is_some());
-        let mut needs = hop.needs.iter().skip(usize::from(is_decided));
-        hop.edges.first() == Some(&first) && needs.all(|need| self.turnouts.allow(*need))
     }
 }
 
@@ -169,7 +126,7 @@ impl Iterator for Reaches<'_> {
             level.open.0 += 1;
             let begins_at = level.length;
             let hop = self.layout.hop(level.last)?;
-            if !self.is_open(&hop) {
+            if !hop.is_open(self.turnouts) {
                 continue;
             }
             let length = begins_at + hop.length;
@@ -204,8 +161,7 @@ mod tests {
         let layout = oval();
         let from = layout.node_named(from).unwrap();
         let text = |reach: Reach| {
-            let length: Length =
-                layout.edges_of(reach).filter_map(|edge| layout.edge(edge)).map(|edge| edge.length).sum();
+            let length: Length = reach.hops().iter().map(|hop| layout.hop(*hop).unwrap().length).sum();
             assert!((length - reach.length).abs() < Length::from_mm(1e-9));
             assert_eq!(reach.sensor, layout.sensor_at(reach.to));
             format!("{} {:.0} past {}", layout.node_name(reach.to), reach.length.as_mm(), reach.missed())
@@ -232,29 +188,6 @@ mod tests {
     fn the_end_of_the_track_ends_a_reach() {
         assert_eq!(reaches("EN1", &TurnoutStates::unknown(), 3), ["E1 30 past 0", "EX2 70 past 1"]);
         assert!(reaches("EX2", &TurnoutStates::unknown(), 3).is_empty());
-    }
-
-    #[test]
-    fn a_moving_train_reaches_what_is_ahead_of_it() {
-        let layout = oval();
-        let node = |name| layout.node_named(name).unwrap();
-        let edge = layout.edge_between(node("BR1"), node("C1")).unwrap();
-        let position = Position { edge, offset: Length::from_mm(50.0) };
-        // It is on the curved leg, whatever the turnout position since.
-        let straight: TurnoutStates = [(TurnoutId(1), Leg::Straight)].into_iter().collect();
-        let reached: Vec<_> = layout
-            .reaches_ahead(position, &straight, 1)
-            .map(|reach| format!("{} {:.0}", layout.node_name(reach.to), reach.length.as_mm()))
-            .collect();
-        assert_eq!(reached, ["C1 170", "D1 420"]);
-
-        let edge = layout.edge_between(node("A1"), node("BR1")).unwrap();
-        let position = Position { edge, offset: Length::from_mm(90.0) };
-        let sensors: Vec<_> =
-            layout.reaches_ahead(position, &straight, 0).map(|reach| layout.node_name(reach.to)).collect();
-        assert_eq!(sensors, ["B1"], "the turnout still decides");
-        let elsewhere = Position { edge: EdgeId(999), offset: Length::ZERO };
-        assert_eq!(layout.reaches_ahead(elsewhere, &straight, 3).count(), 0);
     }
 
     #[test]

@@ -116,16 +116,6 @@ impl Predictor {
         }
     }
 
-    /// The forecast for the contact named next, as things stand: before any further report.
-    #[must_use]
-    pub fn forecast(&self, layout: &Layout) -> Option<Forecast> {
-        let (place, tracker) = self.present.as_ref()?;
-        let train = self.trains.get(*place)?;
-        let others = || self.trains.iter().filter(|other| other.train() != train.train());
-        let prior = |model: &MotionModel, section| expected_length(model, others(), &self.sections, section);
-        train.forecast(layout, &self.sections, tracker, prior)
-    }
-
     /// What is known of a train.
     #[must_use]
     pub fn train(&self, train: TrainId) -> Option<&TrainForecaster> {
@@ -150,12 +140,6 @@ impl Predictor {
     #[must_use]
     pub const fn sections(&self) -> &SectionIndex {
         &self.sections
-    }
-
-    /// The rhythm of the link as learnt so far.
-    #[must_use]
-    pub fn timing(&self) -> &PollTimingEstimator {
-        self.present.as_ref().map_or(&self.timing, |(_, tracker)| tracker.timing())
     }
 
     fn place_of(&mut self, train: TrainId) -> usize {

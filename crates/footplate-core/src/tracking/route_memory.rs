@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use crate::ids::{NodeId, SensorId, SpeedStep};
-use crate::track::{HopId, Layout, Reach, TurnoutStates};
+use crate::track::{HopId, Layout, Reach};
 
 /// The routes of one train.
 #[derive(Debug, Clone, Default)]
@@ -39,24 +39,6 @@ impl RouteMemory {
                 *habit = Some(*hop);
             }
         }
-    }
-
-    /// The next sensor as the turnouts are known to lie, or else by the train's last route.
-    pub(super) fn likely_path(
-        &self,
-        layout: &Layout,
-        from: NodeId,
-        turnouts: &TurnoutStates,
-    ) -> Option<Reach> {
-        let habit = self.habit(from);
-        let mut open = layout.reaches(from, turnouts, 0);
-        let first = open.next()?;
-        Some(
-            core::iter::once(first)
-                .chain(open)
-                .find(|path| path.hops().first().copied() == habit)
-                .unwrap_or(first),
-        )
     }
 
     /// Which sensor had been named as the next before the train took this path.

@@ -13,7 +13,7 @@ use crate::ids::{DecoderSteps, SensorId, SpeedStep, TrainId};
 use crate::linalg::Gaussian;
 use crate::link::UniformNormal;
 use crate::model::survey::SectionIndex;
-use crate::model::{Drive, Passage, PassageTracker};
+use crate::model::{Drive, Passage};
 use crate::model::{MotionFit, SensorScatter};
 use crate::model::{MotionModel, PATH_LENGTH_SPREAD};
 use crate::time::{TimeSpan, Timestamp};
@@ -291,25 +291,6 @@ impl TrainForecaster {
             speed: Speed::from_m_per_s(due.speed),
             phase,
         }
-    }
-
-    /// The forecast for the contact named next, from the state as it stands.
-    pub(super) fn forecast(
-        &self,
-        layout: &Layout,
-        sections: &SectionIndex,
-        tracker: &PassageTracker,
-        prior: impl Fn(&MotionModel, usize) -> Gaussian,
-    ) -> Option<Forecast> {
-        let from = tracker.at().filter(|_| self.filter.is_placed())?;
-        let path = self.routes.likely_path(layout, from, tracker.turnouts())?;
-        let mut filter = self.filter.clone();
-        let ahead = filter.ahead(sections, &path, |section| prior(&self.model, section));
-        let sensor = path.sensor?;
-        let scatter = self.scatter.variance(sensor, self.drive.step);
-        let due = filter.arrival(&ahead, scatter)?;
-        let is_changing = !filter.is_settled();
-        self.foreseeable(self.forecast_of(sensor, &path, &due, is_changing, Polls::of(tracker.timing())))
     }
 }
 

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use footplate_core::track::{
-    HopId, Layout, LayoutPlan, Leg, NodeKind, Place, Position, RailEnd, Stretch, Survey, TurnoutStates,
+    Layout, LayoutPlan, Leg, NodeKind, Place, Position, RailEnd, Stretch, Survey, TurnoutStates,
 };
 use footplate_core::{EdgeId, Length, NodeId, SensorId, TurnoutId};
 use proptest::collection::vec;
@@ -192,44 +192,14 @@ proptest! {
     }
 
     #[test]
-    fn a_moving_train_reaches_what_its_last_node_does(
-        (_, layout) in any_layout(), states in any_states(), edge in any::<Index>(), part in 0.0..=1.0_f64,
-    ) {
-        let position = position(&layout, edge, part);
-        let edge = layout.edge(position.edge).unwrap();
-        // The turnout at the start of the edge no longer matters.
-        let mut decided = states.clone();
-        if let (NodeKind::Branch(turnout), Some(leg)) = (layout.node(edge.from).unwrap().kind, edge.leg) {
-            decided.set(turnout, leg);
-        }
-        let first = |hop: HopId| layout.hop(hop).unwrap().edges[0];
-        let expected: BTreeSet<_> = layout
-            .reaches(edge.from, &decided, 0)
-            .filter(|reach| first(reach.hops()[0]) == position.edge)
-            .map(|reach| reach.hops()[0])
-            .collect();
-        let reaches = layout.reaches_ahead(position, &states, 0);
-        prop_assert_eq!(reaches.map(|reach| reach.hops()[0]).collect::<BTreeSet<_>>(), expected);
-    }
-
-    #[test]
-    fn routes_are_the_shortest_and_as_long_in_the_other_direction((plan, layout) in any_layout()) {
+    fn distances_are_the_shortest((plan, layout) in any_layout()) {
         let (leads, free) = (leads(&plan), TurnoutStates::unknown());
         for (from, node) in layout.nodes() {
             let shortest = distances(&leads, &node.name);
             for (to, other) in layout.nodes() {
-                let route = layout.route(from, to, &free).ok();
-                let mm = route.as_ref().map(|route| route.length.as_mm().round());
+                let (Some(start), Some(end)) = (arrival(&layout, from), departure(&layout, to)) else { continue };
+                let mm = layout.distance_ahead(start, end, &free).map(|way| way.as_mm().round());
                 prop_assert_eq!(mm, shortest.get(&other.name).copied(), "{} to {}", node.name, other.name);
-                let back = layout.route(to.reverse(), from.reverse(), &free).ok();
-                prop_assert_eq!(back.map(|back| back.length.as_mm().round()), mm);
-                let Some(route) = route else { continue };
-                let mut at = from;
-                for edge in route.edges {
-                    prop_assert_eq!(layout.edge(edge).unwrap().from, at);
-                    at = layout.edge(edge).unwrap().to;
-                }
-                prop_assert_eq!(at, to);
             }
         }
     }
@@ -273,8 +243,7 @@ proptest! {
         (_, layout) in any_layout(), states in any_states(), ids in any::<[u16; 4]>(), mm in any::<[f64; 3]>(), text in "\\PC{0,12}",
     ) {
         let [one, two, three] = mm.map(Length::from_mm);
-        let (from, to) = (NodeId(ids[0]), NodeId(ids[1]));
-        let _ = layout.route(from, to, &states);
+        let from = NodeId(ids[0]);
         let _ = layout.landmark(&text);
         prop_assert_eq!(layout.reaches(from, &states, usize::from(ids[2])).next().is_some(), layout.open_hops_from(from, &states).next().is_some());
         let ids = [ids[2], ids[3] % 64];
@@ -283,7 +252,6 @@ proptest! {
         let _ = layout.advance(target, three, &states);
         let _ = layout.distance_ahead(target, position, &states);
         let _ = layout.reversed(target);
-        let _ = layout.reaches_ahead(target, &states, 3).count();
     }
 }
 
@@ -304,6 +272,18 @@ fn in_a_row(
             in_a_row(layout, states, hop.to, length, missed, depth + 1, found);
         }
     }
+}
+
+/// A train that has just arrived at a node, if any track leads there.
+fn arrival(layout: &Layout, node: NodeId) -> Option<Position> {
+    let (edge, found) = layout.edges().find(|(_, edge)| edge.to == node)?;
+    Some(Position { edge, offset: found.length })
+}
+
+/// A train that is about to leave a node, if any track begins there.
+fn departure(layout: &Layout, node: NodeId) -> Option<Position> {
+    let (edge, _) = layout.edges().find(|(_, edge)| edge.from == node)?;
+    Some(Position { edge, offset: Length::ZERO })
 }
 
 /// The shortest distances from a node in mm: relaxed until nothing changes (Bellman and Ford, 1956).

@@ -36,12 +36,6 @@ impl Drawing {
     pub fn set(&mut self, node: NodeId, point: [f64; 2]) {
         self.points.insert(place(node), point);
     }
-
-    /// Whether no place has a point.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.points.is_empty()
-    }
 }
 
 /// The key of a node's place: the lower of its two nodes.

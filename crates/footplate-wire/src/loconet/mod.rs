@@ -20,7 +20,7 @@ mod time_model;
 pub use functions::{FunctionGroup, FunctionPacket};
 pub use line::{LONGEST_LINE, Line, Lines, SentReport};
 pub use message::{Malformed, Message};
-pub use request::{LAST_WILL, LOCOMOTIVES, TURNOUTS, speed_of};
+pub use request::{LOCOMOTIVES, TURNOUTS, speed_of};
 pub use session::Client;
 pub use settings::Settings;
 pub use slot::{SlotData, SlotUse};

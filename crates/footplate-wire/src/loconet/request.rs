@@ -8,9 +8,6 @@ use footplate_core::{DecoderSteps, SpeedStep};
 use super::functions::{FunctionGroup, FunctionPacket};
 use super::message::Message;
 
-/// What stops everything: all locomotives stop, and the track loses its power.
-pub const LAST_WILL: &[u8] = b"SEND 85 7A\r\nSEND 82 7D\r\n";
-
 /// The decoders' addresses.
 pub const LOCOMOTIVES: RangeInclusive<u16> = 1..=9_983;
 

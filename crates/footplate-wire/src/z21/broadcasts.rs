@@ -31,12 +31,6 @@ impl Broadcasts {
     pub const fn has(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
-
-    /// What of another it does not hold.
-    #[must_use]
-    pub const fn lacks(self, other: Self) -> Self {
-        Self(other.0 & !self.0)
-    }
 }
 
 impl BitOr for Broadcasts {

@@ -113,8 +113,6 @@ pub struct RailCom {
 impl RailCom {
     /// The bits of `options` that announce a speed.
     pub const SPEEDS: u8 = 0x03;
-    /// The bit of `options` that announces quality.
-    pub const QUALITY: u8 = 0x04;
     /// A second speed is counted from here.
     const SECOND_SPEED: u16 = 256;
 

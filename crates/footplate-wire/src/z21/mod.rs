@@ -25,7 +25,7 @@ pub use broadcasts::Broadcasts;
 pub use dataset::{Dataset, Datasets, LONGEST_DATAGRAM};
 pub use detectors::{CanDetection, Feedback, GROUP_INPUTS, GROUP_MODULES, LocoNetDetection, RailCom};
 pub use reply::{Malformed, Reply};
-pub use request::{FunctionSwitch, LAST_WILL, LOCOMOTIVES, Request, TURNOUTS};
+pub use request::{FunctionSwitch, LOCOMOTIVES, Request, TURNOUTS};
 pub use session::Client;
 pub use settings::Settings;
 pub use speed::Throttle;

@@ -18,11 +18,6 @@ pub const LOCOMOTIVES: RangeInclusive<u16> = 1..=9_999;
 /// Addresses of turnouts on the way: 2048 from 0.
 pub const TURNOUTS: RangeInclusive<u16> = 0..=2_047;
 
-/// One datagram that stops every locomotive and switches the track power off, for a guardian that holds the line when the program
-/// has died: a Z21 lets trains run when their client is gone. It needs no state and may be sent more than once.
-pub const LAST_WILL: [u8; 13] =
-    [0x06, 0x00, 0x40, 0x00, 0x80, 0x80, 0x07, 0x00, 0x40, 0x00, 0x21, 0x80, 0xa1];
-
 /// The functions that one request can switch (F0 to F31).
 const HIGHEST_FUNCTION: u8 = 31;
 /// The kind of a request for one state by its address.

@@ -67,9 +67,6 @@ impl CentralState {
     pub const POWER_OFF: u8 = 0x02;
     /// There is a short circuit.
     pub const SHORT_CIRCUIT: u8 = 0x04;
-    /// Decoders are programmed.
-    pub const PROGRAMMING: u8 = 0x20;
-
     /// Whether the track has no power. A stop of all locomotives leaves it on.
     #[must_use]
     pub const fn is_off(self) -> bool {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use footplate_core::control::LinkNews;
 use footplate_core::{Command, EventKind, SensorId, TimeSpan, TrainId, TurnoutId};
 use footplate_wire::loconet::{
-    Client, FunctionGroup, FunctionPacket, LAST_WILL, Line, Lines, Message, Settings, SlotData, SlotUse,
+    Client, FunctionGroup, FunctionPacket, Line, Lines, Message, Settings, SlotData, SlotUse,
 };
 use footplate_wire::{CommandError, LinkNotice, ReportedFunctions, Session};
 
@@ -419,14 +419,6 @@ fn a_train_that_was_never_driven_here_is_stopped_at_the_end_if_that_was_commande
     assert_eq!(desk.written[1].1, Message::StopAll, "{:?}", desk.written);
     assert_eq!(desk.station.slots[&1].speed, 0);
     assert!(!desk.station.power && desk.client.closing().is_complete(), "{}", desk.client.closing());
-}
-
-#[test]
-fn the_last_will_stops_every_locomotive_and_takes_the_power() {
-    let mut lines = Lines::default();
-    let read: Vec<Line> =
-        LAST_WILL.iter().filter_map(|byte| lines.push(*byte).map(|line| Line::read(line).unwrap())).collect();
-    assert_eq!(read, [Line::Send(Message::StopAll), Line::Send(Message::PowerOff)]);
 }
 
 #[test]

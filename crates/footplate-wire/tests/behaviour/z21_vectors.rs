@@ -1,6 +1,6 @@
 //! The datagrams in `testdata/wire/z21.csv` mean what is written beside them, in both directions.
 
-use footplate_wire::z21::{Datasets, LAST_WILL, Reply, Request};
+use footplate_wire::z21::{Datasets, Reply, Request};
 
 const VECTORS: &str = include_str!("../../../../testdata/wire/z21.csv");
 
@@ -105,12 +105,4 @@ fn a_datagram_is_read_up_to_a_length_that_cannot_be_true() {
         let mut datasets = Datasets::of(&bytes);
         assert_eq!((datasets.by_ref().count(), datasets.unread()), (whole, unread), "{text}");
     }
-}
-
-#[test]
-fn the_last_will_stops_every_locomotive_and_takes_the_power() {
-    let requests: Vec<Request> =
-        Datasets::of(&LAST_WILL).filter_map(|dataset| Request::read(&dataset)).collect();
-    assert_eq!(requests, [Request::StopAll, Request::Power { on: false }]);
-    assert!(Datasets::of(&LAST_WILL).all(|dataset| dataset.is_sound()));
 }

@@ -103,7 +103,7 @@ export const ENGLISH = {
   "under-way": "Calibration in progress", "about": "experiment", "because": "reason", "time-left": "time left", "time-used": "time used",
   "expected": "expected accuracy", "left-of": "{0} s of {1} s of track time", "expected-at": "at step {0}: stops within {1} mm, speed within {2} % (95 %)",
   "phase-finding": "locating the train", "phase-joining": "running to a circuit", "phase-experiment": "measuring",
-  "phase-paused": "paused", "phase-ending": "stopping", "phase-finished": "complete", "because-untried": "this step has not been measured yet",
+  "phase-ending": "stopping", "phase-finished": "complete", "because-untried": "this step has not been measured yet",
   "because-most": "most informative experiment per second; it takes {0} s (value {1}, in variances of one stop)",
   "chart-speeds": "Speed by step", "chart-stops-by-step": "Stopping distance by step", "chart-stored": "Speed by step from recordings",
   "chart-law": "Change of speed", "chart-beyond": "Residuals", "axis-step": "speed step", "axis-since": "since the command (s)",

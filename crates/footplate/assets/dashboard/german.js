@@ -104,7 +104,7 @@ export const GERMAN = {
   "under-way": "Kalibrierung läuft", "about": "Versuch", "because": "Grund", "time-left": "Restzeit", "time-used": "verbrauchte Zeit",
   "expected": "erwartete Genauigkeit", "left-of": "{0} s von {1} s Gleiszeit", "expected-at": "bei Stufe {0}: Halte auf {1} mm, Tempo auf {2} % (95 %)",
   "phase-finding": "Zug wird lokalisiert", "phase-joining": "Fahrt zu einem Ringgleis", "phase-experiment": "Messung",
-  "phase-paused": "angehalten", "phase-ending": "hält an", "phase-finished": "abgeschlossen", "because-untried": "diese Fahrstufe ist noch nicht gemessen",
+  "phase-ending": "hält an", "phase-finished": "abgeschlossen", "because-untried": "diese Fahrstufe ist noch nicht gemessen",
   "because-most": "aufschlussreichster Versuch je Sekunde; er dauert {0} s (Wert {1}, in Varianzen eines Halts)",
   "chart-speeds": "Tempo je Stufe", "chart-stops-by-step": "Anhalteweg je Fahrstufe", "chart-stored": "Tempo je Stufe aus Aufzeichnungen",
   "chart-law": "Tempowechsel", "chart-beyond": "Restabweichungen", "axis-step": "Fahrstufe", "axis-since": "seit dem Befehl (s)",

@@ -84,7 +84,6 @@ impl CalibrationPicture {
             Phase::Finding => "finding",
             Phase::Joining => "joining",
             Phase::Experiment(_) => "experiment",
-            Phase::Paused => "paused",
             Phase::Ending => "ending",
             Phase::Finished => "finished",
         };

@@ -20,8 +20,6 @@ pub(super) enum Activity {
     Joining,
     /// An experiment runs.
     Trying(Trial),
-    /// An operator paused the calibration: the train stops.
-    Paused,
     /// The train was lost and commanded to stop; the search begins at this time.
     Waiting { until: Timestamp },
     /// The train stops; the calibration is over then.
@@ -41,7 +39,6 @@ impl Activity {
             | Self::Waiting { .. } => Phase::Finding,
             Self::Joining => Phase::Joining,
             Self::Trying(trial) => Phase::Experiment(trial.experiment),
-            Self::Paused => Phase::Paused,
             Self::Ending { .. } => Phase::Ending,
             Self::Finished => Phase::Finished,
         }

@@ -147,12 +147,6 @@ impl<'l> Calibrator<'l> {
         &self.surveyed
     }
 
-    /// The comparison of surveyed lengths with path lengths.
-    #[must_use]
-    pub const fn survey_test(&self) -> &SurveyTest {
-        &self.survey_test
-    }
-
     /// The position of the train.
     #[must_use]
     pub const fn locator(&self) -> &Locator {

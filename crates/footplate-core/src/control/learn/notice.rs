@@ -83,8 +83,6 @@ pub enum Phase {
     Joining,
     /// Running an experiment.
     Experiment(Experiment),
-    /// Paused by the operator; the train is at rest or stops.
-    Paused,
     /// Bringing the train to rest.
     Ending,
     /// Done.

@@ -155,24 +155,6 @@ fn a_train_that_moves_at_no_step_is_not_found_and_commanded_to_stop() {
 }
 
 #[test]
-fn a_person_can_pause_it_and_end_it() {
-    let layout = large_oval();
-    let mut train = ScriptedTrain::new(&layout, "D1", "A1", 200.0);
-    let mut machine = calibrator(&layout, 200.0);
-    train.run(&mut machine, 20.0);
-    machine.pause(train.now);
-    train.run(&mut machine, 10.0);
-    assert!(train.is_at_rest());
-    machine.resume(train.now);
-    train.run(&mut machine, 20.0);
-    assert!(!train.is_at_rest());
-    machine.stop(train.now);
-    train.run(&mut machine, 20.0);
-    assert_eq!(machine.ending(), Some(&Ending::Told));
-    assert!(train.is_at_rest());
-}
-
-#[test]
 fn a_train_that_runs_otherwise_than_in_earlier_sessions_is_noticed() {
     let layout = large_oval();
     let mut train = ScriptedTrain::new(&layout, "D1", "A1", 200.0);

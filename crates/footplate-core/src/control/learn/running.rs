@@ -352,8 +352,7 @@ impl Calibrator<'_> {
 
     /// The last time to command a stop within the budget; `None` if it is commanded already.
     fn last_moment(&self) -> Option<Timestamp> {
-        let is_over =
-            matches!(self.activity, Activity::Ending { .. } | Activity::Finished | Activity::Paused);
+        let is_over = matches!(self.activity, Activity::Ending { .. } | Activity::Finished);
         let started = self.started.filter(|_| !is_over)?;
         Some(started + self.settings.budget - LAST_STOP.max(self.stops_within() + COMMAND_TIME))
     }
@@ -374,7 +373,7 @@ impl Calibrator<'_> {
                 Stage::Braking { until } | Stage::BrakingAgain { until } => Some(until),
                 Stage::Aiming { at: None, .. } | Stage::Steady { .. } | Stage::Creeping => None,
             },
-            Activity::Joining | Activity::Paused | Activity::Finished => None,
+            Activity::Joining | Activity::Finished => None,
         };
         // While a command waits for the line, nothing else is due.
         let next = next.filter(|_| self.requested.is_none());
@@ -382,28 +381,5 @@ impl Calibrator<'_> {
             .into_iter()
             .flatten()
             .min()
-    }
-
-    /// Stops the train until [`resume`](Self::resume); results are kept.
-    pub fn pause(&mut self, now: Timestamp) {
-        if self.finished.is_none() && !matches!(self.activity, Activity::Ending { .. }) {
-            self.hold_line(None);
-            self.issue(now, SpeedStep::STAND);
-            self.due_by = None;
-            self.activity = Activity::Paused;
-            self.report_progress(now);
-        }
-    }
-
-    /// Continues after [`pause`](Self::pause): searches for the train.
-    pub fn resume(&mut self, now: Timestamp) {
-        if matches!(self.activity, Activity::Paused) {
-            self.find(now);
-        }
-    }
-
-    /// Ends the session: the train stops, and results are kept.
-    pub fn stop(&mut self, now: Timestamp) {
-        self.end(now, Ending::Told);
     }
 }

@@ -11,7 +11,7 @@ use crate::ids::{SpeedStep, TrainId};
 use crate::model::MotionModel;
 use crate::time::Timestamp;
 use crate::track::Position;
-use crate::tracking::{Locator, PathPoint};
+use crate::tracking::PathPoint;
 use crate::units::Length;
 
 use super::alarm::{Alarm, ConsistencyMonitor};
@@ -134,12 +134,6 @@ impl Watchdog {
     pub fn add_train(&mut self, model: MotionModel) {
         self.forget(model.train());
         self.driver.add_train(model);
-    }
-
-    /// See [`Driver::add_located`].
-    pub fn add_located(&mut self, model: MotionModel, locator: Locator) {
-        self.forget(model.train());
-        self.driver.add_located(model, locator);
     }
 
     /// See [`Driver::set_model`]. Ignored while a recovery measures the train.

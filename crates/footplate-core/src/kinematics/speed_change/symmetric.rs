@@ -4,7 +4,7 @@ use super::ends::Ends;
 use crate::kinematics::motion::{Motion, MotionState};
 use crate::kinematics::phase::{Phase, SlowEnd, even_time};
 use crate::time::TimeSpan;
-use crate::units::{Acceleration, Jerk, Length, Speed};
+use crate::units::{Acceleration, Length, Speed};
 
 /// A step at the middle of the interval: sufficient where the course of the change does not matter, because its total
 /// distance is that of the mean speed.
@@ -154,16 +154,6 @@ impl ConstantJerk {
             [phase(at_start, 0.0, sixth_jerk), phase(at_half, half_peak, -sixth_jerk)]
         };
         Self { ends, half, halves, distance_at_half }
-    }
-
-    /// From one speed to another with a jerk, whose sign is ignored; zero takes the longest possible [`TimeSpan`].
-    #[must_use]
-    pub fn with_jerk(from: Speed, to: Speed, jerk: Jerk) -> Self {
-        let difference = (to - from).abs();
-        // v₂ − v₁ = j (Δ/2)²
-        let seconds = 2.0 * libm::sqrt(difference.as_m_per_s() / jerk.abs().as_m_per_s3());
-        let duration = if difference > Speed::ZERO { TimeSpan::from_s(seconds) } else { TimeSpan::ZERO };
-        Self::new(from, to, duration)
     }
 }
 

@@ -26,14 +26,6 @@ pub enum Direction {
     Down,
 }
 
-impl Direction {
-    /// The direction of a command.
-    #[must_use]
-    pub fn of(drive: Drive) -> Self {
-        if drive.step < drive.from { Self::Down } else { Self::Up }
-    }
-}
-
 /// One contact of a change of speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TransientPoint {

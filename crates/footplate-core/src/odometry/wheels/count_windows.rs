@@ -15,9 +15,6 @@ const WINDOWS: usize = 6;
 /// Lengths of the windows (s): around `2 √(p / (b - a))`, where pulse and acceleration cost the same, for pitches of 10
 /// to 40 mm and accelerations known to 0.3 to 3 m/s².
 const LENGTHS_S: [f64; WINDOWS] = [0.1, 0.16, 0.25, 0.4, 0.6, 0.9];
-/// The window for a mean speed: long enough for a pulse to be 0.1 m/s, short enough for a wheel that touches the speed of
-/// the train for a moment.
-const MEAN_WINDOW: usize = 2;
 /// What jitter and pitch errors of a tooth can add to the one pulse of a count, in pulses (2 % of a pitch once per
 /// revolution, 0.5 % a tooth, each at both ends).
 const PITCH_ERROR: f64 = 0.05;
@@ -114,25 +111,6 @@ impl CountWindows {
         for reading in &mut self.readings {
             core::mem::swap(&mut reading.back, &mut reading.forth);
         }
-    }
-
-    /// The mean speed (m/s) with this pitch (m) over the shortest window of at least a fifth of a second, and how long
-    /// ago its middle was (s); nothing before there is one.
-    #[must_use]
-    pub fn mean_speed(&self, pitch: f64) -> Option<(f64, f64)> {
-        let Window { lag, half, per_second } = self.windows[MEAN_WINDOW];
-        if lag >= self.good {
-            return None;
-        }
-        let turned = self.turned(lag);
-        Some((0.5 * (turned.forth - turned.back) * pitch * per_second, half))
-    }
-
-    /// How many pulses it can have turned at most since so many readings, backwards and forwards.
-    #[inline]
-    fn turned(&self, lag: usize) -> Turned {
-        let (now, then) = (&self.readings[self.newest], &self.readings[(self.newest + RING - lag) % RING]);
-        Turned::between(now, then)
     }
 
     /// Between which speeds (m/s) the wheel must turn now, with a pitch (m) within `pitch` and accelerations (m/s²)

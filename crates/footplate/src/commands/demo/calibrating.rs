@@ -139,7 +139,6 @@ fn detail(progress: &Progress, budget: TimeSpan) -> String {
         Phase::Finding => "waits for its first sensor".to_owned(),
         Phase::Joining => "goes to its circuit".to_owned(),
         Phase::Experiment(experiment) => experiment.to_string(),
-        Phase::Paused => "waits".to_owned(),
         Phase::Ending | Phase::Finished => "comes to rest".to_owned(),
     };
     format!("{about:<32} {bar} {} of {}", minutes(progress.elapsed), minutes(budget))

@@ -7,7 +7,6 @@ use super::{
     ALL_BELIEVED, Closed, KEPT_TRIPS, LONGEST_STEP, MOST_HALVINGS, MOST_ITERATIONS, MOST_TRIPS, MotionFit,
     SETTLED, Survey, Values,
 };
-use crate::model::MotionModel;
 use crate::model::fit::unknowns::Columns;
 use crate::model::parameters::{SPEEDS, knots};
 use crate::model::survey::{SectionIndex, SurveyTest};
@@ -78,12 +77,6 @@ impl MotionFit {
 }
 
 impl Refit {
-    /// The model of the fit; until it is over, that of the fit before.
-    #[must_use]
-    pub const fn model(&self) -> &MotionModel {
-        self.fit.model()
-    }
-
     /// Whether the fit is complete.
     #[must_use]
     pub const fn is_over(&self) -> bool {

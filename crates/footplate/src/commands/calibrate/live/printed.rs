@@ -99,7 +99,6 @@ pub(super) fn state(progress: &Progress) -> String {
         Phase::Finding => "looking for the train".to_owned(),
         Phase::Joining => "running to a circuit".to_owned(),
         Phase::Experiment(experiment) => experiment.to_string(),
-        Phase::Paused => "paused".to_owned(),
         Phase::Ending => "coming to rest".to_owned(),
         Phase::Finished => "done".to_owned(),
     };
