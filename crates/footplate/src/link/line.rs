@@ -98,36 +98,45 @@ impl std::fmt::Display for Lost {
 
 impl std::error::Error for Lost {}
 
+/// The methods of a [`Link`] that one around another passes on, all but what is said and heard.
+macro_rules! passes_on {
+    ($self:ident, $link:expr) => {
+        fn now(&$self) -> footplate_core::Timestamp {
+            $link.now()
+        }
+        fn cts(&$self) -> Option<bool> {
+            $link.cts()
+        }
+        fn patience(&$self) -> footplate_core::TimeSpan {
+            $link.patience()
+        }
+        fn reopen(&mut $self) -> Result<(), $crate::link::Lost> {
+            $link.reopen()
+        }
+        fn may_be_half_open(&$self) -> bool {
+            $link.may_be_half_open()
+        }
+        fn real_time(&$self) -> std::time::Duration {
+            $link.real_time()
+        }
+        fn pause(&mut $self, span: std::time::Duration) {
+            $link.pause(span);
+        }
+        fn guardian(&mut $self) -> Option<&mut dyn $crate::link::Guardian> {
+            $link.guardian()
+        }
+    };
+}
+pub(super) use passes_on;
+
 /// A link that is owned or borrowed elsewhere.
 impl<L: DerefMut<Target: Link>> Link for L {
-    fn now(&self) -> Timestamp {
-        (**self).now()
-    }
+    passes_on!(self, (**self));
+
     fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
         (**self).write(bytes)
     }
     fn wait(&mut self, until: Timestamp) -> Heard {
         (**self).wait(until)
-    }
-    fn cts(&self) -> Option<bool> {
-        (**self).cts()
-    }
-    fn patience(&self) -> TimeSpan {
-        (**self).patience()
-    }
-    fn reopen(&mut self) -> Result<(), Lost> {
-        (**self).reopen()
-    }
-    fn may_be_half_open(&self) -> bool {
-        (**self).may_be_half_open()
-    }
-    fn real_time(&self) -> Duration {
-        (**self).real_time()
-    }
-    fn pause(&mut self, span: Duration) {
-        (**self).pause(span);
-    }
-    fn guardian(&mut self) -> Option<&mut dyn Guardian> {
-        (**self).guardian()
     }
 }

@@ -3,10 +3,11 @@
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use footplate_core::{TimeSpan, Timestamp};
+use footplate_core::Timestamp;
 
+use super::line::passes_on;
 use super::rhythm::{PowerCommand, Rhythm};
-use super::{Guardian, Heard, Link, Lost};
+use super::{Heard, Link, Lost};
 use crate::clock::Stopwatch;
 use crate::tally::Tally;
 
@@ -81,9 +82,7 @@ impl Observed {
 }
 
 impl<L: Link> Link for ObservedLink<L> {
-    fn now(&self) -> Timestamp {
-        self.link.now()
-    }
+    passes_on!(self, self.link);
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
         // Single bytes go to a 6051; other stations get whole messages and are not polled.
@@ -127,33 +126,5 @@ impl<L: Link> Link for ObservedLink<L> {
             }
         }
         heard
-    }
-
-    fn cts(&self) -> Option<bool> {
-        self.link.cts()
-    }
-
-    fn patience(&self) -> TimeSpan {
-        self.link.patience()
-    }
-
-    fn reopen(&mut self) -> Result<(), Lost> {
-        self.link.reopen()
-    }
-
-    fn may_be_half_open(&self) -> bool {
-        self.link.may_be_half_open()
-    }
-
-    fn real_time(&self) -> Duration {
-        self.link.real_time()
-    }
-
-    fn pause(&mut self, span: Duration) {
-        self.link.pause(span);
-    }
-
-    fn guardian(&mut self) -> Option<&mut dyn Guardian> {
-        self.link.guardian()
     }
 }

@@ -1,10 +1,9 @@
 //! A link with a listener: what was written and heard, and when.
 
-use std::time::Duration;
+use footplate_core::Timestamp;
 
-use footplate_core::{TimeSpan, Timestamp};
-
-use super::{Guardian, Heard, Link, Lost};
+use super::line::passes_on;
+use super::{Heard, Link, Lost};
 
 /// One byte that passed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,9 +40,7 @@ impl<L: Link> TappedLink<L> {
 }
 
 impl<L: Link> Link for TappedLink<L> {
-    fn now(&self) -> Timestamp {
-        self.link.now()
-    }
+    passes_on!(self, self.link);
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
         let now = self.link.now();
@@ -62,33 +59,5 @@ impl<L: Link> Link for TappedLink<L> {
             Heard::Cts(_) | Heard::Nothing | Heard::Lost(_) => {}
         }
         heard
-    }
-
-    fn cts(&self) -> Option<bool> {
-        self.link.cts()
-    }
-
-    fn patience(&self) -> TimeSpan {
-        self.link.patience()
-    }
-
-    fn reopen(&mut self) -> Result<(), Lost> {
-        self.link.reopen()
-    }
-
-    fn may_be_half_open(&self) -> bool {
-        self.link.may_be_half_open()
-    }
-
-    fn real_time(&self) -> Duration {
-        self.link.real_time()
-    }
-
-    fn pause(&mut self, span: Duration) {
-        self.link.pause(span);
-    }
-
-    fn guardian(&mut self) -> Option<&mut dyn Guardian> {
-        self.link.guardian()
     }
 }
