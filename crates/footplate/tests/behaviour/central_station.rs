@@ -6,26 +6,15 @@ use std::time::Duration;
 use footplate_wire::marklin_can::{Frame, Message};
 use serde_json::Value;
 
-use crate::board::{SCRIPT, calibrated_over, driven};
+use crate::board::{calibrated_over, driven_to_two, errors_over};
 use crate::program::footplate;
 use crate::station::Standing;
-use crate::z21::errors;
 
 const LINK: &str = "sim:track-a?faults=none&trains=24&station=marklin-can&seed=";
 
 #[test]
 fn a_train_is_calibrated_behind_a_central_station_and_stops_where_it_should() {
-    let (mut all, mut broken) = (Vec::new(), 0);
-    // Worlds whose train faces the way of the script's places.
-    for seed in [7, 10, 11] {
-        let folder = calibrated_over(LINK, &format!("can-{seed}"), seed);
-        let (stops, outside) = errors(&driven(&folder, &format!("{LINK}{seed}"), SCRIPT).1);
-        all.extend(stops);
-        broken += outside;
-    }
-    all.sort_by(f64::total_cmp);
-    println!("{} stops, errors in mm: {all:.1?}, {broken} promises of 95 % broken", all.len());
-    assert!(all.len() >= 15, "{all:?}");
+    let (all, broken) = errors_over(LINK, "can");
     assert!(all[all.len() / 2] < 15.0 && all[all.len() - 1] < 60.0, "{all:?}");
     assert!(broken <= 3, "{broken} of {} promises of 95 % broken", all.len());
 }
@@ -33,7 +22,6 @@ fn a_train_is_calibrated_behind_a_central_station_and_stops_where_it_should() {
 #[test]
 fn it_stops_there_over_every_line_whatever_that_does_to_frames() {
     let folder = calibrated_over(LINK, "can-lines", 7);
-    let script: String = SCRIPT.lines().take(7).map(|line| format!("{line}\n")).collect();
     for (place, quirks, begins) in [
         ("udp:127.0.0.1:0", "lossy,twice,overtaken", "marklin-can:127.0.0.1:"),
         ("tcp:127.0.0.1:0", "split,dcc", "marklin-can:tcp://"),
@@ -43,14 +31,7 @@ fn it_stops_there_over_every_line_whatever_that_does_to_frames() {
         let station =
             Standing::with(place, "5", &["--protocol", "marklin-can", "--quirks", quirks, "--seed", "7"]);
         assert!(station.address.starts_with(begins), "{}", station.address);
-        let (run, stops) = driven(&folder, &station.address, &script);
-        assert_eq!(stops.len(), 2, "{place}: {}", run.output);
-        assert!(
-            stops.iter().all(|stop| stop["achieved"].is_string()),
-            "{place}: {}{}",
-            run.output,
-            run.errors
-        );
+        let run = driven_to_two(&folder, &station.address);
         let wrong = ["another throttle", "lost its power", "NOT commanded", "could not be read"];
         assert!(wrong.iter().all(|wrong| !run.errors.contains(wrong)), "{place}: {}", run.errors);
     }

@@ -1,9 +1,8 @@
 //! A train with 126 steps is calibrated in the time of one with 14 and stops as precisely where the step is free; from steps that
 //! no calibration measured it stops where it says. Stations refuse what they cannot command, with a reason.
 
-use crate::board::{SCRIPT, calibrated_over, driven};
+use crate::board::{SCRIPT, calibrated_over, driven, errors};
 use crate::program::footplate;
-use crate::z21::errors;
 
 const LINK: &str = "sim:track-a?faults=none&trains=24&steps=126&station=dcc-ex&seed=";
 

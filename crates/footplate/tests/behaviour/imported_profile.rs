@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::board::{SCRIPT, calibrated_over, stops_of};
+use crate::board::{SCRIPT, calibrated_over, errors, stops_of};
 use crate::program::{Run, footplate};
-use crate::z21::errors;
 
 /// Worlds whose train faces the direction of the script's places.
 const SEEDS: [u64; 3] = [7, 10, 11];

@@ -4,26 +4,15 @@ use std::io::{Read as _, Write as _};
 
 use serde_json::Value;
 
-use crate::board::{SCRIPT, calibrated_over, driven};
+use crate::board::{calibrated_over, driven_to_two, errors_over};
 use crate::program::footplate;
 use crate::station::Standing;
-use crate::z21::errors;
 
 const LINK: &str = "sim:track-a?faults=none&trains=24&station=jmri&seed=";
 
 #[test]
 fn a_train_is_calibrated_behind_jmri_and_stops_where_it_should() {
-    let (mut all, mut broken) = (Vec::new(), 0);
-    // Worlds whose train faces the way of the script's places.
-    for seed in [7, 10, 11] {
-        let folder = calibrated_over(LINK, &format!("jmri-{seed}"), seed);
-        let (stops, outside) = errors(&driven(&folder, &format!("{LINK}{seed}"), SCRIPT).1);
-        all.extend(stops);
-        broken += outside;
-    }
-    all.sort_by(f64::total_cmp);
-    println!("{} stops, errors in mm: {all:.1?}, {broken} promises of 95 % broken", all.len());
-    assert!(all.len() >= 15, "{all:?}");
+    let (all, _) = errors_over(LINK, "jmri");
     assert!(all[all.len() / 2] < 15.0 && all[all.len() - 1] < 60.0, "{all:?}");
 }
 
@@ -38,10 +27,7 @@ fn it_stops_there_over_a_web_socket_with_polled_sensors_and_without_a_prefix() {
     let figures: Value = serde_json::from_str(&doctor.output).expect("JSON");
     assert_eq!(figures["sensors"].as_u64(), Some(80), "{figures}{}", doctor.errors);
     assert_eq!(figures["system"], "LocoNet (L)");
-    let script: String = SCRIPT.lines().take(7).map(|line| format!("{line}\n")).collect();
-    let (run, stops) = driven(&folder, &link, &script);
-    assert_eq!(stops.len(), 2, "{}", run.output);
-    assert!(stops.iter().all(|stop| stop["achieved"].is_string()), "{}", run.output);
+    let run = driven_to_two(&folder, &link);
     assert!(!run.errors.contains("did not confirm"), "{}", run.errors);
 }
 

@@ -2,8 +2,7 @@
 //!
 //! The truth is the simulated world's. `--no-capture` prints the figures.
 
-use crate::board::{SCRIPT, calibrated_on, tried_on};
-use crate::z21::errors;
+use crate::board::{SCRIPT, calibrated_on, errors, tried_on};
 
 /// The station of the calibration.
 const CALIBRATED_OVER: &str = "marklin";

@@ -6,39 +6,15 @@ use std::time::Duration;
 use footplate_wire::z21::{Datasets, Request};
 use serde_json::Value;
 
-use crate::board::{SCRIPT, calibrated_over, driven};
+use crate::board::{SCRIPT, calibrated_over, driven, driven_to_two, errors, errors_over};
 use crate::program::footplate;
 use crate::station::Standing;
 
 const LINK: &str = "sim:track-a?faults=none&trains=24&station=z21&seed=";
 
-/// The true errors of stops in mm, without their signs, and how many of them were outside of what was promised.
-pub(crate) fn errors(stops: &[Value]) -> (Vec<f64>, usize) {
-    let number =
-        |stop: &Value, field: &str| stop[field].as_f64().unwrap_or_else(|| panic!("{field}: {stop}"));
-    // A stop whose train was lost on its way has no error.
-    let scored: Vec<&Value> = stops.iter().filter(|stop| stop["true_error_mm"].is_f64()).collect();
-    let is_broken = |stop: &&&Value| {
-        let promised = number(stop, "promised_low_mm")..=number(stop, "promised_high_mm");
-        !promised.contains(&number(stop, "true_error_mm"))
-    };
-    let broken = scored.iter().filter(is_broken).count();
-    (scored.iter().map(|stop| number(stop, "true_error_mm").abs()).collect(), broken)
-}
-
 #[test]
 fn a_train_is_calibrated_behind_a_z21_and_stops_where_it_should() {
-    let (mut all, mut broken) = (Vec::new(), 0);
-    // Worlds whose train faces the way of the script's places.
-    for seed in [7, 10, 11] {
-        let folder = calibrated_over(LINK, &format!("z21-{seed}"), seed);
-        let (stops, outside) = errors(&driven(&folder, &format!("{LINK}{seed}"), SCRIPT).1);
-        all.extend(stops);
-        broken += outside;
-    }
-    all.sort_by(f64::total_cmp);
-    println!("{} stops, errors in mm: {all:.1?}, {broken} promises of 95 % broken", all.len());
-    assert!(all.len() >= 15, "{all:?}");
+    let (all, broken) = errors_over(LINK, "z21");
     assert!(all[all.len() / 2] < 12.0 && all[all.len() - 1] < 60.0, "{all:?}");
     // One in twenty should be.
     assert!(broken <= 3, "{broken} of {} promises of 95 % broken", all.len());
@@ -59,10 +35,7 @@ fn it_stops_there_over_a_network_that_loses_doubles_and_reorders_datagrams() {
         doctor.errors
     );
     assert!(figures["lost_answers"].as_u64().is_some_and(|lost| lost > 0), "{figures}");
-    let script: String = SCRIPT.lines().take(7).map(|line| format!("{line}\n")).collect();
-    let (run, stops) = driven(&folder, &station.address, &script);
-    assert_eq!(stops.len(), 2, "{}", run.output);
-    assert!(stops.iter().all(|stop| stop["achieved"].is_string()), "{}{}", run.output, run.errors);
+    let run = driven_to_two(&folder, &station.address);
     assert!(
         !run.errors.contains("another throttle") && !run.errors.contains("lost its power"),
         "{}",
