@@ -12,7 +12,6 @@ use footplate_core::{
 };
 
 use crate::motion_replay::{MotionReplay, RunBegin, own_events};
-use crate::poll_rhythm::poll_rhythm;
 use crate::recording::{Recording, Run, TrainAtStart};
 use crate::recording_names::distinct_names;
 use crate::store::{AssignedDetections, Store, StoreError};
@@ -426,4 +425,28 @@ fn batch_run(
     Ok(wanted
         .is_none_or(|wanted| wanted == only.train)
         .then(|| BatchRun::of(recording, is_live, run, only, events)))
+}
+
+/// Learns the rhythm in which a link was polled from the runs of its recording.
+pub(crate) fn poll_rhythm<'e, R>(runs: impl Iterator<Item = R>) -> PollTimingEstimator
+where
+    R: Iterator<Item = &'e Event>,
+{
+    let mut timing = PollTimingEstimator::default();
+    let mut last = Timestamp::ZERO;
+    for run in runs {
+        timing.restart();
+        for event in run {
+            match event.kind {
+                EventKind::Sensor(_) => timing.report(event.time),
+                EventKind::Freed(_) | EventKind::Stopped { .. } => {}
+                EventKind::Speed { .. } | EventKind::Reverse { .. } | EventKind::Turnout { .. } => {
+                    timing.command_sent();
+                }
+            }
+            last = event.time;
+        }
+    }
+    timing.fit(last);
+    timing
 }

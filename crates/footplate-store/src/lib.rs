@@ -16,7 +16,6 @@ mod line_file;
 mod motion_file;
 mod motion_replay;
 pub mod odometry;
-mod poll_rhythm;
 mod position_series;
 mod published_table;
 mod quantity;

@@ -21,7 +21,7 @@ use footplate_core::{Approach, Event, EventKind, RunId, SpeedStep, TimeSpan, Tim
 use run_reader::RunReader;
 use serde::{Deserialize, Serialize};
 
-use crate::poll_rhythm::poll_rhythm;
+use crate::batch::poll_rhythm;
 use crate::recording::{Run, TrainAtStart};
 use crate::recording_names::distinct_names;
 use crate::speed_profile::SpeedProfile;

@@ -198,7 +198,7 @@ proptest! {
             let shortest = distances(&leads, &node.name);
             for (to, other) in layout.nodes() {
                 let (Some(start), Some(end)) = (arrival(&layout, from), departure(&layout, to)) else { continue };
-                let mm = layout.distance_ahead(start, end, &free).map(|way| way.as_mm().round());
+                let mm = layout.distance_ahead(start, end, &free).map(|ahead| ahead.as_mm().round());
                 prop_assert_eq!(mm, shortest.get(&other.name).copied(), "{} to {}", node.name, other.name);
             }
         }

@@ -6,7 +6,6 @@ use std::path::Path;
 
 use footplate_core::Timestamp;
 
-use super::error::AccelerometerError;
 use crate::decimal::scaled;
 use crate::table::{Column, Table, TableError, shown};
 
@@ -143,4 +142,41 @@ pub(super) fn mean(readings: &[(Timestamp, [f64; 3])]) -> [f64; 3] {
 
 fn length(axes: [f64; 3]) -> f64 {
     axes.iter().map(|axis| axis * axis).sum::<f64>().sqrt()
+}
+
+/// A recording of an accelerometer, or marks of stops, that could not be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum AccelerometerError {
+    /// A line or a field is wrong.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// Columns that no recording can do without.
+    #[error(
+        "{file}: missing columns: {wanted}; the header names {found} (docs/formats/accelerometer-recording.md)"
+    )]
+    MissingColumns {
+        /// The file.
+        file: String,
+        /// What is missing.
+        wanted: &'static str,
+        /// What the header names, shortened if long.
+        found: String,
+    },
+    /// There is a header and nothing below it.
+    #[error("{file}: no rows below the header; there should be at least one")]
+    NoRows {
+        /// The file.
+        file: String,
+    },
+    /// More rows than are read.
+    #[error("{file}, line {line}: more than {most} rows; cut the recording into trips")]
+    TooManyRows {
+        /// The file.
+        file: String,
+        /// The line of the first row too many.
+        line: u64,
+        /// The most that are read.
+        most: usize,
+    },
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use footplate_core::Timestamp;
 
-use super::error::AccelerometerError;
+use super::recording::AccelerometerError;
 use crate::decimal::scaled;
 use crate::table::{Table, TableError, shown};
 

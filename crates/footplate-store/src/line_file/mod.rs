@@ -7,10 +7,9 @@ mod own;
 mod read;
 mod trainruns;
 mod ttobench;
-mod write;
 
 pub use form::{LineFile, LineFileForm};
+pub use own::write_line;
 pub use read::{parse_line, read_line};
-pub use write::write_line;
 
 pub(crate) use read::form_of;

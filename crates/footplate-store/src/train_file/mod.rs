@@ -8,10 +8,9 @@ mod own;
 mod read;
 mod trainruns;
 mod ttobench;
-mod write;
 
 pub use form::{TrainFile, TrainFileForm};
+pub use own::write_train;
 pub use read::{parse_train, read_train};
-pub use write::write_train;
 
 pub(crate) use read::form_of;

@@ -12,11 +12,9 @@ use super::frame::hash_of;
 use super::framing::Framing;
 use super::inputs::Inputs;
 use super::message::{Direction, Message};
-use super::opening::Question;
 use super::outstanding::Awaited;
 use super::roster::{ListedLocomotive, Roster};
 use super::settings::{Settings, Transport};
-use super::solenoid::Solenoid;
 use super::speed::speed_of;
 use super::uid::Uid;
 use crate::dialogue::{Dialogue, Repeat};
@@ -307,5 +305,42 @@ impl Protocol for Client {
             self.dialogue.stop_all_next();
         }
         self.solenoid.iter_mut().for_each(|powered| powered.release_at = now);
+    }
+}
+
+/// A question.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Question {
+    /// Who is there.
+    Ping,
+    /// The inputs of all modules.
+    Modules,
+    /// Sets the track power.
+    Power,
+    /// The list of locomotives.
+    Roster,
+}
+
+impl Question {
+    /// All questions, in the order in which they are asked.
+    pub(super) const ALL: [Self; 4] = [Self::Ping, Self::Modules, Self::Power, Self::Roster];
+    /// The questions after a silence, when the list of locomotives is known.
+    pub(super) const AGAIN: [Self; 3] = [Self::Ping, Self::Modules, Self::Power];
+}
+
+/// How long a coil is powered (another program was seen to release it after 200 ms).
+const PULSE: TimeSpan = TimeSpan::from_ms(200);
+
+/// A coil under power.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Solenoid {
+    pub(super) turnout: TurnoutId,
+    pub(super) curved: bool,
+    pub(super) release_at: Timestamp,
+}
+
+impl Solenoid {
+    pub(super) fn powered(turnout: TurnoutId, curved: bool, now: Timestamp) -> Self {
+        Self { turnout, curved, release_at: now + PULSE }
     }
 }

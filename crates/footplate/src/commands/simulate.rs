@@ -7,7 +7,6 @@ mod layout;
 mod line;
 mod long;
 mod recording;
-mod score_form;
 mod seed_scores;
 mod series;
 mod station;

@@ -4,7 +4,7 @@
 //! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`; board_address  port
 //! can_address  jmri_address  loconet_address  serial_address  z21_address   a station on Märklin's CAN bus; JMRI; a LocoNet server; a 6051; a Z21
 //! parameters  what follows the `?` of an address
-//! named_train  station_kind   a train by its address; which addresses and decoders a station commands
+//! named_train  station_kind   a train by its address; which addresses and decoders a station commands, and how long its link takes
 //! station_session   the session of any station, as one type
 //! line        what every link can do, and what is heard of it
 //! news        what of that a watchdog wants to know
@@ -45,7 +45,6 @@ mod station_kind;
 mod station_session;
 mod stream;
 mod tapped;
-mod time_models;
 mod web_socket;
 mod z21_address;
 

@@ -1,11 +1,12 @@
 //! A machine whose inputs and decisions are recorded.
 
+use std::fmt::Debug;
+
 use footplate_core::control::{Machine, Output};
 use footplate_core::{Event, Timestamp};
 
 use super::decision::Decision;
 use super::input::Input;
-use super::listener::Listener;
 use crate::session_journal::Scribe;
 
 /// A machine whose inputs are recorded before it receives them, and whose decisions before they take effect.
@@ -84,5 +85,30 @@ impl<M: Listener> Machine for Recorded<M> {
 
     fn next_timeout(&self) -> Option<Timestamp> {
         self.machine.next_timeout()
+    }
+}
+
+/// A machine whose decisions follow from its inputs alone.
+pub(crate) trait Listener: Machine<Notice: Debug> {
+    /// Takes an input that comes from a person or a program. The default ignores it.
+    fn handle_word(&mut self, _now: Timestamp, _word: &Input) {}
+
+    /// Takes any input.
+    fn handle_input(&mut self, now: Timestamp, input: &Input) {
+        match input {
+            Input::Event(event) => self.handle_event(now, event),
+            Input::Timeout => self.handle_timeout(now),
+            Input::Line(_)
+            | Input::Schedule(_)
+            | Input::Schedules(_)
+            | Input::EndSchedule(_)
+            | Input::EmergencyStop
+            | Input::NoMoreLines
+            | Input::Order(_)
+            | Input::Link(_) => {
+                self.handle_word(now, input);
+            }
+            Input::End => {}
+        }
     }
 }

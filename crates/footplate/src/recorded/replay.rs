@@ -12,7 +12,7 @@ use footplate_store::{Side, Traced};
 
 use super::decision::Decision;
 use super::input::{Input, InputError};
-use super::listener::Listener;
+use super::machine::Listener;
 
 /// Two equal commands within this time count as the same command (chosen: a lap takes longer).
 const SAME_COMMAND_WITHIN: TimeSpan = TimeSpan::from_ms(10_000);

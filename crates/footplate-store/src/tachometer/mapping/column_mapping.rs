@@ -1,10 +1,10 @@
 //! The pairs of a mapping, from the command line and from a file.
 
+use std::io;
 use std::path::Path;
 
 use toml::de::{DeTable, DeValue};
 
-use super::error::MappingError;
 use super::target::Target;
 use crate::layout_file::TextPlace;
 use crate::table::shown;
@@ -137,6 +137,44 @@ fn period(text: &str) -> Result<f64, String> {
     value.ok_or_else(|| {
         format!("period_s is `{}`; it should be a number of seconds between 0.001 and 1", shown(text))
     })
+}
+
+/// A column mapping that could not be read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MappingError {
+    /// The file could not be opened or read.
+    #[error("{file}: cannot be read: {source}")]
+    Read {
+        /// The file.
+        file: String,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// More bytes than any mapping has.
+    #[error("{file}: the file is longer than {limit} bytes; is it a column mapping?")]
+    TooLarge {
+        /// The file.
+        file: String,
+        /// The most that is read.
+        limit: usize,
+    },
+    /// Something in a file is wrong.
+    #[error("{place}: {problem}")]
+    Wrong {
+        /// Where.
+        place: TextPlace,
+        /// What.
+        problem: String,
+    },
+    /// Something in a pair on the command line is wrong.
+    #[error("--map {pair}: {problem}")]
+    Pair {
+        /// The pair as it was written.
+        pair: String,
+        /// What is wrong with it.
+        problem: String,
+    },
 }
 
 #[cfg(test)]

@@ -4,7 +4,6 @@
 
 mod clock;
 mod column_mapping;
-mod error;
 mod mapped_columns;
 mod mapped_reader;
 mod number_style;
@@ -13,5 +12,5 @@ mod unit_watch;
 mod wheel_path;
 
 pub use column_mapping::ColumnMapping;
-pub use error::MappingError;
+pub use column_mapping::MappingError;
 pub(super) use mapped_reader::MappedReader;

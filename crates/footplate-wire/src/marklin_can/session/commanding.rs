@@ -4,9 +4,9 @@ use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::super::frame::Frame;
 use super::super::message::{Direction, Message};
-use super::super::opening::Question;
 use super::super::outstanding::{Awaited, REPEATED_AFTER};
 use super::super::roster::LOCOMOTIVES_FILE;
+use super::super::session::Question;
 use super::super::settings::Transport;
 use super::super::uid::Uid;
 use super::{Client, Query};

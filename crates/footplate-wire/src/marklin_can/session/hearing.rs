@@ -7,8 +7,8 @@ use footplate_core::{EventKind, FunctionNumber, SensorId, SpeedStep, Timestamp, 
 use super::super::frame::Frame;
 use super::super::inputs::News;
 use super::super::message::{Direction, InputChange, Message, kind_in_words};
-use super::super::opening::Question;
 use super::super::outstanding::Awaited;
+use super::super::session::Question;
 use super::super::speed::step_of;
 use super::super::time_model::{INPUTS_PER_MODULE, Order};
 use super::super::uid::Uid;

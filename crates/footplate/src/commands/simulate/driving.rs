@@ -8,7 +8,7 @@ use footplate_sim::LawFamily;
 
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
-use super::score_form::ScoreForm;
+use super::seed_scores::ScoreForm;
 use super::series::Series;
 use crate::link::law_named;
 

@@ -1,13 +1,14 @@
 //! `footplate simulate pacing`, `zones` and `disasters`: calibrated trains, with one score for each seed.
 
-use std::io::Write;
+use std::io::{self, Write};
 
 use clap::Args;
+use footplate_eval::seeds::{FRESH, seeds_sentence};
+use footplate_eval::written_scores::WrittenScores;
 use footplate_eval::{disasters, pacing, zones};
 
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
-use super::score_form::ScoreForm;
 use super::series::Series;
 
 /// The seeds of a score, and its form.
@@ -48,5 +49,35 @@ impl<const BUDGET_S: u16> SeedScores<BUDGET_S> {
             runs.map(move |what| FailedRun { what: format!("seed {seed}, {what}"), again: again.clone() })
         };
         failures.flat_map(failed).collect()
+    }
+}
+
+/// The form that was asked for; a text for people without a word.
+#[derive(Debug, Clone, Copy, Args)]
+pub(super) struct ScoreForm {
+    /// Write the scores as a page of the documentation.
+    #[arg(long, conflicts_with = "json")]
+    markdown: bool,
+    /// Write the scores as JSON.
+    #[arg(long)]
+    json: bool,
+    /// Write only how often what must not happen did, as rows of a table, each with its 95 % interval (Wilson).
+    #[arg(long, conflicts_with_all = ["json", "markdown"])]
+    rates: bool,
+}
+
+impl ScoreForm {
+    pub(super) fn write<S: WrittenScores>(self, scores: &S, output: &mut dyn Write) -> io::Result<()> {
+        if self.rates {
+            return scores.rates().iter().try_for_each(|rate| writeln!(output, "{}", rate.row(S::SCORER)));
+        }
+        if self.json {
+            return scores.write_json(output);
+        }
+        if self.markdown {
+            let head = scores.head();
+            writeln!(output, "{head}\n{}\n", seeds_sentence(head.contains(FRESH)))?;
+        }
+        scores.write_text(output)
     }
 }

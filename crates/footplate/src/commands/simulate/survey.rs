@@ -8,7 +8,7 @@ use footplate_eval::survey::{Page, Surveyed, longest_between_sensors, score};
 
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
-use super::score_form::ScoreForm;
+use super::seed_scores::ScoreForm;
 use super::series::Series;
 
 /// Survey a layout of which one length is known by driving random trains, and score the lengths by the truth.

@@ -9,7 +9,7 @@ use footplate_eval::traffic::{Asked, LONGEST_NOWHERE_S, Page, Session, Tally};
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
 use super::long::number_of_hours;
-use super::score_form::ScoreForm;
+use super::seed_scores::ScoreForm;
 use super::series::Series;
 
 /// Send several calibrated trains to random places, one after the other, and count what comes of it by the truth.

@@ -16,7 +16,7 @@ use self::sessions::{ScoredWorld, score};
 use self::world::WorldName;
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
-use super::score_form::ScoreForm;
+use super::seed_scores::ScoreForm;
 use super::series::Series;
 use crate::commands::written_layout::WrittenLayout;
 
