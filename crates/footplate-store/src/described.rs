@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::document::{DocumentError, DocumentProblem, Syntax, Table, parse, read_bytes};
+use crate::document::{DOCUMENT, DocumentError, DocumentProblem, Syntax, Table, parse};
 use crate::line_file::{self, LineFile, parse_line};
 use crate::train_file::{self, TrainFile, parse_train};
 
@@ -20,7 +20,7 @@ pub enum Described {
 /// # Errors
 /// What is wrong with it, with file, line and column.
 pub fn read_described(path: &Path, which: Option<&str>) -> Result<Described, DocumentError> {
-    parse_described(&path.display().to_string(), &read_bytes(path)?, which)
+    parse_described(&path.display().to_string(), &DOCUMENT.read(path)?, which)
 }
 
 /// Reads a train or a line from the bytes of a file. `file` is what messages call it; its end tells the syntax.

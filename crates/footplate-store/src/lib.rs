@@ -31,6 +31,7 @@ mod store;
 mod table;
 mod tachometer;
 mod taped_moves;
+mod text_file;
 mod train_file;
 mod ttobench;
 mod vehicle_file;
@@ -46,7 +47,7 @@ pub use findings::{
 };
 pub use layout_file::{
     BUILT_IN, Drawing, ImportContext, ImportError, ImportedPanel, LARGEST_LAYOUT, LayoutFile,
-    LayoutFileError, LayoutProblem, LayoutTables, NothingToDraw, PanelError, RowProblem, TextPlace, built_in,
+    LayoutFileError, LayoutProblem, LayoutTables, NothingToDraw, PanelError, RowProblem, built_in,
     draw_layout, import_layout, import_panel, layout_named, parse_layout, read_layout, write_layout,
 };
 pub use line_file::{LineFile, LineFileForm, parse_line, read_line, write_line};
@@ -84,6 +85,7 @@ pub use tachometer::{
     TachometerNote, TachometerOddity, TachometerReader, TachometerWriter, TimeFaults, Truth, WrittenColumns,
 };
 pub use taped_moves::{TapedMoves, TapedMovesError};
+pub use text_file::{TextFileError, TextPlace};
 pub use train_file::{TrainFile, TrainFileForm, parse_train, read_train, write_train};
 pub use vehicle_file::{
     DEFAULT_VEHICLE, LARGEST_VEHICLE, VehicleFile, VehicleFileError, VehicleProblem, default_vehicle,

@@ -1,11 +1,9 @@
 //! Why a description of a train or a line could not be read: where, what stands there and what would be right.
 
-use std::io;
-
 use footplate_sim::line::{LineError, TrainError};
 
 use super::node::Place;
-use crate::layout_file::TextPlace;
+use crate::text_file::{TextFileError, TextPlace};
 
 /// A value and what is wrong with it, before the file has its name.
 pub(crate) type Fault = (Place, DocumentProblem);
@@ -14,28 +12,9 @@ pub(crate) type Fault = (Place, DocumentProblem);
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DocumentError {
-    /// The file could not be opened or read.
-    #[error("{file}: cannot be read: {source}")]
-    Read {
-        /// The file.
-        file: String,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// More bytes than any train or line has.
-    #[error("{file}: the file is longer than {limit} bytes; is it a train or a line?")]
-    TooLarge {
-        /// The file.
-        file: String,
-        /// The most that is read.
-        limit: usize,
-    },
-    /// Bytes that are no UTF-8.
-    #[error("{place}: no UTF-8 text; save the file as UTF-8")]
-    NotText {
-        /// Where.
-        place: TextPlace,
-    },
+    /// It is no such text.
+    #[error(transparent)]
+    Text(#[from] TextFileError),
     /// A name that does not tell how to read the file.
     #[error("{file}: its name should end in .toml (Footplate's own form), .json or .yaml")]
     Syntax {

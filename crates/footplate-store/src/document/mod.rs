@@ -16,4 +16,4 @@ pub use text::LARGEST_DOCUMENT;
 pub(crate) use error::Fault;
 pub(crate) use node::{Node, Place};
 pub(crate) use table::{Range, Table, pairs};
-pub(crate) use text::{Syntax, parse, read_bytes};
+pub(crate) use text::{DOCUMENT, Syntax, parse};

@@ -5,8 +5,7 @@ use std::path::Path;
 use super::error::DocumentError;
 use super::node::Node;
 use super::{toml_tree, yaml_tree};
-use crate::layout_file::TextPlace;
-use crate::whole_file::read_at_most;
+use crate::text_file::TextFile;
 
 /// The largest description that is read, in bytes: a hundred times the longest line at hand.
 pub const LARGEST_DOCUMENT: usize = 1024 * 1024;
@@ -31,22 +30,13 @@ impl Syntax {
     }
 }
 
-/// The bytes of the file at `path`, one more than are read at most.
-pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, DocumentError> {
-    read_at_most(path, LARGEST_DOCUMENT)
-        .map_err(|source| DocumentError::Read { file: path.display().to_string(), source })
-}
+/// What a document is.
+pub(crate) const DOCUMENT: TextFile = TextFile { kind: "a train or a line", largest: LARGEST_DOCUMENT };
 
 /// The tree of a document, and its syntax, which the end of the file's name tells.
 pub(crate) fn parse(file: &str, bytes: &[u8]) -> Result<(Syntax, Node), DocumentError> {
     let syntax = Syntax::of(file).ok_or_else(|| DocumentError::Syntax { file: file.to_owned() })?;
-    if bytes.len() > LARGEST_DOCUMENT {
-        return Err(DocumentError::TooLarge { file: file.to_owned(), limit: LARGEST_DOCUMENT });
-    }
-    let text = std::str::from_utf8(bytes).map_err(|error| {
-        let before = String::from_utf8_lossy(&bytes[..error.valid_up_to()]);
-        DocumentError::NotText { place: TextPlace::of_byte(file, &before, before.len()) }
-    })?;
+    let text = DOCUMENT.text(file, bytes)?;
     let tree = match syntax {
         Syntax::Toml => toml_tree::tree(text),
         Syntax::Yaml => yaml_tree::tree(text),

@@ -5,7 +5,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::{DocumentProblem, Fault};
 use super::node::{DEEPEST, Node, Place, Value};
-use crate::layout_file::TextPlace;
+use crate::text_file::TextPlace;
 
 /// The tree of a TOML text.
 pub(super) fn tree(text: &str) -> Result<Node, Fault> {

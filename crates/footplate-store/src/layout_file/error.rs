@@ -1,30 +1,17 @@
 //! Errors in layout files: where, what is wrong, and what would be right.
 
-use std::fmt;
-use std::io;
 
 use footplate_core::track::LayoutError;
+
+use crate::text_file::{TextFileError, TextPlace};
 
 /// A layout file that could not be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LayoutFileError {
-    /// The file could not be opened or read.
-    #[error("{file}: cannot be read: {source}")]
-    Read {
-        /// The file.
-        file: String,
-        /// The error of the system.
-        source: io::Error,
-    },
-    /// The file is larger than any layout.
-    #[error("{file}: the file is longer than {limit} bytes; is it a layout?")]
-    TooLarge {
-        /// The file.
-        file: String,
-        /// The limit.
-        limit: usize,
-    },
+    /// It is no such text.
+    #[error(transparent)]
+    Text(#[from] TextFileError),
     /// The file is not UTF-8.
     #[error("{file}, line {line}: byte {byte} of the line is not UTF-8; save the file as UTF-8")]
     NotText {
@@ -51,46 +38,6 @@ pub enum LayoutFileError {
         /// The names of the built-in layouts.
         built_in: String,
     },
-}
-
-/// A place in a text file.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TextPlace {
-    /// The file.
-    pub file: String,
-    /// The line, counted from 1.
-    pub line: usize,
-    /// The character in the line, counted from 1.
-    pub column: usize,
-}
-
-impl TextPlace {
-    /// Where XML is wrong; at the end of what breaks off, for which its parser names no place.
-    pub(crate) fn of_xml(file: &str, text: &str, error: &roxmltree::Error) -> Self {
-        use roxmltree::Error;
-        if matches!(error, Error::UnclosedRootNode | Error::UnexpectedEndOfStream | Error::NoRootNode) {
-            return Self::of_byte(file, text, text.len());
-        }
-        let at = error.pos();
-        Self { file: file.to_owned(), line: at.row as usize, column: at.col as usize }
-    }
-
-    /// The place of a byte of `text`.
-    pub(crate) fn of_byte(file: &str, text: &str, byte: usize) -> Self {
-        let before = text.get(..byte).unwrap_or(text);
-        let line_start = before.rfind('\n').map_or(0, |end| end + 1);
-        Self {
-            file: file.to_owned(),
-            line: before.bytes().filter(|byte| *byte == b'\n').count() + 1,
-            column: before[line_start..].chars().count() + 1,
-        }
-    }
-}
-
-impl fmt::Display for TextPlace {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, line {}, column {}", self.file, self.line, self.column)
-    }
 }
 
 /// An error in the text of a layout.

@@ -28,8 +28,8 @@ use roxmltree::{Document, Node, ParsingOptions};
 use self::tracks::Tracks;
 
 use super::drawing::{Drawing, LayoutFile};
-use super::error::TextPlace;
 use super::import::ImportContext;
+use crate::text_file::TextPlace;
 
 /// More nodes than any panel has.
 const MOST_NODES: u32 = 500_000;

@@ -17,7 +17,7 @@ mod write;
 pub use built_in::{BUILT_IN, built_in, layout_named};
 pub use draw::{NothingToDraw, draw_layout};
 pub use drawing::{Drawing, LayoutFile};
-pub use error::{LayoutFileError, LayoutProblem, TextPlace};
+pub use error::{LayoutFileError, LayoutProblem};
 pub use import::{ImportContext, import_layout};
 pub use import_error::{ImportError, RowProblem};
 pub use jmri_panel::{ImportedPanel, PanelError, import_panel};

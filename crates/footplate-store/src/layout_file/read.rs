@@ -11,12 +11,14 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::drawing::{Drawing, LayoutFile};
-use super::error::{LayoutFileError, LayoutProblem, TextPlace};
+use super::error::{LayoutFileError, LayoutProblem};
 use crate::sensor_names::{ModuleLetters, SensorNames};
-use crate::whole_file::read_at_most;
+use crate::text_file::{TextFile, TextPlace};
 
 /// The largest layout file, in bytes: a hundred times a built-in layout.
 pub const LARGEST_LAYOUT: usize = 1024 * 1024;
+
+const LAYOUT: TextFile = TextFile { kind: "a layout", largest: LARGEST_LAYOUT };
 
 /// The version of the format.
 pub(super) const FORMAT: i64 = 1;
@@ -30,9 +32,7 @@ pub(super) const LARGEST_COORDINATE: f64 = 1e6;
 /// The first error, with file, line and column.
 pub fn read_layout(path: &Path) -> Result<LayoutFile, LayoutFileError> {
     let file = path.display().to_string();
-    let bytes = read_at_most(path, LARGEST_LAYOUT)
-        .map_err(|source| LayoutFileError::Read { file: file.clone(), source })?;
-    parse_layout(&file, &bytes)
+    parse_layout(&file, &LAYOUT.read(path)?)
 }
 
 /// Reads a layout from the bytes of a file. `file` is its name in messages.
@@ -40,9 +40,7 @@ pub fn read_layout(path: &Path) -> Result<LayoutFile, LayoutFileError> {
 /// # Errors
 /// As [`read_layout`].
 pub fn parse_layout(file: &str, bytes: &[u8]) -> Result<LayoutFile, LayoutFileError> {
-    if bytes.len() > LARGEST_LAYOUT {
-        return Err(LayoutFileError::TooLarge { file: file.to_owned(), limit: LARGEST_LAYOUT });
-    }
+    LAYOUT.check_size(file, bytes)?;
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let before = &bytes[..error.valid_up_to()];
         let line_start = before.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::form::{LineFile, LineFileForm};
 use super::{own, trainruns, ttobench};
-use crate::document::{DocumentError, DocumentProblem, Node, Syntax, Table, parse, read_bytes};
+use crate::document::{DOCUMENT, DocumentError, DocumentProblem, Node, Syntax, Table, parse};
 use crate::railtoolkit::listed;
 
 /// Reads the line in the file at `path`; `which` names one of several.
@@ -12,7 +12,7 @@ use crate::railtoolkit::listed;
 /// # Errors
 /// What is wrong with it, with file, line and column.
 pub fn read_line(path: &Path, which: Option<&str>) -> Result<LineFile, DocumentError> {
-    parse_line(&path.display().to_string(), &read_bytes(path)?, which)
+    parse_line(&path.display().to_string(), &DOCUMENT.read(path)?, which)
 }
 
 /// Reads a line from the bytes of a file. `file` is what messages call it; its end tells the syntax.

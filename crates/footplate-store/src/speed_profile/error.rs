@@ -1,33 +1,16 @@
 //! Why a speed profile could not be read or written: where, what stands there and what would be right.
 
-use std::io;
-
 use super::profile::FASTEST_MM_S;
-use crate::layout_file::TextPlace;
 use crate::table::TableError;
+use crate::text_file::{TextFileError, TextPlace};
 
 /// A speed profile that could not be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProfileError {
-    /// The file could not be opened or read.
-    #[error("{file}: cannot be read: {source}")]
-    Read {
-        /// The file.
-        file: String,
-        /// The error of the system.
-        source: io::Error,
-    },
-    /// More bytes than any profile has.
-    #[error(
-        "{file}: the file is longer than {limit} bytes; is it the roster entry of one locomotive, or a table of speeds?"
-    )]
-    TooLarge {
-        /// The file.
-        file: String,
-        /// The most that is read.
-        limit: usize,
-    },
+    /// It is no such text.
+    #[error(transparent)]
+    Text(#[from] TextFileError),
     /// Bytes that are not UTF-8.
     #[error("{place}: not UTF-8; save the file as UTF-8")]
     NotText {

@@ -18,8 +18,8 @@ use roxmltree::{Document, Node, ParsingOptions};
 
 use super::error::{ProfileError, ProfileProblem};
 use super::profile::{ProfileNote, ProfileSpeed, SpeedProfile};
-use crate::layout_file::TextPlace;
 use crate::table::shown;
+use crate::text_file::TextPlace;
 
 /// More nodes than any roster entry has: each CV is one, and decoders have at most a few thousand.
 const MOST_NODES: u32 = 200_000;

@@ -8,12 +8,13 @@ use footplate_core::SpeedStep;
 use super::error::ProfileError;
 use super::jmri;
 use super::profile::{ProfileSpeed, SpeedProfile};
-use crate::layout_file::TextPlace;
 use crate::table::{LastLine, Row, Table, shown};
-use crate::whole_file::read_at_most;
+use crate::text_file::{TextFile, TextPlace};
 
 /// The largest file that is read, in bytes: roster entries with thousands of CVs and labels have a tenth of it.
 pub const LARGEST_PROFILE: usize = 4 * 1024 * 1024;
+const PROFILE: TextFile =
+    TextFile { kind: "the roster entry of one locomotive, or a table of speeds", largest: LARGEST_PROFILE };
 /// More rows than a train passes in an evening.
 const MOST_ROWS: usize = 20_000;
 /// One km/h in mm/s.
@@ -44,9 +45,7 @@ pub struct ProfileContext {
 /// The first error, with file, line and column; a file without a usable speed.
 pub fn read_profile(path: &Path, context: &ProfileContext) -> Result<SpeedProfile, ProfileError> {
     let file = path.display().to_string();
-    let bytes = read_at_most(path, LARGEST_PROFILE)
-        .map_err(|source| ProfileError::Read { file: file.clone(), source })?;
-    parse_profile(&file, &bytes, context)
+    parse_profile(&file, &PROFILE.read(path)?, context)
 }
 
 /// Reads a profile from the bytes of a file. `file` is its name in messages.
@@ -75,13 +74,9 @@ pub fn parse_profile(
 
 /// The text of a file, without a byte order mark.
 pub(super) fn text_of<'b>(file: &str, bytes: &'b [u8]) -> Result<&'b str, ProfileError> {
-    if bytes.len() > LARGEST_PROFILE {
-        return Err(ProfileError::TooLarge { file: file.to_owned(), limit: LARGEST_PROFILE });
-    }
-    let text = std::str::from_utf8(bytes).map_err(|error| {
-        let before = String::from_utf8_lossy(bytes.get(..error.valid_up_to()).unwrap_or_default());
-        ProfileError::NotText { place: TextPlace::of_byte(file, &before, before.len()) }
-    })?;
+    PROFILE.check_size(file, bytes)?;
+    let text = std::str::from_utf8(bytes)
+        .map_err(|error| ProfileError::NotText { place: TextPlace::of_error(file, bytes, &error) })?;
     Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
 }
 

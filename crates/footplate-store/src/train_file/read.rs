@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::form::{TrainFile, TrainFileForm};
 use super::{osrd, own, trainruns, ttobench};
-use crate::document::{DocumentError, DocumentProblem, Node, Syntax, Table, parse, read_bytes};
+use crate::document::{DOCUMENT, DocumentError, DocumentProblem, Node, Syntax, Table, parse};
 use crate::railtoolkit::listed;
 
 /// Reads the train in the file at `path`; `which` selects one of several.
@@ -12,7 +12,7 @@ use crate::railtoolkit::listed;
 /// # Errors
 /// The file is invalid; the error names file, line and column.
 pub fn read_train(path: &Path, which: Option<&str>) -> Result<TrainFile, DocumentError> {
-    parse_train(&path.display().to_string(), &read_bytes(path)?, which)
+    parse_train(&path.display().to_string(), &DOCUMENT.read(path)?, which)
 }
 
 /// Reads a train from the bytes of a file. `file` is its name in messages; its extension selects the syntax.

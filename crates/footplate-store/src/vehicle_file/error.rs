@@ -1,37 +1,16 @@
 //! Why a vehicle file could not be read: where, what stands there and what would be right.
 
-use std::io;
-
 use footplate_core::odometry::wheels::VehicleError;
 
-use crate::layout_file::TextPlace;
+use crate::text_file::{TextFileError, TextPlace};
 
 /// A vehicle file that could not be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VehicleFileError {
-    /// The file could not be opened or read.
-    #[error("{file}: cannot be read: {source}")]
-    Read {
-        /// The file.
-        file: String,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// More bytes than any vehicle has.
-    #[error("{file}: the file is longer than {limit} bytes; is it a vehicle?")]
-    TooLarge {
-        /// The file.
-        file: String,
-        /// The most that is read.
-        limit: usize,
-    },
-    /// Bytes that are no UTF-8.
-    #[error("{place}: no UTF-8 text; save the file as UTF-8")]
-    NotText {
-        /// Where.
-        place: TextPlace,
-    },
+    /// It is no such text.
+    #[error(transparent)]
+    Text(#[from] TextFileError),
     /// Something in the text is wrong.
     #[error("{place}: {problem}")]
     Wrong {

@@ -10,11 +10,12 @@ use toml::de::{DeTable, DeValue};
 use super::entries::{Entries, Fault, Number, kind, table, text};
 use super::error::{VehicleFileError, VehicleProblem};
 use super::keys::{BRAKE_COMMAND, Key, SLIDE_PROTECTION, THRESHOLDS};
-use crate::layout_file::TextPlace;
-use crate::whole_file::read_at_most;
+use crate::text_file::{TextFile, TextPlace};
 
 /// The largest file that is read, in bytes: a hundred times the built-in vehicle.
 pub const LARGEST_VEHICLE: usize = 64 * 1024;
+
+const VEHICLE: TextFile = TextFile { kind: "a vehicle", largest: LARGEST_VEHICLE };
 
 /// A vehicle and what people call it.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,9 +32,7 @@ pub struct VehicleFile {
 /// What is wrong with it, with file, line and column.
 pub fn read_vehicle(path: &Path) -> Result<VehicleFile, VehicleFileError> {
     let file = path.display().to_string();
-    let bytes = read_at_most(path, LARGEST_VEHICLE)
-        .map_err(|source| VehicleFileError::Read { file: file.clone(), source })?;
-    parse_vehicle(&file, &bytes)
+    parse_vehicle(&file, &VEHICLE.read(path)?)
 }
 
 /// Reads a vehicle from the bytes of a file. `file` is what messages call it.
@@ -41,13 +40,7 @@ pub fn read_vehicle(path: &Path) -> Result<VehicleFile, VehicleFileError> {
 /// # Errors
 /// As [`read_vehicle`].
 pub fn parse_vehicle(file: &str, bytes: &[u8]) -> Result<VehicleFile, VehicleFileError> {
-    if bytes.len() > LARGEST_VEHICLE {
-        return Err(VehicleFileError::TooLarge { file: file.to_owned(), limit: LARGEST_VEHICLE });
-    }
-    let text = std::str::from_utf8(bytes).map_err(|error| {
-        let before = String::from_utf8_lossy(bytes.get(..error.valid_up_to()).unwrap_or_default());
-        VehicleFileError::NotText { place: TextPlace::of_byte(file, &before, before.len()) }
-    })?;
+    let text = VEHICLE.text(file, bytes)?;
     read_text(text).map_err(|(byte, problem)| VehicleFileError::Wrong {
         place: TextPlace::of_byte(file, text, byte),
         problem,

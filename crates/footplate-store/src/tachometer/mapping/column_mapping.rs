@@ -1,17 +1,15 @@
 //! The pairs of a mapping, from the command line and from a file.
 
-use std::io;
 use std::path::Path;
 
 use toml::de::{DeTable, DeValue};
 
 use super::target::Target;
-use crate::layout_file::TextPlace;
 use crate::table::shown;
-use crate::whole_file::read_at_most;
+use crate::text_file::{TextFile, TextFileError, TextPlace};
 
 /// The largest file that is read, in bytes: a hundred times one that names every column.
-const LARGEST: usize = 64 * 1024;
+const MAPPING: TextFile = TextFile { kind: "a column mapping", largest: 64 * 1024 };
 /// Longest and shortest period that a counter of rows can have (s), as the `period_s` of a vehicle.
 const PERIODS_S: std::ops::RangeInclusive<f64> = 0.001..=1.0;
 
@@ -48,9 +46,7 @@ impl ColumnMapping {
     /// What is wrong with it, with file, line and column.
     pub fn take_file(&mut self, path: &Path) -> Result<(), MappingError> {
         let file = path.display().to_string();
-        let bytes = read_at_most(path, LARGEST)
-            .map_err(|source| MappingError::Read { file: file.clone(), source })?;
-        self.take_bytes(&file, &bytes)
+        self.take_bytes(&file, &MAPPING.read(path)?)
     }
 
     /// Takes in the pairs of a TOML text. `file` is what messages call it.
@@ -58,16 +54,7 @@ impl ColumnMapping {
     /// # Errors
     /// As [`take_file`](Self::take_file).
     pub fn take_bytes(&mut self, file: &str, bytes: &[u8]) -> Result<(), MappingError> {
-        if bytes.len() > LARGEST {
-            return Err(MappingError::TooLarge { file: file.to_owned(), limit: LARGEST });
-        }
-        let text = std::str::from_utf8(bytes).map_err(|error| {
-            let before = String::from_utf8_lossy(bytes.get(..error.valid_up_to()).unwrap_or_default());
-            MappingError::Wrong {
-                place: TextPlace::of_byte(file, &before, before.len()),
-                problem: "no UTF-8 text; save the file as UTF-8".to_owned(),
-            }
-        })?;
+        let text = MAPPING.text(file, bytes)?;
         let wrong =
             |byte, problem| MappingError::Wrong { place: TextPlace::of_byte(file, text, byte), problem };
         let document = DeTable::parse(text).map_err(|error| {
@@ -143,22 +130,9 @@ fn period(text: &str) -> Result<f64, String> {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MappingError {
-    /// The file could not be opened or read.
-    #[error("{file}: cannot be read: {source}")]
-    Read {
-        /// The file.
-        file: String,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// More bytes than any mapping has.
-    #[error("{file}: the file is longer than {limit} bytes; is it a column mapping?")]
-    TooLarge {
-        /// The file.
-        file: String,
-        /// The most that is read.
-        limit: usize,
-    },
+    /// It is no such text.
+    #[error(transparent)]
+    Text(#[from] TextFileError),
     /// Something in a file is wrong.
     #[error("{place}: {problem}")]
     Wrong {
