@@ -1,23 +1,13 @@
 //! The virtual DCC-EX board answers as the real firmware was seen to, and its world does what it is asked.
 
-use footplate_core::track::{Leg, Position};
-use footplate_core::{Length, Ratio, TimeSpan, Timestamp, TrainId, TurnoutId};
-use footplate_sim::{
-    BoardSwitches, Delivery, End, LawFamily, LivingLayout, LivingSwitches, Train, VirtualBoard,
-};
+use footplate_core::{Ratio, TimeSpan, Timestamp, TrainId};
+use footplate_sim::{BoardSwitches, Delivery, End, VirtualBoard};
 
-use crate::yard::{TRAIN, two_loops};
+use crate::yard::{TRAIN, odometer, one_train, two_loops};
 
 /// A board in front of the two loops, with one train 100 mm behind S0 that leads with an end.
 fn board(layout: &footplate_core::track::Layout, leads: End, switches: BoardSwitches) -> VirtualBoard<'_> {
-    let calm = LivingSwitches { true_rails: false, stale_detections: false, ..LivingSwitches::faultless() };
-    let mut world = LivingLayout::without_trains(layout, 7, &calm);
-    (1..=3).for_each(|number| world.lay(TurnoutId(number), Leg::Straight));
-    world.add(TRAIN, Train::draw(24, LawFamily::Constant), 1.0);
-    let node = |name| layout.node_named(name).unwrap();
-    let edge = layout.edge_between(node("S0"), node("B1")).unwrap();
-    world.place(TRAIN, Position { edge, offset: Length::from_mm(100.0) }, leads).unwrap();
-    VirtualBoard::new(world, 7, switches)
+    VirtualBoard::new(one_train(layout, leads), 7, switches)
 }
 
 /// Writes something and returns what comes back within a time, portion by portion with the time of each.
@@ -33,10 +23,6 @@ fn ask(board: &mut VirtualBoard<'_>, text: &str, within_ms: i64) -> Vec<(Timesta
 
 fn answer(board: &mut VirtualBoard<'_>, text: &str) -> String {
     ask(board, text, 50).into_iter().map(|(_, text)| text).collect()
-}
-
-fn odometer(board: &VirtualBoard<'_>) -> f64 {
-    board.world().truth().train(TRAIN).unwrap().odometer.as_mm()
 }
 
 #[test]
@@ -145,10 +131,10 @@ fn trains_run_on_without_commands_and_stop_when_the_board_is_reset() {
     let mut board = board(&layout, End::Nose, BoardSwitches::default());
     answer(&mut board, "<1>");
     ask(&mut board, "<t 24 72 1>", 10_000);
-    let before = odometer(&board);
+    let before = odometer(board.world());
     let later = board.now() + TimeSpan::from_s(5.0);
     while board.advance(later).is_some() {}
-    assert!(odometer(&board) > before + 500.0);
+    assert!(odometer(board.world()) > before + 500.0);
     board.restart();
     assert!(!board.world().is_powered());
     let began = board.now();

@@ -1,26 +1,17 @@
 //! The virtual Central Station answers as real ones were seen to, over every line, and its world does what it is asked.
 
-use footplate_core::track::{Layout, Position};
-use footplate_core::{Length, Ratio, TimeSpan, Timestamp, TurnoutId};
-use footplate_sim::{
-    CanSwitches, CanTransport, End, LawFamily, LivingLayout, LivingSwitches, Train, VirtualCentralStation,
-};
+use footplate_core::track::Layout;
+use footplate_core::{Ratio, TimeSpan, Timestamp};
+use footplate_sim::{CanSwitches, CanTransport, End, VirtualCentralStation};
 use footplate_wire::marklin_can::{
     Direction, Frame, Framing, InputChange, Message, Transport, Uid, read_list,
 };
 
-use crate::yard::{TRAIN, two_loops};
+use crate::yard::{TRAIN, one_train, two_loops};
 
 /// A station in front of the two loops, with one train 100 mm behind S0 that leads with its nose.
 fn station(layout: &Layout, switches: CanSwitches) -> VirtualCentralStation<'_> {
-    let calm = LivingSwitches { true_rails: false, stale_detections: false, ..LivingSwitches::faultless() };
-    let mut world = LivingLayout::without_trains(layout, 7, &calm);
-    (1..=3).for_each(|number| world.lay(TurnoutId(number), footplate_core::track::Leg::Straight));
-    world.add(TRAIN, Train::draw(24, LawFamily::Constant), 1.0);
-    let node = |name| layout.node_named(name).unwrap();
-    let edge = layout.edge_between(node("S0"), node("B1")).unwrap();
-    world.place(TRAIN, Position { edge, offset: Length::from_mm(100.0) }, End::Nose).unwrap();
-    VirtualCentralStation::new(world, 7, switches)
+    VirtualCentralStation::new(one_train(layout, End::Nose), 7, switches)
 }
 
 /// The train's decoder is a registered one.

@@ -1,21 +1,14 @@
 //! The virtual JMRI answers as its sources say, its hardware takes its time, and it stops the trains of a client that has gone.
 
-use footplate_core::track::{Layout, Leg, Position};
-use footplate_core::{Length, TimeSpan, Timestamp, TurnoutId};
-use footplate_sim::{End, JmriSwitches, LawFamily, LivingLayout, LivingSwitches, Train, VirtualJmri};
+use footplate_core::track::{Layout, Leg};
+use footplate_core::{TimeSpan, Timestamp, TurnoutId};
+use footplate_sim::{End, JmriSwitches, VirtualJmri};
 
-use crate::yard::{TRAIN, two_loops};
+use crate::yard::{TRAIN, odometer, one_train, two_loops};
 
 /// JMRI in front of the two loops, with one train 100 mm behind S0 that leads with its nose.
 fn jmri(layout: &Layout, switches: JmriSwitches) -> VirtualJmri<'_> {
-    let calm = LivingSwitches { true_rails: false, stale_detections: false, ..LivingSwitches::faultless() };
-    let mut world = LivingLayout::without_trains(layout, 7, &calm);
-    (1..=3).for_each(|number| world.lay(TurnoutId(number), Leg::Straight));
-    world.add(TRAIN, Train::draw(24, LawFamily::Constant), 1.0);
-    let node = |name| layout.node_named(name).unwrap();
-    let edge = layout.edge_between(node("S0"), node("B1")).unwrap();
-    world.place(TRAIN, Position { edge, offset: Length::from_mm(100.0) }, End::Nose).unwrap();
-    VirtualJmri::new(world, 7, switches)
+    VirtualJmri::new(one_train(layout, End::Nose), 7, switches)
 }
 
 /// Waits for a time and returns what is heard in it, line by line.
@@ -31,10 +24,6 @@ fn hear(jmri: &mut VirtualJmri<'_>, for_ms: i64) -> Vec<String> {
 fn ask(jmri: &mut VirtualJmri<'_>, message: &str) -> Vec<String> {
     jmri.write(format!("{message}\n").as_bytes());
     hear(jmri, 60)
-}
-
-fn odometer(jmri: &VirtualJmri<'_>) -> f64 {
-    jmri.world().truth().train(TRAIN).unwrap().odometer.as_mm()
 }
 
 const POWER: &str = r#"{"type":"power","method":"post","data":{"state":2}}"#;
@@ -69,9 +58,9 @@ fn requests_are_answered_as_its_sources_say() {
         drive.len() == 1 && says(&drive, &[r#""speed":0.5"#]) && !says(&drive, &["address"]),
         "{drive:?}"
     );
-    let before = odometer(&jmri);
+    let before = odometer(jmri.world());
     hear(&mut jmri, 3_000);
-    assert!(odometer(&jmri) > before + 200.0, "{}", odometer(&jmri));
+    assert!(odometer(jmri.world()) > before + 200.0, "{}", odometer(jmri.world()));
     let light = ask(&mut jmri, r#"{"type":"throttle","data":{"name":"any","F0":true,"status":null}}"#);
     assert!(says(&light, &[r#""F0":true"#, r#""F1":false"#]), "{light:?}");
     assert_eq!(jmri.functions(TRAIN), 1);

@@ -1,23 +1,14 @@
 //! The virtual command station on LocoNet answers as the protocols say, at the pace of its bus, and its world does what it is asked.
 
-use footplate_core::track::{Layout, Leg, Position};
-use footplate_core::{Length, Ratio, TimeSpan, Timestamp, TurnoutId};
-use footplate_sim::{
-    Delivery, End, LawFamily, LivingLayout, LivingSwitches, LocoNetSwitches, Train, VirtualLocoNet,
-};
+use footplate_core::track::{Layout, Leg};
+use footplate_core::{Ratio, TimeSpan, Timestamp, TurnoutId};
+use footplate_sim::{Delivery, End, LocoNetSwitches, VirtualLocoNet};
 
-use crate::yard::{TRAIN, two_loops};
+use crate::yard::{TRAIN, odometer, one_train, two_loops};
 
 /// A station in front of the two loops, with one train 100 mm behind S0 that leads with its nose.
 fn station(layout: &Layout, switches: LocoNetSwitches) -> VirtualLocoNet<'_> {
-    let calm = LivingSwitches { true_rails: false, stale_detections: false, ..LivingSwitches::faultless() };
-    let mut world = LivingLayout::without_trains(layout, 7, &calm);
-    (1..=3).for_each(|number| world.lay(TurnoutId(number), Leg::Straight));
-    world.add(TRAIN, Train::draw(24, LawFamily::Constant), 1.0);
-    let node = |name| layout.node_named(name).unwrap();
-    let edge = layout.edge_between(node("S0"), node("B1")).unwrap();
-    world.place(TRAIN, Position { edge, offset: Length::from_mm(100.0) }, End::Nose).unwrap();
-    VirtualLocoNet::new(world, 7, switches)
+    VirtualLocoNet::new(one_train(layout, End::Nose), 7, switches)
 }
 
 /// Waits for a time and returns what is heard in it.
@@ -33,10 +24,6 @@ fn hear(station: &mut VirtualLocoNet<'_>, for_ms: i64) -> String {
 fn ask(station: &mut VirtualLocoNet<'_>, line: &str) -> Vec<String> {
     station.write(format!("{line}\r\n").as_bytes());
     hear(station, 60).lines().map(str::to_owned).collect()
-}
-
-fn odometer(station: &VirtualLocoNet<'_>) -> f64 {
-    station.world().truth().train(TRAIN).unwrap().odometer.as_mm()
 }
 
 #[test]
@@ -66,14 +53,14 @@ fn requests_are_answered_as_the_protocols_say() {
     for (line, expected) in conversation {
         assert_eq!(ask(&mut station, line), expected, "{line}");
     }
-    let before = odometer(&station);
+    let before = odometer(station.world());
     hear(&mut station, 3_000);
-    assert!(odometer(&station) > before + 200.0, "{}", odometer(&station));
+    assert!(odometer(station.world()) > before + 200.0, "{}", odometer(station.world()));
     // All stop at once; the slot keeps its speed.
     ask(&mut station, "SEND 85 7A");
-    let stopped = odometer(&station);
+    let stopped = odometer(station.world());
     hear(&mut station, 2_000);
-    assert!(odometer(&station) < stopped + 60.0, "{} after {stopped}", odometer(&station));
+    assert!(odometer(station.world()) < stopped + 60.0, "{} after {stopped}", odometer(station.world()));
     assert!(station.world().truth().train(TRAIN).unwrap().at_rest_since.is_some());
 }
 

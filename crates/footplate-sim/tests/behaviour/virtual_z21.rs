@@ -2,25 +2,16 @@
 
 use footplate_core::track::{Layout, Leg, Position};
 use footplate_core::{DecoderSteps, Length, Ratio, TimeSpan, TrainId, TurnoutId};
-use footplate_sim::{
-    End, LawFamily, LivingLayout, LivingSwitches, SpeedReports, Train, VirtualZ21, Z21Switches,
-};
+use footplate_sim::{End, LawFamily, SpeedReports, Train, VirtualZ21, Z21Switches};
 use footplate_wire::z21::{
     Broadcasts, Datasets, Feedback, FunctionSwitch, Reply, Request, Throttle, TurnoutPosition,
 };
 
-use crate::yard::{TRAIN, two_loops};
+use crate::yard::{TRAIN, odometer, one_train, two_loops};
 
 /// A station in front of the two loops, with one train 100 mm behind S0 that leads with an end.
 fn station(layout: &Layout, leads: End, switches: Z21Switches) -> VirtualZ21<'_> {
-    let calm = LivingSwitches { true_rails: false, stale_detections: false, ..LivingSwitches::faultless() };
-    let mut world = LivingLayout::without_trains(layout, 7, &calm);
-    (1..=3).for_each(|number| world.lay(TurnoutId(number), Leg::Straight));
-    world.add(TRAIN, Train::draw(24, LawFamily::Constant), 1.0);
-    let node = |name| layout.node_named(name).unwrap();
-    let edge = layout.edge_between(node("S0"), node("B1")).unwrap();
-    world.place(TRAIN, Position { edge, offset: Length::from_mm(100.0) }, leads).unwrap();
-    VirtualZ21::new(world, 7, switches)
+    VirtualZ21::new(one_train(layout, leads), 7, switches)
 }
 
 /// What reaches which client within a time.
@@ -49,10 +40,6 @@ fn ask(station: &mut VirtualZ21<'_>, requests: &[Request]) -> Vec<Reply> {
 fn drive(step: u8, forward: bool) -> Request {
     let throttle = if step == 0 { Throttle::Stop } else { Throttle::Step(step) };
     Request::Drive { address: 24, steps: DecoderSteps::All, throttle, forward }
-}
-
-fn odometer(station: &VirtualZ21<'_>) -> f64 {
-    station.world().truth().train(TRAIN).unwrap().odometer.as_mm()
 }
 
 #[test]
@@ -170,9 +157,9 @@ fn turnouts_obey_repeated_commands_and_trains_stop_at_once_when_all_do() {
     wait(&mut station, 6_000);
     assert!(ask(&mut station, &[Request::StopAll]).contains(&Reply::Stopped));
     wait(&mut station, 1_500);
-    let stopped = odometer(&station);
+    let stopped = odometer(station.world());
     wait(&mut station, 2_000);
-    assert_eq!(odometer(&station).to_bits(), stopped.to_bits(), "it stands");
+    assert_eq!(odometer(station.world()).to_bits(), stopped.to_bits(), "it stands");
     assert!(station.world().is_powered());
 }
 
@@ -190,7 +177,7 @@ fn directions_are_absolute_and_every_number_of_steps_is_driven() {
             wait(&mut station, 3_000);
             let truth = station.world().truth().train(TRAIN).unwrap();
             assert_eq!(truth.leads, End::Nose);
-            assert!(odometer(&station) > 100.0, "{steps:?}: {}", odometer(&station));
+            assert!(odometer(station.world()) > 100.0, "{steps:?}: {}", odometer(station.world()));
         }
     }
 }
@@ -220,9 +207,9 @@ fn trains_run_on_without_commands_and_stop_when_the_station_is_restarted() {
     let subscribe = Request::SetBroadcasts(Broadcasts::STATES);
     ask(&mut station, &[subscribe, Request::Power { on: true }, drive(72, true)]);
     wait(&mut station, 10_000);
-    let before = odometer(&station);
+    let before = odometer(station.world());
     wait(&mut station, 5_000);
-    assert!(odometer(&station) > before + 500.0);
+    assert!(odometer(station.world()) > before + 500.0);
     station.restart();
     assert_eq!(ask(&mut station, &[Request::SerialNumber]), [], "it starts");
     wait(&mut station, 6_000);
@@ -239,7 +226,7 @@ fn each_quirk_does_what_it_says() {
     let mut station = with(locked);
     ask(&mut station, &[Request::Power { on: true }, drive(99, true)]);
     wait(&mut station, 3_000);
-    assert!(odometer(&station) < 1.0, "it is locked");
+    assert!(odometer(station.world()) < 1.0, "it is locked");
 
     let wrong = [0x07, 0x00, 0x40, 0x00, 0x21, 0x81, 0xa1];
     for (strict_xor, powered) in [(false, true), (true, false)] {
@@ -274,9 +261,9 @@ fn decoders_report_whole_numbers_at_a_scale_of_their_own() {
         let all = Request::SetBroadcasts(Broadcasts::ALL_RAIL_COM);
         write(&mut station, 0, &[all, Request::Power { on: true }, drive(72, true)]);
         wait(&mut station, 4_000);
-        let before = odometer(&station);
+        let before = odometer(station.world());
         let heard = wait(&mut station, 5_000);
-        let km_h = 87.0 * 3.6e-3 * (odometer(&station) - before) / 5.0;
+        let km_h = 87.0 * 3.6e-3 * (odometer(station.world()) - before) / 5.0;
         let numbers: Vec<Option<u16>> = heard
             .iter()
             .filter_map(|(_, reply)| match reply {

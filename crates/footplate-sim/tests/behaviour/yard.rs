@@ -61,14 +61,32 @@ pub(crate) fn two_loops() -> Layout {
     .unwrap()
 }
 
-/// A station before a faultless layout with surveyed rails, all turnouts straight, without trains.
-pub(crate) fn empty(layout: &Layout, switches: StationSwitches) -> VirtualStation<'_> {
+/// A faultless layout with surveyed rails, all turnouts straight, without trains.
+fn calm(layout: &Layout) -> LivingLayout<'_> {
     let calm = LivingSwitches { true_rails: false, stale_detections: false, ..LivingSwitches::faultless() };
     let mut world = LivingLayout::without_trains(layout, 7, &calm);
-    for number in 1..=3 {
-        world.lay(TurnoutId(number), Leg::Straight);
-    }
-    VirtualStation::new(world, 7, switches)
+    (1..=3).for_each(|number| world.lay(TurnoutId(number), Leg::Straight));
+    world
+}
+
+/// The same with one train 100 mm behind S0 that leads with an end.
+pub(crate) fn one_train(layout: &Layout, leads: End) -> LivingLayout<'_> {
+    let mut world = calm(layout);
+    world.add(TRAIN, Train::draw(24, LawFamily::Constant), 1.0);
+    let node = |name| layout.node_named(name).unwrap();
+    let edge = layout.edge_between(node("S0"), node("B1")).unwrap();
+    world.place(TRAIN, Position { edge, offset: Length::from_mm(100.0) }, leads).unwrap();
+    world
+}
+
+/// How far that train has run, in mm.
+pub(crate) fn odometer(world: &LivingLayout<'_>) -> f64 {
+    world.truth().train(TRAIN).unwrap().odometer.as_mm()
+}
+
+/// A station before such a layout without trains.
+pub(crate) fn empty(layout: &Layout, switches: StationSwitches) -> VirtualStation<'_> {
+    VirtualStation::new(calm(layout), 7, switches)
 }
 
 /// A train with a law of its own on an edge between two nodes, so far from its beginning.

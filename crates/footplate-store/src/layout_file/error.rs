@@ -1,6 +1,5 @@
 //! Errors in layout files: where, what is wrong, and what would be right.
 
-
 use footplate_core::track::LayoutError;
 
 use crate::text_file::{TextFileError, TextPlace};
