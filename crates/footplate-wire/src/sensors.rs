@@ -44,6 +44,23 @@ impl Sensors {
     }
 }
 
+/// Returns the latest time at which a sensor became occupied, and the width of the span before it. The delay of its report is about
+/// uniform between the shortest and the longest.
+///
+/// `not_before` is the time of the last entry of the recording, whose entries stay in order: where a command went out within the
+/// shortest delay the span is a little wider. `free_at`: when the station last said that the sensor is free, where that is known: for
+/// what was missed when it happened and is found when asked for.
+pub(crate) fn occupied(
+    heard: Timestamp,
+    not_before: Timestamp,
+    [shortest, longest]: [TimeSpan; 2],
+    free_at: Option<Timestamp>,
+) -> (Timestamp, TimeSpan) {
+    let latest = (heard - shortest).max(not_before).min(heard);
+    let earliest = free_at.map_or(heard, |free| free.min(heard)) - longest;
+    (latest, latest - earliest)
+}
+
 impl<A: Awaited> Dialogue<A> {
     /// Reports what has changed at a sensor within a span that ends at `latest`. After a silence, it may have become occupied at any time
     /// since that began.
@@ -81,5 +98,19 @@ mod tests {
         assert_eq!(sensors.heard(9, true, false), Change::Occupied, "defined while the line was open");
         // Asked for again after the line was lost: what has become occupied meanwhile is reported.
         assert_eq!(sensors.heard(5, true, true), Change::Occupied);
+    }
+
+    #[test]
+    fn a_report_reaches_back_over_the_delays_or_to_where_the_sensor_was_free() {
+        let heard = Timestamp::from_s(10.0);
+        let delays = [TimeSpan::from_us(3_600), TimeSpan::from_us(23_100)];
+        let (latest, width) = occupied(heard, Timestamp::ZERO, delays, None);
+        assert_eq!((heard - latest, width), (TimeSpan::from_us(3_600), TimeSpan::from_us(19_500)));
+        // An entry one millisecond ago: the span ends there and begins where it did.
+        let (latest, width) = occupied(heard, heard - TimeSpan::from_ms(1), delays, None);
+        assert_eq!((heard - latest, width), (TimeSpan::from_ms(1), TimeSpan::from_us(22_100)));
+        let free = Some(heard - TimeSpan::from_ms(200));
+        let (latest, width) = occupied(heard, heard, delays, free);
+        assert_eq!((heard - latest, width), (TimeSpan::ZERO, TimeSpan::from_us(223_100)));
     }
 }

@@ -99,6 +99,17 @@ impl<'a> Table<'a> {
         item.map_or(self.place_of(key), |item| item.place)
     }
 
+    /// Refuses a version of our own form that is not this one.
+    pub(crate) fn check_format(&self, known: i64) -> Result<(), Fault> {
+        let format = self.number("format")?;
+        if format == known as f64 {
+            return Ok(());
+        }
+        let what = "`format`".to_owned();
+        let expected = format!("{known}, the one that this version of Footplate knows");
+        Err((self.place_of("format"), DocumentProblem::Kind { what, found: format.to_string(), expected }))
+    }
+
     /// Refuses every key but these.
     pub(crate) fn only(&self, known: &[&str]) -> Result<(), Fault> {
         match self.entries.iter().find(|(key, _)| !known.contains(&key.as_str())) {

@@ -6,10 +6,10 @@ use footplate_core::{Length, TimeSpan};
 use footplate_sim::line::{LineParts, LineProfile, Stepped, Stop};
 
 use super::form::{KILOMETRES_PER_HOUR, LineFile, LineFileForm, at_places, built, limits};
-use crate::document::{DocumentProblem, Fault, Node, Table, pairs};
+use crate::document::{Fault, Node, Table, pairs};
 
 /// The version of the form.
-pub(super) const FORMAT: i64 = 1;
+const FORMAT: i64 = 1;
 
 const KEYS: [&str; 7] = [
     "format",
@@ -23,13 +23,7 @@ const KEYS: [&str; 7] = [
 
 pub(super) fn read(node: &Node) -> Result<LineFile, Fault> {
     let table = Table::of(node, "a line")?;
-    let format = table.number("format")?;
-    if format != FORMAT as f64 {
-        let what = "`format`".to_owned();
-        let expected = format!("{FORMAT}, the one that this version of Footplate knows");
-        let found = format.to_string();
-        return Err((table.place_of("format"), DocumentProblem::Kind { what, found, expected }));
-    }
+    table.check_format(FORMAT)?;
     table.only(&KEYS)?;
     let steps = |key: &str, unit| match table.get(key) {
         Some(node) => pairs(node, &format!("`{key}`"), ["place in m", unit]),

@@ -6,10 +6,10 @@ use footplate_core::{Acceleration, Length, Ratio, Speed};
 use footplate_sim::line::{Brake, PerMille, Resistance, TractiveEffort, Train};
 
 use super::form::{TrainFile, TrainFileForm, checked, full_brake_n};
-use crate::document::{DocumentProblem, Fault, Node, Table, pairs};
+use crate::document::{Fault, Node, Table, pairs};
 
 /// The version of the format.
-pub(super) const FORMAT: i64 = 1;
+const FORMAT: i64 = 1;
 
 const KEYS: [&str; 13] = [
     "format",
@@ -29,13 +29,7 @@ const KEYS: [&str; 13] = [
 
 pub(super) fn read(node: &Node) -> Result<TrainFile, Fault> {
     let table = Table::of(node, "a train")?;
-    let format = table.number("format")?;
-    if format != FORMAT as f64 {
-        let what = "`format`".to_owned();
-        let expected = format!("{FORMAT}, the one that this version of Footplate knows");
-        let found = format.to_string();
-        return Err((table.place_of("format"), DocumentProblem::Kind { what, found, expected }));
-    }
+    table.check_format(FORMAT)?;
     table.only(&KEYS)?;
     let length = table.number("length_m")?;
     let mass_kg = table.number("mass_kg")?;

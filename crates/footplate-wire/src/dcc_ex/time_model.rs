@@ -3,8 +3,8 @@
 //! Measured on firmware 5.6.0 under a cycle-accurate simulator in real time, 8 sensors defined. The source agrees: each sensor
 //! is read every 10 ms at most, and a change counts when the next scan confirms it.
 
+use footplate_core::TimeSpan;
 use footplate_core::link::{TimeModel, UsualLine};
-use footplate_core::{TimeSpan, Timestamp};
 
 use super::outstanding::REPEATED_AFTER;
 
@@ -33,29 +33,3 @@ pub const TIME_MODEL: TimeModel = TimeModel {
 /// The line that these times hold for: answers come within the longest that was measured.
 pub const USUAL_LINE: UsualLine =
     UsualLine { answers_within: ANSWER_LONGEST, repeated_after: REPEATED_AFTER };
-
-/// Returns the latest time at which a sensor became occupied, and the width of the span before it.
-///
-/// The delay is about uniform between its shortest and longest. `not_before` is the time of the last entry of the recording,
-/// whose entries stay in order: where a command went out within the shortest delay the span is a little wider.
-pub(super) fn occupied(heard: Timestamp, not_before: Timestamp) -> (Timestamp, TimeSpan) {
-    let latest = (heard - SENSOR_DELAY_SHORTEST).max(not_before).min(heard);
-    (latest, latest - (heard - SENSOR_DELAY_LONGEST))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_report_reaches_back_over_the_delays_that_were_measured() {
-        let heard = Timestamp::from_s(10.0);
-        let (latest, width) = occupied(heard, Timestamp::ZERO);
-        assert_eq!(heard - latest, TimeSpan::from_us(3_600));
-        assert_eq!(width, TimeSpan::from_us(19_500));
-        // An entry one millisecond ago: the span ends there and begins where it did.
-        let (latest, width) = occupied(heard, heard - TimeSpan::from_ms(1));
-        assert_eq!(heard - latest, TimeSpan::from_ms(1));
-        assert_eq!(width, TimeSpan::from_us(22_100));
-    }
-}

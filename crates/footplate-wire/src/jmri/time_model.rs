@@ -3,8 +3,8 @@
 //! They depend on the hardware, of which JMRI drives dozens of kinds: some report a sensor at once, others are polled. So the range is
 //! wide, and no source states it for all; [`Settings::sensor_delay`](super::Settings::sensor_delay) narrows or widens it.
 
+use footplate_core::TimeSpan;
 use footplate_core::link::{TimeModel, UsualLine};
-use footplate_core::{TimeSpan, Timestamp};
 
 use super::outstanding::REPEATED_AFTER;
 
@@ -28,11 +28,3 @@ pub const TIME_MODEL: TimeModel = TimeModel {
 /// The line that these times hold for: JMRI answers from its own memory, within a few milliseconds on the same computer or network.
 pub const USUAL_LINE: UsualLine =
     UsualLine { answers_within: TimeSpan::from_ms(40), repeated_after: REPEATED_AFTER };
-
-/// Returns the latest time at which a sensor became occupied, and the width of the span before it.
-///
-/// `not_before` is the time of the last entry of the recording, whose entries stay in order.
-pub(super) fn occupied(heard: Timestamp, not_before: Timestamp, longest: TimeSpan) -> (Timestamp, TimeSpan) {
-    let latest = (heard - SENSOR_DELAY_SHORTEST).max(not_before).min(heard);
-    (latest, latest - (heard - longest))
-}

@@ -4,8 +4,8 @@
 //! detector's priority for up to 1.5 ms more (LocoNet Personal Use Edition, "Network timing"). How long detectors filter their inputs
 //! no source says of all; 40 ms leave room for a scan and for a slot's data of 14 bytes before the report.
 
+use footplate_core::TimeSpan;
 use footplate_core::link::{TimeModel, UsualLine};
-use footplate_core::{TimeSpan, Timestamp};
 
 use super::outstanding::REPEATED_AFTER;
 
@@ -31,11 +31,3 @@ pub const TIME_MODEL: TimeModel = TimeModel {
 /// The line that these times hold for: answers come within three messages on a bus that others use, too.
 pub const USUAL_LINE: UsualLine =
     UsualLine { answers_within: TimeSpan::from_ms(40), repeated_after: REPEATED_AFTER };
-
-/// Returns the latest time at which a sensor became occupied, and the width of the span before it.
-///
-/// `not_before` is the time of the last entry of the recording, whose entries stay in order.
-pub(super) fn occupied(heard: Timestamp, not_before: Timestamp, longest: TimeSpan) -> (Timestamp, TimeSpan) {
-    let latest = (heard - SENSOR_DELAY_SHORTEST).max(not_before).min(heard);
-    (latest, latest - (heard - longest))
-}

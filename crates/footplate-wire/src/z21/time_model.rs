@@ -4,8 +4,8 @@
 //! modules in a cycle of 33 ms (the RS-bus that the R-BUS resembles), so that a change waits for up to one cycle; then the station
 //! sends a datagram. Over a wired network that takes about a millisecond; 40 ms leave some for a busy station.
 
+use footplate_core::TimeSpan;
 use footplate_core::link::{TimeModel, UsualLine};
-use footplate_core::{TimeSpan, Timestamp};
 
 use super::outstanding::REPEATED_AFTER;
 
@@ -28,33 +28,3 @@ pub const TIME_MODEL: TimeModel = TimeModel {
 /// The line that these times hold for: answers come within some milliseconds in the station, and a wired network.
 pub const USUAL_LINE: UsualLine =
     UsualLine { answers_within: TimeSpan::from_ms(10), repeated_after: REPEATED_AFTER };
-
-/// Returns the latest time at which a sensor became occupied, and the width of the span before it.
-///
-/// `not_before` is the time of the last entry of the recording, whose entries stay in order. `free_at`: when the station last said
-/// that the sensor is free, where that is known: for what was missed when it happened and is found when asked for.
-pub(super) fn occupied(
-    heard: Timestamp,
-    not_before: Timestamp,
-    longest: TimeSpan,
-    free_at: Option<Timestamp>,
-) -> (Timestamp, TimeSpan) {
-    let latest = (heard - SENSOR_DELAY_SHORTEST).max(not_before).min(heard);
-    let earliest = free_at.map_or(heard, |free| free.min(heard)) - longest;
-    (latest, latest - earliest)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_report_reaches_back_over_the_delays_or_to_where_the_sensor_was_free() {
-        let heard = Timestamp::from_s(10.0);
-        let (latest, width) = occupied(heard, Timestamp::ZERO, SENSOR_DELAY_LONGEST, None);
-        assert_eq!((heard - latest, width), (TimeSpan::from_ms(1), TimeSpan::from_ms(39)));
-        let free = Some(heard - TimeSpan::from_ms(200));
-        let (latest, width) = occupied(heard, heard, SENSOR_DELAY_LONGEST, free);
-        assert_eq!((heard - latest, width), (TimeSpan::ZERO, TimeSpan::from_ms(240)));
-    }
-}

@@ -9,10 +9,11 @@ use super::super::outstanding::Awaited;
 use super::super::reply::{Malformed, Reply};
 use super::super::request::Throttle;
 use super::super::settings::TurnoutRequests;
-use super::super::time_model::occupied;
+use super::super::time_model::{SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST};
 use super::Client;
 use crate::locomotives::ReportedFunctions;
 use crate::outstanding::Awaited as _;
+use crate::sensors::occupied;
 use crate::session::LinkNotice;
 
 impl Client {
@@ -172,7 +173,8 @@ impl Client {
         let Some(number) = id.checked_sub(self.settings.first_sensor) else { return };
         let sensor = SensorId(number);
         let change = self.sensors.heard(id, active, self.opening.is_listing());
-        let span = occupied(now, self.dialogue.last_entry);
+        let span =
+            occupied(now, self.dialogue.last_entry, [SENSOR_DELAY_SHORTEST, SENSOR_DELAY_LONGEST], None);
         self.dialogue.hear_of_change(sensor, change, span);
     }
 }

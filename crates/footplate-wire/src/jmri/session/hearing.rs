@@ -11,11 +11,12 @@ use super::super::reply::Reply;
 use super::super::request::Request;
 use super::super::settings::System;
 use super::super::throttle::ThrottleMessage;
-use super::super::time_model::occupied;
+use super::super::time_model::SENSOR_DELAY_SHORTEST;
 use super::Client;
 use crate::dcc_ex::Throttle;
 use crate::outstanding::Awaited as _;
 use crate::protocol::Opening;
+use crate::sensors::occupied;
 use crate::session::LinkNotice;
 
 /// JMRI's code for an object that is not in its tables; of those that are asked for here, only turnouts may be missing.
@@ -239,7 +240,12 @@ impl Client {
     fn hear_of_sensor(&mut self, now: Timestamp, name: &str, active: Option<bool>) {
         let Some(((number, sensor), active)) = self.sensor_named(name).zip(active) else { return };
         let change = self.sensors.heard(number, active, !self.opening.is_open());
-        let span = occupied(now, self.dialogue.last_entry, self.settings.sensor_delay);
+        let span = occupied(
+            now,
+            self.dialogue.last_entry,
+            [SENSOR_DELAY_SHORTEST, self.settings.sensor_delay],
+            None,
+        );
         self.dialogue.hear_of_change(sensor, change, span);
     }
 }

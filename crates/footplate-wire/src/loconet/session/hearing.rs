@@ -9,10 +9,11 @@ use super::super::message::{Malformed, Message};
 use super::super::outstanding::{Answer, Awaited};
 use super::super::request::speed_of;
 use super::super::slot::{SlotData, SlotUse};
-use super::super::time_model::occupied;
+use super::super::time_model::SENSOR_DELAY_SHORTEST;
 use super::Client;
 use crate::locomotives::ReportedFunctions;
 use crate::outstanding::Awaited as _;
+use crate::sensors::occupied;
 use crate::session::LinkNotice;
 
 /// The opcode of a request for a slot, as the station's refusal of it names it.
@@ -191,7 +192,12 @@ impl Client {
         let Some(index) = number.checked_sub(self.settings.first_sensor) else { return };
         let sensor = SensorId(index);
         let change = self.sensors.heard(number, is_occupied, !self.opening.is_open());
-        let span = occupied(now, self.dialogue.last_entry, self.settings.sensor_delay);
+        let span = occupied(
+            now,
+            self.dialogue.last_entry,
+            [SENSOR_DELAY_SHORTEST, self.settings.sensor_delay],
+            None,
+        );
         self.dialogue.hear_of_change(sensor, change, span);
     }
 }

@@ -14,11 +14,12 @@ use super::super::request::Request;
 use super::super::sensors::Change;
 use super::super::speed::Throttle;
 use super::super::states::{Firmware, Lock, LocomotiveState, TurnoutPosition};
-use super::super::time_model::occupied;
+use super::super::time_model::SENSOR_DELAY_SHORTEST;
 use super::{Client, DETECTORS_WITHIN};
 use crate::locomotives::ReportedFunctions;
 use crate::outstanding::{Awaited as _, Outstanding};
 use crate::protocol::Opening;
+use crate::sensors::occupied;
 use crate::session::{LinkNotice, Transmit};
 
 /// A speed that a decoder reports again is passed on after this time: stations report many times a second (chosen: a few numbers
@@ -243,13 +244,21 @@ impl Client {
         match self.sensors.heard(now, number, is_occupied, is_listing) {
             Change::Occupied { free_at } => {
                 let free_at = free_at.filter(|_| was_missed);
-                let (latest, width) =
-                    occupied(now, self.dialogue.last_entry, self.settings.sensor_delay, free_at);
+                let (latest, width) = occupied(
+                    now,
+                    self.dialogue.last_entry,
+                    [SENSOR_DELAY_SHORTEST, self.settings.sensor_delay],
+                    free_at,
+                );
                 self.dialogue.report(sensor, latest, width);
             }
             Change::Freed => {
-                let (latest, width) =
-                    occupied(now, self.dialogue.last_entry, self.settings.sensor_delay, None);
+                let (latest, width) = occupied(
+                    now,
+                    self.dialogue.last_entry,
+                    [SENSOR_DELAY_SHORTEST, self.settings.sensor_delay],
+                    None,
+                );
                 self.dialogue.report_free(sensor, latest, width);
             }
             Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
