@@ -51,12 +51,12 @@ pub(super) fn page(data: &ReportData, language: Language) -> serde_json::Result<
 }
 
 fn overview(data: &ReportData, language: Language) -> String {
-    let columns = match language {
-        Language::English => ["train", "state", "what to know", "prediction error", "steps", "contacts"],
-        Language::German => ["Zug", "Zustand", "was zu wissen ist", "Vorhersagefehler", "Stufen", "Kontakte"],
-    };
+    let columns = language.pick(
+        "train | state | what to know | prediction error | steps | contacts",
+        "Zug | Zustand | was zu wissen ist | Vorhersagefehler | Stufen | Kontakte",
+    );
     let caption = language.pick("All trains", "Alle Züge");
-    let mut table = Table::new(caption, &columns, &[true, false, false, false, true, true]);
+    let mut table = Table::new(caption, columns, &[true, false, false, false, true, true]);
     for train in &data.trains {
         let health = &train.health;
         let number = train.calibration.train;

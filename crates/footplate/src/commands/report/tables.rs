@@ -14,11 +14,9 @@ pub(super) fn badge(state: State, language: Language) -> String {
 }
 
 pub(super) fn health(health: &Health, language: Language) -> String {
-    let columns = match language {
-        Language::English => ["check", "found", "state", "meaning"],
-        Language::German => ["Prüfung", "gefunden", "Zustand", "Bedeutung"],
-    };
-    let mut table = Table::new(language.pick("How it fares", "Wie es ihm geht"), &columns, &[false; 4]);
+    let columns =
+        language.pick("check | found | state | meaning", "Prüfung | gefunden | Zustand | Bedeutung");
+    let mut table = Table::new(language.pick("How it fares", "Wie es ihm geht"), columns, &[false; 4]);
     for check in &health.checks {
         let Check { name, found, state, says } = check;
         table.row_of_markup(&[text(name), text(found), badge(*state, language), text(says)]);
@@ -27,14 +25,12 @@ pub(super) fn health(health: &Health, language: Language) -> String {
 }
 
 pub(super) fn speeds(train: &TrainFindings, language: Language) -> String {
-    let columns = match language {
-        Language::English => {
-            ["step", "reached from", "speed", "contacts", "stopping distance", "scatter", "stops"]
-        }
-        Language::German => ["Stufe", "erreicht von", "Tempo", "Kontakte", "Anhalteweg", "Streuung", "Halte"],
-    };
+    let columns = language.pick(
+        "step | reached from | speed | contacts | stopping distance | scatter | stops",
+        "Stufe | erreicht von | Tempo | Kontakte | Anhalteweg | Streuung | Halte",
+    );
     let caption = language.pick("Speed and stop by throttle step", "Tempo und Halt je Fahrstufe");
-    let mut table = Table::new(caption, &columns, &[true, false, true, true, true, true, true]);
+    let mut table = Table::new(caption, columns, &[true, false, true, true, true, true, true]);
     for step in train.steps.iter().filter(|step| step.is_measured()) {
         table.row(&[
             step.step.to_string(),
@@ -57,23 +53,13 @@ pub(super) fn laws(train: &TrainFindings, language: Language) -> String {
         );
         return format!("<p>{none}</p>\n");
     }
-    let columns = match language {
-        Language::English => {
-            ["getting", "law", "pace", "begins after the command", "changes", "held-out error", "verdict"]
-        }
-        Language::German => [
-            "wird",
-            "Gesetz",
-            "Maß",
-            "beginnt nach dem Befehl",
-            "Wechsel",
-            "Fehler an Zurückgehaltenem",
-            "Urteil",
-        ],
-    };
+    let columns = language.pick(
+        "getting | law | pace | begins after the command | changes | held-out error | verdict",
+        "wird | Gesetz | Maß | beginnt nach dem Befehl | Wechsel | Fehler an Zurückgehaltenem | Urteil",
+    );
     let numbers = &[false, false, true, true, true, true, false];
     let mut table =
-        Table::new(language.pick("Laws of speed change", "Gesetze der Tempowechsel"), &columns, numbers);
+        Table::new(language.pick("Laws of speed change", "Gesetze der Tempowechsel"), columns, numbers);
     for law in &train.laws {
         let direction = match law.direction {
             Direction::Up => language.pick("faster", "schneller"),
@@ -109,15 +95,13 @@ pub(super) fn stops(train: &TrainFindings, language: Language) -> String {
             language.pick("No stop was measured with a tape.", "Kein Halt wurde mit dem Maßband gemessen.");
         return format!("<p>{none}</p>\n");
     }
-    let columns = match language {
-        Language::English => ["step", "from", "distance", "time", "where", "run"],
-        Language::German => ["Stufe", "aus", "Weg", "Zeit", "wo", "Fahrt"],
-    };
+    let columns =
+        language.pick("step | from | distance | time | where | run", "Stufe | aus | Weg | Zeit | wo | Fahrt");
     let caption = language.pick(
         "Stops measured with a tape, counted from the command",
         "Mit dem Maßband gemessene Halte, vom Befehl an gezählt",
     );
-    let mut table = Table::new(caption, &columns, &[true, true, true, true, false, true]);
+    let mut table = Table::new(caption, columns, &[true, true, true, true, false, true]);
     for stop in &train.stops {
         table.row(&[
             stop.step.to_string(),
@@ -132,15 +116,12 @@ pub(super) fn stops(train: &TrainFindings, language: Language) -> String {
 }
 
 pub(super) fn lengths(train: &TrainFindings, language: Language) -> String {
-    let columns = match language {
-        Language::English => ["from", "to", "surveyed", "to add"],
-        Language::German => ["von", "bis", "vermessen", "dazu"],
-    };
+    let columns = language.pick("from | to | surveyed | to add", "von | bis | vermessen | dazu");
     let caption = language.pick(
         "Between sensors: surveyed lengths and corrections",
         "Zwischen Kontakten: die Vermessung, und was dazukommt",
     );
-    let mut table = Table::new(caption, &columns, &[false, false, true, true]);
+    let mut table = Table::new(caption, columns, &[false, false, true, true]);
     for section in &train.sections {
         let correction = &section.add;
         table.row(&[
@@ -158,16 +139,16 @@ pub(super) fn suspicious(train: &TrainFindings, language: Language) -> String {
         let none = language.pick("No measurement was suspicious.", "Keine Messung war verdächtig.");
         return format!("<p>{none}</p>\n");
     }
-    let columns = match language {
-        Language::English => ["where", "run", "sensor", "late", "distance", "chance"],
-        Language::German => ["wo", "Fahrt", "Rückmelder", "später", "als Weg", "Zufall"],
-    };
+    let columns = language.pick(
+        "where | run | sensor | late | distance | chance",
+        "wo | Fahrt | Rückmelder | später | als Weg | Zufall",
+    );
     let numbers = &[false, true, false, true, true, true];
     let caption = language.pick(
         "Suspicious measurements, of little weight in the fit",
         "Verdächtige Messungen, mit wenig Gewicht im Abgleich",
     );
-    let mut table = Table::new(caption, &columns, numbers);
+    let mut table = Table::new(caption, columns, numbers);
     for suspicion in &train.suspicious {
         table.row(&[
             format!("{}:{}", suspicion.recording, suspicion.line),
@@ -182,13 +163,13 @@ pub(super) fn suspicious(train: &TrainFindings, language: Language) -> String {
 }
 
 pub(super) fn polling(recordings: &[PollingForm], language: Language) -> String {
-    let columns = match language {
-        Language::English => ["recording", "idle period", "after a report", "jitter"],
-        Language::German => ["Aufzeichnung", "Periode im Leerlauf", "nach einer Meldung", "Schwankung"],
-    };
+    let columns = language.pick(
+        "recording | idle period | after a report | jitter",
+        "Aufzeichnung | Periode im Leerlauf | nach einer Meldung | Schwankung",
+    );
     let caption = language
         .pick("Recordings, and the rhythm of their polls", "Aufzeichnungen, und der Rhythmus ihrer Abfragen");
-    let mut table = Table::new(caption, &columns, &[false, true, true, true]);
+    let mut table = Table::new(caption, columns, &[false, true, true, true]);
     for polling in recordings {
         table.row(&[
             polling.recording.clone(),

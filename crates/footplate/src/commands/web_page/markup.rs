@@ -41,10 +41,10 @@ pub(in crate::commands) struct Table {
 }
 
 impl Table {
-    /// Begins a table with a caption and columns.
-    pub(in crate::commands) fn new(caption: &str, columns: &[&str], numbers: &'static [bool]) -> Self {
+    /// Begins a table with a caption and columns, which ` | ` separates.
+    pub(in crate::commands) fn new(caption: &str, columns: &str, numbers: &'static [bool]) -> Self {
         let mut html = format!("<div class=\"wide\"><table><caption>{}</caption><thead><tr>", text(caption));
-        for (column, number) in columns.iter().zip(numbers) {
+        for (column, number) in columns.split(" | ").zip(numbers) {
             let class = if *number { " class=\"number\"" } else { "" };
             let _ = write!(html, "<th scope=\"col\"{class}>{}</th>", text(column));
         }
@@ -92,7 +92,7 @@ mod tests {
 
     #[test]
     fn a_table_names_its_rows() {
-        let mut table = Table::new("Speeds", &["step", "speed"], &[true, false]);
+        let mut table = Table::new("Speeds", "step | speed", &[true, false]);
         table.row(&["8".into(), "<fast>".into()]);
         let html = table.end();
         assert!(html.contains("<th scope=\"row\" class=\"number\">8</th><td>&lt;fast&gt;</td>"), "{html}");

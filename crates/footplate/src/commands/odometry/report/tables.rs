@@ -249,39 +249,18 @@ fn each_run(walked: &Walked) -> impl Iterator<Item = (String, &WalkedRun)> {
 }
 
 fn runs_table(walked: &Walked) -> String {
-    let columns = [
-        "run",
-        "duration s",
-        "distance m",
-        "at least m",
-        "at most m",
-        "top speed m/s",
-        "normal %",
-        "one slips %",
-        "correction %",
-        "ambiguous %",
-        "degraded %",
-    ];
-    const NUMBERS: &[bool] = &[false, true, true, true, true, true, true, true, true, true, true];
-    let german = [
-        "Fahrt",
-        "Dauer s",
-        "Weg m",
-        "mindestens m",
-        "höchstens m",
-        "Höchsttempo m/s",
-        "normal %",
-        "einer gleitet %",
-        "Korrektur %",
-        "mehrdeutig %",
-        "beeinträchtigt %",
-    ];
-    let mut table = match walked.language {
-        Language::English => Table::new("Distance, and the share of periods in each mode", &columns, NUMBERS),
-        Language::German => {
-            Table::new("Weg, und der Anteil der Perioden in jeder Betriebsart", &german, NUMBERS)
-        }
-    };
+    let columns = walked.language.pick(
+        "run | duration s | distance m | at least m | at most m | top speed m/s | normal % | one slips % | \
+         correction % | ambiguous % | degraded %",
+        "Fahrt | Dauer s | Weg m | mindestens m | höchstens m | Höchsttempo m/s | normal % | einer gleitet % | \
+         Korrektur % | mehrdeutig % | beeinträchtigt %",
+    );
+    let caption = walked.language.pick(
+        "Distance, and the share of periods in each mode",
+        "Weg, und der Anteil der Perioden in jeder Betriebsart",
+    );
+    let mut table =
+        Table::new(caption, columns, &[false, true, true, true, true, true, true, true, true, true, true]);
     for (name, run) in each_run(walked) {
         let summary = run.odometry.summary();
         let RunSummary { modes, top_speed, .. } = summary;
@@ -312,33 +291,14 @@ fn score_table(walked: &Walked) -> String {
     if scored.peek().is_none() {
         return String::new();
     }
-    let columns = [
-        "run",
-        "bounds",
-        "speed error m/s",
-        "at worst m/s",
-        "speed inside %",
-        "distance error m",
-        "of distance %",
-        "distance inside %",
-        "noticed after s",
-    ];
-    const NUMBERS: &[bool] = &[false, false, true, true, true, true, true, true, true];
-    let german = [
-        "Fahrt",
-        "Grenzen",
-        "Tempofehler m/s",
-        "höchstens m/s",
-        "Tempo darin %",
-        "Wegfehler m",
-        "vom Weg %",
-        "Weg darin %",
-        "bemerkt nach s",
-    ];
-    let mut table = match walked.language {
-        Language::English => Table::new("Against the truth", &columns, NUMBERS),
-        Language::German => Table::new("Gegen die Wahrheit", &german, NUMBERS),
-    };
+    let columns = walked.language.pick(
+        "run | bounds | speed error m/s | at worst m/s | speed inside % | distance error m | of distance % | \
+         distance inside % | noticed after s",
+        "Fahrt | Grenzen | Tempofehler m/s | höchstens m/s | Tempo darin % | Wegfehler m | vom Weg % | \
+         Weg darin % | bemerkt nach s",
+    );
+    let caption = walked.language.pick("Against the truth", "Gegen die Wahrheit");
+    let mut table = Table::new(caption, columns, &[false, false, true, true, true, true, true, true, true]);
     for (name, score) in scored {
         let (class, word) = if leaves_bounds(&score) {
             ("red", walked.language.pick("left", "verlassen"))
