@@ -205,12 +205,7 @@ impl Arguments {
                 let link = open_simulated(simulated, &real, pace)?;
                 self.drive(&written, link, beginning, output)
             }
-            Address::Serial(_)
-            | Address::Board(_)
-            | Address::Z21(_)
-            | Address::Can(_)
-            | Address::LocoNet(_)
-            | Address::Jmri(_) => {
+            _ => {
                 let link = opened.map_or_else(|| open(address, layout, pace), Ok)?;
                 self.drive(&written, link, beginning, output)
             }

@@ -129,12 +129,7 @@ impl Session<'_> {
                 }
                 self.drive(&written, link, output)
             }
-            Address::Serial(_)
-            | Address::Board(_)
-            | Address::Z21(_)
-            | Address::Can(_)
-            | Address::LocoNet(_)
-            | Address::Jmri(_) => {
+            _ => {
                 let link = opened.map_or_else(|| open(self.link, &real, pace), Ok)?;
                 self.drive(&written, link, output)
             }

@@ -105,10 +105,7 @@ pub(super) fn introduction(walked: &Walked) -> String {
     }
     if let Some(scores) = walked.known_scores() {
         let score = scores.preset(walked.preset);
-        html.push_str(&match walked.language {
-            Language::English => verdict(&score),
-            Language::German => german_verdict(&score),
-        });
+        html.push_str(&verdict(&score, walked.language));
     }
     html
 }
@@ -119,62 +116,48 @@ pub(super) fn held(score: &OdometryScore) -> &'static str {
 }
 
 /// A score in words.
-fn verdict(score: &OdometryScore) -> String {
-    let (class, word) = (if leaves_bounds(score) { "red" } else { "green" }, held(score));
-    let mut words = Vec::new();
-    if let (Some(rms), Some(worst)) = (score.speed_rms_m_s, score.speed_max_m_s) {
-        words.push(format!(
-            "The speed was off by {rms:.3} m/s (root mean square), by {worst:.2} m/s at worst."
-        ));
-    }
-    if let (Some(inside), Some(width)) = (score.speed_inside_pct, score.speed_width_mean_m_s) {
-        words.push(format!(
-            "It lay within its bounds in {} of all periods; they were {width:.2} m/s apart on average.",
-            share(inside)
-        ));
-    }
-    if let Some(end) = score.distance_end_m {
-        let sense = if end < 0.0 { "short" } else { "long" };
-        let part = score.distance_end_pct.map_or_else(String::new, |pct| format!(" ({:.2} %)", pct.abs()));
-        words.push(format!("At the end the distance was {:.2} m{part} too {sense}.", end.abs()));
-    }
-    if let (Some(inside), Some(width)) = (score.distance_inside_pct, score.distance_width_end_m) {
-        words.push(format!(
-            "It lay within its bounds in {} of all periods; they were {width:.1} m apart at the end.",
-            share(inside)
-        ));
-    }
-    format!("<p class=\"verdict\"><span class=\"state {class}\">{word}</span> {}</p>\n", words.join(" "))
-}
-
-/// The same in German.
-fn german_verdict(score: &OdometryScore) -> String {
+fn verdict(score: &OdometryScore, language: Language) -> String {
+    let pick = |english: String, german: String| match language {
+        Language::English => english,
+        Language::German => german,
+    };
     let (class, word) = if leaves_bounds(score) {
-        ("red", "die Wahrheit hat die Grenzen verlassen")
+        ("red", language.pick(held(score), "die Wahrheit hat die Grenzen verlassen"))
     } else {
-        ("green", "die Wahrheit blieb in den Grenzen")
+        ("green", language.pick(held(score), "die Wahrheit blieb in den Grenzen"))
     };
     let mut words = Vec::new();
     if let (Some(rms), Some(worst)) = (score.speed_rms_m_s, score.speed_max_m_s) {
-        words.push(format!(
-            "Das Tempo lag um {rms:.3} m/s daneben (quadratisches Mittel), höchstens um {worst:.2} m/s."
+        words.push(pick(
+            format!("The speed was off by {rms:.3} m/s (root mean square), by {worst:.2} m/s at worst."),
+            format!(
+                "Das Tempo lag um {rms:.3} m/s daneben (quadratisches Mittel), höchstens um {worst:.2} m/s."
+            ),
         ));
     }
-    if let (Some(inside), Some(width)) = (score.speed_inside_pct, score.speed_width_mean_m_s) {
-        words.push(format!(
-            "Es lag in {} aller Perioden in seinen Grenzen; sie waren im Mittel {width:.2} m/s auseinander.",
-            share(inside)
+    if let (Some(inside), Some(width)) = (score.speed_inside_pct.map(share), score.speed_width_mean_m_s) {
+        words.push(pick(
+            format!(
+                "It lay within its bounds in {inside} of all periods; they were {width:.2} m/s apart on average."
+            ),
+            format!(
+                "Es lag in {inside} aller Perioden in seinen Grenzen; sie waren im Mittel {width:.2} m/s auseinander."
+            ),
         ));
     }
     if let Some(end) = score.distance_end_m {
-        let sense = if end < 0.0 { "kurz" } else { "lang" };
+        let sense = if end < 0.0 { ["short", "kurz"] } else { ["long", "lang"] };
         let part = score.distance_end_pct.map_or_else(String::new, |pct| format!(" ({:.2} %)", pct.abs()));
-        words.push(format!("Am Ende war der Weg {:.2} m{part} zu {sense}.", end.abs()));
+        let off = format!("{:.2} m{part}", end.abs());
+        words.push(pick(
+            format!("At the end the distance was {off} too {}.", sense[0]),
+            format!("Am Ende war der Weg {off} zu {}.", sense[1]),
+        ));
     }
-    if let (Some(inside), Some(width)) = (score.distance_inside_pct, score.distance_width_end_m) {
-        words.push(format!(
-            "Er lag in {} aller Perioden in seinen Grenzen; am Ende waren sie {width:.1} m auseinander.",
-            share(inside)
+    if let (Some(inside), Some(width)) = (score.distance_inside_pct.map(share), score.distance_width_end_m) {
+        words.push(pick(
+            format!("It lay within its bounds in {inside} of all periods; they were {width:.1} m apart at the end."),
+            format!("Er lag in {inside} aller Perioden in seinen Grenzen; am Ende waren sie {width:.1} m auseinander."),
         ));
     }
     format!("<p class=\"verdict\"><span class=\"state {class}\">{word}</span> {}</p>\n", words.join(" "))
