@@ -274,15 +274,15 @@ fn in_a_row(
     }
 }
 
-/// A train that has just arrived at a node, if any track leads there.
+/// A train that has just arrived at a node, if any track leads there. The ends of an edge of 0 mm are one point in both directions.
 fn arrival(layout: &Layout, node: NodeId) -> Option<Position> {
-    let (edge, found) = layout.edges().find(|(_, edge)| edge.to == node)?;
+    let (edge, found) = layout.edges().find(|(_, edge)| edge.to == node && edge.length > Length::ZERO)?;
     Some(Position { edge, offset: found.length })
 }
 
 /// A train that is about to leave a node, if any track begins there.
 fn departure(layout: &Layout, node: NodeId) -> Option<Position> {
-    let (edge, _) = layout.edges().find(|(_, edge)| edge.from == node)?;
+    let (edge, _) = layout.edges().find(|(_, edge)| edge.from == node && edge.length > Length::ZERO)?;
     Some(Position { edge, offset: Length::ZERO })
 }
 
