@@ -2,6 +2,7 @@
 //!
 //! [`Odometer::step`] takes what was read in one [`Period`](crate::odometry::wheels::Period) and returns a [`MotionEstimate`].
 
+mod accuracy_monitor;
 mod balise_link;
 mod command_watch;
 pub mod diameter;
@@ -16,6 +17,7 @@ mod observing;
 mod odometer;
 pub mod paper;
 mod places;
+mod reading_amounts;
 mod recent;
 mod reporting;
 mod settings;
@@ -26,11 +28,13 @@ mod vote;
 mod wheel_channel;
 pub mod wheels;
 
+pub use accuracy_monitor::{AccuracyMonitor, OdometerAccuracy};
 pub use balise_link::{BaliseLink, BaliseVerdict, DistanceInterval};
 pub use hypotheses::{HYPOTHESES, Hypothesis};
 pub use implausible_claims::ImplausibleClaims;
 pub use motion_estimate::{Mode, MotionBounds, MotionEstimate, WheelState};
 pub use odometer::Odometer;
+pub use reading_amounts::ReadingAmounts;
 pub use settings::{Carrier, OdometrySettings};
 pub use stated_places::{MOST_PLACES, PlacedValue, StatedPlaces};
 pub use tolerance::{distance_tolerance, speed_tolerance};
