@@ -8,7 +8,6 @@
 //! does not move on, is judged as well. What they were 5000 m ago is remembered every 50 m: the window is at least
 //! 5000 m long and at most 50 m more, plus what the train runs in a period.
 
-use super::reading_amounts::ReadingAmounts;
 use super::tolerance::distance_tolerance;
 use crate::units::Length;
 
@@ -22,6 +21,32 @@ const FAILED_BEYOND_M: f64 = 1500.0;
 const SPACING_M: f64 = 50.0;
 /// Both ends of the window, the spaces between, and the one that is being left.
 const PLACES: usize = (WINDOW_M / SPACING_M) as usize + 2;
+
+/// Never-decreasing sums since the start. An ETCS on-board unit subtracts two readings of such sums to know the confidence interval
+/// of any distance between them (SUBSET-026-3, 3.6.4). Over- and under-reading are separate sums, and both directions of travel add
+/// to them (3.6.8.1.1): an error that reversing cancels cannot be distinguished from one that it doubles.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ReadingAmounts {
+    /// Estimated distance travelled, forward plus backward.
+    pub travelled: Length,
+    /// Over-reading: the largest amount by which it can exceed the true distance.
+    pub over: Length,
+    /// Under-reading: the largest amount by which it can fall short of the true distance.
+    pub under: Length,
+}
+
+impl ReadingAmounts {
+    /// Returns the amounts since an earlier reading.
+    #[must_use]
+    pub fn since(&self, earlier: &Self) -> Self {
+        Self {
+            travelled: self.travelled - earlier.travelled,
+            over: self.over - earlier.over,
+            under: self.under - earlier.under,
+        }
+    }
+}
 
 /// What may be done with distances.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
@@ -151,7 +176,9 @@ mod tests {
     fn run(monitor: &mut AccuracyMonitor, sums: &mut ReadingAmounts, distance_m: f64, over: f64, under: f64) {
         for _ in 0..(distance_m / 2.0) as u32 {
             let distance = Length::from_m(2.0);
-            sums.add(distance, distance * (1.0 - over), distance * (1.0 + under));
+            sums.travelled += distance;
+            sums.over += distance * over;
+            sums.under += distance * under;
             monitor.take(*sums);
         }
     }
@@ -224,7 +251,7 @@ mod tests {
     fn locked_wheels_are_judged_though_the_odometer_stands() {
         let (mut monitor, mut sums) = fresh();
         for _ in 0..251 {
-            sums.add(Length::ZERO, Length::ZERO, Length::from_m(1.0));
+            sums.under += Length::from_m(1.0);
             monitor.take(sums);
         }
         assert_eq!(monitor.accuracy(), OdometerAccuracy::Impaired);
@@ -242,7 +269,8 @@ mod tests {
             for (distance, part) in distances {
                 let mut now = *history.last().unwrap();
                 let distance = Length::from_m(distance);
-                now.add(distance, distance * (1.0 - part), distance);
+                now.travelled += distance;
+                now.over += distance * part;
                 let longest_period = 200.0;
                 let over = |window: f64| {
                     let start = history.iter().rev().find(|at| (now.travelled - at.travelled).as_m() >= window);

@@ -1,9 +1,12 @@
 //! One run of a train through the odometer.
 
-use footplate_core::Estimate;
 use footplate_core::odometry::diameter::WheelScale;
 use footplate_core::odometry::wheels::{Period, Vehicle, VehicleError, Wheelset};
-use footplate_core::odometry::{ImplausibleClaims, MotionEstimate, Odometer, OdometrySettings, PlacedValue};
+use footplate_core::odometry::{
+    AccuracyMonitor, ImplausibleClaims, MotionEstimate, Odometer, OdometrySettings, PlacedValue,
+    ReadingAmounts,
+};
+use footplate_core::{Estimate, Length};
 
 use super::counted_distances::DistanceCounter;
 use super::detection::{FlagWatch, SlipWatch};
@@ -91,6 +94,8 @@ impl RunContext {
 pub struct OdometryRun {
     odometer: Odometer,
     summary: RunSummary,
+    monitor: AccuracyMonitor,
+    amounts: ReadingAmounts,
     scoring: Option<Box<Scoring>>,
     context: RunContext,
     /// From the first place of stated accuracy on.
@@ -125,7 +130,8 @@ impl OdometryRun {
         let odometer = Odometer::new(context.vehicle, context.settings(context.preset))?;
         let scoring = if context.score { Some(Box::new(Scoring::new(context)?)) } else { None };
         let context = *context;
-        Ok(Self { odometer, summary: RunSummary::default(), scoring, context, placed: None })
+        let (summary, monitor, amounts) = Default::default();
+        Ok(Self { odometer, summary, monitor, amounts, scoring, context, placed: None })
     }
 
     /// Takes in the readings of one period. The truth is for the score only.
@@ -135,7 +141,13 @@ impl OdometryRun {
         if self.placed.is_some() || period.balise_deviation.is_some() {
             estimate = self.place(period, &estimate);
         }
-        self.summary.see(&estimate);
+        let before = self.summary.last.map_or(Length::ZERO, |last| last.distance);
+        self.amounts = ReadingAmounts {
+            travelled: self.amounts.travelled + (estimate.distance - before).abs(),
+            over: estimate.over,
+            under: estimate.under,
+        };
+        self.summary.see(&estimate, self.monitor.take(self.amounts));
         if let Some(scoring) = &mut self.scoring {
             scoring.see(period, &estimate, &truth());
         }

@@ -1,6 +1,6 @@
 //! What a run comes to, without any truth.
 
-use footplate_core::odometry::{Mode, MotionEstimate, WheelState};
+use footplate_core::odometry::{Mode, MotionEstimate, OdometerAccuracy, WheelState};
 use footplate_core::{Speed, TimeSpan, Timestamp};
 use serde::Serialize;
 
@@ -19,6 +19,10 @@ pub struct RunSummary {
     pub modes: ModeCounts,
     /// For each wheelset, in how many periods it was flagged how.
     pub flags: [FlagCounts; 2],
+    /// The worst that ETCS says of the accuracy of its distances, by the guaranteed bounds.
+    pub accuracy: OdometerAccuracy,
+    /// When it became so; `None` if it was sound throughout.
+    pub accuracy_since: Option<Timestamp>,
 }
 
 /// How many periods were of each mode.
@@ -50,11 +54,14 @@ pub struct FlagCounts {
 impl RunSummary {
     /// Takes in the estimate of a period.
     #[inline]
-    pub(super) fn see(&mut self, estimate: &MotionEstimate) {
+    pub(super) fn see(&mut self, estimate: &MotionEstimate, accuracy: OdometerAccuracy) {
         self.periods += 1;
         self.begin.get_or_insert(estimate.time);
         self.last = Some(*estimate);
         self.top_speed = self.top_speed.max(estimate.speed.abs());
+        if accuracy > self.accuracy {
+            (self.accuracy, self.accuracy_since) = (accuracy, Some(estimate.time));
+        }
         let modes = &mut self.modes;
         *match estimate.mode {
             Mode::Normal => &mut modes.normal,

@@ -61,6 +61,11 @@ fn run(file: &str, run: &WalkedRun, walked: &Walked) -> Value {
             fields.insert(key.into(), figure(value.as_m()));
         }
     }
+    fields.insert("accuracy".into(), json!(summary.accuracy));
+    fields.insert(
+        "accuracy_since_s".into(),
+        summary.accuracy_since.map_or(Value::Null, |at| figure(at.as_s())),
+    );
     fields.insert("top_speed_m_s".into(), figure(summary.top_speed.as_m_per_s()));
     let scales = run.odometry.wheel_scales();
     if scales.iter().any(Option::is_some) {

@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use footplate_core::Timestamp;
+use footplate_core::odometry::OdometerAccuracy;
 use footplate_store::odometry::{OdometryScore, RunScores, RunSummary};
 
 use super::recording::WalkedRun;
@@ -36,6 +38,9 @@ pub(super) fn write(output: &mut dyn Write, walked: &Walked) -> io::Result<()> {
         for run in &recording.runs {
             run_row(output, run)?;
         }
+        for run in &recording.runs {
+            accuracy_note(output, run.odometry.summary())?;
+        }
         writeln!(output)?;
     }
     match walked.scores() {
@@ -63,6 +68,20 @@ fn run_row(output: &mut dyn Write, run: &WalkedRun) -> io::Result<()> {
         run.id.as_deref().unwrap_or("–"),
         summary.duration().as_s(),
         top_speed.as_m_per_s(),
+    )
+}
+
+/// Whether distances are accurate enough for ETCS (SUBSET-026-3, 3.6.8), where they are not.
+fn accuracy_note(output: &mut dyn Write, summary: &RunSummary) -> io::Result<()> {
+    let said = match summary.accuracy {
+        OdometerAccuracy::Sound => return Ok(()),
+        OdometerAccuracy::Impaired => "impaired: more than 250 m may be wrong within 5000 m",
+        OdometerAccuracy::Failed => "insufficient: more than 1500 m may be wrong within 5000 m",
+    };
+    let since = summary.accuracy_since.map_or(0.0, Timestamp::as_s);
+    writeln!(
+        output,
+        "  from {since:.1} s on the accuracy of ETCS (3.6.8) is {said}, by the guaranteed bounds"
     )
 }
 
