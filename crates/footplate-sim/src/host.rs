@@ -1,5 +1,6 @@
 //! The polling program and its operator: they follow a script and record what they see.
 
+use footplate_core::track::Layout;
 use footplate_core::{Event, EventKind, Length, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use crate::draws::Draws;
@@ -31,6 +32,7 @@ pub(crate) struct Notes {
 pub(crate) struct Host<'w> {
     train: TrainId,
     link: &'w Link,
+    layout: &'w Layout,
     clock: Timestamp,
     orders: std::slice::Iter<'w, Order>,
     /// The pending order, and the time at which it is ready once that is known.
@@ -53,7 +55,7 @@ impl<'w> Host<'w> {
     /// The start of a run, when the clock shows `clock`, after earlier `events`.
     pub(crate) fn new(
         train: TrainId,
-        link: &'w Link,
+        (link, layout): (&'w Link, &'w Layout),
         clock: Timestamp,
         orders: &'w [Order],
         events: Vec<Event>,
@@ -66,6 +68,7 @@ impl<'w> Host<'w> {
         Self {
             train,
             link,
+            layout,
             clock,
             orders,
             next,
@@ -146,7 +149,7 @@ impl<'w> Host<'w> {
             }
             let interval = TimeSpan::from_s(poll.stamp - poll.stamp_before);
             let poll_interval = self.link.intervals.then_some(interval);
-            let report = Report { sensor: actuation.sensor, poll_interval };
+            let report = Report { sensor: self.layout.input(actuation.sensor), poll_interval };
             let event = self.write(poll.stamp, EventKind::Sensor(report));
             self.notes.reports.push(ReportTruth {
                 event,

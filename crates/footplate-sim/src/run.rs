@@ -94,7 +94,14 @@ impl World<'_> {
         let gate_clock = GateClock::new(&mut draws);
         let mut gates = Vec::new();
         let turnouts = self.turnouts_thrown(conditions.clock);
-        let mut host = Host::new(self.train_id, self.link, conditions.clock, &script.orders, turnouts, draws);
+        let mut host = Host::new(
+            self.train_id,
+            (self.link, self.railway.layout),
+            conditions.clock,
+            &script.orders,
+            turnouts,
+            draws,
+        );
 
         let steps = (lasts_s(script) / STEP_S) as usize;
         let mut samples = Vec::with_capacity(steps / SAMPLE_STEPS + 1);

@@ -16,7 +16,7 @@ use footplate_core::link::PollTimingEstimator;
 use footplate_core::model::StepUse;
 use footplate_core::model::survey::{LayoutTest, SectionIndex, SurveyTest};
 use footplate_core::model::{MotionFit, StepChanges};
-use footplate_core::track::{Layout, Leg, TurnoutStates};
+use footplate_core::track::{DirectionFinder, Layout, Leg, TurnoutStates};
 use footplate_core::{Approach, Event, EventKind, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 use run_reader::RunReader;
 use serde::{Deserialize, Serialize};
@@ -301,12 +301,18 @@ impl MotionReplay {
         let mut reader = RunReader::new(train, begin.step);
         let mut fitted: Option<Timestamp> = None;
         let mut changes = StepChanges::default();
+        let mut directions = DirectionFinder::default();
         for (event, was_lost) in events {
             note_turnout(turnouts, &event);
             let Some(read) = reader.take(&event, rhythm.timing()) else { continue };
             if begin.is_shared && is_left_out(&mut self.fit, &read.event, &mut changes) {
                 continue;
             }
+            // A session that drove several trains has already found where each of them passed.
+            let found = match begin.is_shared {
+                true => Some(read.event),
+                false => directions.take(layout, turnouts, train, &read.event),
+            };
             let time = read.event.time;
             let starts = matches!(read.event.kind, EventKind::Speed { step, .. } if step != SpeedStep::STAND);
             if starts && time - *fitted.get_or_insert(time) >= REFIT_AFTER {
@@ -320,7 +326,9 @@ impl MotionReplay {
                 // How long it was stuck says nothing of how it starts and runs.
                 self.fit.interrupt();
             }
-            self.fit.take(layout, turnouts, &read.event);
+            if let Some(event) = found {
+                self.fit.take(layout, turnouts, &event);
+            }
             self.events += 1;
             let at = begin.began_at.map(|began_at| began_at + (time - Timestamp::ZERO));
             self.newest = self.newest.max(at);

@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use anyhow::bail;
 use footplate_core::model::survey::{LayoutTest, SectionIndex, SurveyTest};
-use footplate_core::track::{HopId, Layout, SequenceVerdict, StrayReport};
+use footplate_core::track::{Hop, HopId, Layout, SequenceVerdict, StrayReport};
 use footplate_core::{Event, EventKind, Length, SensorId};
 use footplate_store::{BUILT_IN, Batch, Direction, Run, built_in};
 
@@ -139,8 +139,8 @@ fn mean_speeds(layout: &Layout, run: &Run) -> impl Iterator<Item = f64> {
     run.events.iter().filter(|_| layout.is_measured()).filter_map(move |raw| {
         let EventKind::Sensor(report) = raw.event.kind else { return None };
         let (from, left) = before.replace((report.sensor, raw.event.time))?;
-        let mut hops = layout.hops_from(layout.sensor_node(from)?);
-        let hop = hops.find(|hop| hop.sensor == Some(report.sensor))?;
+        let mut hops = hops_after(layout, from);
+        let hop = hops.find(|hop| layout.meanings(report.sensor).any(|meant| hop.sensor == Some(meant)))?;
         let took = (raw.event.time - left).as_s();
         (took > 0.0 && hop.length > Length::ZERO).then(|| hop.length.as_mm() / took)
     })
@@ -262,9 +262,15 @@ fn stray_said(layout: &Layout, stray: &StrayReport) -> String {
     format!("{} after {name} {times} ({only})", layout.sensor_name(stray.seen))
 }
 
+/// The hops from a sensor, in both directions where it does not report the direction.
+fn hops_after(layout: &Layout, sensor: SensorId) -> impl Iterator<Item = Hop<'_>> {
+    let nodes = layout.meanings(sensor).filter_map(|meant| layout.sensor_node(meant));
+    nodes.flat_map(|node| layout.hops_from(node))
+}
+
 /// The sensors that may come right after one.
 fn followers(layout: &Layout, sensor: SensorId) -> Vec<&str> {
-    let hops = layout.sensor_node(sensor).into_iter().flat_map(|node| layout.hops_from(node));
+    let hops = hops_after(layout, sensor);
     let mut names: Vec<&str> = hops.filter_map(|hop| Some(layout.sensor_name(hop.sensor?))).collect();
     names.dedup();
     names

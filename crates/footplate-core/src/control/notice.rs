@@ -140,6 +140,15 @@ pub enum Notice {
         /// The next likely train; `None` for noise.
         or: Option<TrainId>,
     },
+    /// A train was detected by a sensor that does not report the direction, and its direction is not known: the next sensor decides.
+    EitherDirection {
+        /// The train.
+        train: TrainId,
+        /// The sensor.
+        sensor: SensorId,
+        /// When it was detected.
+        time: Timestamp,
+    },
     /// A sensor reported repeatedly where no train can be: its reports are ignored.
     SensorStuck {
         /// The sensor.

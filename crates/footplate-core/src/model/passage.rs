@@ -8,7 +8,7 @@ use crate::event::{Approach, Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
 use crate::link::{DetectionWindow, PollTimingEstimator};
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Layout, Leg, Reach, TurnoutStates};
+use crate::track::{DirectionFinder, Layout, Leg, Reach, TurnoutStates};
 
 /// A report this soon after a start from rest is of a contact the train stood on, or that the station still
 /// remembered: command delay (0.1 to 0.6 s measured) and the first 0.5 s of any start move a train by less
@@ -70,6 +70,8 @@ pub enum Sighting {
     Repeat,
     /// The train stands on it, or the station remembered it from before.
     Standing,
+    /// The train passed the sensor, which does not report the direction, and its direction is not known.
+    UnknownDirection,
     /// The layout has no such sensor.
     UnknownSensor,
 }
@@ -81,6 +83,7 @@ pub struct PassageTracker {
     drive: Drive,
     /// Node of the last passage.
     at: Option<NodeId>,
+    directions: DirectionFinder,
     last_sensor: Option<SensorId>,
     last_report: Option<Timestamp>,
     timing: PollTimingEstimator,
@@ -98,6 +101,7 @@ impl PassageTracker {
             train,
             drive: Drive { step, from: step, commanded: None },
             at: None,
+            directions: DirectionFinder::default(),
             last_sensor: None,
             last_report: None,
             timing,
@@ -143,6 +147,7 @@ impl PassageTracker {
                     // The contact behind becomes the one ahead, at an unknown distance.
                     self.at = None;
                     self.last_sensor = None;
+                    self.directions.reverse(layout, &self.turnouts);
                 }
                 None
             }
@@ -188,8 +193,16 @@ impl PassageTracker {
         window: DetectionWindow,
         entry: usize,
     ) -> Sighting {
-        let Some(node) = layout.sensor_node(sensor) else { return Sighting::UnknownSensor };
+        if layout.sensor_node(sensor).is_none() {
+            return Sighting::UnknownSensor;
+        }
         self.last_sensor = Some(sensor);
+        let passed = self.directions.passed(layout, &self.turnouts, sensor);
+        let Some((sensor, node)) = passed.and_then(|sensor| Some((sensor, layout.sensor_node(sensor)?)))
+        else {
+            self.at = None;
+            return Sighting::UnknownDirection;
+        };
         if self.stands_until().is_some_and(|until| window.until < until) {
             // It moves off from somewhere behind or on the contact: no path can be measured from here.
             self.at = None;

@@ -56,12 +56,6 @@ impl Layout {
         self.block_of_entry(self.sensor_at(node.reverse())?)
     }
 
-    /// The number under which the station reports a sensor: that of the detector for the entry of a block.
-    #[must_use]
-    pub fn input(&self, sensor: SensorId) -> SensorId {
-        self.block_of_entry(sensor).map_or(sensor, |block| block.detector)
-    }
-
     /// Checks the blocks of a plan, and finds their entries and rails.
     pub(super) fn with_blocks(
         mut self,

@@ -57,6 +57,7 @@ impl Layout {
             restricted: BTreeMap::new(),
             blocks: Vec::new(),
             entered: BTreeMap::new(),
+            undirected: places.undirected,
             crossings: Vec::new(),
         };
         let layout = layout.with_blocks(&plan.blocks, &plan.places)?.with_hops()?;
@@ -139,6 +140,7 @@ struct Places {
     names: BTreeMap<String, NodeId>,
     sensors: Vec<Option<NodeId>>,
     turnouts: BTreeMap<TurnoutId, NodeId>,
+    undirected: BTreeMap<SensorId, [SensorId; 2]>,
 }
 
 fn place_nodes(plan: &LayoutPlan) -> Result<Places, LayoutError> {
@@ -149,15 +151,22 @@ fn place_nodes(plan: &LayoutPlan) -> Result<Places, LayoutError> {
     let mut places = Places::default();
     let mut entries = first_entry(plan)..u16::MAX;
     for (place, entry) in plan.places.iter().enumerate() {
+        let mut unused = || {
+            let too_many =
+                LayoutError::TooMany { what: "sensors", found: MAX_SENSORS + 1, limit: MAX_SENSORS };
+            entries.next().map(SensorId).ok_or(too_many)
+        };
         let mut entry_of = |enters: &Option<String>| match enters {
             None => Ok(NodeKind::Boundary),
-            Some(_) => entries
-                .next()
-                .map(|number| NodeKind::Sensor(SensorId(number)))
-                .ok_or(LayoutError::TooMany { what: "sensors", found: MAX_SENSORS + 1, limit: MAX_SENSORS }),
+            Some(_) => unused().map(NodeKind::Sensor),
         };
         let kinds = match entry {
             Place::Sensor { sensors: [one, other], .. } => [NodeKind::Sensor(*one), NodeKind::Sensor(*other)],
+            Place::UndirectedSensor { sensor, .. } => {
+                let both = [*sensor, unused()?];
+                places.undirected.extend(both.map(|direction| (direction, both)));
+                both.map(NodeKind::Sensor)
+            }
             Place::Boundary { enters: [one, other], .. } => [entry_of(one)?, entry_of(other)?],
             Place::Turnout { turnout, .. } => [NodeKind::Branch(*turnout), NodeKind::Merge(*turnout)],
             Place::End { .. } => [NodeKind::Enter, NodeKind::Exit],
@@ -177,10 +186,11 @@ fn place_nodes(plan: &LayoutPlan) -> Result<Places, LayoutError> {
     Ok(places)
 }
 
-/// The first number for the entries of blocks: above all sensors and detectors.
+/// The first number for the entries of blocks and the second directions of sensors: above all sensors and detectors.
 fn first_entry(plan: &LayoutPlan) -> u16 {
     let of_places = plan.places.iter().filter_map(|place| match place {
         Place::Sensor { sensors: [one, other], .. } => Some(one.0.max(other.0)),
+        Place::UndirectedSensor { sensor, .. } => Some(sensor.0),
         _ => None,
     });
     let used = of_places.chain(plan.blocks.iter().map(|block| block.detector.0));

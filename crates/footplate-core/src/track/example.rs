@@ -54,6 +54,17 @@ pub(crate) fn oval_plan() -> LayoutPlan {
     }
 }
 
+/// The oval with sensors that do not report the direction.
+pub(crate) fn undirected_oval() -> Layout {
+    let mut plan = oval_plan();
+    for place in &mut plan.places {
+        if let Place::Sensor { names, sensors: [sensor, _] } = place {
+            *place = Place::UndirectedSensor { names: names.clone(), sensor: *sensor };
+        }
+    }
+    Layout::build(&plan).unwrap()
+}
+
 /// An oval with a turnout in its station, and a siding that joins the main line without a detector.
 ///
 /// ```text

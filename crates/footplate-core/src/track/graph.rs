@@ -141,6 +141,8 @@ pub struct Layout {
     pub(crate) blocks: Vec<Block>,
     /// The block of each entry, as an index into `blocks`.
     pub(crate) entered: BTreeMap<SensorId, usize>,
+    /// The two directions of each sensor that reports one number for both, by either; the first has that number.
+    pub(crate) undirected: BTreeMap<SensorId, [SensorId; 2]>,
     pub(crate) crossings: Vec<Crossing>,
 }
 

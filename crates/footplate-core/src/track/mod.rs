@@ -8,6 +8,7 @@
 //! - [`Layout::circuit_from`]: a path that leads back;
 //! - [`Layout::blocks`]: sections with an occupancy detector, and where trains enter them;
 //! - [`Occupancy`]: from reports of their detectors to these entries;
+//! - [`DirectionFinder`]: the direction in which a train passes sensors that do not report it;
 //! - [`Layout::crossings`]: where two tracks cross without a connection;
 //! - [`Layout::zone`]: the speed restriction of an edge;
 //! - [`Position`] and [`Landmark`]: points on the rails, and their names.
@@ -30,6 +31,7 @@ mod route;
 mod sequence_test;
 mod survey;
 mod turnout;
+mod undirected_sensor;
 mod zone;
 
 pub use block::Block;
@@ -48,4 +50,5 @@ pub use reach::{MAX_MISSED, Reach, Reaches};
 pub use sequence_test::{SequenceTest, SequenceVerdict, StrayReport};
 pub use survey::{StretchLength, Survey, SurveyedDistance};
 pub use turnout::{Leg, TurnoutNeed, TurnoutStates};
+pub use undirected_sensor::DirectionFinder;
 pub use zone::{MAX_ZONE_LIMIT, MIN_ZONE_LIMIT, Zone};

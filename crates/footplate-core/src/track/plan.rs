@@ -64,6 +64,13 @@ pub enum Place {
         /// The sensors of the two directions.
         sensors: [SensorId; 2],
     },
+    /// A sensor that reports the same number whichever direction a train passes in.
+    UndirectedSensor {
+        /// The names of the two directions.
+        names: [String; 2],
+        /// The number that the station reports.
+        sensor: SensorId,
+    },
     /// The boundary of a block, where its insulated rail joint is.
     Boundary {
         /// The names of the two directions.
@@ -91,6 +98,7 @@ impl Place {
     pub const fn names(&self) -> &[String; 2] {
         match self {
             Self::Sensor { names, .. }
+            | Self::UndirectedSensor { names, .. }
             | Self::Boundary { names, .. }
             | Self::Turnout { names, .. }
             | Self::End { names } => names,

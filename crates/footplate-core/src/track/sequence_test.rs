@@ -128,10 +128,14 @@ impl SequenceTest {
             return;
         };
         let unknown = TurnoutStates::unknown();
+        let is_here = |to: NodeId| to == node || is_undirected(layout, to) && to == node.reverse();
         // How many sensors further on this one is, at the least.
         let sensors_on = |from: &NodeId| {
-            let reaches = layout.reaches(*from, &unknown, MAX_SILENT).filter(|reach| reach.to == node);
-            reaches.map(|reach| reach.hops().len()).min()
+            let back = Some(from.reverse()).filter(|_| is_undirected(layout, *from));
+            let reaches = core::iter::once(*from)
+                .chain(back)
+                .flat_map(|from| layout.reaches(from, &unknown, MAX_SILENT));
+            reaches.filter(|reach| is_here(reach.to)).map(|reach| reach.hops().len()).min()
         };
         // Another train may be behind this one: the nearest was here. Of several, the one that was detected longest ago.
         let nearest = (0..self.places.len())
@@ -175,6 +179,11 @@ impl SequenceTest {
         stray.sort_by_key(|stray| core::cmp::Reverse(stray.times));
         SequenceVerdict::Contradicts { stray, reports }
     }
+}
+
+/// Whether the sensor at a node does not report the direction: a train may have left it in either.
+fn is_undirected(layout: &Layout, node: NodeId) -> bool {
+    layout.sensor_at(node).is_some_and(|sensor| layout.both_directions(sensor).is_some())
 }
 
 /// The probability that at least `count` of `all` reports are stray on the right layout.

@@ -35,5 +35,6 @@ mod toy_railway;
 mod trains_fitted;
 mod two_sensors;
 mod unauthorised_movements;
+mod undirected_sensors;
 mod watching;
 mod wheel_diameters;

@@ -73,7 +73,9 @@ fn rail_ends_of(place: &Place) -> Vec<RailEnd> {
     let [one, other] = place.names().clone();
     let end = |node: &String, leg| RailEnd { node: node.clone(), leg };
     match place {
-        Place::Sensor { .. } | Place::Boundary { .. } => vec![end(&one, None), end(&other, None)],
+        Place::Sensor { .. } | Place::UndirectedSensor { .. } | Place::Boundary { .. } => {
+            vec![end(&one, None), end(&other, None)]
+        }
         Place::Turnout { .. } => {
             vec![end(&one, Some(Leg::Straight)), end(&one, Some(Leg::Curved)), end(&other, None)]
         }

@@ -40,6 +40,21 @@ pub(crate) fn step(step: u8) -> SpeedStep {
 }
 
 pub(crate) fn layout() -> Layout {
+    Layout::build(&plan()).expect("a layout")
+}
+
+/// The same with sensors that report one number for both directions.
+pub(crate) fn undirected_layout() -> Layout {
+    let mut plan = plan();
+    for place in &mut plan.places {
+        if let Place::Sensor { names, sensors: [sensor, _] } = place {
+            *place = Place::UndirectedSensor { names: names.clone(), sensor: *sensor };
+        }
+    }
+    Layout::build(&plan).expect("a layout")
+}
+
+fn plan() -> LayoutPlan {
     let sensor = |name: &str, number| Place::Sensor {
         names: [format!("{name}1"), format!("{name}2")],
         sensors: [SensorId(number), SensorId(number + 1)],
@@ -58,7 +73,7 @@ pub(crate) fn layout() -> Layout {
         to: rail_end(to),
         length: Length::from_mm(mm).into(),
     };
-    let plan = LayoutPlan {
+    LayoutPlan {
         name: "toy".into(),
         survey: Survey::taped(Length::from_mm(2.0), "made up".into()),
         places: vec![
@@ -88,8 +103,7 @@ pub(crate) fn layout() -> Layout {
         never_both_curved: vec![],
         zones: vec![],
         blocks: vec![],
-    };
-    Layout::build(&plan).expect("a layout")
+    }
 }
 
 pub(crate) fn straight() -> TurnoutStates {
@@ -267,7 +281,8 @@ impl ToyRailway {
             passed.extend(sensor);
             self.passes.extend(sensor.map(|sensor| (self.now, sensor, train.id)));
         }
-        self.closed.extend(passed.into_iter().filter(|sensor| !self.dead.contains(sensor)));
+        let closed = passed.into_iter().filter(|sensor| !self.dead.contains(sensor));
+        self.closed.extend(closed.map(|sensor| self.layout.input(sensor)));
         if self.line_free <= self.now
             && !self.is_silent
             && let Some(command) = self.queue.pop_front()

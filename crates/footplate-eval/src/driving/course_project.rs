@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, VecDeque};
 
 use footplate_core::control::{Machine, Output};
-use footplate_core::track::{Layout, TurnoutStates};
+use footplate_core::track::{DirectionFinder, Layout, TurnoutStates};
 use footplate_core::{Command, Event, EventKind, Length, NodeId, SensorId, SpeedStep, TimeSpan, Timestamp};
 
 use super::trial::{Counts, Plan, Results, TRAIN};
@@ -65,6 +65,8 @@ pub(super) struct CourseProject<'a, 'l> {
     line: &'a mut VirtualLine<'l>,
     turnouts: TurnoutStates,
     listener: DetectionListener,
+    /// It never reverses: the order of sensors shows the direction where they do not report it.
+    directions: DirectionFinder,
     /// Speed in mm/s by step.
     speeds: BTreeMap<SpeedStep, f64>,
     /// Pairs of speed (mm/s) and stopping distance (mm), in order of speed.
@@ -74,7 +76,8 @@ pub(super) struct CourseProject<'a, 'l> {
 impl<'a, 'l> CourseProject<'a, 'l> {
     pub(super) fn new(layout: &'l Layout, line: &'a mut VirtualLine<'l>, turnouts: TurnoutStates) -> Self {
         let (speeds, stops) = (BTreeMap::new(), Vec::new());
-        Self { layout, line, turnouts, listener: DetectionListener::default(), speeds, stops }
+        let (listener, directions) = (DetectionListener::default(), DirectionFinder::default());
+        Self { layout, line, turnouts, listener, directions, speeds, stops }
     }
 
     /// Measures the train and carries out the tasks.
@@ -117,7 +120,13 @@ impl<'a, 'l> CourseProject<'a, 'l> {
 
     /// The next detection before `until`.
     fn next_detection(&mut self, until: Timestamp) -> Option<(SensorId, Timestamp)> {
-        self.line.drive(&mut self.listener, until)
+        loop {
+            let (reported, at) = self.line.drive(&mut self.listener, until)?;
+            let passed = self.directions.passed(self.layout, &self.turnouts, reported);
+            if let Some(sensor) = passed {
+                return Some((sensor, at));
+            }
+        }
     }
 
     fn wait(&mut self, seconds: f64) {

@@ -3,3 +3,4 @@
 mod blocks;
 mod reported_speeds;
 mod same_seed;
+mod undirected_sensors;

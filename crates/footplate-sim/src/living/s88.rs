@@ -49,6 +49,8 @@ pub(crate) struct S88 {
     /// The sensors, from which spurious detections are drawn.
     sensors: Vec<SensorId>,
     detectors: Detectors,
+    /// The numbers of sensors that report both directions under one, by direction.
+    inputs: BTreeMap<SensorId, SensorId>,
     /// Detectors whose current is interrupted, and how often.
     dark: BTreeMap<SensorId, u8>,
     /// By the sensor's number: how many hold it closed, and whether it closed since the last reading.
@@ -66,7 +68,10 @@ impl S88 {
     /// All open; a few are remembered from before, if that is asked for.
     pub(crate) fn new(layout: &Layout, faults: &Faults, stale: bool, mut draws: Draws) -> Self {
         let detectors = Detectors::draw(layout, &mut draws);
-        let sensors = detectors.inputs(layout);
+        let both = |(sensor, _)| layout.both_directions(sensor).map(|[number, _]| (sensor, number));
+        let inputs: BTreeMap<SensorId, SensorId> = layout.sensors().filter_map(both).collect();
+        let mut sensors = detectors.inputs(layout);
+        sensors.retain(|sensor| inputs.get(sensor).is_none_or(|number| number == sensor));
         let count = sensors.iter().map(|sensor| usize::from(sensor.0) + 1).max().unwrap_or(0);
         let mut states = vec![(0, false); count];
         if stale {
@@ -81,6 +86,7 @@ impl S88 {
             draws,
             sensors,
             detectors,
+            inputs,
             dark: BTreeMap::new(),
             states,
             changes: BinaryHeap::new(),
@@ -108,7 +114,7 @@ impl S88 {
         let closes = !self.faults.misses(sensor, &mut self.draws);
         self.passes.push(PassTruth { sensor, at, train: Some(train), cause, closed: closes, odometer_mm });
         if closes {
-            self.change(sensor, at, Turn::Closes);
+            self.change(self.input(sensor), at, Turn::Closes);
         }
         closes
     }
@@ -138,7 +144,11 @@ impl S88 {
     /// A shoe leaves a sensor that it closed.
     pub(crate) fn leave(&mut self, sensor: SensorId, at: Timestamp) {
         let sticks = TimeSpan::from_s(self.faults.sticks_for_s(&mut self.draws));
-        self.change(sensor, at + sticks, Turn::Opens);
+        self.change(self.input(sensor), at + sticks, Turn::Opens);
+    }
+
+    fn input(&self, sensor: SensorId) -> SensorId {
+        self.inputs.get(&sensor).copied().unwrap_or(sensor)
     }
 
     /// The state of a module at a time, not before that of the last call; `forget` clears what is only remembered.

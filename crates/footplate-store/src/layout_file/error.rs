@@ -64,9 +64,29 @@ pub enum LayoutProblem {
         found: String,
     },
     /// A sensor without a number whose name does not imply one.
-    #[error("`{name}` does not imply the sensor's number: add `numbers = [.., ..]`, or call it A1 to E16")]
+    #[error(
+        "`{name}` does not imply the sensor's number: add `numbers = [.., ..]`, `number = ..` if it reports the same number for \
+         both directions, or call it A1 to E16"
+    )]
     SensorNumber {
         /// The name.
+        name: String,
+    },
+    /// A sensor with two numbers that are equal.
+    #[error(
+        "numbers = [{number}, {number}] are one number: write `number = {number}` if the sensor reports both directions under it"
+    )]
+    EqualNumbers {
+        /// The number.
+        number: u16,
+    },
+    /// A sensor with one number for both directions and one for each.
+    #[error(
+        "`{name}` has `number` and `numbers`: keep `number` if it reports the same number for both directions, `numbers` if it \
+         reports one for each"
+    )]
+    NumberAndNumbers {
+        /// The first name.
         name: String,
     },
     /// An uncertainty without a length.

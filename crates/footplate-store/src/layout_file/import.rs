@@ -102,10 +102,12 @@ fn pair_nodes(nodes: &[NodeRow]) -> Result<(Vec<(u64, Place)>, Reverses<'_>), Fa
         let names = [row.name.clone(), other.name.clone()];
         match row.kind {
             NodeType::Sensor if !is_known => {
-                sensors.push((
-                    row.line,
-                    Place::Sensor { names, sensors: [row, other].map(|row| SensorId(row.number)) },
-                ));
+                let numbers = [row, other].map(|row| SensorId(row.number));
+                let place = match numbers {
+                    [one, two] if one == two => Place::UndirectedSensor { names, sensor: one },
+                    sensors => Place::Sensor { names, sensors },
+                };
+                sensors.push((row.line, place));
             }
             NodeType::Branch => {
                 turnouts.push((row.line, Place::Turnout { names, turnout: TurnoutId(row.number) }));

@@ -131,6 +131,8 @@ struct Written {
 struct WrittenSensor {
     names: [String; 2],
     numbers: Option<[u16; 2]>,
+    /// Of a sensor that reports the same number for both directions.
+    number: Option<u16>,
     at: Option<Spanned<[f64; 2]>>,
 }
 
@@ -337,11 +339,19 @@ impl WrittenSensor {
             let unknown = || (start, LayoutProblem::SensorNumber { name: name.clone() });
             ModuleLetters.sensor_named(name).ok_or_else(unknown)
         };
-        let sensors = match self.numbers {
-            Some(numbers) => numbers.map(SensorId),
-            None => [number_in(one)?, number_in(other)?],
+        let names = self.names.clone();
+        let sensors = match (self.number, self.numbers) {
+            (Some(_), Some(_)) => return Err((start, LayoutProblem::NumberAndNumbers { name: one.clone() })),
+            (Some(number), None) => {
+                return Ok(Place::UndirectedSensor { names, sensor: SensorId(number) });
+            }
+            (None, Some([one, other])) if one == other => {
+                return Err((start, LayoutProblem::EqualNumbers { number: one }));
+            }
+            (None, Some(numbers)) => numbers.map(SensorId),
+            (None, None) => [number_in(one)?, number_in(other)?],
         };
-        Ok(Place::Sensor { names: self.names.clone(), sensors })
+        Ok(Place::Sensor { names, sensors })
     }
 }
 

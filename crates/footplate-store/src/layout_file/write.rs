@@ -113,6 +113,10 @@ impl<'f> Places<'f> {
                 quoted(block.map_or("", |block| block.name.as_str()))
             });
             line += &format!(", enters = [{}]", enters.join(", "));
+        } else if let Some([number, _]) =
+            self.layout.sensor_at(id).and_then(|sensor| self.layout.both_directions(sensor))
+        {
+            line += &format!(", number = {number}");
         } else if let (Some(one), Some(two)) = (self.layout.sensor_at(id), self.layout.sensor_at(other)) {
             let stated =
                 [&node.name, self.layout.node_name(other)].map(|name| ModuleLetters.sensor_named(name));

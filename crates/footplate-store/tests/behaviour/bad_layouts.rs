@@ -167,8 +167,22 @@ fn places_are_named_with_what_is_wrong() {
     );
     assert_eq!(
         complaint(", numbers = [40, 41]", ""),
-        "oval.toml, line 7, column 3: `main` does not imply the sensor's number: add `numbers = [.., ..]`, or \
-         call it A1 to E16"
+        "oval.toml, line 7, column 3: `main` does not imply the sensor's number: add `numbers = [.., ..]`, `number = ..` if it \
+         reports the same number for both directions, or call it A1 to E16"
+    );
+    assert_eq!(
+        complaint("numbers = [40, 41]", "numbers = [40, 40]"),
+        "oval.toml, line 7, column 3: numbers = [40, 40] are one number: write `number = 40` if the sensor reports both \
+         directions under it"
+    );
+    assert_eq!(
+        complaint("numbers = [40, 41]", "numbers = [40, 41], number = 40"),
+        "oval.toml, line 7, column 3: `main` has `number` and `numbers`: keep `number` if it reports the same number for both \
+         directions, `numbers` if it reports one for each"
+    );
+    assert_eq!(
+        complaint("numbers = [40, 41]", "number = 1"),
+        "oval.toml, line 7, column 3: sensor 1 is placed at `A2` and again at `main`"
     );
     assert_eq!(
         complaint("numbers = [40, 41]", "numbers = [40, 1]"),

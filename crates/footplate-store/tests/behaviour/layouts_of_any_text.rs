@@ -100,7 +100,7 @@ fn tables(layout: &Layout) -> (String, String) {
     let name = |node: NodeId| layout.node_name(node);
     for (id, node) in layout.nodes() {
         let (kind, number) = match node.kind {
-            NodeKind::Sensor(sensor) => ("sensor", sensor.0),
+            NodeKind::Sensor(sensor) => ("sensor", layout.input(sensor).0),
             NodeKind::Branch(turnout) => ("branch", turnout.0),
             NodeKind::Merge(turnout) => ("merge", turnout.0),
             NodeKind::Boundary => unreachable!("these layouts have no blocks"),
@@ -146,10 +146,9 @@ fn any_layout() -> impl Strategy<Value = LayoutFile> {
             let mut ahead = "in".to_owned();
             for (number, (long, short, swap_first, swap_last)) in (0_u16..).zip(&sidings) {
                 let names = |name: &str| [format!("{name}{number}"), format!("{name}{number}_back")];
-                for (sensor, contact) in [("P", 0), ("Q", 2)] {
-                    let sensors = [SensorId(4 * number + contact), SensorId(4 * number + contact + 1)];
-                    places.push(Place::Sensor { names: names(sensor), sensors });
-                }
+                let sensors = [SensorId(4 * number), SensorId(4 * number + 1)];
+                places.push(Place::Sensor { names: names("P"), sensors });
+                places.push(Place::UndirectedSensor { names: names("Q"), sensor: SensorId(4 * number + 2) });
                 for (turnout, which) in [("S", 0), ("T", 1)] {
                     places.push(Place::Turnout {
                         names: names(turnout),
@@ -182,7 +181,7 @@ fn any_layout() -> impl Strategy<Value = LayoutFile> {
             });
             // Files list sensors, boundaries, turnouts, ends.
             places.sort_by_key(|place| match place {
-                Place::Sensor { .. } => 0,
+                Place::Sensor { .. } | Place::UndirectedSensor { .. } => 0,
                 Place::Boundary { .. } => 1,
                 Place::Turnout { .. } => 2,
                 Place::End { .. } => 3,

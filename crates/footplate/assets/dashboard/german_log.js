@@ -25,6 +25,7 @@ const LINES = [
   [/^( *[\d.]+ s {2})train (\d+) will be commanded to stop(.*)$/, (_, at, train, more) => `${at}Zug ${train} erhält den Haltbefehl${tailed(more)}`],
   [/^( *[\d.]+ s {2})train (\d+) will be at rest there(.*)$/, (_, at, train, more) => `${at}Zug ${train} wird dort stehen${tailed(more)}`],
   [/^( *[\d.]+ s {2})train (\d+) holds (\S+) mm\/s from here on$/, "$1Zug $2 hält von hier an $3 mm/s"],
+  [/^( *[\d.]+ s {2})(\S+) was reported by train (\d+): the next sensor shows its direction$/, (_, at, sensor, train) => `${at}${sensor} kam von Zug ${train}: seine Richtung zeigt der nächste Rückmelder`],
   [/^( *[\d.]+ s {2})(\S+) was reported by train (\d+) or by (.*): the next reports decide$/, (_, at, sensor, train, or) => `${at}${sensor} kam von Zug ${train} oder ${or === "no train at all" ? "von keinem Zug" : `von ${trains(or)}`}: die nächsten Meldungen entscheiden`],
   [/^train (\d+) comes to rest about (\S+) mm beyond the target: .*$/, "Zug $1 hält etwa $2 mm hinter dem Ziel: es war näher als geschätzt"],
   [/^train (\d+) is held back: it would come too close to train (\d+), .*$/, "Zug $1 wird zurückgehalten: er käme Zug $2 zu nah, oder dessen Position ist unbekannt"],

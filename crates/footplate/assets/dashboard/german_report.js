@@ -43,6 +43,8 @@ const WHYS = {
   "interrupted; the measurements so far are kept": "unterbrochen; die bisherigen Messungen bleiben",
   "the train was not found: no sensor reported it at any step. Check that it is on the track, that the track has power and that the address is right":
     "der Zug wurde nicht gefunden: kein Rückmelder hat ihn bei irgendeiner Fahrstufe gemeldet. Steht er auf dem Gleis, hat das Gleis Strom, stimmt die Adresse?",
+  "the order of the sensors does not show in which direction the train runs: a circuit needs three of them, or one that reports the direction":
+    "die Reihenfolge der Rückmelder zeigt nicht, in welcher Richtung der Zug fährt: ein Kreis braucht drei von ihnen, oder einen, der die Richtung meldet",
   "no circuit can be reached from the train's position: put it on a closed loop": "von seiner Position ist kein Kreis erreichbar: den Zug auf einen geschlossenen Kreis stellen",
   "the sensors report in an order that is impossible on this layout: check `--layout`": "die Rückmelder melden in einer Folge, die es auf dieser Anlage nicht gibt: die Anlage prüfen",
 };

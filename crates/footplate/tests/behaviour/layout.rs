@@ -56,6 +56,26 @@ fn show_as_json_is_the_same_facts() {
 }
 
 #[test]
+fn a_sensor_with_one_number_is_read_written_and_shown() {
+    let folder = folder("undirected");
+    let file = folder.join("line.toml");
+    fs::write(&file, LINE.replace("\"A2\"] }", "\"A2\"], number = 7 }")).unwrap();
+    let checked = footplate(&["layout", "check", text(&file)]);
+    assert!(checked.output.contains("a sound layout of 6 nodes and 4 edges"), "{}", checked.output);
+    let shown = footplate(&["layout", "show", text(&file)]).output;
+    assert!(shown.contains("        1 place reports both directions under one number\n"), "{shown}");
+    // The same number in both rows of the tables is the same sensor.
+    let (nodes, edges, out) = (folder.join("nodes.csv"), folder.join("edges.csv"), folder.join("out.toml"));
+    fs::write(&nodes, NODES.replace("A1,sensor,0,A2\nA2,sensor,1", "A1,sensor,7,A2\nA2,sensor,7")).unwrap();
+    fs::write(&edges, EDGES).unwrap();
+    let tables = ["--nodes", text(&nodes), "--edges", text(&edges), "--out", text(&out)];
+    let imported = footplate(&[&["layout", "import"], &tables[..]].concat());
+    assert_eq!(imported.status, 0, "{}", imported.errors);
+    let written = fs::read_to_string(&out).unwrap();
+    assert!(written.contains("{ names = [\"A1\", \"A2\"], number = 7 },"), "{written}");
+}
+
+#[test]
 fn speed_restrictions_are_shown() {
     let folder = folder("zones");
     let file = folder.join("line.toml");

@@ -72,6 +72,11 @@ impl Ambiguity {
         Self { detection, is_assigned: false, probability, branches, until: Some(now + RESOLVE_WITHIN) }
     }
 
+    /// A detection of a train in a direction that is not known. Only another sensor shows it, however long the train takes to get there.
+    pub(super) fn of_direction(self) -> Self {
+        Self { until: None, ..self }
+    }
+
     /// A detection that was assigned to a train, with the branch in which that train did not cause it. Branches of an
     /// earlier assignment are kept.
     pub(super) fn assigned(now: Timestamp, not_passed: Branch, before: Option<Self>) -> Self {
@@ -107,7 +112,7 @@ impl Branch {
         let train = trains.get(&explanation.train())?;
         let mut branch =
             Self { caused: true, missed_sensor: None, ..Self::before(train, detection, probability) };
-        branch.pass(trains, context, detection, explanation);
+        branch.pass(trains, context, detection, hypothesis);
         Some(branch)
     }
 
@@ -194,7 +199,7 @@ impl Branch {
             && one.log_density > log_spurious
             && one.explanation.train() == self.train
         {
-            self.pass(trains, context, detection, one.explanation);
+            self.pass(trains, context, detection, one);
         }
     }
 
@@ -203,9 +208,10 @@ impl Branch {
         trains: &BTreeMap<TrainId, DrivenTrain>,
         context: TrackContext<'_>,
         detection: Detection,
-        explanation: Explanation,
+        &Hypothesis { explanation, sensor, .. }: &Hypothesis,
     ) {
         let Some(train) = trains.get(&self.train) else { return };
+        let detection = Detection { sensor, ..detection };
         match explanation {
             Explanation::Turnout { turnout, leg, .. } => self.legs.push((turnout, leg)),
             Explanation::Strayed(_) => self.locator.lose(),

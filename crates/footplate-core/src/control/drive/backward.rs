@@ -75,7 +75,11 @@ impl Driver {
         let context = self.track.context();
         let claim = |train: &DrivenTrain| {
             let missed = train.missed_share(context, time);
-            train.backward.as_ref()?.claim(context, &train.model, sensor, window, missed)
+            let backward = train.backward.as_ref()?;
+            let meanings = context.layout.meanings(sensor);
+            let claims =
+                meanings.filter_map(|one| backward.claim(context, &train.model, one, window, missed));
+            claims.max_by(f64::total_cmp)
         };
         let claims = self.trains.values().filter_map(|train| Some((train.id(), claim(train)?)));
         let (train, density) = claims.max_by(|(_, one), (_, other)| one.total_cmp(other))?;

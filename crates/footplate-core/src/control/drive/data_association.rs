@@ -35,7 +35,9 @@ const UNUSUAL: f64 = -3.0;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Association {
     /// One train caused it.
-    Explained(Explanation),
+    Explained(Hypothesis),
+    /// This train caused it, and its direction of travel is not known; later detections decide.
+    EitherDirection(TrainId),
     /// Two trains, or one and a fault, may have caused it; later detections decide.
     Ambiguous { likeliest: TrainId, or: Option<TrainId> },
     /// No train can have caused it.
@@ -96,11 +98,10 @@ impl DataAssociation {
     /// The train that is probably not where it was estimated, but at the sensor of the ambiguous detection.
     pub(super) fn probably_strayed(&self) -> Option<TrainId> {
         let ambiguity = self.ambiguity.as_ref().filter(|ambiguity| !ambiguity.is_assigned)?;
-        let strayed = ambiguity.branches.iter().filter(|branch| branch.has_strayed());
-        strayed
-            .max_by(|one, other| one.probability.total_cmp(&other.probability))
-            .filter(|one| one.probability >= ASSIGNED_FROM)
-            .map(|one| one.train)
+        let strayed = || ambiguity.branches.iter().filter(|branch| branch.has_strayed());
+        // In either direction.
+        let of = |train| strayed().filter(|one| one.train == train).map(|one| one.probability).sum::<f64>();
+        strayed().map(|one| one.train).find(|train| of(*train) >= ASSIGNED_FROM)
     }
 
     /// The detections that a train has probably caused elsewhere, although they were assigned to no train: a sensor has been silent
@@ -196,6 +197,16 @@ impl DataAssociation {
         None
     }
 
+    /// The branch in which a train passed a sensor, of a detection in an unknown direction.
+    pub(super) fn take_direction(&mut self, train: TrainId, sensor: SensorId) -> Option<Branch> {
+        let is_it = |branch: &Branch| {
+            let first = branch.passes.first();
+            branch.train == train && first.is_some_and(|pass| pass.detection.sensor == sensor)
+        };
+        let ambiguity = self.ambiguity.take_if(|ambiguity| ambiguity.branches.iter().any(is_it))?;
+        ambiguity.branches.into_iter().find(is_it)
+    }
+
     /// Associates a detection with a train, if one is probable enough.
     pub(super) fn associate(
         &mut self,
@@ -208,9 +219,9 @@ impl DataAssociation {
         let spurious = libm::exp(self.faults.log_rate(detection.sensor, now));
         let density = |one: &Hypothesis| libm::exp(one.log_density);
         let all = spurious + found.iter().map(density).sum::<f64>();
-        let mut of_trains: Vec<(TrainId, f64)> = Vec::new();
+        let mut of_trains: Vec<((TrainId, SensorId), f64)> = Vec::new();
         for one in &found {
-            let train = one.explanation.train();
+            let train = (one.explanation.train(), one.sensor);
             match of_trains.iter_mut().find(|(known, _)| *known == train) {
                 Some((_, probability)) => *probability += density(one) / all,
                 None => of_trains.push((train, density(one) / all)),
@@ -218,8 +229,8 @@ impl DataAssociation {
         }
         of_trains.sort_by(|(_, one), (_, other)| other.total_cmp(one));
         let best = of_trains.first().copied();
-        let likeliest_of = |train: TrainId| {
-            let own = found.iter().filter(move |one| one.explanation.train() == train);
+        let likeliest_of = |train: (TrainId, SensorId)| {
+            let own = found.iter().filter(move |one| (one.explanation.train(), one.sensor) == train);
             own.max_by(|one, other| one.log_density.total_cmp(&other.log_density))
         };
         let enough =
@@ -235,18 +246,18 @@ impl DataAssociation {
                         !ambiguity.is_assigned || ambiguity.probability < ASSIGNED_FROM
                     }) {
                         // An earlier ambiguity may explain this one better once it is resolved.
-                        return Association::Ambiguous { likeliest: train, or: None };
+                        return Association::Ambiguous { likeliest: one.explanation.train(), or: None };
                     }
-                    if let Some(train) = trains.get(&train) {
+                    if let Some(train) = trains.get(&one.explanation.train()) {
                         let not_passed =
                             Branch::not_passing(train, context, detection, &one.explanation, spurious / all);
                         self.ambiguity = Some(Ambiguity::assigned(now, not_passed, self.ambiguity.take()));
                     }
                 }
-                return Association::Explained(one.explanation);
+                return Association::Explained(*one);
             }
         }
-        let Some((likeliest, _)) = best.filter(|_| spurious < ASSIGNED_FROM * all) else {
+        let Some(((likeliest, _), _)) = best.filter(|_| spurious < ASSIGNED_FROM * all) else {
             return self.unexplained(detection, &found, all);
         };
         if self.faults.is_stuck(detection.sensor) {
@@ -258,9 +269,18 @@ impl DataAssociation {
             .filter(|one| density(one) >= NEGLIGIBLE * all)
             .filter_map(|one| Branch::passing(trains, context, detection, one, density(one) / all));
         // Only one ambiguity is kept: this one replaces an older one that the detection did not resolve.
-        self.ambiguity = Some(Ambiguity::unassigned(now, detection, spurious / all, branches.collect()));
-        let second = of_trains.get(1).filter(|(_, probability)| *probability >= spurious / all);
-        Association::Ambiguous { likeliest, or: second.map(|(train, _)| *train) }
+        let ambiguity = Ambiguity::unassigned(now, detection, spurious / all, branches.collect());
+        let of_likeliest =
+            |one: &&Hypothesis| matches!(one.explanation, Explanation::Train(train) if train == likeliest);
+        if found.iter().filter(of_likeliest).map(density).sum::<f64>() >= ASSIGNED_FROM * all {
+            self.faults.note_explained(detection.sensor, now);
+            self.ambiguity = Some(ambiguity.of_direction());
+            return Association::EitherDirection(likeliest);
+        }
+        self.ambiguity = Some(ambiguity);
+        let mut others = of_trains.iter().filter(|((train, _), _)| *train != likeliest);
+        let second = others.next().filter(|(_, probability)| *probability >= spurious / all);
+        Association::Ambiguous { likeliest, or: second.map(|((train, _), _)| *train) }
     }
 
     fn unexplained(&mut self, detection: Detection, found: &[Hypothesis], all: f64) -> Association {

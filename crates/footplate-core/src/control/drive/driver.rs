@@ -16,7 +16,7 @@ use crate::units::Length;
 use super::ambiguity::Branch;
 use super::data_association::{Association, DataAssociation, Resolution};
 use super::driven_train::DrivenTrain;
-use super::hypotheses::{Detection, Explanation};
+use super::hypotheses::{Detection, Explanation, Hypothesis};
 use super::order::{Aim, Order, OrderId, StopOrder};
 use super::outputs::Outputs;
 use super::path::KnownTrack;
@@ -346,7 +346,12 @@ impl Driver {
             None => {}
         }
         match self.association.associate(&self.trains, self.track.context(), now, detection) {
-            Association::Explained(explanation) => self.passed(now, detection, explanation),
+            Association::Explained(Hypothesis { explanation, sensor, .. }) => {
+                self.passed(now, Detection { sensor, ..detection }, explanation);
+            }
+            Association::EitherDirection(train) => {
+                self.outputs.notify(Notice::EitherDirection { train, sensor, time });
+            }
             Association::Ambiguous { likeliest, or } => {
                 self.outputs.notify(Notice::Ambiguous { sensor, time, likeliest, or });
             }
@@ -381,7 +386,7 @@ impl Driver {
     }
 
     /// Corrects a train after later detections have shown that it caused an earlier one, or that it did not.
-    fn revise(&mut self, now: Timestamp, branch: Branch) {
+    pub(super) fn revise(&mut self, now: Timestamp, branch: Branch) {
         let Branch { detection, caused, train, passes, legs, locator, missed_sensor, ends, .. } = branch;
         if !caused {
             let Detection { sensor, window } = detection;

@@ -65,11 +65,25 @@ impl Explanation {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Hypothesis {
     pub(super) explanation: Explanation,
+    /// The sensor that the train passed: one of its two directions, where it does not report the direction.
+    pub(super) sensor: SensorId,
     pub(super) log_density: f64,
 }
 
 /// All hypotheses in which a train caused a detection.
 pub(super) fn hypotheses(
+    trains: &BTreeMap<TrainId, DrivenTrain>,
+    context: TrackContext<'_>,
+    now: Timestamp,
+    detection: Detection,
+) -> Vec<Hypothesis> {
+    let meanings = context.layout.meanings(detection.sensor);
+    let of = |sensor| hypotheses_of(trains, context, now, Detection { sensor, ..detection });
+    meanings.flat_map(of).collect()
+}
+
+/// The hypotheses in which a train passed a sensor in its direction.
+fn hypotheses_of(
     trains: &BTreeMap<TrainId, DrivenTrain>,
     context: TrackContext<'_>,
     now: Timestamp,
@@ -81,7 +95,7 @@ pub(super) fn hypotheses(
         let anywhere = log_density_if_lost(train, context);
         let mut add = |explanation, log_density: f64| {
             if log_density.is_finite() {
-                found.push(Hypothesis { explanation, log_density });
+                found.push(Hypothesis { explanation, sensor: detection.sensor, log_density });
             }
         };
         if !train.locator.is_located() {

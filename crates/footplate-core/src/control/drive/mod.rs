@@ -11,6 +11,7 @@ mod blocks;
 mod command_time;
 mod data_association;
 mod detections;
+mod direction;
 mod driven_train;
 mod driver;
 mod ends;

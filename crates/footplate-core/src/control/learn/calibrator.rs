@@ -259,6 +259,11 @@ impl<'l> Calibrator<'l> {
         let window = DetectionWindow { after: event.time - interval, until: event.time };
         let context =
             TrackContext { layout: self.layout, sections: &self.sections, turnouts: &self.turnouts };
+        let Some(sensor) = self.tracker.passed(context, report.sensor) else {
+            return self.found_without_direction(now);
+        };
+        let report = Report { sensor, ..report };
+        let event = &Event { kind: EventKind::Sensor(report), ..*event };
         let model = self.fit.model();
         let before = self.tracker.last();
         match self.tracker.classify(context, &self.locator, model, report.sensor, window) {

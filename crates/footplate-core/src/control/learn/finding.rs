@@ -55,6 +55,10 @@ const LONGEST_JOIN: TimeSpan = TimeSpan::from_ms(150_000);
 /// Margin added to every distance that must be clear.
 const MARGIN: Length = Length::from_mm(100.0);
 
+/// So many sensors in a row leave the direction of a train open only where their order is the same in both: on a circuit of three, one
+/// that is silent costs three more.
+const MOST_UNDECIDED: usize = 8;
+
 /// A turnout is requested again after this time.
 const ASK_AGAIN: TimeSpan = TimeSpan::from_ms(3_000);
 
@@ -109,6 +113,16 @@ impl Calibrator<'_> {
         self.issue(now, step);
         self.activity = Activity::Finding { push_at: now + self.push_up_after() };
         self.report_progress(now);
+    }
+
+    /// A sensor that does not report the direction reported the lost train: the next ones show where it runs.
+    pub(super) fn found_without_direction(&mut self, now: Timestamp) {
+        if self.tracker.undecided() >= MOST_UNDECIDED {
+            return self.end(now, Ending::NoDirection);
+        }
+        if matches!(self.activity, Activity::Finding { .. }) {
+            self.activity = Activity::Finding { push_at: now + self.push_up_after() };
+        }
     }
 
     fn finding_step(&self) -> SpeedStep {
@@ -172,6 +186,7 @@ impl Calibrator<'_> {
         };
         self.fit.take(self.layout, &self.turnouts, event);
         self.locator.handle_command(context, self.fit.model(), event);
+        self.tracker.reverse(context);
         if matches!(self.activity, Activity::Reversing { .. }) {
             self.find(now);
         }

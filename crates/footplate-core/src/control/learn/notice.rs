@@ -151,6 +151,8 @@ pub enum Ending {
     Told,
     /// The train could not be found: no sensor reported it, at any step and in either direction.
     NotFound,
+    /// Sensors that do not report the direction do not show it by their order either.
+    NoDirection,
     /// No circuit can be reached from where the train is, in either direction.
     NoCircuit,
     /// Turnouts of the circuit could not be set: the train is always too near to them.

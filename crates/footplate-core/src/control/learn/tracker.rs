@@ -8,7 +8,7 @@ use crate::ids::{NodeId, SensorId, TurnoutId};
 use crate::link::DetectionWindow;
 use crate::model::MotionModel;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Layout, Leg, Reach, TurnoutStates};
+use crate::track::{DirectionFinder, Layout, Leg, Reach, TurnoutStates};
 use crate::tracking::{Locator, TrackContext};
 use crate::units::{Length, Speed};
 
@@ -55,6 +55,7 @@ pub(super) enum ReportClass {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tracker {
     last: Option<(NodeId, Timestamp)>,
+    directions: DirectionFinder,
     /// A sensor that reported where the train cannot have run; it may have been moved there.
     elsewhere: Option<(NodeId, Timestamp)>,
     reported: BTreeMap<SensorId, Timestamp>,
@@ -77,6 +78,32 @@ impl Tracker {
     pub(super) fn lose(&mut self) {
         self.last = None;
         self.elsewhere = None;
+        self.directions.lose();
+    }
+
+    /// The train reverses.
+    pub(super) fn reverse(&mut self, context: TrackContext<'_>) {
+        self.directions.reverse(context.layout, context.turnouts);
+    }
+
+    /// How many sensors in a row have left the direction of the train open.
+    pub(super) const fn undecided(&self) -> usize {
+        self.directions.undecided()
+    }
+
+    /// The sensor that the train passed if one is reported; `None` for a lost train whose direction that does not show.
+    pub(super) fn passed(&mut self, context: TrackContext<'_>, reported: SensorId) -> Option<SensorId> {
+        let TrackContext { layout, turnouts, .. } = context;
+        let found = self.directions.passed(layout, turnouts, reported);
+        let Some(last) = self.last() else { return found };
+        let reached = |turnouts: &TurnoutStates, missed| {
+            let reaches = layout.reaches(last, turnouts, missed);
+            let meant =
+                reaches.filter(|reach| layout.meanings(reported).any(|one| Some(one) == reach.sensor));
+            meant.min_by_key(Reach::missed).and_then(|reach| reach.sensor)
+        };
+        let by_other_leg = || reached(&TurnoutStates::unknown(), 0);
+        reached(turnouts, MAX_MISSED).or_else(by_other_leg).or(found).or(Some(reported))
     }
 
     /// Classifies a report.

@@ -107,8 +107,10 @@ impl Watchdog {
     pub(super) fn is_clear_ahead(&self, now: Timestamp, train: TrainId) -> bool {
         let Some(seen) = self.seen.get(&train) else { return false };
         let closed = self.closed_to(now, train);
-        let ahead = Ahead { run: self.unheard_run(now, train), sensors: SENSORS_AHEAD };
         let layout = self.driver.layout();
+        // Where sensors do not report the direction, it takes one more.
+        let sensors = SENSORS_AHEAD + usize::from(layout.has_undirected_sensors());
+        let ahead = Ahead { run: self.unheard_run(now, train), sensors };
         let back = layout.reversed(*seen).filter(|_| self.undirected.contains(&train));
         let begins = core::iter::once(*seen).chain(back).map(|place| (place.edge, place.offset)).collect();
         reports_before(layout, self.driver.turnouts(), begins, ahead, &closed)

@@ -1,6 +1,6 @@
 //! A train that is probably not where it was estimated: it is stopped, and searched from where it was detected.
 
-use crate::ids::{SensorId, TrainId};
+use crate::ids::{NodeId, SensorId, TrainId};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::Position;
 use crate::units::Length;
@@ -93,7 +93,7 @@ impl Watchdog {
         let layout = self.driver.layout();
         let Some(node) = layout.sensor_node(sensor) else { return };
         let Some(edge) = layout.outgoing(node).edges().next() else { return };
-        if layout.sensor_at(node.reverse()).is_none() {
+        if layout.sensor_at(node.reverse()).is_none() || layout.both_directions(sensor).is_some() {
             self.undirected.insert(train);
         } else {
             self.undirected.remove(&train);
@@ -101,5 +101,25 @@ impl Watchdog {
         self.seen.insert(train, Position { edge, offset: Length::ZERO });
         self.behind.insert(train, Behind { sensor: node, trails_otherwise: false, was_placed: false });
         self.note_detection(train, time);
+    }
+
+    /// A train was detected in a direction that is not known. One that creeps back is known to have reversed: it passes the sensor that
+    /// reported it last or, if it stood on that, the next one.
+    pub(super) fn direction_unknown(&mut self, now: Timestamp, train: TrainId, sensor: SensorId) {
+        let may_be_turned = self.undirected.contains(&train);
+        let Some(Recovery { phase: Phase::Locating { pushed, seen, .. }, .. }) = self.dangers.get_mut(&train)
+        else {
+            return;
+        };
+        *pushed = now;
+        let layout = self.driver.layout();
+        let is_it =
+            |node: &NodeId| layout.meanings(sensor).any(|meant| layout.sensor_at(*node) == Some(meant));
+        let behind = seen.filter(|_| !may_be_turned);
+        let next = behind.into_iter().flat_map(|seen| layout.open_hops_from(seen, self.driver.turnouts()));
+        let found = behind.into_iter().chain(next.map(|hop| hop.to)).find(is_it);
+        if let Some(node) = found {
+            self.driver.decide_direction(now, train, node);
+        }
     }
 }

@@ -306,9 +306,10 @@ impl Watchdog {
             Notice::Unexplained { sensor, time } if self.refute(now, *sensor, *time) => {}
             Notice::Unexplained { sensor, .. } if self.is_watching && self.is_noise(now, *sensor) => {}
             Notice::Unexplained { sensor, time } if self.is_watching => {
+                let is_meant = |ahead| self.driver.layout().meanings(*sensor).any(|meant| meant == ahead);
                 let stray = |train: &TrainId| {
                     self.stops.should_be_at_rest(*train, now)
-                        && self.driver.sensor_ahead(*train, now) == Some(*sensor)
+                        && self.driver.sensor_ahead(*train, now).is_some_and(is_meant)
                 };
                 let stray = self.driver.trains().find(stray);
                 if let Some(train) = stray {
@@ -324,6 +325,11 @@ impl Watchdog {
                 let (train, silent) = (*train, *sensor);
                 self.notify(notice);
                 return self.compare_with_unexplained(now, train, silent);
+            }
+            Notice::EitherDirection { train, sensor, .. } => {
+                let (train, sensor) = (*train, *sensor);
+                self.notify(notice);
+                return self.direction_unknown(now, train, sensor);
             }
             Notice::Ambiguous { sensor, time, likeliest, or } => {
                 let (train, is_spurious) = (*likeliest, or.is_none());

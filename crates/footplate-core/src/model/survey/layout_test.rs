@@ -13,7 +13,7 @@ use super::survey_test::{SurveyTest, median};
 use crate::event::{Event, EventKind};
 use crate::ids::NodeId;
 use crate::time::{TimeSpan, Timestamp};
-use crate::track::{Layout, Leg, SequenceTest, SequenceVerdict, TurnoutStates};
+use crate::track::{DirectionFinder, Layout, Leg, SequenceTest, SequenceVerdict, TurnoutStates};
 
 /// A train runs steadily this long after its last command (the longest changes of the published trains take 4 s).
 const SETTLES: TimeSpan = TimeSpan::from_ms(4_000);
@@ -33,6 +33,7 @@ const SCATTER: f64 = 0.013;
 pub struct LayoutTest {
     sequence: SequenceTest,
     turnouts: TurnoutStates,
+    directions: DirectionFinder,
     last: Option<(NodeId, Timestamp)>,
     steady_from: Timestamp,
     /// Sections of the present stretch of running, with `ln(t/m)`.
@@ -53,6 +54,7 @@ impl LayoutTest {
         self.end_stretch();
         self.sequence.begin_run_at_rest(trains);
         self.turnouts = TurnoutStates::unknown();
+        self.directions.lose();
         (self.last, self.steady_from) = (None, Timestamp::from_ns(i64::MIN));
     }
 
@@ -75,12 +77,16 @@ impl LayoutTest {
         self.sequence.take(layout, event);
         match event.kind {
             EventKind::Sensor(report) => {
-                if let Some(node) = layout.sensor_node(report.sensor) {
+                let passed = self.directions.passed(layout, &self.turnouts, report.sensor);
+                if let Some(node) = passed.and_then(|sensor| layout.sensor_node(sensor)) {
                     self.pass(layout, sections, node, event.time);
                 }
             }
             EventKind::Turnout { turnout, curved } => self.turnouts.set(turnout, Leg::from_curved(curved)),
             EventKind::Speed { .. } | EventKind::Reverse { .. } => {
+                if matches!(event.kind, EventKind::Reverse { .. }) {
+                    self.directions.reverse(layout, &self.turnouts);
+                }
                 self.end_stretch();
                 (self.last, self.steady_from) = (None, event.time + SETTLES);
             }

@@ -153,6 +153,11 @@ impl NoticeFormatter<'_> {
                     self.sensor(*sensor)
                 )
             }
+            Notice::EitherDirection { train, sensor, time } => format!(
+                "{}  {} was reported by train {train}: the next sensor shows its direction",
+                self.at(*time),
+                self.sensor(*sensor)
+            ),
             Notice::SensorStuck { sensor } => format!(
                 "{} reports repeatedly where no train can be: it is ignored until it behaves",
                 self.sensor(*sensor)

@@ -66,6 +66,12 @@ fn write_words(file: &LayoutFile, output: &mut dyn Write) -> anyhow::Result<()> 
         0 => writeln!(output)?,
         boundaries => writeln!(output, ", {boundaries} boundaries")?,
     }
+    let undirected = layout.sensors().filter(|(sensor, _)| layout.both_directions(*sensor).is_some()).count();
+    match undirected / 2 {
+        0 => {}
+        1 => writeln!(output, "        1 place reports both directions under one number")?,
+        places => writeln!(output, "        {places} places report both directions under one number")?,
+    }
     let known = || layout.edges().filter(|(_, edge)| edge.known != StretchLength::Unknown);
     let (shortest, longest) = range_mm(known().map(|(_, edge)| edge.length.as_mm()));
     let unknown = layout.edges().len() - known().count();

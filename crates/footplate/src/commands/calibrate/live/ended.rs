@@ -27,7 +27,9 @@ impl Why {
         !matches!(
             self,
             Self::OtherLayout { .. }
-                | Self::Ended(Ending::WrongLayout { .. } | Ending::NotFound | Ending::NoCircuit)
+                | Self::Ended(
+                    Ending::WrongLayout { .. } | Ending::NotFound | Ending::NoDirection | Ending::NoCircuit
+                )
         )
     }
 
@@ -38,6 +40,7 @@ impl Why {
             Self::Ended(Ending::NothingToGain) => "nothing-to-gain",
             Self::Ended(Ending::Told) | Self::Interrupted => "interrupted",
             Self::Ended(Ending::NotFound) => "not-found",
+            Self::Ended(Ending::NoDirection) => "no-direction",
             Self::Ended(Ending::NoCircuit) => "no-circuit",
             Self::Ended(Ending::TurnoutsUnset) => "turnouts-unset",
             Self::Ended(Ending::WrongLayout { .. }) | Self::OtherLayout { .. } => "wrong-layout",
@@ -62,6 +65,10 @@ impl Display for Why {
             Self::Ended(Ending::NotFound) => f.write_str(
                 "the train was not found: no sensor reported it at any step. Check that it is on the \
                  track, that the track has power and that the address is right",
+            ),
+            Self::Ended(Ending::NoDirection) => f.write_str(
+                "the order of the sensors does not show in which direction the train runs: a circuit needs three of them, or one \
+                 that reports the direction",
             ),
             Self::Ended(Ending::NoCircuit) => {
                 f.write_str("no circuit can be reached from the train's position: put it on a closed loop")
