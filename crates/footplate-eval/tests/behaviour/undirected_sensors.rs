@@ -123,7 +123,6 @@ fn session(layout: &Layout, seed: u64) -> Session {
 
 #[test]
 fn stops_are_as_exact_and_detections_as_certain_as_where_sensors_report_the_direction() {
-    // 95 % of the stops on the same layout with directions are within 38 mm, and all within 60 mm (seeds 9301 to 9312).
     let every = undirected("track-b", |_| true);
     let some = undirected("track-b", |number| number % 4 == 0);
     for (layout, seeds) in [(&every, 9_201..9_204), (&some, 9_204..9_207)] {

@@ -77,7 +77,7 @@ impl Learning {
     }
 
     /// Takes in a detection of a train. A train that has only just been located has no known earlier position.
-    fn passed(&mut self, train: TrainId, driver: &Driver, passed: &PassedSensor) {
+    pub fn passed(&mut self, train: TrainId, driver: &Driver, passed: &PassedSensor) {
         if passed.late.is_none()
             && let Some(fit) = self.fits.get_mut(&train)
         {

@@ -231,32 +231,6 @@ mod tests {
         assert_eq!(windows.speed(Range::exactly(0.0338), Range { low: -1.0, high: 1.0 }), Range::ANY);
     }
 
-    #[test]
-    fn the_mean_speed_is_of_a_quarter_of_a_second_and_dated_to_its_middle() {
-        let mut windows = CountWindows::new(0.05);
-        // Four pulses of 20 mm in 50 ms are 1.6 m/s. Five periods are six readings.
-        for reading in 0..6 {
-            assert_eq!(windows.mean_speed(0.02), None, "{reading} readings");
-            windows.counted(0.05, 4.0, 0.0);
-        }
-        let near = |found: Option<(f64, f64)>, speed: f64, half: f64| {
-            found.is_some_and(|(v, h)| (v - speed).abs() < 1e-9 && (h - half).abs() < 1e-9)
-        };
-        assert!(near(windows.mean_speed(0.02), 1.6, 0.125), "{:?}", windows.mean_speed(0.02));
-        // Backwards, with one reading of which any count may be wrong: 16 less 3 pulses of 30 mm in the window.
-        windows.counted(0.05, -3.0, 2.0);
-        let mean = (4.0 * 4.0 - 3.0) * 0.03 / 0.25;
-        assert!(near(windows.mean_speed(0.03), mean, 0.125), "{:?}", windows.mean_speed(0.03));
-        windows.reverse();
-        assert!(near(windows.mean_speed(0.03), -mean, 0.125), "{:?}", windows.mean_speed(0.03));
-        windows.interrupt();
-        assert_eq!(windows.mean_speed(0.02), None);
-        // Read every 80 ms instead, it takes the same five readings: 0.4 s.
-        let mut windows = CountWindows::new(0.05);
-        (0..6).for_each(|_| windows.counted(0.08, 4.0, 0.0));
-        assert!(near(windows.mean_speed(0.02), 1.0, 0.2), "{:?}", windows.mean_speed(0.02));
-    }
-
     /// Every window by itself, each with all cases minded.
     fn asked_one_by_one(windows: &CountWindows, pitch: Range, acceleration: Range) -> Range {
         let mut speed = Range::ANY;
