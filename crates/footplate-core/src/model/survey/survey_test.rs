@@ -80,7 +80,7 @@ impl SurveyTest {
         let is_doubted = usual.factor > doubted;
         let part =
             PER_MEDIAN * median(known.iter().map(|one| usual.off(one).abs() / one.surveyed)).unwrap_or(0.0);
-        // What chance may do is no sign of anything in common: the scale is as sure as before where doubt begins.
+        // What chance may do is no sign of anything in common: the scale is as sure as before at that limit.
         let chance = doubted / usual.factor;
         let scale = if is_doubted { part * libm::sqrt(1.0 - chance * chance) } else { 0.0 };
         let mut odd: Vec<&Compared> = known.iter().filter(|one| !usual.agrees(one)).collect();
@@ -225,7 +225,7 @@ mod tests {
     #[test]
     fn the_common_scale_is_as_unsure_as_the_lengths_are_off_beyond_chance() {
         assert_eq!((off_by(2.0).factor, off_by(2.0).scale), (1.0, 0.0));
-        // Of ten sections doubt begins at 2.48: the scale is as sure as before there, and as unsure as the lengths where they are far off.
+        // Of ten sections the limit is 2.48: the scale is as sure as before there, and as unsure as the lengths where they are far off.
         for (by, factor, scale) in [(2.2, 2.501, 0.0085), (2.5, 2.840, 0.0365), (8.0, 8.946, 0.2270)] {
             let test = off_by(by);
             assert!(
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn chance_alone_doubts_one_survey_in_a_thousand_however_few_sections_there_are() {
+    fn chance_alone_fails_one_survey_in_a_thousand_however_few_sections_there_are() {
         let sections = SectionIndex::of(&oval());
         let mut draws = 1_u64;
         // The sum of twelve uniform values has deviation 1 (Knuth's generator MMIX).
@@ -250,9 +250,9 @@ mod tests {
         for known in FEWEST..=sections.len() {
             let mut doubted = 0;
             for _ in 0..2_000 {
-                let felt: Vec<_> =
+                let lengths: Vec<_> =
                     (0..known).map(|section| (section, normal() * sd(&sections, section), 0.0)).collect();
-                doubted += u32::from(SurveyTest::of(&sections, felt.into_iter()).factor > 1.0);
+                doubted += u32::from(SurveyTest::of(&sections, lengths.into_iter()).factor > 1.0);
             }
             assert!(doubted <= 8, "{doubted} of 2000 with {known} sections");
         }
