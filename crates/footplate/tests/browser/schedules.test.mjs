@@ -41,8 +41,8 @@ test("a schedule is written stop by stop, checked, saved and run line by line", 
   await page.click("#schedule-save");
   await until(page, () => document.querySelector("#schedule-answer.bad"));
   const mistakes = await page.locator("#schedule-answer").textContent();
-  assert.match(mistakes, /line 4, column 10: `onn` should be `on` or `off`/);
-  assert.match(mistakes, /line 5: `quit` is not for schedules/);
+  assert.match(mistakes, /line 4, column 10: onn should be on or off/);
+  assert.match(mistakes, /line 5: quit is not for schedules/);
   await page.fill("#schedule-lines", "go 24 to C13+300mm\nwait 24 at rest\nwait 2s\nlight 24 on");
   await page.fill("#schedule-rounds", "2");
   await page.click("#schedule-save");
@@ -97,14 +97,14 @@ test("the prompt lists, begins and ends saved schedules by name", async () => {
   };
   const log = (what) => until(page, (text) => document.querySelector("#said").textContent.includes(text), what);
   await give("schedule run Round and rund");
-  await until(page, () => /did you mean `Round and round`/.test(document.querySelector("#answer").textContent));
+  await until(page, () => /did you mean Round and round/.test(document.querySelector("#answer").textContent));
   await give('schedule run "Round and round"');
-  await log("schedule `Round and round` begins");
+  await log("schedule Round and round begins");
   await give("schedule list");
-  await log("schedule `Round and round` runs: round");
-  await log("schedule `Evening` is saved");
+  await log("schedule Round and round runs: round");
+  await log("schedule Evening is saved");
   await give("schedule end Round and round");
-  await log("schedule `Round and round` was ended");
+  await log("schedule Round and round was ended");
   // The next line is written while the answer to the last one is on its way.
   await page.route("**/api/orders", async (route) => {
     const response = await route.fetch();
