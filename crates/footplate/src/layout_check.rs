@@ -140,7 +140,7 @@ fn mean_speeds(layout: &Layout, run: &Run) -> impl Iterator<Item = f64> {
         let EventKind::Sensor(report) = raw.event.kind else { return None };
         let (from, left) = before.replace((report.sensor, raw.event.time))?;
         let mut hops = hops_after(layout, from);
-        let hop = hops.find(|hop| layout.meanings(report.sensor).any(|meant| hop.sensor == Some(meant)))?;
+        let hop = hops.find(|hop| hop.sensor.is_some_and(|passed| layout.may_mean(report.sensor, passed)))?;
         let took = (raw.event.time - left).as_s();
         (took > 0.0 && hop.length > Length::ZERO).then(|| hop.length.as_mm() / took)
     })

@@ -42,6 +42,12 @@ impl Layout {
         one.into_iter().chain(other)
     }
 
+    /// Whether a report of one sensor may be of a train that passed the other: the same, or its other direction.
+    #[must_use]
+    pub fn may_mean(&self, reported: SensorId, passed: SensorId) -> bool {
+        self.meanings(reported).any(|one| one == passed)
+    }
+
     /// Whether no station reports this number, although a place has it: the entry of a block, or the second direction of a sensor.
     #[must_use]
     pub fn is_never_reported(&self, sensor: SensorId) -> bool {

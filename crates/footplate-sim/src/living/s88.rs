@@ -71,7 +71,7 @@ impl S88 {
         let both = |(sensor, _)| layout.both_directions(sensor).map(|[number, _]| (sensor, number));
         let inputs: BTreeMap<SensorId, SensorId> = layout.sensors().filter_map(both).collect();
         let mut sensors = detectors.inputs(layout);
-        sensors.retain(|sensor| inputs.get(sensor).is_none_or(|number| number == sensor));
+        sensors.retain(|sensor| !layout.is_never_reported(*sensor));
         let count = sensors.iter().map(|sensor| usize::from(sensor.0) + 1).max().unwrap_or(0);
         let mut states = vec![(0, false); count];
         if stale {

@@ -1,4 +1,4 @@
-//! The direction of a train that a sensor has reported which does not report it, if somebody else knows it.
+//! The direction of a train that was detected without one, where its recovery knows it.
 
 use crate::ids::{NodeId, TrainId};
 use crate::time::Timestamp;

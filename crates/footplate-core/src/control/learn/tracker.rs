@@ -99,7 +99,7 @@ impl Tracker {
         let reached = |turnouts: &TurnoutStates, missed| {
             let reaches = layout.reaches(last, turnouts, missed);
             let meant =
-                reaches.filter(|reach| layout.meanings(reported).any(|one| Some(one) == reach.sensor));
+                reaches.filter(|reach| reach.sensor.is_some_and(|passed| layout.may_mean(reported, passed)));
             meant.min_by_key(Reach::missed).and_then(|reach| reach.sensor)
         };
         let by_other_leg = || reached(&TurnoutStates::unknown(), 0);

@@ -35,8 +35,8 @@ impl Intruder {
 pub(super) fn are_adjacent(layout: &Layout, one: SensorId, other: SensorId) -> bool {
     let Some(node) = layout.sensor_node(one) else { return false };
     let hops = [node, node.reverse()].into_iter().flat_map(|node| layout.hops_from(node));
-    let is_other = |sensor: SensorId| layout.meanings(other).any(|meant| meant == sensor);
-    one != other && hops.into_iter().any(|hop| hop.sensor.is_some_and(is_other))
+    one != other
+        && hops.into_iter().any(|hop| hop.sensor.is_some_and(|passed| layout.may_mean(other, passed)))
 }
 
 #[cfg(test)]

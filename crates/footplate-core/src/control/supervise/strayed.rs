@@ -114,7 +114,7 @@ impl Watchdog {
         *pushed = now;
         let layout = self.driver.layout();
         let is_it =
-            |node: &NodeId| layout.meanings(sensor).any(|meant| layout.sensor_at(*node) == Some(meant));
+            |node: &NodeId| layout.sensor_at(*node).is_some_and(|passed| layout.may_mean(sensor, passed));
         let behind = seen.filter(|_| !may_be_turned);
         let next = behind.into_iter().flat_map(|seen| layout.open_hops_from(seen, self.driver.turnouts()));
         let found = behind.into_iter().chain(next.map(|hop| hop.to)).find(is_it);

@@ -306,7 +306,7 @@ impl Watchdog {
             Notice::Unexplained { sensor, time } if self.refute(now, *sensor, *time) => {}
             Notice::Unexplained { sensor, .. } if self.is_watching && self.is_noise(now, *sensor) => {}
             Notice::Unexplained { sensor, time } if self.is_watching => {
-                let is_meant = |ahead| self.driver.layout().meanings(*sensor).any(|meant| meant == ahead);
+                let is_meant = |ahead| self.driver.layout().may_mean(*sensor, ahead);
                 let stray = |train: &TrainId| {
                     self.stops.should_be_at_rest(*train, now)
                         && self.driver.sensor_ahead(*train, now).is_some_and(is_meant)
