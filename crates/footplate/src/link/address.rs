@@ -13,23 +13,13 @@ use footplate_sim::{
     BoardSwitches, CanSwitches, Delivery, JmriSwitches, LawFamily, LocoNetSwitches, PhysicsRange, Z21Switches,
 };
 
-use super::board_address::BoardAddress;
 use super::cable::Cable;
-use super::can_address::{self, CanAddress};
-use super::jmri_address::{self, JmriAddress};
-use super::loconet_address::{self, LocoNetAddress};
 use super::named_train::{NamedTrain, decoder_of, trains};
 use super::parameters::{number, pair, times};
-use super::serial_address::{SERIAL, SerialAddress};
+use super::station_address::StationAddress;
 use super::station_kind::StationKind;
-use super::z21_address::{QUIRKS, Z21Address, set_quirk};
-
-const SIMULATED: &str = "sim:";
-const BOARD: &str = "dcc-ex:";
-const Z21: &str = "z21:";
-const CAN: &str = "marklin-can:";
-const LOCONET: &str = "loconet:";
-const JMRI: &str = "jmri:";
+use super::z21_address::{QUIRKS, set_quirk};
+use super::{can_address, jmri_address, loconet_address};
 
 /// The trains of the course's track that its reports are about.
 const TRAINS: [TrainId; 2] = [TrainId(24), TrainId(58)];
@@ -39,18 +29,8 @@ const TRAINS: [TrainId; 2] = [TrainId(24), TrainId(58)];
 pub(crate) enum Address {
     /// A simulated station in this process.
     Simulated(SimulatedAddress),
-    /// A 6050 or 6051 behind a line of bytes.
-    Serial(SerialAddress),
-    /// A DCC-EX board behind a serial port or a network.
-    Board(BoardAddress),
-    /// A Z21 in a network.
-    Z21(Z21Address),
-    /// A station on Märklin's CAN bus.
-    Can(CanAddress),
-    /// A LocoNet server in a network.
-    LocoNet(LocoNetAddress),
-    /// JMRI in a network.
-    Jmri(JmriAddress),
+    /// A station outside this process.
+    Station(StationAddress),
 }
 
 impl Address {
@@ -58,22 +38,15 @@ impl Address {
     pub(crate) const fn simulated(&self) -> Option<&SimulatedAddress> {
         match self {
             Self::Simulated(simulated) => Some(simulated),
-            _ => None,
+            Self::Station(_) => None,
         }
     }
-}
 
-impl Address {
     /// Which station it is.
     pub(crate) const fn kind(&self) -> StationKind {
         match self {
             Self::Simulated(simulated) => simulated.station,
-            Self::Serial(_) => StationKind::Marklin,
-            Self::Board(_) => StationKind::DccEx,
-            Self::Z21(_) => StationKind::Z21,
-            Self::Can(_) => StationKind::MarklinCan,
-            Self::LocoNet(_) => StationKind::LocoNet,
-            Self::Jmri(_) => StationKind::Jmri,
+            Self::Station(station) => station.kind(),
         }
     }
 
@@ -109,12 +82,7 @@ impl Address {
     pub(crate) fn cable(&self) -> Option<Cable> {
         match self {
             Self::Simulated(_) => None,
-            Self::Serial(serial) => Some(serial.into()),
-            Self::Board(board) => Some(board.into()),
-            Self::Z21(z21) => Some(z21.into()),
-            Self::Can(can) => Some(can.into()),
-            Self::LocoNet(server) => Some(server.into()),
-            Self::Jmri(jmri) => Some(jmri.into()),
+            Self::Station(station) => Some(station.cable.clone()),
         }
     }
 }
@@ -173,44 +141,32 @@ impl FromStr for Address {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (place, parameters) = text.split_once('?').unwrap_or((text, ""));
-        let pairs = || parameters.split('&').filter(|pair| !pair.is_empty()).map(pair);
-        if let Some(layout) = place.strip_prefix(SIMULATED) {
-            let mut address = SimulatedAddress::of(layout)?;
-            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
-            for train in &address.trains {
-                address.station.check(*train, address.decoder)?;
-            }
-            Ok(Self::Simulated(address))
-        } else if let Some(port) = place.strip_prefix(SERIAL) {
-            let mut address = SerialAddress::of(port)?;
-            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
-            Ok(Self::Serial(address))
-        } else if let Some(port) = place.strip_prefix(BOARD) {
-            let mut address = BoardAddress::of(port)?;
-            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
-            Ok(Self::Board(address))
-        } else if let Some(place) = place.strip_prefix(Z21) {
-            let mut address = Z21Address::of(place)?;
-            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
-            Ok(Self::Z21(address))
-        } else if let Some(place) = place.strip_prefix(CAN) {
-            let mut address = CanAddress::of(place)?;
-            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
-            Ok(Self::Can(address))
-        } else if let Some(place) = place.strip_prefix(LOCONET) {
-            let mut address = LocoNetAddress::of(place)?;
-            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
-            Ok(Self::LocoNet(address))
-        } else if let Some(place) = place.strip_prefix(JMRI) {
-            let mut address = JmriAddress::of(place)?;
-            pairs().try_for_each(|pair| pair.and_then(|(key, value)| address.set(key, value)))?;
-            Ok(Self::Jmri(address))
+        let (scheme, place) = place.split_once(':').unwrap_or(("", place));
+        let mut address = if scheme == "sim" {
+            Self::Simulated(SimulatedAddress::of(place)?)
         } else {
-            Err(format!(
-                "`{text}` is not a link: use sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, \
-                 dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5, loconet:192.168.0.20, jmri:192.168.0.20, or tcp://host:port in place of a port"
-            ))
+            let station = StationAddress::read(scheme, place).ok_or_else(|| {
+                format!(
+                    "`{text}` is not a link: use sim:track-a?seed=7, marklin-serial:/dev/ttyUSB0, \
+                     dcc-ex:/dev/ttyACM0, z21:192.168.0.111, marklin-can:192.168.0.5, loconet:192.168.0.20, jmri:192.168.0.20, or tcp://host:port in place of a port"
+                )
+            })?;
+            Self::Station(station?)
+        };
+        for one in parameters.split('&').filter(|one| !one.is_empty()) {
+            let (key, value) = pair(one)?;
+            match &mut address {
+                Self::Simulated(simulated) => simulated.set(key, value)?,
+                Self::Station(station) => station.set(key, value)?,
+            }
         }
+        if let Self::Simulated(simulated) = &address {
+            simulated
+                .trains
+                .iter()
+                .try_for_each(|train| simulated.station.check(*train, simulated.decoder))?;
+        }
+        Ok(address)
     }
 }
 
@@ -326,8 +282,9 @@ pub(crate) fn physics_named(value: &str) -> Result<PhysicsRange, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::port::Port;
-    use super::super::serial_address::PaceChoice;
+    use footplate_wire::marklin_serial::Pace;
+
+    use super::super::station_address::StationSettings;
     use super::*;
 
     fn refused(text: &str) -> String {
@@ -359,18 +316,18 @@ mod tests {
 
     #[test]
     fn a_cable_is_named_by_its_port() {
-        let serial = |port| SerialAddress { port, pace: None, cts: None, modules: None, speed: 1.0 };
-        let device = serial(Port::Device("/dev/ttyUSB0".into()));
-        assert_eq!("marklin-serial:/dev/ttyUSB0".parse(), Ok(Address::Serial(device)));
-        let tcp = SerialAddress {
-            pace: Some(PaceChoice::Fast),
-            speed: 50.0,
-            ..serial(Port::Tcp { host: "127.0.0.1".into(), port: 2400 })
+        let serial = |text: &str| match text.parse() {
+            Ok(Address::Station(StationAddress { cable, settings })) => {
+                (cable.to_string(), cable.speed(), settings)
+            }
+            other => panic!("{text}: {other:?}"),
         };
-        let written = "marklin-serial:tcp://127.0.0.1:2400?pace=fast&speed=50";
-        assert_eq!(written.parse(), Ok(Address::Serial(tcp)));
-        let six = serial(Port::Tcp { host: "::1".into(), port: 2400 });
-        assert_eq!("marklin-serial:tcp://[::1]:2400".parse(), Ok(Address::Serial(six)));
+        let plain = StationSettings::Serial { pace: None, modules: None };
+        assert_eq!(serial("marklin-serial:/dev/ttyUSB0"), ("/dev/ttyUSB0".into(), 1.0, plain.clone()));
+        let fast = StationSettings::Serial { pace: Some(Pace::FAST), modules: Some(3) };
+        let written = "marklin-serial:tcp://127.0.0.1:2400?pace=fast&speed=50&modules=3";
+        assert_eq!(serial(written), ("tcp://127.0.0.1:2400".into(), 50.0, fast));
+        assert_eq!(serial("marklin-serial:tcp://[::1]:2400"), ("tcp://::1:2400".into(), 1.0, plain));
     }
 
     #[test]
@@ -400,6 +357,42 @@ mod tests {
             ("marklin-serial:/dev/ttyS0?cts=maybe", "cts=no"),
             ("marklin-serial:/dev/ttyS0?pace=slow", "pace=careful"),
             ("marklin-serial:/dev/ttyS0?baud=9600", "pace, cts, modules and speed"),
+            ("dcc-ex:", "dcc-ex:/dev/ttyACM0"),
+            ("dcc-ex:tcp://host", "tcp://127.0.0.1:2560"),
+            ("dcc-ex:/dev/ttyACM0?turnouts=all", "turnouts=defined"),
+            ("dcc-ex:/dev/ttyACM0?reset=maybe", "reset=no"),
+            ("dcc-ex:/dev/ttyACM0?first-sensor=-1", "first-sensor=100"),
+            ("dcc-ex:/dev/ttyACM0?modules=5", "turnouts, first-sensor, reset and speed"),
+            ("z21:", "z21:192.168.0.111"),
+            ("z21:host:many", "z21:HOST:21105"),
+            ("z21:/dev/ttyUSB0", "z21:HOST:21105"),
+            ("z21:host?steps=27", "14, 28 or 126"),
+            ("z21:host?feedback=s88", "feedback=r-bus"),
+            ("z21:host?straight=left", "straight=second"),
+            ("z21:host?sensor-delay=0", "between 1 and 2000 ms"),
+            ("z21:host?modules=5", "steps, feedback, first-sensor"),
+            ("marklin-can:", "marklin-can:192.168.0.5"),
+            ("marklin-can:tcp://host", "tcp://127.0.0.1:15731"),
+            ("marklin-can:host:many", "marklin-can:192.168.0.5"),
+            ("marklin-can:cs3?locos=sx", "locos=mfx"),
+            ("marklin-can:cs3?turnouts=servo", "turnouts=dcc"),
+            ("marklin-can:cs3?scan=5", "between 10 and 1000 ms"),
+            ("marklin-can:cs3?modules=32", "1 to 31"),
+            ("marklin-can:tcp://cs3:15731?receive=1", "marklin-can:HOST?receive=1"),
+            ("marklin-can:cs3?pace=fast", "locos, turnouts, first-contact"),
+            ("loconet:", "loconet:192.168.0.20"),
+            ("loconet:/dev/ttyUSB0", "LbServer"),
+            ("loconet:host:many", "HOST:1234"),
+            ("loconet:host?straight=left", "straight=thrown"),
+            ("loconet:host?sensor-delay=1", "between 3 and 2000 ms"),
+            ("loconet:host?modules=5", "first-sensor, first-turnout"),
+            ("jmri:", "jmri:192.168.0.20"),
+            ("jmri:/dev/ttyUSB0", "web server"),
+            ("jmri:host:many", "HOST:12080"),
+            ("jmri:host?system=LocoNet", "system=L"),
+            ("jmri:host?straight=left", "straight=thrown"),
+            ("jmri:host?sensor-delay=1", "between 3 and 2000 ms"),
+            ("jmri:host?modules=5", "system, first-sensor"),
         ];
         for (text, right) in cases {
             assert!(refused(text).contains(right), "{text}: {}", refused(text));

@@ -9,101 +9,24 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use footplate_core::{TimeSpan, Timestamp};
-use serialport::StopBits;
 
-use super::board_address::BoardAddress;
 use super::cable_end::{Arrival, CableEnd};
-use super::can_address::{CanAddress, CanPlace};
-use super::datagrams::{Correspondent, exchange_datagrams};
-use super::jmri_address::JmriAddress;
+use super::datagrams::exchange_datagrams;
 use super::line::PERSON_MS;
-use super::loconet_address::LocoNetAddress;
-use super::port::Port;
-use super::serial_address::SerialAddress;
-use super::stream::{SerialFormat, connect, open_device};
+use super::place::Place;
+use super::stream::{connect, open_device};
 use super::web_socket::connect_socket;
-use super::z21_address::Z21Address;
 use super::{Heard, Link, Lost};
 use crate::clock::Stopwatch;
 
-/// The speed of the interface's line (Märklin).
-const MARKLIN_BAUD: u32 = 2400;
-/// The speed of a DCC-EX board's serial port.
-const DCC_EX_BAUD: u32 = 115_200;
-/// The speed of a serial CAN adapter.
-const ADAPTER_BAUD: u32 = 115_200;
-
 /// Where a line is and how its bytes are sent.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Cable {
-    place: Place,
-    /// How many times faster than real time the station's clock runs.
-    speed: f64,
+    pub(super) place: Place,
+    /// How many times faster than real time the station's clock runs; 1 for a real station.
+    pub(super) speed: f64,
     /// Whether the station answers each command: all but a 6050 or 6051 do.
-    has_answers: bool,
-}
-
-#[derive(Debug, Clone)]
-enum Place {
-    Stream(Port, SerialFormat),
-    Datagrams(Correspondent),
-    WebSocket { host: String, port: u16 },
-}
-
-impl From<&SerialAddress> for Cable {
-    fn from(address: &SerialAddress) -> Self {
-        let SerialAddress { port, cts, speed, .. } = address.clone();
-        let format = SerialFormat { baud: MARKLIN_BAUD, stop_bits: StopBits::Two, cts };
-        Self { place: Place::Stream(port, format), speed, has_answers: false }
-    }
-}
-
-impl From<&BoardAddress> for Cable {
-    fn from(address: &BoardAddress) -> Self {
-        let BoardAddress { port, speed, .. } = address.clone();
-        let format = SerialFormat { baud: DCC_EX_BAUD, stop_bits: StopBits::One, cts: Some(false) };
-        Self { place: Place::Stream(port, format), speed, has_answers: true }
-    }
-}
-
-impl From<&Z21Address> for Cable {
-    fn from(address: &Z21Address) -> Self {
-        let Z21Address { host, port, speed, .. } = address.clone();
-        let place = Place::Datagrams(Correspondent { host, port, receive_at: None });
-        Self { place, speed, has_answers: true }
-    }
-}
-
-impl From<&CanAddress> for Cable {
-    fn from(address: &CanAddress) -> Self {
-        let place = match address.place.clone() {
-            // An adapter on USB runs as fast as it can, whatever is set.
-            CanPlace::Line(port) => {
-                let format = SerialFormat { baud: ADAPTER_BAUD, stop_bits: StopBits::One, cts: Some(false) };
-                Place::Stream(port, format)
-            }
-            CanPlace::Datagrams { host, port, receive_at } => {
-                Place::Datagrams(Correspondent { host, port, receive_at: Some(receive_at) })
-            }
-        };
-        Self { place, speed: address.speed, has_answers: true }
-    }
-}
-
-impl From<&LocoNetAddress> for Cable {
-    fn from(address: &LocoNetAddress) -> Self {
-        let LocoNetAddress { port, speed, .. } = address.clone();
-        // Servers are reached over TCP, where no format matters.
-        let format = SerialFormat { baud: ADAPTER_BAUD, stop_bits: StopBits::One, cts: Some(false) };
-        Self { place: Place::Stream(port, format), speed, has_answers: true }
-    }
-}
-
-impl From<&JmriAddress> for Cable {
-    fn from(address: &JmriAddress) -> Self {
-        let JmriAddress { host, port, speed, .. } = address.clone();
-        Self { place: Place::WebSocket { host, port }, speed, has_answers: true }
-    }
+    pub(super) has_answers: bool,
 }
 
 impl Cable {
@@ -119,7 +42,7 @@ impl Cable {
 
     /// Whether bytes go over a connection, whose other end may be gone without notice.
     pub(crate) const fn is_connection(&self) -> bool {
-        matches!(self.place, Place::Stream(Port::Tcp { .. }, _) | Place::WebSocket { .. })
+        matches!(self.place, Place::Tcp { .. } | Place::WebSocket { .. })
     }
 
     /// Whether the station answers each command.
@@ -136,8 +59,8 @@ impl Cable {
         deliver: impl FnMut(Arrival<'_>) -> bool + Send + 'static,
     ) -> Result<CableEnd, Lost> {
         match &self.place {
-            Place::Stream(Port::Tcp { host, port }, _) => connect(host, *port, deliver),
-            Place::Stream(Port::Device(path), format) => open_device(path, format, deliver),
+            Place::Tcp { host, port } => connect(host, *port, deliver),
+            Place::Device(path, format) => open_device(path, format, deliver),
             Place::Datagrams(correspondent) => exchange_datagrams(correspondent, deliver),
             Place::WebSocket { host, port } => connect_socket(host, *port, deliver),
         }
@@ -146,11 +69,7 @@ impl Cable {
 
 impl Display for Cable {
     fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
-        match &self.place {
-            Place::Stream(port, _) => port.fmt(f),
-            Place::Datagrams(correspondent) => correspondent.fmt(f),
-            Place::WebSocket { host, port } => write!(f, "{host}:{port}"),
-        }
+        self.place.fmt(f)
     }
 }
 
@@ -173,8 +92,7 @@ impl CableLink {
     ///
     /// # Errors
     /// When the port cannot be opened.
-    pub(crate) fn open(cable: impl Into<Cable>) -> Result<Self, Lost> {
-        let cable = cable.into();
+    pub(crate) fn open(cable: Cable) -> Result<Self, Lost> {
         Ok(Self { line: Some(open(&cable)?), cable, stopwatch: Stopwatch::start() })
     }
 

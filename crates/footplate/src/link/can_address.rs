@@ -6,8 +6,11 @@ use footplate_core::{Ratio, TimeSpan};
 use footplate_sim::CanSwitches;
 use footplate_wire::marklin_can::{AccessoryProtocol, LocomotiveProtocol, Settings, Transport, Uid};
 
-use super::parameters::{number, times};
-use super::port::{Port, host_and_port};
+use super::datagrams::Correspondent;
+use super::parameters::number;
+use super::place::{Place, host_and_port};
+use super::station_address::{StationAddress, StationSettings};
+use super::stream::SerialFormat;
 
 const SCHEME: &str = "marklin-can:";
 /// The port at which stations listen, for datagrams and for connections.
@@ -17,111 +20,76 @@ const RECEIVE: u16 = 15_730;
 /// The cycles of contacts that can be set on a station, in ms.
 const SCANS_MS: std::ops::RangeInclusive<u16> = 10..=1000;
 
-/// Where the bus is reached.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum CanPlace {
-    /// At a station that exchanges datagrams.
-    Datagrams {
-        /// Its name or address in the network.
-        host: String,
-        /// Its port.
-        port: u16,
-        /// The port at which Footplate listens; 0 for any.
-        receive_at: u16,
-    },
-    /// At a station that accepts connections, or an adapter at a serial port.
-    Line(Port),
-}
+/// The speed of a serial CAN adapter. One on USB runs as fast as it can, whatever is set.
+const ADAPTER_BAUD: u32 = 115_200;
 
-/// A station on the bus.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct CanAddress {
-    /// Where it is.
-    pub(crate) place: CanPlace,
-    /// Its settings.
-    pub(crate) settings: Settings,
-    /// S88 modules behind it; if left out, as many as the layout's sensors need.
-    pub(crate) modules: Option<u8>,
-    /// How many times faster than real time it runs; 1 for a real station.
-    pub(crate) speed: f64,
-}
-
-impl CanAddress {
-    /// Returns a station at a place.
-    ///
-    /// # Errors
-    /// When no place is named.
-    pub(super) fn of(place: &str) -> Result<Self, String> {
-        let wanted = || {
-            format!(
-                "`{SCHEME}{place}` names no station: write {SCHEME}192.168.0.5, {SCHEME}tcp://HOST:{PORT}, or {SCHEME}/dev/ttyACM0 for \
+/// Returns a station at a place.
+///
+/// # Errors
+/// When no place is named.
+pub(super) fn read(place: &str) -> Result<StationAddress, String> {
+    let wanted = || {
+        format!(
+            "`{SCHEME}{place}` names no station: write {SCHEME}192.168.0.5, {SCHEME}tcp://HOST:{PORT}, or {SCHEME}/dev/ttyACM0 for \
                  a CAN adapter"
-            )
-        };
-        let is_device = place.starts_with(['/', '\\']) || place.starts_with("COM");
-        let place = if place.is_empty() {
-            return Err(wanted());
-        } else if is_device || place.starts_with("tcp://") {
-            CanPlace::Line(Port::named(SCHEME, place, "/dev/ttyACM0", PORT)?)
-        } else {
-            let named = place.strip_prefix("udp://").unwrap_or(place);
-            let (host, port) = host_and_port(named, PORT).ok_or_else(wanted)?;
-            CanPlace::Datagrams { host, port, receive_at: RECEIVE }
-        };
-        let transport = match &place {
-            CanPlace::Line(Port::Device(_)) => Transport::Adapter,
-            CanPlace::Line(Port::Tcp { .. }) | CanPlace::Datagrams { .. } => Transport::Network,
-        };
-        // Each process has its own number, to recognise its own frames.
-        let uid = Uid(Settings::default().uid.0 & 0xFFFF_0000 | std::process::id() & 0xFFFF);
-        let settings = Settings { transport, uid, ..Settings::default() };
-        Ok(Self { place, settings, modules: None, speed: 1.0 })
-    }
+        )
+    };
+    let is_device = place.starts_with(['/', '\\']) || place.starts_with("COM");
+    let place = if place.is_empty() {
+        return Err(wanted());
+    } else if is_device || place.starts_with("tcp://") {
+        Place::named(SCHEME, place, "/dev/ttyACM0", PORT, SerialFormat::of_baud(ADAPTER_BAUD))?
+    } else {
+        let named = place.strip_prefix("udp://").unwrap_or(place);
+        let (host, port) = host_and_port(named, PORT).ok_or_else(wanted)?;
+        Place::Datagrams(Correspondent { host, port, receive_at: Some(RECEIVE) })
+    };
+    let transport = match &place {
+        Place::Device(..) => Transport::Adapter,
+        _ => Transport::Network,
+    };
+    // Each process has its own number, to recognise its own frames.
+    let uid = Uid(Settings::default().uid.0 & 0xFFFF_0000 | std::process::id() & 0xFFFF);
+    let settings = Settings { transport, uid, ..Settings::default() };
+    Ok(StationAddress::new(place, StationSettings::Can { settings, modules: None }))
+}
 
-    pub(super) fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
-        match (key, value) {
-            ("locos", _) => self.settings.locomotives = locomotives_named(value)?,
-            ("turnouts", "mm") => self.settings.turnouts = AccessoryProtocol::Motorola,
-            ("turnouts", "dcc") => self.settings.turnouts = AccessoryProtocol::Dcc,
-            ("turnouts", _) => {
-                return Err(format!("`{value}` is no protocol of turnouts: use turnouts=mm or turnouts=dcc"));
-            }
-            ("first-contact", _) => self.settings.first_input = number(key, value, "17")?,
-            ("device", _) => self.settings.device = Some(number(key, value, "0")?),
-            ("modules", _) => {
-                let modules: u8 = number(key, value, "5")?;
-                if !(1..=31).contains(&modules) {
-                    return Err(format!("{modules} sensor modules; the bus has 1 to 31"));
-                }
-                self.modules = Some(modules);
-            }
-            ("scan", _) => {
-                let ms: u16 = number(key, value, "20")?;
-                if !SCANS_MS.contains(&ms) {
-                    return Err(format!(
-                        "scan {ms} is not between {} and {} ms, as a station's cycle is",
-                        SCANS_MS.start(),
-                        SCANS_MS.end()
-                    ));
-                }
-                self.settings.scan = TimeSpan::from_ms(ms.into());
-            }
-            ("receive", _) => match &mut self.place {
-                CanPlace::Datagrams { receive_at, .. } => *receive_at = number(key, value, "15730")?,
-                CanPlace::Line(_) => {
-                    return Err(format!("`receive` is for datagrams: write {SCHEME}HOST?receive={value}"));
-                }
-            },
-            ("speed", _) => self.speed = times(value)?,
-            _ => {
+/// Changes a setting of a station other than the number of its modules.
+pub(super) fn set(settings: &mut Settings, place: &mut Place, key: &str, value: &str) -> Result<(), String> {
+    match (key, value) {
+        ("locos", _) => settings.locomotives = locomotives_named(value)?,
+        ("turnouts", "mm") => settings.turnouts = AccessoryProtocol::Motorola,
+        ("turnouts", "dcc") => settings.turnouts = AccessoryProtocol::Dcc,
+        ("turnouts", _) => {
+            return Err(format!("`{value}` is no protocol of turnouts: use turnouts=mm or turnouts=dcc"));
+        }
+        ("first-contact", _) => settings.first_input = number(key, value, "17")?,
+        ("device", _) => settings.device = Some(number(key, value, "0")?),
+        ("scan", _) => {
+            let ms: u16 = number(key, value, "20")?;
+            if !SCANS_MS.contains(&ms) {
                 return Err(format!(
-                    "a Märklin CAN link has no `{key}`; it has locos, turnouts, first-contact, device, modules, scan, receive and \
-                     speed"
+                    "scan {ms} is not between {} and {} ms, as a station's cycle is",
+                    SCANS_MS.start(),
+                    SCANS_MS.end()
                 ));
             }
+            settings.scan = TimeSpan::from_ms(ms.into());
         }
-        Ok(())
+        ("receive", _) => match place {
+            Place::Datagrams(station) => station.receive_at = Some(number(key, value, "15730")?),
+            _ => {
+                return Err(format!("`receive` is for datagrams: write {SCHEME}HOST?receive={value}"));
+            }
+        },
+        _ => {
+            return Err(format!(
+                "a Märklin CAN link has no `{key}`; it has locos, turnouts, first-contact, device, modules, scan, receive and \
+                     speed"
+            ));
+        }
     }
+    Ok(())
 }
 
 fn locomotives_named(value: &str) -> Result<LocomotiveProtocol, String> {
@@ -170,28 +138,38 @@ mod tests {
 
     #[test]
     fn a_station_is_named_by_its_place() {
-        let datagrams =
-            |host: &str, port, receive_at| CanPlace::Datagrams { host: host.into(), port, receive_at };
+        let datagrams = |host: &str, port, receive_at| {
+            Place::Datagrams(Correspondent { host: host.into(), port, receive_at: Some(receive_at) })
+        };
+        let can = |text: &str| match text.parse() {
+            Ok(Address::Station(StationAddress {
+                cable,
+                settings: StationSettings::Can { settings, modules },
+            })) => (cable.place, settings, modules),
+            other => panic!("{text}: {other:?}"),
+        };
         let places = [
             ("marklin-can:192.168.0.5", datagrams("192.168.0.5", 15_731, 15_730)),
             ("marklin-can:cs3.home?receive=0", datagrams("cs3.home", 15_731, 0)),
             ("marklin-can:udp://127.0.0.1:3000", datagrams("127.0.0.1", 3_000, 15_730)),
-            ("marklin-can:tcp://cs3:15731", CanPlace::Line(Port::Tcp { host: "cs3".into(), port: 15_731 })),
-            ("marklin-can:/dev/ttyACM0", CanPlace::Line(Port::Device("/dev/ttyACM0".into()))),
+            ("marklin-can:tcp://cs3:15731", Place::Tcp { host: "cs3".into(), port: 15_731 }),
+            (
+                "marklin-can:/dev/ttyACM0",
+                Place::Device("/dev/ttyACM0".into(), SerialFormat::of_baud(ADAPTER_BAUD)),
+            ),
         ];
         for (text, place) in places {
-            let Ok(Address::Can(can)) = text.parse() else { panic!("{text}") };
-            let is_adapter = text.contains("/dev/");
+            let (there, settings, _) = can(text);
             assert_eq!(
-                (can.settings.transport == Transport::Adapter, can.place),
-                (is_adapter, place),
+                (settings.transport == Transport::Adapter, there),
+                (text.contains("/dev/"), place),
                 "{text}"
             );
         }
         let written = "marklin-can:cs3?locos=dcc&turnouts=dcc&first-contact=17&device=2&modules=3&scan=20";
-        let Ok(Address::Can(can)) = written.parse() else { panic!("a station") };
+        let (_, settings, modules) = can(written);
         let expected = Settings {
-            uid: can.settings.uid,
+            uid: settings.uid,
             locomotives: LocomotiveProtocol::Dcc,
             turnouts: AccessoryProtocol::Dcc,
             first_input: 17,
@@ -199,25 +177,6 @@ mod tests {
             scan: TimeSpan::from_ms(20),
             ..Settings::default()
         };
-        assert_eq!((can.settings, can.modules), (expected, Some(3)));
-    }
-
-    #[test]
-    fn what_is_wrong_is_answered_with_what_would_be_right() {
-        let cases = [
-            ("marklin-can:", "marklin-can:192.168.0.5"),
-            ("marklin-can:tcp://host", "tcp://127.0.0.1:15731"),
-            ("marklin-can:host:many", "marklin-can:192.168.0.5"),
-            ("marklin-can:cs3?locos=sx", "locos=mfx"),
-            ("marklin-can:cs3?turnouts=servo", "turnouts=dcc"),
-            ("marklin-can:cs3?scan=5", "between 10 and 1000 ms"),
-            ("marklin-can:cs3?modules=32", "1 to 31"),
-            ("marklin-can:tcp://cs3:15731?receive=1", "marklin-can:HOST?receive=1"),
-            ("marklin-can:cs3?pace=fast", "locos, turnouts, first-contact"),
-        ];
-        for (text, right) in cases {
-            let refused = text.parse::<Address>().expect_err(text);
-            assert!(refused.contains(right), "{text}: {refused}");
-        }
+        assert_eq!((settings, modules), (expected, Some(3)));
     }
 }

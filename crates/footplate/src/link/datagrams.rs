@@ -17,7 +17,7 @@ use super::cable_end::{Arrival, CableEnd};
 const NOTICES_EVERY: Duration = Duration::from_millis(50);
 
 /// Where a station is, and where it answers to.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Correspondent {
     pub(super) host: String,
     pub(super) port: u16,

@@ -5,57 +5,42 @@ use footplate_sim::JmriSwitches;
 use footplate_wire::jmri::Settings;
 
 use super::loconet_address::{is_closed_straight, sensor_delay};
-use super::parameters::{number, times};
-use super::port::host_and_port;
+use super::parameters::number;
+use super::place::{Place, host_and_port};
+use super::station_address::{StationAddress, StationSettings};
 
 const SCHEME: &str = "jmri:";
 /// The port of JMRI's web server.
 const PORT: u16 = 12_080;
 
-/// JMRI.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct JmriAddress {
-    /// The computer on which it runs.
-    pub(crate) host: String,
-    /// The port of its web server.
-    pub(crate) port: u16,
-    /// How it names sensors and turnouts.
-    pub(crate) settings: Settings,
-    /// How many times faster than real time it runs; 1 for a real one.
-    pub(crate) speed: f64,
-}
-
-impl JmriAddress {
-    /// Returns JMRI at a place in the network.
-    ///
-    /// # Errors
-    /// When no place is named.
-    pub(super) fn of(place: &str) -> Result<Self, String> {
-        let named = place.strip_prefix("tcp://").unwrap_or(place);
-        let (host, port) = host_and_port(named, PORT).ok_or_else(|| {
+/// Returns JMRI at a place in the network.
+///
+/// # Errors
+/// When no place is named.
+pub(super) fn read(place: &str) -> Result<StationAddress, String> {
+    let named = place.strip_prefix("tcp://").unwrap_or(place);
+    let (host, port) = host_and_port(named, PORT).ok_or_else(|| {
             format!(
                 "`{SCHEME}{place}` names no computer: write {SCHEME}192.168.0.20 or {SCHEME}HOST:{PORT}, where JMRI's web server runs"
             )
         })?;
-        Ok(Self { host, port, settings: Settings::default(), speed: 1.0 })
-    }
+    Ok(StationAddress::new(Place::WebSocket { host, port }, StationSettings::Jmri(Settings::default())))
+}
 
-    pub(super) fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
-        match key {
-            "system" => self.settings.prefix = Some(prefix_of(value)?),
-            "first-sensor" => self.settings.first_sensor = number(key, value, "17")?,
-            "first-turnout" => self.settings.first_turnout = number(key, value, "5")?,
-            "straight" => self.settings.closed_is_straight = is_closed_straight(value)?,
-            "sensor-delay" => self.settings.sensor_delay = sensor_delay(key, value)?,
-            "speed" => self.speed = times(value)?,
-            _ => {
-                return Err(format!(
-                    "a JMRI link has no `{key}`; it has system, first-sensor, first-turnout, straight, sensor-delay and speed"
-                ));
-            }
+pub(super) fn set(settings: &mut Settings, key: &str, value: &str) -> Result<(), String> {
+    match key {
+        "system" => settings.prefix = Some(prefix_of(value)?),
+        "first-sensor" => settings.first_sensor = number(key, value, "17")?,
+        "first-turnout" => settings.first_turnout = number(key, value, "5")?,
+        "straight" => settings.closed_is_straight = is_closed_straight(value)?,
+        "sensor-delay" => settings.sensor_delay = sensor_delay(key, value)?,
+        _ => {
+            return Err(format!(
+                "a JMRI link has no `{key}`; it has system, first-sensor, first-turnout, straight, sensor-delay and speed"
+            ));
         }
-        Ok(())
     }
+    Ok(())
 }
 
 /// The prefix of a system: a letter, and a number where there are several of one kind.
@@ -102,12 +87,12 @@ mod tests {
             ("jmri:attic.local:12081", ("attic.local", 12_081)),
             ("jmri:tcp://[::1]:12081", ("::1", 12_081)),
         ] {
-            let Ok(Address::Jmri(jmri)) = text.parse() else { panic!("{text}") };
-            assert_eq!((jmri.host.as_str(), jmri.port), place);
+            let Ok(Address::Station(jmri)) = text.parse() else { panic!("{text}") };
+            assert_eq!(jmri.cable.place, Place::WebSocket { host: place.0.to_owned(), port: place.1 });
         }
         let written =
             "jmri:host?system=L2&first-sensor=17&first-turnout=5&straight=thrown&sensor-delay=150&speed=20";
-        let Ok(Address::Jmri(jmri)) = written.parse() else { panic!("JMRI") };
+        let Ok(Address::Station(jmri)) = written.parse() else { panic!("JMRI") };
         let expected = Settings {
             prefix: Some("L2".to_owned()),
             first_sensor: 17,
@@ -116,22 +101,7 @@ mod tests {
             sensor_delay: TimeSpan::from_ms(150),
             ..Settings::default()
         };
-        assert_eq!((jmri.settings, jmri.speed), (expected, 20.0));
-    }
-
-    #[test]
-    fn what_is_wrong_is_answered_with_what_would_be_right() {
-        for (text, right) in [
-            ("jmri:", "jmri:192.168.0.20"),
-            ("jmri:/dev/ttyUSB0", "web server"),
-            ("jmri:host:many", "HOST:12080"),
-            ("jmri:host?system=LocoNet", "system=L"),
-            ("jmri:host?straight=left", "straight=thrown"),
-            ("jmri:host?sensor-delay=1", "between 3 and 2000 ms"),
-            ("jmri:host?modules=5", "system, first-sensor"),
-        ] {
-            let refused = text.parse::<Address>().expect_err(text);
-            assert!(refused.contains(right), "{text}: {refused}");
-        }
+        assert_eq!(jmri.settings, StationSettings::Jmri(expected));
+        assert_eq!(jmri.cable.speed(), 20.0);
     }
 }

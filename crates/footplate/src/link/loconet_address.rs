@@ -5,8 +5,9 @@ use footplate_core::{Ratio, TimeSpan};
 use footplate_sim::LocoNetSwitches;
 use footplate_wire::loconet::Settings;
 
-use super::parameters::{number, times};
-use super::port::{Port, host_and_port};
+use super::parameters::number;
+use super::place::{Place, host_and_port};
+use super::station_address::{StationAddress, StationSettings};
 
 const SCHEME: &str = "loconet:";
 /// The port at which servers listen (LbServer).
@@ -15,48 +16,34 @@ const PORT: u16 = 1234;
 const SHORTEST_DELAY_MS: u16 = 3;
 const LONGEST_DELAY_MS: u16 = 2_000;
 
-/// A LocoNet server.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct LocoNetAddress {
-    /// Where it is.
-    pub(crate) port: Port,
-    /// Settings of the bus.
-    pub(crate) settings: Settings,
-    /// How many times faster than real time it runs; 1 for a real station.
-    pub(crate) speed: f64,
-}
-
-impl LocoNetAddress {
-    /// Returns a server at a place in the network.
-    ///
-    /// # Errors
-    /// When no place is named.
-    pub(super) fn of(place: &str) -> Result<Self, String> {
-        let named = place.strip_prefix("tcp://").unwrap_or(place);
-        let (host, port) = host_and_port(named, PORT).ok_or_else(|| {
+/// Returns a server at a place in the network.
+///
+/// # Errors
+/// When no place is named.
+pub(super) fn read(place: &str) -> Result<StationAddress, String> {
+    let named = place.strip_prefix("tcp://").unwrap_or(place);
+    let (host, port) = host_and_port(named, PORT).ok_or_else(|| {
             format!(
                 "`{SCHEME}{place}` names no server: write {SCHEME}192.168.0.20 or {SCHEME}HOST:{PORT}, where a LocoNet-over-TCP \
                  server (LbServer, JMRI, Rocrail, a gateway) runs"
             )
         })?;
-        Ok(Self { port: Port::Tcp { host, port }, settings: Settings::default(), speed: 1.0 })
-    }
+    Ok(StationAddress::new(Place::Tcp { host, port }, StationSettings::LocoNet(Settings::default())))
+}
 
-    pub(super) fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
-        match key {
-            "first-sensor" => self.settings.first_sensor = number(key, value, "17")?,
-            "first-turnout" => self.settings.first_turnout = number(key, value, "5")?,
-            "straight" => self.settings.closed_is_straight = is_closed_straight(value)?,
-            "sensor-delay" => self.settings.sensor_delay = sensor_delay(key, value)?,
-            "speed" => self.speed = times(value)?,
-            _ => {
-                return Err(format!(
-                    "a LocoNet link has no `{key}`; it has first-sensor, first-turnout, straight, sensor-delay and speed"
-                ));
-            }
+pub(super) fn set(settings: &mut Settings, key: &str, value: &str) -> Result<(), String> {
+    match key {
+        "first-sensor" => settings.first_sensor = number(key, value, "17")?,
+        "first-turnout" => settings.first_turnout = number(key, value, "5")?,
+        "straight" => settings.closed_is_straight = is_closed_straight(value)?,
+        "sensor-delay" => settings.sensor_delay = sensor_delay(key, value)?,
+        _ => {
+            return Err(format!(
+                "a LocoNet link has no `{key}`; it has first-sensor, first-turnout, straight, sensor-delay and speed"
+            ));
         }
-        Ok(())
     }
+    Ok(())
 }
 
 /// Whether a closed turnout lies straight.
@@ -108,32 +95,18 @@ mod tests {
             ("loconet:localhost:5550", ("localhost", 5550)),
             ("loconet:tcp://[::1]:5550", ("::1", 5550)),
         ] {
-            let Ok(Address::LocoNet(server)) = text.parse() else { panic!("{text}") };
-            assert_eq!(server.port, Port::Tcp { host: place.0.to_owned(), port: place.1 });
+            let Ok(Address::Station(server)) = text.parse() else { panic!("{text}") };
+            assert_eq!(server.cable.place, Place::Tcp { host: place.0.to_owned(), port: place.1 });
         }
         let written = "loconet:host?first-sensor=17&first-turnout=5&straight=thrown&sensor-delay=60&speed=20";
-        let Ok(Address::LocoNet(server)) = written.parse() else { panic!("a server") };
+        let Ok(Address::Station(server)) = written.parse() else { panic!("a server") };
         let expected = Settings {
             first_sensor: 17,
             first_turnout: 5,
             closed_is_straight: false,
             sensor_delay: TimeSpan::from_ms(60),
         };
-        assert_eq!((server.settings, server.speed), (expected, 20.0));
-    }
-
-    #[test]
-    fn what_is_wrong_is_answered_with_what_would_be_right() {
-        for (text, right) in [
-            ("loconet:", "loconet:192.168.0.20"),
-            ("loconet:/dev/ttyUSB0", "LbServer"),
-            ("loconet:host:many", "HOST:1234"),
-            ("loconet:host?straight=left", "straight=thrown"),
-            ("loconet:host?sensor-delay=1", "between 3 and 2000 ms"),
-            ("loconet:host?modules=5", "first-sensor, first-turnout"),
-        ] {
-            let refused = text.parse::<Address>().expect_err(text);
-            assert!(refused.contains(right), "{text}: {refused}");
-        }
+        assert_eq!(server.settings, StationSettings::LocoNet(expected));
+        assert_eq!(server.cable.speed(), 20.0);
     }
 }

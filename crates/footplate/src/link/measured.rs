@@ -86,18 +86,9 @@ impl Address {
 
     /// Returns the place of the station, without settings.
     fn place(&self) -> String {
-        use super::can_address::CanPlace;
         match self {
             Self::Simulated(simulated) => format!("sim:{} {:?}", simulated.layout, simulated.station),
-            Self::Serial(serial) => format!("marklin-serial:{}", serial.port),
-            Self::Board(board) => format!("dcc-ex:{}", board.port),
-            Self::Z21(z21) => format!("z21:{}:{}", z21.host, z21.port),
-            Self::Can(can) => match &can.place {
-                CanPlace::Line(port) => format!("marklin-can:{port}"),
-                CanPlace::Datagrams { host, port, .. } => format!("marklin-can:{host}:{port}"),
-            },
-            Self::LocoNet(server) => format!("loconet:{}", server.port),
-            Self::Jmri(jmri) => format!("jmri:{}:{}", jmri.host, jmri.port),
+            Self::Station(station) => format!("{}:{}", station.kind().scheme(), station.cable),
         }
     }
 }

@@ -1,8 +1,9 @@
 //! Bytes to and from a command station: over a cable, over a network, or into a simulated one.
 //!
 //! ```text
-//! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`; board_address  port
-//! can_address  jmri_address  loconet_address  serial_address  z21_address   a station on Märklin's CAN bus; JMRI; a LocoNet server; a 6051; a Z21
+//! address     what a person writes: `sim:track-a?seed=7`, `marklin-serial:/dev/ttyUSB0`
+//! station_address  place   a station outside this process, with its settings; where its line ends
+//! board_address  can_address  jmri_address  loconet_address  serial_address  z21_address   what each kind of station adds
 //! parameters  what follows the `?` of an address
 //! named_train  station_kind   a train by its address; which addresses and decoders a station commands, and how long its link takes
 //! station_session   the session of any station, as one type
@@ -35,12 +36,13 @@ mod named_train;
 mod observed;
 mod open;
 mod parameters;
-mod port;
+mod place;
 mod rhythm;
 mod serial_address;
 mod served;
 mod simulated;
 mod simulated_station;
+mod station_address;
 mod station_kind;
 mod station_session;
 mod stream;

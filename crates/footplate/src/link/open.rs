@@ -7,8 +7,7 @@ use footplate_wire::marklin_serial::{INPUTS_PER_MODULE, Interface, Pace, Setting
 use footplate_wire::{dcc_ex, jmri, loconet, marklin_can, z21};
 
 use super::address::{Address, SimulatedAddress, Speed};
-use super::can_address::CanAddress;
-use super::serial_address::{PaceChoice, SerialAddress};
+use super::station_address::{StationAddress, StationSettings};
 use super::station_kind::StationKind;
 use super::{Cable, CableLink, Link, Lost, SimulatedLink, SimulatedStation, StationSession};
 #[cfg(unix)]
@@ -29,12 +28,7 @@ pub(crate) fn open<'l>(
 ) -> anyhow::Result<Box<dyn Link + 'l>> {
     Ok(match address {
         Address::Simulated(simulated) => Box::new(open_simulated(simulated, layout, default_speed)?),
-        Address::Serial(serial) => open_cable(serial.into())?,
-        Address::Board(board) => open_cable(board.into())?,
-        Address::Z21(z21) => open_cable(z21.into())?,
-        Address::Can(can) => open_cable(can.into())?,
-        Address::LocoNet(server) => open_cable(server.into())?,
-        Address::Jmri(jmri) => open_cable(jmri.into())?,
+        Address::Station(station) => open_cable(station.cable.clone())?,
     })
 }
 
@@ -138,14 +132,27 @@ fn session_with(address: &Address, link: &dyn Link, highest: u16) -> anyhow::Res
                 jmri::Client::new(now, jmri_settings(jmri::Settings::default(), highest)).into()
             }
         },
-        Address::Serial(serial) => {
-            Interface::new(now, serial_settings(serial, link.cts().is_some(), modules))?.into()
-        }
-        Address::Board(board) => dcc_ex::Client::new(now, board.settings).into(),
-        Address::Z21(z21) => z21::Client::new(now, z21_settings(z21.settings, highest)).into(),
-        Address::Can(can) => marklin_can::Client::new(now, can_settings(can, highest)).into(),
-        Address::LocoNet(server) => loconet::Client::new(now, server.settings).into(),
-        Address::Jmri(jmri) => jmri::Client::new(now, jmri_settings(jmri.settings.clone(), highest)).into(),
+        Address::Station(StationAddress { cable, settings }) => match settings {
+            StationSettings::Serial { pace, modules: counted } => {
+                let by_line = if link.cts().is_some() { Pace::Cts } else { Pace::CAREFUL };
+                let mut settings = Settings::timed(counted.unwrap_or(modules), pace.unwrap_or(by_line));
+                settings.reply_allowance += TimeSpan::from_s(JITTER.as_s() * cable.speed().max(1.0));
+                Interface::new(now, settings)?.into()
+            }
+            StationSettings::Board(settings) => dcc_ex::Client::new(now, *settings).into(),
+            StationSettings::Z21(settings) => z21::Client::new(now, z21_settings(*settings, highest)).into(),
+            StationSettings::Can { settings, modules } => {
+                // The modules that the layout's sensors are on.
+                let last = highest.saturating_add(settings.first_input.max(1));
+                let needed = u8::try_from(last.div_ceil(INPUTS_PER_MODULE)).unwrap_or(u8::MAX);
+                let modules = modules.unwrap_or(needed);
+                marklin_can::Client::new(now, marklin_can::Settings { modules, ..*settings }).into()
+            }
+            StationSettings::LocoNet(settings) => loconet::Client::new(now, *settings).into(),
+            StationSettings::Jmri(settings) => {
+                jmri::Client::new(now, jmri_settings(settings.clone(), highest)).into()
+            }
+        },
     })
 }
 
@@ -157,23 +164,4 @@ fn z21_settings(settings: z21::Settings, highest: u16) -> z21::Settings {
 /// Settings that know how many sensors the layout has.
 fn jmri_settings(settings: jmri::Settings, highest: u16) -> jmri::Settings {
     jmri::Settings { last_sensor: highest.saturating_add(settings.first_sensor), ..settings }
-}
-
-/// Settings that know which modules the layout's contacts are on.
-fn can_settings(address: &CanAddress, highest: u16) -> marklin_can::Settings {
-    let CanAddress { settings, modules, .. } = address;
-    let last = highest.saturating_add(settings.first_input.max(1));
-    let needed = u8::try_from(last.div_ceil(INPUTS_PER_MODULE)).unwrap_or(u8::MAX);
-    marklin_can::Settings { modules: modules.unwrap_or(needed), ..*settings }
-}
-
-fn serial_settings(address: &SerialAddress, has_cts: bool, modules: u8) -> Settings {
-    let pace = match (address.pace, has_cts) {
-        (Some(PaceChoice::Careful), _) | (None, false) => Pace::CAREFUL,
-        (Some(PaceChoice::Fast), _) => Pace::FAST,
-        (None, true) => Pace::Cts,
-    };
-    let mut settings = Settings::timed(address.modules.unwrap_or(modules), pace);
-    settings.reply_allowance += TimeSpan::from_s(JITTER.as_s() * address.speed.max(1.0));
-    settings
 }

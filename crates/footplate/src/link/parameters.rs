@@ -23,3 +23,10 @@ pub(super) fn times(value: &str) -> Result<f64, String> {
         format!("speed {value} is not between 0 and {FASTEST}; write speed=20 for twenty times real time")
     })
 }
+
+/// How many S88 modules are on a bus.
+pub(super) fn modules(value: &str) -> Result<u8, String> {
+    let modules: u8 = number("modules", value, "5")?;
+    let is_possible = (1..=31).contains(&modules);
+    is_possible.then_some(modules).ok_or_else(|| format!("{modules} sensor modules; the bus has 1 to 31"))
+}

@@ -1,63 +1,39 @@
 //! The address of a 6050 or 6051: `marklin-serial:DEVICE` or `marklin-serial:tcp://HOST:PORT`, with
 //! `[?pace=careful&cts=no&modules=5&speed=20]`.
 
-use super::parameters::{number, times};
-use super::port::Port;
+use footplate_wire::marklin_serial::Pace;
+use serialport::StopBits;
 
-pub(super) const SERIAL: &str = "marklin-serial:";
+use super::place::Place;
+use super::station_address::{StationAddress, StationSettings};
+use super::stream::SerialFormat;
+
 /// The port that a served simulated 6051 is written with in examples.
 const EXAMPLE_PORT: u16 = 2400;
+/// How the interface's line is used (Märklin).
+const FORMAT: SerialFormat = SerialFormat { baud: 2400, stop_bits: StopBits::Two, cts: None };
 
-/// A 6050 or 6051.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct SerialAddress {
-    /// Where it is.
-    pub(crate) port: Port,
-    /// The pace without its hand-shake line; if left out, the hand-shake line sets it where there is one.
-    pub(crate) pace: Option<PaceChoice>,
-    /// Whether to use its hand-shake line; if left out, where it can be read.
-    pub(crate) cts: Option<bool>,
-    /// S88 modules on its bus; if left out, as many as the layout's sensors need.
-    pub(crate) modules: Option<u8>,
-    /// How many times faster than real time it runs; 1 for a real station.
-    pub(crate) speed: f64,
+pub(super) fn read(port: &str) -> Result<StationAddress, String> {
+    let place = Place::named("marklin-serial:", port, "/dev/ttyUSB0", EXAMPLE_PORT, FORMAT)?;
+    Ok(StationAddress::new(place, StationSettings::Serial { pace: None, modules: None }))
 }
 
-/// The gaps that are left without a hand-shake.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum PaceChoice {
-    /// Long gaps, which suit every interface.
-    Careful,
-    /// Short gaps, for a fast interface or adapter.
-    Fast,
-}
-
-impl SerialAddress {
-    pub(super) fn of(port: &str) -> Result<Self, String> {
-        let port = Port::named(SERIAL, port, "/dev/ttyUSB0", EXAMPLE_PORT)?;
-        Ok(Self { port, pace: None, cts: None, modules: None, speed: 1.0 })
-    }
-
-    pub(super) fn set(&mut self, key: &str, value: &str) -> Result<(), String> {
-        match (key, value) {
-            ("pace", "careful") => self.pace = Some(PaceChoice::Careful),
-            ("pace", "fast") => self.pace = Some(PaceChoice::Fast),
-            ("pace", _) => return Err(format!("`{value}` is not a pace: use pace=careful or pace=fast")),
-            ("cts", "yes") => self.cts = Some(true),
-            ("cts", "no") => self.cts = Some(false),
-            ("cts", _) => return Err(format!("`{value}` is not a value of cts: use cts=yes or cts=no")),
-            ("modules", _) => {
-                let modules: u8 = number(key, value, "5")?;
-                if !(1..=31).contains(&modules) {
-                    return Err(format!("{modules} sensor modules; the bus has 1 to 31"));
-                }
-                self.modules = Some(modules);
-            }
-            ("speed", _) => self.speed = times(value)?,
-            _ => {
-                return Err(format!("a serial link has no `{key}`; it has pace, cts, modules and speed"));
-            }
+/// Changes a setting other than the number of modules.
+pub(super) fn set(pace: &mut Option<Pace>, place: &mut Place, key: &str, value: &str) -> Result<(), String> {
+    let uses_cts = match (key, value) {
+        ("pace", "careful" | "fast") => {
+            *pace = Some(if value == "fast" { Pace::FAST } else { Pace::CAREFUL });
+            return Ok(());
         }
-        Ok(())
+        ("pace", _) => return Err(format!("`{value}` is not a pace: use pace=careful or pace=fast")),
+        ("cts", "yes") => true,
+        ("cts", "no") => false,
+        ("cts", _) => return Err(format!("`{value}` is not a value of cts: use cts=yes or cts=no")),
+        _ => return Err(format!("a serial link has no `{key}`; it has pace, cts, modules and speed")),
+    };
+    // A connection over a network has no hand-shake line.
+    if let Place::Device(_, format) = place {
+        format.cts = Some(uses_cts);
     }
+    Ok(())
 }

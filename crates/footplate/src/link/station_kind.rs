@@ -92,6 +92,14 @@ impl StationKind {
 }
 
 impl StationKind {
+    /// How the address of a station of this kind begins.
+    pub(super) const fn scheme(self) -> &'static str {
+        match self {
+            Self::Marklin => "marklin-serial",
+            other => other.key(),
+        }
+    }
+
     /// Returns the station's time model, which holds over a usual line.
     pub(crate) const fn time_model(self) -> TimeModel {
         match self {

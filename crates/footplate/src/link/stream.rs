@@ -72,7 +72,7 @@ fn unreached(host: &str, port: u16, error: &dyn Display) -> Lost {
 }
 
 /// How a serial port is used.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SerialFormat {
     pub(super) baud: u32,
     pub(super) stop_bits: StopBits,

@@ -65,8 +65,7 @@ impl Served {
 
 fn connected(place: &str) -> Runtime<'static, CableLink> {
     let address: Address = format!("dcc-ex:{place}?speed={TIMES}").parse().expect("an address");
-    let Address::Board(board) = &address else { panic!("a board") };
-    let link = CableLink::open(board).expect("a connection");
+    let link = CableLink::open(address.cable().expect("a line")).expect("a connection");
     let layout = layout_named("track-a").expect("a layout").layout;
     let session = open_session(&address, &link, &layout).expect("a session");
     Runtime::new(link, session, None, None)

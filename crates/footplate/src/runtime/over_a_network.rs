@@ -71,8 +71,7 @@ impl Standing {
 fn connected(place: &str) -> Runtime<'static, CableLink> {
     let written = format!("marklin-serial:{place}?pace=fast&speed={TIMES}");
     let address: Address = written.parse().expect("an address");
-    let Address::Serial(serial) = &address else { panic!("a serial one") };
-    let link = CableLink::open(serial).expect("a connection");
+    let link = CableLink::open(address.cable().expect("a line")).expect("a connection");
     let layout = layout_named("track-a").expect("a layout").layout;
     let session = open_session(&address, &link, &layout).expect("modules");
     Runtime::new(link, session, None, None)
