@@ -277,11 +277,7 @@ fn another_throttle_is_noticed() {
 #[test]
 fn the_end_is_confirmed_by_the_board() {
     let mut desk = Desk::opened();
-    for command in [speed(T24, 8), speed(T58, 9)] {
-        desk.command(command);
-    }
-    desk.run_for(500);
-    desk.written.clear();
+    desk.drive_two();
     desk.client.close(desk.now);
     desk.run_for(500);
     assert_eq!(desk.texts(), ["<t 24 0 0>", "<t 58 0 1>", "<0>"]);
@@ -321,14 +317,9 @@ fn all_locomotives_are_stopped_again_while_a_direction_is_unknown_at_the_end() {
 #[test]
 fn what_was_not_confirmed_at_the_end_is_named() {
     let mut desk = Desk::opened();
-    for command in [speed(T24, 8), speed(T58, 9)] {
-        desk.command(command);
-    }
-    desk.run_for(500);
+    desk.drive_two();
     desk.station.answers.retain(|(request, _)| *request != "<t 58 0 1>");
-    desk.client.close(desk.now);
-    desk.run_for(5_000);
-    let closing = desk.client.closing();
+    let closing = desk.close(5_000);
     assert!(!closing.is_complete() && closing.power_off, "{closing}");
     assert_eq!((closing.commanded_to_stop, closing.not_commanded), (vec![T24], vec![T58]));
 }
@@ -336,34 +327,20 @@ fn what_was_not_confirmed_at_the_end_is_named() {
 #[test]
 fn noise_is_called_noise_once() {
     let mut desk = Desk::opened();
-    for _ in 0..20 {
-        desk.hear("\u{fffd}\u{fffd}xyz~~");
-        desk.run_for(20);
-    }
-    let noise: Vec<String> = desk
-        .notices
-        .iter()
-        .filter(|notice| matches!(notice, LinkNotice::Unreadable { .. }))
-        .map(ToString::to_string)
-        .collect();
-    assert_eq!(noise.len(), 1);
-    assert!(noise[0].contains("115200 baud"), "{}", noise[0]);
+    desk.assert_noise(20, "\u{fffd}\u{fffd}xyz~~".as_bytes(), "115200 baud");
 }
 
 #[test]
 fn what_the_board_does_not_know_is_refused() {
     let mut desk = Desk::opened();
-    let refusals = [
+    desk.assert_refused(&[
         (speed(TrainId(0), 3), "train 0 has no address here; addresses are 1 to 10239"),
         (speed(T24, 15), "step 15 is beyond the decoder; steps are 0 to 14"),
         (
             Command::Turnout { turnout: TurnoutId(2045), curved: true },
             "turnout 2045 has no address here; addresses are 1 to 2044",
         ),
-    ];
-    for (command, reason) in refusals {
-        assert_eq!(desk.client.handle_command(desk.now, command).unwrap_err().to_string(), reason);
-    }
+    ]);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use footplate_core::{
     Command, Event, EventKind, FunctionNumber, Report, SpeedStep, TimeSpan, Timestamp, TrainId,
 };
-use footplate_wire::{LinkNotice, ReportedFunctions, Session, Transmit};
+use footplate_wire::{Closing, LinkNotice, ReportedFunctions, Session, Transmit};
 
 pub(crate) const T24: TrainId = TrainId(24);
 pub(crate) const T58: TrainId = TrainId(58);
@@ -102,6 +102,41 @@ impl<C: Session, S: Station> Desk<C, S> {
 
     pub(crate) fn command(&mut self, command: Command) {
         self.client.handle_command(self.now, command).unwrap();
+    }
+
+    /// Drives two trains for half a second; nothing that was written until then counts.
+    pub(crate) fn drive_two(&mut self) {
+        for command in [speed(T24, 8), speed(T58, 9)] {
+            self.command(command);
+        }
+        self.run_for(500);
+        self.written.clear();
+    }
+
+    /// Ends the session, and waits for the station; returns how far the end has come.
+    pub(crate) fn close(&mut self, span_ms: i64) -> Closing {
+        self.client.close(self.now);
+        self.run_for(span_ms);
+        self.client.closing()
+    }
+
+    /// Hears bytes again and again; asserts that they are called noise once, with what to check.
+    pub(crate) fn assert_noise(&mut self, times: usize, bytes: &[u8], check: &str) {
+        for _ in 0..times {
+            self.client.handle_bytes(self.now, bytes);
+            self.run_for(20);
+        }
+        let is_noise = |notice: &&LinkNotice| matches!(notice, LinkNotice::Unreadable { .. });
+        let noise: Vec<String> = self.notices.iter().filter(is_noise).map(ToString::to_string).collect();
+        assert_eq!(noise.len(), 1);
+        assert!(noise[0].contains(check), "{}", noise[0]);
+    }
+
+    /// Asserts that commands are refused, each with its reason.
+    pub(crate) fn assert_refused(&mut self, refusals: &[(Command, &str)]) {
+        for (command, reason) in refusals {
+            assert_eq!(self.client.handle_command(self.now, *command).unwrap_err().to_string(), *reason);
+        }
     }
 
     /// The reports of sensors: when, which, and the width of the span before it (ms).

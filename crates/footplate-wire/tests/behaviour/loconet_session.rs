@@ -399,9 +399,8 @@ fn the_end_is_confirmed_by_the_station() {
     }
     desk.run_for(500);
     desk.written.clear();
-    desk.client.close(desk.now);
-    desk.run_for(1_000);
-    assert!(desk.client.closing().is_complete(), "{}", desk.client.closing());
+    let closing = desk.close(1_000);
+    assert!(closing.is_complete(), "{closing}");
     assert_eq!(desk.commands(), [drives(1, 0), drives(2, 0), Message::PowerOff]);
     assert!(matches!(desk.notices.last(), Some(LinkNotice::Closed(_))));
     assert_eq!(desk.client.next_timeout(), None);

@@ -363,11 +363,7 @@ fn silence_is_noticed_and_everything_asked_again_after_it() {
 #[test]
 fn the_end_is_confirmed_by_the_station() {
     let mut desk = Desk::opened();
-    for command in [speed(T24, 8), speed(T58, 9)] {
-        desk.command(command);
-    }
-    desk.run_for(500);
-    desk.written.clear();
+    desk.drive_two();
     desk.client.close(desk.now);
     desk.run_for(500);
     assert_eq!(desk.messages(), [drives(24, 0), drives(58, 0), Message::Stop(Uid::ALL)]);
@@ -380,9 +376,7 @@ fn the_end_is_confirmed_by_the_station() {
 fn a_train_that_was_never_driven_here_is_stopped_at_the_end_if_that_was_commanded() {
     let mut desk = Desk::new(Settings::default());
     desk.command(speed(T24, 0));
-    desk.client.close(desk.now);
-    desk.run_for(500);
-    let closing = desk.client.closing();
+    let closing = desk.close(500);
     assert_eq!((closing.is_complete(), closing.commanded_to_stop), (true, vec![T24]));
     assert!(desk.messages().contains(&drives(24, 0)));
     // The list has not been read: its number may be another.
@@ -394,14 +388,9 @@ fn a_train_that_was_never_driven_here_is_stopped_at_the_end_if_that_was_commande
 #[test]
 fn what_was_not_confirmed_at_the_end_is_named() {
     let mut desk = Desk::opened();
-    for command in [speed(T24, 8), speed(T58, 9)] {
-        desk.command(command);
-    }
-    desk.run_for(500);
+    desk.drive_two();
     desk.station.ignores = |message| *message == drives(58, 0);
-    desk.client.close(desk.now);
-    desk.run_for(5_000);
-    let closing = desk.client.closing();
+    let closing = desk.close(5_000);
     assert!(!closing.is_complete() && closing.power_off, "{closing}");
     assert_eq!((closing.commanded_to_stop, closing.not_commanded), (vec![T24], vec![T58]));
 }
@@ -409,11 +398,7 @@ fn what_was_not_confirmed_at_the_end_is_named() {
 #[test]
 fn the_end_on_a_line_from_which_nothing_is_heard_stops_trains_at_once_and_takes_the_power() {
     let mut desk = Desk::opened();
-    for command in [speed(T24, 8), speed(T58, 9)] {
-        desk.command(command);
-    }
-    desk.run_for(500);
-    desk.written.clear();
+    desk.drive_two();
     desk.station.ignores = |_| true;
     let began = (desk.now - ms(0)).as_ns() / 1_000_000;
     desk.client.handle_reopened(desk.now);
@@ -429,34 +414,20 @@ fn the_end_on_a_line_from_which_nothing_is_heard_stops_trains_at_once_and_takes_
 #[test]
 fn noise_is_called_noise_once() {
     let mut desk = Desk::opened();
-    for _ in 0..40 {
-        desk.client.handle_bytes(desk.now, &[0xFF; 7]);
-        desk.run_for(20);
-    }
-    let noise: Vec<String> = desk
-        .notices
-        .iter()
-        .filter(|notice| matches!(notice, LinkNotice::Unreadable { .. }))
-        .map(ToString::to_string)
-        .collect();
-    assert_eq!(noise.len(), 1);
-    assert!(noise[0].contains("15731"), "{}", noise[0]);
+    desk.assert_noise(40, &[0xFF; 7], "15731");
 }
 
 #[test]
 fn what_the_station_does_not_know_is_refused() {
     let mut desk = Desk::new(Settings { locomotives: LocomotiveProtocol::Dcc, ..Settings::default() });
-    let refusals = [
+    desk.assert_refused(&[
         (speed(TrainId(0), 3), "train 0 has no address here; addresses are 1 to 10239"),
         (speed(T24, 15), "step 15 is beyond the decoder; steps are 0 to 14"),
         (
             Command::Turnout { turnout: TurnoutId(321), curved: true },
             "turnout 321 has no address here; addresses are 1 to 320",
         ),
-    ];
-    for (command, reason) in refusals {
-        assert_eq!(desk.client.handle_command(desk.now, command).unwrap_err().to_string(), reason);
-    }
+    ]);
 }
 
 #[test]

@@ -349,18 +349,12 @@ fn a_station_that_was_restarted_is_recognised_by_what_it_forgot_and_trains_are_s
 #[test]
 fn the_end_is_confirmed_by_the_station() {
     let mut desk = Desk::opened();
-    for command in [speed(T24, 8), speed(T58, 9)] {
-        desk.command(command);
-    }
-    desk.run_for(500);
-    desk.written.clear();
-    desk.client.close(desk.now);
-    desk.run_for(500);
+    desk.drive_two();
+    let closing = desk.close(500);
     let expected =
         [drive(24, Throttle::Stop, false), drive(58, Throttle::Stop, true), Request::Power { on: false }];
     assert_eq!(desk.commands(), expected);
     assert_eq!(desk.written.last().map(|(_, request)| *request), Some(Request::LogOff));
-    let closing = desk.client.closing();
     assert!(closing.is_complete(), "{closing}");
     let said = "commanded to stop: 24, 58; track power switched off; the station has confirmed it";
     assert_eq!(closing.to_string(), said);
@@ -372,66 +366,44 @@ fn a_train_that_was_never_driven_here_is_stopped_at_the_end_if_that_was_commande
     let mut desk = Desk::new(Settings::default());
     desk.station.locomotives.insert(24, state(24, Throttle::Step(72), false));
     desk.command(speed(T24, 0));
-    desk.client.close(desk.now);
-    desk.run_for(500);
+    let closing = desk.close(500);
     let expected = [Request::StopAll, drive(24, Throttle::Stop, false), Request::Power { on: false }];
     assert_eq!(desk.commands(), expected);
-    let closing = desk.client.closing();
     assert_eq!((closing.is_complete(), closing.commanded_to_stop), (true, vec![T24]));
 }
 
 #[test]
 fn the_end_gets_through_when_datagrams_are_lost_and_names_what_did_not() {
     let mut desk = Desk::opened();
-    for command in [speed(T24, 8), speed(T58, 9)] {
-        desk.command(command);
-    }
-    desk.run_for(500);
+    desk.drive_two();
     desk.station.loses = |count| !count.is_multiple_of(3);
-    desk.client.close(desk.now);
-    desk.run_for(3_000);
-    assert!(desk.client.closing().is_complete(), "{}", desk.client.closing());
+    let closing = desk.close(3_000);
+    assert!(closing.is_complete(), "{closing}");
     let mut desk = Desk::opened();
     desk.command(speed(T24, 8));
     desk.run_for(500);
     desk.station.answers = false;
-    desk.client.close(desk.now);
-    desk.run_for(5_000);
-    let closing = desk.client.closing();
+    let closing = desk.close(5_000);
     assert_eq!((closing.power_off, closing.not_commanded), (false, vec![T24]));
 }
 
 #[test]
 fn noise_is_called_noise_once() {
     let mut desk = Desk::opened();
-    for _ in 0..20 {
-        desk.client.handle_bytes(desk.now, b"GET / HTTP/1.1");
-        desk.run_for(20);
-    }
-    let noise: Vec<String> = desk
-        .notices
-        .iter()
-        .filter(|notice| matches!(notice, LinkNotice::Unreadable { .. }))
-        .map(ToString::to_string)
-        .collect();
-    assert_eq!(noise.len(), 1);
-    assert!(noise[0].contains("UDP port 21105"), "{}", noise[0]);
+    desk.assert_noise(20, b"GET / HTTP/1.1", "UDP port 21105");
 }
 
 #[test]
 fn what_the_station_does_not_know_is_refused() {
     let mut desk = Desk::opened();
-    let refusals = [
+    desk.assert_refused(&[
         (speed(TrainId(0), 3), "train 0 has no address here; addresses are 1 to 9999"),
         (speed(T24, 15), "step 15 is beyond the decoder; steps are 0 to 14"),
         (
             Command::Turnout { turnout: TurnoutId(2_049), curved: true },
             "turnout 2049 has no address here; addresses are 1 to 2048",
         ),
-    ];
-    for (command, reason) in refusals {
-        assert_eq!(desk.client.handle_command(desk.now, command).unwrap_err().to_string(), reason);
-    }
+    ]);
 }
 
 #[test]
