@@ -98,17 +98,8 @@ pub(crate) trait Listener: Machine<Notice: Debug> {
         match input {
             Input::Event(event) => self.handle_event(now, event),
             Input::Timeout => self.handle_timeout(now),
-            Input::Line(_)
-            | Input::Schedule(_)
-            | Input::Schedules(_)
-            | Input::EndSchedule(_)
-            | Input::EmergencyStop
-            | Input::NoMoreLines
-            | Input::Order(_)
-            | Input::Link(_) => {
-                self.handle_word(now, input);
-            }
             Input::End => {}
+            word => self.handle_word(now, word),
         }
     }
 }

@@ -11,7 +11,6 @@ mod blocks;
 mod command_time;
 mod data_association;
 mod detections;
-mod direction;
 mod driven_train;
 mod driver;
 mod ends;

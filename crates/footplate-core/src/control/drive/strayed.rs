@@ -4,7 +4,7 @@
 //! silent sensor and a detection elsewhere, in either order, are enough to stop it. By chance they coincide once in
 //! 300 000 passages: sensors miss 3 in 1000, and in the 1.5 s around that one of 80 reports spuriously once in 800 times.
 
-use crate::ids::{SensorId, TrainId};
+use crate::ids::{NodeId, SensorId, TrainId};
 use crate::time::Timestamp;
 
 use super::driver::Driver;
@@ -27,5 +27,14 @@ impl Driver {
             self.trains.get(&train).map_or(0.0, |known| known.missed_share(self.track.context(), now));
         let found = self.association.probably_elsewhere(train, missed_or_elsewhere(missed));
         found.map(|detection| (detection.sensor, detection.window.until))
+    }
+
+    /// A train that was detected in an unknown direction passed the sensor in that of this node.
+    pub(in crate::control) fn decide_direction(&mut self, now: Timestamp, train: TrainId, node: NodeId) {
+        let Some(sensor) = self.track.layout.sensor_at(node) else { return };
+        if let Some(branch) = self.association.take_direction(train, sensor) {
+            self.revise(now, branch);
+            self.update(now);
+        }
     }
 }
