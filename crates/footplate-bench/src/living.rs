@@ -49,7 +49,7 @@ fn seconds_of(runs: bool) -> impl FnMut(usize) -> f64 {
             second += 1;
             host.attend(&mut station);
         }
-        assert!(station.world().incidents().is_empty(), "{:?}", station.world().incidents());
+        assert!(station.world.incidents().is_empty(), "{:?}", station.world.incidents());
         f64::from(host.closed)
     }
 }

@@ -37,7 +37,7 @@ pub fn score(layout: &Layout, seed: u64, law: LawFamily, budget: TimeSpan) -> an
     let sensors: Vec<_> =
         ahead(layout, &line, &calibrated.turnouts).into_iter().map(|(node, _)| node).collect();
     let context = TrackContext { layout, sections: &sections, turnouts: &calibrated.turnouts };
-    let oracle = known(context, line.station.world().truth(), TRAIN, &sensors)?;
+    let oracle = known(context, line.station.world.truth(), TRAIN, &sensors)?;
     let mut by = Vec::new();
     for model in [calibrated.model.clone(), oracle] {
         let mut world = line.clone();
@@ -51,7 +51,7 @@ pub fn score(layout: &Layout, seed: u64, law: LawFamily, budget: TimeSpan) -> an
     by.push(CourseProject::new(layout, &mut world, calibrated.turnouts).run(plan, COUNTS));
     let (calibration_s, ending) = (calibrated.seconds, calibrated.ending);
     let found = calibrated.model.train_length();
-    let truth = line.station.world().truth().sensed_length(TRAIN);
+    let truth = line.station.world.truth().sensed_length(TRAIN);
     let length_error_mm = truth.filter(|_| !found.is_unknown()).map(|truth| {
         let found = found.length();
         [(found.value - truth).as_mm(), found.uncertainty.as_mm()]

@@ -71,19 +71,19 @@ impl Kind {
                 // An engine that no train of this world has, with any law.
                 let other = seed.wrapping_mul(1000).wrapping_add(777);
                 let law = LawFamily::ALL[(seed % LawFamily::ALL.len() as u64) as usize];
-                station.world_mut().swap(train, Train::draw(other, law), COLD_WARMTH)?;
+                station.world.swap(train, Train::draw(other, law), COLD_WARMTH)?;
             }
-            Self::Dirty => station.world_mut().dirty_wheels(train, DIRTY_SPEED),
+            Self::Dirty => station.world.dirty_wheels(train, DIRTY_SPEED),
             Self::Restarted => station.restart(POWER_CUT),
             Self::Lifted | Self::Turned => {
-                station.world_mut().lift(train);
-                let layout = station.world().layout();
+                station.world.lift(train);
+                let layout = station.world.layout();
                 // Try places until the train fits.
                 for _ in 0..100 {
                     let Some(place) = choice.of(places).copied() else { break };
                     let turned = layout.reversed(place).filter(|_| self == Self::Turned);
                     let place = turned.unwrap_or(place);
-                    if station.world_mut().place(train, place, End::Nose).is_ok() {
+                    if station.world.place(train, place, End::Nose).is_ok() {
                         break;
                     }
                 }

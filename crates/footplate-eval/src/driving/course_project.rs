@@ -110,7 +110,7 @@ impl<'a, 'l> CourseProject<'a, 'l> {
             let moved = step.and_then(|step| self.short_move(ordered, step));
             results.moves.extend(moved.map(|moved| [ordered, moved]));
         }
-        results.incidents = in_words(self.line.station.world().incidents());
+        results.incidents = in_words(self.line.station.world.incidents());
         results
     }
 
@@ -252,7 +252,7 @@ impl<'a, 'l> CourseProject<'a, 'l> {
             while self.next_detection(until).is_some() {}
             self.command(SpeedStep::STAND);
             self.wait(BRAKING_S);
-            let past = self.line.station.world().truth().past(TRAIN, target)?;
+            let past = self.line.station.world.truth().past(TRAIN, target)?;
             return Some((past - offset).as_mm());
         }
     }
@@ -266,8 +266,7 @@ impl<'a, 'l> CourseProject<'a, 'l> {
         } else {
             distance_mm / speed
         };
-        let moved =
-            |line: &VirtualLine<'_>| Some(line.station.world().truth().train(TRAIN)?.odometer.as_mm());
+        let moved = |line: &VirtualLine<'_>| Some(line.station.world.truth().train(TRAIN)?.odometer.as_mm());
         let before = moved(self.line)?;
         self.command(step);
         self.wait(for_s);

@@ -215,7 +215,7 @@ mod tests {
         let context = TrackContext { layout: &layout, sections: &sections, turnouts: &turnouts };
         for law in LawFamily::ALL {
             let line = world(&layout, 3, law).unwrap();
-            let truth = line.station.world().truth();
+            let truth = line.station.world.truth();
             let engine = truth.engine(TRAIN).unwrap();
             let model = known(context, truth, TRAIN, &[]).unwrap();
             for step in steps(engine.speeds.highest()).skip(4) {

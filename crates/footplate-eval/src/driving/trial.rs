@@ -81,7 +81,7 @@ impl Plan {
     /// The tasks of a train in this world.
     #[must_use]
     pub fn new(line: &VirtualLine<'_>, seed: u64) -> Self {
-        let truth = line.station.world().truth();
+        let truth = line.station.world.truth();
         let steps = |range: std::ops::Range<f64>| {
             let speed = |step: SpeedStep| {
                 truth
@@ -162,11 +162,11 @@ impl<'a, 'l> Trial<'a, 'l> {
         for _ in 0..counts.moves {
             self.short_move();
         }
-        self.results.incidents = in_words(self.line.station.world().incidents());
+        self.results.incidents = in_words(self.line.station.world.incidents());
     }
 
     fn truth(&self) -> Option<TrainTruth> {
-        self.line.station.world().truth().train(TRAIN)
+        self.line.station.world.truth().train(TRAIN)
     }
 
     /// Stops at a random place ahead; returns how far beyond it the train came to rest, in mm.
@@ -179,7 +179,7 @@ impl<'a, 'l> Trial<'a, 'l> {
         let order = StopOrder { train: TRAIN, target, aim, step: Some(step), next_round: true };
         let sensor = self.layout.sensor_at(target.node)?;
         self.carry_out(Order::Stop(order))?;
-        let past = self.line.station.world().truth().past(TRAIN, sensor)?;
+        let past = self.line.station.world.truth().past(TRAIN, sensor)?;
         Some((past - target.offset).as_mm())
     }
 
@@ -260,7 +260,7 @@ impl<'a, 'l> Trial<'a, 'l> {
         // The position as it is shown: millimetres past a sensor.
         let Some(said) = self.driver.landmark(TRAIN, located.at) else { return };
         let Some(sensor) = self.layout.sensor_at(said.node) else { return };
-        let Some(past) = self.line.station.world().truth().past(TRAIN, sensor) else { return };
+        let Some(past) = self.line.station.world.truth().past(TRAIN, sensor) else { return };
         let off = (past - said.offset).as_mm();
         self.results.position_checks[0] += 1;
         self.results.position_checks[1] += u32::from(off.abs() <= HALF_95 * located.uncertainty.as_mm());
@@ -291,7 +291,7 @@ impl<'a, 'l> Trial<'a, 'l> {
 
 /// The sensors of the circuit that the train is on, with the surveyed lengths to the next.
 pub(super) fn ahead(layout: &Layout, line: &VirtualLine<'_>, turnouts: &TurnoutStates) -> Vec<(NodeId, f64)> {
-    let position = line.station.world().truth().train(TRAIN).and_then(|truth| truth.position);
+    let position = line.station.world.truth().train(TRAIN).and_then(|truth| truth.position);
     let mut found: Vec<(NodeId, f64)> = Vec::new();
     let mut node = position.and_then(|at| layout.edge(at.edge)).map(|edge| edge.to);
     for _ in 0..MAX_SENSORS {

@@ -20,7 +20,7 @@ pub(super) struct Odometer(Vec<(Timestamp, f64)>);
 impl Odometer {
     /// Takes a sample.
     pub(super) fn look(&mut self, line: &VirtualLine<'_>, train: TrainId) {
-        let truth = line.station.world().truth().train(train);
+        let truth = line.station.world.truth().train(train);
         self.0.extend(truth.map(|truth| (line.now(), truth.odometer.as_mm())));
     }
 

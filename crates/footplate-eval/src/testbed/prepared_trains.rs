@@ -86,11 +86,11 @@ impl<'l> PreparedTrains<'l> {
         let starts_at: Vec<Option<(Position, End)>> = trains
             .iter()
             .map(|train| {
-                let truth = station.world().truth().train(*train)?;
+                let truth = station.world.truth().train(*train)?;
                 Some((truth.position?, truth.leads))
             })
             .collect();
-        trains.iter().for_each(|train| station.world_mut().lift(*train));
+        trains.iter().for_each(|train| station.world.lift(*train));
         let mut line = VirtualLine::open(station)?;
         let (mut models, mut fits) = (BTreeMap::new(), BTreeMap::new());
         for (nth, train) in trains.iter().enumerate() {
@@ -99,11 +99,11 @@ impl<'l> PreparedTrains<'l> {
             let starts = starts_at.iter().cycle().skip(nth).take(trains.len()).flatten();
             let mut calibrated = None;
             for (position, leads) in starts {
-                let faults = line.station.world().incidents().len();
-                line.station.world_mut().place(*train, *position, *leads)?;
+                let faults = line.station.world.incidents().len();
+                line.station.world.place(*train, *position, *leads)?;
                 calibrated = Some(calibrate(assumed, &mut line, *train, budget));
-                line.station.world_mut().lift(*train);
-                if line.station.world().incidents().len() == faults {
+                line.station.world.lift(*train);
+                if line.station.world.incidents().len() == faults {
                     break;
                 }
             }
@@ -113,7 +113,7 @@ impl<'l> PreparedTrains<'l> {
         }
         let mut turnouts = TurnoutStates::unknown();
         for (turnout, _) in layout.turnouts() {
-            line.station.world_mut().lay(turnout, Leg::Straight);
+            line.station.world.lay(turnout, Leg::Straight);
             turnouts.set(turnout, Leg::Straight);
         }
         let mut prepared = Self { layout, line, models, fits, turnouts, places: BTreeMap::new() };
@@ -129,7 +129,7 @@ impl<'l> PreparedTrains<'l> {
 
     /// The world, with the truth.
     pub fn world(&self) -> &LivingLayout<'l> {
-        self.line.station.world()
+        &self.line.station.world
     }
 
     /// Puts a train down with the leading end of its shoe past the sensor at a node, nose first, in the node's
@@ -140,7 +140,7 @@ impl<'l> PreparedTrains<'l> {
     pub fn put(&mut self, train: TrainId, node: NodeId, offset: Length) -> anyhow::Result<()> {
         let at = footplate_core::track::Landmark { node, offset };
         let position = self.layout.locate(at, &self.turnouts)?;
-        self.line.station.world_mut().place(train, position, End::Nose)?;
+        self.line.station.world.place(train, position, End::Nose)?;
         self.places.insert(train, PathPoint { node, distance: offset });
         Ok(())
     }

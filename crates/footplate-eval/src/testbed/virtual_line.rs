@@ -24,7 +24,7 @@ impl<'l> VirtualLine<'l> {
         let now = station.now();
         let mut interface = Interface::new(now, Settings::with_cts(MODULES))?;
         interface.handle_cts(now, station.cts());
-        let blocks = BlockReports::of(station.world().layout(), &mut interface);
+        let blocks = BlockReports::of(station.world.layout(), &mut interface);
         Ok(Self { station, interface, blocks })
     }
 
@@ -95,7 +95,7 @@ impl<'l> VirtualLine<'l> {
                 Output::Command(command) => self.command(command),
                 Output::HoldLine(until) => self.interface.hold_line(until),
                 Output::Watch(sensor) => {
-                    let layout = self.station.world().layout();
+                    let layout = self.station.world.layout();
                     self.interface.watch(sensor.map(|sensor| layout.input(sensor)));
                 }
                 Output::Notice(notice) => return Some(notice),

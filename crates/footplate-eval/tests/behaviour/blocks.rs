@@ -53,7 +53,7 @@ fn a_block_is_occupied_from_the_front_of_a_train_until_its_rear_has_left() {
     let command = Some(Command::Speed { train: ONE, step: step(10) });
     let mut listener = Listener { command, heard: Vec::new() };
     line.drive(&mut listener, Timestamp::from_s(40.0));
-    let truth = line.station.world().truth();
+    let truth = line.station.world.truth();
     let length = truth.sensed_length(ONE).unwrap().as_mm();
     let (mut entered, mut freed) = (0, 0);
     for event in &listener.heard {
@@ -93,7 +93,7 @@ fn a_train_is_calibrated_stopped_and_measured_by_blocks_alone() {
     let Calibrated { model, locator, turnouts, seconds, ending, .. } =
         calibrate(&layout, &mut line, ONE, TimeSpan::from_s(480.0));
     assert!(seconds <= 481.0 && ending.contains("Budget"), "{seconds} s, {ending}");
-    let (found, truth) = (model.train_length().known().unwrap(), line.station.world().truth());
+    let (found, truth) = (model.train_length().known().unwrap(), line.station.world.truth());
     let error = (found.value - truth.sensed_length(ONE).unwrap()).as_mm();
     assert!(error.abs() < 10.0 && error.abs() < 3.0 * found.uncertainty.as_mm(), "{error} mm, {found:?}");
 
@@ -113,7 +113,7 @@ fn a_train_is_calibrated_stopped_and_measured_by_blocks_alone() {
         let until = line.now() + TimeSpan::from_s(60.0);
         while !matches!(line.drive(&mut driver, until).expect("it stops"), Notice::Done(_)) {}
         line.drive(&mut driver, line.now() + TimeSpan::from_s(2.0));
-        let past = line.station.world().truth().past(ONE, layout.sensor_at(target.node).unwrap());
+        let past = line.station.world.truth().past(ONE, layout.sensor_at(target.node).unwrap());
         let error = past.unwrap().as_mm() - offset;
         assert!(error.abs() < 40.0, "{name}{offset:+}: {error} mm");
     }
@@ -126,7 +126,7 @@ fn drive_and_compare(line: &mut VirtualLine<'_>, driver: &mut Driver, layout: &L
     for train in [ONE, OTHER] {
         let located = driver.locate(train, line.now()).expect("both are located");
         let said = driver.landmark(train, located.at).unwrap();
-        let truth = line.station.world().truth();
+        let truth = line.station.world.truth();
         let past = truth.past(train, layout.sensor_at(said.node).unwrap()).unwrap();
         let error = (said.offset - past).as_mm();
         assert!(error.abs() < 50.0, "train {train} at {}: {error} mm", layout.display(said));
@@ -143,14 +143,14 @@ fn two_trains_on_six_blocks_are_kept_apart_and_found_again_after_reversing() {
     };
     let mut driver = Driver::new(layout.clone(), TurnoutStates::unknown());
     for train in [ONE, OTHER] {
-        [ONE, OTHER].into_iter().for_each(|all| line.station.world_mut().lift(all));
-        line.station.world_mut().place(train, place(0), End::Nose).unwrap();
+        [ONE, OTHER].into_iter().for_each(|all| line.station.world.lift(all));
+        line.station.world.place(train, place(0), End::Nose).unwrap();
         let found = calibrate(&layout, &mut line, train, TimeSpan::from_s(240.0));
         driver.add_located(found.model, Locator::new(train));
     }
-    [ONE, OTHER].into_iter().for_each(|all| line.station.world_mut().lift(all));
-    line.station.world_mut().place(ONE, place(4), End::Nose).unwrap();
-    line.station.world_mut().place(OTHER, place(0), End::Nose).unwrap();
+    [ONE, OTHER].into_iter().for_each(|all| line.station.world.lift(all));
+    line.station.world.place(ONE, place(4), End::Nose).unwrap();
+    line.station.world.place(OTHER, place(0), End::Nose).unwrap();
     let wait = |line: &mut VirtualLine<'_>, driver: &mut Driver, seconds: f64| {
         let until = line.now() + TimeSpan::from_s(seconds);
         while line.drive(driver, until).is_some() {}
@@ -181,7 +181,7 @@ fn two_trains_on_six_blocks_are_kept_apart_and_found_again_after_reversing() {
         }
         wait(&mut line, &mut driver, 5.0);
     }
-    let truth = line.station.world().truth();
+    let truth = line.station.world.truth();
     assert!([ONE, OTHER].iter().all(|train| !truth.train(*train).unwrap().is_wrecked));
 }
 
@@ -216,7 +216,7 @@ fn sensors_and_blocks_locate_a_train_together() {
     let mut line = world(&layout, 2, &[ONE]);
     let found = calibrate(&layout, &mut line, ONE, TimeSpan::from_s(480.0));
     assert!(found.ending.contains("Budget"), "{}", found.ending);
-    let truth = line.station.world().truth();
+    let truth = line.station.world.truth();
     let length = found.model.train_length().length();
     let error = (length.value - truth.sensed_length(ONE).unwrap()).as_mm();
     assert!(length.count > 0 && error.abs() < 3.0 * length.uncertainty.as_mm(), "{error} mm, {length:?}");

@@ -46,7 +46,7 @@ fn calibrated(layout: &Layout, seed: u64) -> (LivingLayout<'_>, Calibrated) {
     let station = VirtualStation::draw(layout, seed, &[TRAIN], &LivingSwitches::faultless()).unwrap();
     let mut line = VirtualLine::open(station).unwrap();
     let found = calibrate(layout, &mut line, TRAIN, TimeSpan::from_s(480.0));
-    let mut world = line.station.world().clone();
+    let mut world = line.station.world.clone();
     world.begin_session(TimeSpan::from_s(3600.0));
     (world, found)
 }
@@ -139,7 +139,7 @@ impl<'l> Line<'l> {
         let driver = self.watchdog.driver();
         let located = driver.locate(TRAIN, self.station.now())?;
         let said = driver.landmark(TRAIN, located.at)?;
-        let past = self.station.world().truth().past(TRAIN, driver.layout().sensor_at(said.node)?)?;
+        let past = self.station.world.truth().past(TRAIN, driver.layout().sensor_at(said.node)?)?;
         let error = (said.offset - past).as_mm();
         // Distances are known up to whole laps.
         Some([error - LAP_MM * (error / LAP_MM).round(), located.uncertainty.as_mm()])
@@ -246,7 +246,7 @@ fn reports_make_stops_among_many_sensors_no_worse() {
                 let is_at_rest = line.watchdog.driver().is_at_rest(TRAIN, line.station.now());
                 assert!(is_at_rest, "seed {seed}: {:?}", line.notices.last());
                 let sensor = layout.sensor_at(landmark.node).unwrap();
-                let past = line.station.world().truth().past(TRAIN, sensor).unwrap();
+                let past = line.station.world.truth().past(TRAIN, sensor).unwrap();
                 let error = (past - landmark.offset).as_mm();
                 errors.push((error - LAP_MM * (error / LAP_MM).round()).abs());
             }
@@ -274,7 +274,7 @@ fn a_train_that_stalls_between_sensors_is_reported_within_seconds() {
                 line.run(RUN, |_| {});
             }
             let stalled = line.station.now();
-            line.station.world_mut().dirty_wheels(TRAIN, 0.0);
+            line.station.world.dirty_wheels(TRAIN, 0.0);
             line.run(90.0, |_| {});
             let alarm = line.alarm(Alarm::Stalled).or(line.alarm(Alarm::Lost)).unwrap();
             times.push((alarm - stalled).as_s());

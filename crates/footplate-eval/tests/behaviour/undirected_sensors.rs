@@ -62,7 +62,7 @@ impl Session {
         while let Some(notice) = line.drive(driver, until) {
             match notice {
                 Notice::Passed { train, passed, .. } => {
-                    let truth = line.station.world().truth();
+                    let truth = line.station.world.truth();
                     let is_it = |pass: &PassTruth| {
                         let off = (pass.at - passed.window.until).abs();
                         pass.train == Some(train) && pass.sensor == passed.sensor && off < REPORTED_WITHIN
@@ -100,7 +100,7 @@ impl Session {
         }
         if self.drive(line, driver, now + TimeSpan::from_s(90.0)) {
             self.wait(line, driver, 2.0);
-            let past = line.station.world().truth().past(TRAIN, sensor);
+            let past = line.station.world.truth().past(TRAIN, sensor);
             self.stops.push(past.map_or(f64::INFINITY, |past| past.as_mm() - BEYOND_MM));
         }
     }
@@ -162,7 +162,7 @@ fn a_lost_train_is_located_in_its_true_direction_by_two_sensors() {
         session.wait(&mut line, &mut driver, 12.0);
         let located = driver.locate(TRAIN, line.now()).expect("by the next sensor");
         let said = driver.landmark(TRAIN, located.at).unwrap();
-        let past = line.station.world().truth().past(TRAIN, layout.sensor_at(said.node).unwrap()).unwrap();
+        let past = line.station.world.truth().past(TRAIN, layout.sensor_at(said.node).unwrap()).unwrap();
         let error = (said.offset - past).as_mm();
         assert!(error.abs() < 80.0, "seed {seed}: {error} mm");
         assert!(session.passed >= 2 && session.wrong == 0, "seed {seed}: {session:?}");
@@ -173,12 +173,12 @@ fn a_lost_train_is_located_in_its_true_direction_by_two_sensors() {
 fn a_train_that_starts_on_a_sensor_is_found_by_the_next_ones() {
     let layout = undirected("track-a", |_| true);
     let mut line = world(&layout, 9_221);
-    line.station.world_mut().lift(TRAIN);
+    line.station.world.lift(TRAIN);
     let sensor = layout.sensor_named("C13").unwrap();
     let (edge, _) = layout.edges().find(|(_, edge)| Some(edge.from) == layout.sensor_node(sensor)).unwrap();
     // Its shoe is on it.
     let position = Position { edge, offset: Length::from_mm(20.0) };
-    line.station.world_mut().place(TRAIN, position, End::Nose).unwrap();
+    line.station.world.place(TRAIN, position, End::Nose).unwrap();
     let mut driver = calibrated(&layout, &mut line);
     let mut session = Session::default();
     (0..3).for_each(|_| session.stop(&mut line, &mut driver, 3, 9));

@@ -87,7 +87,8 @@ struct Slot {
 /// A living layout behind a DCC-EX board, on a clock of its own.
 #[derive(Debug, Clone)]
 pub struct VirtualBoard<'l> {
-    world: LivingLayout<'l>,
+    /// The layout; an operator intervenes in it.
+    pub world: LivingLayout<'l>,
     switches: BoardSwitches,
     draws: Draws,
     now: Timestamp,
@@ -158,17 +159,6 @@ impl<'l> VirtualBoard<'l> {
     #[must_use]
     pub const fn now(&self) -> Timestamp {
         self.now
-    }
-
-    /// The layout.
-    #[must_use]
-    pub const fn world(&self) -> &LivingLayout<'l> {
-        &self.world
-    }
-
-    /// The layout, for operator intervention.
-    pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
-        &mut self.world
     }
 
     /// The operator presses its reset button, or opens its serial port: the track loses power, and the board reads nothing for

@@ -108,7 +108,8 @@ struct Slot {
 /// A living layout behind a Central Station, on a clock of its own.
 #[derive(Debug, Clone)]
 pub struct VirtualCentralStation<'l> {
-    world: LivingLayout<'l>,
+    /// The layout; an operator intervenes in it.
+    pub world: LivingLayout<'l>,
     switches: CanSwitches,
     draws: Draws,
     now: Timestamp,
@@ -181,17 +182,6 @@ impl<'l> VirtualCentralStation<'l> {
     #[must_use]
     pub const fn now(&self) -> Timestamp {
         self.now
-    }
-
-    /// The layout.
-    #[must_use]
-    pub const fn world(&self) -> &LivingLayout<'l> {
-        &self.world
-    }
-
-    /// The layout, for operator intervention.
-    pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
-        &mut self.world
     }
 
     /// How frames travel.

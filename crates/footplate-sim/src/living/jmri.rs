@@ -77,7 +77,8 @@ enum Order {
 /// A living layout behind JMRI, on a clock of its own.
 #[derive(Debug, Clone)]
 pub struct VirtualJmri<'l> {
-    world: LivingLayout<'l>,
+    /// The layout; an operator intervenes in it.
+    pub world: LivingLayout<'l>,
     switches: JmriSwitches,
     draws: Draws,
     now: Timestamp,
@@ -148,17 +149,6 @@ impl<'l> VirtualJmri<'l> {
     #[must_use]
     pub const fn now(&self) -> Timestamp {
         self.now
-    }
-
-    /// The layout.
-    #[must_use]
-    pub const fn world(&self) -> &LivingLayout<'l> {
-        &self.world
-    }
-
-    /// The layout, for operator intervention.
-    pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
-        &mut self.world
     }
 
     /// The functions of a locomotive that are on, F0 in the lowest bit.

@@ -84,7 +84,8 @@ struct Waiting {
 /// A living layout behind a command station on LocoNet, on a clock of its own.
 #[derive(Debug, Clone)]
 pub struct VirtualLocoNet<'l> {
-    world: LivingLayout<'l>,
+    /// The layout; an operator intervenes in it.
+    pub world: LivingLayout<'l>,
     switches: LocoNetSwitches,
     draws: Draws,
     now: Timestamp,
@@ -157,22 +158,11 @@ impl<'l> VirtualLocoNet<'l> {
         self.now
     }
 
-    /// The layout.
-    #[must_use]
-    pub const fn world(&self) -> &LivingLayout<'l> {
-        &self.world
-    }
-
     /// The functions of a locomotive that are on, F0 in the lowest bit; none of one that is in no slot.
     #[must_use]
     pub fn functions(&self, train: TrainId) -> u32 {
         let slot = self.slots.iter().find(|slot| slot.data.address == train.0);
         slot.map_or(0, |slot| slot.data.functions | slot.higher_functions)
-    }
-
-    /// The layout, for operator intervention.
-    pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
-        &mut self.world
     }
 
     /// The command station is switched off and on: it knows no locomotive, and the track has no power. The server stays.

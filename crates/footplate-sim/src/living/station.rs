@@ -108,7 +108,8 @@ struct Coil {
 /// A living layout behind the bytes of a 6051, on a clock of its own.
 #[derive(Debug, Clone)]
 pub struct VirtualStation<'l> {
-    world: LivingLayout<'l>,
+    /// The layout; an operator intervenes in it.
+    pub world: LivingLayout<'l>,
     switches: StationSwitches,
     draws: Draws,
     now: Timestamp,
@@ -189,17 +190,6 @@ impl<'l> VirtualStation<'l> {
     #[must_use]
     pub const fn cts(&self) -> bool {
         self.cts.is_up
-    }
-
-    /// The layout.
-    #[must_use]
-    pub const fn world(&self) -> &LivingLayout<'l> {
-        &self.world
-    }
-
-    /// The layout, for operator intervention.
-    pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
-        &mut self.world
     }
 
     /// Solenoids that were left powered for too long.

@@ -119,7 +119,8 @@ struct Slot {
 /// A living layout behind a Z21, on a clock of its own.
 #[derive(Debug, Clone)]
 pub struct VirtualZ21<'l> {
-    world: LivingLayout<'l>,
+    /// The layout; an operator intervenes in it.
+    pub world: LivingLayout<'l>,
     switches: Z21Switches,
     draws: Draws,
     network: Network,
@@ -197,17 +198,6 @@ impl<'l> VirtualZ21<'l> {
     #[must_use]
     pub const fn now(&self) -> Timestamp {
         self.now
-    }
-
-    /// The layout.
-    #[must_use]
-    pub const fn world(&self) -> &LivingLayout<'l> {
-        &self.world
-    }
-
-    /// The layout, for operator intervention.
-    pub const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
-        &mut self.world
     }
 
     /// It is switched off and on: it forgets its clients and its locomotives, and after some seconds gives power to the track.

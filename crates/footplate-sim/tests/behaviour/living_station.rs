@@ -80,10 +80,10 @@ fn bytes_that_do_not_wait_are_lost_and_tear_answers() {
     station.write(10);
     station.write(24);
     wait(&mut station, 5.0);
-    assert!(station.world().truth().train(TRAIN).unwrap().at_rest_since.is_some());
+    assert!(station.world.truth().train(TRAIN).unwrap().at_rest_since.is_some());
     say(&mut station, &[24]);
     wait(&mut station, 5.0);
-    assert!(station.world().truth().train(TRAIN).unwrap().at_rest_since.is_none());
+    assert!(station.world.truth().train(TRAIN).unwrap().at_rest_since.is_none());
 
     station.write(133);
     wait(&mut station, 0.015);
@@ -105,7 +105,7 @@ fn without_the_wire_bytes_may_follow_each_other() {
     station.write(10);
     station.write(24);
     assert_eq!(station.advance(Timestamp::ZERO + TimeSpan::from_ms(5000)), None);
-    assert!(station.world().truth().train(TRAIN).unwrap().at_rest_since.is_none());
+    assert!(station.world.truth().train(TRAIN).unwrap().at_rest_since.is_none());
 }
 
 #[test]
@@ -116,13 +116,13 @@ fn detections_are_remembered_until_they_are_read_module_by_module() {
     put(&mut station, OTHER, "R8", "M3", 100.0);
     say(&mut station, &[192]);
     // Over S2, number 4, and on.
-    station.world_mut().push(TRAIN, footplate_core::Length::from_mm(400.0));
+    station.world.push(TRAIN, footplate_core::Length::from_mm(400.0));
     wait(&mut station, 0.1);
     assert_eq!(ask(&mut station, 194, 2), [0, 0], "the second module has nothing");
     assert_eq!(ask(&mut station, 193, 2), [0b0000_1000, 0]);
     assert_eq!(ask(&mut station, 193, 2), [0, 0], "read, and so forgotten");
     say(&mut station, &[128]);
-    station.world_mut().push(TRAIN, footplate_core::Length::from_mm(800.0));
+    station.world.push(TRAIN, footplate_core::Length::from_mm(800.0));
     wait(&mut station, 0.1);
     for _ in 0..2 {
         assert_eq!(ask(&mut station, 129, 2), [0b0000_0010, 0], "without the mode it is kept");
@@ -135,7 +135,7 @@ fn a_sensor_that_stays_closed_is_seen_again_and_again() {
     let mut station = empty(&layout, StationSwitches::default());
     put(&mut station, TRAIN, "S1", "S2", 890.0);
     say(&mut station, &[192]);
-    station.world_mut().push(TRAIN, footplate_core::Length::from_mm(20.0));
+    station.world.push(TRAIN, footplate_core::Length::from_mm(20.0));
     for _ in 0..3 {
         assert_eq!(ask(&mut station, 193, 2), [0b0000_1000, 0]);
     }
@@ -158,7 +158,7 @@ fn a_solenoid_left_on_raises_an_alarm_and_burns() {
     wait(&mut station, 0.2);
     assert_eq!(station.alarms().iter().map(|alarm| alarm.turnout).collect::<Vec<_>>(), [TurnoutId(3)]);
     wait(&mut station, 6.0);
-    let kinds: Vec<IncidentKind> = station.world().incidents().iter().map(|incident| incident.kind).collect();
+    let kinds: Vec<IncidentKind> = station.world.incidents().iter().map(|incident| incident.kind).collect();
     assert_eq!(kinds, [IncidentKind::CoilBurnt { turnout: TurnoutId(3) }]);
 }
 
@@ -169,7 +169,7 @@ fn points_need_a_tenth_of_a_second_of_power() {
     say(&mut station, &[34, 1]);
     say(&mut station, &[32]);
     wait(&mut station, 1.0);
-    assert_eq!(station.world().lies(TurnoutId(1)), Some(footplate_core::track::Leg::Straight));
+    assert_eq!(station.world.lies(TurnoutId(1)), Some(footplate_core::track::Leg::Straight));
 }
 
 /// All that a host sees in half a minute of driving, and what the world came to.
@@ -191,8 +191,8 @@ fn seen(seed: u64) -> (Vec<(Timestamp, FromStation)>, String) {
             seen.push((station.now(), heard));
         }
     }
-    let truth = station.world().truth();
-    (seen, format!("{:?} {:?} {:?}", truth.passes(), truth.rests(), station.world().incidents()))
+    let truth = station.world.truth();
+    (seen, format!("{:?} {:?} {:?}", truth.passes(), truth.rests(), station.world.incidents()))
 }
 
 #[test]
@@ -213,7 +213,7 @@ fn how_often_the_host_looks_changes_nothing() {
             let next = (station.now() + TimeSpan::from_s(look_ms * 1e-3)).min(until);
             station.advance(next);
         }
-        station.world().truth().train(TRAIN).unwrap()
+        station.world.truth().train(TRAIN).unwrap()
     };
     assert_eq!(run(0.37), run(8000.0));
 }
@@ -226,7 +226,7 @@ fn modules_without_a_latch_forget_at_once_and_some_boxes_know_no_single_module()
     put(&mut station, TRAIN, "S1", "S2", 800.0);
     say(&mut station, &[192]);
     // Over S2, number 4, and on: nothing is left of it when the modules are read.
-    station.world_mut().push(TRAIN, footplate_core::Length::from_mm(400.0));
+    station.world.push(TRAIN, footplate_core::Length::from_mm(400.0));
     wait(&mut station, 0.1);
     assert_eq!(ask(&mut station, 130, 4), [0; 4]);
     assert_eq!(ask(&mut station, 193, 2), [0_u8; 0], "it does not know the question");

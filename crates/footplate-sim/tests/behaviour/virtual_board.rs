@@ -97,7 +97,7 @@ fn a_sensor_is_reported_within_the_delays_that_were_measured() {
         let id = text.strip_prefix("<Q ")?.trim_end().strip_suffix('>')?.parse::<u16>().ok()?;
         Some((*at, id))
     });
-    let mut passes = board.world().truth().passes().iter();
+    let mut passes = board.world.truth().passes().iter();
     let mut count = 0;
     for (at, id) in reports {
         let pass = passes.next().expect("a pass for each report");
@@ -118,10 +118,10 @@ fn directions_are_absolute() {
         // Whichever end leads, forward is the front end.
         ask(&mut board, "<t 24 72 1>", 2_000);
         ask(&mut board, "<t 24 72 1>", 2_000);
-        assert_eq!(board.world().truth().train(TRAIN).unwrap().leads, End::Nose);
+        assert_eq!(board.world.truth().train(TRAIN).unwrap().leads, End::Nose);
         ask(&mut board, "<t 24 0 1>", 8_000);
         ask(&mut board, "<t 24 72 0>", 3_000);
-        assert_eq!(board.world().truth().train(TRAIN).unwrap().leads, End::Tail);
+        assert_eq!(board.world.truth().train(TRAIN).unwrap().leads, End::Tail);
     }
 }
 
@@ -131,17 +131,17 @@ fn trains_run_on_without_commands_and_stop_when_the_board_is_reset() {
     let mut board = board(&layout, End::Nose, BoardSwitches::default());
     answer(&mut board, "<1>");
     ask(&mut board, "<t 24 72 1>", 10_000);
-    let before = odometer(board.world());
+    let before = odometer(&board.world);
     let later = board.now() + TimeSpan::from_s(5.0);
     while board.advance(later).is_some() {}
-    assert!(odometer(board.world()) > before + 500.0);
+    assert!(odometer(&board.world) > before + 500.0);
     board.restart();
-    assert!(!board.world().is_powered());
+    assert!(!board.world.is_powered());
     let began = board.now();
     let heard = ask(&mut board, "<s>", 6_000);
     let banner = heard.iter().find(|(_, text)| text.starts_with("<iDCC-EX")).expect("a banner");
     assert!(banner.0 - began >= TimeSpan::from_ms(2_000));
-    assert!(board.world().truth().train(TRAIN).unwrap().at_rest_since.is_some());
+    assert!(board.world.truth().train(TRAIN).unwrap().at_rest_since.is_some());
     assert_eq!(answer(&mut board, "<t 24>"), "<l 24 -1 128 0>\n", "it has forgotten the locomotive");
 }
 
@@ -167,5 +167,5 @@ fn it_may_chatter_between_messages() {
     let heard = answer(&mut board, "<#>");
     assert!(heard.ends_with("<# 50>\n") && heard.len() > 12, "{heard}");
     let unknown = TrainId(99);
-    assert!(board.world().truth().train(unknown).is_none());
+    assert!(board.world.truth().train(unknown).is_none());
 }

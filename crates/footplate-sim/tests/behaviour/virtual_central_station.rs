@@ -76,7 +76,7 @@ fn commands_are_confirmed_and_questions_answered_over_every_line() {
         let participants = answers(&mut station, Message::Ping).len();
         assert_eq!(participants, if transport == CanTransport::Adapter { 1 } else { 2 });
         assert_eq!(answers(&mut station, Message::Stop(Uid::ALL)), [Message::Stop(Uid::ALL)]);
-        assert!(!station.world().is_powered());
+        assert!(!station.world.is_powered());
     }
 }
 
@@ -95,7 +95,7 @@ fn an_adapter_passes_nothing_on_until_it_is_opened_at_the_right_rate() {
         while let Some((_, bytes)) = station.advance(until) {
             said.extend(bytes);
         }
-        assert_eq!(station.world().is_powered(), is_passed, "{opening:?}");
+        assert_eq!(station.world.is_powered(), is_passed, "{opening:?}");
         assert_eq!(said.contains(&0x07), !opening.contains('O'), "{opening:?}: {said:?}");
     }
 }
@@ -131,7 +131,7 @@ fn sensors_are_reported_within_a_cycle_with_the_time_since_the_change_before() {
             _ => None,
         })
     };
-    let mut passes = station.world().truth().passes().iter();
+    let mut passes = station.world.truth().passes().iter();
     let mut count = 0;
     for (at, input, change) in changes(true) {
         let pass = passes.next().expect("a pass for each report");
@@ -160,19 +160,19 @@ fn trains_run_on_without_commands_and_stop_when_it_is_switched_off() {
     answers(&mut station, Message::Go(Uid::ALL));
     ask(&mut station, Message::Speed { uid: UID, speed: Some(600) }, 10_000);
     let odometer =
-        |station: &VirtualCentralStation<'_>| station.world().truth().train(TRAIN).unwrap().odometer.as_mm();
+        |station: &VirtualCentralStation<'_>| station.world.truth().train(TRAIN).unwrap().odometer.as_mm();
     let before = odometer(&station);
     let later = station.now() + TimeSpan::from_s(5.0);
     while station.advance(later).is_some() {}
     assert!(odometer(&station) > before + 500.0);
     station.restart();
-    assert!(!station.world().is_powered());
+    assert!(!station.world.is_powered());
     assert_eq!(answers(&mut station, Message::Ping), [], "it starts");
     let later = station.now() + TimeSpan::from_s(6.0);
     while station.advance(later).is_some() {}
     let asked = Message::Speed { uid: UID, speed: None };
     assert_eq!(answers(&mut station, asked), [Message::Speed { uid: UID, speed: Some(0) }]);
-    assert!(station.world().truth().train(TRAIN).unwrap().at_rest_since.is_some());
+    assert!(station.world.truth().train(TRAIN).unwrap().at_rest_since.is_some());
 }
 
 #[test]

@@ -58,9 +58,9 @@ fn requests_are_answered_as_its_sources_say() {
         drive.len() == 1 && says(&drive, &[r#""speed":0.5"#]) && !says(&drive, &["address"]),
         "{drive:?}"
     );
-    let before = odometer(jmri.world());
+    let before = odometer(&jmri.world);
     hear(&mut jmri, 3_000);
-    assert!(odometer(jmri.world()) > before + 200.0, "{}", odometer(jmri.world()));
+    assert!(odometer(&jmri.world) > before + 200.0, "{}", odometer(&jmri.world));
     let light = ask(&mut jmri, r#"{"type":"throttle","data":{"name":"any","F0":true,"status":null}}"#);
     assert!(says(&light, &[r#""F0":true"#, r#""F1":false"#]), "{light:?}");
     assert_eq!(jmri.functions(TRAIN), 1);
@@ -108,14 +108,14 @@ fn the_trains_of_a_client_that_has_gone_are_stopped() {
     hear(&mut jmri, 3_000);
     jmri.disconnect();
     assert!(hear(&mut jmri, 5_000).is_empty(), "to whom?");
-    assert!(jmri.world().truth().train(TRAIN).unwrap().at_rest_since.is_some());
+    assert!(jmri.world.truth().train(TRAIN).unwrap().at_rest_since.is_some());
     jmri.connect();
     assert!(says(&hear(&mut jmri, 10), &["hello"]));
     // Its throttle has to be asked for again, and turnouts are thrown.
     assert!(says(&ask(&mut jmri, r#"{"type":"throttle","data":{"name":"any","speed":0.6}}"#), &["error"]));
     ask(&mut jmri, r#"{"type":"turnout","method":"post","data":{"name":"LT2","state":4}}"#);
     hear(&mut jmri, 1_000);
-    assert_eq!(jmri.world().lies(TurnoutId(2)), Some(Leg::Curved));
+    assert_eq!(jmri.world.lies(TurnoutId(2)), Some(Leg::Curved));
 }
 
 #[test]
@@ -126,7 +126,7 @@ fn quirks_are_what_they_say() {
     let systems = ask(&mut jmri, r#"{"type":"power","method":"list"}"#);
     assert!(says(&systems, &[r#""state":0"#]) && !says(&systems, &["prefix"]), "{systems:?}");
     assert_eq!(ask(&mut jmri, POWER).len(), 1, "the hardware says nothing");
-    assert!(jmri.world().is_powered());
+    assert!(jmri.world.is_powered());
     ask(&mut jmri, ACQUIRE);
     let second = ask(&mut jmri, r#"{"type":"throttle","data":{"name":"second","address":58}}"#);
     assert!(says(&second, &["error", "512"]), "{second:?}");

@@ -53,15 +53,15 @@ fn requests_are_answered_as_the_protocols_say() {
     for (line, expected) in conversation {
         assert_eq!(ask(&mut station, line), expected, "{line}");
     }
-    let before = odometer(station.world());
+    let before = odometer(&station.world);
     hear(&mut station, 3_000);
-    assert!(odometer(station.world()) > before + 200.0, "{}", odometer(station.world()));
+    assert!(odometer(&station.world) > before + 200.0, "{}", odometer(&station.world));
     // All stop at once; the slot keeps its speed.
     ask(&mut station, "SEND 85 7A");
-    let stopped = odometer(station.world());
+    let stopped = odometer(&station.world);
     hear(&mut station, 2_000);
-    assert!(odometer(station.world()) < stopped + 60.0, "{} after {stopped}", odometer(station.world()));
-    assert!(station.world().truth().train(TRAIN).unwrap().at_rest_since.is_some());
+    assert!(odometer(&station.world) < stopped + 60.0, "{} after {stopped}", odometer(&station.world));
+    assert!(station.world.truth().train(TRAIN).unwrap().at_rest_since.is_some());
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn turnouts_are_thrown_and_a_restarted_station_has_forgotten_its_slots() {
     // Address 1 on the wire is the second turnout.
     ask(&mut station, "SEND B0 01 10 5E");
     hear(&mut station, 1_000);
-    assert_eq!(station.world().lies(TurnoutId(2)), Some(Leg::Curved));
+    assert_eq!(station.world.lies(TurnoutId(2)), Some(Leg::Curved));
     station.restart();
     assert_eq!(ask(&mut station, "SEND BB 01 00 45"), ["RECEIVE BB 01 00 45", "SENT OK"]);
     hear(&mut station, 2_500);

@@ -122,7 +122,7 @@ fn sensors_are_reported_within_a_cycle_of_their_bus_or_by_their_detectors() {
                     if std::mem::replace(&mut known[usize::from(number)], occupied) || !occupied {
                         continue;
                     }
-                    let truth = station.world().truth();
+                    let truth = station.world.truth();
                     let pass =
                         truth.passes().iter().rfind(|pass| pass.sensor.0 + 1 == number).expect("a pass");
                     delays.push((station.now() - pass.at).as_ms());
@@ -147,7 +147,7 @@ fn turnouts_obey_repeated_commands_and_trains_stop_at_once_when_all_do() {
         wait(&mut station, if activate { 150 } else { 10 });
     }
     wait(&mut station, 500);
-    assert_eq!(station.world().lies(TurnoutId(1)), Some(Leg::Curved), "the second output is straight");
+    assert_eq!(station.world.lies(TurnoutId(1)), Some(Leg::Curved), "the second output is straight");
     let position = TurnoutPosition::Output { second: false };
     assert_eq!(
         ask(&mut station, &[Request::Turnout { address: 0 }]),
@@ -157,10 +157,10 @@ fn turnouts_obey_repeated_commands_and_trains_stop_at_once_when_all_do() {
     wait(&mut station, 6_000);
     assert!(ask(&mut station, &[Request::StopAll]).contains(&Reply::Stopped));
     wait(&mut station, 1_500);
-    let stopped = odometer(station.world());
+    let stopped = odometer(&station.world);
     wait(&mut station, 2_000);
-    assert_eq!(odometer(station.world()).to_bits(), stopped.to_bits(), "it stands");
-    assert!(station.world().is_powered());
+    assert_eq!(odometer(&station.world).to_bits(), stopped.to_bits(), "it stands");
+    assert!(station.world.is_powered());
 }
 
 #[test]
@@ -175,9 +175,9 @@ fn directions_are_absolute_and_every_number_of_steps_is_driven() {
             let request = Request::Drive { address: 24, steps, throttle, forward: true };
             ask(&mut station, &[Request::Power { on: true }, request]);
             wait(&mut station, 3_000);
-            let truth = station.world().truth().train(TRAIN).unwrap();
+            let truth = station.world.truth().train(TRAIN).unwrap();
             assert_eq!(truth.leads, End::Nose);
-            assert!(odometer(station.world()) > 100.0, "{steps:?}: {}", odometer(station.world()));
+            assert!(odometer(&station.world) > 100.0, "{steps:?}: {}", odometer(&station.world));
         }
     }
 }
@@ -187,7 +187,7 @@ fn a_train_with_a_long_address_is_driven() {
     let layout = two_loops();
     let long = TrainId(3_078);
     let mut station = station(&layout, End::Nose, Z21Switches::default());
-    let world = station.world_mut();
+    let world = &mut station.world;
     world.lift(TRAIN);
     world.add(long, Train::draw(24, LawFamily::Constant), 1.0);
     let edge =
@@ -197,7 +197,7 @@ fn a_train_with_a_long_address_is_driven() {
     let request = Request::Drive { address: 3_078, steps: DecoderSteps::All, throttle, forward: true };
     ask(&mut station, &[Request::Power { on: true }, request]);
     wait(&mut station, 3_000);
-    assert!(station.world().truth().train(long).unwrap().odometer.as_mm() > 100.0);
+    assert!(station.world.truth().train(long).unwrap().odometer.as_mm() > 100.0);
 }
 
 #[test]
@@ -207,15 +207,15 @@ fn trains_run_on_without_commands_and_stop_when_the_station_is_restarted() {
     let subscribe = Request::SetBroadcasts(Broadcasts::STATES);
     ask(&mut station, &[subscribe, Request::Power { on: true }, drive(72, true)]);
     wait(&mut station, 10_000);
-    let before = odometer(station.world());
+    let before = odometer(&station.world);
     wait(&mut station, 5_000);
-    assert!(odometer(station.world()) > before + 500.0);
+    assert!(odometer(&station.world) > before + 500.0);
     station.restart();
     assert_eq!(ask(&mut station, &[Request::SerialNumber]), [], "it starts");
     wait(&mut station, 6_000);
     assert_eq!(ask(&mut station, &[Request::Broadcasts]), [Reply::Broadcasts(Broadcasts::NONE)]);
-    assert!(station.world().is_powered(), "it gives power when it has started");
-    assert!(station.world().truth().train(TRAIN).unwrap().at_rest_since.is_some());
+    assert!(station.world.is_powered(), "it gives power when it has started");
+    assert!(station.world.truth().train(TRAIN).unwrap().at_rest_since.is_some());
 }
 
 #[test]
@@ -226,14 +226,14 @@ fn each_quirk_does_what_it_says() {
     let mut station = with(locked);
     ask(&mut station, &[Request::Power { on: true }, drive(99, true)]);
     wait(&mut station, 3_000);
-    assert!(odometer(station.world()) < 1.0, "it is locked");
+    assert!(odometer(&station.world) < 1.0, "it is locked");
 
     let wrong = [0x07, 0x00, 0x40, 0x00, 0x21, 0x81, 0xa1];
     for (strict_xor, powered) in [(false, true), (true, false)] {
         let mut station = with(Z21Switches { strict_xor, ..Z21Switches::default() });
         station.write(0, &wrong);
         wait(&mut station, 40);
-        assert_eq!(station.world().is_powered(), powered);
+        assert_eq!(station.world.is_powered(), powered);
     }
     let mut station = with(Z21Switches { loses_first_subscription: true, ..Z21Switches::default() });
     let subscribes = [Request::SetBroadcasts(Broadcasts::STATES), Request::Broadcasts];
@@ -261,9 +261,9 @@ fn decoders_report_whole_numbers_at_a_scale_of_their_own() {
         let all = Request::SetBroadcasts(Broadcasts::ALL_RAIL_COM);
         write(&mut station, 0, &[all, Request::Power { on: true }, drive(72, true)]);
         wait(&mut station, 4_000);
-        let before = odometer(station.world());
+        let before = odometer(&station.world);
         let heard = wait(&mut station, 5_000);
-        let km_h = 87.0 * 3.6e-3 * (odometer(station.world()) - before) / 5.0;
+        let km_h = 87.0 * 3.6e-3 * (odometer(&station.world) - before) / 5.0;
         let numbers: Vec<Option<u16>> = heard
             .iter()
             .filter_map(|(_, reply)| match reply {

@@ -91,12 +91,12 @@ pub(crate) fn empty(layout: &Layout, switches: StationSwitches) -> VirtualStatio
 
 /// A train with a law of its own on an edge between two nodes, so far from its beginning.
 pub(crate) fn put(station: &mut VirtualStation<'_>, train: TrainId, from: &str, to: &str, mm: f64) {
-    let layout = station.world().layout();
+    let layout = station.world.layout();
     let node = |name| layout.node_named(name).unwrap();
     let edge = layout.edge_between(node(from), node(to)).unwrap();
-    station.world_mut().add(train, Train::draw(u64::from(train.0), LawFamily::Constant), 1.0);
+    station.world.add(train, Train::draw(u64::from(train.0), LawFamily::Constant), 1.0);
     let at = Position { edge, offset: Length::from_mm(mm) };
-    station.world_mut().place(train, at, End::Nose).unwrap();
+    station.world.place(train, at, End::Nose).unwrap();
 }
 
 /// Sends bytes as a program does that waits for the station, and drops what comes back.

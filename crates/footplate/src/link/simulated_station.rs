@@ -138,24 +138,24 @@ impl<'l> SimulatedStation<'l> {
     /// The world behind it.
     pub(crate) const fn world(&self) -> &LivingLayout<'l> {
         match self {
-            Self::Marklin(station) => station.world(),
-            Self::DccEx(board) => board.world(),
-            Self::Z21(station) => station.world(),
-            Self::Can(station) => station.world(),
-            Self::LocoNet(station) => station.world(),
-            Self::Jmri(jmri) => jmri.world(),
+            Self::Marklin(station) => &station.world,
+            Self::DccEx(board) => &board.world,
+            Self::Z21(station) => &station.world,
+            Self::Can(station) => &station.world,
+            Self::LocoNet(station) => &station.world,
+            Self::Jmri(jmri) => &jmri.world,
         }
     }
 
     /// The same, to change it with.
     pub(crate) const fn world_mut(&mut self) -> &mut LivingLayout<'l> {
         match self {
-            Self::Marklin(station) => station.world_mut(),
-            Self::DccEx(board) => board.world_mut(),
-            Self::Z21(station) => station.world_mut(),
-            Self::Can(station) => station.world_mut(),
-            Self::LocoNet(station) => station.world_mut(),
-            Self::Jmri(jmri) => jmri.world_mut(),
+            Self::Marklin(station) => &mut station.world,
+            Self::DccEx(board) => &mut board.world,
+            Self::Z21(station) => &mut station.world,
+            Self::Can(station) => &mut station.world,
+            Self::LocoNet(station) => &mut station.world,
+            Self::Jmri(jmri) => &mut jmri.world,
         }
     }
 

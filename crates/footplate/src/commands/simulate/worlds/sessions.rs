@@ -112,7 +112,7 @@ pub(super) fn score(
             break;
         }
     }
-    let incidents = driven.line.station.world().incidents().iter().map(ToString::to_string).collect();
+    let incidents = driven.line.station.world.incidents().iter().map(ToString::to_string).collect();
     scored.incidents = incidents;
     Ok(scored)
 }
@@ -135,7 +135,7 @@ impl Driven<'_, '_> {
         stops: u16,
         learnt: (Vec<MotionModel>, Vec<MotionFit>),
     ) -> anyhow::Result<(Vec<MotionModel>, Vec<MotionFit>)> {
-        self.line.station.world_mut().begin_session(PAUSE);
+        self.line.station.world.begin_session(PAUSE);
         let mut machine = Timed::new(self.begin(learnt.clone())?);
         self.is_stuck = false;
         self.seek(&mut machine);
@@ -180,7 +180,7 @@ impl Driven<'_, '_> {
         let Some((node, offset, step)) = asked else { return };
         if early {
             let by = TimeSpan::from_s(EARLY.as_mm() / self.true_speed(step).max(1.0));
-            self.line.station.world_mut().advance_next_start(TRAIN, by);
+            self.line.station.world.advance_next_start(TRAIN, by);
         }
         let offset = Length::from_mm(offset.as_mm().round());
         let order = format!(
@@ -246,7 +246,7 @@ impl Driven<'_, '_> {
     /// How far beyond a place the train really is, in mm.
     fn beyond(&self, node: NodeId, offset: Length) -> Option<f64> {
         let sensor = self.written.layout.sensor_at(node)?;
-        let past = self.line.station.world().truth().past(TRAIN, sensor)?;
+        let past = self.line.station.world.truth().past(TRAIN, sensor)?;
         Some((past - offset).as_mm())
     }
 
@@ -285,7 +285,7 @@ impl Driven<'_, '_> {
     }
 
     fn truth(&self) -> Option<TrainTruth> {
-        self.line.station.world().truth().train(TRAIN)
+        self.line.station.world.truth().train(TRAIN)
     }
 
     fn is_sound(&self) -> bool {
@@ -293,14 +293,14 @@ impl Driven<'_, '_> {
     }
 
     fn true_speed(&self, step: SpeedStep) -> f64 {
-        let engine = self.line.station.world().truth().engine(TRAIN);
+        let engine = self.line.station.world.truth().engine(TRAIN);
         engine.map_or(0.0, |engine| engine.speeds.speed(step, Approach::Below).as_mm_per_s())
     }
 
     /// All steps that stops are asked for from.
     fn steps(&self) -> Vec<SpeedStep> {
         let all = (1..=SpeedStep::HIGHEST).filter_map(SpeedStep::new);
-        let engine = self.line.station.world().truth().engine(TRAIN);
+        let engine = self.line.station.world.truth().engine(TRAIN);
         let highest = engine.map_or(SpeedStep::STAND, |engine| engine.speeds.highest());
         all.filter(|step| *step <= highest && self.true_speed(*step) >= SLOWEST_MM_PER_S).collect()
     }
