@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::program::{Run, footplate};
+use crate::program::{Run, folder, footplate};
 use crate::station::Standing;
 
 const LINK: &str = "sim:track-a?faults=none&trains=24&station=dcc-ex&seed=";
@@ -23,13 +23,6 @@ stop 24 at E7+200mm
 stop 24 at C13+120mm
 stop 24 at E7+200mm
 ";
-
-fn folder(name: &str) -> PathBuf {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("board").join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).expect("the test folder can be made");
-    folder
-}
 
 /// The true errors of stops in mm, without their signs, and how many of them were outside of what was promised.
 pub(crate) fn errors(stops: &[Value]) -> (Vec<f64>, usize) {
@@ -83,7 +76,7 @@ pub(crate) fn calibrated_over(link: &str, name: &str, seed: u64) -> PathBuf {
 
 /// The same on any layout and within any time.
 pub(crate) fn calibrated_on(layout: &str, budget: &str, link: &str, name: &str) -> PathBuf {
-    let folder = folder(name);
+    let folder = folder(&format!("board/{name}"));
     let store = folder.join("railway.db").display().to_string();
     let over = ["--link", link, "--layout", layout, "--store", &store];
     let calibrated = footplate(&[&["calibrate", "--train", "24", "--budget", budget], &over[..]].concat());

@@ -1,11 +1,11 @@
 //! `footplate calibrate` on the real recordings, its store, and what it says to bad input.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::Value;
 
-use crate::program::footplate;
+use crate::program::{folder, footplate};
 
 fn log(name: &str) -> String {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/sensor-logs");
@@ -14,13 +14,6 @@ fn log(name: &str) -> String {
 
 fn train_24() -> [String; 2] {
     ["run", "stop"].map(|kind| log(&format!("choochoos_2020_track_a_train24_{kind}.csv")))
-}
-
-fn scratch(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("the test folder can be made");
-    folder
 }
 
 fn speed(calibration: &Value, step: u64, approach: &str) -> [f64; 2] {
@@ -77,7 +70,7 @@ fn every_number_can_be_traced_to_its_lines() {
 
 #[test]
 fn a_store_keeps_the_logs_once_and_calibrates_again_from_itself() {
-    let folder = scratch("calibrate-store");
+    let folder = folder("calibrate-store");
     let store = folder.join("railway.db").display().to_string();
     let [run, stop] = train_24();
     let from = ["calibrate", "--from", &run, &stop, "--layout", "track-a", "--store", &store, "--json"];
@@ -98,7 +91,7 @@ fn a_store_keeps_the_logs_once_and_calibrates_again_from_itself() {
 
 #[test]
 fn a_calibration_is_written_whole_as_toml_and_json() {
-    let folder = scratch("calibrate-out");
+    let folder = folder("calibrate-out");
     let [run, _] = train_24();
     for ending in ["toml", "json"] {
         let out = folder.join(format!("train24.{ending}"));
@@ -117,7 +110,7 @@ fn a_calibration_is_written_whole_as_toml_and_json() {
 
 #[test]
 fn bad_input_is_answered_with_its_place_and_what_would_be_right() {
-    let folder = scratch("calibrate-bad");
+    let folder = folder("calibrate-bad");
     let write = |name: &str, text: &str| {
         let path = folder.join(name);
         fs::write(&path, text).expect("a test file");

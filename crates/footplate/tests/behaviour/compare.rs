@@ -1,9 +1,8 @@
 //! `footplate compare` sets published figures beside ours, and says what is wrong with a table.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::program::footplate;
+use crate::program::{footplate, written};
 
 const LOG: &str =
     concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/sensor-logs/choochoos_2020_track_a_train24_run.csv");
@@ -12,9 +11,7 @@ const STOPS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/publish
 
 /// A table of its own for each test.
 fn table(name: &str, text: &str) -> PathBuf {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("compare-{name}.csv"));
-    fs::write(&path, text).unwrap();
-    path
+    written(&format!("compare-{name}.csv"), text)
 }
 
 fn compare(with: &[&str], more: &[&str]) -> crate::program::Run {

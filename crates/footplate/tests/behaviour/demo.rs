@@ -1,7 +1,6 @@
 //! `footplate` alone shows two unknown trains being calibrated and stopped, and ends with what was promised beside the
 //! truth; a session that is killed in the middle has lost nothing that was acknowledged.
 
-use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -12,13 +11,10 @@ use footplate_store::{MotionFile, MotionReplay, Store, built_in};
 use serde_json::Value;
 
 use crate::drawn_moments::DrawnMoments;
-use crate::program::footplate;
+use crate::program::{folder, footplate};
 
 fn store(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir(&folder).unwrap();
-    folder.join("railway.db")
+    folder(name).join("railway.db")
 }
 
 fn lines(text: &str) -> Vec<Value> {

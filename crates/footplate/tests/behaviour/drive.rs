@@ -1,24 +1,16 @@
 //! `footplate drive` does what a script says, says what came of it, and refuses what cannot be before a train moves.
 
 use std::io::Write;
-use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::program::{Run, footplate};
+use crate::program::{Run, folder, footplate};
 
 const LINK: &str = "sim:track-a?seed=7&faults=none&trains=24";
 
-fn folder(name: &str) -> PathBuf {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("drive").join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).expect("the test folder can be made");
-    folder
-}
-
 fn drive(name: &str, link: &str, script: &str, more: &[&str]) -> Run {
-    let path = folder(name).join("script.txt");
+    let path = folder(&format!("drive/{name}")).join("script.txt");
     std::fs::write(&path, script).expect("a test file");
     let path = path.display().to_string();
     footplate(&[&["drive", "--link", link, "--script", &path], more].concat())
@@ -87,7 +79,7 @@ fn the_same_seed_and_script_print_the_same_bytes() {
 
 #[test]
 fn what_was_learnt_is_kept_in_the_store_and_known_the_next_time() {
-    let store = folder("store").join("railway.db").display().to_string();
+    let store = folder("drive/store").join("railway.db").display().to_string();
     let first = drive("first", LINK, EVENING, &["--json", "--store", &store]);
     assert_eq!(first.status, 0, "{}", first.errors);
     assert!(first.errors.contains("train 24 is not calibrated"));
@@ -213,7 +205,7 @@ fn a_train_goes_where_it_is_sent_by_turnouts_and_reversals_and_is_told_by_hand_a
 
 /// A store that knows both trains of a simulated railway.
 fn store_that_knows(name: &str, link: &str, trains: &[&str]) -> String {
-    let store = folder(name).join("railway.db").display().to_string();
+    let store = folder(&format!("drive/{name}")).join("railway.db").display().to_string();
     for train in trains {
         let knows = ["calibrate", "--layout", "track-a", "--link", link, "--train", train, "--store", &store];
         let run = footplate(&[&knows[..], &["--budget", "150s"]].concat());
@@ -298,7 +290,7 @@ fn a_script_waits_for_a_train_that_is_lost_and_found_again() {
 fn every_journey_of_a_script_is_carried_out_and_ends_where_it_was_promised_to() {
     // Given a train that has been calibrated, and nobody says where it is,
     let link = "sim:track-a?seed=9804&trains=24";
-    let store = folder("journeys").join("railway.db").display().to_string();
+    let store = folder("drive/journeys").join("railway.db").display().to_string();
     let calibrated =
         footplate(&["calibrate", "--link", link, "--layout", "track-a", "--train", "24", "--store", &store]);
     assert_eq!(calibrated.status, 0, "{}", calibrated.errors);
@@ -328,7 +320,7 @@ fn a_limit_of_waiting_is_a_number_of_seconds() {
 fn a_script_of_any_editor_is_read_and_one_that_is_no_text_is_placed() {
     let run = drive("mark", LINK, "\u{feff}turnout all straight\n", &[]);
     assert_eq!(run.status, 0, "{}", run.errors);
-    let path = folder("no-text").join("script.txt");
+    let path = folder("drive/no-text").join("script.txt");
     std::fs::write(&path, b"turnout all straight\n# \xff\n").expect("a test file");
     let run = footplate(&["drive", "--link", LINK, "--script", &path.display().to_string()]);
     assert_eq!(run.status, 2, "{}", run.output);

@@ -1,26 +1,15 @@
 //! Files that are given to the program: each counts once, none is destroyed, and readers that go away end no session.
 
 use std::fs::{self, File};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::program::{Run, footplate};
-
-fn testdata(name: &str) -> String {
-    format!("{}/../../testdata/{name}", env!("CARGO_MANIFEST_DIR"))
-}
+use crate::program::{Run, folder, footplate, testdata};
 
 fn train_24(kind: &str) -> String {
     testdata(&format!("sensor-logs/choochoos_2020_track_a_train24_{kind}.csv"))
-}
-
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("files-given").join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("the test folder can be made");
-    folder
 }
 
 fn copied(from: &str, folder: &Path, name: &str) -> String {
@@ -41,7 +30,7 @@ fn json(run: &Run) -> Value {
 
 #[test]
 fn a_question_changes_no_model_that_trains_are_driven_by() {
-    let folder = folder("questions");
+    let folder = folder("files-given/questions");
     let store = folder.join("railway.db").display().to_string();
     let (run, stop) = (train_24("run"), train_24("stop"));
     json(&calibrate(&["--from", &run, &stop, "--store", &store, "--json"]));
@@ -62,7 +51,7 @@ fn a_question_changes_no_model_that_trains_are_driven_by() {
 
 #[test]
 fn two_recordings_of_one_name_are_two_recordings() {
-    let folder = folder("same-name");
+    let folder = folder("files-given/same-name");
     let one = copied(&train_24("run"), &folder, "a/train24.csv");
     let same = copied(&train_24("stop"), &folder, "b/train24.csv");
     let other = copied(&train_24("stop"), &folder, "b/train24_other.csv");
@@ -85,7 +74,7 @@ fn two_recordings_of_one_name_are_two_recordings() {
 
 #[test]
 fn a_log_that_is_given_twice_counts_once() {
-    let folder = folder("twice");
+    let folder = folder("files-given/twice");
     let (log, copy) = (train_24("run"), copied(&train_24("run"), &folder, "train24_copy.csv"));
     let once = json(&calibrate(&["--from", &log, "--json"]));
     let twice = calibrate(&["--from", &log, &copy, &log, "--json"]);
@@ -127,7 +116,7 @@ fn a_log_may_come_through_a_pipe() {
 #[cfg(unix)]
 #[test]
 fn a_script_and_a_model_without_an_end_are_refused() {
-    let folder = folder("endless");
+    let folder = folder("files-given/endless");
     let model = folder.join("endless.toml");
     std::os::unix::fs::symlink("/dev/zero", &model).expect("a link to a device");
     let model = model.display().to_string();
@@ -158,7 +147,7 @@ fn files_of_several_kinds_are_named_by_their_kinds() {
 
 #[test]
 fn a_mistyped_store_is_not_made() {
-    let path = folder("mistyped").join("typo.db");
+    let path = folder("files-given/mistyped").join("typo.db");
     let refused = calibrate(&["--store", &path.display().to_string()]);
     assert_eq!(refused.status, 2);
     assert!(refused.errors.contains("typo.db") && !path.exists(), "{}", refused.errors);
@@ -169,7 +158,7 @@ fn a_mistyped_store_is_not_made() {
 
 #[test]
 fn a_store_says_how_it_keeps_a_log_that_is_given_otherwise() {
-    let store = folder("otherwise").join("railway.db").display().to_string();
+    let store = folder("files-given/otherwise").join("railway.db").display().to_string();
     let import = |layout: &str| {
         footplate(&["store", "--store", &store, "import", &train_24("run"), "--layout", layout])
     };
@@ -193,7 +182,7 @@ fn a_store_says_how_it_keeps_a_log_that_is_given_otherwise() {
 
 #[test]
 fn no_output_replaces_an_input_or_another_output() {
-    let folder = folder("outputs");
+    let folder = folder("files-given/outputs");
     let log = copied(&train_24("run"), &folder, "train24.csv");
     let before = fs::read(&log).expect("a log");
     let refused = |arguments: &[&str], says: &str| {
@@ -225,7 +214,7 @@ fn an_output_may_be_the_standard_one() {
 #[test]
 fn a_session_goes_on_when_its_readers_have_gone() {
     // Given a calibration whose standard error is a pipe without a reader,
-    let folder = folder("unread");
+    let folder = folder("files-given/unread");
     let store = folder.join("railway.db").display().to_string();
     let link = "sim:track-a?seed=7&faults=none&trains=24";
     let spawn = |arguments: &[&str]| {

@@ -1,19 +1,14 @@
 //! What the guides promise beyond what they print (`pages.rs`): lengths near the truth, and the same on other railways.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
+
+use crate::program::folder;
 
 fn guide(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/guides").join(name);
     fs::read_to_string(path).expect("the guide is there")
-}
-
-fn scratch(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("the test folder can be made");
-    folder
 }
 
 /// The fenced blocks of a language in a guide, from a heading on.
@@ -74,7 +69,7 @@ fn at_the_prompt(folder: &Path, block: &str) -> String {
 
 #[test]
 fn a_layout_without_lengths_is_measured_as_the_guide_says() {
-    let folder = scratch("guide-no-tape-measure");
+    let folder = folder("guide-no-tape-measure");
     let text = guide("no-tape-measure.md");
     let layout = blocks(&text, "## Write the layout", "toml");
     fs::write(folder.join("attic.toml"), layout[0]).expect("a file of the test");
@@ -108,7 +103,7 @@ fn a_layout_without_lengths_is_measured_as_the_guide_says() {
 
 #[test]
 fn turnouts_that_cannot_be_set_end_a_calibration_as_incomplete() {
-    let folder = scratch("guide-unset");
+    let folder = folder("guide-unset");
     let text = guide("no-tape-measure.md");
     // The known edge is so short that a train which runs there still stands on one turnout and is near the other.
     let layout = blocks(&text, "## Write the layout", "toml")[0].replace(", mm = 1215", ", mm = 60");
@@ -131,7 +126,7 @@ fn trains_hold_arrive_and_follow_as_the_guide_says_on_other_railways_too() {
     let block = blocks(&text, "# Hold a speed", "")[0];
     assert!(block.contains("seed=13"), "{block}");
     for seed in OTHER_RAILWAYS {
-        let folder = scratch(&format!("guide-pacing-{seed}"));
+        let folder = folder(&format!("guide-pacing-{seed}"));
         let printed = at_the_prompt(&folder, &block.replace("seed=13", &format!("seed={seed}")));
         assert!(printed.contains("train 24 holds 250 mm/s from here on"), "seed {seed}: {printed}");
         for wrong in ["refused", "accident", "cannot be kept clear"] {
@@ -144,7 +139,7 @@ fn trains_hold_arrive_and_follow_as_the_guide_says_on_other_railways_too() {
 fn the_last_step_of_the_dcc_ex_guide_stops_its_train() {
     let text = guide("dcc-ex.md");
     assert!(text.contains("Enter `turnout all straight`, `speed 24 9`, and `stop 24 at C13+120mm`"));
-    let folder = scratch("guide-stations");
+    let folder = folder("guide-stations");
     let script = "turnout all straight\nspeed 24 9\nstop 24 at C13+120mm\n";
     fs::write(folder.join("stop.txt"), script).expect("a file of the test");
     let link = "'sim:track-a?station=dcc-ex&seed=7&trains=24&faults=none'";

@@ -1,17 +1,9 @@
 //! `footplate layout` shows, checks and imports layouts, and leaves nothing half written.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use crate::program::footplate;
-
-/// A folder of its own for each test, empty at its start.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("layout").join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
+use crate::program::{folder, footplate};
 
 fn text(path: &Path) -> &str {
     path.to_str().unwrap()
@@ -57,7 +49,7 @@ fn show_as_json_is_the_same_facts() {
 
 #[test]
 fn a_sensor_with_one_number_is_read_written_and_shown() {
-    let folder = folder("undirected");
+    let folder = folder("layout/undirected");
     let file = folder.join("line.toml");
     fs::write(&file, LINE.replace("\"A2\"] }", "\"A2\"], number = 7 }")).unwrap();
     let checked = footplate(&["layout", "check", text(&file)]);
@@ -77,7 +69,7 @@ fn a_sensor_with_one_number_is_read_written_and_shown() {
 
 #[test]
 fn speed_restrictions_are_shown() {
-    let folder = folder("zones");
+    let folder = folder("layout/zones");
     let file = folder.join("line.toml");
     let zone = LINE.replace("mm = 80 }", "mm = 80, zone = \"end\" }");
     fs::write(&file, zone + "zones = [{ name = \"end\", max_mm_s = 90 }]\n").unwrap();
@@ -112,7 +104,7 @@ fn blocks_are_shown_with_their_boundaries() {
 
 #[test]
 fn show_draws_a_layout_or_says_what_it_lacks() {
-    let folder = folder("drawing");
+    let folder = folder("layout/drawing");
     let drawing = folder.join("track-a.svg");
     let run = footplate(&["layout", "show", "track-a", "--svg", text(&drawing)]);
     assert_eq!((run.status, run.errors.as_str()), (0, ""));
@@ -128,7 +120,7 @@ fn show_draws_a_layout_or_says_what_it_lacks() {
 
 #[test]
 fn check_says_what_is_wrong_and_where() {
-    let folder = folder("check");
+    let folder = folder("layout/check");
     let layout = folder.join("line.toml");
     fs::write(&layout, LINE).unwrap();
     let run = footplate(&["layout", "check", text(&layout)]);
@@ -153,7 +145,7 @@ fn check_says_what_is_wrong_and_where() {
 
 #[test]
 fn import_makes_a_layout_file_that_is_right() {
-    let folder = folder("import");
+    let folder = folder("layout/import");
     let [nodes, edges, out] = ["nodes.csv", "edges.csv", "line.toml"].map(|file| folder.join(file));
     fs::write(&nodes, NODES).unwrap();
     fs::write(&edges, EDGES).unwrap();

@@ -3,15 +3,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::program::{Run, footplate};
+use crate::program::{Run, folder, footplate, testdata};
 
 /// Four stops of train 24 of 2020, two from step 8, the last of them without what the tape said: `E12 + 260 mm`.
 fn store(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir(&folder).unwrap();
-    let logs = format!("{}/../../testdata/sensor-logs", env!("CARGO_MANIFEST_DIR"));
-    let whole = fs::read_to_string(format!("{logs}/choochoos_2020_track_a_train24_stop.csv")).unwrap();
+    let folder = folder(name);
+    let whole = fs::read_to_string(testdata("sensor-logs/choochoos_2020_track_a_train24_stop.csv")).unwrap();
     let (without, last) = whole.trim_end().rsplit_once('\n').unwrap();
     assert!(last.starts_with("4,stopped,8,,260,"), "{last}");
     let stops = folder.join("train24_stop.csv");
@@ -20,7 +17,7 @@ fn store(name: &str) -> PathBuf {
     let run = footplate(&[
         "calibrate",
         "--from",
-        &format!("{logs}/choochoos_2020_track_a_train24_run.csv"),
+        &testdata("sensor-logs/choochoos_2020_track_a_train24_run.csv"),
         stops.to_str().unwrap(),
         "--layout",
         "track-a",
@@ -80,10 +77,7 @@ fn a_second_reading_of_the_same_stop_replaces_the_first_and_a_misread_one_is_poi
 #[test]
 fn a_tape_is_right_although_all_trains_were_told_to_stand_again_at_the_end() {
     // Given a demonstration, at whose end trains that stand are told to, and the true place of its last stop,
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("measure-demo");
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir(&folder).unwrap();
-    let store = folder.join("railway.db");
+    let store = folder("measure-demo").join("railway.db");
     let demo = footplate(&["demo", "--store", store.to_str().unwrap()]);
     let table = demo.output.lines().rev().find(|line| line.ends_with("inside")).unwrap();
     let columns: Vec<&str> = table.split_whitespace().collect();

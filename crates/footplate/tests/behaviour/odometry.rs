@@ -1,12 +1,12 @@
 //! `footplate odometry` turns recordings into estimates, scores them, and answers a live input line by line.
 
 use std::io::{BufRead, BufReader, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::program::{Run, footplate};
+use crate::program::{Run, folder, footplate};
 
 const PLAIN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/tachometer/plain.csv");
 const RUNS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/tachometer/runs.csv");
@@ -117,13 +117,6 @@ fn a_reader_that_goes_ends_the_program() {
     assert!(first.starts_with("t_s,"), "{first}");
     // The pipe is closed now. Before, this waited for good.
     child.wait().expect("it ends");
-}
-
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).expect("the test folder can be made");
-    folder
 }
 
 #[test]
@@ -273,9 +266,7 @@ fn wrong_input_is_named_and_ends_with_status_2() {
 
 #[test]
 fn labels_say_the_probability_that_was_asked_for() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("odometry-confidence");
-    std::fs::create_dir_all(&folder).unwrap();
-    let page = folder.join("page.html").display().to_string();
+    let page = folder("odometry-confidence").join("page.html").display().to_string();
     let run = odometry(&[PLAIN, "--score", "--confidence", "0.5", "--report", &page]);
     assert!(run.output.contains(" 50 %") && !run.output.contains("99.99 %"), "{}", run.output);
     let page = std::fs::read_to_string(&page).unwrap();
@@ -289,8 +280,7 @@ fn labels_say_the_probability_that_was_asked_for() {
 
 #[test]
 fn runs_of_one_name_in_two_files_are_named_by_file() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("odometry-same-runs");
-    std::fs::create_dir_all(&folder).unwrap();
+    let folder = folder("odometry-same-runs");
     let copy = folder.join("copy.csv");
     std::fs::copy(RUNS, &copy).unwrap();
     let (copy, out) = (copy.display().to_string(), folder.join("out.csv"));

@@ -1,11 +1,11 @@
 //! `footplate odometry --report` draws what the odometer said: the same numbers as the result, and bounds never narrower.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::Value;
 
-use crate::program::footplate;
+use crate::program::{folder, footplate};
 
 const PLAIN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/tachometer/plain.csv");
 const RUNS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/tachometer/runs.csv");
@@ -15,13 +15,6 @@ const VEHICLE: &str =
 
 /// Half of the last digit that a page has, and a little for the rounding of decimals.
 const HALF_DIGIT: f64 = 0.000_501;
-
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("odometry-report").join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
 
 /// The page of a recording, and the data in it.
 fn page(recording: &str, out: &Path) -> (String, Value) {
@@ -46,7 +39,7 @@ fn column(csv: &str, name: &str) -> Vec<f64> {
 
 #[test]
 fn a_page_is_read_in_german_where_that_is_asked_for() {
-    let out = folder("german").join("page.html");
+    let out = folder("odometry-report/german").join("page.html");
     let out = out.to_str().unwrap();
     let run = footplate(&["odometry", "--vehicle", VEHICLE, PLAIN, "--report", out, "--language", "de"]);
     assert_eq!(run.status, 0, "{}", run.errors);
@@ -62,7 +55,7 @@ fn a_page_is_read_in_german_where_that_is_asked_for() {
 
 #[test]
 fn lines_are_the_result_and_bounds_are_no_narrower() {
-    let folder = folder("lines");
+    let folder = folder("odometry-report/lines");
     let (_, data) = page(PLAIN, &folder.join("page.html"));
     let result = footplate(&["odometry", "--vehicle", VEHICLE, PLAIN, "--out", "-"]).output;
     let recording = fs::read_to_string(PLAIN).unwrap();
@@ -107,7 +100,7 @@ fn lines_are_the_result_and_bounds_are_no_narrower() {
 
 #[test]
 fn runs_have_their_names_and_without_truth_widths_instead_of_errors() {
-    let folder = folder("runs");
+    let folder = folder("odometry-report/runs");
     let (html, data) = page(RUNS, &folder.join("page.html"));
     let runs = data["runs"].as_array().unwrap();
     assert_eq!(runs.iter().map(|run| run["name"].as_str().unwrap()).collect::<Vec<_>>(), ["a", "b"]);
@@ -125,7 +118,7 @@ fn runs_have_their_names_and_without_truth_widths_instead_of_errors() {
 
 #[test]
 fn a_long_recording_has_few_points_and_all_its_peaks() {
-    let folder = folder("long");
+    let folder = folder("odometry-report/long");
     let recording = folder.join("long.csv");
     // Four minutes at 10 m/s; in one period the first wheel counts three times as much as in any other.
     let mut rows = String::from("t_s,pulses_1,pulses_2\n");
@@ -148,7 +141,7 @@ fn a_long_recording_has_few_points_and_all_its_peaks() {
 
 #[test]
 fn a_page_that_cannot_be_written_is_an_error() {
-    let folder = folder("missing");
+    let folder = folder("odometry-report/missing");
     let run = footplate(&[
         "odometry",
         "--vehicle",

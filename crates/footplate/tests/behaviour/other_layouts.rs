@@ -2,13 +2,11 @@
 
 use std::path::Path;
 
-use crate::program::footplate;
+use crate::program::{folder, footplate, testdata};
 
 #[test]
 fn a_log_of_track_a_is_refused_as_one_of_track_b() {
-    let log =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/sensor-logs/eadanila_2020_track_a.csv");
-    let log = log.to_str().unwrap();
+    let log = &testdata("sensor-logs/eadanila_2020_track_a.csv");
     let page = Path::new(env!("CARGO_TARGET_TMPDIR")).join("other_layouts.html");
     let out = page.to_str().unwrap();
     for command in [
@@ -29,9 +27,7 @@ fn a_log_of_track_a_is_refused_as_one_of_track_b() {
 #[test]
 fn a_log_that_is_too_short_to_refuse_is_marked_before_any_figure() {
     // Five laps of track A, on which one of the two distances that differ is certain.
-    let log = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../testdata/sensor-logs/choochoos_2020_track_a_train1_run.csv");
-    let log = log.to_str().unwrap();
+    let log = &testdata("sensor-logs/choochoos_2020_track_a_train1_run.csv");
     let page = Path::new(env!("CARGO_TARGET_TMPDIR")).join("short_log.html");
     let out = page.to_str().unwrap();
     let said = "lengths that are not those of layout `track-b`: D9 to E12 takes as long as 377 mm, not 282";
@@ -54,9 +50,7 @@ fn a_log_that_is_too_short_to_refuse_is_marked_before_any_figure() {
 #[test]
 fn a_train_that_is_driven_on_another_layout_says_so_while_it_runs() {
     // Track B has the sensors and turnouts of track A, on which the simulated trains run; two lengths of this lap differ by 87 and 95 mm.
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("driven_elsewhere");
-    std::fs::create_dir_all(&folder).unwrap();
-    let script = folder.join("laps.txt");
+    let script = folder("driven_elsewhere").join("laps.txt");
     std::fs::write(&script, "turnout all straight\nspeed 24 10\nwait 120s\nstop 24\n").unwrap();
     for (layout, status) in [("track-a", 0), ("track-b", 1)] {
         let script = script.to_str().unwrap();
@@ -83,13 +77,10 @@ fn a_train_that_is_driven_on_another_layout_says_so_while_it_runs() {
 
 #[test]
 fn a_store_of_another_layout_is_marked_as_its_files_are_and_no_train_is_called_good() {
-    let testdata = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/sensor-logs");
-    let log = testdata.join("choochoos_2020_track_a_train1_run.csv");
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("stored_elsewhere");
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).unwrap();
+    let log = &testdata("sensor-logs/choochoos_2020_track_a_train1_run.csv");
+    let folder = folder("stored_elsewhere");
     let (store, page) = (folder.join("railway.db"), folder.join("train1.html"));
-    let [log, store, page] = [&log, &store, &page].map(|path| path.to_str().unwrap());
+    let [store, page] = [&store, &page].map(|path| path.to_str().unwrap());
     let import = footplate(&["store", "import", log, "--store", store, "--layout", "track-b"]);
     assert_eq!(import.status, 0, "{}", import.errors);
     let said = "lengths that are not those of layout `track-b`: D9 to E12 takes as long as 377 mm, not 282";

@@ -13,6 +13,8 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use crate::program::folder;
+
 const LEFT_OUT: &str = "…";
 
 /// The page is written anew, not checked, where this is set.
@@ -28,13 +30,6 @@ struct Example {
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
-}
-
-fn scratch(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).expect("the test folder can be made");
-    folder
 }
 
 fn lines_of(page: &Path) -> Vec<String> {
@@ -210,7 +205,7 @@ fn brief(printed: &[String]) -> String {
 }
 
 fn check(page: &Path, name: &str) -> Vec<String> {
-    let folder = scratch(&format!("page-{}", name.replace('/', "-")));
+    let folder = folder(&format!("page-{}", name.replace('/', "-")));
     std::os::unix::fs::symlink(root().join("testdata"), folder.join("testdata")).expect("a link");
     let mut lines = lines_of(page);
     let (mut objections, mut rewritten) = (Vec::new(), Vec::new());

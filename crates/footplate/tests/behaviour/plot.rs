@@ -1,22 +1,15 @@
 //! `--plot` draws what a command found, as SVG or PNG by the ending of the file, with units on its axes and a legend.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use crate::program::{Run, footplate};
+use crate::program::{Run, folder, footplate};
 
 const VEHICLE: &str =
     concat!(env!("CARGO_MANIFEST_DIR"), "/../footplate-store/vehicles/two-measured-wheelsets.toml");
 const TESTDATA: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata");
 /// What every file of pixels begins with (PNG specification, third edition, 5.2).
 const PNG_SIGNATURE: [u8; 8] = [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n'];
-
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("plot").join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
 
 fn drawn(arguments: &[&str], picture: &Path) -> Run {
     footplate(&[arguments, &["--plot", picture.to_str().unwrap()]].concat())
@@ -39,7 +32,7 @@ fn says(picture: &Path, expected: &[&str]) {
 
 #[test]
 fn a_run_of_odometry_is_drawn_with_its_bounds_and_the_truth() {
-    let folder = folder("odometry");
+    let folder = folder("plot/odometry");
     let recording = format!("{TESTDATA}/tachometer/plain.csv");
     let svg = folder.join("run.svg");
     assert_eq!(drawn(&["odometry", "--vehicle", VEHICLE, &recording], &svg).status, 0);
@@ -62,7 +55,7 @@ fn a_run_of_odometry_is_drawn_with_its_bounds_and_the_truth() {
 
 #[test]
 fn speeds_and_stops_are_drawn_by_step() {
-    let folder = folder("calibrate");
+    let folder = folder("plot/calibrate");
     let log = |kind| format!("{TESTDATA}/sensor-logs/choochoos_2020_track_a_train24_{kind}.csv");
     let (run, stop) = (log("run"), log("stop"));
     let svg = folder.join("train.svg");
@@ -103,7 +96,7 @@ fn speeds_and_stops_are_drawn_by_step() {
 
 #[test]
 fn stops_measured_by_hand_are_drawn_beside_the_model() {
-    let folder = folder("measure");
+    let folder = folder("plot/measure");
     let store = folder.join("railway.db");
     let log = |kind| format!("{TESTDATA}/sensor-logs/choochoos_2020_track_a_train24_{kind}.csv");
     let from = [
@@ -136,7 +129,7 @@ fn stops_measured_by_hand_are_drawn_beside_the_model() {
 
 #[test]
 fn forecasts_are_drawn_phase_by_phase_beside_those_of_others() {
-    let folder = folder("predict");
+    let folder = folder("plot/predict");
     let log = format!("{TESTDATA}/sensor-logs/eadanila_2020_track_a.csv");
     let svg = folder.join("errors.svg");
     let run = drawn(&["predict", &log, "--layout", "track-a", "--summary", "--json"], &svg);
@@ -154,7 +147,7 @@ fn forecasts_are_drawn_phase_by_phase_beside_those_of_others() {
 
 #[test]
 fn a_store_is_drawn_as_the_calibration_of_all_that_it_holds() {
-    let folder = folder("store");
+    let folder = folder("plot/store");
     let store = folder.join("railway.db");
     let store = store.to_str().unwrap();
     let log = |train| format!("{TESTDATA}/sensor-logs/choochoos_2020_track_a_train{train}_run.csv");
@@ -176,7 +169,7 @@ fn a_store_is_drawn_as_the_calibration_of_all_that_it_holds() {
 
 #[test]
 fn the_latencies_of_a_line_are_drawn() {
-    let svg = folder("doctor").join("line.svg");
+    let svg = folder("plot/doctor").join("line.svg");
     let run = drawn(&["doctor", "--link", "sim:track-a?seed=7"], &svg);
     assert_eq!(run.status, 0, "{}", run.errors);
     says(&svg, &["How fast the line is", "poll period", "first byte", "at most (ms)"]);
@@ -184,7 +177,7 @@ fn the_latencies_of_a_line_are_drawn() {
 
 #[test]
 fn ours_are_drawn_beside_what_others_published() {
-    let svg = folder("compare").join("train24.svg");
+    let svg = folder("plot/compare").join("train24.svg");
     let log = format!("{TESTDATA}/sensor-logs/choochoos_2020_track_a_train24_run.csv");
     let speeds = format!("{TESTDATA}/published-tables/speeds.csv");
     let run = drawn(&["compare", &log, "--layout", "track-a", "--with", &speeds, "--train", "24"], &svg);

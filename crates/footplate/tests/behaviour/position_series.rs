@@ -1,24 +1,15 @@
 //! `footplate calibrate --from` a series of positions: four filmed stops, trains whose truth is known, and bad files.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::Value;
 
-use crate::program::footplate;
+use crate::program::{assert_not_calibrated, footplate, written};
 
 /// Stops of a filmed train, a pixel written as a millimetre (testdata/position-series).
 fn filmed(number: u32) -> String {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/position-series");
     folder.join(format!("cs452_2015_stop_{number}.csv")).display().to_string()
-}
-
-fn written(name: &str, text: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("position_series");
-    fs::create_dir_all(&folder).expect("the test folder can be made");
-    let path = folder.join(name);
-    fs::write(&path, text).expect("the test file can be written");
-    path
 }
 
 fn fitted(path: &str) -> Value {
@@ -77,7 +68,7 @@ fn drawn(state: &mut u64) -> f64 {
 fn the_speed_of_a_train_of_other_physics_is_within_2_mm_per_s() {
     for seed in 1..=8 {
         let (text, _) = other_physics(seed);
-        let fit = fitted(&written(&format!("drag{seed}.csv"), &text).display().to_string());
+        let fit = fitted(&written(&format!("position_series-drag{seed}.csv"), &text).display().to_string());
         let [speed, deviation] = number(&fit, "speed_mm_per_s");
         // Its ± supposes that the law holds, which it does not here.
         assert!((speed - 480.0).abs() < 2.0, "{speed} ± {deviation}");
@@ -89,7 +80,7 @@ fn the_speed_of_a_train_of_other_physics_is_within_2_mm_per_s() {
 fn the_stop_of_a_train_of_other_physics_is_within_its_uncertainty() {
     for seed in 1..=8 {
         let (text, braked) = other_physics(seed);
-        let fit = fitted(&written(&format!("rest{seed}.csv"), &text).display().to_string());
+        let fit = fitted(&written(&format!("position_series-rest{seed}.csv"), &text).display().to_string());
         let [effect, effect_deviation] = number(&fit, "effect_s");
         let [way, deviation] = number(&fit, "stopping_distance_mm");
         assert!((effect - 1.0).abs() < 3.0 * effect_deviation, "{effect} ± {effect_deviation}");
@@ -107,7 +98,7 @@ fn a_start_is_found_and_backwards_is_like_forwards() {
         let position = 900.0 - 300.0 * (since - 0.4 * (1.0 - (-since / 0.4).exp()));
         text += &format!("{time:.2},{position:.4}\n");
     }
-    let fit = fitted(&written("start.csv", &text).display().to_string());
+    let fit = fitted(&written("position_series-start.csv", &text).display().to_string());
     assert_eq!(fit["change"], "start");
     let [speed, _] = number(&fit, "speed_mm_per_s");
     let [lag, _] = number(&fit, "lag_s");
@@ -137,11 +128,7 @@ fn bad_series_are_refused_with_their_place_and_what_would_be_right() {
         ("cut_off", "t_s,position_mm\n0,1\n1".to_owned(), "the line breaks off"),
     ];
     for (name, text, expected) in cases {
-        let path = written(&format!("{name}.csv"), &text);
-        let done = footplate(&["calibrate", "--from", &path.display().to_string()]);
-        assert_ne!(done.status, 0, "{name}: {}", done.output);
-        assert!(done.errors.contains(expected), "{name}: {}", done.errors);
-        assert!(done.errors.contains(&format!("{name}.csv")), "{name}: {}", done.errors);
+        assert_not_calibrated(&format!("position_series-{name}.csv"), &text, expected);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::program::{Run, footplate};
+use crate::program::{Run, folder, footplate};
 
 const LOG: &str =
     concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/sensor-logs/eadanila_2020_track_a.csv");
@@ -125,8 +125,7 @@ fn wrong_input_is_named_and_ends_with_status_2() {
 #[test]
 fn a_calibration_makes_the_first_lap_forecast_as_well_as_the_second() {
     // Given the calibration of a log,
-    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("predict-calibration");
-    std::fs::create_dir_all(&folder).expect("the test folder can be made");
+    let folder = folder("predict-calibration");
     let calibration = folder.join("all.toml").display().to_string();
     let log = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/sensor-logs/eadanila_2020_track_a.csv");
     let made = footplate(&[
@@ -163,8 +162,7 @@ fn a_calibration_makes_the_first_lap_forecast_as_well_as_the_second() {
 
 #[test]
 fn a_model_of_another_layout_and_a_turnout_that_is_not_there_are_refused() {
-    let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("predict-other-layout");
-    std::fs::create_dir_all(&folder).expect("the test folder can be made");
+    let folder = folder("predict-other-layout");
     let model = folder.join("model.toml").display().to_string();
     let log = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/sensor-logs/eadanila_2020_track_a.csv");
     let made =

@@ -6,7 +6,7 @@ use footplate_store::{ContentHash, Store};
 use rusqlite::Connection;
 use serde_json::Value;
 
-use crate::program::{Run, footplate};
+use crate::program::{Run, folder, footplate};
 use crate::station::Standing;
 
 /// Everything that can be said, on a layout where contacts and turnouts fail now and then.
@@ -29,16 +29,9 @@ stop 24
 hold 24 200mm/s
 ";
 
-fn folder(name: &str) -> PathBuf {
-    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("replay").join(name);
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).expect("the test folder can be made");
-    folder
-}
-
 /// A session of driving in the simulator, written down; returns the store.
 fn driven(name: &str, seed: u64, faults: &str) -> PathBuf {
-    let folder = folder(name);
+    let folder = folder(&format!("replay/{name}"));
     let (script, store) = (folder.join("script.txt"), folder.join("railway.db"));
     std::fs::write(&script, SCRIPT).expect("a test file");
     let link = format!("sim:track-a?seed={seed}&faults={faults}&trains=24");
@@ -100,7 +93,7 @@ fn every_decision_of_a_driven_session_is_made_again_bit_for_bit() {
 #[test]
 fn a_session_over_a_line_in_real_time_is_made_again_bit_for_bit() {
     let standing = Standing::at("tcp:127.0.0.1:0");
-    let folder = folder("real-time");
+    let folder = folder("replay/real-time");
     let (script, store) = (folder.join("script.txt"), folder.join("railway.db"));
     let lines = "turnout 6 straight\nspeed 24 10\nwait 24 located\nstop 24\nwait 24 at rest\nmove 24 60mm\n";
     std::fs::write(&script, lines).expect("a test file");
@@ -117,7 +110,7 @@ fn a_session_over_a_line_in_real_time_is_made_again_bit_for_bit() {
 
 #[test]
 fn every_machine_of_a_demo_is_made_again_bit_for_bit() {
-    let store = folder("demo").join("railway.db");
+    let store = folder("replay/demo").join("railway.db");
     let run = footplate(&["demo", "--json", "--seed", "3", "--store", store.to_str().expect("a plain name")]);
     assert_eq!(run.status, 0, "{}", run.errors);
     let again = replay(&store, &["--json", "--diff"]);
@@ -131,7 +124,7 @@ fn every_machine_of_a_demo_is_made_again_bit_for_bit() {
 
 #[test]
 fn a_session_that_learns_on_from_others_is_made_again_too() {
-    let folder = folder("learns-on");
+    let folder = folder("replay/learns-on");
     let (script, store) = (folder.join("script.txt"), folder.join("railway.db"));
     std::fs::write(&script, "speed 24 9\nwait 24 located\nstop 24 at C13+120mm\nstop 24 at E7+50mm\n")
         .expect("a test file");
@@ -176,7 +169,7 @@ fn a_session_that_learns_on_from_others_is_made_again_too() {
 #[test]
 fn every_decision_of_a_calibration_is_made_again_bit_for_bit() {
     for seed in [2, 9] {
-        let store = folder(&format!("calibrated-{seed}")).join("railway.db");
+        let store = folder(&format!("replay/calibrated-{seed}")).join("railway.db");
         let link = format!("sim:track-a?seed={seed}&faults=some");
         let run = footplate(&[
             "calibrate",
@@ -266,7 +259,7 @@ fn rows_that_are_missing_end_the_replay_there_and_it_says_so() {
 
 #[test]
 fn wrong_usage_is_named_and_a_store_without_decisions_says_so() {
-    let nothing = folder("nothing").join("railway.db");
+    let nothing = folder("replay/nothing").join("railway.db");
     let missing = replay(&nothing, &[]);
     assert_eq!(missing.status, 2);
     assert!(missing.errors.contains("there is no store at"), "{}", missing.errors);

@@ -1,19 +1,11 @@
 //! `footplate report` writes one page that needs nothing else, the same for the same input, or no page at all.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use crate::program::{Run, footplate};
+use crate::program::{Run, folder, footplate};
 
 const LOGS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../testdata/sensor-logs/");
-
-/// A folder of its own for each test, empty at its start.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report").join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
 
 fn log(name: &str) -> String {
     format!("{LOGS}choochoos_2020_track_a_{name}.csv")
@@ -31,7 +23,7 @@ fn data(page: &str) -> serde_json::Value {
 
 #[test]
 fn a_page_holds_tables_and_data_of_the_same_numbers_and_is_the_same_twice() {
-    let folder = folder("twice");
+    let folder = folder("report/twice");
     let (one, two) = (folder.join("one.html"), folder.join("two.html"));
     let run = report(&log("train24_run"), &one);
     assert_eq!(run.status, 0, "{}", run.errors);
@@ -54,7 +46,7 @@ fn a_page_holds_tables_and_data_of_the_same_numbers_and_is_the_same_twice() {
 
 #[test]
 fn the_law_runs_through_its_contacts_and_residuals_are_what_is_left() {
-    let out = folder("law").join("report.html");
+    let out = folder("report/law").join("report.html");
     report(&log("train24_run"), &out);
     let data = data(&fs::read_to_string(out).unwrap());
     let changes = data["trains"][0]["changes"].as_array().unwrap();
@@ -83,7 +75,7 @@ fn the_law_runs_through_its_contacts_and_residuals_are_what_is_left() {
 #[test]
 #[cfg(unix)]
 fn a_name_that_looks_like_markup_stays_text() {
-    let folder = folder("markup");
+    let folder = folder("report/markup");
     let hostile = folder.join("<script>alert(1)&.csv");
     fs::copy(log("train24_run"), &hostile).unwrap();
     let out = folder.join("report.html");
@@ -96,7 +88,7 @@ fn a_name_that_looks_like_markup_stays_text() {
 
 #[test]
 fn a_store_makes_the_same_page_as_the_log_in_it() {
-    let folder = folder("store");
+    let folder = folder("report/store");
     let store = folder.join("railway.db");
     let (from_log, from_store) = (folder.join("log.html"), folder.join("store.html"));
     let log = log("train24_run");
@@ -132,7 +124,7 @@ fn a_store_makes_the_same_page_as_the_log_in_it() {
 
 #[test]
 fn what_is_wrong_leaves_no_page_and_an_old_one_as_it_was() {
-    let folder = folder("wrong");
+    let folder = folder("report/wrong");
     let out = folder.join("report.html");
     fs::write(&out, "old").unwrap();
     let columns = folder.join("columns.csv");
@@ -163,7 +155,7 @@ fn what_is_wrong_leaves_no_page_and_an_old_one_as_it_was() {
 
 #[test]
 fn a_page_is_read_in_german_and_holds_the_same_numbers() {
-    let folder = folder("german");
+    let folder = folder("report/german");
     let (english, german) = (folder.join("english.html"), folder.join("german.html"));
     let log = log("train24_run");
     report(&log, &english);

@@ -6,7 +6,7 @@ use std::path::Path;
 use footplate_core::{Event, EventKind, SpeedStep, Timestamp, TrainId};
 use footplate_store::{Journal, MotionFile, Store};
 
-use crate::program::footplate;
+use crate::program::{folder, footplate};
 
 const TRAIN: TrainId = TrainId(24);
 /// A date after all that is stored.
@@ -14,10 +14,7 @@ const LATEST: Timestamp = Timestamp::from_ns(i64::MAX);
 
 #[test]
 fn runs_of_several_trains_are_named_and_replace_no_model_that_knows_more() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("several_trains");
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).unwrap();
-    let path = folder.join("railway.db");
+    let path = folder("several_trains").join("railway.db");
     let file = path.to_str().unwrap();
     let logs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/sensor-logs");
     let log =
@@ -59,9 +56,7 @@ fn runs_of_several_trains_are_named_and_replace_no_model_that_knows_more() {
 
 #[test]
 fn a_session_of_two_trains_teaches_what_each_of_them_did() {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("two_trains_teach");
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).unwrap();
+    let folder = folder("two_trains_teach");
     let (store, script) = (folder.join("railway.db"), folder.join("evening.txt"));
     let (store, script) = (store.to_str().unwrap(), script.to_str().unwrap());
     let orders = "turnout all straight\nfind 24\nfind 58\ngo 24 to B5+100mm\ngo 58 to C13+120mm\ngo 24 to C11+100mm\n\

@@ -1,11 +1,11 @@
 //! `footplate calibrate` of short moves: real ones measured with a tape, calibrated trains, and bad files.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::Value;
 
-use crate::program::footplate;
+use crate::program::{assert_not_calibrated, folder, footplate, testdata, written};
 
 /// Moves that teams of the course measured with a tape (testdata/short-moves).
 fn measured(name: &str) -> Value {
@@ -19,14 +19,6 @@ fn fitted(path: &Path) -> Value {
     assert_eq!(done.status, 0, "{}", done.errors);
     let report: Value = serde_json::from_str(&done.output).expect("JSON");
     report["short_moves"][0].clone()
-}
-
-fn written(name: &str, text: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("short_moves");
-    fs::create_dir_all(&folder).expect("the test folder can be made");
-    let path = folder.join(name);
-    fs::write(&path, text).expect("the test file can be written");
-    path
 }
 
 fn number(value: &Value) -> f64 {
@@ -55,7 +47,7 @@ fn laws_are_found_again_and_more_so_by_many_moves() {
         let (reached, ran) = (250.0 * since, 125.0 * since * since + 200.0 * (time - 1.1_f64).max(0.0));
         text += &format!("{time},{:.3}\n", ran + reached * reached / 800.0);
     }
-    let fit = fitted(&written("laws.csv", &text));
+    let fit = fitted(&written("short_moves-laws.csv", &text));
     for (name, truth) in [
         ("start_delay_s", 0.3),
         ("speed_mm_per_s", 200.0),
@@ -81,18 +73,14 @@ fn bad_files_are_refused_with_their_place_and_what_would_be_right() {
         ("train", "train,command_time_s,distance_mm\nx,0.5,20\n".to_owned(), "the number of a train"),
     ];
     for (name, text, expected) in cases {
-        let path = written(&format!("{name}.csv"), &text);
-        let done = footplate(&["calibrate", "--from", &path.display().to_string()]);
-        assert_ne!(done.status, 0, "{name}: {}", done.output);
-        assert!(done.errors.contains(expected), "{name}: {}", done.errors);
-        assert!(done.errors.contains(&format!("{name}.csv")), "{name}: {}", done.errors);
+        assert_not_calibrated(&format!("short_moves-{name}.csv"), &text, expected);
     }
 }
 
 #[test]
 fn moves_that_contradict_each_other_have_laws_and_no_table() {
     let text = "command_time_s,distance_mm\n0.5,20\n0.75,60\n1,110\n1.25,105\n1.5,200\n2,300\n2.5,400\n";
-    let path = written("contradicting.csv", text).display().to_string();
+    let path = written("short_moves-contradicting.csv", text).display().to_string();
     let done = footplate(&["calibrate", "--from", &path]);
     assert_eq!(done.status, 0, "{}", done.errors);
     assert!(done.output.contains("no table: the move of 1250 ms got 105 mm"), "{}", done.output);
@@ -100,8 +88,7 @@ fn moves_that_contradict_each_other_have_laws_and_no_table() {
 
 #[test]
 fn a_calibrated_train_has_a_time_for_each_distance() {
-    let logs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/sensor-logs");
-    let log = logs.join("choochoos_2020_track_a_train24_stop.csv").display().to_string();
+    let log = testdata("sensor-logs/choochoos_2020_track_a_train24_stop.csv");
     let arguments = ["calibrate", "--from", &log, "--layout", "track-a", "--method", "short-moves", "--json"];
     let done = footplate(&arguments);
     assert_eq!(done.status, 0, "{}", done.errors);
@@ -114,11 +101,8 @@ fn a_calibrated_train_has_a_time_for_each_distance() {
 
 #[test]
 fn models_of_several_trains_go_to_a_file_each() {
-    let logs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../testdata/sensor-logs");
-    let log =
-        |train: u32| logs.join(format!("choochoos_2020_track_a_train{train}_stop.csv")).display().to_string();
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("several_trains");
-    fs::create_dir_all(&folder).expect("the test folder can be made");
+    let log = |train: u32| testdata(&format!("sensor-logs/choochoos_2020_track_a_train{train}_stop.csv"));
+    let folder = folder("several_trains_move");
     let out = folder.join("model.toml").display().to_string();
     let done = footplate(&["calibrate", "--from", &log(24), &log(74), "--layout", "track-a", "--out", &out]);
     assert_eq!(done.status, 0, "{}", done.errors);

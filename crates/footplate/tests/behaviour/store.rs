@@ -1,17 +1,9 @@
 //! `footplate store` keeps what it is given, tells why numbers changed, and saves what it can.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use crate::program::{Run, footplate};
-
-/// A folder of this test's own, empty.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir(&folder).unwrap();
-    folder
-}
+use crate::program::{Run, folder, footplate};
 
 fn log(name: &str) -> String {
     format!("{}/../../testdata/sensor-logs/{name}", env!("CARGO_MANIFEST_DIR"))
