@@ -1,5 +1,6 @@
 //! What the protocol of a confirming station adds to the [`Dialogue`] that all of them share; a [`Session`] follows from it.
 
+use alloc::boxed::Box;
 use alloc::collections::VecDeque;
 use core::ops::{ControlFlow, RangeInclusive};
 
@@ -229,7 +230,11 @@ pub(crate) trait Protocol {
     }
 }
 
-impl<P: Protocol> Session for P {
+impl<P: Protocol + Clone + 'static> Session for P {
+    fn copied(&self) -> Box<dyn Session> {
+        Box::new(self.clone())
+    }
+
     fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]) {
         self.dialogue_mut().now = now;
         if self.dialogue().farewell.is_over() {

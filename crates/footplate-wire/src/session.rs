@@ -1,8 +1,10 @@
 //! A session with a command station, without a socket: bytes and commands in, bytes and entries of the recording out.
 
+use alloc::boxed::Box;
 use alloc::format;
-use alloc::string::String;
+use alloc::string::{String, ToString};
 use alloc::vec::Vec;
+use core::any::Any;
 use core::fmt::{Display, Formatter, Result as FmtResult};
 use core::ops::RangeInclusive;
 
@@ -18,7 +20,10 @@ use crate::marklin_serial::ModuleReads;
 ///
 /// Every `handle_…` may produce outputs. Take them at once with [`poll_output`](Self::poll_output) until there are none: a byte counts
 /// as written at the `now` of the call before. Then wait for a byte, the hand-shake or [`next_timeout`](Self::next_timeout).
-pub trait Session {
+pub trait Session: Any {
+    /// The same session again, to see what it would do.
+    fn copied(&self) -> Box<dyn Session>;
+
     /// Takes bytes from the station.
     fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]);
 
@@ -303,16 +308,14 @@ pub enum CommandError {
 impl CommandError {
     /// Refuses a train whose address a link does not have.
     pub(crate) fn check_train(train: TrainId, addresses: &RangeInclusive<u16>) -> Result<(), Self> {
-        let has_address = addresses.contains(&train.0);
-        let addresses = (*addresses.start(), *addresses.end());
-        has_address.then_some(()).ok_or(Self::Train { train, addresses })
+        let range = (*addresses.start(), *addresses.end());
+        addresses.contains(&train.0).then_some(()).ok_or(Self::Train { train, addresses: range })
     }
 
     /// Refuses a turnout whose address a link does not have.
     pub(crate) fn check_turnout(turnout: TurnoutId, addresses: &RangeInclusive<u16>) -> Result<(), Self> {
-        let has_address = addresses.contains(&turnout.0);
-        let addresses = (*addresses.start(), *addresses.end());
-        has_address.then_some(()).ok_or(Self::Turnout { turnout, addresses })
+        let range = (*addresses.start(), *addresses.end());
+        addresses.contains(&turnout.0).then_some(()).ok_or(Self::Turnout { turnout, addresses: range })
     }
 }
 
@@ -458,27 +461,16 @@ impl Display for Said {
     }
 }
 
-/// Trains as `24, 58`.
-struct Listed<'l>(&'l [TrainId]);
-
-impl Display for Listed<'_> {
-    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
-        for (at, train) in self.0.iter().enumerate() {
-            let comma = if at == 0 { "" } else { ", " };
-            write!(f, "{comma}{train}")?;
-        }
-        Ok(())
-    }
-}
-
 impl Display for Closing {
     fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
         let not = |done| if done { "" } else { "not " };
+        let listed =
+            |trains: &[TrainId]| trains.iter().map(ToString::to_string).collect::<Vec<String>>().join(", ");
         if !self.commanded_to_stop.is_empty() {
-            write!(f, "commanded to stop: {}; ", Listed(&self.commanded_to_stop))?;
+            write!(f, "commanded to stop: {}; ", listed(&self.commanded_to_stop))?;
         }
         if !self.not_commanded.is_empty() {
-            write!(f, "NOT commanded to stop and possibly running: {}; ", Listed(&self.not_commanded))?;
+            write!(f, "NOT commanded to stop and possibly running: {}; ", listed(&self.not_commanded))?;
         }
         if let Some(released) = self.solenoids_released {
             write!(f, "solenoids {}released, ", not(released))?;

@@ -2,6 +2,7 @@
 
 mod hearing;
 
+use alloc::boxed::Box;
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
@@ -320,6 +321,10 @@ impl Interface {
 }
 
 impl Session for Interface {
+    fn copied(&self) -> Box<dyn Session> {
+        Box::new(self.clone())
+    }
+
     fn handle_bytes(&mut self, now: Timestamp, bytes: &[u8]) {
         if let Exchange::Sending(sending) = self.exchange
             && sending.next_byte().is_none()

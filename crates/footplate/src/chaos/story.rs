@@ -25,7 +25,7 @@ use super::plan::{Plan, PlannedLife};
 use super::promises::Promises;
 use super::selection::Selection;
 use crate::commands::{recall_directions, stop_all};
-use crate::link::{Address, Link, Quirks, SimulatedStation, StationKind, StationSession, open_session};
+use crate::link::{Address, Link, OpenSession, Quirks, SimulatedStation, StationKind, open_session};
 use crate::runtime::{Ended, Runtime, carry_out};
 
 /// Trains of every story.
@@ -246,7 +246,7 @@ impl<'l> Teller<'_, 'l> {
         CALENDAR + (self.now() - Timestamp::ZERO)
     }
 
-    fn session(&self, line: &dyn Link) -> anyhow::Result<StationSession> {
+    fn session(&self, line: &dyn Link) -> anyhow::Result<OpenSession> {
         open_session(&self.address, line, self.stage.layout)
     }
 
@@ -259,9 +259,9 @@ impl<'l> Teller<'_, 'l> {
         let began = self.now();
         let life = Rc::new(Life::new(None));
         let mut line = FaultyLine::new(Rc::clone(&self.station), life, &TRAINS, &[], Choice::new(0));
-        let mut session = self.session(&line)?;
-        recall_directions(&mut session, &Store::open(self.store)?)?;
-        let closing = stop_all(&mut line, session, unfinished.trains);
+        let mut opened = self.session(&line)?;
+        recall_directions(opened.session.as_mut(), &Store::open(self.store)?)?;
+        let closing = stop_all(&mut line, opened, unfinished.trains);
         if !line.all_stopped() {
             // The end of a session takes its time; stops come first in it.
             self.fail(
@@ -302,8 +302,8 @@ impl<'l> Teller<'_, 'l> {
         let noise = Choice::new(self.choice.between(0.0, 1e15) as u64);
         let mut line =
             FaultyLine::new(Rc::clone(&self.station), Rc::clone(&life), &TRAINS, &planned.troubles, noise);
-        let mut session = self.session(&line)?;
-        recall_directions(&mut session, &Store::open(self.store)?)?;
+        let mut opened = self.session(&line)?;
+        recall_directions(opened.session.as_mut(), &Store::open(self.store)?)?;
         let mut recorder = SharedDisk(Rc::clone(&disk));
         let mut people = People::new(
             self.stage.layout,
@@ -314,7 +314,7 @@ impl<'l> Teller<'_, 'l> {
             Rc::clone(&disk),
             planned.lasts,
         );
-        let mut runtime = Runtime::new(&mut line, session, Some(&mut recorder), None);
+        let mut runtime = Runtime::new(&mut line, opened, Some(&mut recorder), None);
         let ended = runtime.run(&mut dispatcher, &mut people);
         let began = self.station.borrow().now();
         disk.borrow_mut().close();

@@ -8,6 +8,7 @@ mod jmri_figures;
 mod loconet_figures;
 mod z21_figures;
 
+use std::any::Any;
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::PathBuf;
@@ -19,18 +20,13 @@ use footplate_core::link::RoundTrips;
 use footplate_core::{Command, Event, TimeSpan, Timestamp};
 use footplate_store::layout_named;
 use footplate_wire::marklin_serial::{Interface, ModuleReads};
-use footplate_wire::{CommandError, LinkNotice};
+use footplate_wire::{CommandError, LinkNotice, loconet, z21};
 
-use self::board_figures::BoardFigures;
-use self::can_figures::CanFigures;
 use self::figures::{Figures, StationFigures};
-use self::jmri_figures::JmriFigures;
-use self::loconet_figures::LocoNetFigures;
-use self::z21_figures::Z21Figures;
 use super::Outcome;
 use super::plot::PictureFile;
 use crate::clock::now;
-use crate::link::{Address, Link, MeasuredLine, Passed, Speed, Station, TappedLink, open, open_session};
+use crate::link::{Address, Link, MeasuredLine, Passed, Speed, TappedLink, open, open_session};
 use crate::runtime::{Attendant, Ended, Runtime, StopFlag, Wish};
 use crate::standard_error::say;
 
@@ -40,6 +36,11 @@ const COMMAND_EVERY: TimeSpan = TimeSpan::from_ms(500);
 const SECONDS: [f64; 2] = [1.0, 1e5];
 /// More lost replies than this and the line needs a look.
 const LOST_SHARE: f64 = 0.01;
+
+/// Whether the line is in order, by the share of what was lost.
+fn outcome(lost_share: f64) -> Outcome {
+    if lost_share > LOST_SHARE { Outcome::FallsShort } else { Outcome::Done }
+}
 
 /// Listen to a line: how often sensors are read, and what is lost.
 ///
@@ -111,19 +112,22 @@ impl Arguments {
         }
         let heard =
             Heard { passed: runtime.link().passed(), ear: &ear, has_cts: runtime.link().cts().is_some() };
-        let lost_share = match runtime.session().station() {
-            Station::Marklin(interface) => self.report_interface(interface, &heard, output)?,
-            Station::DccEx(_) => self.report(&BoardFigures::of(heard.passed), &heard, output)?,
-            Station::Z21(session) => {
-                self.report(&Z21Figures::of(heard.passed, session.settings()), &heard, output)?
-            }
-            Station::Can(session) => self.report(&CanFigures::of(heard.passed, session), &heard, output)?,
-            Station::LocoNet(session) => {
-                self.report(&LocoNetFigures::of(heard.passed, session.settings()), &heard, output)?
-            }
-            Station::Jmri(session) => self.report(&JmriFigures::of(heard.passed, session), &heard, output)?,
+        let session: &dyn Any = runtime.session();
+        let passed = heard.passed;
+        let figures = if let Some(interface) = session.downcast_ref() {
+            return self.report_interface(interface, &heard, output).map(outcome);
+        } else if let Some(session) = session.downcast_ref::<z21::Client>() {
+            z21_figures::figures_of(passed, session.settings())
+        } else if let Some(session) = session.downcast_ref() {
+            can_figures::figures_of(passed, session)
+        } else if let Some(session) = session.downcast_ref::<loconet::Client>() {
+            loconet_figures::figures_of(passed, session.settings())
+        } else if let Some(session) = session.downcast_ref() {
+            jmri_figures::figures_of(passed, session)
+        } else {
+            board_figures::figures_of(passed)
         };
-        Ok(if lost_share > LOST_SHARE { Outcome::FallsShort } else { Outcome::Done })
+        self.report(figures, &heard, output).map(outcome)
     }
 
     /// Reports on a 6051; returns the share of replies that were lost.
@@ -176,27 +180,26 @@ impl Arguments {
     /// Reports on a station that reports by itself; returns the share of requests that were not answered.
     fn report(
         &self,
-        figures: &dyn StationFigures,
+        figures: StationFigures,
         heard: &Heard<'_>,
         output: &mut dyn Write,
     ) -> anyhow::Result<f64> {
         // Noise is the best explanation of a station that was not found.
-        figures.check().map_err(|check| {
-            heard.ear.noise.clone().map_or_else(|| anyhow!(check), |noise| anyhow!(noise))
-        })?;
-        let answers = figures.answers();
+        if let Some(missing) = figures.missing {
+            bail!(heard.ear.noise.clone().unwrap_or_else(|| missing.to_owned()));
+        }
+        let StationFigures { answers, mut json, station, reports, .. } = figures;
         let line = answers.round_trips();
         if let Some(plot) = &self.plot {
             plot.write(&answers.picture())?;
         }
         if self.json {
-            let mut json = figures.json();
             answers.add_to(&mut json);
             writeln!(output, "{json}")?;
         } else {
-            figures.write_station(output)?;
+            station.iter().try_for_each(|line| writeln!(output, "{line}"))?;
             answers.write(output)?;
-            figures.write_reports(output)?;
+            reports.iter().try_for_each(|line| writeln!(output, "{line}"))?;
             self.advise(line.as_ref(), output)?;
             heard.ear.write(output)?;
         }

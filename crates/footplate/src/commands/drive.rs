@@ -26,7 +26,6 @@ use clap::Args;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{DecoderSteps, Timestamp, TrainId, TurnoutId};
 use footplate_store::{Schedule, Store, layout_named, parse_layout};
-use footplate_wire::Session as _;
 
 pub(crate) use self::beginning::DriveBeginning;
 use self::console::{Console, lines_of_stdin};
@@ -320,13 +319,13 @@ impl Arguments {
         let line = dashboard.map(|dashboard| Arc::clone(&dashboard.line));
         let line = line.or_else(|| self.railway.phones.map(|_| SharedTallies::default()));
         let link = ObservedLink::new(link, line.clone());
-        let mut session = open_session(address, &link, layout)?;
-        session.expect_delays(address.excess(self.railway.line()?.as_ref()));
+        let mut opened = open_session(address, &link, layout)?;
+        opened.session.expect_delays(address.excess(self.railway.line()?.as_ref()));
         if let (Some(store), None) = (&self.railway.store, address.simulated()) {
-            recall_directions(&mut session, &Store::open_to_read(store)?)?;
+            recall_directions(opened.session.as_mut(), &Store::open_to_read(store)?)?;
         }
         for model in &beginning.models {
-            session.set_decoder(model.train(), DecoderSteps::with(model.highest()))?;
+            opened.session.set_decoder(model.train(), DecoderSteps::with(model.highest()))?;
         }
         let sits_at_terminal = self.is_drawn();
         let asks = self.script.is_none() && !self.is_headless() && !sits_at_terminal;
@@ -360,7 +359,7 @@ impl Arguments {
         let recorder = journal.as_mut().map(|journal| journal as &mut dyn Recorder);
         let mut watch = LayoutWatch::new(layout, trains, recorder);
         console.watch_lengths(watch.warning());
-        let mut runtime = Runtime::new(link, session, Some(&mut watch), Some(StopFlag::install()));
+        let mut runtime = Runtime::new(link, opened, Some(&mut watch), Some(StopFlag::install()));
         let mut start_odometers = StartOdometers::default();
         let mut unwritten = None;
         let ending = loop {

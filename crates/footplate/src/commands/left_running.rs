@@ -11,7 +11,7 @@ use footplate_core::{Command, SpeedStep, TrainId};
 use footplate_store::{Store, UnfinishedSession};
 use footplate_wire::{Closing, Session};
 
-use crate::link::{Address, Link, StationSession, open_cable, open_session_to_stop};
+use crate::link::{Address, Link, OpenSession, open_cable, open_session_to_stop};
 use crate::runtime::Runtime;
 use crate::standard_error::say;
 
@@ -90,13 +90,13 @@ fn stop_over(
 ) -> anyhow::Result<Box<dyn Link>> {
     let cable = address.cable().context("a simulated railway has no line")?;
     let mut link = open_cable(cable)?;
-    let mut session = open_session_to_stop(address, &link)?;
+    let mut opened = open_session_to_stop(address, &link)?;
     // A train of unknown direction is stopped together with all others.
-    let _ = store.map(|store| recall_directions(&mut session, store));
+    let _ = store.map(|store| recall_directions(opened.session.as_mut(), store));
     if all {
-        session.stop_all();
+        opened.session.stop_all();
     }
-    say!("{}", stop_all(&mut link, session, trains));
+    say!("{}", stop_all(&mut link, opened, trains));
     say!("{CHECK_TURNOUTS}");
     Ok(link)
 }
@@ -111,7 +111,7 @@ const CHECK_TURNOUTS: &str = "before trains run again, check the turnouts: a tra
 ///
 /// # Errors
 /// The store cannot be read.
-pub(crate) fn recall_directions(session: &mut StationSession, store: &Store) -> anyhow::Result<()> {
+pub(crate) fn recall_directions(session: &mut dyn Session, store: &Store) -> anyhow::Result<()> {
     for (train, forward) in store.directions()? {
         session.set_direction(train, forward);
     }
@@ -121,17 +121,17 @@ pub(crate) fn recall_directions(session: &mut StationSession, store: &Store) -> 
 /// Stops trains and switches the power off over a line that has just been opened.
 pub(crate) fn stop_all(
     link: &mut dyn Link,
-    mut session: StationSession,
+    mut opened: OpenSession,
     trains: impl IntoIterator<Item = TrainId>,
 ) -> Closing {
     for train in trains {
         let stop = Command::Speed { train, step: SpeedStep::STAND };
         // Power off stops a train, too, that this station has no address for.
-        if let Err(error) = session.handle_command(link.now(), stop) {
+        if let Err(error) = opened.session.handle_command(link.now(), stop) {
             say!("train {train}: {error}");
         }
     }
-    Runtime::new(link, session, None, None).close()
+    Runtime::new(link, opened, None, None).close()
 }
 
 fn said(unfinished: &UnfinishedSession) -> String {

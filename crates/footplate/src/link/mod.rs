@@ -6,7 +6,6 @@
 //! board_address  can_address  jmri_address  loconet_address  serial_address  z21_address   what each kind of station adds
 //! parameters  what follows the `?` of an address
 //! named_train  station_kind   a train by its address; which addresses and decoders a station commands, and how long its link takes
-//! station_session   the session of any station, as one type
 //! line        what every link can do, and what is heard of it
 //! news        what of that a watchdog wants to know
 //! discovery   serial ports, and stations that answer a call to the network
@@ -44,7 +43,6 @@ mod simulated;
 mod simulated_station;
 mod station_address;
 mod station_kind;
-mod station_session;
 mod stream;
 mod tapped;
 mod web_socket;
@@ -59,13 +57,12 @@ pub(crate) use measured::MeasuredLine;
 pub(crate) use named_train::{NamedTrain, decoder_of, trains};
 pub(crate) use observed::{LineTallies, ObservedLink, SharedTallies};
 pub(crate) use open::{
-    module_count, open, open_cable, open_session, open_session_to_stop, open_simulated, station,
+    OpenSession, module_count, open, open_cable, open_session, open_session_to_stop, open_simulated, station,
 };
 pub(crate) use rhythm::{PowerCommand, Rhythm};
 pub(crate) use served::{Incoming, Server, listen_for_datagrams, listen_on, open_pseudo_terminal};
 pub(crate) use simulated::SimulatedLink;
 pub(crate) use simulated_station::{FromSimulated, SimulatedStation};
 pub(crate) use station_kind::StationKind;
-pub(crate) use station_session::{Station, StationSession};
 pub(crate) use tapped::{Passed, TappedLink};
 pub(crate) use web_socket::listen_for_sockets;

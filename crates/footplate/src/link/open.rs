@@ -4,12 +4,12 @@ use footplate_core::track::Layout;
 use footplate_core::{Ratio, TimeSpan};
 use footplate_sim::living::{LivingLayout, LivingSwitches, StationSwitches};
 use footplate_wire::marklin_serial::{INPUTS_PER_MODULE, Interface, Pace, Settings};
-use footplate_wire::{dcc_ex, jmri, loconet, marklin_can, z21};
+use footplate_wire::{BlockReports, Session, dcc_ex, jmri, loconet, marklin_can, z21};
 
 use super::address::{Address, SimulatedAddress, Speed};
 use super::station_address::{StationAddress, StationSettings};
 use super::station_kind::StationKind;
-use super::{Cable, CableLink, Link, Lost, SimulatedLink, SimulatedStation, StationSession};
+use super::{Cable, CableLink, Link, Lost, SimulatedLink, SimulatedStation};
 #[cfg(unix)]
 use crate::guardian::WardLink;
 
@@ -90,6 +90,20 @@ fn modules_up_to(highest: u16) -> u8 {
     u8::try_from(highest / INPUTS_PER_MODULE + 1).unwrap_or(u8::MAX)
 }
 
+/// The session over an open line with the station of its kind, and what makes its reports those of the layout's blocks.
+pub(crate) struct OpenSession {
+    /// The session.
+    pub(crate) session: Box<dyn Session>,
+    /// What the detectors of blocks report; `None` for a layout without blocks.
+    pub(crate) blocks: Option<BlockReports>,
+}
+
+impl<S: Session> From<S> for OpenSession {
+    fn from(session: S) -> Self {
+        Self { session: Box::new(session), blocks: None }
+    }
+}
+
 /// The session over an open line.
 ///
 /// # Errors
@@ -98,20 +112,22 @@ pub(crate) fn open_session(
     address: &Address,
     link: &dyn Link,
     layout: &Layout,
-) -> anyhow::Result<StationSession> {
-    Ok(session_with(address, link, highest_input(layout))?.with_blocks(layout))
+) -> anyhow::Result<OpenSession> {
+    let mut opened = session_with(address, link, highest_input(layout))?;
+    opened.blocks = BlockReports::of(layout, opened.session.as_mut());
+    Ok(opened)
 }
 
 /// The session over an open line that only stops trains: no layout is needed for that.
 ///
 /// # Errors
 /// The address asks for more sensor modules than a bus has.
-pub(crate) fn open_session_to_stop(address: &Address, link: &dyn Link) -> anyhow::Result<StationSession> {
+pub(crate) fn open_session_to_stop(address: &Address, link: &dyn Link) -> anyhow::Result<OpenSession> {
     session_with(address, link, 0)
 }
 
 /// The session of an address whose station reports sensors up to this number.
-fn session_with(address: &Address, link: &dyn Link, highest: u16) -> anyhow::Result<StationSession> {
+fn session_with(address: &Address, link: &dyn Link, highest: u16) -> anyhow::Result<OpenSession> {
     let (now, modules) = (link.now(), modules_up_to(highest));
     Ok(match address {
         Address::Simulated(simulated) => match simulated.station {

@@ -10,7 +10,7 @@ use footplate_core::{Command, Event, EventKind, SpeedStep, TimeSpan, Timestamp, 
 use footplate_wire::{Session, Transmit};
 
 use super::ending::WITHIN;
-use crate::link::{Bequest, Link, Lost, StationSession};
+use crate::link::{Bequest, Link, Lost};
 
 /// How long the handshake line is down after a byte, for the copy: one byte at 2400 baud (Märklin). The guardian waits for
 /// the real one.
@@ -74,7 +74,7 @@ impl LastWill {
 
     /// Tells the guardian what has changed. Call it before bytes leave, so that the guardian can stop a train before the train
     /// receives its step.
-    pub(super) fn keep<L: Link>(&mut self, session: &StationSession, link: &mut L) -> Result<(), Lost> {
+    pub(super) fn keep<L: Link>(&mut self, session: &dyn Session, link: &mut L) -> Result<(), Lost> {
         let (now, has_cts) = (link.now(), link.cts().is_some());
         let Some(guardian) = link.guardian() else { return Ok(()) };
         if !self.expected.is_empty() {
@@ -110,8 +110,8 @@ pub(crate) fn written(will: &[Bequest], speed: f64) -> Vec<u8> {
 }
 
 /// What a session sends at its end on a line that was reopened and is silent.
-fn farewell_of(session: &StationSession, began: Timestamp, has_cts: bool) -> Vec<Bequest> {
-    let mut copy = session.clone();
+fn farewell_of(session: &dyn Session, began: Timestamp, has_cts: bool) -> Vec<Bequest> {
+    let mut copy = session.copied();
     let mut said = Vec::new();
     let (mut now, mut last) = (began, began);
     while copy.poll_output().is_some() {}
@@ -171,7 +171,7 @@ mod tests {
     }
 
     /// A session that has told its trains a step, and may have been cut off at any moment.
-    fn driven(mut session: StationSession, until: Timestamp) -> StationSession {
+    fn driven(mut session: impl Session, until: Timestamp) -> impl Session {
         session.handle_cts(Timestamp::ZERO, true);
         for train in TRAINS {
             let step = SpeedStep::new(9).expect("a step");
@@ -189,7 +189,7 @@ mod tests {
         for (pace, has_cts) in [(Pace::CAREFUL, false), (Pace::FAST, false), (Pace::Cts, true)] {
             for until in (0..1_000).step_by(7) {
                 let settings = Settings { pace, ..Settings::with_cts(5) };
-                let session = Interface::new(Timestamp::ZERO, settings).expect("modules").into();
+                let session = Interface::new(Timestamp::ZERO, settings).expect("modules");
                 let now = Timestamp::ZERO + TimeSpan::from_ms(until);
                 let said = ms(&farewell_of(&driven(session, now), now, has_cts));
                 let bytes: Vec<u8> = said.iter().flat_map(|(_, bytes)| bytes).copied().collect();
@@ -211,8 +211,7 @@ mod tests {
     #[test]
     fn no_will_switches_the_power_on_after_an_emergency_stop() {
         for until in (0..1_000).step_by(7) {
-            let session: StationSession =
-                Interface::new(Timestamp::ZERO, Settings::with_cts(5)).expect("modules").into();
+            let session = Interface::new(Timestamp::ZERO, Settings::with_cts(5)).expect("modules");
             let now = Timestamp::ZERO + TimeSpan::from_ms(until);
             let mut session = driven(session, now);
             // The commands of an emergency stop are accepted; none has left yet.
@@ -228,8 +227,7 @@ mod tests {
 
     #[test]
     fn the_will_of_a_board_stops_its_trains_at_once() {
-        let mut session: StationSession =
-            dcc_ex::Client::new(Timestamp::ZERO, dcc_ex::Settings::default()).into();
+        let mut session = dcc_ex::Client::new(Timestamp::ZERO, dcc_ex::Settings::default());
         // A board that answers what is needed to open, and how each train faces.
         let mut now = Timestamp::ZERO;
         for train in TRAINS {

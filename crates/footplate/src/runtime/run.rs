@@ -5,13 +5,13 @@ use std::time::Duration;
 use footplate_core::control::{Machine, Output};
 use footplate_core::{Event, TimeSpan, Timestamp, TrainId};
 use footplate_store::Direction;
-use footplate_wire::{Closing, LinkNotice, ReportedFunctions, Session, Transmit};
+use footplate_wire::{BlockReports, Closing, LinkNotice, ReportedFunctions, Session, Transmit};
 
 use super::attendant::{Attendant, Recorder, Wish};
 use super::ending::{Ended, REOPEN_WITHIN, SECOND_CHANCE, WITHIN};
 use super::last_will::LastWill;
 use super::stop_flag::StopFlag;
-use crate::link::{Heard, Link, Lost, StationSession};
+use crate::link::{Heard, Link, Lost, OpenSession};
 use crate::standard_error::say;
 
 /// A machine that was woken and still asks for a past time is woken again after this time, so that time always advances:
@@ -30,7 +30,8 @@ const REOPENED_IN_VAIN: u32 = 4;
 /// When it is dropped, at its end, after an error or in a panic, it commands all trains to stop first.
 pub(crate) struct Runtime<'r, L: Link> {
     link: L,
-    session: StationSession,
+    session: Box<dyn Session>,
+    blocks: Option<BlockReports>,
     recorder: Option<&'r mut dyn Recorder>,
     stop: Option<StopFlag>,
     /// Entries that are not recorded yet; reused, so that no byte costs an allocation.
@@ -58,11 +59,11 @@ impl<'r, L: Link> Runtime<'r, L> {
     /// Joins them. `stop` is the flag that ends a run, if signals may end it.
     pub(crate) fn new(
         link: L,
-        session: impl Into<StationSession>,
+        session: impl Into<OpenSession>,
         recorder: Option<&'r mut dyn Recorder>,
         stop: Option<StopFlag>,
     ) -> Self {
-        let mut session = session.into();
+        let OpenSession { mut session, blocks } = session.into();
         if let Some(up) = link.cts() {
             session.handle_cts(link.now(), up);
         }
@@ -70,6 +71,7 @@ impl<'r, L: Link> Runtime<'r, L> {
         Self {
             link,
             session,
+            blocks,
             recorder,
             stop,
             fresh,
@@ -94,8 +96,8 @@ impl<'r, L: Link> Runtime<'r, L> {
     }
 
     /// The session with the station.
-    pub(crate) const fn session(&self) -> &StationSession {
-        &self.session
+    pub(crate) fn session(&self) -> &dyn Session {
+        self.session.as_ref()
     }
 
     /// Runs until the attendant or a signal ends it, or the line is lost. The session stays open: another machine may
@@ -143,7 +145,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                     return Ok(Ended::Interrupted);
                 }
                 self.ask(machine, attendant);
-                if let Some(blocks) = self.session.blocks() {
+                if let Some(blocks) = &self.blocks {
                     attendant.see_blocks(blocks);
                 }
                 if attendant.attend(now, machine) == Wish::Finish {
@@ -222,8 +224,13 @@ impl<'r, L: Link> Runtime<'r, L> {
 
     /// Writes the session's bytes to the line; collects its entries and notices.
     fn write(&mut self) -> Result<(), Lost> {
-        self.will.keep(&self.session, &mut self.link)?;
+        self.will.keep(self.session.as_ref(), &mut self.link)?;
         while let Some(output) = self.session.poll_output() {
+            let output = match &mut self.blocks {
+                Some(blocks) => blocks.take(output),
+                None => Some(output),
+            };
+            let Some(output) = output else { continue };
             match output {
                 Transmit::Byte(byte) => self.link.write(&[byte])?,
                 Transmit::Message(bytes) => self.link.write(&bytes)?,
@@ -255,7 +262,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                 }
             }
         }
-        self.will.keep(&self.session, &mut self.link)
+        self.will.keep(self.session.as_ref(), &mut self.link)
     }
 
     /// Takes the machine's outputs.
@@ -268,7 +275,10 @@ impl<'r, L: Link> Runtime<'r, L> {
                     Err(error) => attendant.hear_of_refusal(now, command, error),
                 },
                 Output::HoldLine(until) => self.session.hold_line(until),
-                Output::Watch(sensor) => self.session.watch(sensor),
+                Output::Watch(sensor) => {
+                    let input = |sensor| self.blocks.as_ref().map_or(sensor, |blocks| blocks.input(sensor));
+                    self.session.watch(sensor.map(input));
+                }
                 Output::Notice(notice) => attendant.hear(now, notice),
             }
         }

@@ -20,7 +20,6 @@ use footplate_core::model::StepUse;
 use footplate_core::track::{Layout, TurnoutStates};
 use footplate_core::{DecoderSteps, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_store::{MotionFile, MotionReplay, Store, StoredModel, layout_named};
-use footplate_wire::Session as _;
 
 pub(crate) use self::beginning::CalibrationBeginning;
 use self::ended::{Why, outcome_of};
@@ -163,14 +162,14 @@ impl Session<'_> {
             None => None,
         };
         let line = MeasuredLine::of(self.link, self.store)?;
-        let mut session = open_session(self.link, &link, layout)?;
-        session.expect_delays(self.link.excess(line.as_ref()));
-        session.set_decoder(self.train, decoder)?;
+        let mut opened = open_session(self.link, &link, layout)?;
+        opened.session.expect_delays(self.link.excess(line.as_ref()));
+        opened.session.set_decoder(self.train, decoder)?;
         let scribe = written.as_ref().and_then(SessionJournal::scribe);
         let recorder = written.as_mut().map(|written| written as &mut dyn Recorder);
         let mut calibrator = Recorded::new(beginning.calibrator(layout), scribe);
         let mut watcher = Watcher::new(layout, self.train, self.budget).seen_by(showing);
-        let mut runtime = Runtime::new(link, session, recorder, Some(StopFlag::install()));
+        let mut runtime = Runtime::new(link, opened, recorder, Some(StopFlag::install()));
         let ended = runtime.run(&mut calibrator, &mut watcher);
         let at = runtime.link().now();
         let closing = runtime.close();

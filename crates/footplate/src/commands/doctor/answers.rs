@@ -146,12 +146,9 @@ impl Sensors {
     }
 }
 
-/// Says how much could not be read, if anything.
-pub(super) fn write_noise(unread: usize, output: &mut dyn Write) -> std::io::Result<()> {
-    if unread > 0 {
-        writeln!(output, "noise         {unread} bytes could not be read")?;
-    }
-    Ok(())
+/// How much could not be read, if anything.
+pub(super) fn noise(unread: usize) -> Option<String> {
+    (unread > 0).then(|| format!("noise         {unread} bytes could not be read"))
 }
 
 #[cfg(test)]

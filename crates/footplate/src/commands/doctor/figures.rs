@@ -9,24 +9,17 @@ use crate::commands::plot::{Ink, Layer, Panel, Picture, SHOWN, Shape, shares};
 use crate::link::{Passed, Rhythm};
 
 /// What the messages of a station come to that reports by itself.
-pub(super) trait StationFigures {
-    /// Whether a station of this kind was heard.
-    ///
-    /// # Errors
-    /// What the user should check, if none was heard.
-    fn check(&self) -> Result<(), &'static str>;
-
+pub(super) struct StationFigures {
+    /// What the user should check, if none of this kind was heard.
+    pub(super) missing: Option<&'static str>,
     /// Times to its answers.
-    fn answers(&self) -> &Answers;
-
+    pub(super) answers: Answers,
     /// All figures except those of answers.
-    fn json(&self) -> serde_json::Value;
-
-    /// Prints what the station is.
-    fn write_station(&self, output: &mut dyn Write) -> std::io::Result<()>;
-
-    /// Prints what the station reports.
-    fn write_reports(&self, output: &mut dyn Write) -> std::io::Result<()>;
+    pub(super) json: serde_json::Value,
+    /// What the station is, in lines.
+    pub(super) station: Vec<String>,
+    /// What it reports, in lines.
+    pub(super) reports: Vec<String>,
 }
 
 /// Bars of the histogram are as wide as this at most.
