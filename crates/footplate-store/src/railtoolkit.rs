@@ -24,7 +24,7 @@ pub(crate) fn chosen<'a>(table: &Table<'a>, key: &str, which: Option<&str>) -> R
     let place = table.place_of(key);
     match (which, all.as_slice()) {
         (None, [one]) => Ok(*one),
-        (None, _) => Err((place, DocumentProblem::Which { found })),
+        (None, _) => Err((place, DocumentProblem::Which(found))),
         (Some(wanted), _) => {
             let at = ids.iter().position(|id| *id == wanted);
             let entry = at.and_then(|at| all.get(at).copied());

@@ -170,20 +170,11 @@ impl fmt::Display for Note {
 #[non_exhaustive]
 pub enum Oddity {
     /// Columns that no reader knows.
-    UnknownColumns {
-        /// Their names.
-        names: Vec<String>,
-    },
+    UnknownColumns(Vec<String>),
     /// The timer behind the times began anew between two runs.
-    TimerRestarted {
-        /// The run that begins with the new count.
-        run: RunId,
-    },
+    TimerRestarted(RunId),
     /// Nothing was reported in a run.
-    NoReports {
-        /// The run.
-        run: RunId,
-    },
+    NoReports(RunId),
     /// The last line has all its columns but no end.
     LineNotEnded,
     /// The last line breaks off before its end.
@@ -193,11 +184,11 @@ pub enum Oddity {
 impl fmt::Display for Oddity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::UnknownColumns { names } => write!(f, "unknown columns are ignored: {}", names.join(", ")),
-            Self::TimerRestarted { run } => {
+            Self::UnknownColumns(names) => write!(f, "unknown columns are ignored: {}", names.join(", ")),
+            Self::TimerRestarted(run) => {
                 write!(f, "the timer restarts before run {run}; every run keeps its own clock")
             }
-            Self::NoReports { run } => {
+            Self::NoReports(run) => {
                 write!(f, "run {run} has no report; kept, it tells that the train stood")
             }
             Self::LineNotEnded => f.write_str("the last line has no end of line; kept unchanged"),

@@ -75,11 +75,8 @@ pub enum TextFileError {
         kind: &'static str,
     },
     /// Bytes that are not UTF-8.
-    #[error("{place}: no UTF-8 text; save the file as UTF-8")]
-    NotText {
-        /// The first of them.
-        place: TextPlace,
-    },
+    #[error("{0}: no UTF-8 text; save the file as UTF-8")]
+    NotText(TextPlace),
 }
 
 /// What a file describes.
@@ -113,6 +110,6 @@ impl TextFile {
     pub(crate) fn text<'b>(&self, file: &str, bytes: &'b [u8]) -> Result<&'b str, TextFileError> {
         self.check_size(file, bytes)?;
         std::str::from_utf8(bytes)
-            .map_err(|error| TextFileError::NotText { place: TextPlace::of_error(file, bytes, &error) })
+            .map_err(|error| TextFileError::NotText(TextPlace::of_error(file, bytes, &error)))
     }
 }

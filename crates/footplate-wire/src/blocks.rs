@@ -40,7 +40,7 @@ impl BlockReports {
             }
             Transmit::Event(event) => self.occupancy.take(&self.layout, event).map(Transmit::Event),
             // A train stands in this block: nothing that a person should look at.
-            Transmit::Notice(LinkNotice::HeldClosed { sensor })
+            Transmit::Notice(LinkNotice::HeldClosed(sensor))
                 if self.occupancy.occupied_from_start(&self.layout, sensor) =>
             {
                 None

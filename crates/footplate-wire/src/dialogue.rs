@@ -194,12 +194,12 @@ impl<A: Awaited> Dialogue<A> {
             }
             if due.is_exhausted() {
                 if let Some(command) = command {
-                    self.notify(LinkNotice::Unconfirmed { command });
+                    self.notify(LinkNotice::Unconfirmed(command));
                 }
                 return Some(Repeat::GivenUp(due));
             }
             if let Some(command) = command.filter(|_| tries > A::REPEATS.usual) {
-                self.notify(LinkNotice::Repeated { command });
+                self.notify(LinkNotice::Repeated(command));
             }
             let tries = tries.saturating_add(1);
             let Outstanding { request, awaited, .. } = due;

@@ -185,7 +185,7 @@ impl<A: Awaited> Dialogue<A> {
         let Some(locomotive) = self.locomotives.get_mut(train) else { return };
         let commanded = locomotive.forward.take();
         if commanded.is_some() && commanded != confirmed {
-            self.notify(LinkNotice::ReverseInDoubt { train });
+            self.notify(LinkNotice::ReverseInDoubt(train));
         }
     }
 

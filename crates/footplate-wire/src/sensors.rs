@@ -76,7 +76,7 @@ impl<A: Awaited> Dialogue<A> {
                 self.report(sensor, latest, width);
             }
             Change::Freed => self.report_free(sensor, latest, width),
-            Change::HeldFromStart => self.notify(LinkNotice::HeldClosed { sensor }),
+            Change::HeldFromStart => self.notify(LinkNotice::HeldClosed(sensor)),
             Change::None => {}
         }
     }

@@ -140,17 +140,11 @@ pub enum LinkNotice {
     /// The line was lost and is open again: what was sent and reported meanwhile is unknown.
     Reopened,
     /// The station has identified itself.
-    Identified {
-        /// Its own words.
-        identity: String,
-    },
+    Identified(String),
     /// The station was reset: it lost all commands, and trains stopped where they were when the power went off.
     Restarted,
     /// The station did not confirm a command after all repeats; it was given up.
-    Unconfirmed {
-        /// The command.
-        command: Command,
-    },
+    Unconfirmed(Command),
     /// The station is locked for driving over the network.
     Locked,
     /// The station does not report everything that this client subscribed to.
@@ -159,20 +153,11 @@ pub enum LinkNotice {
         missing: u32,
     },
     /// The station has no such turnout.
-    TurnoutRefused {
-        /// The turnout.
-        turnout: TurnoutId,
-    },
+    TurnoutRefused(TurnoutId),
     /// The station refused a request.
-    Refused {
-        /// Its own words.
-        message: String,
-    },
+    Refused(String),
     /// The station has no slot for a train: others use all of them.
-    NoSlot {
-        /// The train.
-        train: TrainId,
-    },
+    NoSlot(TrainId),
     /// Another throttle drives a train of this program.
     OtherThrottle {
         /// The train.
@@ -195,21 +180,12 @@ pub enum LinkNotice {
         since: TimeSpan,
     },
     /// A command was sent shortly before a reply was lost, and was sent again.
-    Repeated {
-        /// The command.
-        command: Command,
-    },
+    Repeated(Command),
     /// A train was commanded to reverse shortly before a reply was lost. The command is not repeated, because it toggles, and the
     /// direction cannot be read back: check which way the train faces.
-    ReverseInDoubt {
-        /// The train.
-        train: TrainId,
-    },
+    ReverseInDoubt(TrainId),
     /// This sensor was occupied when the line was opened: a train is on it, or it is stuck. It is reported again after it was free.
-    HeldClosed {
-        /// The sensor.
-        sensor: SensorId,
-    },
+    HeldClosed(SensorId),
     /// The interface does not answer all reads of sensor modules.
     Reads(ModuleReads),
     /// The solenoid of a turnout was powered for longer than it tolerates.
@@ -372,11 +348,11 @@ impl Display for LinkNotice {
             Self::Unreadable { bytes, check } => write!(f, "{bytes} bytes came that could not be read; {check}"),
             Self::Garbled => f.write_str("the line garbles data: trains stop until it is clean; check its cable"),
             Self::Reopened => f.write_str("the line is open again; trains are stopped, and the station is asked for all states"),
-            Self::Identified { identity } => write!(f, "the station is {identity}"),
+            Self::Identified(identity) => write!(f, "the station is {identity}"),
             Self::Restarted => f.write_str(
                 "the station was reset; trains stopped when the power went and stay so until they are commanded anew",
             ),
-            Self::Unconfirmed { command } => {
+            Self::Unconfirmed(command) => {
                 write!(f, "the station did not confirm: {}; check that it has not stopped", Said(*command))
             }
             Self::Locked => f.write_str(
@@ -387,13 +363,13 @@ impl Display for LinkNotice {
                 "the station does not report everything it was asked to (broadcast flags {missing:#010x}): check its firmware, \
                  and what its sensors are connected to (feedback=r-bus, can or loconet)"
             ),
-            Self::TurnoutRefused { turnout } => write!(
+            Self::TurnoutRefused(turnout) => write!(
                 f,
                 "the station has no turnout {turnout}: define it there (<T {turnout} DCC address sub>), or leave out \
                  `turnouts=defined`"
             ),
-            Self::Refused { message } => write!(f, "the station refused a request: {message}"),
-            Self::NoSlot { train } => write!(
+            Self::Refused(message) => write!(f, "the station refused a request: {message}"),
+            Self::NoSlot(train) => write!(
                 f,
                 "the station has no free slot for train {train}: release a locomotive at a throttle that drives none, or \
                  restart the station"
@@ -419,15 +395,15 @@ impl Display for LinkNotice {
                  the timed mode if the adapter has no CTS",
                 since.as_s()
             ),
-            Self::Repeated { command } => {
+            Self::Repeated(command) => {
                 write!(f, "repeated, because a reply was lost after it: {}", Said(*command))
             }
-            Self::ReverseInDoubt { train } => write!(
+            Self::ReverseInDoubt(train) => write!(
                 f,
                 "train {train} was commanded to reverse just before a reply was lost; it may face \
                  either direction"
             ),
-            Self::HeldClosed { sensor } => {
+            Self::HeldClosed(sensor) => {
                 write!(f, "sensor {sensor} is occupied from the start: a train is on it, or it is stuck")
             }
             Self::Reads(reads) => write!(f, "the interface {reads}"),

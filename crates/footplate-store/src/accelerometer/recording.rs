@@ -95,7 +95,7 @@ impl AccelerometerRecording {
         }
         table.check_end()?;
         if readings.is_empty() {
-            return Err(AccelerometerError::NoRows { file: file.to_owned() });
+            return Err(AccelerometerError::NoRows(file.to_owned()));
         }
         let form = if three.is_none() {
             SensorForm::Along
@@ -164,11 +164,8 @@ pub enum AccelerometerError {
         found: String,
     },
     /// There is a header and nothing below it.
-    #[error("{file}: no rows below the header; there should be at least one")]
-    NoRows {
-        /// The file.
-        file: String,
-    },
+    #[error("{0}: no rows below the header; there should be at least one")]
+    NoRows(String),
     /// More rows than are read.
     #[error("{file}, line {line}: more than {most} rows; cut the recording into trips")]
     TooManyRows {

@@ -79,7 +79,7 @@ impl StopMarks {
         }
         table.check_end()?;
         if stops.is_empty() {
-            return Err(AccelerometerError::NoRows { file: file.to_owned() });
+            return Err(AccelerometerError::NoRows(file.to_owned()));
         }
         Ok(Self { stops })
     }

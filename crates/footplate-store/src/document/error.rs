@@ -16,11 +16,8 @@ pub enum DocumentError {
     #[error(transparent)]
     Text(#[from] TextFileError),
     /// A name that does not tell how to read the file.
-    #[error("{file}: its name should end in .toml (Footplate's own form), .json or .yaml")]
-    Syntax {
-        /// The file.
-        file: String,
-    },
+    #[error("{0}: its name should end in .toml (Footplate's own form), .json or .yaml")]
+    Syntax(String),
     /// Something in the text is wrong.
     #[error("{place}: {problem}")]
     Wrong {
@@ -47,23 +44,14 @@ pub enum DocumentProblem {
     #[error("{0}")]
     Syntax(String),
     /// A part of YAML that no description needs.
-    #[error("{what} are not read; write the value itself")]
-    NotRead {
-        /// Which part.
-        what: &'static str,
-    },
+    #[error("{0} are not read; write the value itself")]
+    NotRead(&'static str),
     /// Deeper than any description.
-    #[error("more than {limit} levels of nesting; a train or a line has a handful")]
-    TooDeep {
-        /// The most that is read.
-        limit: usize,
-    },
+    #[error("more than {0} levels of nesting; a train or a line has a handful")]
+    TooDeep(usize),
     /// A key said twice.
-    #[error("`{key}` is given twice; remove one")]
-    KeyTwice {
-        /// The key.
-        key: String,
-    },
+    #[error("`{0}` is given twice; remove one")]
+    KeyTwice(String),
     /// A key that means nothing here.
     #[error("`{key}` is not a key of {of}; its keys are {known}")]
     UnknownKey {
@@ -113,11 +101,8 @@ pub enum DocumentProblem {
         expected: &'static str,
     },
     /// A file with several trains or lines, of which none was named.
-    #[error("the file describes {found}; say which one")]
-    Which {
-        /// Their names.
-        found: String,
-    },
+    #[error("the file describes {0}; say which one")]
+    Which(String),
     /// A file without the train or line that was named.
     #[error("there is no `{wanted}` in the file, which describes {found}")]
     NotThere {

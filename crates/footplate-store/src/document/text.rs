@@ -35,7 +35,7 @@ pub(crate) const DOCUMENT: TextFile = TextFile { kind: "a train or a line", larg
 
 /// The tree of a document, and its syntax, which the end of the file's name tells.
 pub(crate) fn parse(file: &str, bytes: &[u8]) -> Result<(Syntax, Node), DocumentError> {
-    let syntax = Syntax::of(file).ok_or_else(|| DocumentError::Syntax { file: file.to_owned() })?;
+    let syntax = Syntax::of(file).ok_or_else(|| DocumentError::Syntax(file.to_owned()))?;
     let text = DOCUMENT.text(file, bytes)?;
     let tree = match syntax {
         Syntax::Toml => toml_tree::tree(text),

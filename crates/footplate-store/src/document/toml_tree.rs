@@ -31,7 +31,7 @@ fn table(text: &str, place: Place, entries: &DeTable<'_>, levels: usize) -> Resu
 fn node(text: &str, value: &Spanned<DeValue<'_>>, levels: usize) -> Result<Node, Fault> {
     let place = place(text, value.span().start);
     let Some(levels) = levels.checked_sub(1) else {
-        return Err((place, DocumentProblem::TooDeep { limit: DEEPEST }));
+        return Err((place, DocumentProblem::TooDeep(DEEPEST)));
     };
     let value = match value.get_ref() {
         DeValue::String(text) => Value::Text(text.to_string()),

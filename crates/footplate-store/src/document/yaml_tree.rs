@@ -40,7 +40,7 @@ enum Open {
 
 impl Tree {
     fn take(&mut self, event: Event<'_>, place: Place) -> Result<(), Fault> {
-        let not_read = |what| Err((place, DocumentProblem::NotRead { what }));
+        let not_read = |what| Err((place, DocumentProblem::NotRead(what)));
         match event {
             Event::Alias(_) => not_read("aliases"),
             Event::Scalar(_, _, 1.., _) | Event::SequenceStart(1.., _) | Event::MappingStart(1.., _) => {
@@ -70,7 +70,7 @@ impl Tree {
 
     fn open(&mut self, place: Place, what: Open) -> Result<(), Fault> {
         if self.open.len() >= DEEPEST {
-            return Err((place, DocumentProblem::TooDeep { limit: DEEPEST }));
+            return Err((place, DocumentProblem::TooDeep(DEEPEST)));
         }
         self.open.push(what);
         Ok(())
@@ -90,7 +90,7 @@ impl Tree {
                     };
                     if entries.iter().any(|(before, _)| *before == key) {
                         let key = key.escape_debug().to_string();
-                        return Err((node.place, DocumentProblem::KeyTwice { key }));
+                        return Err((node.place, DocumentProblem::KeyTwice(key)));
                     }
                     *waiting = Some(key);
                 }

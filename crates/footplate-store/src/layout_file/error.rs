@@ -56,48 +56,33 @@ pub enum LayoutProblem {
     },
     /// The end of an edge is more than a name and a leg.
     #[error(
-        "`{found}` is not an end of an edge: write a name like `C13`, or `BR6 straight` or `BR6 \
+        "`{0}` is not an end of an edge: write a name like `C13`, or `BR6 straight` or `BR6 \
              curved`"
     )]
-    RailEnd {
-        /// The text in the file.
-        found: String,
-    },
+    RailEnd(String),
     /// A sensor without a number whose name does not imply one.
     #[error(
-        "`{name}` does not imply the sensor's number: add `numbers = [.., ..]`, `number = ..` if it reports the same number for \
+        "`{0}` does not imply the sensor's number: add `numbers = [.., ..]`, `number = ..` if it reports the same number for \
          both directions, or call it A1 to E16"
     )]
-    SensorNumber {
-        /// The name.
-        name: String,
-    },
+    SensorNumber(String),
     /// A sensor with two numbers that are equal.
     #[error(
-        "numbers = [{number}, {number}] are one number: write `number = {number}` if the sensor reports both directions under it"
+        "numbers = [{0}, {0}] are one number: write `number = {0}` if the sensor reports both directions under it"
     )]
-    EqualNumbers {
-        /// The number.
-        number: u16,
-    },
+    EqualNumbers(u16),
     /// A sensor with one number for both directions and one for each.
     #[error(
-        "`{name}` has `number` and `numbers`: keep `number` if it reports the same number for both directions, `numbers` if it \
+        "`{0}` has `number` and `numbers`: keep `number` if it reports the same number for both directions, `numbers` if it \
          reports one for each"
     )]
-    NumberAndNumbers {
-        /// The first name.
-        name: String,
-    },
+    NumberAndNumbers(String),
     /// An uncertainty without a length.
     #[error("an uncertainty without a length: add `mm`, or leave out `uncertainty_mm`")]
     UncertaintyOfNothing,
     /// An edge in a zone that is not defined.
-    #[error("no zone is called `{found}`: add `{{ name = \"{found}\", max_mm_s = .. }}` to `zones`")]
-    UnknownZone {
-        /// The name in the file.
-        found: String,
-    },
+    #[error("no zone is called `{0}`: add `{{ name = \"{0}\", max_mm_s = .. }}` to `zones`")]
+    UnknownZone(String),
     /// A crossing on an edge that is not in the file.
     #[error("no edge leads from `{from}` to `{to}`: name it as it is written in `edges`")]
     UnknownEdge {

@@ -131,7 +131,7 @@ fn check_reverse<'n>(row: &NodeRow, rows: &BTreeMap<&str, &'n NodeRow>) -> Resul
         return Err(RowProblem::OneWayReverse { name, reverse, back: other.reverse.clone() });
     }
     if name == reverse {
-        return Err(RowProblem::OwnReverse { name });
+        return Err(RowProblem::OwnReverse(name));
     }
     let expected = row.kind.reverse();
     if other.kind != expected {
@@ -157,7 +157,7 @@ fn pair_edges(edges: &[EdgeRow], reverses: &Reverses<'_>) -> Result<Vec<(u64, St
         alone.entry((&edge.from, &edge.to)).or_default().push(number);
     }
     let reverse = |line: u64, name: &str| {
-        let unknown = || (line, RowProblem::UnknownNode { name: name.to_owned() });
+        let unknown = || (line, RowProblem::UnknownNode(name.to_owned()));
         reverses.get(name).copied().ok_or_else(unknown)
     };
     let mut stretches = Vec::with_capacity(edges.len() / 2);
@@ -197,7 +197,7 @@ fn draw(layout: &Layout, points: &[PointRow]) -> Result<Drawing, Fault> {
     let mut drawing = Drawing::default();
     for row in points {
         let Some(node) = layout.node_named(&row.name) else {
-            return Err((row.line, RowProblem::UnknownNode { name: row.name.clone() }));
+            return Err((row.line, RowProblem::UnknownNode(row.name.clone())));
         };
         if drawing.point(node).is_some_and(|point| point != row.point) {
             let reverse = layout.node_name(node.reverse()).to_owned();

@@ -83,11 +83,8 @@ pub enum RowProblem {
         back: String,
     },
     /// A node is its own reverse.
-    #[error("`{name}` cannot be its own reverse: each direction of travel is a node of its own")]
-    OwnReverse {
-        /// The node.
-        name: String,
-    },
+    #[error("`{0}` cannot be its own reverse: each direction of travel is a node of its own")]
+    OwnReverse(String),
     /// The types of a node and its reverse do not match.
     #[error(
         "`{name}` is of type {kind}, so its reverse `{reverse}` should be of type {expected}, not {found}"
@@ -117,11 +114,8 @@ pub enum RowProblem {
         found: u16,
     },
     /// An edge names a node that is not in the table of nodes.
-    #[error("no node is called `{name}`")]
-    UnknownNode {
-        /// The name.
-        name: String,
-    },
+    #[error("no node is called `{0}`")]
+    UnknownNode(String),
     /// Two edges leave a node by the same exit.
     #[error("line {first} already has an edge that leaves `{from}` by the same exit")]
     DuplicateEdge {

@@ -59,12 +59,9 @@ pub enum PanelError {
     },
     /// There is no panel of the Layout Editor in the file.
     #[error(
-        "{file}: no track of a Layout Editor panel; give a file that JMRI's Layout Editor saved (File, Store)"
+        "{0}: no track of a Layout Editor panel; give a file that JMRI's Layout Editor saved (File, Store)"
     )]
-    NoTrack {
-        /// The file.
-        file: String,
-    },
+    NoTrack(String),
     /// A turnout has no number.
     #[error(
         "{place}: turnout {ident} has no number, because its `turnoutname` is `{name}`; give it a turnout in JMRI whose system name \
@@ -101,7 +98,7 @@ pub fn import_panel(file: &str, text: &str, context: &ImportContext) -> Result<I
     let root = document.root_element();
     let mut editors =
         children(root, "LayoutEditor").filter(|one| children(*one, "tracksegment").next().is_some());
-    let editor = editors.next().ok_or_else(|| PanelError::NoTrack { file: file.to_owned() })?;
+    let editor = editors.next().ok_or_else(|| PanelError::NoTrack(file.to_owned()))?;
     let mut tracks = Tracks::new(root, editor);
     for other in editors {
         tracks.left_out.push(format!(

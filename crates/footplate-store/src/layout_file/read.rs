@@ -262,7 +262,7 @@ impl Written {
         let is_known = |name: &str| self.zones.iter().any(|zone| zone.get_ref().name == name);
         if let Some((_, unknown)) = restricted().find(|(_, zone)| !is_known(zone.get_ref())) {
             let found = unknown.get_ref().escape_debug().to_string();
-            return Err((unknown.span().start, LayoutProblem::UnknownZone { found }));
+            return Err((unknown.span().start, LayoutProblem::UnknownZone(found)));
         }
         let zones = self.zones.iter().map(|zone| {
             let WrittenZone { name, max_mm_s } = zone.get_ref();
@@ -336,17 +336,17 @@ impl WrittenSensor {
     fn place(&self, start: usize) -> Result<Place, Fault> {
         let [one, other] = &self.names;
         let number_in = |name: &String| {
-            let unknown = || (start, LayoutProblem::SensorNumber { name: name.clone() });
+            let unknown = || (start, LayoutProblem::SensorNumber(name.clone()));
             ModuleLetters.sensor_named(name).ok_or_else(unknown)
         };
         let names = self.names.clone();
         let sensors = match (self.number, self.numbers) {
-            (Some(_), Some(_)) => return Err((start, LayoutProblem::NumberAndNumbers { name: one.clone() })),
+            (Some(_), Some(_)) => return Err((start, LayoutProblem::NumberAndNumbers(one.clone()))),
             (Some(number), None) => {
                 return Ok(Place::UndirectedSensor { names, sensor: SensorId(number) });
             }
             (None, Some([one, other])) if one == other => {
-                return Err((start, LayoutProblem::EqualNumbers { number: one }));
+                return Err((start, LayoutProblem::EqualNumbers(one)));
             }
             (None, Some(numbers)) => numbers.map(SensorId),
             (None, None) => [number_in(one)?, number_in(other)?],
@@ -410,9 +410,6 @@ fn rail_end(text: &Spanned<String>) -> Result<RailEnd, Fault> {
     };
     match (node, leg, words.next()) {
         (Some(node), Some(leg), None) => Ok(RailEnd { node, leg }),
-        _ => Err((
-            text.span().start,
-            LayoutProblem::RailEnd { found: text.get_ref().escape_debug().to_string() },
-        )),
+        _ => Err((text.span().start, LayoutProblem::RailEnd(text.get_ref().escape_debug().to_string()))),
     }
 }

@@ -28,17 +28,11 @@ pub enum MotionFileError {
         source: std::io::Error,
     },
     /// The file is too large to be a motion model.
-    #[error("{file}: too large for a motion model, which has at most {LARGEST} bytes")]
-    TooLarge {
-        /// The file.
-        file: String,
-    },
+    #[error("{0}: too large for a motion model, which has at most {LARGEST} bytes")]
+    TooLarge(String),
     /// The extension is neither .toml nor .json.
-    #[error("{file}: a motion model is a .toml or .json file")]
-    UnknownEnding {
-        /// The file.
-        file: String,
-    },
+    #[error("{0}: a motion model is a .toml or .json file")]
+    UnknownEnding(String),
     /// It is not a motion model.
     #[error("{file}: {problem} (docs/formats/motion-model.md describes the format)")]
     Form {
@@ -49,13 +43,10 @@ pub enum MotionFileError {
     },
     /// A calibration in the old format, from before there was one model per train.
     #[error(
-        "{file}: a calibration in an old format, computed with other formulas; calibrate again: \
+        "{0}: a calibration in an old format, computed with other formulas; calibrate again: \
          footplate calibrate --from LOGS --layout LAYOUT --out FILE, or from a store with --store"
     )]
-    OldForm {
-        /// The file.
-        file: String,
-    },
+    OldForm(String),
     /// A model of another version of the formulas.
     #[error(
         "{file}: computed by version {found} of the model, this program has version {MOTION_MODEL_VERSION}; calibrate \
@@ -98,17 +89,17 @@ impl MotionFile {
         // Devices and pipes have no size that could be asked for.
         let bytes = read_at_most(path, LARGEST).map_err(system)?;
         if bytes.len() > LARGEST {
-            return Err(MotionFileError::TooLarge { file });
+            return Err(MotionFileError::TooLarge(file));
         }
         let text = String::from_utf8(bytes)
             .map_err(|error| system(io::Error::new(io::ErrorKind::InvalidData, error)))?;
         if is_old_form(&text) {
-            return Err(MotionFileError::OldForm { file });
+            return Err(MotionFileError::OldForm(file));
         }
         let parsed = match is_toml(path) {
             Some(true) => toml::from_str(&text).map_err(|error: toml::de::Error| error.to_string()),
             Some(false) => serde_json::from_str(&text).map_err(|error| error.to_string()),
-            None => return Err(MotionFileError::UnknownEnding { file }),
+            None => return Err(MotionFileError::UnknownEnding(file)),
         };
         Self::checked(file, parsed)
     }
@@ -123,7 +114,7 @@ impl MotionFile {
         let text = match is_toml(path) {
             Some(true) => toml::to_string(self).map_err(|error| form(error.to_string()))?,
             Some(false) => serde_json::to_string_pretty(self).map_err(|error| form(error.to_string()))?,
-            None => return Err(MotionFileError::UnknownEnding { file }),
+            None => return Err(MotionFileError::UnknownEnding(file)),
         };
         write_whole(path, text.as_bytes()).map_err(|source| MotionFileError::System { file, source })
     }
@@ -326,7 +317,7 @@ mod tests {
             refused.contains("old form") && refused.contains("footplate calibrate --from LOGS"),
             "{refused}"
         );
-        assert!(matches!(file().write(&path("model.xml")), Err(MotionFileError::UnknownEnding { .. })));
+        assert!(matches!(file().write(&path("model.xml")), Err(MotionFileError::UnknownEnding(_))));
         assert!(matches!(MotionFile::read(&path("none.toml")), Err(MotionFileError::System { .. })));
     }
 }

@@ -69,11 +69,8 @@ pub enum PublishedTableError {
         line: u64,
     },
     /// The table has no rows.
-    #[error("{file}: the table has no row below its header")]
-    NoRow {
-        /// The file.
-        file: String,
-    },
+    #[error("{0}: the table has no row below its header")]
+    NoRow(String),
 }
 
 /// Reads a table of speeds or of stops, recognised by its columns; other columns are ignored.
@@ -99,7 +96,7 @@ pub fn read_published_table(path: &Path) -> Result<Vec<PublishedFigure>, Publish
     }
     table.check_end()?;
     if figures.is_empty() {
-        return Err(PublishedTableError::NoRow { file });
+        return Err(PublishedTableError::NoRow(file));
     }
     Ok(figures)
 }

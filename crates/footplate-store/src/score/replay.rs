@@ -31,13 +31,8 @@ pub enum ReplayError {
         trains: Vec<TrainId>,
     },
     /// No row names the train.
-    #[error(
-        "run {run}: no row names a train; begin it with a `running` row that names the train and its step"
-    )]
-    NoTrain {
-        /// The run.
-        run: RunId,
-    },
+    #[error("run {0}: no row names a train; begin it with a `running` row that names the train and its step")]
+    NoTrain(RunId),
 }
 
 fn listed(trains: &[TrainId]) -> String {
@@ -50,7 +45,7 @@ fn no_train(run: &Run) -> ReplayError {
     let trains = if moving.is_empty() { &run.trains } else { &moving };
     let trains: Vec<TrainId> = trains.iter().map(|known| known.train).collect();
     if trains.is_empty() {
-        return ReplayError::NoTrain { run: run.id };
+        return ReplayError::NoTrain(run.id);
     }
     ReplayError::ManyTrains { run: run.id, trains }
 }

@@ -101,7 +101,7 @@ impl FormReader for LightGateLog<'_> {
                 let first = run.gates.is_empty();
                 run.add_gate(row, self.time, gate, clock)?;
                 if first && self.last_gate.is_some_and(|last| clock < last) {
-                    runs.note(Note { line: row.line(), oddity: Oddity::TimerRestarted { run: id } });
+                    runs.note(Note { line: row.line(), oddity: Oddity::TimerRestarted(id) });
                 }
                 Ok(())
             }

@@ -49,20 +49,14 @@ pub enum RecordingError {
         missing: Vec<&'static str>,
     },
     /// There is a header and nothing below it.
-    #[error("{file}: no rows below the header; a recording has at least one")]
-    NoRows {
-        /// The file.
-        file: String,
-    },
+    #[error("{0}: no rows below the header; a recording has at least one")]
+    NoRows(String),
     /// Neither the rows nor the file name nor the caller say which train ran.
     #[error(
-        "{file}: which train ran? its file name should contain `train` and the number, such as `train24`, or the \
+        "{0}: which train ran? its file name should contain `train` and the number, such as `train24`, or the \
          train should be given (`--train 24`)"
     )]
-    WhichTrain {
-        /// The file.
-        file: String,
-    },
+    WhichTrain(String),
 }
 
 /// Reads the sensor log at `path`, whatever its form.
@@ -87,7 +81,7 @@ pub fn parse_sensor_log(
     // The most demanding form first: no other has all its columns.
     if let Some(columns) = table.columns_named(SinceCommandLog::COLUMNS) {
         let Some(train) = named.or(context.train) else {
-            return Err(RecordingError::WhichTrain { file });
+            return Err(RecordingError::WhichTrain(file));
         };
         let log = SinceCommandLog::new(&table, columns, context.sensors, train);
         return read_rows(&file, name, table, log);
@@ -130,7 +124,7 @@ fn read_rows<L: FormReader, R: BufRead>(
         .map(|column| shown(column))
         .collect();
     if !unknown.is_empty() {
-        runs.note(Note { line: table.line(), oddity: Oddity::UnknownColumns { names: unknown } });
+        runs.note(Note { line: table.line(), oddity: Oddity::UnknownColumns(unknown) });
     }
     while let Some(row) = table.next_row()? {
         match log.read_row(row, &mut runs) {
@@ -148,7 +142,7 @@ fn read_rows<L: FormReader, R: BufRead>(
     let (runs, mut notes) = runs.finish();
     notes.extend(oddity.map(|oddity| Note { line: table.line(), oddity }));
     if runs.is_empty() {
-        return Err(RecordingError::NoRows { file: file.to_owned() });
+        return Err(RecordingError::NoRows(file.to_owned()));
     }
     Ok(Recording { name, form: L::FORM, runs, notes })
 }

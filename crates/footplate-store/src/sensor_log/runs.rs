@@ -71,7 +71,7 @@ impl Runs {
         self.runs.pop_if(|run| run.events.is_empty() && run.trains.is_empty() && run.gates.is_empty());
         for (run, line) in self.runs.iter().zip(&self.began) {
             if run.reports().next().is_none() {
-                self.notes.push(Note { line: *line, oddity: Oddity::NoReports { run: run.id } });
+                self.notes.push(Note { line: *line, oddity: Oddity::NoReports(run.id) });
             }
         }
         self.notes.sort_by_key(|note| note.line);

@@ -142,7 +142,7 @@ impl FormReader for SinceCommandLog<'_> {
             if let (Some(before), Some(now)) = (self.last_ticks, ticks)
                 && now < before
             {
-                runs.note(Note { line: row.line(), oddity: Oddity::TimerRestarted { run: id } });
+                runs.note(Note { line: row.line(), oddity: Oddity::TimerRestarted(id) });
             }
             let standing = TrainAtStart { train: self.train, step: SpeedStep::STAND };
             let run = runs.begin(row, id, vec![standing]);

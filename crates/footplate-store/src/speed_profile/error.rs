@@ -12,11 +12,8 @@ pub enum ProfileError {
     #[error(transparent)]
     Text(#[from] TextFileError),
     /// Bytes that are not UTF-8.
-    #[error("{place}: not UTF-8; save the file as UTF-8")]
-    NotText {
-        /// Where.
-        place: TextPlace,
-    },
+    #[error("{0}: not UTF-8; save the file as UTF-8")]
+    NotText(TextPlace),
     /// Something in an XML file is wrong.
     #[error("{place}: {problem}")]
     Wrong {
@@ -30,30 +27,21 @@ pub enum ProfileError {
     Table(#[from] TableError),
     /// No form that is read.
     #[error(
-        "{file}: not a speed profile; give a roster entry of JMRI (XML), mvtrack.csv of Rocrail, or a CSV with the columns step, \
+        "{0}: not a speed profile; give a roster entry of JMRI (XML), mvtrack.csv of Rocrail, or a CSV with the columns step, \
          forward_mm_s and reverse_mm_s"
     )]
-    Form {
-        /// The file.
-        file: String,
-    },
+    Form(String),
     /// There is no usable speed.
     #[error(
-        "{file}: no speed was measured in this profile; measure speeds in the program that wrote it, or choose another file"
+        "{0}: no speed was measured in this profile; measure speeds in the program that wrote it, or choose another file"
     )]
-    NoSpeeds {
-        /// The file.
-        file: String,
-    },
+    NoSpeeds(String),
     /// All speeds are too fast for a model.
     #[error(
-        "{file}: every speed is above {FASTEST_MM_S:.0} mm/s, which no model train reaches; if these are speeds of the full-size \
+        "{0}: every speed is above {FASTEST_MM_S:.0} mm/s, which no model train reaches; if these are speeds of the full-size \
          train, divide them by the scale (87 for H0)"
     )]
-    OtherUnit {
-        /// The file.
-        file: String,
-    },
+    OtherUnit(String),
     /// Several locomotives, of which none was named.
     #[error("{file}: measurements of several locomotives ({found}); choose one with --loco")]
     Which {
@@ -91,13 +79,10 @@ pub enum ProfileProblem {
     },
     /// A root of another kind.
     #[error(
-        "<{found}> is not the roster entry of a locomotive (<locomotive-config>); JMRI keeps one file per locomotive in the folder \
+        "<{0}> is not the roster entry of a locomotive (<locomotive-config>); JMRI keeps one file per locomotive in the folder \
          `roster`"
     )]
-    Root {
-        /// The root element.
-        found: String,
-    },
+    Root(String),
     /// A value that cannot be.
     #[error("<{element}> is `{value}`; it should be {expected}")]
     Value {
@@ -109,9 +94,6 @@ pub enum ProfileProblem {
         expected: &'static str,
     },
     /// More entries than any decoder has steps.
-    #[error("more than {limit} speeds; a decoder has 126 steps")]
-    TooMany {
-        /// The most that are read.
-        limit: usize,
-    },
+    #[error("more than {0} speeds; a decoder has 126 steps")]
+    TooMany(usize),
 }

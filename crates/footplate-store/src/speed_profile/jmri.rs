@@ -68,7 +68,7 @@ impl<'i> RosterEntry<'i> {
         let begin = root.range().start;
         if root.tag_name().name() != "locomotive-config" {
             let found = shown(root.tag_name().name());
-            return Err(self.wrong(begin, ProfileProblem::Root { found }));
+            return Err(self.wrong(begin, ProfileProblem::Root(found)));
         }
         let missing = ProfileProblem::Missing { of: "locomotive-config", element: "locomotive" };
         child(root, "locomotive").ok_or_else(|| self.wrong(begin, missing))
@@ -112,7 +112,7 @@ pub(super) fn read(file: &str, text: &str) -> Result<SpeedProfile, ProfileError>
     let mut profile =
         SpeedProfile { source: file.to_owned(), train: address(locomotive), ..SpeedProfile::default() };
     let Some(written) = child(locomotive, "speedprofile") else {
-        return Err(ProfileError::NoSpeeds { file: file.to_owned() });
+        return Err(ProfileError::NoSpeeds(file.to_owned()));
     };
     for name in ["overRunTimeForward", "overRunTimeReverse"] {
         let Some(overrun) = child(written, name) else { continue };
@@ -125,7 +125,7 @@ pub(super) fn read(file: &str, text: &str) -> Result<SpeedProfile, ProfileError>
     let speeds = child(written, "speeds").into_iter().flat_map(|speeds| children(speeds, "speed"));
     for (nth, speed) in speeds.enumerate() {
         if nth >= MOST_SPEEDS {
-            return Err(entry.wrong(speed.range().start, ProfileProblem::TooMany { limit: MOST_SPEEDS }));
+            return Err(entry.wrong(speed.range().start, ProfileProblem::TooMany(MOST_SPEEDS)));
         }
         let step = child(speed, "step").ok_or_else(|| {
             entry.wrong(speed.range().start, ProfileProblem::Missing { of: "speed", element: "step" })

@@ -64,10 +64,10 @@ pub fn parse_profile(
         read_table(file, text, context)?
     };
     if profile.is_other_unit() {
-        return Err(ProfileError::OtherUnit { file: file.to_owned() });
+        return Err(ProfileError::OtherUnit(file.to_owned()));
     }
     if profile.speeds.is_empty() {
-        return Err(ProfileError::NoSpeeds { file: file.to_owned() });
+        return Err(ProfileError::NoSpeeds(file.to_owned()));
     }
     Ok(profile)
 }
@@ -76,7 +76,7 @@ pub fn parse_profile(
 pub(super) fn text_of<'b>(file: &str, bytes: &'b [u8]) -> Result<&'b str, ProfileError> {
     PROFILE.check_size(file, bytes)?;
     let text = std::str::from_utf8(bytes)
-        .map_err(|error| ProfileError::NotText { place: TextPlace::of_error(file, bytes, &error) })?;
+        .map_err(|error| ProfileError::NotText(TextPlace::of_error(file, bytes, &error)))?;
     Ok(text.strip_prefix('\u{feff}').unwrap_or(text))
 }
 
@@ -113,7 +113,7 @@ fn read_table(file: &str, text: &str, context: &ProfileContext) -> Result<SpeedP
             });
         }
     } else {
-        return Err(ProfileError::Form { file: file.to_owned() });
+        return Err(ProfileError::Form(file.to_owned()));
     }
     if table.last_line() == LastLine::CutOff {
         let place = TextPlace { file: file.to_owned(), line: table.line() as usize, column: 1 };

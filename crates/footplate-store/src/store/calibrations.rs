@@ -67,7 +67,7 @@ impl Store {
             Ok(()) => Ok(()),
             // The only constraint that these types can violate.
             Err(error) if error.sqlite_error_code() == Some(ErrorCode::ConstraintViolation) => {
-                Err(StoreError::NotJson { train: new.train })
+                Err(StoreError::NotJson(new.train))
             }
             Err(error) => Err(self.error(error)),
         }

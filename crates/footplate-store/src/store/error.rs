@@ -12,17 +12,11 @@ use super::recordings::{EventKey, RecordingKey};
 #[non_exhaustive]
 pub enum StoreError {
     /// There is no such file.
-    #[error("there is no store at {}; `footplate store import` makes one", file.display())]
-    Missing {
-        /// Where it was looked for.
-        file: PathBuf,
-    },
+    #[error("there is no store at {}; `footplate store import` makes one", .0.display())]
+    Missing(PathBuf),
     /// A file that something else wrote.
-    #[error("{} is not a Footplate store", file.display())]
-    NotAStore {
-        /// The file.
-        file: PathBuf,
-    },
+    #[error("{} is not a Footplate store", .0.display())]
+    NotAStore(PathBuf),
     /// A store that a newer Footplate has migrated.
     #[error(
         "{} has version {found} of the store, and this Footplate knows versions up to {known}; use a newer \
@@ -41,12 +35,9 @@ pub enum StoreError {
     #[error(
         "the store {} is in use by another process, which has been writing to it for longer than we wait; try again \
          when it has ended",
-        file.display()
+        .0.display()
     )]
-    InUse {
-        /// The file.
-        file: PathBuf,
-    },
+    InUse(PathBuf),
     /// The file is damaged.
     #[error(
         "the store {} is damaged ({what}); `footplate store salvage --store {} --out salvaged.db` copies what can still be \
@@ -61,20 +52,14 @@ pub enum StoreError {
         what: String,
     },
     /// A file of which a salvage could read nothing.
-    #[error("nothing of a store can be read in {}", file.display())]
-    NothingReadable {
-        /// The file.
-        file: PathBuf,
-    },
+    #[error("nothing of a store can be read in {}", .0.display())]
+    NothingReadable(PathBuf),
     /// No space is left.
     #[error(
         "no space is left for the store {}; nothing of this was stored, and what was stored before is safe",
-        file.display()
+        .0.display()
     )]
-    DiskFull {
-        /// The file.
-        file: PathBuf,
-    },
+    DiskFull(PathBuf),
     /// The disk took less than it was given: it is failing, or a limit was reached.
     #[error(
         "the disk does not take what is written to the store {} ({source}); nothing of this was stored, and what was \
@@ -88,17 +73,11 @@ pub enum StoreError {
         source: rusqlite::Error,
     },
     /// The file or its folder cannot be written.
-    #[error("the store {} cannot be written; is its folder there, and may you write to both?", file.display())]
-    ReadOnly {
-        /// The file.
-        file: PathBuf,
-    },
+    #[error("the store {} cannot be written; is its folder there, and may you write to both?", .0.display())]
+    ReadOnly(PathBuf),
     /// A file that should be made exists.
-    #[error("{} exists already; name a file that does not", file.display())]
-    Exists {
-        /// The file.
-        file: PathBuf,
-    },
+    #[error("{} exists already; name a file that does not", .0.display())]
+    Exists(PathBuf),
     /// The system refused something outside SQLite.
     #[error("cannot {doing} {}: {source}", file.display())]
     System {
@@ -118,17 +97,11 @@ pub enum StoreError {
         source: rusqlite::Error,
     },
     /// An event that is not in the store.
-    #[error("there is no event {event}; `footplate store show` lists them")]
-    NoEvent {
-        /// Its number.
-        event: EventKey,
-    },
+    #[error("there is no event {0}; `footplate store show` lists them")]
+    NoEvent(EventKey),
     /// A recording that is not in the store.
-    #[error("there is no recording {recording}; `footplate store show` lists them")]
-    NoRecording {
-        /// Its number.
-        recording: RecordingKey,
-    },
+    #[error("there is no recording {0}; `footplate store show` lists them")]
+    NoRecording(RecordingKey),
     /// An event that a mark would leave as it is.
     #[error("event {event} is {} already: {reason}", if *excluded { "excluded" } else { "restored" })]
     MarkedAlready {
@@ -140,20 +113,14 @@ pub enum StoreError {
         reason: String,
     },
     /// An event that was never excluded cannot be restored.
-    #[error("event {event} was never excluded; there is nothing to restore")]
-    NeverExcluded {
-        /// The event.
-        event: EventKey,
-    },
+    #[error("event {0} was never excluded; there is nothing to restore")]
+    NeverExcluded(EventKey),
     /// A mark without a reason.
     #[error("a mark needs a reason, so that later readers know why the numbers changed")]
     NoReason,
     /// The body of a calibration is no JSON.
-    #[error("the calibration of train {train} is not JSON")]
-    NotJson {
-        /// The train.
-        train: footplate_core::TrainId,
-    },
+    #[error("the calibration of train {0} is not JSON")]
+    NotJson(footplate_core::TrainId),
 }
 
 impl StoreError {
@@ -167,13 +134,13 @@ impl StoreError {
             return Self::Damaged { file, what: source.to_string() };
         }
         match source.sqlite_error_code() {
-            Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => Self::InUse { file },
+            Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => Self::InUse(file),
             Some(ErrorCode::DatabaseCorrupt) => Self::Damaged { file, what: source.to_string() },
-            Some(ErrorCode::NotADatabase) => Self::NotAStore { file },
-            Some(ErrorCode::DiskFull) => Self::DiskFull { file },
+            Some(ErrorCode::NotADatabase) => Self::NotAStore(file),
+            Some(ErrorCode::DiskFull) => Self::DiskFull(file),
             Some(ErrorCode::SystemIoFailure) if is_write(&source) => Self::WriteFailed { file, source },
             Some(ErrorCode::ReadOnly | ErrorCode::CannotOpen | ErrorCode::PermissionDenied) => {
-                Self::ReadOnly { file }
+                Self::ReadOnly(file)
             }
             _ => Self::Refused { file, source },
         }

@@ -51,7 +51,7 @@ impl Store {
     /// Opens the store at `path`, and migrates it if an older Footplate made it.
     pub fn open(path: &Path) -> Result<Self, StoreError> {
         if !path.try_exists().unwrap_or(true) {
-            return Err(StoreError::Missing { file: path.to_owned() });
+            return Err(StoreError::Missing(path.to_owned()));
         }
         Self::open_with(path, OpenFlags::SQLITE_OPEN_READ_WRITE, MIGRATIONS)
     }
@@ -60,7 +60,7 @@ impl Store {
     /// copy in a temporary folder.
     pub fn open_to_read(path: &Path) -> Result<Self, StoreError> {
         if !path.try_exists().unwrap_or(true) {
-            return Err(StoreError::Missing { file: path.to_owned() });
+            return Err(StoreError::Missing(path.to_owned()));
         }
         let unread_log = UnreadLog::beside(path)?;
         let has_log = fs::metadata(write_ahead_log::path_of(path)).is_ok_and(|log| log.len() > 0);
@@ -69,13 +69,13 @@ impl Store {
         let opened = if is_fixed { Self::open_fixed(path) } else { Self::open_shared(path) };
         let opened = match opened {
             // SQLite shares a log through a file that it cannot make here.
-            Err(StoreError::ReadOnly { .. }) if has_log => Self::open_copy(path, |copy| {
+            Err(StoreError::ReadOnly(_)) if has_log => Self::open_copy(path, |copy| {
                 let copied = fs::copy(path, copy)
                     .and_then(|_| fs::copy(write_ahead_log::path_of(path), write_ahead_log::path_of(copy)));
                 let doing = "make a copy, to read it, of";
                 copied.map(drop).map_err(|source| StoreError::System { file: path.to_owned(), doing, source })
             }),
-            Err(StoreError::ReadOnly { .. }) if !is_fixed => Self::open_fixed(path),
+            Err(StoreError::ReadOnly(_)) if !is_fixed => Self::open_fixed(path),
             other => other,
         };
         let known = MIGRATIONS.len() as i64;
@@ -282,7 +282,7 @@ impl Store {
                 Err(StoreError::Newer { file: file(), found, known })
             }
             (APPLICATION_ID, _, found) if found > 0 => Ok(found),
-            _ => Err(StoreError::NotAStore { file: file() }),
+            _ => Err(StoreError::NotAStore(file())),
         }
     }
 
@@ -361,7 +361,7 @@ mod tests {
         let path = folder.path().join("railway.db");
         Connection::open(&path).unwrap().execute_batch("CREATE TABLE theirs (x)").unwrap();
         let before = std::fs::read(&path).unwrap();
-        assert!(matches!(Store::open_or_create(&path), Err(StoreError::NotAStore { .. })));
+        assert!(matches!(Store::open_or_create(&path), Err(StoreError::NotAStore(_))));
         assert_eq!(std::fs::read(&path).unwrap(), before);
         std::fs::write(
             &path,
@@ -369,14 +369,14 @@ mod tests {
             so that it is not taken for an empty file.",
         )
         .unwrap();
-        assert!(matches!(Store::open_or_create(&path), Err(StoreError::NotAStore { .. })));
+        assert!(matches!(Store::open_or_create(&path), Err(StoreError::NotAStore(_))));
     }
 
     #[test]
     fn a_store_that_is_read_is_not_changed() {
         let folder = folder();
         let path = folder.path().join("railway.db");
-        assert!(matches!(Store::open_to_read(&path), Err(StoreError::Missing { .. })));
+        assert!(matches!(Store::open_to_read(&path), Err(StoreError::Missing(_))));
         drop(Store::open_or_create(&path).unwrap());
         let before = std::fs::read(&path).unwrap();
         let mut store = Store::open_to_read(&path).unwrap();
@@ -410,10 +410,10 @@ mod tests {
     fn opening_makes_no_file_where_there_is_none() {
         let folder = folder();
         let path = folder.path().join("railway.db");
-        assert!(matches!(Store::open(&path), Err(StoreError::Missing { .. })));
+        assert!(matches!(Store::open(&path), Err(StoreError::Missing(_))));
         assert!(!path.exists());
         let nowhere = folder.path().join("no folder/railway.db");
-        assert!(matches!(Store::open_or_create(&nowhere), Err(StoreError::ReadOnly { .. })));
+        assert!(matches!(Store::open_or_create(&nowhere), Err(StoreError::ReadOnly(_))));
     }
 
     #[test]

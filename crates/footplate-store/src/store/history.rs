@@ -168,7 +168,7 @@ impl Store {
         if runs.is_empty() {
             let known = self.rows("SELECT id FROM recordings WHERE id = ?1", [recording.0], |_| Ok(()))?;
             if known.is_empty() {
-                return Err(StoreError::NoRecording { recording });
+                return Err(StoreError::NoRecording(recording));
             }
         }
         runs.into_iter().map(|(key, id, began_at)| self.run(key, id, began_at, as_of)).collect()

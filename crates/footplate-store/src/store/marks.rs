@@ -101,7 +101,7 @@ fn objection(
 ) -> rusqlite::Result<Option<StoreError>> {
     let known = transaction.prepare_cached("SELECT 1 FROM events WHERE id = ?1")?.exists([event.0])?;
     if !known {
-        return Ok(Some(StoreError::NoEvent { event }));
+        return Ok(Some(StoreError::NoEvent(event)));
     }
     let newest = transaction
         .prepare_cached("SELECT mark, reason FROM marks WHERE event = ?1 ORDER BY id DESC LIMIT 1")?
@@ -111,7 +111,7 @@ fn objection(
         Some((now, reason)) if now == kind => {
             Some(StoreError::MarkedAlready { event, excluded: kind == MarkKind::Excluded, reason })
         }
-        None if kind == MarkKind::Restored => Some(StoreError::NeverExcluded { event }),
+        None if kind == MarkKind::Restored => Some(StoreError::NeverExcluded(event)),
         _ => None,
     })
 }

@@ -18,8 +18,7 @@ impl Store {
         profile: Option<&SpeedProfile>,
         now: Timestamp,
     ) -> Result<(), StoreError> {
-        let body =
-            profile.map(serde_json::to_string).transpose().map_err(|_| StoreError::NotJson { train })?;
+        let body = profile.map(serde_json::to_string).transpose().map_err(|_| StoreError::NotJson(train))?;
         let source = profile.map_or("withdrawn", |profile| profile.source.as_str());
         let columns = ["train", "stored_at_ns", "source", "body"];
         checksum::append(&self.connection, "profiles", &columns, &[&train.0, &now.as_ns(), &source, &body])

@@ -104,7 +104,7 @@ impl Store {
             .and_then(|run| transaction.commit().map(|()| run));
         begun.map_err(|error| match error.sqlite_error() {
             Some(sqlite) if sqlite.extended_code == rusqlite::ffi::SQLITE_CONSTRAINT_FOREIGNKEY => {
-                StoreError::NoRecording { recording }
+                StoreError::NoRecording(recording)
             }
             _ => StoreError::of(&path, error),
         })
@@ -248,7 +248,7 @@ mod tests {
 
         let many: Vec<Event> = (0..10_000).map(reverse).collect();
         let error = store.append(run, &many, Timestamp::ZERO).unwrap_err();
-        assert!(matches!(error, StoreError::DiskFull { .. }), "{error}");
+        assert!(matches!(error, StoreError::DiskFull(_)), "{error}");
         let content = ContentHash::of(b"long");
         let error = store.import(&long_recording(10_000), content, "track-a", Timestamp::ZERO).unwrap_err();
         assert!(error.to_string().starts_with("no space is left for the store "), "{error}");
@@ -264,7 +264,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut store = store(folder.path());
         let error = store.begin_run(RecordingKey(7), RunId(1), None, &[]).unwrap_err();
-        assert!(matches!(error, StoreError::NoRecording { recording: RecordingKey(7) }), "{error}");
+        assert!(matches!(error, StoreError::NoRecording(RecordingKey(7))), "{error}");
         assert!(store.append(RunKey(7), &[reverse(1)], Timestamp::ZERO).is_err());
         assert_eq!((count(&store, "runs"), count(&store, "events")), (0, 0));
     }

@@ -117,10 +117,10 @@ const MOST_BYTES: usize = 1 << 34;
 pub fn salvage(damaged: &Path, into: &Path) -> Result<Salvaged, StoreError> {
     let exists = |path: &Path| path.try_exists().unwrap_or(true);
     if !exists(damaged) {
-        return Err(StoreError::Missing { file: damaged.to_owned() });
+        return Err(StoreError::Missing(damaged.to_owned()));
     }
     if exists(into) {
-        return Err(StoreError::Exists { file: into.to_owned() });
+        return Err(StoreError::Exists(into.to_owned()));
     }
     let beside = into.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let folder = tempfile::tempdir_in(beside).map_err(system(into, "write beside"))?;
@@ -152,7 +152,7 @@ pub fn salvage(damaged: &Path, into: &Path) -> Result<Salvaged, StoreError> {
         }
     }
     if salvaged.rows() == 0 {
-        return Err(StoreError::NothingReadable { file: damaged.to_owned() });
+        return Err(StoreError::NothingReadable(damaged.to_owned()));
     }
     salvaged.damage = damage_of(&copy);
     salvaged.unread_log = UnreadLog::beside(damaged)?.map(|unread| unread.to_string());
@@ -197,7 +197,7 @@ fn damage_of(copy: &Path) -> Option<String> {
     let checked = Store::open(copy).and_then(|store| store.check());
     checked.err().map(|error| match error {
         StoreError::Damaged { what, .. } => what,
-        StoreError::NotAStore { .. } => "it does not begin as a store does".to_owned(),
+        StoreError::NotAStore(_) => "it does not begin as a store does".to_owned(),
         other => other.to_string(),
     })
 }

@@ -20,11 +20,8 @@ pub enum TableError {
         source: io::Error,
     },
     /// The file has no line at all.
-    #[error("{file}: the file is empty; its first line should name the columns")]
-    Empty {
-        /// The file.
-        file: String,
-    },
+    #[error("{0}: the file is empty; its first line should name the columns")]
+    Empty(String),
     /// A line longer than [`LONGEST_LINE`].
     #[error(
         "{file}, line {line}: the line is longer than {LONGEST_LINE} bytes; is this a CSV file with a row a line?"

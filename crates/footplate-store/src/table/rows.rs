@@ -52,7 +52,7 @@ impl<R: BufRead> Table<R> {
         };
         while table.fields.is_empty() {
             if matches!(table.read_line()?, Line::None) {
-                return Err(TableError::Empty { file: table.file });
+                return Err(TableError::Empty(table.file));
             }
             table.split()?;
         }

@@ -109,7 +109,7 @@ impl TachometerColumns {
         let unknown = names.iter().zip(&slots).filter(|(_, slot)| **slot == Slot::Unused);
         let unknown: Vec<String> = unknown.map(|(name, _)| shown(name)).collect();
         if !unknown.is_empty() {
-            oddities.push(TachometerOddity::UnknownColumns { names: unknown });
+            oddities.push(TachometerOddity::UnknownColumns(unknown));
         }
         let mut missing = Vec::new();
         if !slots.contains(&Slot::Time) {
@@ -192,7 +192,7 @@ mod tests {
         assert_eq!(
             oddities,
             [
-                TachometerOddity::UnknownColumns { names: vec!["wind".to_owned()] },
+                TachometerOddity::UnknownColumns(vec!["wind".to_owned()]),
                 TachometerOddity::CountedTwice { wheelset: 1 },
             ]
         );

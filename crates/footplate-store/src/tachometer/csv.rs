@@ -38,7 +38,7 @@ impl<R: Read> CsvReader<R> {
         let mut line_reader = LineReader::default();
         let names = loop {
             let Some(line) = lines.next_line()? else {
-                return Err(TableError::Empty { file: file.to_owned() }.into());
+                return Err(TableError::Empty(file.to_owned()).into());
             };
             let names = line_reader.header(line)?;
             if !names.is_empty() {
@@ -81,7 +81,7 @@ impl<R: Read> CsvReader<R> {
             if !self.lines.fill()? {
                 self.watch.end(&self.lines.file, &self.columns)?;
                 let file = self.lines.file.clone();
-                return if self.has_rows { Ok(false) } else { Err(TachometerError::NoRows { file }) };
+                return if self.has_rows { Ok(false) } else { Err(TachometerError::NoRows(file)) };
             }
         }
     }

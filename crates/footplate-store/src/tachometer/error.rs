@@ -45,18 +45,12 @@ pub enum TachometerError {
     },
     /// A mapping for a file that has its units and types in itself.
     #[error(
-        "{file}: columns of Parquet files cannot be mapped; rename them where the file is written, or write CSV"
+        "{0}: columns of Parquet files cannot be mapped; rename them where the file is written, or write CSV"
     )]
-    MappedParquet {
-        /// The file.
-        file: String,
-    },
+    MappedParquet(String),
     /// There is a header and nothing below it.
-    #[error("{file}: no rows below the header; a recording has at least one")]
-    NoRows {
-        /// The file.
-        file: String,
-    },
+    #[error("{0}: no rows below the header; a recording has at least one")]
+    NoRows(String),
     /// The times stand in another column.
     #[error(
         "{file}: `t_s` does not increase from row to row and `{column}` does; are the two columns swapped in the \

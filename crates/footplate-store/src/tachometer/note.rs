@@ -36,10 +36,7 @@ pub struct TachometerNote {
 #[non_exhaustive]
 pub enum TachometerOddity {
     /// Columns that say nothing to us.
-    UnknownColumns {
-        /// What they are called.
-        names: Vec<String>,
-    },
+    UnknownColumns(Vec<String>),
     /// A wheelset has both pulses and a running counter.
     CountedTwice {
         /// 1 or 2.
@@ -77,7 +74,7 @@ impl fmt::Display for TachometerNote {
 impl fmt::Display for TachometerOddity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::UnknownColumns { names } => write!(f, "columns that are not used: {}", names.join(", ")),
+            Self::UnknownColumns(names) => write!(f, "columns that are not used: {}", names.join(", ")),
             Self::CountedTwice { wheelset } => {
                 write!(f, "counter_{wheelset} is not used, because pulses_{wheelset} is there")
             }

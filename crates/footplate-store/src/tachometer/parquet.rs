@@ -55,7 +55,7 @@ impl ParquetReader {
             })?);
         }
         if rows == 0 {
-            return Err(TachometerError::NoRows { file: file.to_owned() });
+            return Err(TachometerError::NoRows(file.to_owned()));
         }
         check_sizes(file, reader.metadata(), &used)?;
         let notes = oddities.into_iter().map(|oddity| TachometerNote { place: None, oddity }).collect();

@@ -99,7 +99,7 @@ impl TachometerReader {
         let unreadable = |source| TableError::Read { file: name.to_owned(), source };
         let begin = beginning(&mut input).map_err(unreadable)?;
         if begin == PARQUET_MAGIC {
-            return Err(TachometerError::MappedParquet { file: name.to_owned() });
+            return Err(TachometerError::MappedParquet(name.to_owned()));
         }
         let whole = Box::new(io::Cursor::new(begin).chain(input));
         let reader = MappedReader::open(name, whole, mapping, vehicle)?;

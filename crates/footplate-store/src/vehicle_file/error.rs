@@ -63,12 +63,9 @@ pub enum VehicleProblem {
     },
     /// More or fewer wheelsets than there are tachometers.
     #[error(
-        "{found} tables `[[wheelset]]`; there should be two, the first for pulses_1 and the second for pulses_2"
+        "{0} tables `[[wheelset]]`; there should be two, the first for pulses_1 and the second for pulses_2"
     )]
-    Wheelsets {
-        /// How many there are.
-        found: usize,
-    },
+    Wheelsets(usize),
     /// A value that no railway has.
     #[error(transparent)]
     Range(#[from] VehicleError),

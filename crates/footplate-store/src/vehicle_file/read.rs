@@ -106,7 +106,7 @@ fn wheelsets(value: &Spanned<DeValue<'_>>, numbers: &mut Numbers) -> Result<[Whe
     let mut tables = tables.iter();
     match (tables.next(), tables.next(), tables.next()) {
         (Some(first), Some(second), None) => Ok([wheelset(first, numbers)?, wheelset(second, numbers)?]),
-        _ => Err((begin, VehicleProblem::Wheelsets { found })),
+        _ => Err((begin, VehicleProblem::Wheelsets(found))),
     }
 }
 

@@ -114,7 +114,7 @@ fn a_session_that_could_not_be_kept_for_a_while_loses_nothing_and_repeats_nothin
     assert_eq!(other.next_word().as_deref(), Some("writing"));
     // then the event is refused with the reason, and can be handed over again once the other has ended.
     let refused = journal.append(&[event(1)], minute(0)).unwrap_err();
-    assert!(matches!(refused, StoreError::InUse { .. }), "{refused}");
+    assert!(matches!(refused, StoreError::InUse(_)), "{refused}");
     assert_eq!(journal.acknowledged(), 1);
     other.let_end();
     assert_eq!(journal.append(&[event(1), event(2)], minute(0)).unwrap(), 3);

@@ -106,7 +106,7 @@ fn own_columns_need_no_mapping_and_truth_may_be_in_km_h() {
     assert_eq!(period.wheels.map(|wheel| wheel.count), [Count::Pulses(4), Count::Missing]);
     assert_eq!(period.balise, Some(Length::from_m(12.5)));
     assert!((truth.speed.unwrap_or(Speed::ZERO).as_m_per_s() - 10.0).abs() < 1e-12);
-    let unused = TachometerOddity::UnknownColumns { names: vec!["wind".to_owned()] };
+    let unused = TachometerOddity::UnknownColumns(vec!["wind".to_owned()]);
     assert_eq!(whole.notes[0].oddity, unused);
 }
 

@@ -120,7 +120,7 @@ fn commanded(run: &Run) -> SpeedStep {
 #[test]
 fn a_restarted_timer_is_noted_and_touches_no_time() {
     let restarts = |file: &str| real(file).notes;
-    let restart = |line: u64, run: u32| Note { line, oddity: Oddity::TimerRestarted { run: RunId(run) } };
+    let restart = |line: u64, run: u32| Note { line, oddity: Oddity::TimerRestarted(RunId(run)) };
     assert_eq!(restarts(ALL[2]), [restart(31, 2)]);
     assert_eq!(restarts(ALL[6]), [restart(137, 8), restart(162, 10)]);
     for file in [ALL[0], ALL[1], ALL[3], ALL[4], ALL[5], ALL[7]] {

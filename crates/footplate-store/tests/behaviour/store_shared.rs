@@ -31,7 +31,7 @@ fn a_second_writer_waits_and_then_says_who_is_in_the_way() {
     assert_eq!(other.next_word().as_deref(), Some("writing"));
 
     let refused = store.exclude(&[EventKey(1)], "dirty", minute(1)).unwrap_err();
-    assert!(matches!(refused, StoreError::InUse { .. }), "{refused}");
+    assert!(matches!(refused, StoreError::InUse(_)), "{refused}");
     assert!(refused.to_string().contains("railway.db is in use by another process"), "{refused}");
     // Readers are not in anybody's way, new ones neither.
     assert_eq!(store.recordings(minute(1)).unwrap().len(), 1);

@@ -15,11 +15,8 @@ fn a_network_board_is_asked_what_it_is_then_for_its_states() {
     desk.run_until(ms(400));
     assert_eq!(desk.texts(), ["<s>", "<Q>", "<T>", "<1 MAIN>", "<#>"]);
     let identity = "DCC-EX V-5.6.0 / MEGA / STANDARD_MOTOR_SHIELD G-x".to_owned();
-    let expected = [
-        LinkNotice::Identified { identity },
-        LinkNotice::HeldClosed { sensor: SensorId(3) },
-        LinkNotice::Answers,
-    ];
+    let expected =
+        [LinkNotice::Identified(identity), LinkNotice::HeldClosed(SensorId(3)), LinkNotice::Answers];
     assert_eq!(desk.notices, expected);
     assert_eq!(desk.events, [], "states at the opening are no events");
 }
@@ -141,7 +138,7 @@ fn what_is_not_answered_is_repeated_and_given_up_if_it_stops_nothing() {
         desk.written.iter().filter(|(_, text)| text == "<t 24 81 0>").map(|(at, _)| *at).collect();
     assert_eq!(times.len(), 4, "{:?}", desk.written);
     assert!(times.windows(2).all(|pair| pair[1] - pair[0] == 250), "{times:?}");
-    assert!(desk.notices.contains(&LinkNotice::Unconfirmed { command: speed(T24, 9) }));
+    assert!(desk.notices.contains(&LinkNotice::Unconfirmed(speed(T24, 9))));
     desk.written.clear();
     desk.command(speed(T24, 0));
     desk.run_for(3_000);
@@ -188,7 +185,7 @@ fn turnouts_that_are_defined_are_awaited_only_when_they_move() {
     }
     desk.run_for(450);
     assert_eq!(desk.texts(), ["<T 9 1>", "<T 7 1>", "<T 8 1>"]);
-    assert_eq!(desk.notices.last(), Some(&LinkNotice::TurnoutRefused { turnout: TurnoutId(8) }));
+    assert_eq!(desk.notices.last(), Some(&LinkNotice::TurnoutRefused(TurnoutId(8))));
 }
 
 #[test]
@@ -396,5 +393,5 @@ fn a_function_whose_answer_was_lost_is_asked_for() {
     desk.station.answers.push(("<t 24>", "<l 24 0 0 268435456>\n"));
     desk.run_for(1_000);
     assert_eq!(desk.texts().into_iter().filter(|text| text.starts_with("<F 24 28 1>")).count(), 1);
-    assert!(!desk.notices.iter().any(|notice| matches!(notice, LinkNotice::Unconfirmed { .. })));
+    assert!(!desk.notices.iter().any(|notice| matches!(notice, LinkNotice::Unconfirmed(_))));
 }

@@ -92,6 +92,6 @@ fn a_reversal_that_a_station_may_have_forgotten_leaves_the_direction_unknown() {
     desk.run_for(4_000);
     // then the train faces as before, and that is said.
     assert!(desk.notices.contains(&LinkNotice::Restarted), "{:?}", desk.notices);
-    assert!(desk.notices.contains(&LinkNotice::ReverseInDoubt { train: T24 }), "{:?}", desk.notices);
+    assert!(desk.notices.contains(&LinkNotice::ReverseInDoubt(T24)), "{:?}", desk.notices);
     assert!(desk.station.slots[&1].forward);
 }

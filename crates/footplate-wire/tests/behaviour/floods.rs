@@ -46,7 +46,7 @@ fn flooded(mut session: impl Session, message: impl Fn(&mut u32) -> Vec<u8>) -> 
 
 /// Whether a notice is of one sensor: each may have one.
 const fn is_of_one(notice: &LinkNotice) -> bool {
-    matches!(notice, LinkNotice::HeldClosed { .. })
+    matches!(notice, LinkNotice::HeldClosed(_))
 }
 
 fn holds(written: &[u8], part: &[u8]) -> bool {

@@ -158,8 +158,8 @@ fn the_systems_the_power_and_the_sensors_of_the_layout_are_asked_for() {
     // Not for the internal sensor, and not for the one beyond the layout.
     assert_eq!(desk.requests(), [Request::Powers, power, Request::Sensors, sensor("LS1"), sensor("LS4")]);
     let expected = [
-        LinkNotice::Identified { identity: "JMRI 5.14, Attic".to_owned() },
-        LinkNotice::HeldClosed { sensor: SensorId(3) },
+        LinkNotice::Identified("JMRI 5.14, Attic".to_owned()),
+        LinkNotice::HeldClosed(SensorId(3)),
         LinkNotice::Answers,
     ];
     assert_eq!(desk.notices, expected);
@@ -267,7 +267,7 @@ fn turnouts_are_named_by_their_system_and_a_missing_one_is_said_once() {
     desk.command(Command::Turnout { turnout, curved: false });
     desk.run_for(5_000);
     let message = "turnout XT7 not found".to_owned();
-    assert_eq!(desk.notices, [LinkNotice::Refused { message }]);
+    assert_eq!(desk.notices, [LinkNotice::Refused(message)]);
     assert_eq!(desk.written.iter().filter(|(_, one)| matches!(one, Request::Turnout { .. })).count(), 1);
 }
 
@@ -293,7 +293,7 @@ fn hardware_without_a_throttle_for_a_train_is_named_once() {
     desk.run_for(100);
     desk.command(speed(T58, 8));
     desk.run_for(3_000);
-    assert_eq!(desk.notices, [LinkNotice::Refused { message: "no throttle".to_owned() }]);
+    assert_eq!(desk.notices, [LinkNotice::Refused("no throttle".to_owned())]);
     // As soon as there is one it drives.
     desk.station.room = 2;
     desk.run_for(1_000);

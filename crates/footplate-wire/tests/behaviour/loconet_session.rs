@@ -171,8 +171,8 @@ fn the_station_is_asked_for_its_state_and_detectors_for_theirs() {
     let asked = |closed| (1_017..=1_020).map(move |address| Message::Switch { address, closed, on: false });
     assert!(messages[3..11].iter().copied().eq(asked(true).chain(asked(false))), "{messages:?}");
     let expected = [
-        LinkNotice::Identified { identity: "LbServer 0.1a".to_owned() },
-        LinkNotice::HeldClosed { sensor: SensorId(3) },
+        LinkNotice::Identified("LbServer 0.1a".to_owned()),
+        LinkNotice::HeldClosed(SensorId(3)),
         LinkNotice::Answers,
     ];
     assert_eq!(desk.notices, expected);
@@ -328,7 +328,7 @@ fn a_station_without_a_free_slot_is_named_once() {
     desk.run_for(300);
     desk.command(speed(T58, 8));
     desk.run_for(3_000);
-    assert_eq!(desk.notices, [LinkNotice::NoSlot { train: T58 }]);
+    assert_eq!(desk.notices, [LinkNotice::NoSlot(T58)]);
     // As soon as one is free it drives.
     desk.station.room = 2;
     desk.run_for(1_000);
@@ -361,7 +361,7 @@ fn a_station_that_was_restarted_gets_everything_again() {
     assert!(desk.station.power);
     let slot = desk.station.slots[&1];
     assert_eq!((slot.address, slot.speed, slot.forward), (24, 0, false), "it stands, in its own direction");
-    assert!(!desk.notices.contains(&LinkNotice::ReverseInDoubt { train: T24 }), "{:?}", desk.notices);
+    assert!(!desk.notices.contains(&LinkNotice::ReverseInDoubt(T24)), "{:?}", desk.notices);
 }
 
 #[test]

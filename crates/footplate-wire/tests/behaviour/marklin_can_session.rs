@@ -115,11 +115,8 @@ fn a_station_is_asked_who_is_there_then_for_its_states() {
     let poll = Message::ModulePoll { uid: Uid::ALL, modules: 2 };
     assert_eq!(asked, [Message::Ping, poll, Message::Go(Uid::ALL), Message::File(*b"loks\0\0\0\0")]);
     let identity = "a track box (Gleisbox), number 474681D4, version 1.39".to_owned();
-    let expected = [
-        LinkNotice::Identified { identity },
-        LinkNotice::HeldClosed { sensor: SensorId(3) },
-        LinkNotice::Answers,
-    ];
+    let expected =
+        [LinkNotice::Identified(identity), LinkNotice::HeldClosed(SensorId(3)), LinkNotice::Answers];
     assert_eq!(desk.notices, expected);
     assert_eq!(desk.events, [], "states at the opening are no events");
 }
@@ -220,7 +217,7 @@ fn what_is_not_confirmed_is_repeated_and_given_up_if_it_stops_nothing() {
     let repeats = times(&desk, drives(24, 642));
     assert_eq!(repeats.len(), 4, "{:?}", desk.written);
     assert!(repeats.windows(2).all(|pair| pair[1] - pair[0] == 250), "{repeats:?}");
-    assert!(desk.notices.contains(&LinkNotice::Unconfirmed { command: speed(T24, 9) }));
+    assert!(desk.notices.contains(&LinkNotice::Unconfirmed(speed(T24, 9))));
     desk.command(speed(T24, 0));
     desk.run_for(2_000);
     let stops = times(&desk, drives(24, 0));

@@ -78,7 +78,7 @@ fn a_turn_that_may_be_lost_is_not_said_again_but_said_to_people() {
     bench.lose_to_host(&[0]);
     bench.run_for(2_000);
     assert_eq!(bench.station.turned[&TrainId(24)], 1);
-    assert!(bench.notices.contains(&LinkNotice::ReverseInDoubt { train: TrainId(24) }));
+    assert!(bench.notices.contains(&LinkNotice::ReverseInDoubt(TrainId(24))));
 }
 
 #[test]

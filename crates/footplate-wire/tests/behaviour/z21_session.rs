@@ -35,8 +35,8 @@ fn the_station_is_asked_what_it_is_and_told_what_to_tell() {
     assert_eq!(requests, expected);
     assert_eq!(desk.station.told, wanted);
     let identity = "z21, firmware 1.42, serial number 82850".to_owned();
-    let held = LinkNotice::HeldClosed { sensor: SensorId(3) };
-    assert_eq!(desk.notices, [LinkNotice::Identified { identity }, held, LinkNotice::Answers]);
+    let held = LinkNotice::HeldClosed(SensorId(3));
+    assert_eq!(desk.notices, [LinkNotice::Identified(identity), held, LinkNotice::Answers]);
     assert_eq!(desk.events, [], "states at the opening are no events");
 }
 
@@ -166,7 +166,7 @@ fn what_is_given_up_is_named() {
     desk.station.answers = false;
     desk.command(speed(T24, 9));
     desk.run_for(2_000);
-    assert!(desk.notices.contains(&LinkNotice::Unconfirmed { command: speed(T24, 9) }), "{:?}", desk.notices);
+    assert!(desk.notices.contains(&LinkNotice::Unconfirmed(speed(T24, 9))), "{:?}", desk.notices);
     desk.written.clear();
     desk.command(speed(T24, 0));
     desk.run_for(3_000);

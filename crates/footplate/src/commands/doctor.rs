@@ -301,7 +301,7 @@ impl<M: Machine> Attendant<M> for Ear {
     fn hear_of_line(&mut self, _: Timestamp, notice: &LinkNotice) {
         match notice {
             // The kind of reads has its own line in the report, and finding it out loses some replies.
-            LinkNotice::Answers | LinkNotice::Identified { .. } => return,
+            LinkNotice::Answers | LinkNotice::Identified(_) => return,
             LinkNotice::Reads(_) => {
                 self.lost = self.lost.saturating_sub(ModuleReads::READS_TRIED);
                 return;

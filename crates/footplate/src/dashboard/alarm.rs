@@ -255,7 +255,7 @@ impl Alarm {
     /// alarms.
     pub(crate) fn of_line(notice: &LinkNotice) -> Option<Self> {
         let (grade, what, train, blanks) = match notice {
-            LinkNotice::Closed(_) | LinkNotice::Identified { .. } | LinkNotice::OtherFunctions { .. } => {
+            LinkNotice::Closed(_) | LinkNotice::Identified(_) | LinkNotice::OtherFunctions { .. } => {
                 return None;
             }
             LinkNotice::Answers => (Grade::Over, "line-answers", None, Vec::new()),
@@ -270,11 +270,9 @@ impl Alarm {
             LinkNotice::UnexpectedBytes { count } => {
                 (Grade::Warning, "line-unexpected", None, vec![count.to_string()])
             }
-            LinkNotice::Repeated { .. } => (Grade::Warning, "line-repeated", None, Vec::new()),
-            LinkNotice::ReverseInDoubt { train } => {
-                (Grade::Danger, DIRECTION_UNKNOWN, Some(*train), Vec::new())
-            }
-            LinkNotice::HeldClosed { sensor } => {
+            LinkNotice::Repeated(_) => (Grade::Warning, "line-repeated", None, Vec::new()),
+            LinkNotice::ReverseInDoubt(train) => (Grade::Danger, DIRECTION_UNKNOWN, Some(*train), Vec::new()),
+            LinkNotice::HeldClosed(sensor) => {
                 (Grade::Warning, "line-held-closed", None, vec![sensor.to_string()])
             }
             LinkNotice::Reads(_) => (Grade::Warning, "line-reads-all-only", None, Vec::new()),
@@ -287,7 +285,7 @@ impl Alarm {
             }
             LinkNotice::PowerLost => (Grade::Danger, "line-power-lost", None, Vec::new()),
             LinkNotice::Restarted => (Grade::Danger, "line-restarted", None, Vec::new()),
-            LinkNotice::Unconfirmed { .. } | LinkNotice::Locked => {
+            LinkNotice::Unconfirmed(_) | LinkNotice::Locked => {
                 (Grade::Danger, "line-says", None, vec![notice.to_string()])
             }
             other => (Grade::Warning, "line-says", None, vec![other.to_string()]),

@@ -119,7 +119,7 @@ impl MappedColumns {
         let unknown: Vec<String> = unknown.map(|(name, _)| shown(name)).collect();
         let mut oddities = Vec::new();
         if !unknown.is_empty() {
-            oddities.push(TachometerOddity::UnknownColumns { names: unknown });
+            oddities.push(TachometerOddity::UnknownColumns(unknown));
         }
         if [0, 1].into_iter().any(|wheel| self.turns(wheel)) {
             oddities.push(TachometerOddity::SpeedsAddedUp);

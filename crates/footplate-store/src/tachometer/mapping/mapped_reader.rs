@@ -66,7 +66,7 @@ impl MappedReader {
         let mut lines = Lines::new(file, input);
         let (names, style, line_reader) = loop {
             let Some(line) = lines.next_line()? else {
-                return Err(TableError::Empty { file: file.to_owned() }.into());
+                return Err(TableError::Empty(file.to_owned()).into());
             };
             let separator = mapping.separator.unwrap_or_else(|| NumberStyle::separator_of(line.bytes));
             let mut line_reader = LineReader::separated_by(separator);
@@ -122,7 +122,7 @@ impl MappedReader {
             }
             if !self.lines.fill()? {
                 let file = self.lines.file.clone();
-                return if self.has_rows { Ok(false) } else { Err(TachometerError::NoRows { file }) };
+                return if self.has_rows { Ok(false) } else { Err(TachometerError::NoRows(file)) };
             }
         }
     }

@@ -62,7 +62,7 @@ impl Client {
             Reply::Failed => {
                 let refused = self.dialogue.outstanding.take_first(|one| one.awaited.turnout().is_some());
                 if let Some(turnout) = refused.and_then(|refused| refused.awaited.turnout()) {
-                    self.dialogue.notify(LinkNotice::TurnoutRefused { turnout });
+                    self.dialogue.notify(LinkNotice::TurnoutRefused(turnout));
                 }
             }
             _ => {}
@@ -75,7 +75,7 @@ impl Client {
             Opening::Banner { .. } | Opening::Identity => {
                 let was_reset =
                     self.opening.awaits_banner() && self.dialogue.locomotives.iter().next().is_some();
-                self.dialogue.notify(LinkNotice::Identified { identity: identity.to_owned() });
+                self.dialogue.notify(LinkNotice::Identified(identity.to_owned()));
                 if was_reset {
                     self.restarted();
                 }

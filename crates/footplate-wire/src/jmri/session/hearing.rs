@@ -67,7 +67,7 @@ impl Client {
                 }
                 if self.refusal.as_ref() != Some(&message) {
                     self.refusal = Some(message.clone());
-                    self.dialogue.notify(LinkNotice::Refused { message });
+                    self.dialogue.notify(LinkNotice::Refused(message));
                 }
             }
             Reply::List(all) => self.take_list(now, all),
@@ -82,7 +82,7 @@ impl Client {
         };
         if self.identity.as_ref() != Some(&identity) {
             self.identity = Some(identity.clone());
-            self.dialogue.notify(LinkNotice::Identified { identity });
+            self.dialogue.notify(LinkNotice::Identified(identity));
         }
     }
 

@@ -51,7 +51,7 @@ impl Client {
     fn identified(&mut self, identity: String) {
         if self.identity.as_ref() != Some(&identity) {
             self.identity = Some(identity.clone());
-            self.dialogue.notify(LinkNotice::Identified { identity });
+            self.dialogue.notify(LinkNotice::Identified(identity));
         }
     }
 
@@ -99,7 +99,7 @@ impl Client {
                 });
                 if let Some(train) = refused {
                     self.without_slot.push(train);
-                    self.dialogue.notify(LinkNotice::NoSlot { train });
+                    self.dialogue.notify(LinkNotice::NoSlot(train));
                 }
             }
             _ => {}

@@ -151,7 +151,7 @@ impl Client {
         }
         self.participants.push(uid);
         let identity = format!("{}, number {:08X}, version {major}.{minor}", kind_in_words(kind), uid.0);
-        self.dialogue.notify(LinkNotice::Identified { identity });
+        self.dialogue.notify(LinkNotice::Identified(identity));
     }
 
     /// Reads all states again, including every locomotive's.
@@ -280,7 +280,7 @@ impl Client {
                 let (latest, width) = span.entry(input, self.settings.scan, order);
                 self.dialogue.report_free(sensor, latest, width);
             }
-            News::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
+            News::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed(sensor)),
             News::None => {}
         }
     }

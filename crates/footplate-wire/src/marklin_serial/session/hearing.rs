@@ -51,13 +51,13 @@ impl Interface {
     fn say_again(&mut self) {
         for command in self.unanswered.take() {
             match command {
-                Command::Reverse { train } => self.notify(LinkNotice::ReverseInDoubt { train }),
+                Command::Reverse { train } => self.notify(LinkNotice::ReverseInDoubt(train)),
                 // The power goes off as its last word.
                 Command::PowerOff | Command::PowerOn | Command::Turnout { .. } if self.farewell.begun => {}
                 Command::Speed { step, .. } if self.farewell.begun && step != SpeedStep::STAND => {}
                 _ => {
                     if self.waiting.push_again(command) {
-                        self.notify(LinkNotice::Repeated { command });
+                        self.notify(LinkNotice::Repeated(command));
                     }
                 }
             }
@@ -77,7 +77,7 @@ impl Interface {
                             return;
                         }
                         Read::Closed(event) | Read::Opened(event) => Transmit::Event(event),
-                        Read::Held(sensor) => Transmit::Notice(LinkNotice::HeldClosed { sensor }),
+                        Read::Held(sensor) => Transmit::Notice(LinkNotice::HeldClosed(sensor)),
                     });
                 });
             }

@@ -99,7 +99,7 @@ impl Client {
         let identity = format!("{name}, firmware {firmware}, serial number {}", self.serial_number);
         if self.identity.as_ref() != Some(&identity) {
             self.identity = Some(identity.clone());
-            self.dialogue.notify(LinkNotice::Identified { identity });
+            self.dialogue.notify(LinkNotice::Identified(identity));
         }
     }
 
@@ -261,7 +261,7 @@ impl Client {
                 );
                 self.dialogue.report_free(sensor, latest, width);
             }
-            Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed { sensor }),
+            Change::HeldFromStart => self.dialogue.notify(LinkNotice::HeldClosed(sensor)),
             Change::None => {}
         }
     }
