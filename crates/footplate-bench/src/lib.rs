@@ -18,7 +18,6 @@ pub mod replays;
 pub use operation::Operation;
 
 /// Every operation there is.
-#[must_use]
 pub fn everything() -> Vec<Operation> {
     [profiles::operations(), odometry::operations(), replays::operations(), living::operations()]
         .into_iter()

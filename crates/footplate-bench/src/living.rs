@@ -23,7 +23,6 @@ const STEPS: [u8; 6] = [8, 12, 10, 6, 0, 11];
 /// # Panics
 ///
 /// When the layout of two ovals is none.
-#[must_use]
 pub fn operations() -> Vec<Operation> {
     vec![
         Operation::with_body("a second of a living layout", "two trains, polled", seconds_of(true)),

@@ -23,7 +23,6 @@ pub use rounds::{Load, PERIOD_S, Round};
 const GROUP: &str = "a period of odometry";
 
 /// All of them; the first is all of the odometer while both wheelsets roll.
-#[must_use]
 pub fn operations() -> Vec<Operation> {
     let recommended = OdometrySettings::recommended();
     let rolling = Round::new(Load::Rolling);
@@ -77,7 +76,6 @@ impl Run {
     ///
     /// # Panics
     /// When the vehicle of these tables is none.
-    #[must_use]
     pub fn new(round: Round, settings: OdometrySettings) -> Self {
         let odometer = Odometer::new(Round::vehicle(), settings).expect("a usual vehicle");
         Self { round, odometer, next: 0, before: TimeSpan::ZERO }

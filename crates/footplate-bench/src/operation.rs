@@ -52,7 +52,6 @@ impl Operation {
     }
 
     /// Its name in full.
-    #[must_use]
     pub fn name(&self) -> String {
         format!("{}/{}", self.group, self.means)
     }

@@ -22,7 +22,6 @@ use inputs::{Inputs, LIMITS, PROFILES, Question, Task};
 const FOOTPLATE: &str = "footplate";
 
 /// All of them; the first of a group is Footplate's own.
-#[must_use]
 pub fn operations() -> Vec<Operation> {
     let mut inputs = Inputs::new();
     // Known only at run time, as they are in the program.

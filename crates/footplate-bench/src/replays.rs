@@ -25,7 +25,6 @@ const LAPS: &str = "eadanila_2020_track_a";
 ///
 /// # Panics
 /// When the recordings of the project or its built-in layout cannot be read.
-#[must_use]
 pub fn operations() -> Vec<Operation> {
     let layout = built_in("track-a").expect("the layout is built in").layout;
     let logs = logs(&layout);

@@ -57,7 +57,6 @@ impl SpeedStep {
     pub const HIGHEST: u8 = 126;
 
     /// The step, or `None` above [`HIGHEST`](Self::HIGHEST).
-    #[must_use]
     pub const fn new(step: u8) -> Option<Self> {
         if step <= Self::HIGHEST { Some(Self(step)) } else { None }
     }
@@ -101,7 +100,6 @@ impl DecoderSteps {
     }
 
     /// The decoder with the fewest steps that has this one.
-    #[must_use]
     pub fn with(step: SpeedStep) -> Self {
         Self::EVERY.into_iter().find(|steps| steps.highest() >= step).unwrap_or(Self::All)
     }
@@ -133,7 +131,6 @@ impl FunctionNumber {
     pub const HIGHEST: u8 = 28;
 
     /// The function, or `None` above [`HIGHEST`](Self::HIGHEST).
-    #[must_use]
     pub const fn new(number: u8) -> Option<Self> {
         if number <= Self::HIGHEST { Some(Self(number)) } else { None }
     }

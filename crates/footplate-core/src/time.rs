@@ -25,7 +25,6 @@ impl Timestamp {
 
     /// From whole nanoseconds since the origin.
     #[inline]
-    #[must_use]
     pub const fn from_ns(ns: i64) -> Self {
         Self(ns)
     }
@@ -39,7 +38,6 @@ impl Timestamp {
 
     /// From seconds since the origin, to the nearest nanosecond.
     #[inline]
-    #[must_use]
     pub const fn from_s(seconds: f64) -> Self {
         Self(TimeSpan::from_s(seconds).0)
     }
@@ -58,7 +56,6 @@ impl TimeSpan {
 
     /// From whole nanoseconds.
     #[inline]
-    #[must_use]
     pub const fn from_ns(ns: i64) -> Self {
         Self(ns)
     }
@@ -72,21 +69,18 @@ impl TimeSpan {
 
     /// From whole microseconds.
     #[inline]
-    #[must_use]
     pub const fn from_us(us: i64) -> Self {
         Self(us.saturating_mul(NS_PER_US))
     }
 
     /// From whole milliseconds.
     #[inline]
-    #[must_use]
     pub const fn from_ms(ms: i64) -> Self {
         Self(ms.saturating_mul(NS_PER_MS))
     }
 
     /// From seconds, to the nearest nanosecond; NaN becomes zero, infinities saturate.
     #[inline]
-    #[must_use]
     pub const fn from_s(seconds: f64) -> Self {
         let ns = seconds * NS_PER_S;
         Self((ns + if ns < 0.0 { -0.5 } else { 0.5 }) as i64)

@@ -33,7 +33,6 @@ pub struct Scored {
 
 impl Scored {
     /// What happened to trains in the simulated world, and disturbances that were not detected.
-    #[must_use]
     pub fn failures(&self) -> Vec<String> {
         let failures = self.runs.iter().filter_map(|(kind, run)| {
             let what = run.failure(*kind)?;

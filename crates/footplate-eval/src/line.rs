@@ -14,7 +14,6 @@ pub use self::scored_run::ScoredRun;
 pub use self::worlds_page::{ScoredWorld, WorldsPage};
 
 /// The figures of a score by their names in files.
-#[must_use]
 pub fn score_json(score: &OdometryScore) -> Value {
     let figures =
         score.figures().into_iter().map(|(key, value)| (key.to_owned(), value.map_or(Value::Null, figure)));
@@ -24,7 +23,6 @@ pub fn score_json(score: &OdometryScore) -> Value {
 }
 
 /// A figure to a micrometre or a millionth of a per cent, so that files do not show the rounding of sums.
-#[must_use]
 pub fn figure(value: f64) -> Value {
     json!((value * 1e6).round() / 1e6 + 0.0)
 }

@@ -38,7 +38,6 @@ pub struct Scored {
 
 impl Scored {
     /// The first train that Footplate drove and whose order failed, and why; before all others one that came to grief.
-    #[must_use]
     pub fn failures(&self) -> Vec<String> {
         let worst = self.troubles().min_by_key(|(_, trouble)| !trouble.starts_with(GRIEF));
         worst.map(|(train, trouble)| format!("train {train}: {trouble}")).into_iter().collect()

@@ -16,7 +16,6 @@ const OF_FRESH_SEEDS: &str =
 const OF_REGRESSION_SEEDS: &str = "The seeds are regression seeds: they were looked at while the program was made. `./ci.sh fresh` draws others.";
 
 /// Says on a page who chose its seeds.
-#[must_use]
 pub const fn seeds_sentence(are_fresh: bool) -> &'static str {
     if are_fresh { OF_FRESH_SEEDS } else { OF_REGRESSION_SEEDS }
 }

@@ -31,7 +31,6 @@ pub struct Scored {
 
 impl Scored {
     /// The first train that did not carry out its order, and why.
-    #[must_use]
     pub fn failures(&self) -> Vec<String> {
         let failed = |ride: &Ridden| Some(format!("train {}: {}", ride.train, ride.trouble.as_deref()?));
         self.rides.iter().find_map(failed).into_iter().collect()

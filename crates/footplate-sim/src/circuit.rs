@@ -152,7 +152,6 @@ impl Circuit {
     }
 
     /// Its edges, in the order of travel; the last ends where the first begins.
-    #[must_use]
     pub fn edges(&self) -> &[EdgeId] {
         &self.edges
     }
@@ -163,13 +162,11 @@ impl Circuit {
     }
 
     /// The sensors on it, in the order of travel.
-    #[must_use]
     pub fn sensors(&self, layout: &Layout) -> Vec<SensorId> {
         self.edges.iter().filter_map(|edge| layout.sensor_at(layout.edge(*edge)?.from)).collect()
     }
 
     /// The length of its edges by the layout's survey.
-    #[must_use]
     pub fn length(&self, layout: &Layout) -> Length {
         self.edges.iter().filter_map(|edge| layout.edge(*edge)).map(|edge| edge.length).sum()
     }

@@ -115,7 +115,6 @@ const MOMENTUM_UNIT_S: f64 = 0.896 / 128.0;
 
 impl Law {
     /// Which law this is.
-    #[must_use]
     pub const fn family(&self) -> LawFamily {
         match self {
             Self::Constant { .. } => LawFamily::Constant,

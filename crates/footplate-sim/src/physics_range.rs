@@ -74,7 +74,6 @@ impl PhysicsRange {
     }
 
     /// The range with a name.
-    #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         Self::EVERY.into_iter().find(|range| range.name() == name)
     }

@@ -36,7 +36,6 @@ impl Link {
     /// A 6051 on its 2400-baud line with five sensor modules, read by a program that does nothing else.
     ///
     /// Period and jitter measured on 1451 repeated reports; a command is two bytes of 11 bits.
-    #[must_use]
     pub const fn every_report() -> Self {
         Self {
             period: TimeSpan::from_us(65_350),
@@ -51,13 +50,11 @@ impl Link {
     }
 
     /// The same line read by a program that records a sensor once per passage (period measured).
-    #[must_use]
     pub const fn first_reports() -> Self {
         Self { period: TimeSpan::from_us(69_640), repeats: false, ..Self::every_report() }
     }
 
     /// Another line of the same kind, with 60 to 100 ms per poll as courses report; the same for the same seed.
-    #[must_use]
     pub fn draw(seed: u64) -> Self {
         let mut draws = Draws::new(seed, Purpose::Line);
         let period = draws.uniform(60.0..100.0);

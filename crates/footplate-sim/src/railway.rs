@@ -28,7 +28,6 @@ impl<'l> Railway<'l> {
     }
 
     /// The true length of the circuit.
-    #[must_use]
     pub fn circuit_length(&self) -> Length {
         self.circuit.edges().iter().map(|edge| self.track.length(*edge)).sum()
     }
@@ -36,7 +35,6 @@ impl<'l> Railway<'l> {
     /// The true mean speed of a warm train over a lap of an average run, as a stopwatch would measure it.
     ///
     /// A lap takes the sum of the times of its edges: slow curves weigh more than their length.
-    #[must_use]
     pub fn lap_speed(&self, train: &Train, step: SpeedStep, approach: Approach) -> Speed {
         let level = train.speeds.speed(step, approach);
         if level <= Speed::ZERO {

@@ -38,7 +38,6 @@ pub struct SimulatedRecording {
 
 impl SimulatedRecording {
     /// Draws a train with a law and simulates a scenario; the same for the same seed.
-    #[must_use]
     pub fn draw(
         railway: &Railway<'_>,
         scenario: Scenario,

@@ -70,7 +70,6 @@ pub struct SimulatedRun {
 
 impl World<'_> {
     /// Simulates a script, the same for the same seed. Also returns the state for the next run.
-    #[must_use]
     pub fn run(&self, script: &Script, conditions: Conditions, seed: u64) -> (SimulatedRun, Conditions) {
         let mut draws = Draws::new(seed, Purpose::Scenario);
         let past_mm = draws.uniform(START_PAST_MM);

@@ -68,25 +68,21 @@ impl Scenario {
     }
 
     /// All scenarios.
-    #[must_use]
     pub const fn all() -> &'static [Self] {
         &SCENARIOS
     }
 
     /// The scenario with a name.
-    #[must_use]
     pub fn named(name: &str) -> Option<Self> {
         SCENARIOS.into_iter().find(|scenario| scenario.name == name)
     }
 
     /// Its name on the command line.
-    #[must_use]
     pub const fn name(&self) -> &'static str {
         self.name
     }
 
     /// Its description, half a sentence.
-    #[must_use]
     pub const fn says(&self) -> &'static str {
         self.says
     }

@@ -71,13 +71,11 @@ pub enum What {
 
 impl Script {
     /// A run from rest past a sensor, without orders yet.
-    #[must_use]
     pub const fn from_rest(past: usize, lasts: TimeSpan) -> Self {
         Self { start: Start::AtRest { past }, orders: Vec::new(), lasts, has_gates: false }
     }
 
     /// A run of a train already running, without orders yet.
-    #[must_use]
     pub const fn running(past: usize, step: SpeedStep, approach: Approach, lasts: TimeSpan) -> Self {
         Self { start: Start::Running { past, step, approach }, orders: Vec::new(), lasts, has_gates: false }
     }

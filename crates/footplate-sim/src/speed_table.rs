@@ -59,7 +59,6 @@ impl SpeedTable {
     ///
     /// The shorter of the two determines the number of steps; step 0 is at rest whatever its speed. Speeds are
     /// limited to the range from 0 to 5 m/s.
-    #[must_use]
     pub fn new(below: &[Speed], above: &[Speed]) -> Self {
         let steps = below.len().min(above.len());
         let column = |speeds: &[Speed]| {
@@ -119,7 +118,6 @@ impl SpeedTable {
     }
 
     /// The highest step.
-    #[must_use]
     pub fn highest(&self) -> SpeedStep {
         let highest = self.below_mm_per_s.len().saturating_sub(1).min(usize::from(SpeedStep::HIGHEST));
         SpeedStep::new(highest as u8).unwrap_or(SpeedStep::STAND)
@@ -128,7 +126,6 @@ impl SpeedTable {
     /// The true steady speed at a step; beyond the highest step, that of the highest.
     ///
     /// An unknown approach counts as from below, as after a start from rest.
-    #[must_use]
     pub fn speed(&self, step: SpeedStep, approach: Approach) -> Speed {
         Speed::from_mm_per_s(
             self.mm_per_s(f64::from(step.get()), if approach == Approach::Above { 1.0 } else { 0.0 }),

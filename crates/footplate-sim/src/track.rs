@@ -43,7 +43,6 @@ pub struct TrueTrack {
 
 impl TrueTrack {
     /// Rails that differ from a layout as real ones do: lengths by the layout's survey uncertainty.
-    #[must_use]
     pub fn draw(layout: &Layout, seed: u64) -> Self {
         let mut draws = Draws::new(seed, Purpose::Track);
         let survey_mm = layout.survey().uncertainty.as_mm();
@@ -74,7 +73,6 @@ impl TrueTrack {
     }
 
     /// Rails exactly as surveyed, level, straight and clean.
-    #[must_use]
     pub fn as_surveyed(layout: &Layout) -> Self {
         let rail = |length: Length| Rail { length_mm: length.as_mm(), factor: 1.0, dirty: Vec::new() };
         Self {
@@ -84,13 +82,11 @@ impl TrueTrack {
     }
 
     /// The true length of an edge, and of its twin; zero for an edge of another layout.
-    #[must_use]
     pub fn length(&self, edge: EdgeId) -> Length {
         Length::from_mm(self.rail(edge).map_or(0.0, |rail| rail.length_mm))
     }
 
     /// How far past its node, in its own direction of travel, a sensor really closes.
-    #[must_use]
     pub fn sensor_offset(&self, sensor: SensorId) -> Length {
         Length::from_mm(self.sensor_offsets_mm.get(&sensor).copied().unwrap_or(0.0))
     }
@@ -101,7 +97,6 @@ impl TrueTrack {
     }
 
     /// The speed factor of an edge relative to level straight track, for a train with full curve sensitivity.
-    #[must_use]
     pub fn speed_factor(&self, edge: EdgeId) -> Ratio {
         Ratio::from_parts(self.rail(edge).map_or(1.0, |rail| rail.factor))
     }

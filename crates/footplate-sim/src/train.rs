@@ -28,7 +28,6 @@ impl StopScatter {
     pub const FLOOR: Length = Length::from_mm(0.5);
 
     /// The standard deviation of the stopping distance from a speed.
-    #[must_use]
     pub fn sd(&self, speed: Speed) -> Length {
         if speed < Self::MID_SPEED {
             let shrunk = self.at_mid * (speed / Self::MID_SPEED).max(0.0);
@@ -103,7 +102,6 @@ impl Train {
     }
 
     /// A random but plausible train with a law: the same for the same seed.
-    #[must_use]
     pub fn draw(seed: u64, family: LawFamily) -> Self {
         let mut draws = Draws::new(seed, Purpose::Train);
         let shape = if draws.chance(0.5) { Shape::Even } else { Shape::Steep };
@@ -163,14 +161,12 @@ impl Train {
     }
 
     /// From the shoe's end at the tail to the last axle that a detector senses.
-    #[must_use]
     pub fn last_axle(&self) -> Length {
         if self.carriages > Length::ZERO { self.tail - AXLE_INSET } else { Length::ZERO }
     }
 
     /// The stopping distance from the decoder's receipt of the command, on level straight track, in an average run
     /// without variation; integrated, not looked up.
-    #[must_use]
     pub fn stopping_distance(&self, step: SpeedStep, approach: Approach) -> Length {
         let mut motor = Motor::running(self, step, approach);
         motor.command_without_scatter(SpeedStep::STAND);
@@ -179,7 +175,6 @@ impl Train {
 
     /// The distance within a time since the decoder received a step, of a train at rest or running steadily at
     /// another, on level straight track, in an average run without variation; integrated, not looked up.
-    #[must_use]
     pub fn distance_after(
         &self,
         from: SpeedStep,
@@ -201,7 +196,6 @@ impl Train {
 
     /// The distance of a short move from rest to rest, whose stop reaches the decoder `run` after its start, on level
     /// straight track and without variation; integrated, not looked up.
-    #[must_use]
     pub fn short_move(&self, step: SpeedStep, run: TimeSpan) -> Length {
         let mut motor = Motor::at_rest(self);
         motor.start_without_scatter(step);

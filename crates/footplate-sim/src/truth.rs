@@ -80,20 +80,17 @@ pub struct Motion {
 
 impl Motion {
     /// The start of the run.
-    #[must_use]
     pub const fn begins(&self) -> Timestamp {
         self.begins
     }
 
     /// The end of the run.
-    #[must_use]
     pub fn ends(&self) -> Timestamp {
         let spans = self.samples.len().saturating_sub(1) as i64;
         self.begins + TimeSpan::from_ns(self.spacing.as_ns() * spans)
     }
 
     /// Distance from the start of the run; before it and after its end, the distance there.
-    #[must_use]
     pub fn distance(&self, at: Timestamp) -> Length {
         let Some(([x0, v0], [x1, v1], part)) = self.around(at) else { return Length::ZERO };
         let h = self.spacing.as_s();
@@ -107,14 +104,12 @@ impl Motion {
     }
 
     /// Speed; before the start and after the end of the run, the speed there.
-    #[must_use]
     pub fn speed(&self, at: Timestamp) -> Speed {
         let Some(([_, v0], [_, v1], part)) = self.around(at) else { return Speed::ZERO };
         Speed::from_mm_per_s(v0 + (v1 - v0) * part)
     }
 
     /// The edge and the offset on it, by true lengths.
-    #[must_use]
     pub fn place(&self, at: Timestamp) -> Option<(EdgeId, Length)> {
         self.path.place(self.distance(at).as_mm())
     }
@@ -125,7 +120,6 @@ impl Motion {
     }
 
     /// When the train had run a distance; `None` if it never did.
-    #[must_use]
     pub fn time_at(&self, distance: Length) -> Option<Timestamp> {
         let mm = distance.as_mm();
         let after = self.samples.partition_point(|[x, _]| *x < mm);

@@ -334,14 +334,12 @@ impl Batch {
 
     /// What the lengths of the layout are worth after the runs: as all of them show it, or else the first train to contradict
     /// them.
-    #[must_use]
     pub fn survey_test(&self) -> SurveyTest {
         let mut of_trains = self.trains.iter().map(|train| train.replay.fit.survey_test());
         of_trains.find(|test| !test.is_passed()).cloned().unwrap_or_default()
     }
 
     /// The event that a review means by run and entry.
-    #[must_use]
     pub fn event(&self, run: usize, entry: usize) -> Option<&BatchEvent> {
         self.runs.get(run)?.events.get(entry)
     }

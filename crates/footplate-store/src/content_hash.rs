@@ -11,7 +11,6 @@ pub struct ContentHash([u8; 32]);
 
 impl ContentHash {
     /// Of these bytes.
-    #[must_use]
     pub fn of(content: &[u8]) -> Self {
         Self(Sha256::digest(content).into())
     }

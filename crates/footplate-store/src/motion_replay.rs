@@ -202,7 +202,6 @@ impl MotionReplay {
     }
 
     /// Whether anything was found.
-    #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.runs == 0
     }

@@ -31,7 +31,6 @@ impl fmt::Display for Quantity {
 
 impl Quantity {
     /// A number of which no date is known.
-    #[must_use]
     pub fn new(unit: &str, value: f64, uncertainty: f64, measurements: u32) -> Self {
         Self { value, uncertainty, unit: unit.to_owned(), measurements, measured_at_s: None }
     }

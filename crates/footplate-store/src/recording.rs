@@ -77,7 +77,6 @@ pub struct Run {
 
 impl Run {
     /// The train of a run in which there is only one.
-    #[must_use]
     pub fn only_train(&self) -> Option<TrainAtStart> {
         match self.trains.as_slice() {
             [only] => Some(*only),
@@ -86,7 +85,6 @@ impl Run {
     }
 
     /// The trains that move, and what they did when the run began: those that stand all the time close no contact.
-    #[must_use]
     pub fn moving(&self) -> Vec<TrainAtStart> {
         let begin = self.trains.iter().copied();
         let mut moving: Vec<TrainAtStart> =
@@ -104,7 +102,6 @@ impl Run {
 
     /// The train that the reports of a run are of: the only one there is, or the only one that moves. A live session names no
     /// trains at its start, and one that stands all the time trips no sensor.
-    #[must_use]
     pub fn reported_train(&self) -> Option<TrainAtStart> {
         self.only_train().or_else(|| match self.moving().as_slice() {
             [only] => Some(*only),

@@ -28,13 +28,11 @@ pub struct SessionFigure {
 
 impl SessionFigure {
     /// How much more the first session measured, in standard deviations.
-    #[must_use]
     pub fn sigmas(&self) -> f64 {
         (self.ours[0] - self.theirs[0]) / self.deviation
     }
 
     /// The same in percent of the other.
-    #[must_use]
     pub fn difference_percent(&self) -> f64 {
         100.0 * (self.ours[0] / self.theirs[0] - 1.0)
     }
@@ -51,7 +49,6 @@ pub struct SessionCheck {
 
 impl SessionCheck {
     /// Compares the trains that are in both. `None` where they have no step of a train in common.
-    #[must_use]
     pub fn of(ours: &Batch, theirs: &Batch) -> Option<Self> {
         let mut check = Self { speeds: Vec::new(), stops: Vec::new() };
         for train in &ours.trains {
@@ -105,7 +102,6 @@ fn stop(model: &MotionModel, step: SpeedStep, approach: Approach) -> (f64, f64, 
 }
 
 /// Root mean square and largest size of differences in standard deviations; `None` of none.
-#[must_use]
 pub fn standardised(figures: &[SessionFigure]) -> Option<[f64; 2]> {
     let sizes = || figures.iter().map(|figure| figure.sigmas().abs());
     let squares: f64 = sizes().map(|size| size * size).sum();

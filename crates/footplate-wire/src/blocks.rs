@@ -55,7 +55,6 @@ impl BlockReports {
     }
 
     /// The number by which the station knows a sensor.
-    #[must_use]
     pub fn input(&self, sensor: SensorId) -> SensorId {
         self.layout.input(sensor)
     }

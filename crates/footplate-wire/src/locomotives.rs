@@ -21,7 +21,6 @@ pub struct ReportedFunctions {
 
 impl ReportedFunctions {
     /// All functions that a station can switch, these of them on.
-    #[must_use]
     pub const fn all(on: u32) -> Self {
         Self { known: (1 << (FunctionNumber::HIGHEST + 1)) - 1, on }
     }

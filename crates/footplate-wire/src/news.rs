@@ -7,7 +7,6 @@ use crate::session::LinkNotice;
 impl LinkNotice {
     /// Whether the station has fallen silent or answers again, whether the power was lost, or which train may face in either direction; most of
     /// what is heard says nothing of the kind.
-    #[must_use]
     pub const fn news(&self) -> Option<LinkNews> {
         match self {
             // After a reset, too, it is not known what of the last commands was heard; it answers when it has been asked everything.

@@ -228,7 +228,6 @@ pub struct Closing {
 
 impl Closing {
     /// Whether everything necessary was commanded.
-    #[must_use]
     pub fn is_complete(&self) -> bool {
         self.not_commanded.is_empty() && self.solenoids_released != Some(false) && self.power_off
     }

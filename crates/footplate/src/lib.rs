@@ -52,7 +52,6 @@ struct Footplate {
 }
 
 /// Runs the program on the arguments of this process, and returns its exit status.
-#[must_use]
 pub fn run() -> ExitCode {
     // Not locked: the live view of a terminal is drawn from a thread of its own.
     let mut output = std::io::stdout();

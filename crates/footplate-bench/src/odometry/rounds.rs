@@ -42,7 +42,6 @@ pub struct Round {
 
 impl Round {
     /// A round under this load.
-    #[must_use]
     pub fn new(load: Load) -> Self {
         let pitch = PI * DIAMETER_M / f64::from(TEETH);
         let mut phases = [0.25_f64, 0.6];
@@ -66,7 +65,6 @@ impl Round {
     ///
     /// # Panics
     /// Never: it is a usual one.
-    #[must_use]
     pub fn vehicle() -> Vehicle {
         let diameter = Length::from_m(DIAMETER_M);
         let wheelset = Wheelset { teeth: TEETH, diameter, diameter_tolerance: 0.012, axle: Axle::Powered };
@@ -80,19 +78,16 @@ impl Round {
     }
 
     /// Its periods in turn.
-    #[must_use]
     pub fn periods(&self) -> &[Period] {
         &self.periods
     }
 
     /// How long it takes.
-    #[must_use]
     pub fn duration(&self) -> TimeSpan {
         TimeSpan::from_s(PERIODS as f64 * PERIOD_S)
     }
 
     /// What the counts of both wheelsets say, as speeds (m/s).
-    #[must_use]
     pub fn speeds(&self) -> Vec<[f64; 2]> {
         let quantum = PI * DIAMETER_M / f64::from(TEETH) / PERIOD_S;
         let speed = |reading: &WheelReading| match reading.count {

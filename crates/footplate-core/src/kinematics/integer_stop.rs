@@ -98,7 +98,6 @@ impl IntegerStop {
     /// The constants of the stop: print them on a computer, and pass them to [`from_constants`](Self::from_constants)
     /// on the controller. In order: digits and point of the speed, delay, ramp, lag, tail, digits and point of the
     /// rate, time.
-    #[must_use]
     pub const fn constants(&self) -> [i64; 9] {
         let Self { speed, delay, ramp, lag, tail, rate, time } = *self;
         [speed.digits, speed.point, delay, ramp, lag, tail, rate.digits, rate.point, time]
@@ -133,39 +132,33 @@ impl IntegerStop {
     }
 
     /// Distance at constant speed in a number of ticks.
-    #[must_use]
     pub fn run(&self, ticks: i64) -> i32 {
         whole_units(self.speed.times(i128::from(ticks), 0, 0))
     }
 
     /// Ticks until the train, at constant speed, has covered `distance`; negative for a distance behind it.
-    #[must_use]
     pub fn ticks_to(&self, distance: i32) -> i64 {
         whole_ticks(self.time_over(distance))
     }
 
     /// Stopping distance if the stop is commanded now.
-    #[must_use]
     pub fn stopping_distance(&self) -> i32 {
         whole_units(self.speed.times(i128::from(self.steady_time()), TIME_BITS, 0))
     }
 
     /// Ticks until rest if the stop is commanded now.
-    #[must_use]
     pub const fn stopping_time(&self) -> i64 {
         (self.time + (1 << (TIME_BITS - 1))) >> TIME_BITS
     }
 
     /// Ticks until the stop command for which the train comes to rest `distance` ahead of its present position;
     /// negative if that time has passed.
-    #[must_use]
     pub fn command_in(&self, distance: i32) -> i64 {
         whole_ticks(self.time_over(distance) - i128::from(self.steady_time()))
     }
 
     /// Overrun of a target `distance` ahead if the stop is commanded now; negative if the train comes to rest before
     /// it.
-    #[must_use]
     pub fn overrun(&self, distance: i32) -> i32 {
         let stop = self.speed.times(i128::from(self.steady_time()), TIME_BITS, LENGTH_BITS);
         let beyond = stop - (i128::from(distance) << LENGTH_BITS);
@@ -173,7 +166,6 @@ impl IntegerStop {
     }
 
     /// Distance covered a number of ticks after the stop command was sent.
-    #[must_use]
     pub fn run_since_command(&self, ticks: i64) -> i32 {
         let braking = (i128::from(ticks) << TIME_BITS) - i128::from(self.delay);
         if braking <= 0 {

@@ -30,7 +30,6 @@ pub struct MinimumJerk {
 impl MinimumJerk {
     /// A motion over a distance from one speed to another in a time; with a time of zero or less, an instantaneous
     /// change.
-    #[must_use]
     pub fn new(distance: Length, from: Speed, to: Speed, time: TimeSpan) -> Self {
         let (time, distance) = (time.as_s().max(0.0), distance.as_m());
         let (from, to) = (from.as_m_per_s(), to.as_m_per_s());
@@ -45,7 +44,6 @@ impl MinimumJerk {
     }
 
     /// The lowest and the highest speed of the motion.
-    #[must_use]
     pub fn speeds(&self) -> [Speed; 2] {
         let [a, _, c] = self.powers;
         let turn = 0.3 * a / c;

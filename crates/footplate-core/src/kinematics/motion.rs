@@ -18,13 +18,11 @@ pub struct MotionState {
 
 impl MotionState {
     /// At rest at a distance.
-    #[must_use]
     pub const fn at_rest(distance: Length) -> Self {
         Self { distance, speed: Speed::ZERO, acceleration: Acceleration::ZERO }
     }
 
     /// Running at a constant speed.
-    #[must_use]
     pub const fn cruising(distance: Length, speed: Speed) -> Self {
         Self { distance, speed, acceleration: Acceleration::ZERO }
     }

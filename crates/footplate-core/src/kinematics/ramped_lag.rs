@@ -28,19 +28,16 @@ pub struct RampedLag {
 
 impl RampedLag {
     /// From the duration of the ramp and the time constant of the lag, in s; negative values count as zero.
-    #[must_use]
     pub const fn new(ramp: f64, lag: f64) -> Self {
         Self { ramp: ramp.max(SHORTEST_RAMP), lag: lag.max(SHORTEST_LAG) }
     }
 
     /// `r`, the share of the change that is done at a time (s), from 0 to 1.
-    #[must_use]
     pub fn share(&self, time: f64) -> f64 {
         self.at(time).share()
     }
 
     /// `R`, the integral of [`share`](Self::share) over time (s).
-    #[must_use]
     pub fn area(&self, time: f64) -> f64 {
         self.at(time).area()
     }
@@ -52,31 +49,26 @@ impl RampedLag {
     }
 
     /// The share of the change that the set speed, without the lag, has made at a time (s).
-    #[must_use]
     pub const fn set_share(&self, time: f64) -> f64 {
         (time / self.ramp).clamp(0.0, 1.0)
     }
 
     /// The duration `T` of the ramp (s).
-    #[must_use]
     pub const fn ramp(&self) -> f64 {
         self.ramp
     }
 
     /// The time constant `θ` (s).
-    #[must_use]
     pub const fn lag(&self) -> f64 {
         self.lag
     }
 
     /// Mean delay against an instantaneous change: T/2 + θ, in s.
-    #[must_use]
     pub const fn delay(&self) -> f64 {
         0.5 * self.ramp + self.lag
     }
 
     /// The time (s) after which no more than this share of the change remains.
-    #[must_use]
     pub fn settled(&self, left: f64) -> f64 {
         self.ramp + self.lag * libm::log(1.0 / left.clamp(1e-9, 1.0))
     }

@@ -117,7 +117,6 @@ impl SCurve {
     /// Its states in order, one every period from the start, without end.
     ///
     /// Cheaper than [`state_at`](Motion::state_at), because the phase is known from the previous state.
-    #[must_use]
     pub fn playback(&self, period: TimeSpan) -> Playback<'_> {
         Playback::new(self, period)
     }

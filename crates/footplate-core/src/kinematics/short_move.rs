@@ -148,14 +148,12 @@ impl<'t> ShortMove<'t> {
     }
 
     /// The distance of a move whose stop is commanded this long after its start.
-    #[must_use]
     pub fn distance(&self, command_time: TimeSpan) -> Length {
         let (measured, by_law) = self.corrections();
         self.law_distance(stretched(command_time.as_s().max(0.0), measured, by_law))
     }
 
     /// The time after which to command the stop for a distance; `None` if the distance is impossible or not ahead.
-    #[must_use]
     pub fn command_time(&self, distance: Length) -> Option<TimeSpan> {
         let (measured, by_law) = self.corrections();
         let time = stretched(self.law_time(distance)?, by_law, measured);

@@ -46,7 +46,6 @@ pub struct StoppingDistance<From> {
 
 impl<From> StoppingDistance<From> {
     /// A length measured or computed from where the type says.
-    #[must_use]
     pub const fn new(length: Length) -> Self {
         Self { length, counted_from: PhantomData }
     }

@@ -98,19 +98,16 @@ impl<From> StoppingLaw<From> {
     }
 
     /// How long the train keeps its speed.
-    #[must_use]
     pub const fn delay(&self) -> TimeSpan {
         self.delay
     }
 
     /// The braking after the delay.
-    #[must_use]
     pub const fn braking(&self) -> Braking {
         self.braking
     }
 
     /// Distance until rest, from a speed in either direction.
-    #[must_use]
     pub fn distance(&self, speed: Speed) -> StoppingDistance<From> {
         let speed = speed.abs().as_m_per_s();
         // In plain numbers: the time that a quotient of quantities gives would be rounded to nanoseconds.
@@ -122,13 +119,11 @@ impl<From> StoppingLaw<From> {
     }
 
     /// Time until rest; an exponential stop ends at [`Lag::SETTLED_WITHIN`].
-    #[must_use]
     pub fn time(&self, speed: Speed) -> TimeSpan {
         self.delay + self.change_from(speed).duration()
     }
 
     /// The highest speed from which the train stops within a distance; zero if the distance is not ahead.
-    #[must_use]
     pub fn speed_for(&self, distance: StoppingDistance<From>) -> Speed {
         let distance = distance.length().max(Length::ZERO).as_m();
         let delay = self.delay.as_s();
@@ -146,7 +141,6 @@ impl<From> StoppingLaw<From> {
 
     /// The braking itself as a motion; it begins a [`delay`](Self::delay) after the moment from which the law
     /// counts.
-    #[must_use]
     pub fn change_from(&self, speed: Speed) -> SpeedChange<'static> {
         match self.braking {
             Braking::Constant(deceleration) => SpeedChange::ConstantAcceleration(

@@ -28,7 +28,6 @@ pub struct Transit {
 impl Transit {
     /// A motion over a distance from one speed to another in a time, with changes by a law that take `change` each.
     /// `None` if that is more than half of the time, or for a law without symmetry.
-    #[must_use]
     pub fn new(
         distance: Length,
         [from, to]: [Speed; 2],
@@ -58,7 +57,6 @@ impl Transit {
     }
 
     /// The constant speed between the two changes.
-    #[must_use]
     pub const fn kept(&self) -> Speed {
         self.kept
     }

@@ -54,7 +54,6 @@ pub struct Solution {
 
 impl NormalEquations {
     /// Equations without information about this many unknowns.
-    #[must_use]
     pub fn new(unknowns: usize) -> Self {
         Self { unknowns, a: vec![0.0; row(unknowns)], b: vec![0.0; unknowns] }
     }
@@ -78,7 +77,6 @@ impl NormalEquations {
     }
 
     /// The number of unknowns.
-    #[must_use]
     pub const fn unknowns(&self) -> usize {
         self.unknowns
     }
@@ -127,7 +125,6 @@ impl NormalEquations {
     }
 
     /// The sum of squared residuals over variances at `x`, up to a constant.
-    #[must_use]
     pub fn cost(&self, x: &[f64]) -> f64 {
         let mut sum = 0.0;
         for (i, value) in x.iter().enumerate().take(self.unknowns) {
@@ -161,7 +158,6 @@ impl NormalEquations {
 
     /// Solves for the values without covariances, in a sixth of the time. `None` if an unknown is neither measured
     /// nor bounded by a prior.
-    #[must_use]
     pub fn values(&self) -> Option<Vec<f64>> {
         let factor = cholesky(&self.a, self.unknowns)?;
         let mut values = self.b.clone();
@@ -171,14 +167,12 @@ impl NormalEquations {
     }
 
     /// Solves for the unknowns. `None` if an unknown is neither measured nor bounded by a prior.
-    #[must_use]
     pub fn solve(&self) -> Option<Solution> {
         self.solve_for_first(self.unknowns)
     }
 
     /// The same with the covariance of only the first `known` unknowns: for ninety of a thousand, this takes a tenth
     /// of the time.
-    #[must_use]
     pub fn solve_for_first(&self, known: usize) -> Option<Solution> {
         let (n, side) = (self.unknowns, known.min(self.unknowns));
         let factor = cholesky(&self.a, n)?;
@@ -199,7 +193,6 @@ pub struct Eliminated {
 
 impl Eliminated {
     /// Its value, given those of the unknowns before it.
-    #[must_use]
     pub fn value(&self, others: &[f64]) -> f64 {
         let tied: f64 = self.line.iter().zip(others).map(|(tie, value)| tie * value).sum();
         (self.right - tied) / self.pivot
@@ -208,7 +201,6 @@ impl Eliminated {
 
 impl Solution {
     /// The variance of `Σ weight·x[unknown]`.
-    #[must_use]
     pub fn variance_of(&self, terms: &[(usize, f64)]) -> f64 {
         let mut sum = 0.0;
         for &(i, left) in terms {
@@ -220,19 +212,16 @@ impl Solution {
     }
 
     /// The covariance of two unknowns.
-    #[must_use]
     pub fn covariance(&self, one: usize, other: usize) -> f64 {
         self.covariance[row(one.max(other)) + one.min(other)]
     }
 
     /// The covariance of one unknown and the sum of others.
-    #[must_use]
     pub fn covariance_with_sum(&self, one: usize, of: &[usize]) -> f64 {
         of.iter().map(|other| self.covariance(one, *other)).sum()
     }
 
     /// The variance of one unknown.
-    #[must_use]
     pub fn variance(&self, unknown: usize) -> f64 {
         self.covariance[row(unknown) + unknown].max(0.0)
     }

@@ -18,7 +18,6 @@ pub struct DetectionWindow {
 impl DetectionWindow {
     /// The window of a report stamped `stamp`: the recorded interval if the host kept one; otherwise the interval
     /// after a reporting or an idle poll, by the time since the last report of any sensor.
-    #[must_use]
     pub fn of_report(
         stamp: Timestamp,
         recorded_interval: Option<TimeSpan>,

@@ -145,20 +145,17 @@ impl PollTimingEstimator {
 
     /// The rhythm known so far; [`PollTiming::ASSUMED`] until the reports have shown one.
     #[inline]
-    #[must_use]
     pub fn timing(&self) -> PollTiming {
         self.timing
     }
 
     /// The period with its uncertainty, `None` while no rhythm was found.
-    #[must_use]
     pub fn period(&self) -> Option<Estimate<TimeSpan>> {
         self.fitted
     }
 
     /// The next polls, if a rhythm was found and no command has delayed them since the last report.
     #[inline]
-    #[must_use]
     pub fn rhythm(&self) -> Option<PollRhythm> {
         let period = self.fitted?;
         let uncertainty = period.uncertainty.as_ns().max(1);

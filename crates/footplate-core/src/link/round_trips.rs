@@ -42,7 +42,6 @@ pub struct RoundTrips {
 
 impl RoundTrips {
     /// The figures of times in ascending order; `None` if there are fewer than 50.
-    #[must_use]
     pub fn of(sorted: &[TimeSpan], lost: u32) -> Option<Self> {
         let at = |share: f64| {
             let last = sorted.len().saturating_sub(1);
@@ -54,20 +53,17 @@ impl RoundTrips {
     }
 
     /// The share of requests that were not answered.
-    #[must_use]
     pub fn lost_share(&self) -> f64 {
         f64::from(self.lost) / f64::from((self.answered + self.lost).max(1))
     }
 
     /// How much later than on a usual line an answer may come: no command and no report is delayed by more, as either
     /// is a part of it.
-    #[must_use]
     pub fn excess(&self, usual: UsualLine) -> TimeSpan {
         (self.longest_usual - usual.answers_within).max(TimeSpan::ZERO)
     }
 
     /// How often a command is repeated until all but one in a thousand are answered.
-    #[must_use]
     pub fn repeats(&self) -> u32 {
         let lost = self.lost_share();
         if lost <= BEYOND {

@@ -35,7 +35,6 @@ impl TimeModel {
     };
 
     /// The mean time until a command that is ordered now was sent.
-    #[must_use]
     pub fn usually_left(&self) -> TimeSpan {
         self.command + self.usual_wait
     }

@@ -70,7 +70,6 @@ impl MotionModel {
     }
 
     /// A hop at a steady step.
-    #[must_use]
     pub fn prospect_of_speed(&self, step: SpeedStep, approach: Approach) -> ExpectedInformation {
         let (place, above) = (usize::from(step.get()), approach == Approach::Above);
         let speed = self.answers().speed(place, above).max(0.01);
@@ -83,7 +82,6 @@ impl MotionModel {
 
     /// A stop from a steady step, then creep to the next sensor. With `past`, the train passes a sensor this far before it comes
     /// to rest, and creeps to the one after it.
-    #[must_use]
     pub fn prospect_of_stop(
         &self,
         step: SpeedStep,
@@ -134,7 +132,6 @@ impl MotionModel {
     }
 
     /// A short move from a place of rest that was reached at creep speed, then creep to the next sensor.
-    #[must_use]
     pub fn prospect_of_move(&self, step: SpeedStep, run: TimeSpan, creep: SpeedStep) -> ExpectedInformation {
         let (time, creep_speed) = self.creep(creep, CREEP);
         let slopes = self.slopes(|answers| {

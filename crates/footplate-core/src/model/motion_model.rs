@@ -52,7 +52,6 @@ pub struct StopForecast {
 
 impl StopForecast {
     /// One standard deviation of the next stop.
-    #[must_use]
     pub fn deviation(&self) -> Length {
         Length::from_m(libm::hypot(self.doubt.as_m(), self.scatter.as_m()))
     }
@@ -108,7 +107,6 @@ const DECISIVE: f64 = 2.0;
 
 impl MotionModel {
     /// The prior of any model train.
-    #[must_use]
     pub fn unknown(train: TrainId, highest: SpeedStep) -> Self {
         let steps = usize::from(highest.get());
         Self {
@@ -130,13 +128,11 @@ impl MotionModel {
     }
 
     /// The train.
-    #[must_use]
     pub const fn train(&self) -> TrainId {
         self.train
     }
 
     /// How long it is, from releases of blocks.
-    #[must_use]
     pub const fn train_length(&self) -> &TrainLength {
         &self.train_length
     }
@@ -152,7 +148,6 @@ impl MotionModel {
     }
 
     /// The highest step of its decoder.
-    #[must_use]
     pub const fn highest(&self) -> SpeedStep {
         self.highest
     }
@@ -173,7 +168,6 @@ impl MotionModel {
     }
 
     /// Steps from one of these to the next: 1 for a decoder of 14 steps.
-    #[must_use]
     pub fn stride(&self) -> u8 {
         stride(self.steps()) as u8
     }
@@ -206,7 +200,6 @@ impl MotionModel {
     }
 
     /// Its steady speed at a step; the count is of sensors passed at it. An unknown approach counts as from below.
-    #[must_use]
     pub fn speed(&self, step: SpeedStep, approach: Approach) -> Estimate<Speed> {
         let (place, above) = (usize::from(step.get()), approach == Approach::Above);
         let speed = |answers: &Answers<'_>| answers.speed(place, above);
@@ -257,7 +250,6 @@ impl MotionModel {
     }
 
     /// By how much an even change of speed of a running train is late: delay of the command plus lag behind the decoder.
-    #[must_use]
     pub fn change_delay(&self, is_faster: bool) -> Estimate<TimeSpan> {
         let late = |answers: &Answers<'_>| {
             let (lag, _) = answers.lag_and_ramp(is_faster, 0.0, 0.0);
@@ -273,7 +265,6 @@ impl MotionModel {
 
     /// The even acceleration of the train's decoder from one step to another, negative for slowing down: the speeds'
     /// difference by the time of the ramp. `None` if the model cannot tell the ramp from a jump.
-    #[must_use]
     pub fn ramp_acceleration(&self, from: SpeedStep, to: SpeedStep) -> Option<Estimate<Acceleration>> {
         let gain = |answers: &Answers<'_>| {
             answers.speed(usize::from(to.get()), to < from) - answers.speed(usize::from(from.get()), false)
@@ -295,7 +286,6 @@ impl MotionModel {
     }
 
     /// Whether a step moves the train, by experience at this step, or at the two that it is interpolated between.
-    #[must_use]
     pub fn uses(&self, step: SpeedStep) -> StepUse {
         let at =
             |step: SpeedStep| self.uses.get(usize::from(step.get())).copied().unwrap_or(StepUse::Unreliable);
@@ -313,7 +303,6 @@ impl MotionModel {
     }
 
     /// How it stops from its steady speed at a step.
-    #[must_use]
     pub fn stop(&self, step: SpeedStep, approach: Approach) -> StopForecast {
         let above = approach == Approach::Above;
         let speed = self.answers().speed(usize::from(step.get()), above);
@@ -384,13 +373,11 @@ impl MotionModel {
     /// One standard deviation of the scatter of stops that the model does not explain, as broken promises show it: loads, wear,
     /// laws that the model lacks, decoders that are late by chance. It is part of every stop's scatter; this is that of a stop from
     /// a medium speed.
-    #[must_use]
     pub fn unexplained_scatter(&self) -> Length {
         Length::from_m(self.scatter.unexplained(MEDIUM_SPEED))
     }
 
     /// How long it takes, from the command's leaving the line, to be steady at a step coming from another.
-    #[must_use]
     pub fn settles_within(&self, from: SpeedStep, to: SpeedStep) -> TimeSpan {
         TimeSpan::from_s(self.change(from, to).settled().max(LEAST_STOP_S))
     }
@@ -410,7 +397,6 @@ impl MotionModel {
     }
 
     /// The path length of a hop, and one standard deviation of it.
-    #[must_use]
     pub fn length(&self, sections: &SectionIndex, hop: &Hop<'_>) -> [Length; 2] {
         let section = sections.section(hop.id);
         let known = section.and_then(|section| self.sections.get(&section).copied());

@@ -96,7 +96,6 @@ fn by_place(places: &[(usize, f64, f64)]) -> BTreeMap<usize, (f64, f64)> {
 
 impl MotionModel {
     /// The model as plain numbers; [`from_numbers`](Self::from_numbers) makes the same model of them.
-    #[must_use]
     pub fn numbers(&self) -> MotionNumbers {
         let side = self.values.len();
         let counts = |one: &Counts| (one.contacts, one.stops);

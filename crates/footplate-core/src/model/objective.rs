@@ -38,7 +38,6 @@ pub struct Objective {
 
 impl Objective {
     /// Stops, speeds and short moves at some steps.
-    #[must_use]
     pub fn of(model: &MotionModel, steps: &[SpeedStep]) -> Self {
         let mut targets = Vec::new();
         for step in steps.iter().map(|step| step.get()) {
@@ -65,13 +64,11 @@ impl Objective {
     }
 
     /// Its value: the squared uncertainties relative to the scatter, summed.
-    #[must_use]
     pub fn value(&self, model: &MotionModel) -> f64 {
         self.targets.iter().map(|(slopes, weight)| weight * model.spread.variance_along(slopes)).sum()
     }
 
     /// By how much an experiment is expected to lower it.
-    #[must_use]
     pub fn gain(&self, model: &MotionModel, prospect: &ExpectedInformation) -> f64 {
         let mut before: Vec<(&Seen, f64)> = Vec::new();
         let mut gain = 0.0;
@@ -100,7 +97,6 @@ impl Objective {
 
 impl MotionModel {
     /// The doubt of a stop at a step once an experiment has been made (m), for showing what a plan would reach.
-    #[must_use]
     pub fn stop_doubt_after(
         &self,
         step: SpeedStep,

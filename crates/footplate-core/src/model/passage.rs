@@ -95,7 +95,6 @@ pub struct PassageTracker {
 
 impl PassageTracker {
     /// A run of `train` begins, which has been running at `step` for long or stands.
-    #[must_use]
     pub fn new(train: TrainId, step: SpeedStep, timing: PollTimingEstimator) -> Self {
         Self {
             train,
@@ -231,19 +230,16 @@ impl PassageTracker {
     }
 
     /// What it was commanded last.
-    #[must_use]
     pub const fn drive(&self) -> Drive {
         self.drive
     }
 
     /// How the turnouts lie, as far as the run told.
-    #[must_use]
     pub const fn turnouts(&self) -> &TurnoutStates {
         &self.turnouts
     }
 
     /// The rhythm of the link as learnt so far.
-    #[must_use]
     pub const fn timing(&self) -> &PollTimingEstimator {
         &self.timing
     }

@@ -61,7 +61,6 @@ pub struct Rescaling {
 impl Rescaling {
     /// What follows from speeds measured anew, without a stop: the other steps by the geometric mean. Nothing measured is
     /// no change.
-    #[must_use]
     pub fn of(measured: Vec<MeasuredRatio>) -> Self {
         let usable: Vec<MeasuredRatio> = measured
             .into_iter()
@@ -84,13 +83,11 @@ impl Rescaling {
     }
 
     /// A train that may be as it was or different by about such a part, nobody knows.
-    #[must_use]
     pub const fn uncertain_by(part: f64) -> Self {
         Self { measured: Vec::new(), ratio: 1.0, deviation: part, stops: 1.0, stops_deviation: part }
     }
 
     /// By how much the ratios are apart: the largest over the smallest.
-    #[must_use]
     pub fn disagreement(&self) -> f64 {
         let ratios = || self.measured.iter().map(|one| one.ratio);
         let (least, most) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max));
@@ -105,13 +102,11 @@ impl Rescaling {
     }
 
     /// Whether speeds differ by more than from one session to the next.
-    #[must_use]
     pub fn has_other_speeds(&self) -> bool {
         (self.ratio - 1.0).abs() > OTHER_SPEEDS
     }
 
     /// Whether stops differ by more than its speeds explain.
-    #[must_use]
     pub fn has_other_stops(&self) -> bool {
         (self.stops - 1.0).abs() > OTHER_STOPS
     }
@@ -190,7 +185,6 @@ impl MotionModel {
     }
 
     /// Its numbers once it has changed like this.
-    #[must_use]
     pub fn changed_numbers(&self, change: &Rescaling) -> ChangedNumbers {
         let ratio = change.ratio.clamp(1.0 / MOST, MOST);
         let stops = change.stops.clamp(1.0 / MOST, MOST);

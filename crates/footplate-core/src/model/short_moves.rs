@@ -28,7 +28,6 @@ pub struct ShortMoveForecast {
 
 impl ShortMoveForecast {
     /// One standard deviation of where a single move ends.
-    #[must_use]
     pub fn deviation(&self) -> Length {
         Length::from_m(libm::hypot(self.uncertainty.as_m(), self.scatter.as_m()))
     }
@@ -52,7 +51,6 @@ const END_OF_MOVE: f64 = 0.0035;
 
 impl MotionModel {
     /// How far the train gets if it is commanded to a step and, after `run`, to stop.
-    #[must_use]
     pub fn short_move(&self, step: SpeedStep, run: TimeSpan) -> ShortMoveForecast {
         let run = run.as_s().clamp(0.0, LONGEST_S);
         let answers = self.answers();
@@ -80,7 +78,6 @@ impl MotionModel {
 
     /// The time between the commands of a short move of this distance; `None` if it takes longer than a minute or is not
     /// ahead.
-    #[must_use]
     pub fn short_move_time(&self, step: SpeedStep, distance: Length) -> Option<TimeSpan> {
         let answers = self.answers();
         let wanted = distance.as_m();

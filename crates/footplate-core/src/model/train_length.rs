@@ -72,32 +72,27 @@ impl Default for TrainLength {
 
 impl TrainLength {
     /// Whether nothing was measured yet.
-    #[must_use]
     pub const fn is_unknown(&self) -> bool {
         self.count == 0
     }
 
     /// From the first to the last part of the train that detectors sense; with a standard deviation of half a metre before the
     /// first measurement.
-    #[must_use]
     pub fn length(&self) -> Estimate<Length> {
         self.estimate(0).scaled(Length::from_m)
     }
 
     /// The same where it is known to 5 cm.
-    #[must_use]
     pub fn known(&self) -> Option<Estimate<Length>> {
         Some(self.length()).filter(|length| self.count > 0 && length.uncertainty.as_m() <= KNOWN)
     }
 
     /// How long detectors report a block occupied that the train has left.
-    #[must_use]
     pub fn release_delay(&self) -> Estimate<TimeSpan> {
         self.estimate(1).scaled(TimeSpan::from_s)
     }
 
     /// The longest delay that is likely.
-    #[must_use]
     pub fn longest_delay(&self) -> TimeSpan {
         let Estimate { value, uncertainty, .. } = self.estimate(1);
         TimeSpan::from_s(value + 2.0 * uncertainty)

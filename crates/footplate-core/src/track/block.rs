@@ -27,31 +27,26 @@ pub struct Block {
 
 impl Layout {
     /// The blocks, in the order of the plan.
-    #[must_use]
     pub fn blocks(&self) -> &[Block] {
         &self.blocks
     }
 
     /// The block that a detector reports.
-    #[must_use]
     pub fn block_of_detector(&self, detector: SensorId) -> Option<&Block> {
         self.blocks.iter().find(|block| block.detector == detector)
     }
 
     /// The block that a train enters at a sensor; `None` for any other sensor.
-    #[must_use]
     pub fn block_of_entry(&self, entry: SensorId) -> Option<&Block> {
         self.blocks.get(*self.entered.get(&entry)?)
     }
 
     /// The block of an edge; `None` where no detector is.
-    #[must_use]
     pub fn block_of_edge(&self, edge: EdgeId) -> Option<&Block> {
         self.blocks.iter().find(|block| block.stretches.contains(&edge.stretch()))
     }
 
     /// The block that a train leaves at a node, running in its direction.
-    #[must_use]
     pub fn block_left_at(&self, node: NodeId) -> Option<&Block> {
         self.block_of_entry(self.sensor_at(node.reverse())?)
     }
@@ -146,7 +141,6 @@ impl Layout {
     }
 
     /// Whether a node is at the boundary of a block.
-    #[must_use]
     pub fn is_boundary(&self, node: NodeId) -> bool {
         let enters = |node| self.sensor_at(node).is_some_and(|sensor| self.entered.contains_key(&sensor));
         enters(node)

@@ -42,7 +42,6 @@ impl Layout {
     /// It uses no stretch in `avoid`, and turnouts in `locked` only in the position given there (`None`: unknown
     /// position, so the circuit does not face it). Locked turnouts cannot be thrown, because a train is on them or
     /// too near.
-    #[must_use]
     pub fn circuit_from(
         &self,
         start: NodeId,
@@ -53,7 +52,6 @@ impl Layout {
     }
 
     /// The same with a value for each hop: the circuit with the greatest sum.
-    #[must_use]
     pub fn circuit_over(
         &self,
         start: NodeId,

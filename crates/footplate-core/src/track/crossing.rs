@@ -18,7 +18,6 @@ pub struct Crossing {
 
 impl Layout {
     /// The level crossings, in the order of the layout file.
-    #[must_use]
     pub fn crossings(&self) -> &[Crossing] {
         &self.crossings
     }
@@ -48,7 +47,6 @@ impl Layout {
     }
 
     /// Where other tracks cross an interval of an edge, or the track up to a distance beyond the interval's ends.
-    #[must_use]
     pub fn crossed_near(&self, edge: EdgeId, from: Length, to: Length, within: Length) -> Vec<Position> {
         let mut found = Vec::new();
         let Some(known) = self.edge(edge).filter(|_| !self.crossings.is_empty()) else { return found };

@@ -295,7 +295,6 @@ pub enum PlanEntry {
 
 impl LayoutError {
     /// The entry to look at.
-    #[must_use]
     pub const fn entry(&self) -> PlanEntry {
         match *self {
             Self::TooMany { .. } => PlanEntry::Plan,

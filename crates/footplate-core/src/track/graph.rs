@@ -148,32 +148,27 @@ pub struct Layout {
 
 impl Layout {
     /// The name of the layout.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// How well the lengths are known.
-    #[must_use]
     pub const fn survey(&self) -> &Survey {
         &self.survey
     }
 
     /// One standard deviation of the length of a hop, if the survey knows it better than its edges.
-    #[must_use]
     pub fn surveyed_distance(&self, hop: HopId) -> Option<Length> {
         self.distances.get(&hop).copied()
     }
 
     /// Whether the length of every stretch was measured or estimated.
-    #[must_use]
     pub fn is_measured(&self) -> bool {
         self.edges.iter().all(|edge| edge.known != StretchLength::Unknown)
     }
 
     /// A node.
     #[inline]
-    #[must_use]
     pub fn node(&self, node: NodeId) -> Option<&Node> {
         self.nodes.get(usize::from(node.0))
     }
@@ -184,27 +179,23 @@ impl Layout {
     }
 
     /// The name of a node, or `?` for a node of another layout.
-    #[must_use]
     pub fn node_name(&self, node: NodeId) -> &str {
         self.node(node).map_or("?", |node| node.name.as_str())
     }
 
     /// The node of a name.
-    #[must_use]
     pub fn node_named(&self, name: &str) -> Option<NodeId> {
         self.names.get(name).copied()
     }
 
     /// The node at which a sensor reports.
     #[inline]
-    #[must_use]
     pub fn sensor_node(&self, sensor: SensorId) -> Option<NodeId> {
         self.sensors.get(usize::from(sensor.0)).copied().flatten()
     }
 
     /// The sensor at a node.
     #[inline]
-    #[must_use]
     pub fn sensor_at(&self, node: NodeId) -> Option<SensorId> {
         match self.node(node)?.kind {
             NodeKind::Sensor(sensor) => Some(sensor),
@@ -213,13 +204,11 @@ impl Layout {
     }
 
     /// The sensor of a name.
-    #[must_use]
     pub fn sensor_named(&self, name: &str) -> Option<SensorId> {
         self.sensor_at(self.node_named(name)?)
     }
 
     /// The name of a sensor, the name of a detector's block, or `?` for a sensor of another layout.
-    #[must_use]
     pub fn sensor_name(&self, sensor: SensorId) -> &str {
         let of_block = || self.block_of_detector(sensor).map_or("?", |block| block.name.as_str());
         self.sensor_node(sensor).map_or_else(of_block, |node| self.node_name(node))
@@ -236,25 +225,21 @@ impl Layout {
     }
 
     /// The branch of a turnout.
-    #[must_use]
     pub fn branch(&self, turnout: TurnoutId) -> Option<NodeId> {
         self.turnouts.get(&turnout).copied()
     }
 
     /// Pairs of turnouts of which at most one may be set curved.
-    #[must_use]
     pub fn never_both_curved(&self) -> &[[TurnoutId; 2]] {
         &self.never_both_curved
     }
 
     /// The turnout in the same place that has to be set straight before this one may be set curved.
-    #[must_use]
     pub fn never_curved_with(&self, turnout: TurnoutId) -> Option<TurnoutId> {
         self.partners.get(&turnout).copied()
     }
 
     /// A pair of turnouts in one place that are both known to be curved, which is illegal.
-    #[must_use]
     pub fn illegal_pair(&self, turnouts: &TurnoutStates) -> Option<[TurnoutId; 2]> {
         let is_curved = |turnout: &TurnoutId| turnouts.get(*turnout) == Some(Leg::Curved);
         self.never_both_curved.iter().find(|pair| pair.iter().all(is_curved)).copied()
@@ -262,7 +247,6 @@ impl Layout {
 
     /// An edge.
     #[inline]
-    #[must_use]
     pub fn edge(&self, edge: EdgeId) -> Option<&Edge> {
         self.edges.get(usize::from(edge.0))
     }
@@ -273,19 +257,16 @@ impl Layout {
     }
 
     /// Number of stretches: edges without their twins.
-    #[must_use]
     pub fn stretch_count(&self) -> usize {
         self.edges.len() / 2
     }
 
     /// Total length of all rails.
-    #[must_use]
     pub fn total_length(&self) -> Length {
         self.edges.iter().map(|edge| edge.length).sum::<Length>() / 2.0
     }
 
     /// The edge from one node to another, if one leads there directly; the shorter one of two legs.
-    #[must_use]
     pub fn edge_between(&self, from: NodeId, to: NodeId) -> Option<EdgeId> {
         self.outgoing(from)
             .edges()
@@ -297,7 +278,6 @@ impl Layout {
 
     /// The edges that leave a node.
     #[inline]
-    #[must_use]
     pub fn outgoing(&self, node: NodeId) -> OutgoingEdges {
         self.node(node).map_or(OutgoingEdges::Ended, |node| node.outgoing)
     }

@@ -48,7 +48,6 @@ pub struct Hop<'l> {
 impl Hop<'_> {
     /// Whether no turnout on it is known to be in the other position.
     #[inline]
-    #[must_use]
     pub fn is_open(&self, turnouts: &TurnoutStates) -> bool {
         self.needs.iter().all(|need| turnouts.allow(*need))
     }
@@ -75,14 +74,12 @@ impl Layout {
 
     /// A hop by its id; `None` if the id is from another layout.
     #[inline]
-    #[must_use]
     pub fn hop(&self, id: HopId) -> Option<Hop<'_>> {
         self.hops.get(id)
     }
 
     /// A lower bound of the length of a hop (about two standard deviations). The end of an unmeasured track may be
     /// directly beyond the last sensor before it.
-    #[must_use]
     pub fn least_length(&self, hop: &Hop<'_>) -> Length {
         if let Some(uncertainty) = self.surveyed_distance(hop.id) {
             return (hop.length + -2.0 * uncertainty).max(Length::ZERO);

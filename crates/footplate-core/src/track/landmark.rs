@@ -83,7 +83,6 @@ impl Layout {
     }
 
     /// Formats a landmark so that [`landmark`](Self::landmark) reads it back, to the nanometre.
-    #[must_use]
     pub fn display(&self, landmark: Landmark) -> impl fmt::Display + '_ {
         Shown { layout: self, landmark }
     }

@@ -35,7 +35,6 @@ struct BlockState {
 
 impl Occupancy {
     /// All blocks free.
-    #[must_use]
     pub fn new(layout: &Layout) -> Self {
         let blocks = layout.blocks().iter().map(|_| BlockState::default()).collect();
         Self { blocks, turnouts: TurnoutStates::unknown() }

@@ -94,7 +94,6 @@ pub enum Place {
 
 impl Place {
     /// The names of its two nodes.
-    #[must_use]
     pub const fn names(&self) -> &[String; 2] {
         match self {
             Self::Sensor { names, .. }

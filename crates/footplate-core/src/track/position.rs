@@ -67,7 +67,6 @@ impl core::error::Error for PathError {}
 
 impl Layout {
     /// The same point in the opposite direction of travel; `None` for a position of another layout.
-    #[must_use]
     pub fn reversed(&self, position: Position) -> Option<Position> {
         let length = self.edge(position.edge)?.length;
         Some(Position { edge: position.edge.twin(), offset: (length - position.offset).max(Length::ZERO) })
@@ -123,7 +122,6 @@ impl Layout {
 
     /// The distance ahead from one position to another: the shortest over turnouts that are in position or unknown;
     /// `None` if no path leads there without reversing.
-    #[must_use]
     pub fn distance_ahead(&self, from: Position, to: Position, turnouts: &TurnoutStates) -> Option<Length> {
         let (from_edge, to_edge) = (self.edge(from.edge)?, self.edge(to.edge)?);
         if from.edge == to.edge && from.offset <= to.offset {

@@ -32,14 +32,12 @@ pub struct Reach {
 impl Reach {
     /// Its hops in the order of travel, at least one.
     #[inline]
-    #[must_use]
     pub fn hops(&self) -> &[HopId] {
         self.hops.get(..usize::from(self.count)).unwrap_or_default()
     }
 
     /// The number of silent sensors that it passes.
     #[inline]
-    #[must_use]
     pub const fn missed(&self) -> usize {
         (self.count as usize).saturating_sub(1)
     }
@@ -50,14 +48,12 @@ impl Layout {
     /// between (at most [`MAX_MISSED`]). Depth first: a sensor comes before those beyond it. A turnout that a path
     /// passes twice may be thrown in between, so each passage counts by itself. Allocates nothing.
     #[inline]
-    #[must_use]
     pub fn reaches<'l>(&'l self, from: NodeId, turnouts: &'l TurnoutStates, missed: usize) -> Reaches<'l> {
         Reaches::new(self, from, turnouts, missed)
     }
 
     /// The edges that begin within distances from the starts of some edges, over both legs of every turnout, each with the longest
     /// distance that is left where it begins.
-    #[must_use]
     pub(crate) fn edges_within(
         &self,
         from: impl IntoIterator<Item = (EdgeId, Length)>,

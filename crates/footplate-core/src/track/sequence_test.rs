@@ -113,7 +113,6 @@ impl SequenceTest {
     }
 
     /// How many trains may be in motion by the commands so far.
-    #[must_use]
     pub fn in_motion(&self, now: Timestamp) -> usize {
         let rests = |stop: &Option<Timestamp>| stop.is_some_and(|since| now - since >= STOPS_WITHIN);
         self.uncommanded + self.stops.values().filter(|stop| !rests(stop)).count()
@@ -164,7 +163,6 @@ impl SequenceTest {
     }
 
     /// The result of all runs so far.
-    #[must_use]
     pub fn verdict(&self) -> SequenceVerdict {
         let count: u32 = self.stray.values().sum();
         let reports = self.followed + count;

@@ -24,7 +24,6 @@ pub struct Survey {
 
 impl Survey {
     /// Every edge was measured independently, with one standard deviation for all.
-    #[must_use]
     pub const fn taped(uncertainty: Length, origin: String) -> Self {
         Self { uncertainty, origin, scale: 0.0, distances: Vec::new() }
     }

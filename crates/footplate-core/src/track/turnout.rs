@@ -19,7 +19,6 @@ pub enum Leg {
 impl Leg {
     /// The leg for the flag that events and command stations use.
     #[inline]
-    #[must_use]
     pub const fn from_curved(curved: bool) -> Self {
         if curved { Self::Curved } else { Self::Straight }
     }
@@ -67,7 +66,6 @@ pub struct TurnoutStates {
 
 impl TurnoutStates {
     /// No position is known: every path is open.
-    #[must_use]
     pub const fn unknown() -> Self {
         Self { legs: Vec::new(), proven: BTreeSet::new() }
     }
@@ -96,7 +94,6 @@ impl TurnoutStates {
 
     /// The position of a turnout, or `None` while it is unknown.
     #[inline]
-    #[must_use]
     pub fn get(&self, turnout: TurnoutId) -> Option<Leg> {
         self.legs.get(usize::from(turnout.0)).copied().flatten()
     }
@@ -107,7 +104,6 @@ impl TurnoutStates {
     }
 
     /// Whether a train has shown the position of a turnout since it was set.
-    #[must_use]
     pub fn is_proven(&self, turnout: TurnoutId) -> bool {
         self.proven.contains(&turnout)
     }
@@ -115,7 +111,6 @@ impl TurnoutStates {
     /// Whether a train can pass the turnout as `need` requires: always if it trails the turnout; if it faces it, only
     /// if the position is right or unknown.
     #[inline]
-    #[must_use]
     pub fn allow(&self, need: TurnoutNeed) -> bool {
         !need.facing || self.get(need.turnout).is_none_or(|leg| leg == need.leg)
     }

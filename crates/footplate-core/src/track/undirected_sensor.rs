@@ -22,7 +22,6 @@ const ELSEWHERE: usize = MAX_SILENT + DECIDES;
 impl Layout {
     /// The number under which the station reports a sensor: that of the detector for the entry of a block, and that of the first
     /// direction for a sensor that does not report the direction.
-    #[must_use]
     pub fn input(&self, sensor: SensorId) -> SensorId {
         if let Some([reported, _]) = self.undirected.get(&sensor) {
             return *reported;
@@ -31,7 +30,6 @@ impl Layout {
     }
 
     /// The two directions of a sensor that reports the same number for both; `None` for any other sensor.
-    #[must_use]
     pub fn both_directions(&self, sensor: SensorId) -> Option<[SensorId; 2]> {
         self.undirected.get(&sensor).copied()
     }
@@ -43,25 +41,21 @@ impl Layout {
     }
 
     /// Whether a report of one sensor may be of a train that passed the other: the same, or its other direction.
-    #[must_use]
     pub fn may_mean(&self, reported: SensorId, passed: SensorId) -> bool {
         self.meanings(reported).any(|one| one == passed)
     }
 
     /// Whether no station reports this number, although a place has it: the entry of a block, or the second direction of a sensor.
-    #[must_use]
     pub fn is_never_reported(&self, sensor: SensorId) -> bool {
         self.input(sensor) != sensor
     }
 
     /// Whether stations report a train without saying where it came from: at a block, or a sensor without a direction.
-    #[must_use]
     pub fn has_open_reports(&self) -> bool {
         !self.blocks.is_empty() || self.has_undirected_sensors()
     }
 
     /// Whether a sensor does not report the direction.
-    #[must_use]
     pub fn has_undirected_sensors(&self) -> bool {
         !self.undirected.is_empty()
     }
@@ -81,7 +75,6 @@ pub struct DirectionFinder {
 
 impl DirectionFinder {
     /// How many sensors in a row have left the direction of the train open.
-    #[must_use]
     pub const fn undecided(&self) -> usize {
         self.undecided
     }

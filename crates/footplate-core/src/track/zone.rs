@@ -22,14 +22,12 @@ pub struct Zone {
 
 impl Layout {
     /// The speed restrictions, in the order of the plan.
-    #[must_use]
     pub fn zones(&self) -> &[Zone] {
         &self.zones
     }
 
     /// The speed restriction of an edge, if it has one.
     #[inline]
-    #[must_use]
     pub fn zone(&self, edge: EdgeId) -> Option<&Zone> {
         self.zones.get(*self.restricted.get(&edge.stretch())?)
     }

@@ -15,7 +15,6 @@ const MOST_BOUNDARIES: usize = 6;
 impl Locator {
     /// What the release of a block says of a train that is leaving it; `None` if the train did not come through this block,
     /// or is at rest.
-    #[must_use]
     pub fn release_of(
         &self,
         context: TrackContext<'_>,

@@ -23,7 +23,6 @@ impl Locator {
     /// The logarithm of the density (1/s) with which this train closed a sensor within a window; `None` while it is lost, and
     /// where no path as the turnouts lie leads there with few missed detections ([`MAX_MISSED`](crate::track::MAX_MISSED)), of
     /// which sensors miss a share.
-    #[must_use]
     pub fn claim(
         &self,
         context: TrackContext<'_>,

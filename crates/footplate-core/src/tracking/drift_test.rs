@@ -53,7 +53,6 @@ impl DriftTest {
     }
 
     /// How far the larger sum is towards an alarm, 0 to 1.
-    #[must_use]
     pub fn level(&self) -> f64 {
         self.late.max(self.early) / ALARM_AT
     }

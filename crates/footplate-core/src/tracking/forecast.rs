@@ -38,7 +38,6 @@ pub struct Forecast {
 
 impl Forecast {
     /// The central interval that holds the report with probability `level`.
-    #[must_use]
     pub fn interval(&self, level: f64) -> (Timestamp, Timestamp) {
         let half = TimeSpan::from_s(self.spread.half_width(level));
         (self.time - half, self.time + half)
@@ -46,14 +45,12 @@ impl Forecast {
 
     /// How much later than the poll that was expected to report it a report came.
     #[inline]
-    #[must_use]
     pub fn error(&self, report: Timestamp) -> TimeSpan {
         report - self.report
     }
 
     /// How much later than the mean time a report came: the error of the motion, with that of the poll in it.
     #[inline]
-    #[must_use]
     pub fn detection_error(&self, report: Timestamp) -> TimeSpan {
         report - self.time
     }
@@ -61,7 +58,6 @@ impl Forecast {
     /// The same in millimetres: how far beyond the forecast place the train was, negative when it
     /// was short of it.
     #[inline]
-    #[must_use]
     pub fn place_error(&self, report: Timestamp) -> Length {
         self.speed * self.error(report)
     }
@@ -69,7 +65,6 @@ impl Forecast {
     /// The probability that was given to a report no later than this one. Over many forecasts it is uniform
     /// between 0 and 1 when the stated intervals are true.
     #[inline]
-    #[must_use]
     pub fn probability_by(&self, report: Timestamp) -> f64 {
         self.spread.cdf(self.detection_error(report).as_s())
     }

@@ -46,7 +46,6 @@ pub struct Rest {
 
 impl Rest {
     /// One standard deviation of the place.
-    #[must_use]
     pub fn deviation(&self) -> Length {
         Length::from_m(libm::hypot(self.doubt.as_m(), self.scatter.as_m()))
     }

@@ -49,7 +49,6 @@ pub struct Locator {
 
 impl Locator {
     /// A train at rest at an unknown place.
-    #[must_use]
     pub fn new(train: TrainId) -> Self {
         let nowhere = Gaussian { mean: 0.0, variance: ANYWHERE_M * ANYWHERE_M };
         let filter = MotionFilter::at_rest(0.0, nowhere);
@@ -57,13 +56,11 @@ impl Locator {
     }
 
     /// The train.
-    #[must_use]
     pub const fn train(&self) -> TrainId {
         self.train
     }
 
     /// Whether its position is known.
-    #[must_use]
     pub const fn is_located(&self) -> bool {
         self.node.is_some()
     }
@@ -120,7 +117,6 @@ impl Locator {
     }
 
     /// Whether it is at rest at a time not before the last entry, located or not.
-    #[must_use]
     pub fn is_at_rest(&self, model: &MotionModel, at: Timestamp) -> bool {
         let time = self.seconds(at);
         self.filter.at(model, time).rests_at(time)
@@ -171,7 +167,6 @@ impl Locator {
 
     /// Log-likelihood that this train closed a sensor within a window: ln of a probability density in 1/s, `None` if it is
     /// impossible. A lost train may be anywhere (`0`).
-    #[must_use]
     pub fn likelihood(
         &self,
         context: TrackContext<'_>,
@@ -302,7 +297,6 @@ impl Locator {
     }
 
     /// Position and speed at a time not before the last entry; `None` while it is lost.
-    #[must_use]
     pub fn locate(&self, context: TrackContext<'_>, model: &MotionModel, at: Timestamp) -> Option<Located> {
         let node = self.node?;
         let time = self.seconds(at);
@@ -322,7 +316,6 @@ impl Locator {
     }
 
     /// The sensor it reaches next without another command; `None` while it is at rest, stops short of it or is lost.
-    #[must_use]
     pub fn next_sensor(
         &self,
         context: TrackContext<'_>,
@@ -366,7 +359,6 @@ impl Locator {
 
     /// Where it would come to rest if step 0 left the line at a time not before the last entry. For a train that was commanded
     /// to stop already, where it comes to rest anyway.
-    #[must_use]
     pub fn rest_if_stopped(
         &self,
         context: TrackContext<'_>,
@@ -379,7 +371,6 @@ impl Locator {
     }
 
     /// The same for a train at rest that receives a step at `start` first: a short move.
-    #[must_use]
     pub fn rest_after_move(
         &self,
         context: TrackContext<'_>,
@@ -395,7 +386,6 @@ impl Locator {
     }
 
     /// Whether the change of speed commanded last has shown: one more would interrupt it otherwise.
-    #[must_use]
     pub fn has_change_shown(&self, model: &MotionModel, at: Timestamp) -> bool {
         self.filter.has_shown(model, self.seconds(at))
     }

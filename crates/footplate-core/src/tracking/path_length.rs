@@ -72,7 +72,6 @@ pub(super) fn path_reaches<'g>(
 
 /// The path length from a waypoint's node to a place on the layout, as the turnouts lie; `None` if no path leads there within
 /// one lap.
-#[must_use]
 pub fn distance_to(
     context: TrackContext<'_>,
     model: &MotionModel,
@@ -120,7 +119,6 @@ pub(super) fn taped_length(context: TrackContext<'_>, model: &MotionModel, hop: 
 
 /// The path length from a waypoint's node to a landmark ahead: so many millimetres past the sensor of its name, whatever the
 /// survey has for the rest of the hop. `None` if no path leads there within one lap.
-#[must_use]
 pub fn distance_to_landmark(
     context: TrackContext<'_>,
     model: &MotionModel,
@@ -173,7 +171,6 @@ fn path_to_node(
 
 /// A point of the path as people name it and measure it with a tape: from the last sensor before it. Whole laps do not change
 /// the place.
-#[must_use]
 pub fn landmark_of(context: TrackContext<'_>, model: &MotionModel, at: PathPoint) -> Landmark {
     let [landmark, _] = taped(context, model, at);
     landmark
@@ -211,7 +208,6 @@ fn part(of: Length, whole: Length) -> f64 {
 }
 
 /// The place on the layout of a point on the path, as the turnouts lie; for a point behind its node, the node.
-#[must_use]
 pub fn place_of(context: TrackContext<'_>, model: &MotionModel, at: PathPoint) -> Option<Position> {
     let mut left = at.distance.max(Length::ZERO);
     for hop in context.hops_ahead(at.node).take(MOST_HOPS) {

@@ -55,7 +55,6 @@ pub struct Predictor {
 
 impl Predictor {
     /// Knows the layout and nothing of any train.
-    #[must_use]
     pub fn new(layout: &Layout) -> Self {
         Self {
             sections: SectionIndex::of(layout),
@@ -117,7 +116,6 @@ impl Predictor {
     }
 
     /// What is known of a train.
-    #[must_use]
     pub fn train(&self, train: TrainId) -> Option<&TrainForecaster> {
         self.trains.iter().find(|model| model.train() == train)
     }
@@ -137,7 +135,6 @@ impl Predictor {
     }
 
     /// The sections by which lengths are kept.
-    #[must_use]
     pub const fn sections(&self) -> &SectionIndex {
         &self.sections
     }

@@ -17,7 +17,6 @@ pub struct TrackContext<'g> {
 
 impl<'g> TrackContext<'g> {
     /// The one open hop that leads on from a node; `None` where the path divides over a turnout whose position is unknown.
-    #[must_use]
     pub fn hop_from(&self, node: NodeId) -> Option<Hop<'g>> {
         let mut open = self.layout.open_hops_from(node, self.turnouts);
         let hop = open.next()?;
@@ -37,7 +36,6 @@ impl<'g> TrackContext<'g> {
     }
 
     /// The node of a sensor.
-    #[must_use]
     pub fn node_of(&self, sensor: SensorId) -> Option<NodeId> {
         self.layout.sensor_node(sensor)
     }

@@ -80,13 +80,11 @@ impl TrainForecaster {
     }
 
     /// The train.
-    #[must_use]
     pub const fn train(&self) -> TrainId {
         self.model.train()
     }
 
     /// Its motion, as of the last run that ended.
-    #[must_use]
     pub const fn model(&self) -> &MotionModel {
         &self.model
     }
@@ -102,7 +100,6 @@ impl TrainForecaster {
 
     /// The steady speed of the step as the present run has shown it up to the last contact. `None` before the first hop
     /// at a settled speed. The count is of such hops.
-    #[must_use]
     pub fn running_speed(&self) -> Option<Estimate<Speed>> {
         if self.settled_hops == 0 {
             return None;

@@ -24,7 +24,6 @@ pub struct ScoredTrain {
 
 impl ScoredTrain {
     /// What happened in the simulated world while Footplate drove, in words.
-    #[must_use]
     pub fn incidents(&self) -> &[String] {
         self.by.first().map_or(&[], |ours| &ours.incidents)
     }

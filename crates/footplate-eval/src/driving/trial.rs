@@ -79,7 +79,6 @@ pub struct Plan {
 
 impl Plan {
     /// The tasks of a train in this world.
-    #[must_use]
     pub fn new(line: &VirtualLine<'_>, seed: u64) -> Self {
         let truth = line.station.world.truth();
         let steps = |range: std::ops::Range<f64>| {

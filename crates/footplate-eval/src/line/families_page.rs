@@ -53,7 +53,6 @@ of normal runs (N), slips and slides (S) and faults (F), each together.
 impl<'r> FamiliesPage<'r> {
     /// The page of runs of families with these names. Families whose names begin with the same letter are of a kind, unless
     /// they are `all_alike`, of one name and kind.
-    #[must_use]
     pub fn new(names: &[String], runs: &'r [ScoredRun], all_alike: bool, asked: String) -> Self {
         let family = |name: &str, is_in: &dyn Fn(usize) -> bool| {
             Family::new(name, runs.iter().filter(|run| is_in(run.family)))
@@ -146,7 +145,6 @@ impl<'r> FamiliesPage<'r> {
     }
 
     /// Whether the truth left an interval of ours more often than they promise.
-    #[must_use]
     pub fn falls_short(&self, least_inside_pct: f64) -> bool {
         let figures = self.all.figures(OURS);
         figures.guaranteed_speed_inside_pct.is_some_and(|pct| pct < least_inside_pct)
@@ -154,7 +152,6 @@ impl<'r> FamiliesPage<'r> {
     }
 
     /// Everything for machines: families, all together, and each run with the scores that `footplate odometry` gives it.
-    #[must_use]
     pub fn as_json(&self, runs: &[ScoredRun], names: &[String]) -> Value {
         let each = runs.iter().map(|run| {
             let scores = Odometer::ALL

@@ -96,7 +96,6 @@ const PHASES: &str = "\
 
 impl WorldsPage {
     /// Of worlds that were asked for like this on the command line.
-    #[must_use]
     pub fn new(worlds: Vec<ScoredWorld>, asked: String) -> Self {
         Self { worlds, asked }
     }
@@ -153,7 +152,6 @@ impl WorldsPage {
     }
 
     /// Whether the truth left a guaranteed interval more often than it may, in worlds whose claims hold.
-    #[must_use]
     pub fn falls_short(&self, least_inside_pct: f64) -> bool {
         LineLevel::ALL.into_iter().filter_map(|level| self.of(level, |world| world.claims_hold)).any(
             |scores| {
@@ -204,7 +202,6 @@ impl WorldsPage {
     }
 
     /// Everything for machines.
-    #[must_use]
     pub fn as_json(&self) -> Value {
         let levels = LineLevel::ALL.into_iter().filter_map(|level| {
             let scores = self.of(level, |_| true)?;

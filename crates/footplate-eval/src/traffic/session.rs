@@ -37,7 +37,6 @@ const TRAINS: [TrainId; 6] = [TrainId(24), TrainId(58), TrainId(1), TrainId(43),
 const TRIES: usize = 1_000;
 
 /// How much further than estimated a train really is that has come to rest; `None` if its sensor does not tell.
-#[must_use]
 pub fn rest_error(layout: &Layout, world: &LivingLayout<'_>, finished: &Finished) -> Option<Length> {
     let achieved = finished.achieved?;
     let past = world.truth().past(finished.train, layout.sensor_at(achieved.at.node)?)?;
@@ -374,7 +373,6 @@ pub fn set_out(layout: &Layout, seed: u64, asked: Asked) -> anyhow::Result<(Prep
 }
 
 /// Whether all track under a train is truly reserved for it.
-#[must_use]
 pub fn is_on_reserved_track(
     layout: &Layout,
     world: &LivingLayout<'_>,
@@ -397,7 +395,6 @@ pub fn is_on_reserved_track(
 }
 
 /// The position that an operator would read off, in surveyed lengths.
-#[must_use]
 pub fn place_by_hand(layout: &Layout, world: &LivingLayout<'_>, train: TrainId) -> Option<PathPoint> {
     let truth = world.truth();
     let position = truth.train(train)?.position?;

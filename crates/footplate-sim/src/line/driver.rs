@@ -166,7 +166,6 @@ pub struct Driver {
 impl Driver {
     /// A driver who stands at the first stop of the line. Of a train or a style that
     /// [`Train::check`] or [`Style::check`] refuses, nothing is promised.
-    #[must_use]
     pub fn new(train: Train, line: LineProfile, style: Style) -> Self {
         let max_speed = train.max_speed.as_m_per_s();
         let permitted = line.speed_limit().least_behind(train.length);
@@ -190,31 +189,26 @@ impl Driver {
     }
 
     /// The train.
-    #[must_use]
     pub const fn train(&self) -> &Train {
         &self.train
     }
 
     /// The line.
-    #[must_use]
     pub const fn line(&self) -> &LineProfile {
         &self.line
     }
 
     /// The stop of the line at which the train is at rest, or the next one.
-    #[must_use]
     pub const fn stop(&self) -> usize {
         self.next_stop
     }
 
     /// Whether the train stands at the last stop.
-    #[must_use]
     pub fn has_arrived(&self) -> bool {
         self.standing.is_some() && self.next_stop + 1 >= self.line.stops().len()
     }
 
     /// The limit for the front of the train at a place: of the line, for its whole length, and its own.
-    #[must_use]
     pub fn permitted_speed(&self, front: Length) -> Speed {
         Speed::from_m_per_s(self.permitted.at(front)).min(self.train.max_speed)
     }

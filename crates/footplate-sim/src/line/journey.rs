@@ -183,13 +183,11 @@ impl Journey {
     }
 
     /// The running time from the first stop to the last, dwells included.
-    #[must_use]
     pub fn time(&self) -> TimeSpan {
         self.moments.last().map_or(TimeSpan::ZERO, |moment| moment.time)
     }
 
     /// The moment at which the front passes a place; `None` before the first stop and beyond the last.
-    #[must_use]
     pub fn passing(&self, place: Length) -> Option<Moment> {
         let next = self.moments.partition_point(|moment| moment.front < place);
         let to = self.moments.get(next)?;

@@ -76,37 +76,31 @@ impl LineProfile {
     }
 
     /// What people call the line.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// Rise in per mille, positive uphill.
-    #[must_use]
     pub const fn gradient(&self) -> &Stepped {
         &self.gradient
     }
 
     /// Resistance of curves in per mille of the weight.
-    #[must_use]
     pub const fn curve_resistance(&self) -> &Stepped {
         &self.curve_resistance
     }
 
     /// The speed limit in m/s.
-    #[must_use]
     pub const fn speed_limit(&self) -> &Stepped {
         &self.speed_limit
     }
 
     /// Where trains stop, two at least, in order.
-    #[must_use]
     pub fn stops(&self) -> &[Stop] {
         &self.stops
     }
 
     /// How high the line lies at a place above its first gradient's begin.
-    #[must_use]
     pub fn height(&self, at: Length) -> Length {
         Length::from_mm(self.gradient.integral(at))
     }

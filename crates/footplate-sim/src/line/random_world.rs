@@ -126,7 +126,6 @@ pub struct LineWorld {
 
 impl LineWorld {
     /// The world of a seed.
-    #[must_use]
     pub fn draw(seed: u64) -> Self {
         let mut draws = Draws::new(seed, Purpose::Physics);
         let draws = &mut draws;
@@ -206,13 +205,11 @@ impl LineWorld {
     }
 
     /// What is special about it, in a few words.
-    #[must_use]
     pub fn notes(&self) -> String {
         self.notes.join(", ")
     }
 
     /// Whether its sensors and its recorder have no fault.
-    #[must_use]
     pub fn is_sound(&self) -> bool {
         self.setup.fault == Fault::None
     }
@@ -220,7 +217,6 @@ impl LineWorld {
     /// Whether the claims of every level are true in a run of it. They are not where rows are read late, where one burst of
     /// interference meets both sensors, where wheels slip on a train that rolls back against its traction, where a train rolls
     /// back whose sensors report no direction, and where wheels slip longer after a command than the claimed release.
-    #[must_use]
     pub fn claims_hold(&self, run: &LineRun) -> bool {
         let signed = run
             .samples
@@ -237,7 +233,6 @@ impl LineWorld {
     }
 
     /// Runs it, with the vehicle as an operator of a level knows it. The same seed gives the same bytes on every machine.
-    #[must_use]
     pub fn run(&self, level: LineLevel) -> LineRun {
         let mut run = run(level.name(), &self.setup, self.seed, self.conditions);
         claim(&mut run, level, &self.setup.brake_times);

@@ -40,13 +40,11 @@ pub struct PerMille {
 
 impl Resistance {
     /// A + B v + C v², v in m/s, A in N (Davis, 1926).
-    #[must_use]
     pub const fn davis(a: f64, b: f64, c: f64) -> Self {
         Self { constant_n: a, linear_n_s_per_m: b, square_n_s2_per_m2: c }
     }
 
     /// The force on `mass_kg` of per-mille coefficients.
-    #[must_use]
     pub fn per_mille(mass_kg: f64, per_mille: PerMille) -> Self {
         let PerMille { base, rolling, air, head_wind } = per_mille;
         let weight = mass_kg * GRAVITY / 1000.0;
@@ -59,7 +57,6 @@ impl Resistance {
     }
 
     /// The force (N) at a speed, against the motion; the sign of the speed does not matter.
-    #[must_use]
     pub fn at(&self, speed: Speed) -> f64 {
         let v = speed.abs().as_m_per_s();
         self.constant_n + v * (self.linear_n_s_per_m + v * self.square_n_s2_per_m2)

@@ -69,38 +69,32 @@ const SCENARIOS: [LineScenario; 25] = [
 
 impl LineScenario {
     /// All scenarios.
-    #[must_use]
     pub const fn all() -> &'static [Self] {
         &SCENARIOS
     }
 
     /// The scenario of a name, in capitals or not.
-    #[must_use]
     pub fn by_name(name: &str) -> Option<Self> {
         SCENARIOS.into_iter().find(|scenario| scenario.name.eq_ignore_ascii_case(name))
     }
 
     /// Its name on the command line.
-    #[must_use]
     pub const fn name(&self) -> &'static str {
         self.name
     }
 
     /// What happens in it, in half a sentence.
-    #[must_use]
     pub const fn description(&self) -> &'static str {
         self.description
     }
 
     /// Runs it. The same seed and conditions give the same bytes on every machine; the same seed under other
     /// conditions is the same train on the same line.
-    #[must_use]
     pub fn run(&self, seed: u64, conditions: LineConditions) -> LineRun {
         self.run_journey(seed, seed, conditions)
     }
 
     /// Runs it with the wheels of one seed on the journey of another: the same train, later.
-    #[must_use]
     pub fn run_journey(&self, seed: u64, journey: u64, conditions: LineConditions) -> LineRun {
         let mut draws = Draws::new(journey, Purpose::Scenario);
         let setup = match self.kind {

@@ -55,7 +55,6 @@ impl LineService {
 
     /// Runs it on a dry rail with balises, until it stands at the last stop. The same seed and conditions give the same
     /// bytes on every machine.
-    #[must_use]
     pub fn run(&self, seed: u64, conditions: LineConditions) -> LineRun {
         let mut draws = Draws::new(seed, Purpose::Scenario);
         let length = self.design.train.weight_length.as_m().max(1.0);

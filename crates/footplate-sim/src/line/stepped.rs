@@ -17,7 +17,6 @@ pub struct Stepped {
 
 impl Stepped {
     /// One value everywhere.
-    #[must_use]
     pub fn constant(value: f64) -> Self {
         Self { starts: vec![0.0], values: vec![value], integrals: vec![0.0] }
     }
@@ -64,13 +63,11 @@ impl Stepped {
     }
 
     /// The value at a place.
-    #[must_use]
     pub fn at(&self, place: Length) -> f64 {
         self.values[self.index(place.as_m())]
     }
 
     /// The integral of the value over metres, from the first step to a place.
-    #[must_use]
     pub fn integral(&self, place: Length) -> f64 {
         let m = place.as_m();
         let index = self.index(m);
@@ -78,7 +75,6 @@ impl Stepped {
     }
 
     /// The mean over what lies behind a place, `behind` long; the value at the place if that is nothing.
-    #[must_use]
     pub fn mean_behind(&self, place: Length, behind: Length) -> f64 {
         if behind <= Length::ZERO {
             return self.at(place);

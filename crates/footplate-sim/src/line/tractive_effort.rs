@@ -18,7 +18,6 @@ pub enum TractiveEffort {
 
 impl TractiveEffort {
     /// The force (N) at a speed; the sign of the speed does not matter.
-    #[must_use]
     pub fn at(&self, speed: Speed) -> f64 {
         let speed = speed.abs();
         match self {
@@ -35,7 +34,6 @@ impl TractiveEffort {
     }
 
     /// The largest force (N) at any speed.
-    #[must_use]
     pub fn largest(&self) -> f64 {
         match self {
             Self::Table(points) => points.iter().map(|(_, force)| *force).fold(0.0, f64::max),

@@ -70,13 +70,11 @@ impl Brake {
 
 impl Train {
     /// The mass that has to be accelerated (kg), turning parts included.
-    #[must_use]
     pub fn inertia_kg(&self) -> f64 {
         self.mass_kg * (1.0 + self.rotating_mass.as_parts())
     }
 
     /// What the line does to it with its front at a place (N): positive against the motion, gradient and curves.
-    #[must_use]
     pub fn line_force(&self, line: &LineProfile, front: Length) -> f64 {
         let per_mille = line.gradient().mean_behind(front, self.weight_length)
             + line.curve_resistance().mean_behind(front, self.weight_length);
@@ -84,21 +82,18 @@ impl Train {
     }
 
     /// Its acceleration when traction and brake give `force_n` and the line `line_n` against it, while it moves.
-    #[must_use]
     pub fn acceleration(&self, force_n: f64, line_n: f64, speed: Speed) -> Acceleration {
         let left = force_n - line_n - self.resistance.at(speed);
         Acceleration::from_m_per_s2(left / self.inertia_kg())
     }
 
     /// The force (N) of an effort: 1 is all traction that there is at this speed, −1 all of the brake.
-    #[must_use]
     pub fn force(&self, effort: f64, speed: Speed) -> f64 {
         let effort = effort.clamp(-1.0, 1.0);
         if effort > 0.0 { effort * self.tractive_effort.at(speed) } else { effort * self.brake.full_n }
     }
 
     /// The effort of a force (N), −1 to 1: what [`force`](Self::force) turns back into it where it can.
-    #[must_use]
     pub fn effort(&self, force_n: f64, speed: Speed) -> f64 {
         let all = if force_n > 0.0 { self.tractive_effort.at(speed) } else { self.brake.full_n };
         if all > 0.0 { (force_n / all).clamp(-1.0, 1.0) } else { 0.0 }

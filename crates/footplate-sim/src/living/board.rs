@@ -123,7 +123,6 @@ enum Next {
 impl<'l> VirtualBoard<'l> {
     /// A board in front of a layout, which has been driving the trains on it: it knows which end of each leads. The track has
     /// no power yet. The sensors have the numbers of the layout, the turnouts are defined under theirs.
-    #[must_use]
     pub fn new(mut world: LivingLayout<'l>, seed: u64, switches: BoardSwitches) -> Self {
         let now = world.now();
         let known = |train: TrainId| {
@@ -156,7 +155,6 @@ impl<'l> VirtualBoard<'l> {
     }
 
     /// The time.
-    #[must_use]
     pub const fn now(&self) -> Timestamp {
         self.now
     }

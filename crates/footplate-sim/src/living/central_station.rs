@@ -145,7 +145,6 @@ enum Next {
 impl<'l> VirtualCentralStation<'l> {
     /// A station in front of a layout, which has been driving the trains on it: it knows which end of each leads. The track has no
     /// power yet. The layout's sensor 0 is input 1, its turnout 1 is the first.
-    #[must_use]
     pub fn new(mut world: LivingLayout<'l>, seed: u64, switches: CanSwitches) -> Self {
         let now = world.now();
         let slot = |train: TrainId| {
@@ -179,13 +178,11 @@ impl<'l> VirtualCentralStation<'l> {
     }
 
     /// The time.
-    #[must_use]
     pub const fn now(&self) -> Timestamp {
         self.now
     }
 
     /// How frames travel.
-    #[must_use]
     pub const fn transport(&self) -> CanTransport {
         self.switches.transport
     }

@@ -24,7 +24,6 @@ pub enum CtsSwitch {
 
 impl CtsSwitch {
     /// A station that needs the hand-shake (times chosen: a fraction of a byte).
-    #[must_use]
     pub const fn per_byte() -> Self {
         Self::PerByte { least: TimeSpan::from_us(500), most: TimeSpan::from_us(2000) }
     }

@@ -110,7 +110,6 @@ enum Next {
 impl<'l> VirtualJmri<'l> {
     /// JMRI in front of a layout, with a client that has just connected. It has driven the trains before and knows how they face; the track
     /// has no power yet. Sensor 0 of the layout is `LS1`, turnout 1 is `LT1`.
-    #[must_use]
     pub fn new(mut world: LivingLayout<'l>, seed: u64, switches: JmriSwitches) -> Self {
         let now = world.now();
         let known = |train: TrainId| Locomotive {
@@ -146,13 +145,11 @@ impl<'l> VirtualJmri<'l> {
     }
 
     /// The time.
-    #[must_use]
     pub const fn now(&self) -> Timestamp {
         self.now
     }
 
     /// The functions of a locomotive that are on, F0 in the lowest bit.
-    #[must_use]
     pub fn functions(&self, train: TrainId) -> u32 {
         self.locomotives.iter().find(|known| known.train == train).map_or(0, |known| known.functions)
     }

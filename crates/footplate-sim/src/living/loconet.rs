@@ -119,7 +119,6 @@ enum Next {
 impl<'l> VirtualLocoNet<'l> {
     /// A station in front of a layout, which has been driving the trains on it: it has slots for them, which are not in use. The track has no
     /// power yet. Sensor 0 of the layout is input 1.
-    #[must_use]
     pub fn new(mut world: LivingLayout<'l>, seed: u64, switches: LocoNetSwitches) -> Self {
         let now = world.now();
         let slot = |(number, train): (u8, TrainId)| {
@@ -153,13 +152,11 @@ impl<'l> VirtualLocoNet<'l> {
     }
 
     /// The time.
-    #[must_use]
     pub const fn now(&self) -> Timestamp {
         self.now
     }
 
     /// The functions of a locomotive that are on, F0 in the lowest bit; none of one that is in no slot.
-    #[must_use]
     pub fn functions(&self, train: TrainId) -> u32 {
         let slot = self.slots.iter().find(|slot| slot.data.address == train.0);
         slot.map_or(0, |slot| slot.data.functions | slot.higher_functions)

@@ -67,7 +67,6 @@ impl<'l> LivingLayout<'l> {
     }
 
     /// The circuit that each train was put on: what an operator could enter into a program.
-    #[must_use]
     pub fn homes(&self) -> &[(TrainId, Circuit)] {
         &self.homes
     }

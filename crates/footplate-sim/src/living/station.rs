@@ -48,7 +48,6 @@ pub struct StationSwitches {
 impl StationSwitches {
     /// Interfaces as they occur: latching or not, with answers within 10 to 100 ms, 2 % of answers lost, and one in three that
     /// does not answer requests for a single module.
-    #[must_use]
     pub fn draw(seed: u64, physics: PhysicsRange) -> Self {
         if !physics.includes(PhysicsRange::Interface) {
             return Self::default();
@@ -144,7 +143,6 @@ enum Next {
 
 impl<'l> VirtualStation<'l> {
     /// A station in front of a layout, just switched on.
-    #[must_use]
     pub fn new(world: LivingLayout<'l>, seed: u64, switches: StationSwitches) -> Self {
         let now = world.now();
         Self {
@@ -181,19 +179,16 @@ impl<'l> VirtualStation<'l> {
     }
 
     /// The time.
-    #[must_use]
     pub const fn now(&self) -> Timestamp {
         self.now
     }
 
     /// Whether the station says that it is ready for a byte.
-    #[must_use]
     pub const fn cts(&self) -> bool {
         self.cts.is_up
     }
 
     /// Solenoids that were left powered for too long.
-    #[must_use]
     pub fn alarms(&self) -> &[CoilAlarm] {
         &self.alarms
     }

@@ -32,7 +32,6 @@ pub struct LivingSwitches {
 
 impl LivingSwitches {
     /// A well-kept laboratory: rates of faults chosen from what course reports complain about.
-    #[must_use]
     pub fn well_kept() -> Self {
         Self {
             faults: Faults {
@@ -48,7 +47,6 @@ impl LivingSwitches {
     }
 
     /// The same rails and trains, and nothing that fails.
-    #[must_use]
     pub fn faultless() -> Self {
         Self {
             faults: Faults::default(),

@@ -89,7 +89,6 @@ pub struct PassTruth {
 
 impl<'w, 'l> Truth<'w, 'l> {
     /// A train now.
-    #[must_use]
     pub fn train(&self, train: TrainId) -> Option<TrainTruth> {
         let found = self.found(train)?;
         let place = found.body.as_ref().and_then(Body::place);
@@ -114,25 +113,21 @@ impl<'w, 'l> Truth<'w, 'l> {
     }
 
     /// A train as it was drawn.
-    #[must_use]
     pub fn engine(&self, train: TrainId) -> Option<&'w Train> {
         Some(&*self.found(train)?.train)
     }
 
     /// From the first to the last part of a train that detectors of blocks sense.
-    #[must_use]
     pub fn sensed_length(&self, train: TrainId) -> Option<Length> {
         Some(Length::from_mm(self.found(train)?.sensed().iter().sum()))
     }
 
     /// The usual release delay of a detector.
-    #[must_use]
     pub fn release_delay(&self, detector: SensorId) -> Option<TimeSpan> {
         self.world.s88.release_delay(detector)
     }
 
     /// The rails as they are.
-    #[must_use]
     pub fn track(&self) -> &'w TrueTrack {
         &self.world.rails.track
     }
@@ -140,7 +135,6 @@ impl<'w, 'l> Truth<'w, 'l> {
     /// How far the leading end of a train's shoe is past the place where it closes a sensor, or the first part that detectors
     /// sense past the entry of a block, in true lengths; negative if it is before it. This is the distance since the train
     /// passed it or, if that is shorter, the distance to it as the turnouts lie. `None` if neither is below 20 m.
-    #[must_use]
     pub fn past(&self, train: TrainId, sensor: SensorId) -> Option<Length> {
         let found = self.found(train)?;
         let by = |pass: &&PassTruth| pass.train == Some(train) && pass.sensor == sensor;
@@ -171,7 +165,6 @@ impl<'w, 'l> Truth<'w, 'l> {
 
     /// The path length from one sensor to another for a train: the distance that it would run on level straight rails in
     /// the same time. `edges` lead from the one to the other.
-    #[must_use]
     pub fn path_length(
         &self,
         train: TrainId,
@@ -231,13 +224,11 @@ impl<'w, 'l> Truth<'w, 'l> {
     }
 
     /// Every standstill so far, in the order in which they began.
-    #[must_use]
     pub fn rests(&self) -> &'w [RestTruth] {
         &self.world.rests
     }
 
     /// Every passage of a sensor by a train so far; and every spurious detection, as soon as the station has read it.
-    #[must_use]
     pub fn passes(&self) -> &'w [PassTruth] {
         &self.world.s88.passes
     }

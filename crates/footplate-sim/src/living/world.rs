@@ -40,7 +40,6 @@ pub struct LivingLayout<'l> {
 
 impl<'l> LivingLayout<'l> {
     /// A layout without trains, under power, with rails and turnouts from the seed.
-    #[must_use]
     pub fn without_trains(layout: &'l Layout, seed: u64, switches: &LivingSwitches) -> Self {
         let track =
             if switches.true_rails { TrueTrack::draw(layout, seed) } else { TrueTrack::as_surveyed(layout) };
@@ -79,31 +78,26 @@ impl<'l> LivingLayout<'l> {
     }
 
     /// The layout as its owner knows it.
-    #[must_use]
     pub const fn layout(&self) -> &'l Layout {
         self.rails.layout
     }
 
     /// The time up to which the world has advanced: the next whole millisecond after the time asked for.
-    #[must_use]
     pub const fn now(&self) -> Timestamp {
         self.now
     }
 
     /// All incidents so far, in order.
-    #[must_use]
     pub fn incidents(&self) -> &[Incident] {
         &self.incidents
     }
 
     /// Whether the rails are under power.
-    #[must_use]
     pub const fn is_powered(&self) -> bool {
         self.is_powered
     }
 
     /// The true position of a turnout.
-    #[must_use]
     pub fn lies(&self, turnout: TurnoutId) -> Option<Leg> {
         self.points.lies(turnout)
     }
@@ -123,7 +117,6 @@ impl<'l> LivingLayout<'l> {
     }
 
     /// The truth: for scorers only.
-    #[must_use]
     pub const fn truth(&self) -> Truth<'_, 'l> {
         Truth { world: self }
     }

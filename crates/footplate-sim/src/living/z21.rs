@@ -154,7 +154,6 @@ enum Next {
 impl<'l> VirtualZ21<'l> {
     /// A station in front of a layout, which has been driving the trains on it: it knows which end of each leads. The track has no
     /// power yet. The layout's sensor 0 is input 1 of module 1, its turnout 1 is the first.
-    #[must_use]
     pub fn new(mut world: LivingLayout<'l>, seed: u64, switches: Z21Switches) -> Self {
         let now = world.now();
         let known = |train: TrainId| {
@@ -195,7 +194,6 @@ impl<'l> VirtualZ21<'l> {
     }
 
     /// The time.
-    #[must_use]
     pub const fn now(&self) -> Timestamp {
         self.now
     }

@@ -28,7 +28,6 @@ type Place = [usize; 3];
 ///
 /// The thresholds with the fewest errors may lie at the edge of where it goes wrong: on two of three days of a metro they did, and
 /// missed the stops of the third. So those are taken whose worst neighbour does best, which is the middle of a plateau.
-#[must_use]
 pub fn leave_one_out(days: &[(AccelerometerRecording, StopMarks)]) -> Vec<LeftOutScore> {
     if days.len() < 2 {
         return Vec::new();

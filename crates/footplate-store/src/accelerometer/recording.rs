@@ -108,19 +108,16 @@ impl AccelerometerRecording {
     }
 
     /// What its sensor does with gravity.
-    #[must_use]
     pub fn form(&self) -> SensorForm {
         self.form
     }
 
     /// How many readings it has, and how many more were left out because their time did not go on.
-    #[must_use]
     pub fn rows(&self) -> [usize; 2] {
         [self.readings.len(), self.out_of_order]
     }
 
     /// How long it lasts (s).
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         match (self.readings.first(), self.readings.last()) {
             (Some((first, _)), Some((last, _))) => (*last - *first).as_s(),

@@ -46,7 +46,6 @@ pub struct AccelerometerRide {
 
 impl AccelerometerRide {
     /// Walks a recording.
-    #[must_use]
     pub fn walk(recording: &AccelerometerRecording, thresholds: StandstillThresholds) -> Self {
         let forward = Self::forward(recording, thresholds);
         let axis = forward.unwrap_or_else(|| liveliest(recording));

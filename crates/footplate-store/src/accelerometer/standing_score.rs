@@ -27,7 +27,6 @@ pub struct StandingScore {
 
 impl StandingScore {
     /// Compares a ride with marks.
-    #[must_use]
     pub fn of(ride: &AccelerometerRide, marks: &StopMarks) -> Self {
         let Some([begin, end]) = marks.marked() else { return Self::default() };
         let overlap = |one: [Timestamp; 2], other: [Timestamp; 2]| {
@@ -84,19 +83,16 @@ impl StandingScore {
     }
 
     /// For which part of the time it was right, as it is known afterwards (per cent).
-    #[must_use]
     pub fn right_pct(&self) -> f64 {
         100.0 * (1.0 - self.wrong_s / self.marked_s.max(f64::MIN_POSITIVE))
     }
 
     /// The same as it happened.
-    #[must_use]
     pub fn right_live_pct(&self) -> f64 {
         100.0 * (1.0 - self.wrong_live_s / self.marked_s.max(f64::MIN_POSITIVE))
     }
 
     /// How far marks that were found are off: the median and the most (s); `None` if none was found.
-    #[must_use]
     pub fn off_median_and_most_s(&self) -> Option<[f64; 2]> {
         Some([*self.off_s.get(self.off_s.len() / 2)?, *self.off_s.last()?])
     }

@@ -23,7 +23,6 @@ pub struct StopMarks {
 
 impl StopMarks {
     /// Where the marks of a recording lie: `x_stops.csv` beside `x_accel.csv` or `x.csv`.
-    #[must_use]
     pub fn beside(recording: &Path) -> PathBuf {
         let stem = recording.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let stem = stem.strip_suffix(OF_RECORDING).unwrap_or(&stem);
@@ -85,7 +84,6 @@ impl StopMarks {
     }
 
     /// When the first marked stop began and the last ended; what is before and after is not marked.
-    #[must_use]
     pub fn marked(&self) -> Option<[Timestamp; 2]> {
         let ([first, _], [_, last]) = (self.stops.first()?, self.stops.last()?);
         Some([*first, *last])

@@ -16,7 +16,6 @@ use crate::quantity::Quantity;
 
 impl Findings {
     /// The report of a batch.
-    #[must_use]
     pub fn of(layout: &Layout, batch: &Batch) -> Self {
         Self {
             model_version: MOTION_MODEL_VERSION.to_owned(),
@@ -29,7 +28,6 @@ impl Findings {
 
 impl BatchTrain {
     /// The motion model of the train, for a file or a store.
-    #[must_use]
     pub fn file(&self, layout: &Layout) -> MotionFile {
         MotionFile::of(layout, self.replay.fit.model(), self.replay.newest)
     }

@@ -27,7 +27,6 @@ pub struct Drawing {
 
 impl Drawing {
     /// The point of a node's place.
-    #[must_use]
     pub fn point(&self, node: NodeId) -> Option<[f64; 2]> {
         self.points.get(&place(node)).copied()
     }

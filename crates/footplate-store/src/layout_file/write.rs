@@ -11,7 +11,6 @@ use crate::decimal::unscaled;
 use crate::sensor_names::{ModuleLetters, SensorNames};
 
 /// The text of a layout file. Lengths are rounded to a nanometre.
-#[must_use]
 pub fn write_layout(file: &LayoutFile) -> String {
     let LayoutFile { layout, about, drawing } = file;
     let survey = layout.survey();

@@ -63,7 +63,6 @@ fn stop(node: &Node) -> Result<Stop, Fault> {
 
 /// The text of a line's file; reading it gives the same line, but for the last bit of a speed that is no decimal
 /// number of km/h.
-#[must_use]
 pub fn write_line(line: &LineProfile, about: &str) -> String {
     let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
     let mut text = format!("format = {FORMAT}\nname = {}\n", quoted(line.name()));

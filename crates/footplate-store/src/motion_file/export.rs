@@ -13,7 +13,6 @@ use crate::quantity::Quantity;
 
 impl MotionFile {
     /// The file form of a model. `newest`: the time of the last event that it was fitted to, since the Unix epoch.
-    #[must_use]
     pub fn of(layout: &Layout, model: &MotionModel, newest: Option<Timestamp>) -> Self {
         let sections = SectionIndex::of(layout);
         let numbers = model.numbers();

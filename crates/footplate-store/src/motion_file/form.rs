@@ -107,7 +107,6 @@ pub struct MotionStepForm {
 
 impl MotionStepForm {
     /// Whether its speed was measured: two detections at least, as a single one fixes a position but no speed.
-    #[must_use]
     pub const fn is_measured(&self) -> bool {
         self.speed.measurements > 1
     }

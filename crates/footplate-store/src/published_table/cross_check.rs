@@ -49,19 +49,16 @@ pub struct CheckedFigure {
 
 impl CheckedFigure {
     /// Our value minus theirs, in percent of theirs.
-    #[must_use]
     pub fn difference_percent(&self) -> f64 {
         100.0 * (self.ours[0] / self.theirs - 1.0)
     }
 
     /// The difference in standard deviations.
-    #[must_use]
     pub fn sigmas(&self) -> f64 {
         libm::log(self.ours[0] / self.theirs) / self.sigma
     }
 
     /// Whether chance explains the difference.
-    #[must_use]
     pub fn agrees(&self) -> bool {
         self.sigmas().abs() <= AGREES_WITHIN
     }
@@ -176,7 +173,6 @@ impl CrossCheck {
     }
 
     /// The summary of each team, in the order of their names.
-    #[must_use]
     pub fn by_team(figures: &[CheckedFigure]) -> Vec<TeamSummary> {
         let mut teams: BTreeMap<&str, Vec<&CheckedFigure>> = BTreeMap::new();
         for figure in figures {

@@ -32,7 +32,6 @@ pub struct ReferenceScore {
 impl ReferenceScore {
     /// Our median error over the reference's, on the detections that both forecast: below 1 we are better. Two medians
     /// of zero are equal.
-    #[must_use]
     pub fn ratio(&self) -> Option<f64> {
         let (ours, theirs) = (self.ours.median_abs_mm?, self.score.median_abs_mm?);
         Some(if ours == theirs { 1.0 } else { ours / theirs })
@@ -41,7 +40,6 @@ impl ReferenceScore {
 
 impl Comparison {
     /// The scores over a selection.
-    #[must_use]
     pub fn of<'a>(hits: impl Iterator<Item = &'a ScoredHit> + Clone) -> Self {
         let references = ReferenceForecaster::ALL.map(|reference| ReferenceScore {
             reference,
@@ -58,13 +56,11 @@ impl Comparison {
     }
 
     /// The share of correctly named sensors; `None` if none was named.
-    #[must_use]
     pub fn named_correctly(&self) -> Option<f64> {
         (self.named > 0).then(|| self.right as f64 / self.named as f64)
     }
 
     /// The score of one reference.
-    #[must_use]
     pub fn reference(&self, reference: ReferenceForecaster) -> Option<&ReferenceScore> {
         self.references.iter().find(|score| score.reference == reference)
     }

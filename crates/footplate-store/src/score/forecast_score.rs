@@ -32,7 +32,6 @@ pub struct ForecastScore {
 
 impl ForecastScore {
     /// The score of our estimator.
-    #[must_use]
     pub fn of<'a>(hits: impl Iterator<Item = &'a ScoredHit> + Clone) -> Self {
         let levels: Vec<f64> = hits.clone().filter_map(ScoredHit::level).collect();
         let coverage = |level: f64| Coverage {
@@ -47,7 +46,6 @@ impl ForecastScore {
     }
 
     /// The score of a reference, over the detections that both forecast.
-    #[must_use]
     pub fn of_reference<'a>(
         hits: impl Iterator<Item = &'a ScoredHit> + Clone,
         reference: ReferenceForecaster,
@@ -56,7 +54,6 @@ impl ForecastScore {
     }
 
     /// The score of our estimator over the detections that a reference forecast, too.
-    #[must_use]
     pub fn of_ours_beside<'a>(
         hits: impl Iterator<Item = &'a ScoredHit> + Clone,
         reference: ReferenceForecaster,

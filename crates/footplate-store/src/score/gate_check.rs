@@ -41,7 +41,6 @@ pub struct GateCheck {
 
 impl GateCheck {
     /// The estimated speed minus the speed between the gates.
-    #[must_use]
     pub fn excess(&self) -> Speed {
         self.estimated.value - self.spot
     }
@@ -72,7 +71,6 @@ pub struct GateAgreement {
 
 impl GateAgreement {
     /// The statistics of all checks; `None` without a check.
-    #[must_use]
     pub fn of<'a>(checks: impl Iterator<Item = &'a GateCheck>) -> Option<Self> {
         let checks: Vec<&GateCheck> = checks.collect();
         let column =
@@ -95,7 +93,6 @@ impl GateAgreement {
 
 impl GateAgreement {
     /// The statistics of each train.
-    #[must_use]
     pub fn by_train<'a>(checks: impl Iterator<Item = &'a GateCheck>) -> BTreeMap<TrainId, Self> {
         let mut trains: BTreeMap<TrainId, Vec<&GateCheck>> = BTreeMap::new();
         for check in checks {

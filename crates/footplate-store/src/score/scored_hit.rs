@@ -25,31 +25,26 @@ pub struct ScoredHit {
 
 impl ScoredHit {
     /// When the sensor was reported.
-    #[must_use]
     pub const fn reported(&self) -> Timestamp {
         self.hit.passage.window.until
     }
 
     /// The commanded step.
-    #[must_use]
     pub const fn step(&self) -> SpeedStep {
         self.hit.passage.drive.step
     }
 
     /// The phase of motion on the path; `None` without a forecast.
-    #[must_use]
     pub fn phase(&self) -> Option<Phase> {
         self.hit.forecast.map(|forecast| forecast.phase)
     }
 
     /// The delay against our forecast.
-    #[must_use]
     pub fn late(&self) -> Option<TimeSpan> {
         self.hit.forecast.map(|forecast| forecast.detection_error(self.reported()))
     }
 
     /// The delay against the forecast of a reference.
-    #[must_use]
     pub fn late_by(&self, reference: ReferenceForecaster) -> Option<TimeSpan> {
         let expected = self.references.get(reference as usize).copied().flatten()?;
         Some(self.reported() - expected)
@@ -57,14 +52,12 @@ impl ScoredHit {
 
     /// A delay at this sensor in millimetres: at the speed that our estimator forecasts there, for all forecasters
     /// alike.
-    #[must_use]
     pub fn distance_mm(&self, late: TimeSpan) -> Option<f64> {
         self.hit.forecast.map(|forecast| (forecast.speed * late).as_mm())
     }
 
     /// The level of the narrowest central interval of our forecast that contains the report: 0 in the middle, 1 far
     /// outside.
-    #[must_use]
     pub fn level(&self) -> Option<f64> {
         self.hit.forecast.map(|forecast| (2.0 * forecast.probability_by(self.reported()) - 1.0).abs())
     }

@@ -23,7 +23,6 @@ pub struct Forecasters {
 
 impl Forecasters {
     /// Forecasters that know the layout, but no train.
-    #[must_use]
     pub fn of_layout(layout: &Layout) -> Self {
         Self { predictor: Predictor::new(layout), baselines: Baselines::default() }
     }
@@ -44,7 +43,6 @@ pub struct ScoredRecording {
 
 impl ScoredRecording {
     /// The trains that ran, by number.
-    #[must_use]
     pub fn trains(&self) -> Vec<TrainId> {
         let mut trains: Vec<TrainId> = self.hits.iter().map(|hit| hit.train).collect();
         trains.sort_unstable();
@@ -53,7 +51,6 @@ impl ScoredRecording {
     }
 
     /// The comparison over all of it.
-    #[must_use]
     pub fn comparison(&self) -> Comparison {
         Comparison::of(self.hits.iter())
     }

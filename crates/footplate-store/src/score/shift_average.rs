@@ -19,7 +19,6 @@ impl ShiftAverage {
     const LARGEST_VALUE: i64 = 1 << 46;
 
     /// A mean with α = 2⁻ˢʰⁱᶠᵗ; shifts are limited to [`LARGEST_SHIFT`](Self::LARGEST_SHIFT).
-    #[must_use]
     pub(super) const fn new(shift: u32) -> Self {
         let shift = if shift > Self::LARGEST_SHIFT { Self::LARGEST_SHIFT } else { shift };
         Self { shift, scaled_mean: None }
@@ -44,7 +43,6 @@ impl ShiftAverage {
     }
 
     /// The mean, rounded down to a whole unit; `None` before the first value.
-    #[must_use]
     pub(super) const fn mean(&self) -> Option<i64> {
         match self.scaled_mean {
             None => None,

@@ -30,7 +30,6 @@ impl HoldOut {
     }
 
     /// Scores a profile for a decoder with this highest step.
-    #[must_use]
     pub fn of(profile: &SpeedProfile, highest: SpeedStep) -> Self {
         let (motion, _) = profile.stated();
         let mut speeds = motion.speeds.clone();

@@ -31,7 +31,6 @@ pub struct ModelRow {
 impl ModelRow {
     /// The rows of all steps that have moved the train. Other steps are extrapolations, which no other program could tell from
     /// measurements.
-    #[must_use]
     pub fn of_model(model: &MotionModel) -> Vec<Self> {
         let highest = f64::from(model.highest().get());
         let steps = (1..=model.highest().get()).filter_map(SpeedStep::new);
@@ -54,7 +53,6 @@ impl ModelRow {
 }
 
 /// The rows as CSV. A motion model has one speed for both directions.
-#[must_use]
 pub fn write_profile_table(rows: &[ModelRow]) -> String {
     let mut text =
         "step,forward_mm_s,reverse_mm_s,uncertainty_mm_s,stop_mm,stop_uncertainty_mm,stop_scatter_mm,stop_s,\

@@ -133,7 +133,6 @@ impl SpeedProfile {
     }
 
     /// The motion model of a train that begins with this profile and has not run yet.
-    #[must_use]
     pub fn beginning(&self, train: TrainId, highest: SpeedStep) -> MotionModel {
         let mut fit = MotionFit::new(train, highest);
         fit.take_stated(&self.stated().0);
@@ -142,7 +141,6 @@ impl SpeedProfile {
 
     /// The measurements for a motion fit, and which entry each is of. A motion model has one speed for both directions, so forward
     /// and reverse are two measurements of it, unless one number was written for both.
-    #[must_use]
     pub fn stated(&self) -> (StatedMotion, Vec<usize>) {
         let mut of = Vec::new();
         let mut motion = StatedMotion {

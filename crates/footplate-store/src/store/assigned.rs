@@ -52,14 +52,12 @@ impl AssignedDetections {
     }
 
     /// Whether any report was assigned to a train.
-    #[must_use]
     pub fn knows(&self, train: TrainId) -> bool {
         self.of_reports.values().any(|of| of.train == train)
     }
 
     /// An event as part of what a train did: a command to it, a report that was assigned to it, of the sensor that it was taken to have
     /// passed, or a turnout on its path. `None` if the event is not part of that.
-    #[must_use]
     pub fn own(&self, layout: &Layout, train: TrainId, event: &Event) -> Option<Event> {
         let is_own = match event.kind {
             EventKind::Sensor(report) => {
@@ -79,7 +77,6 @@ impl AssignedDetections {
 
     /// Whether a train was lost, or put elsewhere by an operator, between two times, the second included, so that where it came from is
     /// unknown. Its first report after that may be one that a person has excluded.
-    #[must_use]
     pub fn was_lost(&self, train: TrainId, after: Timestamp, until: Timestamp) -> bool {
         let between = (after, SensorId(u16::MAX))..=(until, SensorId(u16::MAX));
         after < until

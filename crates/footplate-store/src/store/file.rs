@@ -96,7 +96,6 @@ impl Store {
 
     /// What the last commit in the log beside a store that was opened to be read lacks: the power was cut in it, or it was damaged later,
     /// which look alike. Without it the store is sound.
-    #[must_use]
     pub fn cut_commit(&self) -> Option<String> {
         self.unread_log.as_ref().filter(|unread| !unread.is_loss()).map(ToString::to_string)
     }
@@ -162,7 +161,6 @@ impl Store {
     }
 
     /// Its path.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }

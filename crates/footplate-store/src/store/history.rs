@@ -33,7 +33,6 @@ pub struct StoredRecording {
 
 impl StoredRecording {
     /// Whether it is a live session and not an imported file.
-    #[must_use]
     pub fn is_live(&self) -> bool {
         self.form == LIVE
     }
@@ -58,7 +57,6 @@ pub struct StoredRun {
 
 impl StoredRun {
     /// The run without excluded events, for estimators.
-    #[must_use]
     pub fn accepted(&self) -> Run {
         let events = self.events.iter().filter(|stored| !stored.is_excluded());
         Run {
@@ -84,7 +82,6 @@ pub struct StoredEvent {
 
 impl StoredEvent {
     /// Whether it is excluded.
-    #[must_use]
     pub fn is_excluded(&self) -> bool {
         self.mark.as_ref().is_some_and(|mark| mark.kind == MarkKind::Excluded)
     }
@@ -119,7 +116,6 @@ pub enum Change {
 
 impl Change {
     /// The time of the change.
-    #[must_use]
     pub const fn at(&self) -> Timestamp {
         match self {
             Self::Measured { at, .. } | Self::Calibrated { at, .. } => *at,

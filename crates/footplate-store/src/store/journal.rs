@@ -29,7 +29,6 @@ pub enum JournalEntry {
 
 impl JournalEntry {
     /// The event, if it is one.
-    #[must_use]
     pub const fn event(&self) -> Option<&Event> {
         match self {
             Self::Event(event) => Some(event),
@@ -158,19 +157,16 @@ impl Journal {
     }
 
     /// The number of events of the session on disk.
-    #[must_use]
     pub const fn acknowledged(&self) -> u64 {
         self.acknowledged
     }
 
     /// The session's number among the recordings.
-    #[must_use]
     pub const fn recording(&self) -> RecordingKey {
         self.recording
     }
 
     /// Its store.
-    #[must_use]
     pub const fn store(&self) -> &Store {
         &self.store
     }

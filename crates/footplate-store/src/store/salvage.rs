@@ -39,7 +39,6 @@ pub struct Salvaged {
 impl Salvaged {
     /// Whether all rows were copied, as far as pages and numbers show: damage that turns a value into another possible one is
     /// not visible there.
-    #[must_use]
     pub fn is_all(&self) -> bool {
         let is_lost = |table: &SalvagedTable| table.lost + table.stand_ins > 0 || !table.is_end_known;
         self.damage.is_none()

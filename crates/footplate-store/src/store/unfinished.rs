@@ -63,7 +63,6 @@ impl Store {
 
     /// Every train that the store names, by number. Of a damaged store those that can be read: trains are stopped with them,
     /// and some are better than none.
-    #[must_use]
     pub fn known_trains(&self) -> Vec<TrainId> {
         self.trains_with(self.newest_machine().ok().flatten().as_ref())
     }

@@ -53,27 +53,23 @@ pub struct Truth {
 
 impl TachometerBlock {
     /// How many rows it has.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.times.len()
     }
 
     /// Whether it has no row.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.times.is_empty()
     }
 
     /// The number of the run that a row belongs to, counted from 0 in the order of first appearance.
     #[inline]
-    #[must_use]
     pub fn run(&self, row: usize) -> usize {
         self.runs.get(row).map_or(0, |run| *run as usize)
     }
 
     /// What was read in the period of a row; one of which nothing is known if there is no such row.
     #[inline]
-    #[must_use]
     pub fn period(&self, row: usize) -> Period {
         Period {
             time: self.times.get(row).copied().unwrap_or_default(),
@@ -87,7 +83,6 @@ impl TachometerBlock {
 
     /// What really happened in the period of a row.
     #[inline]
-    #[must_use]
     pub fn truth(&self, row: usize) -> Truth {
         let speed = |quantity| self.number(row, quantity).map(Speed::from_m_per_s);
         Truth {
@@ -98,7 +93,6 @@ impl TachometerBlock {
     }
 
     /// The median time between the first rows of a run in this block; `None` where they are too few.
-    #[must_use]
     pub fn usual_step(&self, run: usize) -> Option<TimeSpan> {
         let rows = (0..self.len()).filter(|row| self.run(*row) == run).take(JUDGED_ROWS);
         let times: Vec<Timestamp> = rows.filter_map(|row| self.times.get(row).copied()).collect();

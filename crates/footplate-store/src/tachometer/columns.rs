@@ -136,19 +136,16 @@ impl TachometerColumns {
     }
 
     /// Whether the recording says how fast the train really ran.
-    #[must_use]
     pub fn has_true_speed(&self) -> bool {
         self.slots.contains(&Slot::Number(Quantity::TrueSpeed))
     }
 
     /// Whether the recording says how far the train really went.
-    #[must_use]
     pub fn has_true_distance(&self) -> bool {
         self.slots.contains(&Slot::Number(Quantity::TrueDistance))
     }
 
     /// Whether the recording holds many runs, each with its name.
-    #[must_use]
     pub fn has_run_ids(&self) -> bool {
         self.slots.contains(&Slot::Run)
     }

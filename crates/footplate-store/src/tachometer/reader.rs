@@ -116,7 +116,6 @@ impl TachometerReader {
     }
 
     /// The columns it has.
-    #[must_use]
     pub fn columns(&self) -> &TachometerColumns {
         match &self.form {
             Form::Csv(reader) => reader.columns(),
@@ -126,7 +125,6 @@ impl TachometerReader {
     }
 
     /// How much there is to read, in bytes of a text and in rows of a table; unknown of a stream.
-    #[must_use]
     pub fn extent(&self) -> Option<u64> {
         self.extent
     }

@@ -110,7 +110,6 @@ fn tractive_effort(traction: &Table<'_>) -> Result<TractiveEffort, Fault> {
 }
 
 /// The text of a train file; it reads back as the same train, to the last bit.
-#[must_use]
 pub fn write_train(train: &Train, about: &str) -> String {
     let quoted = |text: &str| toml::Value::String(text.to_owned()).to_string();
     let mut text = format!("format = {FORMAT}\nname = {}\n", quoted(&train.name));

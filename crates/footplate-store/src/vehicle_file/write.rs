@@ -9,7 +9,6 @@ use super::keys::{BRAKE_COMMAND, Key, SLIDE_PROTECTION, THRESHOLDS};
 use super::read::VehicleFile;
 
 /// The text of a vehicle file. What follows from the rest is left out.
-#[must_use]
 pub fn write_vehicle(file: &VehicleFile) -> String {
     let VehicleFile { name, vehicle } = file;
     let mut text = format!("name = {}\n", toml::Value::String(name.clone()));

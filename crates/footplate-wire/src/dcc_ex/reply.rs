@@ -113,7 +113,6 @@ impl Reply {
     }
 
     /// Whether the tracks on which trains run have power, if that is what it says.
-    #[must_use]
     pub fn main_power(&self) -> Option<bool> {
         match self {
             Self::Power { on, track } if MAIN_TRACKS.contains(&track.as_str()) => Some(*on),

@@ -116,14 +116,12 @@ pub enum Request {
 
 /// The board's speed for a step of a decoder: all steps are equally far apart, and the highest is the highest. `None` beyond the
 /// highest step.
-#[must_use]
 pub fn speed_of(step: SpeedStep, decoder: DecoderSteps) -> Option<u8> {
     decoder.scaled(step, HIGHEST_SPEED)
 }
 
 impl Request {
     /// Reads the text between the brackets; `None` for what the board would answer with `<X>`.
-    #[must_use]
     pub fn read(text: &str) -> Option<Self> {
         let (opcode, rest) = text.split_at_checked(1)?;
         let mut words = Words(rest.split_ascii_whitespace());

@@ -54,7 +54,6 @@ pub struct Client {
 
 impl Client {
     /// A session over a line that has just been opened.
-    #[must_use]
     pub fn new(now: Timestamp, settings: Settings) -> Self {
         let mut client = Self {
             settings,

@@ -65,7 +65,6 @@ pub enum Reply {
 
 impl Reply {
     /// The line of a message, with its end.
-    #[must_use]
     pub fn text(&self) -> String {
         line_of(&self.write())
     }

@@ -47,7 +47,6 @@ pub enum Request {
 
 impl Request {
     /// The line of a request, with its end.
-    #[must_use]
     pub fn text(&self) -> String {
         line_of(&match self {
             Self::Ping => json!({ "type": "ping" }),

@@ -56,7 +56,6 @@ pub struct Client {
 
 impl Client {
     /// A session over a line that has just been opened.
-    #[must_use]
     pub fn new(now: Timestamp, settings: Settings) -> Self {
         let mut client = Self {
             settings,
@@ -75,13 +74,11 @@ impl Client {
     }
 
     /// How JMRI is taken to name sensors and turnouts.
-    #[must_use]
     pub const fn settings(&self) -> &Settings {
         &self.settings
     }
 
     /// The system that the layout is connected to.
-    #[must_use]
     pub const fn system(&self) -> &System {
         &self.system
     }

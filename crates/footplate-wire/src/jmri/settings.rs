@@ -72,25 +72,21 @@ pub struct System {
 
 impl System {
     /// The system name of a sensor.
-    #[must_use]
     pub fn sensor(&self, number: u16) -> String {
         format!("{}S{number}", self.prefix)
     }
 
     /// The system name of a turnout.
-    #[must_use]
     pub fn turnout(&self, number: u16) -> String {
         format!("{}T{number}", self.prefix)
     }
 
     /// The number in the system name of a sensor; `None` for one of another system, or without a number.
-    #[must_use]
     pub fn number_of_sensor(&self, name: &str) -> Option<u16> {
         name.strip_prefix(&*self.prefix)?.strip_prefix('S')?.parse().ok()
     }
 
     /// The number in the system name of a turnout; `None` as for sensors.
-    #[must_use]
     pub fn number_of_turnout(&self, name: &str) -> Option<u16> {
         name.strip_prefix(&*self.prefix)?.strip_prefix('T')?.parse().ok()
     }

@@ -52,7 +52,6 @@ impl FunctionGroup {
     const ALL: [Self; 5] = [Self::Direction, Self::Sound, Self::F9To12, Self::F13To20, Self::F21To28];
 
     /// The group of a function.
-    #[must_use]
     pub fn of(function: FunctionNumber) -> Self {
         let has = |group: &Self| group.mask() & function.bit() != 0;
         Self::ALL.into_iter().find(has).unwrap_or(Self::F21To28)

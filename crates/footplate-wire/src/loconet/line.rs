@@ -54,7 +54,6 @@ impl Line {
     }
 
     /// The text of a line, with its end.
-    #[must_use]
     pub fn text(&self) -> String {
         let with = |word: &str, message: &Message| {
             let mut line = String::from(word);

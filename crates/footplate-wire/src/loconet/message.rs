@@ -188,7 +188,6 @@ impl Message {
     }
 
     /// The bytes on the bus; none for a message of another kind.
-    #[must_use]
     pub fn encode(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         match *self {

@@ -24,7 +24,6 @@ const FIRST_INTERROGATION: u16 = 1_017;
 
 /// The speed of a slot for a step of a decoder: all steps are equally far apart, and the highest is the highest. `None` beyond
 /// the highest step.
-#[must_use]
 pub fn speed_of(step: SpeedStep, decoder: DecoderSteps) -> Option<u8> {
     match decoder.scaled(step, SpeedStep::HIGHEST)? {
         0 => Some(0),

@@ -73,7 +73,6 @@ pub struct Client {
 
 impl Client {
     /// A session over a line that has just been opened.
-    #[must_use]
     pub fn new(now: Timestamp, settings: Settings) -> Self {
         let mut client = Self {
             settings,
@@ -97,7 +96,6 @@ impl Client {
     }
 
     /// What the bus is taken to be like.
-    #[must_use]
     pub const fn settings(&self) -> &Settings {
         &self.settings
     }

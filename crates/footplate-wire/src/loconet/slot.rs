@@ -52,7 +52,6 @@ impl SlotData {
     pub const FUNCTIONS: u32 = FunctionGroup::Direction.mask() | FunctionGroup::Sound.mask();
 
     /// What it says of its use.
-    #[must_use]
     pub const fn slot_use(&self) -> SlotUse {
         match (self.status & USE) >> 4 {
             0 => SlotUse::Free,
@@ -76,13 +75,11 @@ impl SlotData {
     }
 
     /// Whether the track has power.
-    #[must_use]
     pub const fn is_powered(&self) -> bool {
         self.track & POWER != 0
     }
 
     /// The bits of a track with power, or without it.
-    #[must_use]
     pub const fn track_bits(is_powered: bool, is_stopped: bool) -> u8 {
         (if is_powered { POWER } else { 0 }) | if is_stopped { 0 } else { RUNS }
     }

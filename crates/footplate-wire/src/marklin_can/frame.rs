@@ -30,7 +30,6 @@ pub struct Payload {
 
 impl Payload {
     /// Up to eight bytes; `None` if there are more.
-    #[must_use]
     pub fn of(data: &[u8]) -> Option<Self> {
         let mut bytes = [0; MOST_DATA];
         bytes.get_mut(..data.len())?.copy_from_slice(data);
@@ -38,7 +37,6 @@ impl Payload {
     }
 
     /// The bytes.
-    #[must_use]
     pub fn as_slice(&self) -> &[u8] {
         self.bytes.get(..usize::from(self.length)).unwrap_or_default()
     }
@@ -62,7 +60,6 @@ pub struct Frame {
 
 impl Frame {
     /// The identifier of 29 bits.
-    #[must_use]
     pub const fn identifier(&self) -> u32 {
         ((self.priority & 0x0F) as u32) << 25
             | (self.command as u32) << 17
@@ -71,7 +68,6 @@ impl Frame {
     }
 
     /// A frame of an identifier; `None` if that has more than 29 bits.
-    #[must_use]
     pub fn with_identifier(identifier: u32, data: Payload) -> Option<Self> {
         let [top, second, high, low] = identifier.to_be_bytes();
         (identifier <= HIGHEST_IDENTIFIER).then_some(Self {
@@ -84,7 +80,6 @@ impl Frame {
     }
 
     /// The bytes on a network.
-    #[must_use]
     pub const fn encode(&self) -> [u8; FRAME_BYTES] {
         let [i0, i1, i2, i3] = self.identifier().to_be_bytes();
         let [d0, d1, d2, d3, d4, d5, d6, d7] = self.data.bytes;
@@ -93,7 +88,6 @@ impl Frame {
 
     /// Reads what [`encode`](Self::encode) writes; `None` for an identifier or a length that no frame has. What pads the data is
     /// not looked at.
-    #[must_use]
     pub fn decode(bytes: [u8; FRAME_BYTES]) -> Option<Self> {
         let [i0, i1, i2, i3, length, data @ ..] = bytes;
         let data = Payload::of(data.get(..usize::from(length))?)?;
@@ -101,7 +95,6 @@ impl Frame {
     }
 
     /// The text that an adapter is written, without the carriage return.
-    #[must_use]
     pub fn to_text(&self) -> String {
         let mut text = String::from(TEXT_BEGINS);
         let data = self.data.as_slice();
@@ -114,7 +107,6 @@ impl Frame {
     }
 
     /// Reads a line of an adapter, without the carriage return. A time stamp of four digits may follow the data.
-    #[must_use]
     pub fn of_text(line: &str) -> Option<Self> {
         let rest = line.strip_prefix(TEXT_BEGINS)?;
         let (identifier, rest) = rest.split_at_checked(8)?;
@@ -134,7 +126,6 @@ impl Frame {
 }
 
 /// The hash that a participant with a number puts into its frames: both halves of the number combined, with bits 8 and 9 set and bit 7 left out.
-#[must_use]
 pub const fn hash_of(uid: u32) -> u16 {
     let combined = ((uid >> 16) ^ (uid & 0xFFFF)) as u16;
     ((combined << 3) & 0xFF00) | 0x0300 | (combined & 0x7F)

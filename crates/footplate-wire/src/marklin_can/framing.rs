@@ -24,7 +24,6 @@ pub struct Framing {
 
 impl Framing {
     /// Nothing has arrived yet.
-    #[must_use]
     pub const fn new(transport: Transport) -> Self {
         Self { transport, held: Vec::new(), unread: 0, refused: 0 }
     }

@@ -46,7 +46,6 @@ pub enum Direction {
 
 impl Direction {
     /// Forward or backward.
-    #[must_use]
     pub const fn of(forward: bool) -> Self {
         if forward { Self::Forward } else { Self::Backward }
     }
@@ -197,7 +196,6 @@ pub enum Message {
 
 impl Message {
     /// What a frame says.
-    #[must_use]
     pub fn of(frame: &Frame) -> Self {
         let unknown = Self::Unknown { command: frame.command, data: frame.data };
         Self::known(frame.command, frame.data.as_slice()).unwrap_or(unknown)
@@ -344,7 +342,6 @@ impl Message {
 }
 
 /// A kind of device in words, as stations were seen to name themselves.
-#[must_use]
 pub const fn kind_in_words(kind: u16) -> &'static str {
     match kind {
         0x0000 => "a track processor",

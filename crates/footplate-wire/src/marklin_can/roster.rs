@@ -89,7 +89,6 @@ impl Roster {
 }
 
 /// Reads the list from a whole stream without its padding; `None` if it is damaged, or another of the station's files.
-#[must_use]
 pub fn read_list(stream: &[u8]) -> Option<Vec<ListedLocomotive>> {
     let (_, compressed) = stream.split_first_chunk::<4>()?;
     let text = decompress_to_vec_zlib_with_limit(compressed, LONGEST_TEXT).ok()?;
@@ -125,7 +124,6 @@ fn number(value: &str) -> Option<u32> {
 }
 
 /// The check sum of a stream: CCITT's polynomial 0x1021, from 0xFFFF, over the stream and its padding.
-#[must_use]
 pub fn check_sum(stream: &[u8]) -> u16 {
     let padding = stream.len().next_multiple_of(MOST_DATA) - stream.len();
     let bytes = stream.iter().copied().chain(core::iter::repeat_n(0, padding));

@@ -84,7 +84,6 @@ enum Query {
 
 impl Client {
     /// A session over a line that has just been opened.
-    #[must_use]
     pub fn new(now: Timestamp, settings: Settings) -> Self {
         let checks = match settings.transport {
             Transport::Network => NETWORK_CHECKS,
@@ -112,13 +111,11 @@ impl Client {
     }
 
     /// What it was opened with.
-    #[must_use]
     pub const fn settings(&self) -> &Settings {
         &self.settings
     }
 
     /// The locomotives that the station has listed.
-    #[must_use]
     pub fn listed_locomotives(&self) -> &[ListedLocomotive] {
         self.roster.list()
     }

@@ -7,14 +7,12 @@ pub const HIGHEST_SPEED: u16 = 1000;
 
 /// The speed of a step of `n`: the greatest whole number not above step × 1000 / n, so that it is the same step of the decoder whether
 /// the station rounds to the nearest step or up. `None` beyond the highest step.
-#[must_use]
 pub fn speed_of(step: SpeedStep, decoder: DecoderSteps) -> Option<u16> {
     let share = u32::from(step.get()) * u32::from(HIGHEST_SPEED) / u32::from(decoder.highest().get());
     u16::try_from(share).ok().filter(|speed| *speed <= HIGHEST_SPEED)
 }
 
 /// The step that is nearest to a speed: what a station answers may be rounded to the steps of a decoder. None but 0 stands.
-#[must_use]
 pub fn step_of(speed: u16, decoder: DecoderSteps) -> SpeedStep {
     let speed = u32::from(speed.min(HIGHEST_SPEED));
     let (steps, whole) = (u32::from(decoder.highest().get()), u32::from(HIGHEST_SPEED));

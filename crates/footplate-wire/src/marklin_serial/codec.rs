@@ -164,7 +164,6 @@ impl Message {
     }
 
     /// Reads the first message of a stream and returns what follows it, or `None` while its last byte is missing.
-    #[must_use]
     pub fn decode(bytes: &[u8]) -> Option<(Self, &[u8])> {
         let (&first, rest) = bytes.split_first()?;
         if let Some(message) = Self::of_one_byte(first) {
@@ -225,7 +224,6 @@ impl Message {
 
 impl Frame {
     /// The bytes in the order in which they are sent.
-    #[must_use]
     pub fn as_bytes(&self) -> &[u8] {
         match self {
             Self::One(bytes) => bytes,

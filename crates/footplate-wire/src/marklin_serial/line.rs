@@ -29,7 +29,6 @@ pub const SOLENOID_HOLD_LONGEST: TimeSpan = TimeSpan::from_ms(500);
 pub const TIME_MODEL: TimeModel = TimeModel::POLLED_2400_BAUD;
 
 /// How long a number of bytes without gaps occupies the line.
-#[must_use]
 pub const fn time_on_line(bytes: u32) -> TimeSpan {
     TimeSpan::from_ns(BITS_PER_BYTE * NS_PER_S * bytes as i64 / BITS_PER_S)
 }

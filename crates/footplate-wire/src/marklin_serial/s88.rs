@@ -38,7 +38,6 @@ pub enum ReplyError {
 
 impl ModuleState {
     /// A module on which these inputs are closed, and no others; inputs of other modules do not count.
-    #[must_use]
     pub fn with_closed(module: u8, inputs: impl IntoIterator<Item = SensorId>) -> Self {
         let open = Self { module, closed: 0 };
         let bits = inputs.into_iter().filter_map(|input| open.bit_of(input));
@@ -52,7 +51,6 @@ impl ModuleState {
     }
 
     /// Reads what [`encode`](Self::encode) writes.
-    #[must_use]
     pub fn decode(module: u8, reply: [u8; BYTES_PER_MODULE]) -> Self {
         Self { module, closed: u16::from_be_bytes(reply) }
     }

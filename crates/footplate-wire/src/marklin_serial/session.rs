@@ -104,19 +104,16 @@ impl Interface {
     }
 
     /// How many sensor modules are read.
-    #[must_use]
     pub const fn modules(&self) -> u8 {
         self.settings.modules
     }
 
     /// Which reads of sensor modules the interface answers; `None` until that has been tried.
-    #[must_use]
     pub fn module_reads(&self) -> Option<ModuleReads> {
         self.polls.reads()
     }
 
     /// How much later than its bytes take a reply comes, the latest of late; `None` before the first.
-    #[must_use]
     pub fn reply_lateness(&self) -> Option<TimeSpan> {
         self.reply_time.usual()
     }

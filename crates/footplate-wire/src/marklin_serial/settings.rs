@@ -21,13 +21,11 @@ pub struct Settings {
 
 impl Settings {
     /// A line with a hand-shake that ends at this computer.
-    #[must_use]
     pub const fn with_cts(modules: u8) -> Self {
         Self { modules, pace: Pace::Cts, reply_allowance: REPLY_ALLOWANCE, light: true }
     }
 
     /// The same line without the hand-shake.
-    #[must_use]
     pub const fn timed(modules: u8, pace: Pace) -> Self {
         Self { pace, ..Self::with_cts(modules) }
     }

@@ -24,7 +24,6 @@ pub struct ThrottleKey {
 
 impl ThrottleKey {
     /// Reads `S24` or `L1234`.
-    #[must_use]
     pub fn read(text: &str) -> Option<Self> {
         let is_long = match text.chars().next()? {
             'S' => false,
@@ -132,7 +131,6 @@ pub enum ClientLine {
 
 impl ClientLine {
     /// Reads a line without its end; `None` for one that means nothing to this server.
-    #[must_use]
     pub fn read(line: &str) -> Option<Self> {
         let first = line.chars().next()?;
         let rest = line.get(first.len_utf8()..)?;

@@ -176,7 +176,6 @@ pub struct Phone {
 
 impl Phone {
     /// A conversation that begins now, with the lines that tell the phone what there is.
-    #[must_use]
     pub fn connected(now: Timestamp, roster: Vec<RosterTrain>, railway: Railway) -> Self {
         let trains = roster.iter().map(|train| (train.key, train.name.clone())).collect();
         let lines = vec![
@@ -199,7 +198,6 @@ impl Phone {
     }
 
     /// The name that the phone gave itself.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -215,7 +213,6 @@ impl Phone {
     }
 
     /// When to call [`handle_timeout`](Self::handle_timeout), if no line arrives before.
-    #[must_use]
     pub fn next_timeout(&self) -> Option<Timestamp> {
         (self.is_watched && !self.driven.is_empty()).then(|| self.last_heard + SILENCE_LIMIT)
     }

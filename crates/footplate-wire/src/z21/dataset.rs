@@ -29,14 +29,12 @@ pub struct Dataset<'d> {
 impl<'d> Dataset<'d> {
     /// An X-BUS message without its XOR byte, if this is one. Whether that byte is right is not looked at: a hand-set of the
     /// makers and a widespread program send wrong ones.
-    #[must_use]
     pub fn x_bus(&self) -> Option<&'d [u8]> {
         let (_, message) = self.data.split_last().filter(|(_, message)| !message.is_empty())?;
         (self.header == X_BUS).then_some(message)
     }
 
     /// Whether the XOR byte is right, or there is none.
-    #[must_use]
     pub fn is_sound(&self) -> bool {
         self.header != X_BUS || self.data.iter().fold(0, |xor, byte| xor ^ byte) == 0
     }
@@ -65,13 +63,11 @@ pub struct Datasets<'d> {
 
 impl<'d> Datasets<'d> {
     /// The datasets of a datagram.
-    #[must_use]
     pub const fn of(datagram: &'d [u8]) -> Self {
         Self { rest: datagram }
     }
 
     /// Bytes that were not read: all that remain once the iterator has ended.
-    #[must_use]
     pub const fn unread(&self) -> usize {
         self.rest.len()
     }

@@ -117,7 +117,6 @@ impl RailCom {
     const SECOND_SPEED: u16 = 256;
 
     /// The speed that its decoder reports, if it reports one. A speed of the second kind begins at 256.
-    #[must_use]
     pub fn reported_speed(&self) -> Option<u16> {
         let above = match self.options & Self::SPEEDS {
             0 => return None,

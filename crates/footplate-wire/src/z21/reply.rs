@@ -145,7 +145,6 @@ impl Reply {
     }
 
     /// Whether trains can run, if that is what it says.
-    #[must_use]
     pub const fn power(&self) -> Option<bool> {
         match self {
             Self::Power { on } => Some(*on),
@@ -158,7 +157,6 @@ impl Reply {
     }
 
     /// Whether it says that the power of the track is so. Locomotives that are stopped while the track has power are neither.
-    #[must_use]
     pub const fn confirms_power(&self, on: bool) -> bool {
         match self {
             Self::Stopped => false,

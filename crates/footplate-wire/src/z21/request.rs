@@ -136,7 +136,6 @@ impl Request {
     pub const ALL_LOCO_NET: Self = Self::LocoNetDetectors { kind: 0x80, address: 0 };
 
     /// Reads a dataset; `None` for what is not known here.
-    #[must_use]
     pub fn read(dataset: &Dataset<'_>) -> Option<Self> {
         Some(match (dataset.header, dataset.data) {
             (0x10, []) => Self::SerialNumber,

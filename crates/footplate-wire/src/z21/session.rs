@@ -71,7 +71,6 @@ pub struct Client {
 
 impl Client {
     /// A session over a line that has just been opened.
-    #[must_use]
     pub fn new(now: Timestamp, settings: Settings) -> Self {
         let wanted = settings.broadcasts();
         let mut client = Self {
@@ -99,7 +98,6 @@ impl Client {
     }
 
     /// The settings of the station, its sensors and its turnouts.
-    #[must_use]
     pub const fn settings(&self) -> &Settings {
         &self.settings
     }

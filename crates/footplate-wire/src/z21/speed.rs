@@ -40,7 +40,6 @@ pub(super) const fn steps_of(code: u8) -> Option<DecoderSteps> {
 impl Throttle {
     /// The throttle for a step of `steps`, among the steps that a locomotive is commanded in: all are equally far apart, and the
     /// highest is the highest. `None` beyond the highest step.
-    #[must_use]
     pub fn of(step: SpeedStep, steps: DecoderSteps, commanded: DecoderSteps) -> Option<Self> {
         match steps.scaled(step, commanded.highest().get())? {
             0 => Some(Self::Stop),

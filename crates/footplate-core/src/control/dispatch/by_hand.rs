@@ -187,7 +187,6 @@ const BEYOND: Length = Length::from_mm(100.0);
 impl Dispatcher {
     /// The trains that have reserved the track just beyond a train's end of authority; none if it has no end within the
     /// horizon.
-    #[must_use]
     pub fn holders_beyond(&self, train: TrainId, now: Timestamp) -> Vec<TrainId> {
         let found = || {
             let known = self.trains.get(&train)?;

@@ -26,7 +26,6 @@ pub struct Journey {
 
 impl Journey {
     /// A stop with its median at a place, from the quicker side.
-    #[must_use]
     pub const fn to(target: Landmark) -> Self {
         Self { target, aim: Aim::Median, faces: false }
     }

@@ -69,14 +69,12 @@ pub struct Dispatcher {
 
 impl Dispatcher {
     /// Dispatches the trains of a driver. Its turnout positions are assumed, and commanded again before they are used.
-    #[must_use]
     pub fn new(now: Timestamp, driver: Driver) -> Self {
         Self::over(now, Watchdog::unwatched(driver, now))
     }
 
     /// The same with a [`Watchdog`] over the driver: while a train is in danger no other starts, and it is located and
     /// measured again once all others are at rest.
-    #[must_use]
     pub fn watched(now: Timestamp, driver: Driver) -> Self {
         let mut watchdog = Watchdog::new(driver, now);
         watchdog.ask_before_creeping();
@@ -148,31 +146,26 @@ impl Dispatcher {
     }
 
     /// The driver of the trains.
-    #[must_use]
     pub const fn driver(&self) -> &Driver {
         self.watchdog.driver()
     }
 
     /// See [`Watchdog::is_interrupted`].
-    #[must_use]
     pub fn is_interrupted(&self, now: Timestamp, train: TrainId) -> bool {
         self.watchdog.is_interrupted(now, train)
     }
 
     /// See [`Watchdog::is_in_danger`].
-    #[must_use]
     pub fn is_in_danger(&self, train: TrainId) -> bool {
         self.watchdog.is_in_danger(train)
     }
 
     /// The reservation of a train: no other train may enter it.
-    #[must_use]
     pub fn reservation(&self, train: TrainId) -> Option<&Reservation> {
         self.trains.get(&train).map(|train| &train.reservation)
     }
 
     /// The journey of a train that has not ended, with its order.
-    #[must_use]
     pub fn journey(&self, train: TrainId) -> Option<(OrderId, Journey)> {
         self.trains.get(&train)?.assigned.map(|assigned| (assigned.order, assigned.journey))
     }
@@ -216,7 +209,6 @@ impl Dispatcher {
     }
 
     /// Whether nothing is known of where a train is: neither its position, nor track that is reserved for it.
-    #[must_use]
     pub fn is_nowhere(&self, now: Timestamp, train: TrainId) -> bool {
         self.reservation(train).is_none_or(Reservation::is_empty)
             && self.watchdog.driver().locate(train, now).is_none()

@@ -22,7 +22,6 @@ impl Dispatcher {
     }
 
     /// The order of a train that a recovery interrupted, and that goes on after it.
-    #[must_use]
     pub fn interrupted(&self, train: TrainId) -> Option<OrderId> {
         let own = || Some(self.trains.get(&train)?.interrupted?.id);
         self.watchdog.interrupted(train).map(|(id, _)| id).or_else(own)

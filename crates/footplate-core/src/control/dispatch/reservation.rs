@@ -43,13 +43,11 @@ pub struct Reservation {
 
 impl Reservation {
     /// An empty reservation.
-    #[must_use]
     pub const fn empty() -> Self {
         Self { spans: BTreeMap::new(), crossed: BTreeMap::new(), turnouts: BTreeSet::new() }
     }
 
     /// Whether it has no track.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.spans.is_empty() && self.turnouts.is_empty()
     }
@@ -70,7 +68,6 @@ impl Reservation {
     }
 
     /// Whether a turnout is reserved.
-    #[must_use]
     pub fn takes(&self, turnout: TurnoutId) -> bool {
         self.turnouts.contains(&turnout)
     }
@@ -127,7 +124,6 @@ impl Reservation {
     }
 
     /// Whether two reservations share any track, or cross.
-    #[must_use]
     pub fn meets(&self, other: &Self) -> bool {
         let shares = |(stretch, span): (StretchId, Span)| other.obstructs(stretch, span);
         // Two trains that cross the same track one behind the other do not meet.
@@ -144,7 +140,6 @@ impl Reservation {
 
     /// Where reserved track begins on an edge, from an offset on in its direction: reserved rails, or the fouling point
     /// of a reserved turnout. `None` if the rest of the edge is not reserved.
-    #[must_use]
     pub fn begins_on(&self, layout: &Layout, id: EdgeId, from: Length) -> Option<Length> {
         let rest = Span::on(layout, id, from, layout.edge(id)?.length)?;
         let length = layout.edge(id)?.length;
@@ -163,7 +158,6 @@ impl Reservation {
     }
 
     /// Whether all of an interval is reserved, except less than `tolerance` at its ends.
-    #[must_use]
     pub fn covers(&self, stretch: StretchId, span: Span, tolerance: Length) -> bool {
         let spans = self.spans.get(&stretch);
         spans.is_some_and(|spans| {

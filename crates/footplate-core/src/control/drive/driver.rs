@@ -58,7 +58,6 @@ pub struct Driver {
 
 impl Driver {
     /// A driver without trains, for a layout with known turnout positions.
-    #[must_use]
     pub fn new(layout: Layout, turnouts: TurnoutStates) -> Self {
         Self {
             track: KnownTrack::new(layout, turnouts),
@@ -94,7 +93,6 @@ impl Driver {
     }
 
     /// The motion model of a train.
-    #[must_use]
     pub fn model(&self, train: TrainId) -> Option<&MotionModel> {
         self.trains.get(&train).map(|train| &train.model)
     }
@@ -112,56 +110,47 @@ impl Driver {
     }
 
     /// The layout.
-    #[must_use]
     pub const fn layout(&self) -> &Layout {
         &self.track.layout
     }
 
     /// The turnout positions.
-    #[must_use]
     pub const fn turnouts(&self) -> &TurnoutStates {
         &self.track.turnouts
     }
 
     /// Whether the reports of a sensor are ignored, because it reported repeatedly where no train can be.
-    #[must_use]
     pub fn ignores(&self, sensor: SensorId) -> bool {
         self.association.ignores(sensor)
     }
 
     /// Where a train is at a time not before the last event; `None` if its position is unknown.
-    #[must_use]
     pub fn locate(&self, train: TrainId, now: Timestamp) -> Option<Located> {
         self.trains.get(&train)?.located(self.track.context(), now)
     }
 
     /// A point of a train's path as a landmark and an offset.
-    #[must_use]
     pub fn landmark(&self, train: TrainId, at: PathPoint) -> Option<Landmark> {
         Some(landmark_of(self.track.context(), &self.trains.get(&train)?.model, at))
     }
 
     /// Whether a train is estimated to be at rest.
-    #[must_use]
     pub fn is_at_rest(&self, train: TrainId, now: Timestamp) -> bool {
         self.trains.get(&train).is_some_and(|train| train.is_at_rest(self.track.context(), now))
     }
 
     /// The step that a train was last commanded, sent or not; 0 for a train that is not part of this session.
-    #[must_use]
     pub fn commanded(&self, train: TrainId) -> SpeedStep {
         self.trains.get(&train).map_or(SpeedStep::STAND, |train| train.commanded)
     }
 
     /// The step at which a train of unknown position creeps to a sensor; 0 for a train that is not part of this
     /// session.
-    #[must_use]
     pub fn finding_step(&self, train: TrainId) -> SpeedStep {
         self.trains.get(&train).map_or(SpeedStep::STAND, DrivenTrain::finding_step)
     }
 
     /// The order that a train is carrying out.
-    #[must_use]
     pub fn busy(&self, train: TrainId) -> Option<OrderId> {
         Some(self.trains.get(&train)?.task?.order)
     }

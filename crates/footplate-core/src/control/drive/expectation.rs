@@ -52,7 +52,6 @@ impl Driver {
     }
 
     /// The end of a train's movement authority.
-    #[must_use]
     pub fn end_of_authority(&self, train: TrainId) -> Option<PathPoint> {
         self.trains.get(&train)?.end_of_authority
     }

@@ -96,7 +96,6 @@ pub struct StopOrder {
 
 impl StopOrder {
     /// A stop with its median at a place, the first time the train can.
-    #[must_use]
     pub const fn at(train: TrainId, target: Landmark) -> Self {
         Self { train, target, aim: Aim::Median, step: None, next_round: false }
     }
@@ -114,7 +113,6 @@ pub enum Aim {
 
 impl Order {
     /// The train that the order is for.
-    #[must_use]
     pub const fn train(&self) -> Option<TrainId> {
         match self {
             Self::Speed { train, .. }

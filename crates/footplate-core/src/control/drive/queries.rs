@@ -23,13 +23,11 @@ impl Driver {
     }
 
     /// The median place of rest if a stop command is sent at a time not before the last event.
-    #[must_use]
     pub fn rest_if_stopped(&self, train: TrainId, at: Timestamp) -> Option<PathPoint> {
         Some(self.stopped_at(train, at)?.at)
     }
 
     /// The same with its uncertainty and the time of rest.
-    #[must_use]
     pub fn stopped_at(&self, train: TrainId, at: Timestamp) -> Option<Rest> {
         let train = self.trains.get(&train)?;
         train.locator.rest_if_stopped(self.track.context(), &train.model, at)
@@ -45,39 +43,33 @@ impl Driver {
 
     /// One standard deviation of the least precise stop from a step that moves the train; `None` if no step is known
     /// to.
-    #[must_use]
     pub fn widest_stop(&self, train: TrainId) -> Option<Length> {
         self.trains.get(&train)?.widest_stop
     }
 
     /// Whether the direction of a train is the opposite of that at the begin of the session.
-    #[must_use]
     pub fn is_reversed(&self, train: TrainId) -> bool {
         self.trains.get(&train).is_some_and(|train| train.is_reversed)
     }
 
     /// A sensor that should have reported the train since its last detection and did not: the train may be far behind
     /// its estimate.
-    #[must_use]
     pub fn missed_sensor(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
         let (train, context) = (self.trains.get(&train)?, self.track.context());
         train.missed_sensor().or_else(|| train.sensor_missed_before(context, &train.located(context, now)?))
     }
 
     /// Whether it is known where a train is, and no sensor that should have reported it is silent.
-    #[must_use]
     pub fn is_found(&self, train: TrainId, now: Timestamp) -> bool {
         self.locate(train, now).is_some() && self.missed_sensor(train, now).is_none()
     }
 
     /// The share of detections that sensors miss of a train at its speed, as learnt in this session.
-    #[must_use]
     pub fn missed_share(&self, train: TrainId, now: Timestamp) -> f64 {
         self.trains.get(&train).map_or(0.0, |train| train.missed_share(self.track.context(), now))
     }
 
     /// Whether the position of a train depends on an ambiguous detection that later ones may still resolve.
-    #[must_use]
     pub fn is_position_ambiguous(&self, train: TrainId, now: Timestamp) -> bool {
         self.association.is_ambiguous(train, now)
     }
@@ -98,27 +90,23 @@ impl Driver {
     }
 
     /// The turnouts that cannot be thrown now because of this train.
-    #[must_use]
     pub fn turnouts_under(&self, train: TrainId, now: Timestamp) -> BTreeSet<TurnoutId> {
         let train = self.trains.get(&train);
         train.map_or_else(BTreeSet::new, |train| turnouts_under(self.track.context(), train, now))
     }
 
     /// The position of a train on the layout; `None` if it is unknown.
-    #[must_use]
     pub fn position(&self, train: TrainId, now: Timestamp) -> Option<Position> {
         self.position_at(train, self.locate(train, now)?.at)
     }
 
     /// A point of a train's path as a position on the layout, with the turnouts as they are.
-    #[must_use]
     pub fn position_at(&self, train: TrainId, at: PathPoint) -> Option<Position> {
         place_of(self.track.context(), &self.trains.get(&train)?.model, at)
     }
 
     /// A position on the layout as a point of a train's path ahead of another point, about `away` from it: a circuit may
     /// lead past the position at once and again after a lap.
-    #[must_use]
     pub fn path_point_ahead(
         &self,
         train: TrainId,
@@ -136,21 +124,18 @@ impl Driver {
 
     /// Where the leading end of the pickup will be once a train at rest has reversed. It is then measured from the
     /// node behind it: a turnout there must be set for the track under the train.
-    #[must_use]
     pub fn reversed_position(&self, train: TrainId, now: Timestamp) -> Option<Position> {
         let at = self.locate(train, now)?.at;
         reversed_position(self.track.context(), &self.trains.get(&train)?.model, at)
     }
 
     /// The same for a train that would be at rest at a position, arriving on any path.
-    #[must_use]
     pub fn reversed_position_at(&self, place: Position) -> Option<Position> {
         reversed_on_current_path(self.track.context(), place)
     }
 
     /// A position on the layout as a point of a train's path from a node, with the turnouts as they are; `None` if no
     /// path leads there.
-    #[must_use]
     pub fn path_point(&self, train: TrainId, from: NodeId, to: Position) -> Option<PathPoint> {
         let distance = distance_to(self.track.context(), &self.trains.get(&train)?.model, from, to)?;
         Some(PathPoint { node: from, distance })
@@ -175,7 +160,6 @@ impl Driver {
     }
 
     /// The next sensor ahead of a train, with the turnouts as they are, whether or not the train moves.
-    #[must_use]
     pub fn sensor_ahead(&self, train: TrainId, now: Timestamp) -> Option<SensorId> {
         let located = self.locate(train, now)?;
         let context = self.track.context();
@@ -192,7 +176,6 @@ impl Driver {
     }
 
     /// The path length of a train from one node to the next sensor's node; `None` if `to` is not that node.
-    #[must_use]
     pub fn hop_length(&self, train: TrainId, from: NodeId, to: NodeId) -> Option<Length> {
         let context = self.track.context();
         let hop = context.hop_from(from).filter(|hop| hop.to == to)?;
@@ -200,7 +183,6 @@ impl Driver {
     }
 
     /// The node of the sensor that a train passed.
-    #[must_use]
     pub fn node_passed(&self, passed: &PassedSensor) -> Option<NodeId> {
         self.track.layout.sensor_node(passed.sensor)
     }

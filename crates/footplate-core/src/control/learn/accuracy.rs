@@ -25,20 +25,17 @@ pub struct StepAccuracy {
 
 impl StepAccuracy {
     /// The accuracy of a step in a model.
-    #[must_use]
     pub fn of(model: &MotionModel, step: SpeedStep, approach: Approach, stops: u32) -> Self {
         let (speed, stop) = (model.speed(step, approach), model.stop(step, approach));
         Self { step, approach, speed, stop, stops }
     }
 
     /// Half the 95 % interval of the place of rest.
-    #[must_use]
     pub fn stop_within(&self) -> Length {
         HALF_95 * self.stop.deviation()
     }
 
     /// Half the 95 % interval of the speed, as a fraction of it.
-    #[must_use]
     pub fn speed_within(&self) -> Ratio {
         let (value, uncertainty) = (self.speed.value.as_m_per_s(), self.speed.uncertainty.as_m_per_s());
         Ratio::from_parts(if value > 0.0 { HALF_95 * uncertainty / value } else { f64::INFINITY })
@@ -46,7 +43,6 @@ impl StepAccuracy {
 }
 
 /// The steps with numbers of their own that move the train, lowest first.
-#[must_use]
 pub fn usable_steps(model: &MotionModel) -> Vec<SpeedStep> {
     steps(model).filter(|step| model.uses(*step) == StepUse::Moves).collect()
 }

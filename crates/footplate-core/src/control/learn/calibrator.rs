@@ -77,7 +77,6 @@ pub struct Calibrator<'l> {
 impl<'l> Calibrator<'l> {
     /// A calibration of the train of a fit, which may be empty or from an earlier session. It begins with the first
     /// `handle_…`.
-    #[must_use]
     pub fn new(layout: &'l Layout, settings: CalibratorSettings, mut fit: MotionFit) -> Self {
         let train = fit.model().train();
         note_moving_steps(&mut fit);
@@ -124,13 +123,11 @@ impl<'l> Calibrator<'l> {
     }
 
     /// The known turnout positions.
-    #[must_use]
     pub const fn turnouts(&self) -> &TurnoutStates {
         &self.turnouts
     }
 
     /// The fit of the train's motion.
-    #[must_use]
     pub const fn fit(&self) -> &MotionFit {
         &self.fit
     }
@@ -142,25 +139,21 @@ impl<'l> Calibrator<'l> {
     }
 
     /// The sections of the layout as surveyed.
-    #[must_use]
     pub const fn surveyed(&self) -> &SectionIndex {
         &self.surveyed
     }
 
     /// The position of the train.
-    #[must_use]
     pub const fn locator(&self) -> &Locator {
         &self.locator
     }
 
     /// Why the calibration ended; `None` until the train is at rest.
-    #[must_use]
     pub const fn ending(&self) -> Option<&Ending> {
         self.finished.as_ref()
     }
 
     /// The progress of the calibration.
-    #[must_use]
     pub fn progress(&self, now: Timestamp) -> Progress {
         let elapsed = self.started.map_or(TimeSpan::ZERO, |started| now - started);
         let left = (self.settings.budget - elapsed).max(TimeSpan::ZERO);
@@ -168,7 +161,6 @@ impl<'l> Calibrator<'l> {
     }
 
     /// The accuracy of the steps that move the train, lowest first.
-    #[must_use]
     pub fn accuracy(&self) -> Vec<StepAccuracy> {
         let usable = usable_steps(self.model());
         let highest = usable.last().copied();

@@ -53,7 +53,6 @@ pub enum Experiment {
 
 impl Experiment {
     /// The step of the experiment.
-    #[must_use]
     pub const fn step(&self) -> SpeedStep {
         match self {
             Self::Speed { step, .. } | Self::Stop { step, .. } | Self::Move { step, .. } => *step,
@@ -94,13 +93,11 @@ pub enum Why {
 }
 
 /// The objective over the steps that move a train.
-#[must_use]
 pub fn objective(model: &MotionModel) -> Objective {
     Objective::of(model, &usable_steps(model))
 }
 
 /// The expected reduction of the objective by an experiment: the only measure of its value.
-#[must_use]
 pub fn gain(model: &MotionModel, objective: &Objective, experiment: &Experiment) -> f64 {
     objective.gain(model, &expected_information(model, experiment))
 }

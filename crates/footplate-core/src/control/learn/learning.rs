@@ -27,7 +27,6 @@ pub struct Learning {
 
 impl Learning {
     /// Continues from the fits that a session begins with.
-    #[must_use]
     pub fn new(layout: &Layout, fits: Vec<MotionFit>) -> Self {
         let fits = fits.into_iter().map(|fit| (fit.model().train(), fit)).collect();
         Self {
@@ -121,7 +120,6 @@ impl Learning {
     }
 
     /// All fits, with their current runs ended: what the trains do between sessions is unknown.
-    #[must_use]
     pub fn handed_over(&self) -> Vec<MotionFit> {
         let fits = self.fits.values().cloned();
         fits.map(|mut fit| {
@@ -139,13 +137,11 @@ impl Learning {
     }
 
     /// Whether any refit is being computed.
-    #[must_use]
     pub fn is_refitting(&self) -> bool {
         !self.in_progress.is_empty()
     }
 
     /// Whether a refit of this train is being computed.
-    #[must_use]
     pub fn is_refitting_to(&self, train: TrainId) -> bool {
         self.in_progress.contains_key(&train)
     }

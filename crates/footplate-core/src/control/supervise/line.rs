@@ -159,7 +159,6 @@ impl Watchdog {
     }
 
     /// Whether the track has power, as commanded.
-    #[must_use]
     pub fn is_powered(&self) -> bool {
         self.power == Power::On
     }

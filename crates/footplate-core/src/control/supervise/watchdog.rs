@@ -76,7 +76,6 @@ pub struct Watchdog {
 
 impl Watchdog {
     /// Monitors a driver.
-    #[must_use]
     pub fn new(driver: Driver, now: Timestamp) -> Self {
         let mut watchdog = Self {
             driver,
@@ -114,13 +113,11 @@ impl Watchdog {
     }
 
     /// A driver without monitoring.
-    #[must_use]
     pub fn unwatched(driver: Driver, now: Timestamp) -> Self {
         Self { is_watching: false, ..Self::new(driver, now) }
     }
 
     /// The driver, read only: orders pass through the watchdog.
-    #[must_use]
     pub const fn driver(&self) -> &Driver {
         &self.driver
     }
@@ -185,19 +182,16 @@ impl Watchdog {
     }
 
     /// Whether a train is in danger or held because of one.
-    #[must_use]
     pub fn is_held(&self, train: TrainId) -> bool {
         self.dangers.contains_key(&train) || self.held.contains_key(&train)
     }
 
     /// Whether any train is in danger, or something moves that no session drives.
-    #[must_use]
     pub fn has_danger(&self) -> bool {
         !self.dangers.is_empty() || self.has_intruder()
     }
 
     /// Whether a train is in danger.
-    #[must_use]
     pub fn is_in_danger(&self, train: TrainId) -> bool {
         self.dangers.contains_key(&train)
     }
@@ -208,7 +202,6 @@ impl Watchdog {
     }
 
     /// Whether orders to a train are rejected for a temporary reason: a recovery or a silent station.
-    #[must_use]
     pub fn is_interrupted(&self, now: Timestamp, train: TrainId) -> bool {
         let may_end = self.dangers.values().any(|danger| danger.phase != Phase::GivenUp);
         self.is_silent() || may_end && (self.is_held(train) || self.could_meet(now, train))

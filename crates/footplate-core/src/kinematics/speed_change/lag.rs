@@ -33,7 +33,6 @@ impl Lag {
 
     /// From one speed towards another with a time constant θ; a negative one counts as zero, which is a step.
     /// `settled_within` is the tolerance at which the change ends.
-    #[must_use]
     pub fn new(from: Speed, to: Speed, time_constant: TimeSpan, settled_within: Speed) -> Self {
         let (from, to) = (from.as_m_per_s(), to.as_m_per_s());
         let direction = if from + to < 0.0 { -1.0 } else { 1.0 };

@@ -24,7 +24,6 @@ pub struct StepRamp<'t> {
 impl<'t> StepRamp<'t> {
     /// From one step to another, with a time per step; a negative one counts as zero. Steps above the table's last
     /// count as the last.
-    #[must_use]
     pub fn new(table: &'t StepTable, from: SpeedStep, to: SpeedStep, per_step: TimeSpan) -> Self {
         let (from, to) = (table.index(from) as f64, table.index(to) as f64);
         let per_step = per_step.as_s().max(0.0);
@@ -142,14 +141,12 @@ impl StepTable {
     }
 
     /// The highest step that has a speed.
-    #[must_use]
     pub fn last(&self) -> SpeedStep {
         // At most `SpeedStep::HIGHEST` by construction.
         SpeedStep::new(self.last as u8).unwrap_or_default()
     }
 
     /// The speed at a step; a step above the last counts as the last.
-    #[must_use]
     pub fn speed(&self, step: SpeedStep) -> Speed {
         Speed::from_m_per_s(self.speeds[self.index(step)])
     }

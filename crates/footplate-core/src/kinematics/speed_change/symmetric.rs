@@ -16,7 +16,6 @@ pub struct MidStep {
 
 impl MidStep {
     /// From one speed to another within a duration; a negative one counts as zero.
-    #[must_use]
     pub fn new(from: Speed, to: Speed, duration: TimeSpan) -> Self {
         let ends = Ends::symmetric(from, to, duration);
         Self { ends, half: 0.5 * ends.duration }
@@ -70,7 +69,6 @@ pub struct ConstantAcceleration {
 impl ConstantAcceleration {
     /// From one speed to another within a duration; a negative one counts as zero.
     #[inline]
-    #[must_use]
     pub fn new(from: Speed, to: Speed, duration: TimeSpan) -> Self {
         let ends = Ends::symmetric(from, to, duration);
         let acceleration = ends.per_duration(ends.to - ends.from);
@@ -81,7 +79,6 @@ impl ConstantAcceleration {
 
     /// From one speed to another with an acceleration, whose sign is ignored; zero takes the longest possible
     /// [`TimeSpan`].
-    #[must_use]
     pub fn with_acceleration(from: Speed, to: Speed, acceleration: Acceleration) -> Self {
         let difference = (to - from).abs();
         let duration =
@@ -128,7 +125,6 @@ pub struct ConstantJerk {
 
 impl ConstantJerk {
     /// From one speed to another within a duration; a negative one counts as zero.
-    #[must_use]
     pub fn new(from: Speed, to: Speed, duration: TimeSpan) -> Self {
         let ends = Ends::symmetric(from, to, duration);
         let half = 0.5 * ends.duration;
@@ -196,7 +192,6 @@ pub struct Smooth {
 
 impl Smooth {
     /// From one speed to another within a duration; a negative one counts as zero.
-    #[must_use]
     pub fn new(from: Speed, to: Speed, duration: TimeSpan) -> Self {
         let ends = Ends::symmetric(from, to, duration);
         let gained = ends.to - ends.from;

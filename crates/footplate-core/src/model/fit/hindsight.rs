@@ -50,7 +50,6 @@ impl MotionModel {
     }
 
     /// Sensors passed, over all steps.
-    #[must_use]
     pub fn sensors_passed(&self) -> u32 {
         self.counts.iter().flatten().map(|counts| counts.contacts).sum()
     }

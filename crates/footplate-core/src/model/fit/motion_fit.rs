@@ -115,7 +115,6 @@ struct Closed {
 
 impl MotionFit {
     /// A fit without data.
-    #[must_use]
     pub fn new(train: TrainId, highest: SpeedStep) -> Self {
         Self {
             model: MotionModel::unknown(train, highest),
@@ -393,7 +392,6 @@ impl MotionFit {
     }
 
     /// The model as of the last fit.
-    #[must_use]
     pub const fn model(&self) -> &MotionModel {
         &self.model
     }

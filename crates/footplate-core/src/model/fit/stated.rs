@@ -86,13 +86,11 @@ pub struct StatedFit {
 
 impl StatedFit {
     /// Whether the entry contradicts the others.
-    #[must_use]
     pub fn contradicts(&self) -> bool {
         self.sigmas.abs() > CONTRADICTS
     }
 
     /// Whether it is a gross error, which counts for nothing.
-    #[must_use]
     pub fn is_gross(&self) -> bool {
         self.sigmas.abs() > GROSS
     }
@@ -173,7 +171,6 @@ impl MotionFit {
     }
 
     /// Compares other entries of the same table with what `known` predicts for them, and takes nothing.
-    #[must_use]
     pub fn compare_stated(&self, known: &StatedMotion, others: &[StatedSpeed]) -> Vec<Option<StatedFit>> {
         let (equations, known) = self.weighed(known);
         let mut compared = Table::of(others, &self.model, equations.unknowns());

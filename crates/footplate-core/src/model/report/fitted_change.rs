@@ -22,7 +22,6 @@ pub struct FittedChange {
 impl Review {
     /// The best law of the direction of a change, fitted to its detections: the position of the train at the command is
     /// fitted (x₀ of the law fit). `times` are since the command. `None` if no law was found.
-    #[must_use]
     pub fn fitted_change(
         &self,
         model: &MotionModel,

@@ -81,7 +81,6 @@ pub struct LawComparison {
 }
 
 /// Fits and compares all laws. `table` serves the step ramp. `None` with too few changes.
-#[must_use]
 pub fn compare_laws(changes: &[Transient], table: Option<&StepTable>) -> Option<LawComparison> {
     if changes.len() < FEWEST_CHANGES {
         return None;

@@ -35,7 +35,6 @@ pub struct Review {
 
 impl Review {
     /// Reads the runs of the train of a model; those of other trains are passed over.
-    #[must_use]
     pub fn of(layout: &Layout, sections: &SectionIndex, model: &MotionModel, runs: &[RunPassages]) -> Self {
         let own: Vec<&RunPassages> = runs.iter().filter(|run| run.train == model.train()).collect();
         let running = SettledRunning::of(layout, sections, model, &own);

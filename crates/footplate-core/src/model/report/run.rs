@@ -44,7 +44,6 @@ impl RunPassages {
     /// Reads the entries of a run of `train`, which begins at `step`. `excluded` entries are passed over as if
     /// they had not been reported. The rhythm of the link must have been learnt before: a first walk over all
     /// runs does that.
-    #[must_use]
     pub fn read<'e>(
         layout: &Layout,
         train: TrainId,

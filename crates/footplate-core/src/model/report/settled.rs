@@ -58,7 +58,6 @@ pub struct SettledRunning {
 }
 
 /// The path of a reach as a train feels it, with the corrections of its model.
-#[must_use]
 pub fn path_length(layout: &Layout, sections: &SectionIndex, model: &MotionModel, reach: &Reach) -> Length {
     let hops = reach.hops().iter().filter_map(|hop| layout.hop(*hop));
     hops.fold(Length::ZERO, |sum, hop| sum + model.length(sections, &hop)[0])
@@ -71,7 +70,6 @@ pub(super) fn settles_within(model: &MotionModel, drive: Drive) -> TimeSpan {
 
 impl SettledRunning {
     /// Finds the settled running in the runs of the train of a model.
-    #[must_use]
     pub fn of(layout: &Layout, sections: &SectionIndex, model: &MotionModel, runs: &[&RunPassages]) -> Self {
         let mut stretches: Vec<Vec<SettledPassage>> = Vec::new();
         let settle = |drive: Drive| settles_within(model, drive);

@@ -140,13 +140,11 @@ impl ShortMoveFit {
     }
 
     /// Root mean square error of the laws for moves that they were not fitted to.
-    #[must_use]
     pub fn law_error(&self) -> Length {
         rms(self.moves.iter().map(|one| one.by_law - one.measured))
     }
 
     /// The same for the table; `None` if there is none.
-    #[must_use]
     pub fn table_error(&self) -> Option<Length> {
         let errors: Option<Vec<Length>> =
             self.moves.iter().map(|one| Some(one.by_table? - one.measured)).collect();
@@ -155,7 +153,6 @@ impl ShortMoveFit {
     }
 
     /// The better of both for a move that was not measured.
-    #[must_use]
     pub fn better(&self) -> &ShortMove<'static> {
         match (&self.table, self.table_error()) {
             (Ok(table), Some(error)) if error < self.law_error() => table,

@@ -42,7 +42,6 @@ impl TapedStop {
     /// Counts a measured stop from its command: by the path from the contact passed last before the command to the one
     /// where the tape was laid, what the tape says, less what the train ran on until the command. `None` where the
     /// train was not reported on that path.
-    #[must_use]
     pub fn of(
         layout: &Layout,
         sections: &SectionIndex,

@@ -58,7 +58,6 @@ pub struct Transient {
 
 impl Transient {
     /// The direction of the change.
-    #[must_use]
     pub fn direction(&self) -> Direction {
         let [from, to] = self.steps;
         if to < from { Direction::Down } else { Direction::Up }

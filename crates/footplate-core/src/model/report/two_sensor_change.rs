@@ -55,7 +55,6 @@ pub struct TwoSensorMean {
 
 impl TwoSensorChange {
     /// All changes of the train of a model in its runs; those of other trains are passed over.
-    #[must_use]
     pub fn find(
         layout: &Layout,
         sections: &SectionIndex,
@@ -80,7 +79,6 @@ impl TwoSensorChange {
     }
 
     /// Its acceleration, if the data decide on one.
-    #[must_use]
     pub const fn acceleration(&self) -> Option<Estimate<Acceleration>> {
         match self.verdict {
             Ok(
@@ -99,7 +97,6 @@ impl TwoSensorChange {
     }
 
     /// Of each change the pair of sensors that tells its acceleration best; none of changes of which no pair does.
-    #[must_use]
     pub fn best(changes: &[Self]) -> Vec<Self> {
         let of_one = changes.chunk_by(|one, next| (one.run, one.commanded) == (next.run, next.commanded));
         of_one
@@ -116,7 +113,6 @@ impl TwoSensorMean {
     ///
     /// Changes share the uncertainty of speeds and of the delay, so that many of them are taken to be no better
     /// known than one; they are known less well where they differ by more than they say.
-    #[must_use]
     pub fn of(changes: &[TwoSensorChange]) -> Vec<Self> {
         let mut best = TwoSensorChange::best(changes);
         best.sort_by_key(|change| change.steps);

@@ -131,13 +131,11 @@ impl LayoutTest {
     }
 
     /// What the order of the reports says.
-    #[must_use]
     pub fn sequence(&self) -> SequenceVerdict {
         self.sequence.verdict()
     }
 
     /// How the lengths compare with those of the layout.
-    #[must_use]
     pub fn lengths(&self, sections: &SectionIndex) -> SurveyTest {
         let mut test = self.clone();
         test.end_stretch();

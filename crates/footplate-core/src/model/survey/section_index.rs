@@ -20,7 +20,6 @@ pub struct SectionIndex {
 
 impl SectionIndex {
     /// The sections of a layout.
-    #[must_use]
     pub fn of(layout: &Layout) -> Self {
         let hops: Vec<_> = layout.hops().collect();
         let mut of_hop = vec![u32::MAX; hops.len()];
@@ -50,33 +49,28 @@ impl SectionIndex {
 
     /// The section of a hop.
     #[inline]
-    #[must_use]
     pub fn section(&self, hop: HopId) -> Option<usize> {
         self.of_hop.get(hop.index()).map(|section| *section as usize)
     }
 
     /// How many sections there are.
-    #[must_use]
     pub const fn len(&self) -> usize {
         self.surveyed.len()
     }
 
     /// Whether the layout has no hops.
-    #[must_use]
     pub const fn is_empty(&self) -> bool {
         self.surveyed.is_empty()
     }
 
     /// Variance of the surveyed length of a section (m²).
     #[inline]
-    #[must_use]
     pub fn survey_variance(&self, section: usize) -> f64 {
         self.surveyed.get(section).map_or(0.0, |(_, variance)| *variance)
     }
 
     /// Surveyed length of a section (m).
     #[inline]
-    #[must_use]
     pub fn surveyed_length(&self, section: usize) -> f64 {
         self.surveyed.get(section).map_or(0.0, |(length, _)| *length)
     }
@@ -91,20 +85,17 @@ impl SectionIndex {
     }
 
     /// Whether every edge of a hop was measured.
-    #[must_use]
     pub fn is_measured(&self, hop: HopId) -> bool {
         self.section(hop).and_then(|section| self.measured.get(section)).copied().unwrap_or(false)
     }
 
     /// One standard deviation of the factor that all surveyed lengths have in common, as a part.
-    #[must_use]
     pub const fn scale(&self) -> f64 {
         self.scale
     }
 
     /// How well the survey knows the path over some sections as a whole: variance of its logarithm. No timing
     /// of trains can narrow it, so every speed found on these sections shares it.
-    #[must_use]
     pub fn scale_variance(&self, sections: impl Iterator<Item = usize>) -> f64 {
         let known = sections.filter_map(|section| self.surveyed.get(section));
         let (length, variance) =

@@ -67,7 +67,6 @@ impl Default for SurveyTest {
 
 impl SurveyTest {
     /// Compares the lengths of a survey with a train's: by section, by how much it feels it longer (m), with the variance.
-    #[must_use]
     pub fn of(sections: &SectionIndex, path_length: impl Iterator<Item = (usize, f64, f64)>) -> Self {
         let fits = Self::default();
         let known: Vec<Compared> = compared(sections, path_length);
@@ -94,13 +93,11 @@ impl SurveyTest {
     }
 
     /// Whether nothing speaks against the survey.
-    #[must_use]
     pub fn is_passed(&self) -> bool {
         self.odd.is_empty() && self.factor <= 1.0
     }
 
     /// The sections with what the survey is worth after this: what is off counts for no more than that.
-    #[must_use]
     pub fn applied_to(&self, sections: &SectionIndex) -> SectionIndex {
         sections.doubted(self.factor * self.factor, self.scale, |section| {
             let odd = self.odd.iter().find(|odd| odd.section == section);

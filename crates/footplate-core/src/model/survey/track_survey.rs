@@ -59,7 +59,6 @@ struct Row {
 impl TrackSurvey {
     /// The survey that follows from what is known of trains on a layout with these sections. `None` if no train has run over any
     /// section.
-    #[must_use]
     pub fn of(layout: &Layout, sections: &SectionIndex, trains: &[&MotionFit]) -> Option<Self> {
         let rows: Vec<Row> =
             trains.iter().enumerate().flat_map(|(train, fit)| rows_of(sections, train, fit)).collect();
@@ -139,14 +138,12 @@ impl TrackSurvey {
 
     /// The distance from sensor to sensor over a section and one standard deviation of it, what all distances have in common
     /// included; `None` where no train ran.
-    #[must_use]
     pub fn distance(&self, section: usize) -> Option<[Length; 2]> {
         let (length, deviation) = self.sections.get(section).copied().flatten()?;
         Some([Length::from_m(length), Length::from_m(deviation)])
     }
 
     /// One standard deviation of the factor that all lengths have in common, as a part.
-    #[must_use]
     pub const fn scale(&self) -> f64 {
         self.scale
     }

@@ -99,31 +99,26 @@ impl ArrivalProfile {
     }
 
     /// When the train follows it; before, the train starts.
-    #[must_use]
     pub const fn begins(&self) -> Timestamp {
         self.begins
     }
 
     /// When the train runs steadily at the step that it will stop from.
-    #[must_use]
     pub fn ends(&self) -> Timestamp {
         self.begins + self.plan.profile.motion().duration()
     }
 
     /// The step that it will stop from.
-    #[must_use]
     pub const fn last_step(&self) -> SpeedStep {
         self.plan.last.step
     }
 
     /// Whether it is the motion with minimum jerk; otherwise it keeps a speed between two changes.
-    #[must_use]
     pub const fn has_least_jerk(&self) -> bool {
         matches!(self.plan.profile, Profile::MinimumJerk(_))
     }
 
     /// The planned distance before the target at a time, in the train's path length, and the planned speed.
-    #[must_use]
     pub fn at(&self, time: Timestamp) -> (Length, Speed) {
         let state = self.plan.profile.motion().state_at(time - self.begins);
         (Length::from_m(self.plan.begins.left) - state.distance, state.speed)

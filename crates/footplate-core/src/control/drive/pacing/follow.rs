@@ -77,7 +77,6 @@ pub(super) type Others = BTreeMap<TrainId, DrivenTrain>;
 
 impl Driver {
     /// The train that a train has been ordered to follow.
-    #[must_use]
     pub fn leader(&self, train: TrainId) -> Option<TrainId> {
         match &self.trains.get(&train)?.paced()?.pace {
             Pace::Follow(following) => Some(following.leader),

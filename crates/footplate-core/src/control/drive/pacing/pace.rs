@@ -99,7 +99,6 @@ impl Driver {
 
     /// The estimated distance of a train ahead of the line of its held speed, in surveyed lengths; `None` for any
     /// other train, and before the line starts.
-    #[must_use]
     pub fn ahead_of_line(&self, train: TrainId, now: Timestamp) -> Option<Length> {
         self.trains.get(&train)?.ahead_of_line(self.track.context(), now)
     }

@@ -27,7 +27,6 @@ pub struct Refit {
 
 impl MotionFit {
     /// Begins a fit to all entries so far, with the sections of the layout.
-    #[must_use]
     pub fn begin_refit(&self, sections: &SectionIndex) -> Refit {
         let mut fit = self.clone();
         let passed = fit.chain.trips.iter().flat_map(|trip| &trip.detections);
@@ -61,7 +60,6 @@ impl MotionFit {
     }
 
     /// The comparison by which the lengths of the layout count.
-    #[must_use]
     pub const fn survey_test(&self) -> &SurveyTest {
         &self.survey_test
     }
@@ -78,7 +76,6 @@ impl MotionFit {
 
 impl Refit {
     /// Whether the fit is complete.
-    #[must_use]
     pub const fn is_over(&self) -> bool {
         self.is_over
     }
