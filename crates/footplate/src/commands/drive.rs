@@ -6,7 +6,6 @@ mod formatter;
 mod fuzzed_session;
 mod instruction;
 mod long_drive;
-mod parse;
 mod reader;
 mod script;
 mod script_runner;

@@ -5,8 +5,7 @@ use std::path::Path;
 use anyhow::{Context, anyhow, bail};
 use footplate_store::read_at_most;
 
-use super::instruction::Instruction;
-use super::parse::parse;
+use super::instruction::{Instruction, parse};
 use super::reader::Known;
 use crate::comment::without_comment;
 
