@@ -128,7 +128,7 @@ pub struct LeftOut {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BatchError {
-    /// No run passes two contacts in a row.
+    /// No run passes two sensors in a row.
     #[error(
         "nothing to calibrate in {runs} runs with {passages} sensor passages: at least one run should \
          pass two sensors that the layout links, at a steady speed"

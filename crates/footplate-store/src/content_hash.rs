@@ -22,7 +22,7 @@ impl fmt::Display for ContentHash {
     }
 }
 
-/// Passes on what is read and takes its fingerprint on the way, so that a file is read once.
+/// Passes on what is read and takes its fingerprint meanwhile, so that a file is read once.
 #[derive(Debug)]
 pub struct HashingReader<R> {
     input: R,

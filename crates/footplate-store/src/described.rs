@@ -30,7 +30,7 @@ pub fn read_described(path: &Path, which: Option<&str>) -> Result<Described, Doc
 pub fn parse_described(file: &str, bytes: &[u8], which: Option<&str>) -> Result<Described, DocumentError> {
     let (syntax, node) = parse(file, bytes)?;
     let is_line = match syntax {
-        // A line lists its speed limits; whatever does not is told what a train lacks.
+        // A line lists its speed limits; anything else gets the error of what a train lacks.
         Syntax::Toml => Table::of(&node, "").is_ok_and(|table| table.get("speed_limits_km_h").is_some()),
         Syntax::Yaml => line_file::form_of(syntax, &node).is_some(),
     };

@@ -27,7 +27,7 @@ use crate::recording_names::distinct_names;
 use crate::speed_profile::SpeedProfile;
 use crate::store::{AssignedDetections, KeptReplay, RecordingKey, Store, StoreError};
 
-/// How often the model is fitted anew on the way, at starts from rest: what is thought of a command depends on whether the
+/// How often the model is fitted anew during a replay, at starts from rest: what is thought of a command depends on whether the
 /// train stood, and so on how fast it is known to stop.
 const REFIT_AFTER: TimeSpan = TimeSpan::from_ms(20_000);
 
@@ -35,7 +35,7 @@ const REFIT_AFTER: TimeSpan = TimeSpan::from_ms(20_000);
 /// that have no date count as one session with the one before.
 const ANOTHER_SESSION: TimeSpan = TimeSpan::from_ms(3_600_000);
 
-/// What sessions told of one train.
+/// What sessions reported of one train.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct MotionReplay {
     /// What follows from it, fitted.
@@ -45,7 +45,7 @@ pub struct MotionReplay {
     pub profile: Option<String>,
     /// How the turnouts lay at the end of the last live session, as far as it was recorded.
     pub turnouts: TurnoutStates,
-    /// How those of the recording under way lie, if it was read from a file.
+    /// How those of the present recording lie, if it was read from a file.
     turnouts_of_file: TurnoutStates,
     /// Sessions in which the train was driven, by name.
     pub recordings: Vec<String>,
@@ -206,7 +206,7 @@ impl MotionReplay {
         self.runs == 0
     }
 
-    /// A step at which contacts were passed moves the train. Those at which it stalled show by themselves when they are
+    /// A step at which sensors were passed moves the train. Those at which it stalled show by themselves when they are
     /// tried again.
     fn note_steps(&mut self) {
         for step in (1..=self.fit.model().highest().get()).filter_map(SpeedStep::new) {

@@ -1,7 +1,7 @@
-//! What a railway reported and what it was told, as read from a file: raw, in order, run by run.
+//! What a railway reported and was commanded, as read from a file: raw, in order, run by run.
 //!
-//! Nothing is judged here. A contact that repeats in every poll while the shoe stands on it is an event each
-//! time; the stale contact that a station still remembers from before the start is an event; a run without a
+//! Nothing is judged here. A sensor that repeats in every poll while the shoe stands on it is an event each
+//! time; the stale detection that a station still remembers from before the start is an event; a run without a
 //! single report is a run. What they mean is for the core to decide.
 
 use core::fmt;
@@ -84,7 +84,7 @@ impl Run {
         }
     }
 
-    /// The trains that move, and what they did when the run began: those that stand all the time close no contact.
+    /// The trains that move, and what they did when the run began: those that stand all the time close no sensor.
     pub fn moving(&self) -> Vec<TrainAtStart> {
         let begin = self.trains.iter().copied();
         let mut moving: Vec<TrainAtStart> =
@@ -109,7 +109,7 @@ impl Run {
         })
     }
 
-    /// The contacts that were reported, repeats included.
+    /// The sensors that were reported, repeats included.
     pub fn reports(&self) -> impl Iterator<Item = (Timestamp, Report)> + '_ {
         self.events.iter().filter_map(|raw| match raw.event.kind {
             EventKind::Sensor(report) => Some((raw.event.time, report)),

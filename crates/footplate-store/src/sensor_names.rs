@@ -3,7 +3,7 @@
 use footplate_core::SensorId;
 use footplate_core::track::Layout;
 
-/// The names of a railway's sensors, both ways.
+/// The names of a railway's sensors, in both directions.
 pub trait SensorNames {
     /// The sensor of that name.
     fn sensor_named(&self, name: &str) -> Option<SensorId>;

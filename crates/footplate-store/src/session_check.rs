@@ -41,7 +41,7 @@ impl SessionFigure {
 /// All numbers that two sessions measured of the same trains.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SessionCheck {
-    /// Steady speeds (mm/s), where each session passed contacts at the step.
+    /// Steady speeds (mm/s), where each session passed sensors at the step.
     pub speeds: Vec<SessionFigure>,
     /// Stopping distances (mm), where each session measured a stop from the step.
     pub stops: Vec<SessionFigure>,
@@ -78,7 +78,7 @@ impl SessionCheck {
                         deviation: libm::hypot(later.1, other.1),
                     })
                 };
-                // A single contact tells where a train was, not how fast it ran.
+                // A single sensor shows where a train was, not how fast it ran.
                 self.speeds.extend(figure(speed, 1));
                 self.stops.extend(figure(stop, 0));
             }

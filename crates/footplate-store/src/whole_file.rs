@@ -1,4 +1,4 @@
-//! Files in one piece: written so that whoever looks finds the old one or the new one, never half of it, and read up to a limit.
+//! Files in one piece: written so that a reader finds the old one or the new one, never half of it, and read up to a limit.
 
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, Read, Write};

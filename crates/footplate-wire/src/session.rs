@@ -182,7 +182,7 @@ pub enum LinkNotice {
     /// A command was sent shortly before a reply was lost, and was sent again.
     Repeated(Command),
     /// A train was commanded to reverse shortly before a reply was lost. The command is not repeated, because it toggles, and the
-    /// direction cannot be read back: check which way the train faces.
+    /// direction cannot be read back: check how the train faces.
     ReverseInDoubt(TrainId),
     /// This sensor was occupied when the line was opened: a train is on it, or it is stuck. It is reported again after it was free.
     HeldClosed(SensorId),

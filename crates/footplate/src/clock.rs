@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_date_is_told_what_one_is() {
+    fn what_is_no_date_is_answered_with_what_one_is() {
         for text in ["", "yesterday", "21.11.2026", "2026-13-01", "2026-02-30", "10000000000", "ä026-11-2"] {
             assert_eq!(at(text), "no date", "{text}");
             assert!(text.parse::<Moment>().unwrap_err().contains("2026-11-21T14:30"));

@@ -162,7 +162,7 @@ fn speeds_contradict(layout: &Layout, mut speeds: Vec<f64>) -> Option<String> {
     })
 }
 
-/// The serious warning of a session that is under way, once there is one.
+/// The serious warning of a session that runs, once there is one.
 pub(crate) type LiveWarning = Rc<OnceCell<LengthWarning>>;
 
 /// Watches a session: ends it if the reports are not of the layout on which trains are driven, and warns of its lengths.
@@ -233,7 +233,7 @@ impl Recorder for LayoutWatch<'_> {
     }
 }
 
-/// What a person is told where sensors follow each other that no rails join.
+/// What a person reads where sensors follow each other that no rails join.
 fn order_contradicts(layout: &Layout, verdict: &SequenceVerdict) -> Option<String> {
     let SequenceVerdict::Contradicts { stray, reports } = verdict else { return None };
     let times: u32 = stray.iter().map(|one| one.times).sum();
@@ -286,7 +286,7 @@ fn odd_hops(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTest) -> V
     .collect()
 }
 
-/// What a person is told where lengths are not those of the layout, but no other is known that has them.
+/// What a person reads where lengths are not those of the layout, but no other is known that has them.
 fn lengths_doubted(layout: &Layout, sections: &SectionIndex, lengths: &SurveyTest) -> Option<LengthWarning> {
     if lengths.is_passed() {
         return None;
@@ -386,7 +386,7 @@ mod tests {
 
     #[test]
     fn a_log_of_track_a_is_refused_on_track_b_by_the_two_lengths_that_differ() {
-        // Track B has the same sensors and turnouts, joined in the same way; two distances of this lap are 87 and 95 mm shorter.
+        // Track B has the same sensors and turnouts, joined alike; two distances of this lap are 87 and 95 mm shorter.
         let refusal = check("eadanila_2020_track_a.csv", "track-b").unwrap_err().to_string();
         assert!(
             refusal.starts_with("the recordings are not of layout `track-b` but of `track-a`"),

@@ -1,7 +1,7 @@
 //! A few lines at the foot of a terminal that follow what happens, under lines that stay.
 //!
 //! Every frame is one write: up to where the last one began, line by line over what was there, with wrapping off, so
-//! nothing flickers, no width has to be known, and whoever ends the program in between leaves the terminal as it was. Where the output is no terminal only the lines that stay are written.
+//! nothing flickers, no width has to be known, and a program that ends in between leaves the terminal as it was. Where the output is no terminal only the lines that stay are written.
 
 use std::io::{self, IsTerminal, Write};
 use std::time::{Duration, Instant};
@@ -122,7 +122,7 @@ pub(crate) enum Style {
     Good,
     /// Not as it should be.
     Bad,
-    /// Something on its way.
+    /// Something that has not ended.
     Moving,
 }
 

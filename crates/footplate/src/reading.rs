@@ -1,4 +1,4 @@
-//! How far a file has been read, shown to a person who would otherwise wait in doubt.
+//! How far a file has been read, shown to a person who waits.
 
 use std::fs::File;
 use std::io::{self, Read};

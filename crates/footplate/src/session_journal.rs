@@ -314,7 +314,7 @@ mod tests {
     /// `cargo nextest run -p footplate -E 'test(how_long_an_event)' --run-ignored all --no-capture`
     #[test]
     #[ignore = "measures the disk of this machine"]
-    fn how_long_an_event_is_on_its_way_to_the_disk() {
+    fn how_long_an_event_takes_to_the_disk() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("railway.db");
         let mut session =

@@ -1,4 +1,4 @@
-//! Work that is spread over the cores of the machine, with results in order whoever finishes first.
+//! Work that is spread over the cores of the machine, with results in order whichever finishes first.
 
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicUsize, Ordering};

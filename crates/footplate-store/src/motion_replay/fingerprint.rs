@@ -11,7 +11,7 @@ use crate::motion_file::MOTION_MODEL_VERSION;
 use crate::recording::Run;
 use crate::speed_profile::SpeedProfile;
 
-/// What is read of stored runs. Whoever reads more or less of them raises it, so that all is replayed once.
+/// What is read of stored runs. A change to what is read raises it, so that all is replayed once.
 const READS: u32 = 2;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,11 +1,11 @@
-//! From the raw events of a run to what a fit is given of one train: its commands, and the contacts it passed with the
+//! From the raw events of a run to what a fit is given of one train: its commands, and the sensors it passed with the
 //! interval in which each closed.
 
 use footplate_core::link::{DetectionWindow, PollTiming};
 use footplate_core::model::STALE_WITHIN;
 use footplate_core::{Event, EventKind, Report, SensorId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-/// A train that runs and is told one step more when no contact and no command has been for so long was pushed: it had not come
+/// A train that runs and is commanded one step more when no detection and no command has been for so long was pushed: it had not come
 /// where it should, and the calibration took it for stuck. No trip of an experiment takes as long between two of either.
 const PUSHED_AFTER: TimeSpan = TimeSpan::from_ms(4_000);
 
@@ -29,7 +29,7 @@ pub(super) struct RunReader {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ReadEvent {
     pub(super) event: Event,
-    /// Whether a hand helped the train to the contact that is reported.
+    /// Whether a hand helped the train to the sensor that is reported.
     pub(super) was_pushed: bool,
 }
 

@@ -1,4 +1,4 @@
-//! The form *light-gate*: a train already running, its contacts on the host's clock, and two light gates on a
+//! The form *light-gate*: a train already running, its sensors on the host's clock, and two light gates on a
 //! clock of their own.
 //!
 //! Columns: `run`, `train`, `speed_level`, `kind` (`sensor` or `gate`), `name` (of the sensor; `L0`, `L1` for

@@ -1,4 +1,4 @@
-//! Sensor logs: what contacts reported and trains were told, in the forms in which people keep it.
+//! Sensor logs: what sensors reported and trains were commanded, in the forms in which people keep it.
 //!
 //! [`read_sensor_log`] tells the form from the header and reads any of them into a
 //! [`Recording`]; [`write_sensor_log`] writes Footplate's own. A form is a file

@@ -7,7 +7,7 @@ use footplate_core::{Event, EventKind, RunId, SensorId, TimeSpan, Timestamp, Tra
 use crate::recording::{GatePass, Note, Oddity, RawEvent, Run, TrainAtStart};
 use crate::table::{Column, Row, TableError};
 
-/// The longest run that is believed, chosen: a month, beyond any session, and far from any epoch.
+/// The longest run that is accepted, chosen: a month, beyond any session, and far from any epoch.
 pub(super) const LONGEST_RUN: TimeSpan = TimeSpan::from_ms(30 * 24 * 3_600_000);
 
 /// Times from here on count from the Unix epoch (this is September 2001); earlier ones from the beginning of
@@ -122,7 +122,7 @@ impl Run {
         self.trains.iter().any(|known| known.train == train)
     }
 
-    /// The contact reported last.
+    /// The sensor reported last.
     pub(super) fn last_sensor(&self) -> Option<SensorId> {
         self.events.iter().rev().find_map(|raw| match raw.event.kind {
             EventKind::Sensor(report) => Some(report.sensor),

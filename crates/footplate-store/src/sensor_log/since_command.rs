@@ -1,7 +1,7 @@
 //! The form *since-command*: every run begins with a speed command, and times count from it.
 //!
 //! Columns: `run`, `event` (`speed`, `sensor`, `stop`, `stopped`), `speed_level`, `sensor`, `t_since_command_s`;
-//! also `distance_mm` (tape measure of a stop, from the contact reported last before `stop`) and `t_ticks`
+//! also `distance_mm` (tape measure of a stop, from the sensor reported last before `stop`) and `t_ticks`
 //! (the 508 kHz timer behind the times).
 
 use std::io::BufRead;
@@ -164,7 +164,7 @@ impl FormReader for SinceCommandLog<'_> {
     }
 }
 
-/// The farthest a tape is believed to reach, chosen: a kilometre of model track.
+/// The farthest a tape is taken to reach, chosen: a kilometre of model track.
 const LONGEST_TAPE_MM: f64 = 1e6;
 
 /// A length that a person measured, if it is one.

@@ -98,7 +98,7 @@ pub struct TachometerColumns {
 }
 
 impl TachometerColumns {
-    /// Finds its way in a header, and says what in it is not used.
+    /// Reads a header, and says what in it is not used.
     pub(super) fn of_header(
         file: &str,
         names: Vec<String>,

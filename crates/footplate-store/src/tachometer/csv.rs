@@ -86,7 +86,7 @@ impl<R: Read> CsvReader<R> {
         }
     }
 
-    /// Reads the line at hand: the quick way, or if that does not know it, the slow one.
+    /// Reads the line at hand with the quick reader, or if that does not know it, with the slow one.
     fn read_row(&mut self, block: &mut TachometerBlock) -> Result<(), TachometerError> {
         let row = block.len();
         let is_last = self.lines.is_last_without_end();
@@ -116,7 +116,7 @@ impl<R: Read> CsvReader<R> {
     }
 }
 
-/// Adds the row that `text` begins with and says where it ends; `None` if it is not written the plain way.
+/// Adds the row that `text` begins with and says where it ends; `None` if it is not written plainly.
 #[inline]
 fn plain_row(text: &[u8], slots: &[Slot], runs: &mut RunNames, block: &mut TachometerBlock) -> Option<usize> {
     let mut at = 0;

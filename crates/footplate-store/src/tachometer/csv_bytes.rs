@@ -201,7 +201,7 @@ mod tests {
         }
 
         #[test]
-        fn times_are_those_of_the_slow_way(ns in 0..=i64::MAX, decimals in 0_usize..=9) {
+        fn times_are_those_of_the_slow_reader(ns in 0..=i64::MAX, decimals in 0_usize..=9) {
             let text = format!("{}.{:09}", ns / 1_000_000_000, ns % 1_000_000_000);
             let text = text[..text.len() - 9 + decimals].trim_end_matches('.').to_owned();
             let line = format!("{text}\n");

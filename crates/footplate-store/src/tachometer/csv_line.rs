@@ -1,4 +1,4 @@
-//! A row that is not written the plain way, or that is wrong: read field by field, with an error that says what
+//! A row that is not written plainly, or that is wrong: read field by field, with an error that says what
 //! would be right.
 
 use footplate_core::Timestamp;

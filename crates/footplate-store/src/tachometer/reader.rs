@@ -154,7 +154,7 @@ fn guarded<T>(name: &str, work: impl FnOnce() -> Result<T, TachometerError>) -> 
     })
 }
 
-/// The first bytes, by which a form is told; fewer only of a shorter input.
+/// The first bytes, by which a form is recognised; fewer only of a shorter input.
 fn beginning(input: &mut impl Read) -> io::Result<Vec<u8>> {
     let mut begin = Vec::with_capacity(PARQUET_MAGIC.len());
     input.take(PARQUET_MAGIC.len() as u64).read_to_end(&mut begin)?;

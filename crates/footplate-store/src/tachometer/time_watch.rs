@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_run_has_its_own_time_and_each_fault_is_told_once() {
+    fn each_run_has_its_own_time_and_each_fault_is_noted_once() {
         let mut watch = TimeWatch::default();
         let mut see = |run, ms| watch.see(run, Timestamp::ZERO + TimeSpan::from_ms(ms));
         assert_eq!(see(0, 50), None);

@@ -1,4 +1,4 @@
-//! Messages on their way to the bus: the server takes the next when it has said what became of the one before.
+//! Messages that leave for the bus: the server takes the next when it has said what became of the one before.
 
 use alloc::collections::VecDeque;
 

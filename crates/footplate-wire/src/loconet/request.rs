@@ -17,7 +17,7 @@ pub const TURNOUTS: RangeInclusive<u16> = 1..=2_048;
 /// The speed of an emergency stop; the decoder's steps lie above it.
 const EMERGENCY_STOP: u8 = 1;
 
-/// How often detectors are asked for their states: four addresses of turnouts that no turnout has, each both ways. Detectors report what
+/// How often detectors are asked for their states: four addresses of turnouts that no turnout has, each in both positions. Detectors report what
 /// they see in answer to one of them (as JMRI asks them).
 pub(super) const INTERROGATIONS: u8 = 8;
 const FIRST_INTERROGATION: u16 = 1_017;

@@ -4,7 +4,7 @@ use footplate_core::{TimeSpan, Timestamp};
 
 use super::line::BYTE_TIME;
 
-/// How long after a byte CTS is believed to be up although it was never seen down: the interface may drop it too
+/// How long after a byte CTS is taken to be up although it was never seen down: the interface may drop it too
 /// shortly for a slow computer to notice (after byte 192 it does), and it needs a moment to drop it at all, which
 /// published drivers give it 10 ms for.
 const CTS_GUARD: TimeSpan = TimeSpan::from_ms(10);

@@ -1,7 +1,7 @@
 //! The messages that synchronise the interface after bytes may have been lost.
 //!
 //! An interface that waits for the second byte of a message takes any next byte for it. One power message is therefore enough to
-//! synchronise it: it is swallowed or obeyed, and harmless either way. After the first lost reply nothing else is sent before the next
+//! synchronise it: it is swallowed or obeyed, and harmless in both cases. After the first lost reply nothing else is sent before the next
 //! read, so that sensors are read again soon; a solenoid that the swallowed message may have powered is released after the reply, and
 //! the reset mode is set, without which every sensor reports once and never again. If that read is lost, too, or the line has just been
 //! opened, the station may have been restarted: then power and reset mode are set as well, and again after the first answer, as a

@@ -53,7 +53,7 @@ impl ReplyTime {
         self.foreseen().max(self.least)
     }
 
-    /// How late a reply is to be expected at the worst, with what the way to this computer adds left out.
+    /// How late a reply is to be expected at the worst, with what the line to this computer adds left out.
     pub(super) fn foreseen(&self) -> TimeSpan {
         self.latest.map_or(LATEST, |latest| latest + MARGIN).max(REPLY_ALLOWANCE)
     }

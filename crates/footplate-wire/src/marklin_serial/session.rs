@@ -144,7 +144,7 @@ impl Interface {
             }
             None => {
                 if core::mem::take(&mut self.said_not_ready) {
-                    self.silence.doubt();
+                    self.silence.suspect();
                 }
             }
             Some(_) => {}

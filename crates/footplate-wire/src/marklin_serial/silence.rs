@@ -73,8 +73,8 @@ impl Silence {
         news.then_some(LinkNotice::Answers)
     }
 
-    /// Something else has cast doubt on the station: its next answer is news.
-    pub(super) fn doubt(&mut self) {
+    /// Something else makes the station suspect: its next answer is news.
+    pub(super) fn suspect(&mut self) {
         self.said = None;
     }
 

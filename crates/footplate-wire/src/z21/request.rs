@@ -15,7 +15,7 @@ use super::states::{FORWARD, address_bytes, address_of};
 /// Addresses of locomotives.
 pub const LOCOMOTIVES: RangeInclusive<u16> = 1..=9_999;
 
-/// Addresses of turnouts on the way: 2048 from 0.
+/// Addresses of turnouts on the line: 2048 from 0.
 pub const TURNOUTS: RangeInclusive<u16> = 0..=2_047;
 
 /// The functions that one request can switch (F0 to F31).

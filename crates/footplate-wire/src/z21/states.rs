@@ -183,7 +183,7 @@ impl LocomotiveState {
     }
 }
 
-/// Addresses from 128 on have both upper bits set on the way.
+/// Addresses from 128 on have both upper bits set on the line.
 pub(super) const fn address_of(high: u8, low: u8) -> u16 {
     u16::from_be_bytes([high & 0x3f, low])
 }

@@ -9,7 +9,7 @@ use footplate_core::link::{TimeModel, UsualLine};
 
 use super::outstanding::REPEATED_AFTER;
 
-/// The shortest time from a sensor being occupied until the host has the message: a datagram's way.
+/// The shortest time from a sensor being occupied until the host has the message: a datagram's transit.
 pub const SENSOR_DELAY_SHORTEST: TimeSpan = TimeSpan::from_ms(1);
 
 /// The longest, unless a person says another: one cycle of the feedback bus and what the station needs.

@@ -51,7 +51,7 @@ impl HeldLine {
             if opening.load(Ordering::Acquire) != this {
                 return false;
             }
-            let told = |kind, bytes: &[u8]| {
+            let tell = |kind, bytes: &[u8]| {
                 let mut ear = ear.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
                 // If the child is gone, reading from it fails too.
                 let _ = ear.as_mut().map(|child| child.send(kind, bytes));
@@ -59,15 +59,15 @@ impl HeldLine {
             match arrival {
                 Arrival::Bytes(bytes) => {
                     has_heard.store(true, Ordering::Release);
-                    told(Kind::Heard, bytes);
+                    tell(Kind::Heard, bytes);
                 }
                 Arrival::Cts(up) => {
                     cts.store(cts_byte(Some(up)), Ordering::Release);
-                    told(Kind::Cts, &[up.into()]);
+                    tell(Kind::Cts, &[up.into()]);
                 }
                 Arrival::Lost(why) => {
                     let _ = opening.compare_exchange(this, this + 1, Ordering::AcqRel, Ordering::Acquire);
-                    told(Kind::Lost, format!("`{name}` is gone: {why}").as_bytes());
+                    tell(Kind::Lost, format!("`{name}` is gone: {why}").as_bytes());
                     return false;
                 }
             }

@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_what_would_be_right() {
+    fn what_is_wrong_is_answered_with_what_would_be_right() {
         let cases = [
             ("/dev/ttyUSB0", "marklin-serial:/dev/ttyUSB0"),
             ("sim:", "sim:track-a"),

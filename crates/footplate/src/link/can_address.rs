@@ -17,7 +17,7 @@ const SCHEME: &str = "marklin-can:";
 const PORT: u16 = 15_731;
 /// The port to which they send datagrams.
 const RECEIVE: u16 = 15_730;
-/// The cycles of contacts that can be set on a station, in ms.
+/// The cycles of inputs that can be set on a station, in ms.
 const SCANS_MS: std::ops::RangeInclusive<u16> = 10..=1000;
 
 /// The speed of a serial CAN adapter. One on USB runs as fast as it can, whatever is set.

@@ -1,4 +1,4 @@
-//! A link under observation: how the line and the loop around it keep time, for whoever looks, while neither waits for them.
+//! A link under observation: how the line and the loop around it keep time, for a reader elsewhere, while neither waits for them.
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;

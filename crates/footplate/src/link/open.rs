@@ -14,7 +14,7 @@ use super::{Cable, CableLink, Link, Lost, SimulatedLink, SimulatedStation};
 use crate::guardian::WardLink;
 
 /// How late a byte may come because this computer, an adapter or a network was busy; FTDI's adapters hand over every
-/// 16 ms unless told otherwise.
+/// 16 ms unless set otherwise.
 const JITTER: TimeSpan = TimeSpan::from_ms(40);
 
 /// Opens a line. `layout` is the layout that is simulated, if one is.
@@ -80,7 +80,7 @@ fn highest_input(layout: &Layout) -> u16 {
     layout.sensors().map(|(sensor, _)| layout.input(sensor).0).max().unwrap_or_default()
 }
 
-/// How many modules the contacts of a layout are on.
+/// How many modules the sensors of a layout are on.
 pub(crate) fn module_count(layout: &Layout) -> u8 {
     modules_up_to(highest_input(layout))
 }

@@ -99,9 +99,9 @@ pub(crate) fn replay<M: Listener>(machine: &mut M, trace: Vec<Traced>, extent: E
     let mut rows = trace.into_iter().zip(0_u64..).peekable();
     let mut is_over = false;
     while !is_over {
-        // What was told in a row, up to the first decision.
+        // Inputs in a row, up to the first decision.
         while let Some((row, place)) = rows.next_if(|(row, _)| row.side == Side::Input) {
-            match told(&row, place, extent) {
+            match input_of(&row, place, extent) {
                 Ok(input) => {
                     if !lone.is_empty() {
                         now.extend(decided_by_itself(machine, replay.at, row.time, extent));
@@ -171,7 +171,7 @@ fn decided_by_itself<M: Listener>(
 }
 
 /// The input of a row, or why it ends there.
-fn told(row: &Traced, place: u64, extent: Extent) -> Result<Input, Ending> {
+fn input_of(row: &Traced, place: u64, extent: Extent) -> Result<Input, Ending> {
     if let Some(ending) = obstacle(row, place, extent) {
         return Err(ending);
     }
@@ -309,7 +309,7 @@ mod tests {
 
     use super::*;
 
-    /// Commands the step that lines ask for, in a way.
+    /// Commands the step that lines ask for.
     #[derive(Default)]
     struct Obedient {
         adds: u8,

@@ -170,7 +170,7 @@ mod tests {
             .collect()
     }
 
-    /// A session that has told its trains a step, and may have been cut off at any moment.
+    /// A session that has commanded its trains a step, and may have been cut off at any moment.
     fn driven(mut session: impl Session, until: Timestamp) -> impl Session {
         session.handle_cts(Timestamp::ZERO, true);
         for train in TRAINS {

@@ -1,4 +1,4 @@
-//! The loop over a DCC-EX board: over a network with every quirk of its line, reset under way, and left alone.
+//! The loop over a DCC-EX board: over a network with every quirk of its line, reset meanwhile, and left alone.
 
 use std::io::Write;
 use std::net::TcpStream;

@@ -200,7 +200,7 @@ fn noisy(place: &str, every: usize) -> String {
 }
 
 #[test]
-fn noise_on_the_way_is_noticed_and_trains_can_still_be_stopped() {
+fn noise_on_the_line_is_noticed_and_trains_can_still_be_stopped() {
     let mut standing = Standing::at_a_port();
     let place = noisy(&standing.place, 97);
     let mut runtime = connected(&place);

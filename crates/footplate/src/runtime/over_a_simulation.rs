@@ -108,7 +108,7 @@ fn trains_run_are_written_down_and_stand_in_the_end() {
     let mut written = Written::default();
     let mut machine = Runs::two();
     let mut until = Until(Timestamp::from_s(60.0), Vec::new());
-    let ways = with_runtime(Some(&mut written), |mut runtime| {
+    let distances = with_runtime(Some(&mut written), |mut runtime| {
         let ended = runtime.run(&mut machine, &mut until).expect("no disk is full");
         assert!(matches!(ended, Ended::Finished));
         let closing = runtime.close();
@@ -120,7 +120,7 @@ fn trains_run_are_written_down_and_stand_in_the_end() {
         assert_eq!(station.alarms(), []);
         [T24, T58].map(|train| station.world().truth().train(train).expect("it is there").odometer)
     });
-    assert!(ways.iter().all(|way| way.as_m() > 1.0), "{ways:?}");
+    assert!(distances.iter().all(|ran| ran.as_m() > 1.0), "{distances:?}");
     let reports = machine.heard.iter().filter(|event| matches!(event.kind, EventKind::Sensor(_)));
     assert!(reports.count() > 10);
     // The machine heard what is written down, in this order, and the end is written down as well.
@@ -144,7 +144,7 @@ fn a_disk_that_is_full_ends_the_run_and_stops_the_trains() {
     });
 }
 
-/// Two ovals of six contacts, 60 cm apart, so that two trains run for ever and never meet.
+/// Two ovals of six sensors, 60 cm apart, so that two trains run for ever and never meet.
 fn two_ovals() -> Layout {
     let end = |number: u16| RailEnd { node: format!("S{number}"), leg: None };
     let sensor = |number: u16| Place::Sensor {
@@ -186,8 +186,8 @@ fn two_trains_run_many_times_faster_than_real_time() {
     println!("{times:.0} times real time, {} entries", machine.heard.len());
     let truth = runtime.link().station().world().truth();
     for train in [T24, T58] {
-        let way = truth.train(train).expect("it is there").odometer;
-        assert!(way.as_m() > 60.0, "train {train} ran {way:?}: the figure is of trains that run");
+        let ran = truth.train(train).expect("it is there").odometer;
+        assert!(ran.as_m() > 60.0, "train {train} ran {ran:?}: the figure is of trains that run");
     }
     // The figure is the release build's; this only notices when something is badly wrong.
     assert!(times > 200.0, "{times:.0} times real time");

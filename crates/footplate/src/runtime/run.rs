@@ -110,7 +110,7 @@ impl<'r, L: Link> Runtime<'r, L> {
         machine: &mut M,
         attendant: &mut dyn Attendant<M>,
     ) -> anyhow::Result<Ended> {
-        let mut doubt: Option<(Timestamp, String)> = None;
+        let mut unanswered: Option<(Timestamp, String)> = None;
         let mut attended = self.link.now();
         self.ask(machine, attendant);
         let mut wakes = machine.next_timeout();
@@ -125,7 +125,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                 },
             };
             for notice in self.notices.drain(..) {
-                judge(&mut doubt, now, &notice);
+                judge(&mut unanswered, now, &notice);
                 attendant.hear_of_line(now, &notice);
             }
             for (train, reported) in self.functions.drain(..) {
@@ -134,8 +134,8 @@ impl<'r, L: Link> Runtime<'r, L> {
             for (train, number) in self.speeds.drain(..) {
                 attendant.hear_of_speed(train, number);
             }
-            if doubt.as_ref().is_some_and(|(until, _)| now >= *until)
-                && let Some((_, why)) = doubt.take()
+            if unanswered.as_ref().is_some_and(|(until, _)| now >= *until)
+                && let Some((_, why)) = unanswered.take()
             {
                 return Ok(Ended::NoAnswer(why));
             }
@@ -382,12 +382,12 @@ fn next_waking<M: Machine>(machine: &M, now: Timestamp, is_woken: bool) -> Optio
 }
 
 /// Updates the time until which a silent station may still answer.
-fn judge(doubt: &mut Option<(Timestamp, String)>, now: Timestamp, notice: &LinkNotice) {
+fn judge(unanswered: &mut Option<(Timestamp, String)>, now: Timestamp, notice: &LinkNotice) {
     match notice {
         LinkNotice::Silent { .. } | LinkNotice::NotReady { .. } => {
-            *doubt = Some((now + SECOND_CHANCE, notice.to_string()));
+            *unanswered = Some((now + SECOND_CHANCE, notice.to_string()));
         }
-        LinkNotice::Answers => *doubt = None,
+        LinkNotice::Answers => *unanswered = None,
         _ => {}
     }
 }

@@ -18,17 +18,17 @@ pub(crate) struct Scribe {
     shared: Arc<Shared>,
     number: u64,
     /// Time of the machine's last input.
-    told: Timestamp,
+    at: Timestamp,
 }
 
 impl Scribe {
     pub(super) const fn new(queue: SyncSender<Entry>, when_full: WhenFull, shared: Arc<Shared>) -> Self {
-        Self { queue, when_full, shared, number: 0, told: Timestamp::ZERO }
+        Self { queue, when_full, shared, number: 0, at: Timestamp::ZERO }
     }
 
     /// Records an input, before the machine receives it.
     pub(crate) fn input(&mut self, now: Timestamp, kind: &'static str, text: String) {
-        self.told = now;
+        self.at = now;
         self.write(Side::Input, kind, text);
     }
 
@@ -39,7 +39,7 @@ impl Scribe {
 
     /// Passes an entry on. An entry that the queue refuses is counted as lost, and leaves a gap in the numbers.
     fn write(&mut self, side: Side, kind: &'static str, text: String) {
-        let (number, time) = (self.number, self.told);
+        let (number, time) = (self.number, self.at);
         self.number += 1;
         let traced = Traced { number, time, side, kind: Cow::Borrowed(kind), text };
         if !self.when_full.offer(&self.queue, Entry::Of(JournalEntry::Traced(traced))) {
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_told_and_decided_stands_among_the_events_and_ends_with_the_session() {
+    fn inputs_and_decisions_stand_among_the_events_and_ends_with_the_session() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("railway.db");
         let mut session = session(&path, WhenFull::Wait, 100);

@@ -42,7 +42,7 @@ pub(super) fn figures_of(passed: &[Passed]) -> StationFigures {
     sensors.add_to(&mut json);
     let [count, occupied, reports] = sensors.counts();
     let (from, to) = (SENSOR_DELAY_SHORTEST.as_ms(), SENSOR_DELAY_LONGEST.as_ms());
-    let told = [
+    let lines = [
         format!("sensors       {count}, {occupied} occupied, {reports} reports"),
         format!("delay         of reports taken to be {from:.1} to {to:.1} ms, as on firmware 5.6.0"),
     ];
@@ -54,7 +54,7 @@ pub(super) fn figures_of(passed: &[Passed]) -> StationFigures {
         answers: waiting.finish(),
         json,
         station: vec![format!("station       {}", identity.as_deref().unwrap_or("unknown"))],
-        reports: told.into_iter().chain(noise(unread)).collect(),
+        reports: lines.into_iter().chain(noise(unread)).collect(),
     }
 }
 

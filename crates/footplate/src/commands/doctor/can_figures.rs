@@ -84,7 +84,7 @@ pub(super) fn figures_of(passed: &[Passed], session: &Client) -> StationFigures 
         format!("locomotive    {address}: {name}, number {:#06x}", uid.0)
     });
     let ([count, occupied, reports], scan) = (inputs.counts(), scan.as_ms());
-    let told = [
+    let lines = [
         format!("sensors       {count}, {occupied} occupied, {reports} reports, {timed} with their time"),
         format!("cycle         of sensors taken to be {scan:.0} ms, as set in the station (scan)"),
     ];
@@ -95,7 +95,7 @@ pub(super) fn figures_of(passed: &[Passed], session: &Client) -> StationFigures 
         answers: waiting.finish(),
         json,
         station: on_the_bus.chain(locomotives).collect(),
-        reports: told.into_iter().chain(noise(unread)).collect(),
+        reports: lines.into_iter().chain(noise(unread)).collect(),
     }
 }
 

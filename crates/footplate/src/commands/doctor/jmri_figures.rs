@@ -47,7 +47,7 @@ pub(super) fn figures_of(passed: &[Passed], session: &Client) -> StationFigures 
     sensors.add_to(&mut json);
     let [count, occupied, reports] = sensors.counts();
     let (from, to) = (SENSOR_DELAY_SHORTEST.as_ms(), session.settings().sensor_delay.as_ms());
-    let told = [
+    let lines = [
         format!("sensors       {count}, {occupied} occupied, {reports} reports"),
         format!("delay         of reports taken to be {from:.1} to {to:.0} ms (sensor-delay)"),
     ];
@@ -61,7 +61,7 @@ pub(super) fn figures_of(passed: &[Passed], session: &Client) -> StationFigures 
             format!("station       {}", identity.as_deref().unwrap_or("unknown")),
             format!("system        {system}"),
         ],
-        reports: told.into_iter().chain(noise(unread)).collect(),
+        reports: lines.into_iter().chain(noise(unread)).collect(),
     }
 }
 

@@ -60,7 +60,7 @@ pub(super) fn figures_of(passed: &[Passed], settings: &Settings) -> StationFigur
     });
     let [count, occupied, reports] = sensors.counts();
     let (from, to) = (SENSOR_DELAY_SHORTEST.as_ms(), settings.sensor_delay.as_ms());
-    let told = [
+    let lines = [
         format!("sensors       {count}, {occupied} occupied, {reports} reports"),
         format!("delay         of reports taken to be {from:.1} to {to:.0} ms (sensor-delay)"),
     ];
@@ -72,6 +72,6 @@ pub(super) fn figures_of(passed: &[Passed], settings: &Settings) -> StationFigur
         answers: waiting.finish(),
         json,
         station: [server].into_iter().chain(locomotives).collect(),
-        reports: told.into_iter().chain(refusals).chain(noise(unread)).collect(),
+        reports: lines.into_iter().chain(refusals).chain(noise(unread)).collect(),
     }
 }

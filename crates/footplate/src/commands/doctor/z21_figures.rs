@@ -98,7 +98,7 @@ pub(super) fn figures_of(passed: &[Passed], settings: &Settings) -> StationFigur
     });
     let [count, occupied, reports] = sensors.counts();
     let (from, to) = (SENSOR_DELAY_SHORTEST.as_ms(), settings.sensor_delay.as_ms());
-    let told = [
+    let lines = [
         format!("sensors       {count} inputs, {occupied} occupied, {reports} reports"),
         format!("delay         of reports taken to be {from:.0} to {to:.0} ms (sensor-delay)"),
     ];
@@ -117,7 +117,7 @@ pub(super) fn figures_of(passed: &[Passed], settings: &Settings) -> StationFigur
         answers: waiting.finish(),
         json,
         station: [format!("station       {named}")].into_iter().chain(track).collect(),
-        reports: told.into_iter().chain(decoders).chain(checksums).chain(noise(unread)).collect(),
+        reports: lines.into_iter().chain(decoders).chain(checksums).chain(noise(unread)).collect(),
     }
 }
 
