@@ -5,7 +5,6 @@ use footplate_wire::dcc_ex::{Settings, TurnoutRequests};
 
 use super::parameters::number;
 use super::place::Place;
-use super::station_address::{StationAddress, StationSettings};
 use super::stream::SerialFormat;
 
 /// The port at which a board with a network connection listens.
@@ -17,10 +16,10 @@ const BAUD: u32 = 115_200;
 ///
 /// # Errors
 /// When no port is named.
-pub(super) fn read(port: &str) -> Result<StationAddress, String> {
+pub(super) fn read(port: &str) -> Result<(Place, Settings), String> {
     let place = Place::named("dcc-ex:", port, "/dev/ttyACM0", NETWORK_PORT, SerialFormat::of_baud(BAUD))?;
     let settings = Settings { resets_on_open: matches!(place, Place::Device(..)), ..Settings::default() };
-    Ok(StationAddress::new(place, StationSettings::Board(settings)))
+    Ok((place, settings))
 }
 
 pub(super) fn set(settings: &mut Settings, key: &str, value: &str) -> Result<(), String> {
@@ -51,6 +50,7 @@ pub(super) fn set(settings: &mut Settings, key: &str, value: &str) -> Result<(),
 #[cfg(test)]
 mod tests {
     use super::super::address::Address;
+    use super::super::station_address::{StationAddress, StationSettings};
     use super::*;
 
     #[test]

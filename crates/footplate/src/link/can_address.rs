@@ -9,7 +9,6 @@ use footplate_wire::marklin_can::{AccessoryProtocol, LocomotiveProtocol, Setting
 use super::datagrams::Correspondent;
 use super::parameters::number;
 use super::place::{Place, host_and_port};
-use super::station_address::{StationAddress, StationSettings};
 use super::stream::SerialFormat;
 
 const SCHEME: &str = "marklin-can:";
@@ -27,7 +26,7 @@ const ADAPTER_BAUD: u32 = 115_200;
 ///
 /// # Errors
 /// When no place is named.
-pub(super) fn read(place: &str) -> Result<StationAddress, String> {
+pub(super) fn read(place: &str) -> Result<(Place, Settings), String> {
     let wanted = || {
         format!(
             "`{SCHEME}{place}` names no station: write {SCHEME}192.168.0.5, {SCHEME}tcp://HOST:{PORT}, or {SCHEME}/dev/ttyACM0 for \
@@ -51,7 +50,7 @@ pub(super) fn read(place: &str) -> Result<StationAddress, String> {
     // Each process has its own number, to recognise its own frames.
     let uid = Uid(Settings::default().uid.0 & 0xFFFF_0000 | std::process::id() & 0xFFFF);
     let settings = Settings { transport, uid, ..Settings::default() };
-    Ok(StationAddress::new(place, StationSettings::Can { settings, modules: None }))
+    Ok((place, settings))
 }
 
 /// Changes a setting of a station other than the number of its modules.
@@ -134,6 +133,7 @@ pub(super) fn set_quirk(switches: &mut CanSwitches, name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::address::Address;
+    use super::super::station_address::{StationAddress, StationSettings};
     use super::*;
 
     #[test]

@@ -7,7 +7,6 @@ use footplate_wire::jmri::Settings;
 use super::loconet_address::{is_closed_straight, sensor_delay};
 use super::parameters::number;
 use super::place::{Place, host_and_port};
-use super::station_address::{StationAddress, StationSettings};
 
 const SCHEME: &str = "jmri:";
 /// The port of JMRI's web server.
@@ -17,14 +16,14 @@ const PORT: u16 = 12_080;
 ///
 /// # Errors
 /// When no place is named.
-pub(super) fn read(place: &str) -> Result<StationAddress, String> {
+pub(super) fn read(place: &str) -> Result<(Place, Settings), String> {
     let named = place.strip_prefix("tcp://").unwrap_or(place);
     let (host, port) = host_and_port(named, PORT).ok_or_else(|| {
             format!(
                 "`{SCHEME}{place}` names no computer: write {SCHEME}192.168.0.20 or {SCHEME}HOST:{PORT}, where JMRI's web server runs"
             )
         })?;
-    Ok(StationAddress::new(Place::WebSocket { host, port }, StationSettings::Jmri(Settings::default())))
+    Ok((Place::WebSocket { host, port }, Settings::default()))
 }
 
 pub(super) fn set(settings: &mut Settings, key: &str, value: &str) -> Result<(), String> {
@@ -78,6 +77,7 @@ mod tests {
     use footplate_core::TimeSpan;
 
     use super::super::address::Address;
+    use super::super::station_address::StationSettings;
     use super::*;
 
     #[test]

@@ -7,7 +7,6 @@ use footplate_wire::loconet::Settings;
 
 use super::parameters::number;
 use super::place::{Place, host_and_port};
-use super::station_address::{StationAddress, StationSettings};
 
 const SCHEME: &str = "loconet:";
 /// The port at which servers listen (LbServer).
@@ -20,7 +19,7 @@ const LONGEST_DELAY_MS: u16 = 2_000;
 ///
 /// # Errors
 /// When no place is named.
-pub(super) fn read(place: &str) -> Result<StationAddress, String> {
+pub(super) fn read(place: &str) -> Result<(Place, Settings), String> {
     let named = place.strip_prefix("tcp://").unwrap_or(place);
     let (host, port) = host_and_port(named, PORT).ok_or_else(|| {
             format!(
@@ -28,7 +27,7 @@ pub(super) fn read(place: &str) -> Result<StationAddress, String> {
                  server (LbServer, JMRI, Rocrail, a gateway) runs"
             )
         })?;
-    Ok(StationAddress::new(Place::Tcp { host, port }, StationSettings::LocoNet(Settings::default())))
+    Ok((Place::Tcp { host, port }, Settings::default()))
 }
 
 pub(super) fn set(settings: &mut Settings, key: &str, value: &str) -> Result<(), String> {
@@ -86,6 +85,7 @@ pub(super) fn set_quirk(switches: &mut LocoNetSwitches, name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::address::Address;
+    use super::super::station_address::StationSettings;
     use super::*;
 
     #[test]

@@ -5,7 +5,6 @@ use footplate_wire::marklin_serial::Pace;
 use serialport::StopBits;
 
 use super::place::Place;
-use super::station_address::{StationAddress, StationSettings};
 use super::stream::SerialFormat;
 
 /// The port that a served simulated 6051 is written with in examples.
@@ -13,9 +12,8 @@ const EXAMPLE_PORT: u16 = 2400;
 /// How the interface's line is used (Märklin).
 const FORMAT: SerialFormat = SerialFormat { baud: 2400, stop_bits: StopBits::Two, cts: None };
 
-pub(super) fn read(port: &str) -> Result<StationAddress, String> {
-    let place = Place::named("marklin-serial:", port, "/dev/ttyUSB0", EXAMPLE_PORT, FORMAT)?;
-    Ok(StationAddress::new(place, StationSettings::Serial { pace: None, modules: None }))
+pub(super) fn read(port: &str) -> Result<Place, String> {
+    Place::named("marklin-serial:", port, "/dev/ttyUSB0", EXAMPLE_PORT, FORMAT)
 }
 
 /// Changes a setting other than the number of modules.

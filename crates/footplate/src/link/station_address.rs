@@ -5,7 +5,6 @@ use footplate_wire::{dcc_ex, jmri, loconet, marklin_can, z21};
 
 use super::cable::Cable;
 use super::parameters::{modules, times};
-use super::place::Place;
 use super::station_kind::StationKind;
 use super::{board_address, can_address, jmri_address, loconet_address, serial_address, z21_address};
 
@@ -37,23 +36,25 @@ pub(crate) enum StationSettings {
 }
 
 impl StationAddress {
-    pub(super) fn new(place: Place, settings: StationSettings) -> Self {
-        let has_answers = !matches!(settings, StationSettings::Serial { .. });
-        Self { cable: Cable { place, speed: 1.0, has_answers }, settings }
-    }
-
     /// Returns the station at a place; `None` if no station has this scheme.
     pub(super) fn read(scheme: &str, place: &str) -> Option<Result<Self, String>> {
+        use StationSettings as Of;
         let read = match scheme {
-            "marklin-serial" => serial_address::read,
-            "dcc-ex" => board_address::read,
-            "z21" => z21_address::read,
-            "marklin-can" => can_address::read,
-            "loconet" => loconet_address::read,
-            "jmri" => jmri_address::read,
+            "marklin-serial" => {
+                serial_address::read(place).map(|place| (place, Of::Serial { pace: None, modules: None }))
+            }
+            "dcc-ex" => board_address::read(place).map(|(place, settings)| (place, Of::Board(settings))),
+            "z21" => z21_address::read(place).map(|(place, settings)| (place, Of::Z21(settings))),
+            "marklin-can" => {
+                can_address::read(place).map(|(place, settings)| (place, Of::Can { settings, modules: None }))
+            }
+            "loconet" => loconet_address::read(place).map(|(place, settings)| (place, Of::LocoNet(settings))),
+            "jmri" => jmri_address::read(place).map(|(place, settings)| (place, Of::Jmri(settings))),
             _ => return None,
         };
-        Some(read(place))
+        let has_answers = scheme != "marklin-serial";
+        let cable = |place| Cable { place, speed: 1.0, has_answers };
+        Some(read.map(|(place, settings)| Self { cable: cable(place), settings }))
     }
 
     /// Which station it is.

@@ -9,7 +9,6 @@ use super::datagrams::Correspondent;
 use super::named_train::decoder_of;
 use super::parameters::number;
 use super::place::{Place, host_and_port};
-use super::station_address::{StationAddress, StationSettings};
 
 /// The port at which stations listen.
 const PORT: u16 = 21_105;
@@ -20,12 +19,11 @@ const LONGEST_DELAY_MS: u16 = 2_000;
 ///
 /// # Errors
 /// When no place is named.
-pub(super) fn read(place: &str) -> Result<StationAddress, String> {
+pub(super) fn read(place: &str) -> Result<(Place, Settings), String> {
     let wanted = || format!("`z21:{place}` names no station: write z21:192.168.0.111 or z21:HOST:{PORT}");
     let place = place.strip_prefix("//").unwrap_or(place);
     let (host, port) = host_and_port(place, PORT).ok_or_else(wanted)?;
-    let place = Place::Datagrams(Correspondent { host, port, receive_at: None });
-    Ok(StationAddress::new(place, StationSettings::Z21(Settings::default())))
+    Ok((Place::Datagrams(Correspondent { host, port, receive_at: None }), Settings::default()))
 }
 
 pub(super) fn set(settings: &mut Settings, key: &str, value: &str) -> Result<(), String> {
@@ -104,6 +102,7 @@ pub(super) fn set_quirk(switches: &mut Z21Switches, name: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::address::Address;
+    use super::super::station_address::StationSettings;
     use super::*;
 
     #[test]
