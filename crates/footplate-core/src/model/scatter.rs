@@ -216,6 +216,19 @@ mod tests {
     }
 
     #[test]
+    fn sums_with_the_promises_of_others_keep_their_own_stops_and_starts() {
+        let (mut own, mut other) = (ScatterSums::default(), ScatterSums::default());
+        (0..8).for_each(|_| own.stops.take(4.0));
+        for _ in 0..40 {
+            other.take_promise(0.5, 0.05 * 0.05, 0.005 * 0.005);
+        }
+        let both = own.with_promises_of(&other).scatter();
+        assert_eq!((both.stops, both.starts), (own.scatter().stops, own.scatter().starts));
+        assert_eq!((both.floor, both.delay), (other.scatter().floor, other.scatter().delay));
+        assert!(both.unexplained(0.5) > 0.02 && own.scatter().unexplained(0.5) < 0.01, "{both:?}");
+    }
+
+    #[test]
     fn one_stop_45_mm_off_is_nothing_to_speak_of() {
         let mut sums = ScatterSums::default();
         for _ in 0..20 {

@@ -377,14 +377,15 @@ mod tests {
     }
 
     /// The inverse of a positive definite matrix (Gauss and Jordan), and its product with a vector.
-    fn solved(mut m: [[f64; 3]; 3], y: [f64; 3]) -> ([[f64; 3]; 3], [f64; 3]) {
-        let mut inverse = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        for pivot in 0..3 {
+    fn solved<const N: usize>(mut m: [[f64; N]; N], y: [f64; N]) -> ([[f64; N]; N], [f64; N]) {
+        let mut inverse: [[f64; N]; N] =
+            core::array::from_fn(|row| core::array::from_fn(|column| f64::from(u8::from(row == column))));
+        for pivot in 0..N {
             let by = m[pivot][pivot];
             (m[pivot], inverse[pivot]) = (m[pivot].map(|x| x / by), inverse[pivot].map(|x| x / by));
-            for row in (0..3).filter(|row| *row != pivot) {
+            for row in (0..N).filter(|row| *row != pivot) {
                 let times = m[row][pivot];
-                for column in 0..3 {
+                for column in 0..N {
                     m[row][column] -= times * m[pivot][column];
                     inverse[row][column] -= times * inverse[pivot][column];
                 }
@@ -392,6 +393,40 @@ mod tests {
         }
         let x = inverse.map(|row| row.iter().zip(y).map(|(a, b)| a * b).sum());
         (inverse, x)
+    }
+
+    /// Each probability is the one that follows from least squares over all places at once, weighted by the probabilities; so are the
+    /// estimates at the latest place.
+    #[test]
+    fn probabilities_and_estimates_are_those_of_least_squares_over_all_places() {
+        let mut places = StatedPlaces::new(0.02);
+        for (x, off) in [(300.0, 0.4), (650.0, -0.7), (900.0, 4.5), (1500.0, 0.9)] {
+            pass(&mut places, x, 1.01 * x + off, 1.0);
+        }
+        // Unknown: the error at the start and at each place, and the logarithm `k` of the scale.
+        let (mut information, mut weighted) = ([[0.0; 6]; 6], [0.0; 6]);
+        information[5][5] = 3.0 / (0.02 * 0.02);
+        let mut from = 0.0;
+        for (at, mark) in places.remembered().iter().enumerate() {
+            information[at][at] += mark.w / mark.r;
+            weighted[at] += mark.w / mark.r * (mark.y - mark.x);
+            if at > 0 {
+                // The error grows by `k Δx`, but for 3e-4 m² a metre.
+                let row = [(at - 1, -1.0), (at, 1.0), (5, -(mark.x - from))];
+                for ((one, a), (other, b)) in row.into_iter().flat_map(|a| row.map(|b| (a, b))) {
+                    information[one][other] += a * b / (3e-4 * (mark.x - from));
+                }
+            }
+            from = mark.x;
+        }
+        let (covariance, x) = solved(information, weighted);
+        for (at, mark) in places.remembered().iter().enumerate().skip(1) {
+            let left = mark.y - mark.x - x[at];
+            let expected = right(left * left + covariance[at][at], 1.0);
+            assert!((mark.w - expected).abs() < 2e-4, "{at}: {} {expected}", mark.w);
+        }
+        assert_eq!(places.passed_and_wrong(), [4, 1]);
+        assert!((places.latest.c - x[4]).abs() < 2e-3 && (places.latest.k - x[5]).abs() < 1e-6);
     }
 
     proptest! {

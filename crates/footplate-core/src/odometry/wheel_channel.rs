@@ -277,3 +277,113 @@ impl WheelChannel {
         self.quality != Quality::Missing
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::odometry::wheels::Axle;
+    use crate::time::{TimeSpan, Timestamp};
+    use crate::units::{Acceleration, Length, Speed};
+
+    /// A period (s).
+    const T: f64 = 0.1;
+    const FORWARD: Heading = Heading { direction: 1.0, certain: true, disputed: false };
+
+    /// Two wheelsets of 100 teeth, whose diameters are known to 0.2 %, of a train of 40 m/s.
+    fn channels() -> [WheelChannel; 2] {
+        let axle = Axle::Trailing;
+        let wheelset =
+            Wheelset { teeth: 100, diameter: Length::from_m(1.0), diameter_tolerance: 0.002, axle };
+        let abilities = [1.0, 1.2].map(Acceleration::from_m_per_s2);
+        let (period, top) = (TimeSpan::from_s(T), Speed::from_m_per_s(40.0));
+        let vehicle = Vehicle::new(period, top, abilities, [wheelset; 2]).unwrap();
+        [(); 2].map(|()| WheelChannel::new(wheelset, &vehicle))
+    }
+
+    fn period(counts: [i64; 2]) -> Period {
+        Period {
+            time: Timestamp::ZERO,
+            wheels: counts.map(WheelReading::pulses),
+            effort: None,
+            acceleration: None,
+            balise: None,
+            balise_deviation: None,
+        }
+    }
+
+    /// Reads both counts. Returns whether each is stuck.
+    fn read([first, second]: &mut [WheelChannel; 2], counts: [i64; 2]) -> [bool; 2] {
+        let acceleration = Range { low: -1.2, high: 1.0 };
+        let allowed = Allowed {
+            slide: false,
+            slip: false,
+            acceleration,
+            rolling: acceleration,
+            commanded: None,
+            traction: 0.0,
+            brake: 0.0,
+        };
+        for (which, channel) in [&mut *first, &mut *second].into_iter().enumerate() {
+            let turned = channel.read(&period(counts), which, (T, T), FORWARD, &allowed);
+            let pitch = core::f64::consts::PI / 100.0;
+            assert!((turned - counts[which] as f64 * pitch).abs() < 1e-9, "{turned} {counts:?}");
+        }
+        first.compare(second, T);
+        [first.stuck, second.stuck]
+    }
+
+    /// The number of periods after the first until the first wheel's count of 30 is stuck beside these two in turn; at most 60.
+    fn stuck_beside(other: [i64; 2]) -> Option<usize> {
+        let mut wheels = channels();
+        (0..=60).find(|nth| read(&mut wheels, [30, other[nth % 2]])[0])
+    }
+
+    #[test]
+    fn a_constant_count_is_stuck_after_0_7_s_beside_one_that_changes_and_is_apart() {
+        // Apart by more than two pulses and 3 % of 40.
+        assert_eq!(stuck_beside([40, 41]), Some(8));
+        assert_eq!(stuck_beside([20, 21]), Some(8));
+        assert_eq!(stuck_beside([33, 33]), None, "the other is constant, too");
+        assert_eq!(stuck_beside([30, 30]), None);
+    }
+
+    #[test]
+    fn a_constant_count_is_stuck_after_1_5_s_where_the_other_wheel_runs_farther_than_it_used_to() {
+        // One pulse farther in each period, of which a missing tooth of 100 explains 0.3. After 15 periods the rest is 10 pulses; two, and 0.9 %
+        // of 450, are 6.
+        assert_eq!(stuck_beside([30, 32]), Some(15));
+        assert_eq!(stuck_beside([28, 30]), Some(15));
+        // Half a pulse is no more than the missing tooth and the diameters explain.
+        assert_eq!(stuck_beside([30, 31]), None);
+    }
+
+    #[test]
+    fn a_stuck_count_stays_stuck_until_it_changes() {
+        let mut wheels = channels();
+        for nth in 0..10 {
+            read(&mut wheels, [30, 40 + nth % 2]);
+        }
+        assert_eq!(read(&mut wheels, [30, 39]), [true, false]);
+        assert_eq!(read(&mut wheels, [30, 39]), [true, false]);
+        assert_eq!(read(&mut wheels, [31, 39]), [false, false]);
+    }
+
+    #[test]
+    fn a_learnt_diameter_is_known_as_well_as_its_bounds_say() {
+        let [mut wheel, _] = channels();
+        assert!((wheel.tolerance() - 0.002).abs() < 1e-12, "{}", wheel.tolerance());
+        wheel.rescale(1.01, Range { low: 1.009, high: 1.012 });
+        // Half of 0.003 of 1.01.
+        assert!((wheel.tolerance() - 0.001_485_149).abs() < 1e-9, "{}", wheel.tolerance());
+        assert!((wheel.pitch - 1.01 * core::f64::consts::PI / 100.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_first_count_is_a_speed_unless_no_train_is_so_fast() {
+        let begun = |count| channels()[0].begin(&period([count, 0]), 0, T);
+        // 30 pulses of 31.4 mm in 0.1 s.
+        assert!((begun(30).unwrap() - 9.424_778).abs() < 1e-6);
+        // 1.2 times 40 m/s are 152.8 pulses, and 2.2 more.
+        assert!(begun(154).is_some() && begun(155).is_none());
+    }
+}

@@ -215,6 +215,51 @@ mod tests {
     use crate::tracking::motion_filter::MotionFilter;
 
     #[test]
+    fn no_run_and_no_step_differs_by_more_than_a_factor_of_4_5() {
+        let model = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));
+        let place = Gaussian { mean: 0.0, variance: 1e-6 };
+        let mut course = MotionFilter::<N>::running(&model, 0.0, 14, place).keep_apart(&model).course;
+        let letter = course.speed.expect("a letter");
+        for (off, held) in [(1.6, 1.5), (1.4, 1.4), (-1.6, -1.5)] {
+            (course.x[E], course.x[letter], course.x[H]) = (off, off, off);
+            course.hold_deviations();
+            assert_eq!([course.x[E], course.x[letter], course.x[H]], [held, held, off]);
+        }
+    }
+
+    #[test]
+    fn what_is_learnt_of_steps_moves_a_change_as_making_it_anew_does() {
+        // Given a train that slows down from step 14 to step 9,
+        let model = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));
+        let place = Gaussian { mean: 0.0, variance: 1e-6 };
+        let mut train = MotionFilter::<N>::running(&model, 0.0, 14, place).keep_apart(&model);
+        let before = train.course.speed.expect("a letter");
+        train.command(&model, 1.0, 9);
+        let course = train.at(&model, 4.0).course;
+        let own = course.speed.expect("a letter");
+        assert_ne!(own, before);
+        for (letter, time) in [(own, 3.0), (own, 6.0), (before, 3.0), (before, 6.0)] {
+            // when one of both steps is found to be 1 % faster,
+            let mut anew = course;
+            anew.x[letter] += 0.01;
+            let learnt = anew.learnt_since(time);
+            let slope = {
+                let mut slope = [0.0; N];
+                course.apart.expect("steps apart").add_slopes(&course, time, &mut slope);
+                0.01 * slope[letter]
+            };
+            // then its place differs by as much as that of the change made anew, to a few per cent.
+            let distance = |course: &FilterState| course.segment.distance(time - course.x[H]);
+            anew.linearise(&model);
+            let moved = distance(&anew) - distance(&course);
+            assert!(moved > 1e-4, "{letter} {time} {moved}");
+            assert!((learnt - moved).abs() < 0.03 * moved, "{letter} {time} {learnt} {moved}");
+            assert!((slope - moved).abs() < 0.03 * moved, "{letter} {time} {slope} {moved}");
+            assert_eq!(anew.learnt_since(time), 0.0, "it is in the change now");
+        }
+    }
+
+    #[test]
     fn what_a_step_is_off_by_is_not_taken_along_to_the_next() {
         // Given a train of which nothing is known, and which runs 13 % faster at step 9 than such trains do,
         let model = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));

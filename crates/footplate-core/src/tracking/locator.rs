@@ -448,3 +448,33 @@ pub(super) fn log_density(of: Gaussian) -> f64 {
     let variance = of.variance.max(f64::MIN_POSITIVE);
     -0.5 * (of.mean * of.mean / variance + libm::log(2.0 * core::f64::consts::PI * variance))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::survey::SectionIndex;
+    use crate::track::TurnoutStates;
+    use crate::track::example::oval;
+
+    #[test]
+    fn commands_of_its_own_train_move_it_and_its_reversal_loses_it() {
+        let (layout, turnouts) = (oval(), TurnoutStates::unknown());
+        let sections = SectionIndex::of(&layout);
+        let context = TrackContext { layout: &layout, sections: &sections, turnouts: &turnouts };
+        let step = SpeedStep::new(14).unwrap();
+        let [train, other] = [24, 58].map(TrainId);
+        let model = MotionModel::unknown(train, step);
+        let at = PathPoint { node: layout.node_named("D1").unwrap(), distance: Length::from_mm(100.0) };
+        let mut locator = Locator::new(train);
+        assert!(!locator.is_located());
+        locator.place(Timestamp::from_s(1.0), at, Length::from_mm(3.0));
+        let mut handle = |kind| {
+            locator.handle_command(context, &model, &Event { time: Timestamp::from_s(2.0), kind });
+            (locator.is_located(), locator.is_at_rest(&model, Timestamp::from_s(6.0)))
+        };
+        assert_eq!(handle(EventKind::Reverse { train: other }), (true, true));
+        assert_eq!(handle(EventKind::Speed { train: other, step }), (true, true));
+        assert_eq!(handle(EventKind::Speed { train, step }), (true, false));
+        assert_eq!(handle(EventKind::Reverse { train }), (false, false), "it runs on, at an unknown place");
+    }
+}

@@ -401,3 +401,6 @@ fn length(layout: &Layout, run: &Run) -> Length {
     let last = run.edges.last().and_then(|edge| layout.edge(*edge)).map_or(Length::ZERO, |edge| edge.length);
     whole - run.start.offset - (last - run.stop.offset)
 }
+
+#[cfg(test)]
+mod tests;

@@ -251,6 +251,66 @@ mod tests {
     }
 
     #[test]
+    fn numbers_of_one_speed_are_within_two_and_8_per_cent() {
+        let apart = |low, high| {
+            let mut numbers = Numbers::default();
+            [high, low, high].into_iter().for_each(|number| numbers.take(number));
+            numbers.are_apart()
+        };
+        // 8 % of 50 are 4, of 100 are 8.
+        assert_eq!([apart(44, 50), apart(43, 50)], [false, true]);
+        assert_eq!([apart(90, 100), apart(89, 100)], [false, true]);
+    }
+
+    #[test]
+    fn a_speed_is_its_number_over_the_scale_unless_the_number_stands_for_all_above() {
+        let mut reported = ReportedSpeed::default();
+        learn(&mut reported, 0.2, &[63], 100);
+        let at = Timestamp::from_s(10.0);
+        (0..16).for_each(|_| reported.take(at, 126));
+        let speed = reported.ln_speed().unwrap();
+        assert!((libm::exp(speed.mean) - 0.4).abs() < 1e-3, "{speed:?}");
+        // The scale is known to 0.548 %, a number of 126 is rounded by 0.229 %, and 16 reports are four places of 1 % each: 0.5 %.
+        assert!((libm::sqrt(speed.variance) - 0.007_764).abs() < 2e-5, "{}", libm::sqrt(speed.variance));
+        reported.take(at, 255);
+        assert_eq!(reported.ln_speed(), None, "255 is any speed above, too");
+        reported.forget_run();
+        reported.take(at, 126);
+        assert!(reported.ln_speed().is_some());
+    }
+
+    #[test]
+    fn numbers_count_for_a_hop_a_second_and_a_half_after_its_first_sensor() {
+        let at = Timestamp::from_s;
+        let window = |from, until| DetectionWindow { after: at(from), until: at(until) };
+        let mut reported = ReportedSpeed::default();
+        reported.take(at(1.0), 20);
+        assert!(!reported.pass(NodeId(3), window(1.9, 2.0), None));
+        assert_eq!(reported.last_passed(), Some((NodeId(3), window(1.9, 2.0))));
+        // 20 was before the sensor, 90 may be of before; only 63 is of this hop.
+        for (time, number) in [(3.4, 90), (3.5, 63), (9.0, 63)] {
+            reported.take(at(time), number);
+        }
+        assert_eq!(reported.hop.range, Some((63, 63)));
+        let speed = Gaussian { mean: libm::log(0.2), variance: 1e-6 };
+        assert!(!reported.pass(NodeId(4), window(9.9, 10.0), Some(speed)));
+        assert_eq!((reported.hops, reported.contradictions, reported.hop.range), (1, 0, None));
+        // It reports 0 for a second and a half, and then a sensor reports it: three of four contradictions.
+        for (count, node) in (1..=3).zip(5..) {
+            reported.take_zero(at(20.0), 0.0);
+            assert!(!reported.pass(NodeId(node), window(21.5, 21.6), None));
+            assert_eq!(reported.contradictions, count);
+        }
+        reported.take(at(22.0), 63);
+        reported.take_zero(at(22.5), 0.0);
+        assert!(!reported.pass(NodeId(8), window(23.9, 24.0), None));
+        assert_eq!(reported.contradictions, 3, "1.4 s are too short to tell");
+        reported.take_zero(at(24.0), 0.0);
+        assert!(reported.pass(NodeId(9), window(25.9, 26.0), None), "once too often");
+        assert!(!reported.pass(NodeId(9), window(27.9, 28.0), None), "said once");
+    }
+
+    #[test]
     fn a_train_that_reports_zero_for_a_second_has_stalled_if_it_should_report_three() {
         let mut reported = ReportedSpeed::default();
         learn(&mut reported, 0.2, &[63, 64], 5);

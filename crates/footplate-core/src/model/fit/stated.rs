@@ -340,6 +340,22 @@ mod tests {
     }
 
     #[test]
+    fn a_throttle_between_two_steps_is_a_share_of_both_as_uncertain_as_a_parabola() {
+        let at = |throttle: f64| terms_at(throttle, 14);
+        // Step 7, and 8 rounded to thousandths.
+        assert_eq!(at(0.5), Some((vec![(speed_at(7), 1.0)], 0.0)));
+        assert_eq!(at(0.571), Some((vec![(speed_at(8), 1.0)], 0.0)));
+        assert_eq!([at(0.07), at(1.002)], [None, None]);
+        assert_eq!([at(0.0714), at(1.000_5)], [1, 14].map(|step| Some((vec![(speed_at(step), 1.0)], 0.0))));
+        // Halfway from 7 to 8: ln (7.5/7) / ln (8/7) = 0.516679, and half of that times the rest is 0.124861.
+        let (terms, variance) = at(7.5 / 14.0).unwrap();
+        let [(low, one), (high, other)] = terms[..] else { panic!("two steps, not {terms:?}") };
+        assert_eq!((low, high), (speed_at(7), speed_at(8)));
+        assert!((one - 0.483_321).abs() < 1e-6 && (other - 0.516_679).abs() < 1e-6, "{one} {other}");
+        assert!((libm::sqrt(variance) / bend_deviation(7) - 0.124_861).abs() < 1e-6, "{variance}");
+    }
+
+    #[test]
     fn one_gross_error_among_good_entries_is_ignored() {
         let mut with_error = TRAIN_58.to_vec();
         with_error.push((9.5 / 14.0, 3_662.0));

@@ -117,6 +117,29 @@ mod tests {
     }
 
     #[test]
+    fn sums_multiples_and_determinants_are_those_of_matrices() {
+        let p = Covariance { speed: 2.0, mixed: 1.0, acceleration: 3.0 };
+        assert_eq!(p.determinant(), 5.0);
+        assert_eq!(p.times(4.0), Covariance { speed: 8.0, mixed: 4.0, acceleration: 12.0 });
+        let sum = p.plus(Covariance { speed: 0.5, mixed: -3.0, acceleration: 7.0 });
+        assert_eq!(sum, Covariance { speed: 2.5, mixed: -2.0, acceleration: 10.0 });
+        assert_eq!(p.plus(Covariance::ZERO), p);
+        assert_eq!(Covariance::diagonal(2.0, 3.0), Covariance { mixed: 0.0, ..p });
+        // Of a product of 6 no less than 6e-12 is left.
+        assert_eq!(Covariance { mixed: 3.0, ..p }.determinant(), 6e-12);
+    }
+
+    #[test]
+    fn one_variance_beyond_its_limit_takes_what_both_have_in_common_with_it() {
+        let within = Covariance { speed: 1e10, mixed: 2.0, acceleration: 1e6 };
+        assert_eq!(within.bounded(), within);
+        // A quarter of a variance is half of what is in common.
+        let halved = Covariance { mixed: 1.0, ..within };
+        assert_eq!(Covariance { speed: 4e10, ..within }.bounded(), halved);
+        assert_eq!(Covariance { acceleration: 4e6, ..within }.bounded(), halved);
+    }
+
+    #[test]
     fn shrinking_keeps_the_correlation() {
         let p = Covariance { speed: 4e14, mixed: 1e11, acceleration: 1e8 };
         let correlation = |p: Covariance| p.mixed / (p.speed * p.acceleration).sqrt();

@@ -377,6 +377,57 @@ mod tests {
     }
 
     #[test]
+    fn after_a_missing_reading_a_count_covers_its_period_or_both_whichever_is_nearer() {
+        // 20 stood in for the missing one. Of both 40 are expected: 42 are two more, 22 two more in the last period alone.
+        for (counted, quality) in [(42, Quality::Ok), (22, Quality::Substituted)] {
+            let turns =
+                turns(&[Count::Pulses(20), Count::Missing, Count::Pulses(counted), Count::Pulses(20)]);
+            assert_eq!((turns[1].pulses, turns[1].quality), (20.0, Quality::Missing));
+            assert_eq!((turns[2].pulses, turns[2].quality), (22.0, quality));
+            assert_eq!((turns[3].pulses, turns[3].quality), (20.0, Quality::Ok), "counts its own period");
+        }
+        let missing = turns(&[Count::Missing, Count::Missing, Count::Pulses(60)]);
+        assert_eq!((missing[2].pulses, missing[2].quality), (20.0, Quality::Ok), "60 cover three periods");
+    }
+
+    #[test]
+    fn a_turn_says_how_wrong_it_may_be_and_what_came_late() {
+        let turns = turns(&[Count::Pulses(21), Count::Pulses(22), Count::Pulses(12), Count::Pulses(8)]);
+        let turn = |pulses, quality, uncertainty, late| Turn { pulses, quality, uncertainty, late };
+        assert_eq!(turns[0], turn(21.0, Quality::Ok, 0.0, 0.0), "as a rolling wheel");
+        assert_eq!(
+            turns[1],
+            turn(22.0, Quality::Ok, 3.0, 0.0),
+            "two more than expected, and one for the phase"
+        );
+        assert_eq!(turns[2], turn(20.0, Quality::Substituted, 3.0, 8.0), "8 of them are only expected");
+        assert_eq!(
+            turns[3],
+            turn(0.0, Quality::Ok, 13.0, -8.0),
+            "they are taken back: 12 fewer than expected"
+        );
+    }
+
+    #[test]
+    fn a_count_at_a_reversal_may_be_wrong_by_all_its_pulses_either_direction() {
+        let standing = Expected { pulses: 0.0, more: 60.0, fewer: 60.0, rolling: 1.5, most: 60.0 };
+        let heading = Heading { certain: false, ..FORWARD };
+        let mut tachometer = Tachometer::new();
+        let mut read = |direction, pulses, heading| {
+            let reading = WheelReading { direction, ..WheelReading::pulses(pulses) };
+            let turn = tachometer.read(&reading, 1.0, heading, &standing);
+            (turn.pulses, turn.uncertainty)
+        };
+        assert_eq!(read(Direction::Forward, 10, heading), (10.0, 11.0));
+        assert_eq!(read(Direction::Backward, 10, heading), (-10.0, 31.0), "twice 10 more");
+        assert_eq!(read(Direction::Backward, 10, heading), (-10.0, 11.0));
+        assert_eq!(read(Direction::Backward, 0, heading), (0.0, 0.0));
+        let disputed = Heading { disputed: true, ..heading };
+        assert_eq!(read(Direction::Forward, 10, disputed), (10.0, 31.0), "the sensors contradict each other");
+        assert_eq!(read(Direction::Unknown, 10, heading), (10.0, 11.0), "as the train runs");
+    }
+
+    #[test]
     fn a_counter_wraps_only_where_both_readings_have_so_many_bits() {
         assert_eq!(unwrapped(65_530, 4, 60.0), Some(10.0));
         assert_eq!(unwrapped(4, 65_530, 60.0), Some(-10.0));
