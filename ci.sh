@@ -311,11 +311,13 @@ step_chaos() {
   TMPDIR=$at "$TARGET/debug/footplate" simulate chaos --seeds "$CHAOS_SEEDS" --accept-known "$known"
 }
 
-# Tests that take minutes without optimisation are left out, so what is missed here may be noticed by them or by other crates.
-readonly SLOW_UNOPTIMISED='/many_seeds|every_train_stays_on|no_follower_touches|stops_downhill|command_budget|other_laws|three_hundred/'
+# Tests of the core that take half a minute are left out, so what is missed here may be noticed by them or by other crates.
+readonly SLOW_FOR_MUTANTS='/no_seed_of_many_dispatched|with_failing_sensors/'
 # Tests of the store that run the core on recordings of real trains, within seconds. Those of the scorers on known seeds stand for the
-# tables, which every run of all steps compares.
-readonly ON_RECORDINGS='/^(replays_go_on|forecasts_of_real_logs|models_of_logs|running_times|real_logs|surveyed_layouts|scored_loop|tachometer_recordings|metro_trips)/'
+# tables, which every run of all steps compares; the others drive trains by blocks, by speeds that decoders report and by sensors that do
+# not report the direction.
+readonly ON_RECORDINGS='/^(accelerometer_recordings|replays_go_on|forecasts_of_real_logs|models_of_logs|running_times|real_logs|surveyed_layouts|scored_loop|tachometer_recordings|metro_trips)/'
+readonly ON_SEEDS='/^(same_seed|blocks)::|stalls_between_sensors|located_in_its_true_direction|starts_on_a_sensor/'
 
 step_mutants() {
   need_nextest
@@ -326,8 +328,8 @@ step_mutants() {
   PROPTEST_CASES=16 cargo mutants --package footplate-core "${files[@]}" --sharding round-robin --shard "${MUTANTS:-0/200}" \
     --test-package footplate-core --test-package footplate-store --test-package footplate-eval --test-tool nextest \
     --profile mutants --timeout 900 --output "$TARGET" -- --lib --test behaviour \
-    -E "(package(footplate-core) and not test($SLOW_UNOPTIMISED)) or (package(footplate-store) and test($ON_RECORDINGS)) \
-      or (package(footplate-eval) and test(/^same_seed::/))"
+    -E "(package(footplate-core) and not test($SLOW_FOR_MUTANTS)) or (package(footplate-store) and test($ON_RECORDINGS)) \
+      or (package(footplate-eval) and test($ON_SEEDS))"
 }
 
 step_fuzz() {
