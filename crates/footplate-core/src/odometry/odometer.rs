@@ -215,22 +215,22 @@ impl Odometer {
     fn fresh(vehicle: Vehicle, settings: OdometrySettings) -> Self {
         let [first, second] = vehicle.wheelsets;
         let top = vehicle.max_speed.as_m_per_s();
-        let all = Range { low: -top, high: top };
+        // What the first period overwrites is anything here.
         Self {
             vehicle,
             settings,
             wheels: [WheelChannel::new(first, &vehicle), WheelChannel::new(second, &vehicle)],
             command: CommandWatch::new(),
-            bounds: GuaranteedSpeed::new(all, top),
+            bounds: GuaranteedSpeed::new(Range::ANY, top),
             distance_bounds: DistanceBounds::new(Range::exactly(0.0)),
-            bank: Bank::new(0.0, top * top, &vehicle.wheelsets),
-            probable_speed: all,
+            bank: Bank::new(0.0, FIRST_SPEED, &vehicle.wheelsets),
+            probable_speed: Range::ANY,
             probable_distance: Range::exactly(0.0),
             last: None,
             direction: 1.0,
             speed: 0.0,
             acceleration: 0.0,
-            variance: top * top,
+            variance: FIRST_SPEED,
             distance: 0.0,
             blind: 0.0,
             corrected_for: 0.0,
@@ -383,4 +383,90 @@ impl Odometer {
 
 fn worse(one: Mode, other: Mode) -> Mode {
     if one == Mode::Ambiguous { one } else { other }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::odometry::wheels::{Axle, Count, Direction, WheelReading, Wheelset};
+    use crate::time::{TimeSpan, Timestamp};
+
+    /// Of a train of 40 m/s with periods of 0.1 s, in which a pulse is π · 1 m / 100.
+    fn odometer() -> Odometer {
+        let (axle, diameter) = (Axle::Powered, Length::from_m(1.0));
+        let wheelset = Wheelset { teeth: 100, diameter, diameter_tolerance: 0.002, axle };
+        let abilities = [1.0, 1.2].map(Acceleration::from_m_per_s2);
+        let (period, top) = (TimeSpan::from_ms(100), Speed::from_m_per_s(40.0));
+        let vehicle = Vehicle::new(period, top, abilities, [wheelset; 2]).unwrap();
+        Odometer::new(vehicle, OdometrySettings::recommended()).unwrap()
+    }
+
+    fn period(ms: i64, wheels: [WheelReading; 2]) -> Period {
+        let time = Timestamp::ZERO + TimeSpan::from_ms(ms);
+        Period { time, wheels, effort: None, acceleration: None, balise: None, balise_deviation: None }
+    }
+
+    fn assert_near(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-5, "{found}, not {expected}");
+    }
+
+    fn speeds(bounds: &MotionBounds) -> [f64; 2] {
+        [bounds.speed_low, bounds.speed_high].map(Speed::as_m_per_s)
+    }
+
+    #[test]
+    fn the_first_counts_give_a_speed_if_they_agree_and_otherwise_the_lower_one_does() {
+        // 30 pulses in a period are 9.424778 m/s.
+        let pulses = WheelReading::pulses;
+        for (wheels, speed, mode) in [
+            ([pulses(30), pulses(32)], 9.738_937, Mode::Normal),
+            ([pulses(30), pulses(33)], 9.424_778, Mode::Normal),
+            ([pulses(45), pulses(30)], 9.424_778, Mode::Normal),
+            ([pulses(30), WheelReading::MISSING], 9.424_778, Mode::Degraded),
+            ([WheelReading::MISSING, pulses(30)], 9.424_778, Mode::Degraded),
+        ] {
+            let first = odometer().step(&period(0, wheels));
+            assert_near(first.speed.as_m_per_s(), speed);
+            assert_eq!((first.mode, first.distance), (mode, Length::ZERO));
+            assert_eq!([speeds(&first.guaranteed), speeds(&first.confidence)], [[0.0, 40.0]; 2]);
+            assert_eq!(first.speed_deviation.as_m_per_s(), 20.0);
+        }
+        // Wheels that do not turn, or turn backward, do not say that the train runs forward.
+        let backward = WheelReading { direction: Direction::Backward, ..pulses(30) };
+        for (wheels, speed) in [([pulses(0); 2], 0.0), ([backward; 2], -9.424_778)] {
+            let first = odometer().step(&period(0, wheels));
+            assert_near(first.speed.as_m_per_s(), speed);
+            assert_eq!(speeds(&first.guaranteed), [-40.0, 40.0]);
+        }
+    }
+
+    #[test]
+    fn running_counters_begin_with_their_second_value_and_the_train_may_have_run_until_then() {
+        let mut odometer = odometer();
+        let counters = |value| [WheelReading { count: Count::Counter(value), ..WheelReading::MISSING }; 2];
+        let first = odometer.step(&period(0, counters(1000)));
+        assert_eq!((first.mode, first.speed, first.distance), (Mode::Degraded, Speed::ZERO, Length::ZERO));
+        let second = odometer.step(&period(100, counters(1030)));
+        assert_eq!(second.mode, Mode::Normal);
+        assert_near(second.speed.as_m_per_s(), 9.424_778);
+        assert_near(second.distance.as_m(), 0.942_478);
+        // 40 m/s for 0.1 s either direction.
+        assert_near(second.guaranteed.distance_low.as_m(), -4.0);
+        assert_near(second.guaranteed.distance_high.as_m(), 4.0);
+        assert_near(second.over.as_m(), 4.942_478);
+        assert!(second.under.as_m() >= 3.057_522 - 1e-5, "{second:?}");
+    }
+
+    #[test]
+    fn a_time_that_does_not_advance_changes_nothing_but_the_mode() {
+        let mut odometer = odometer();
+        odometer.step(&period(0, [WheelReading::pulses(30); 2]));
+        let last = odometer.step(&period(100, [WheelReading::pulses(30); 2]));
+        for ms in [100, 50] {
+            let again = odometer.step(&period(ms, [WheelReading::pulses(99); 2]));
+            assert_eq!(again, MotionEstimate { mode: Mode::Degraded, ..last });
+        }
+        let next = odometer.step(&period(200, [WheelReading::pulses(30); 2]));
+        assert!((next.distance - last.distance).as_m() > 0.9, "{next:?}");
+    }
 }

@@ -49,7 +49,6 @@ pub(super) struct WheelChannel {
     pub(super) pulses: f64,
     /// Those of them that were not read in the period.
     pub(super) late: f64,
-    pub(super) missing_for: f64,
     /// How long its count has been the same and not zero (s).
     same_for: f64,
     /// How far it turned in that time, and how much farther the other wheel did (m).
@@ -85,7 +84,6 @@ impl WheelChannel {
             quality: Quality::Missing,
             pulses: 0.0,
             late: 0.0,
-            missing_for: 0.0,
             same_for: 0.0,
             turned_same: 0.0,
             other_further: 0.0,
@@ -146,7 +144,6 @@ impl WheelChannel {
             self.windows.interrupt();
         }
         if turn.quality == Quality::Missing {
-            self.missing_for += t;
             self.readings = 0;
             self.tracker.turned(self.tracker.expected(t), t);
             return counted;
@@ -154,7 +151,6 @@ impl WheelChannel {
         if self.readings == 0 {
             self.tracker.restart(counted / t);
         }
-        self.missing_for = 0.0;
         self.readings = self.readings.saturating_add(1);
         self.tracker.turned(counted, t);
         counted

@@ -230,3 +230,95 @@ pub fn place_of(context: TrackContext<'_>, model: &MotionModel, at: PathPoint) -
     }
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::{SpeedStep, TrainId, TurnoutId};
+    use crate::model::survey::SectionIndex;
+    use crate::track::example::oval;
+    use crate::track::{Leg, TurnoutStates};
+
+    /// Asks about the oval with both turnouts straight, round which it is 500 + 100 + 400 + 100 mm, and a train that runs as far as its
+    /// survey says.
+    fn on_the_oval(asks: impl Fn(TrackContext<'_>, &MotionModel)) {
+        let layout = oval();
+        let mut turnouts = TurnoutStates::unknown();
+        [1, 2].into_iter().for_each(|turnout| turnouts.set(TurnoutId(turnout), Leg::Straight));
+        let sections = SectionIndex::of(&layout);
+        let context = TrackContext { layout: &layout, sections: &sections, turnouts: &turnouts };
+        asks(context, &MotionModel::unknown(TrainId(24), SpeedStep::new(14).unwrap()));
+    }
+
+    fn mm(found: Option<Length>) -> Option<f64> {
+        found.map(|length| (length.as_mm() * 1e6).round() / 1e6)
+    }
+
+    #[test]
+    fn a_place_is_as_far_as_its_edges_are_long() {
+        on_the_oval(|context, model| {
+            let node = |name: &str| context.layout.node_named(name).unwrap();
+            let at = |from, to, mm| Position {
+                edge: context.layout.edge_between(node(from), node(to)).unwrap(),
+                offset: Length::from_mm(mm),
+            };
+            let from = |name, to| mm(distance_to(context, model, node(name), to));
+            assert_eq!(from("D1", at("D1", "A1", 30.0)), Some(30.0));
+            assert_eq!(from("D1", at("A1", "BR1", 30.0)), Some(530.0));
+            assert_eq!(from("D1", at("BR1", "B1", 30.0)), Some(630.0));
+            assert_eq!(from("A1", at("D1", "A1", 30.0)), Some(630.0));
+            assert_eq!(from("D1", at("BR1", "C1", 30.0)), None, "the turnout lies straight");
+            for (distance, edge) in [
+                (30.0, ("D1", "A1")),
+                (530.0, ("A1", "BR1")),
+                (630.0, ("BR1", "B1")),
+                (1030.0, ("MR2", "D1")),
+            ] {
+                let point = PathPoint { node: node("D1"), distance: Length::from_mm(distance) };
+                let place = place_of(context, model, point).unwrap();
+                assert_eq!(place.edge, at(edge.0, edge.1, 0.0).edge, "{distance}");
+                assert_eq!(mm(Some(place.offset)), Some(30.0), "{distance}");
+            }
+            let behind = PathPoint { node: node("D1"), distance: Length::from_mm(-30.0) };
+            assert_eq!(
+                place_of(context, model, behind),
+                Some(at("D1", "A1", 0.0)),
+                "behind its node: the node"
+            );
+        });
+    }
+
+    #[test]
+    fn a_landmark_is_past_the_last_sensor_before_it_or_before_its_own() {
+        on_the_oval(|context, model| {
+            let node = |name: &str| context.layout.node_named(name).unwrap();
+            let landmark = |name, offset| Landmark { node: node(name), offset: Length::from_mm(offset) };
+            let to =
+                |name, offset| mm(distance_to_landmark(context, model, node("D1"), landmark(name, offset)));
+            assert_eq!(
+                [to("D1", 30.0), to("A1", 30.0), to("B1", 30.0)],
+                [Some(30.0), Some(530.0), Some(830.0)]
+            );
+            assert_eq!([to("A1", -30.0), to("A1", 330.0)], [Some(470.0), Some(830.0)]);
+            assert_eq!(to("C1", 30.0), None, "the turnout lies straight");
+            for (distance, name, offset) in
+                [(30.0, "D1", 30.0), (530.0, "A1", 30.0), (830.0, "B1", 30.0), (1130.0, "D1", 30.0)]
+            {
+                let point = PathPoint { node: node("D1"), distance: Length::from_mm(distance) };
+                let found = landmark_of(context, model, point);
+                assert_eq!((found.node, mm(Some(found.offset))), (node(name), Some(offset)), "{distance}");
+            }
+            // Nothing is known better than the tape and both sensors, 2 · (5 mm)²; the train feels 500 mm less well.
+            let hop = context.hop_from(node("D1")).unwrap();
+            let taped = taped_length(context, model, &hop);
+            let sensors = libm::sqrt(2.0) * 0.005;
+            assert!((taped.mean - 0.5).abs() < 1e-9, "{taped:?}");
+            assert!((0.0..libm::hypot(sensors, 0.003)).contains(&libm::sqrt(taped.variance)), "{taped:?}");
+            let deviation = |distance| {
+                let at = PathPoint { node: node("D1"), distance: Length::from_mm(distance) };
+                taping_deviation(context, model, at)
+            };
+            assert!((deviation(250.0) - 0.5 * libm::sqrt(taped.variance)).abs() < 1e-9, "half of it halfway");
+        });
+    }
+}

@@ -192,3 +192,93 @@ impl Driver {
         fit.refit(&self.track.sections);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ids::SpeedStep;
+    use crate::model::MotionModel;
+    use crate::track::example::oval;
+    use crate::track::{Leg, TurnoutStates};
+    use crate::tracking::Locator;
+
+    const TRAIN: TrainId = TrainId(24);
+    const NOW: Timestamp = Timestamp::ZERO;
+
+    /// A driver on the oval, with both turnouts straight and a train at rest, 40 mm ahead and 60 mm behind of which belong to it.
+    fn driver(name: &str, past_mm: f64) -> Driver {
+        let layout = oval();
+        let mut turnouts = TurnoutStates::unknown();
+        [1, 2].into_iter().for_each(|turnout| turnouts.set(TurnoutId(turnout), Leg::Straight));
+        let node = layout.node_named(name).unwrap();
+        let mut driver = Driver::new(layout, turnouts);
+        driver.add_located(MotionModel::unknown(TRAIN, SpeedStep::new(14).unwrap()), Locator::new(TRAIN));
+        driver.set_reach(TRAIN, Length::from_mm(40.0), Length::from_mm(60.0));
+        driver.place(
+            NOW,
+            TRAIN,
+            PathPoint { node, distance: Length::from_mm(past_mm) },
+            Length::from_mm(1.0),
+        );
+        driver
+    }
+
+    fn place(driver: &Driver, from: &str, to: &str, mm: f64) -> Position {
+        let node = |name: &str| driver.layout().node_named(name).unwrap();
+        let edge = driver.layout().edge_between(node(from), node(to)).unwrap();
+        Position { edge, offset: Length::from_mm(mm) }
+    }
+
+    fn mm(found: Option<Length>) -> Option<f64> {
+        found.map(|length| (length.as_mm() * 1e6).round() / 1e6)
+    }
+
+    #[test]
+    fn a_train_at_rest_is_where_it_was_placed_until_it_is_given_up() {
+        let mut driver = driver("D1", 100.0);
+        assert!(driver.is_found(TRAIN, NOW) && !driver.is_reversed(TRAIN));
+        let at = driver.position(TRAIN, NOW).unwrap();
+        assert_eq!(at.edge, place(&driver, "D1", "A1", 0.0).edge);
+        assert_eq!(mm(Some(at.offset)), Some(100.0));
+        let rest = driver.rest_if_stopped(TRAIN, NOW).unwrap();
+        assert_eq!(
+            (Some(rest.node), mm(Some(rest.distance))),
+            (driver.layout().node_named("D1"), Some(100.0))
+        );
+        assert_eq!(driver.sensor_ahead(TRAIN, NOW), Some(SensorId(0)), "A1");
+        let back = driver.reversed_position(TRAIN, NOW).unwrap();
+        assert_eq!(back.edge, at.edge.twin());
+        assert!((400.0..=500.0).contains(&back.offset.as_mm()), "{back:?}");
+        driver.lose(NOW, TRAIN);
+        assert!(!driver.is_found(TRAIN, NOW));
+        assert_eq!(driver.position(TRAIN, NOW), None);
+    }
+
+    #[test]
+    fn a_place_is_ahead_at_once_or_after_a_lap_whichever_is_nearer_to_what_was_asked() {
+        let driver = driver("D1", 100.0);
+        let node = |name: &str| driver.layout().node_named(name).unwrap();
+        let from = PathPoint { node: node("D1"), distance: Length::from_mm(100.0) };
+        let ahead = |to, away| {
+            let found = driver.path_point_ahead(TRAIN, from, to, Length::from_mm(away))?;
+            mm(Some(found.distance))
+        };
+        let (near, behind) = (place(&driver, "D1", "A1", 300.0), place(&driver, "D1", "A1", 50.0));
+        // A lap is 1100 mm.
+        assert_eq!(
+            [ahead(near, 200.0), ahead(near, 700.0), ahead(near, 800.0)].map(|at| at.unwrap()),
+            [300.0, 300.0, 1400.0]
+        );
+        assert_eq!(ahead(behind, 0.0), Some(1150.0));
+        assert_eq!(ahead(place(&driver, "BR1", "C1", 50.0), 0.0), None, "the turnout lies straight");
+        assert_eq!(mm(driver.hop_length(TRAIN, node("D1"), node("A1"))), Some(500.0));
+        assert_eq!(driver.hop_length(TRAIN, node("D1"), node("B1")), None, "not the next sensor");
+    }
+
+    #[test]
+    fn a_turnout_is_under_a_train_from_its_front_to_its_rear() {
+        // The turnout is 100 mm past A1.
+        let under = |past| driver("A1", past).turnouts_under(TRAIN, NOW).contains(&TurnoutId(1));
+        assert_eq!([20.0, 80.0, 130.0, 250.0].map(under), [false, true, true, false]);
+    }
+}
