@@ -216,6 +216,14 @@ mod tests {
     }
 
     #[test]
+    fn slow_stops_that_scatter_more_are_a_floor_and_no_negative_delay() {
+        let slow = shown(|speed| if speed < 0.2 { 0.04 } else { 0.01 });
+        assert_eq!(slow.delay, 0.0, "{slow:?}");
+        // Both together: the root of (0.04² + 0.01²) / 2 is 29 mm, and sharp promises count for more.
+        assert!((0.01..0.035).contains(&slow.floor), "{slow:?}");
+    }
+
+    #[test]
     fn sums_with_the_promises_of_others_keep_their_own_stops_and_starts() {
         let (mut own, mut other) = (ScatterSums::default(), ScatterSums::default());
         (0..8).for_each(|_| own.stops.take(4.0));

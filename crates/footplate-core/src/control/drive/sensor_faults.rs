@@ -111,6 +111,22 @@ mod tests {
     }
 
     #[test]
+    fn the_rate_before_a_detection_is_the_rate_without_it() {
+        let mut faults = SensorFaults::default();
+        let rates = |faults: &SensorFaults| {
+            [faults.log_rate_before(SENSOR, at(5.0)), faults.log_rate(SENSOR, at(5.0))]
+        };
+        let [usual, none] = rates(&faults);
+        assert_eq!(usual, none);
+        faults.note_unexplained(SENSOR, at(5.0));
+        let [before, one] = rates(&faults);
+        assert_eq!(before, usual);
+        assert!(one > usual + 1.0, "{one} {usual}");
+        faults.note_unexplained(SENSOR, at(5.0));
+        assert_eq!(rates(&faults)[0], one);
+    }
+
+    #[test]
     fn explained_detections_restore_a_stuck_sensor() {
         let mut faults = SensorFaults::default();
         let usual = faults.log_rate(SENSOR, at(0.0));

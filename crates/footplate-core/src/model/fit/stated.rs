@@ -369,6 +369,18 @@ mod tests {
     }
 
     #[test]
+    fn entries_are_compared_with_what_others_state() {
+        let fit = fit(14);
+        let others = stated(&[(8.0 / 14.0, 195.0), (9.5 / 14.0, 3_662.0), (0.0, 100.0)]);
+        let compared = fit.compare_stated(&stated(&TRAIN_58), &others.speeds);
+        let [Some(near), Some(far), None] = compared[..] else { panic!("{compared:?}") };
+        assert!(
+            !near.contradicts() && !near.is_gross() && far.contradicts() && far.is_gross(),
+            "{compared:?}"
+        );
+    }
+
+    #[test]
     fn a_table_that_contradicts_itself_leaves_more_uncertainty() {
         let smooth: Vec<(f64, f64)> =
             (1..=14).map(|step| (f64::from(step) / 14.0, 40.0 * f64::from(step))).collect();

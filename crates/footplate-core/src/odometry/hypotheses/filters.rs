@@ -405,6 +405,15 @@ mod tests {
     }
 
     #[test]
+    fn a_variance_beyond_its_largest_sets_the_sign_bit() {
+        // The largest are 100 m², 10⁴ (m/s)² and 4 (m/s²)².
+        let exceeds =
+            |[prr, pvv, paa]: [f64; 3]| State { prr, pvv, paa, ..filters().state(0) }.exceeds() >> 63 == 1;
+        assert!(!exceeds([100.0, 1e4, 4.0]) && !exceeds([1.0, 1.0, 1.0]));
+        assert!(exceeds([101.0, 1.0, 1.0]) && exceeds([1.0, 1.1e4, 1.0]) && exceeds([1.0, 1.0, 4.1]));
+    }
+
+    #[test]
     fn reversed_means_change_their_signs_and_covariances_stay() {
         let mut reversed = filters();
         reversed.reverse();
