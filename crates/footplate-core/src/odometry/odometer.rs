@@ -267,12 +267,12 @@ impl Odometer {
             self.bank.interval(&scene, 1.0 - self.settings.confidence, t);
         let (lost, dead) = self.probable();
         let (ran, shares, lost, dead) = if let Some(published) = &mut self.published {
-            let fused = published.next(&self.wheels, counted, &allowed, &self.vehicle, t);
+            let fused = published.next(&self.wheels, counted, &allowed, (dead, &self.vehicle), t);
             let top = self.vehicle.max_speed.as_m_per_s();
             let speed = larger(smaller(fused.speed, top), -top);
             (self.speed, self.acceleration, self.variance) = (speed, fused.acceleration, fused.variance);
             self.corrected_for = published.corrected_for();
-            (0.5 * (before + speed) * t, fused.shares, fused.lost, [false; 2])
+            (0.5 * (before + speed) * t, fused.shares, fused.lost, fused.dead)
         } else {
             (self.speed, self.acceleration, self.variance) = self.bank.motion();
             self.speed = bounded.nearest(self.speed);

@@ -29,6 +29,8 @@ pub(in crate::odometry) struct Fused {
     pub(in crate::odometry) variance: f64,
     pub(in crate::odometry) shares: [f64; 3],
     pub(in crate::odometry) lost: [Option<Loss>; 2],
+    /// Which sensors were left out as dead.
+    pub(in crate::odometry) dead: [bool; 2],
 }
 
 /// Follows the train as published.
@@ -80,17 +82,21 @@ impl Published {
         wheels: &[WheelChannel; 2],
         counted: [f64; 2],
         allowed: &Allowed,
-        vehicle: &Vehicle,
+        (dead, vehicle): ([bool; 2], &Vehicle),
         t: f64,
     ) -> Fused {
-        let shown = |wheel: &WheelChannel| Shown {
+        let shown = |wheel: &WheelChannel, read: bool| Shown {
             speed: wheel.tracker.speed(),
             acceleration: wheel.tracker.acceleration(),
             acceleration_deviation: wheel.tracker.acceleration_deviation(),
-            read: wheel.is_read(),
+            read,
             axle: wheel.wheelset.axle,
         };
         let [first, second] = wheels;
+        // The paper removes interference before; a dead sensor is no wheel that slips.
+        let dead = if self.flags.is_literal() { [false; 2] } else { dead };
+        let [first_dead, second_dead] = dead;
+        let read = [first.is_read() && !first_dead, second.is_read() && !second_dead];
         let may = if allowed.commanded.is_some() {
             [allowed.slide, allowed.slip]
         } else {
@@ -99,7 +105,8 @@ impl Published {
         let predicted = self.speed + self.acceleration * t;
         let commanded = allowed.commanded.unwrap_or(-vehicle.max_brake.as_m_per_s2());
         self.keep_calm(first, second, vehicle, t);
-        let mut lost = self.flags.judge(&[shown(first), shown(second)], predicted, may, commanded, t);
+        let mut lost =
+            self.flags.judge(&[shown(first, read[0]), shown(second, read[1])], predicted, may, commanded, t);
         let both = lost.iter().all(Option::is_some);
         let silent = [first, second].iter().all(|wheel| wheel.tracker.silence() > LOCKED_S);
         let stood_in = if both { Some(self.stand_in(wheels, lost, silent, vehicle, t)) } else { None };
@@ -117,8 +124,8 @@ impl Published {
             speed.map_or(MeasuredSpeed::MISSING, |speed| MeasuredSpeed { speed, variance })
         };
         let [first_counted, second_counted] = counted;
-        let first_speed = first.is_read().then_some(first_counted / t);
-        let second_speed = second.is_read().then_some(second_counted / t);
+        let first_speed = read[0].then_some(first_counted / t);
+        let second_speed = read[1].then_some(second_counted / t);
         let before = MeasuredSpeed { speed: self.speed, variance: COUNT_VARIANCE * coarse * coarse };
         let filter = self.filter.get_or_insert_with(|| FederatedFilter::starting_at(self.fusion, before));
         let [first_lost, second_lost] = lost;
@@ -137,7 +144,7 @@ impl Published {
         let [speed, acceleration] = master.state;
         self.manoeuvre.learn(acceleration, rolls == [true; 2]);
         (self.speed, self.acceleration) = (speed, acceleration);
-        Fused { speed, acceleration, variance: master.covariance.speed, shares, lost }
+        Fused { speed, acceleration, variance: master.covariance.speed, shares, lost, dead }
     }
 
     /// The virtual sensor carries the speed (m/s).

@@ -60,6 +60,11 @@ impl PublishedFlags {
         Self { thresholds, reading, lost: [None; 2], suspected: nothing, rolling: nothing, before: nothing }
     }
 
+    /// Whether they are read to the letter.
+    pub(super) fn is_literal(&self) -> bool {
+        self.reading == Reading::Literal
+    }
+
     pub(super) fn lost(&self) -> [Option<Loss>; 2] {
         self.lost
     }
@@ -117,7 +122,9 @@ impl PublishedFlags {
             wheel.acceleration > -rolls_by - SMOOTHED * noise
                 && wheel.acceleration < limits.slip_acceleration.as_m_per_s2() + noise
         };
-        let coherent = together && smooth(first) && smooth(second) && first.read && second.read;
+        // A wheel beside one that is not read is judged by itself.
+        let coherent = wheels.iter().all(|wheel| !wheel.read || smooth(wheel))
+            && (together || !(first.read && second.read));
         for ((lost, (sign, wheel)), (suspected, rolling)) in self
             .lost
             .iter_mut()
@@ -126,7 +133,7 @@ impl PublishedFlags {
         {
             *suspected = if sign.is_some() && wheel.read { *suspected + t } else { 0.0 };
             let rolls = match self.reading {
-                Reading::Figures => coherent && wheel.speed > SLOWEST_CLEARED,
+                Reading::Figures => coherent && wheel.read && wheel.speed > SLOWEST_CLEARED,
                 Reading::Literal => sign.is_none() && wheel.read,
             };
             *rolling = if rolls { *rolling + t } else { 0.0 };
