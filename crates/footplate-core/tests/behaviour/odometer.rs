@@ -167,6 +167,27 @@ proptest! {
     }
 }
 
+/// The paper knows no dead sensor: one wheel that turns beside one at rest met its criterion for a spin, and the train was said to
+/// stand.
+#[test]
+fn the_published_odometer_does_not_follow_a_sensor_that_died_before_the_train_was_driven() {
+    let mut odometer = Odometer::new(vehicle(), OdometrySettings::paper()).expect("a vehicle");
+    let mut train = Rolling { time: 0.0, place: 0.0, counted: [0; 2] };
+    let mut worst: f64 = 0.0;
+    for period in 0..2400 {
+        // At rest for 10 s, then driven with 0.8 m/s² up to 40 m/s.
+        let driven_s = (f64::from(period) * PERIOD_S - 10.0).clamp(0.0, 50.0);
+        let effort = if driven_s > 0.0 && driven_s < 50.0 { 0.8 } else { 0.0 };
+        let mut readings = train.next(0.8 * driven_s, effort);
+        readings.wheels[1].count = Count::Pulses(0);
+        let estimate = odometer.step(&readings);
+        if driven_s > 5.0 {
+            worst = worst.max((estimate.speed.as_m_per_s() - 0.8 * driven_s).abs());
+        }
+    }
+    assert!(worst < 0.5, "{worst}");
+}
+
 #[test]
 fn a_dead_second_sensor_costs_no_accuracy_and_is_reported() {
     let mut odometer = Odometer::new(vehicle(), OdometrySettings::recommended()).expect("a vehicle");
