@@ -106,6 +106,13 @@ export class Draft {
     this.#change(had ? rest : { ...rest, [kind]: [...rest[kind], { x: joint.x, y: joint.y }] });
   }
 
+  /** States the number under which a sensor reports both directions; without one each direction has its own. */
+  number(joint, number) {
+    this.#change({ sensors: this.#now.sensors.map((mark) => (isAt(joint, mark) ? { x: mark.x, y: mark.y, number } : mark)) });
+  }
+
+  numberOf = (joint) => this.#now.sensors.find((mark) => isAt(joint, mark))?.number;
+
   has = (kind, joint) => this.#now[kind].some((mark) => isAt(joint, mark));
 
   /** The sections between boundaries, each with its pieces, and with name and number of its block; none without a boundary. */

@@ -24,6 +24,7 @@ export class DraftFile {
         const input = 2 * this.#sensors.length;
         const named = (nth) => `${S88_MODULES[Math.floor(input / S88_INPUTS)]}${input % S88_INPUTS + nth}`;
         joint.names = [named(1), named(2)];
+        joint.number = draft.numberOf(joint);
         this.#sensors.push(joint);
       } else if (draft.has("boundaries", joint)) {
         const nth = 2 * this.#boundaries.push(joint);
@@ -113,7 +114,7 @@ export class DraftFile {
     return [
       "format = 1", `name = ${quoted(this.#name)}`, 'about = "Drawn with the editor of the dashboard from catalogue pieces."',
       `length_uncertainty_mm = ${LENGTH_UNCERTAINTY_MM}`, 'length_origin = "catalogue lengths of the pieces"', "",
-      ...list("sensors", this.#sensors.map((joint) => `  { names = ["${joint.names.join('", "')}"], at = ${point(joint)} },`)),
+      ...list("sensors", this.#sensors.map((joint) => `  { names = ["${joint.names.join('", "')}"],${joint.number === undefined ? "" : ` number = ${joint.number},`} at = ${point(joint)} },`)),
       ...list("blocks", this.#sections.filter(({ isWatched }) => isWatched).map(({ name, number }) => `  { name = ${quoted(name)}, number = ${number} },`)),
       ...list("boundaries", this.#boundaries.map((joint) => `  { names = ["${joint.names.join('", "')}"], enters = [${this.#block(joint.ends[1])}, ${this.#block(joint.ends[0])}], at = ${point(joint)} },`)),
       ...list("turnouts", this.#turnouts.map(({ number, at }) => `  { number = ${number}, names = ["BR${number}", "MR${number}"], at = ${point(at)} },`)),

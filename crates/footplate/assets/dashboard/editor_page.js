@@ -88,6 +88,8 @@ export function editorPage(root, live) {
       $(`#${id}`).disabled = chosen.ends.length !== 2;
       put($(`#${id}`), say(chosen.ends.length === 2 && draft.has(kind, chosen) ? `${id}-not` : id));
     }
+    $("#draft-number-of").hidden = chosen.ends.length !== 2 || !draft.has("sensors", chosen);
+    $("#draft-number").value = draft.numberOf(chosen) ?? "";
     listBlocks(sections);
     if (toml !== checked) check(toml);
     for (const button of $("#pieces").querySelectorAll("button")) button.disabled = !isOpen();
@@ -209,6 +211,7 @@ export function editorPage(root, live) {
   $("#draft-clear").addEventListener("click", () => { draft.clear(); goesOn(START); });
   $("#draft-sensor").addEventListener("click", () => { draft.toggle("sensors", chosen); draw(); });
   $("#draft-boundary").addEventListener("click", () => { draft.toggle("boundaries", chosen); draw(); });
+  $("#draft-number").addEventListener("change", ({ target: { value } }) => { draft.number(chosen, value === "" ? undefined : Number(value)); draw(); });
   $("#draft-remove").addEventListener("click", () => {
     draft.remove(Math.max(...chosen.ends.map(({ piece }) => piece)));
     goesOn();

@@ -263,7 +263,7 @@ export const ENGLISH = {
   "editor": "Draw a layout", "draft": "The layout that is being drawn; click a joint to select it", "draft-undo": "Undo", "draft-redo": "Redo", "draft-clear": "Clear",
   "draft-next": "The next piece goes where the arrow is. Click another open end to go on there.",
   "draft-joint": "A joint is selected. Put a sensor or the boundary of a block there, or click an open end to lay the next piece.",
-  "draft-sensor": "Sensor here", "draft-sensor-not": "Remove this sensor", "draft-boundary": "Boundary here", "draft-boundary-not": "Remove this boundary", "draft-remove": "Remove this piece", "draft-pieces": "Pieces",
+  "draft-sensor": "Sensor here", "draft-sensor-not": "Remove this sensor", "draft-boundary": "Boundary here", "draft-boundary-not": "Remove this boundary", "draft-remove": "Remove this piece", "draft-number": "Number, if it reports both directions under one", "draft-pieces": "Pieces",
   "library": "Track system", "joined-at": "Turnouts join at", "draft-toe": "the toe", "draft-straight-leg": "the straight leg", "draft-curved-leg": "the curved leg",
   "hand": "Hand of curves and turnouts", "hand-left": "Left", "hand-right": "Right", "draft-straights": "Straights", "draft-curves": "Curves", "draft-turnouts": "Turnouts", "draft-crossings": "Crossings",
   "draft-slips": "Double slips", "draft-slip-about": "A double slip is two turnouts, one for each end, with a number and a drive each. A slip with a single drive for both ends cannot be used.",

@@ -264,7 +264,7 @@ export const GERMAN = {
   "editor": "Anlage zeichnen", "draft": "Die Anlage, die gezeichnet wird; auf einen Stoß klicken, um ihn zu wählen", "draft-undo": "Rückgängig", "draft-redo": "Wiederholen", "draft-clear": "Leeren",
   "draft-next": "Das nächste Stück kommt an den Pfeil. Auf ein anderes offenes Ende klicken, um dort weiterzumachen.",
   "draft-joint": "Ein Stoß ist gewählt. Dort einen Rückmelder oder eine Trennstelle setzen oder auf ein offenes Ende klicken, um weiterzubauen.",
-  "draft-sensor": "Rückmelder hier", "draft-boundary": "Trennstelle hier", "draft-boundary-not": "Diese Trennstelle entfernen", "draft-sensor-not": "Rückmelder entfernen", "draft-remove": "Stück entfernen", "draft-pieces": "Gleisstücke",
+  "draft-sensor": "Rückmelder hier", "draft-boundary": "Trennstelle hier", "draft-boundary-not": "Diese Trennstelle entfernen", "draft-sensor-not": "Rückmelder entfernen", "draft-remove": "Stück entfernen", "draft-number": "Nummer, wenn er beide Richtungen unter einer meldet", "draft-pieces": "Gleisstücke",
   "library": "Gleissystem", "joined-at": "Weichen anlegen mit", "draft-toe": "der Spitze", "draft-straight-leg": "dem geraden Strang", "draft-curved-leg": "dem Abzweig",
   "hand": "Richtung von Bögen und Weichen", "hand-left": "Links", "hand-right": "Rechts", "draft-straights": "Geraden", "draft-curves": "Bögen", "draft-turnouts": "Weichen", "draft-crossings": "Kreuzungen",
   "draft-slips": "Doppelkreuzungsweichen", "draft-slip-about": "Eine Doppelkreuzungsweiche sind zwei Weichen, für jedes Ende eine, mit je einer Nummer und einem Antrieb. Mit nur einem Antrieb für beide Enden lässt sie sich nicht verwenden.",

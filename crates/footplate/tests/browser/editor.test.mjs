@@ -104,12 +104,16 @@ test("a level crossing is placed and joined, and the file says where its tracks 
     await pressJoint(page, "joined", x, y);
     await page.click("#draft-sensor");
   }
+  // A reed contact, say, which reports both directions under one number.
+  await page.fill("#draft-number", "12");
+  await page.locator("#draft-number").blur();
   assert.deepEqual(await findings(page), []);
   await page.screenshot({ path: join(AT, "editor-crossing.png") });
   const [download] = await Promise.all([page.waitForEvent("download", { timeout: PATIENCE }), page.click("#draft-save")]);
   const file = join(folder, "crossing.toml");
   await download.saveAs(file);
   assert.match(footplate("layout", "check", file), /a sound layout of 12 nodes and 8 edges, with 1 crossing$/m);
+  assert.match(readFileSync(file, "utf8"), /names = \["A3", "A4"\], number = 12, at = /);
   // Half of 188.3 mm from the sensor at either end of the piece.
   assert.match(footplate("layout", "show", file), /^cross   A2 to EX1 after 94 mm crosses A4 to EX2 after 94 mm$/m);
   assert.deepEqual(complaints, []);
