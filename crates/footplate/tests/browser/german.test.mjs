@@ -15,7 +15,7 @@ const SERVE = "footplate/src/commands/dashboard_routes";
 /** The sources of lines of the log, of refusals, and of errors of a command. */
 const SOURCES = [
   `${DRIVE}/formatter.rs`, `${DRIVE}/script_runner.rs`, ...readdirSync(join(CRATES, DRIVE, "script_runner")).map((name) => `${DRIVE}/script_runner/${name}`),
-  `${DRIVE}/parse.rs`, `${DRIVE}/reader.rs`, "footplate-core/src/control/drive/refusal.rs", "footplate-core/src/control/supervise/alarm.rs",
+  `${DRIVE}/instruction.rs`, `${DRIVE}/reader.rs`, "footplate-core/src/control/drive/refusal.rs", "footplate-core/src/control/supervise/alarm.rs",
   "footplate-core/src/track/position.rs", "footplate-core/src/track/landmark.rs",
 ];
 /** The sources of errors of a request, among texts for the terminal. */
@@ -29,7 +29,7 @@ const FOR_OTHERS = [
 ];
 /** Values for a blank whose kind is not known from its name. */
 const GUESSES = ["24", "C13", "train 24", "`stop 24 at C13`", "curved"];
-const NAMED = { zone: "yard", end: "EX1", from: "C13", target: "C13", nearest: "C14", or: "by train 58", why: "the station does not answer", found: "its model is unchanged", name: "Evening", near: "", by: "early", error: "the track ends at `EX1`, 30 mm before the end of the path", moves: "at rest", file: "run.csv" };
+const NAMED = { zone: "yard", end: "EX1", from: "C13", target: "C13", nearest: "C14", or: "by train 58", why: "the station does not answer", found: "its model is unchanged", name: "Evening", near: "", by: "early", error: "the track ends at `EX1`, 30 mm before the end of the path", moves: "at rest", file: "run.csv", 0: "run.csv" };
 /** The most combinations of guesses for one text. */
 const MOST_TRIED = 3000;
 /** The sentences of which a text may be a part, as `…`. */
@@ -125,7 +125,7 @@ test("every word of the pages is in both languages, with the same blanks", () =>
 });
 
 test("every line of the list of commands and of a calibration is known in German", () => {
-  const [, list] = /HELP: &str = "\\\n([^"]*)"/.exec(readFileSync(join(CRATES, `${DRIVE}/instruction.rs`), "utf8"));
+  const list = readFileSync(join(CRATES, `${DRIVE}/help.txt`), "utf8").trimEnd();
   const lines = list.split("\n").filter((line) => !line.startsWith("#"));
   assert.ok(lines.length > 25, "the list was found");
   assert.deepEqual(lines.filter((line) => logInGerman(line) === line), []);
