@@ -14,10 +14,10 @@
 #   browser      set-up, pages and reports in a browser: driven, drawn, dark and light, on a phone, in German, by keyboard, axe
 #   stations     programs of others drive trains behind our virtual stations
 #   fuzz         random bytes against every decoder, session, reader, phone, order and HTTP body, two minutes in all; ./ci.sh fuzz --seconds 3600 an hour each
-#   chaos        the whole program in one process under 1000 fresh seeds of this commit, while the line, the disk and processes fail;
+#   chaos        the whole program in one process under 2000 fresh seeds of this commit, while the line, the disk and processes fail;
 #                ./ci.sh chaos --seeds 1..1000000 for others. A story that fails is printed with the fewest troubles that it needs, and
 #                the command that tells it again. Collisions, derailments, overruns and railways that stand without an alarm may be
-#                in CHAOS_KNOWN (16 unless set) of the 1000 stories: five were when that was measured last, and more than sixteen are
+#                in CHAOS_KNOWN (10 unless set) of the 2000 stories: two of 3800 were when that was measured last, and more than ten are
 #                then improbable (docs/trust.md). Lost measurements and trains that run on after a death fail the step at once, and so
 #                does any failure of seeds that were named.
 #
@@ -306,7 +306,7 @@ step_chaos() {
   need git git # seeds are drawn from the commit
   cargo build --quiet --workspace --bins --profile test
   local known=0 at=${TMPDIR:-/tmp}
-  [[ $CHAOS_SEEDS != fresh:* ]] || known=${CHAOS_KNOWN:-16}
+  [[ $CHAOS_SEEDS != fresh:* ]] || known=${CHAOS_KNOWN:-10}
   [[ ! -w /dev/shm ]] || at=/dev/shm
   TMPDIR=$at "$TARGET/debug/footplate" simulate chaos --seeds "$CHAOS_SEEDS" --accept-known "$known"
 }
@@ -425,7 +425,7 @@ print_summary() {
 }
 
 steps=()
-CHAOS_SEEDS=fresh:1000
+CHAOS_SEEDS=fresh:2000
 FUZZ_SECONDS=4 # for each of 30 targets
 while [[ $# -gt 0 ]]; do
   case $1 in
