@@ -267,7 +267,7 @@ impl Odometer {
             self.bank.interval(&scene, 1.0 - self.settings.confidence, t);
         let (lost, dead) = self.probable();
         let (ran, shares, lost, dead) = if let Some(published) = &mut self.published {
-            let fused = published.next(&self.wheels, counted, &allowed, (dead, &self.vehicle), t);
+            let fused = published.next(&self.wheels, counted, &allowed, dead, &self.vehicle, t);
             let top = self.vehicle.max_speed.as_m_per_s();
             let speed = larger(smaller(fused.speed, top), -top);
             (self.speed, self.acceleration, self.variance) = (speed, fused.acceleration, fused.variance);

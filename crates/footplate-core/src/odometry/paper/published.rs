@@ -82,7 +82,8 @@ impl Published {
         wheels: &[WheelChannel; 2],
         counted: [f64; 2],
         allowed: &Allowed,
-        (dead, vehicle): ([bool; 2], &Vehicle),
+        dead: [bool; 2],
+        vehicle: &Vehicle,
         t: f64,
     ) -> Fused {
         let shown = |wheel: &WheelChannel, read: bool| Shown {
