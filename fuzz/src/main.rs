@@ -168,7 +168,6 @@ const ACCELERATION: &[&[u8]] = &[
 ];
 const MODEL: &[&[u8]] =
     &[b"model_version = ", b"[[steps]]\n", b"{\"train\":24,", b"null", b"-1", b"1e309", b"nan", b"["];
-#[cfg(unix)]
 const WARD: &[&[u8]] = &[
     b"w\x02\0\x07\x08",
     b"a\x01\0\x01",
@@ -231,7 +230,6 @@ const TARGETS: &[Target] = &[
     target("motion_file", measurements::motion_file, &[], MODEL),
     target("orders", footplate::fuzzed::orders, &["testdata/orders"], ORDERS),
     target("http_body", footplate::fuzzed::http_body, &["testdata/http-bodies"], JSON),
-    #[cfg(unix)]
     target("guardian_frames", footplate::fuzzed::guardian_frames, &[], WARD),
     target("set_up_file", footplate::fuzzed::set_up_file, &[], SET_UP),
     target("odometer", odometer::fuzz, TACHOMETER, TEXT),

@@ -22,6 +22,11 @@ impl Stopwatch {
     pub(crate) fn elapsed(&self) -> Duration {
         self.0.elapsed()
     }
+
+    /// The same, as a time that counts from the start.
+    pub(crate) fn now(&self) -> Timestamp {
+        Timestamp::from_ns(i64::try_from(self.elapsed().as_nanos()).unwrap_or(i64::MAX))
+    }
 }
 
 /// The time now, since the Unix epoch.

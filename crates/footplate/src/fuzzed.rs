@@ -28,8 +28,7 @@ pub fn http_body(bytes: &[u8]) {
 /// Takes the bytes as what a guardian or its child receives of the other.
 ///
 /// # Panics
-/// A frame is not what was received, or the system has no sockets.
-#[cfg(unix)]
+/// A frame is not what was received.
 pub fn guardian_frames(bytes: &[u8]) {
     let again = crate::guardian::read_fuzzed(bytes).unwrap_or_else(|error| panic!("{error}"));
     assert!(bytes.starts_with(&again), "frames that were not received: {again:?}");

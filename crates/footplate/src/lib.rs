@@ -13,7 +13,6 @@ mod counted;
 mod dashboard;
 mod error_text;
 pub mod fuzzed;
-#[cfg(unix)]
 mod guardian;
 mod layout_check;
 mod link;

@@ -15,6 +15,8 @@ pub(crate) enum FailureKind {
     CoilBurnt,
     /// Trains ran on after a death.
     RanOn,
+    /// Program or guardian was taken for dead, and was alive.
+    Wronged,
     /// The store lost or changed what it had acknowledged.
     NotKept,
     /// Nothing moved, and no alarm said why.

@@ -13,6 +13,8 @@ pub(super) enum Death {
     Hangs,
     /// Its guardian is killed.
     GuardianKilled,
+    /// Its guardian hangs for good.
+    GuardianHangs,
     /// The computer loses its power: the program, its guardian, and what the disk had not written.
     PowerCut(TimeSpan),
 }
@@ -23,7 +25,7 @@ pub(super) struct Life {
     steps: Cell<u64>,
     ends: Option<(u64, Death)>,
     died: Cell<Option<Death>>,
-    /// Whether the program has noticed the death of its guardian, and ends.
+    /// Whether the program has no guardian any more, and ends.
     is_orphan: Cell<bool>,
 }
 
@@ -43,9 +45,9 @@ impl Life {
         !self.is_over()
     }
 
-    /// Whether the program is dead. One whose guardian was killed still stops its trains.
+    /// Whether the program is dead. One whose guardian fails still stops its trains.
     pub(super) fn is_over(&self) -> bool {
-        !matches!(self.died.get(), None | Some(Death::GuardianKilled))
+        !matches!(self.died.get(), None | Some(Death::GuardianKilled | Death::GuardianHangs))
     }
 
     /// Ends it from outside: the guardian kills a program that hangs.

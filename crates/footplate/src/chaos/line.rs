@@ -1,4 +1,4 @@
-//! The line to the station, which loses, delays and garbles bytes and breaks; and the guardian's view of the program.
+//! The line to the station, which loses, delays and garbles bytes and breaks.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -8,17 +8,15 @@ use std::time::Duration;
 use footplate_core::{TimeSpan, Timestamp, TrainId};
 use footplate_eval::seeds::Choice;
 
-use super::life::{Death, Life, Spell};
+use super::life::Spell;
 use super::plan::{Planned, Trouble};
 use super::transport::Transport;
-use crate::link::{Bequest, FromSimulated, Guardian, Heard, Link, Lost, SimulatedStation};
-use crate::runtime::{WillLine, written};
+use crate::link::{Cable, FromSimulated, Heard, Link, Lost, SimulatedStation};
+use crate::runtime::WillLine;
 
-/// The guardian takes a program that drives trains for dead after this silence.
-pub(super) const LATE: TimeSpan = TimeSpan::from_ms(500);
 /// How often the operator acts: seldom enough that a story of minutes takes a second.
-const PATIENCE: TimeSpan = TimeSpan::from_ms(25);
-/// How often the true motion is checked while trains are stopped.
+pub(super) const PATIENCE: TimeSpan = TimeSpan::from_ms(25);
+/// How often the true motion is checked while trains are to be stopped.
 const LOOK: TimeSpan = TimeSpan::from_ms(5);
 
 /// A segment that is lost or garbled on a connection is sent again after this time (the shortest of Linux, RFC 6298).
@@ -27,20 +25,10 @@ const SENT_AGAIN_AFTER: TimeSpan = TimeSpan::from_ms(200);
 /// The station of a story, shared by all its lives.
 pub(super) type SharedStation<'l> = Rc<RefCell<SimulatedStation<'l>>>;
 
-/// Who of those that look at the line is still there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Holder {
-    Guardian,
-    /// The guardian is dead, and the program has not noticed.
-    None,
-    /// The program itself.
-    Program,
-}
-
-/// The line as the program sees it.
+/// The line of one life of the program.
 pub(super) struct FaultyLine<'l> {
     station: SharedStation<'l>,
-    life: Rc<Life>,
+    cable: Cable,
     trains: Vec<TrainId>,
     choice: Choice,
     began: Timestamp,
@@ -48,14 +36,11 @@ pub(super) struct FaultyLine<'l> {
     /// Failures of one moment that have happened.
     begun: Vec<bool>,
     arrivals: VecDeque<(Timestamp, Heard)>,
-    holder: Holder,
     is_open: bool,
     transport: Transport,
     has_answered: bool,
-    after_death: Duration,
-    /// What the guardian knows.
-    pub(super) will: Option<Vec<u8>>,
-    runs: bool,
+    /// Whether trains are to be stopped.
+    is_watched: bool,
     /// When all trains had received their stop, or had no power.
     pub(super) stopped_at: Option<Timestamp>,
     /// What happened, for people.
@@ -65,47 +50,53 @@ pub(super) struct FaultyLine<'l> {
 impl<'l> FaultyLine<'l> {
     pub(super) fn new(
         station: SharedStation<'l>,
-        life: Rc<Life>,
+        cable: Cable,
         trains: &[TrainId],
         troubles: &[Planned],
         choice: Choice,
     ) -> Self {
         let began = station.borrow().now();
-        let transport = Transport::of(&station.borrow());
-        // Each life has a connection of its own.
-        station.borrow_mut().connect();
         Self {
             station,
-            life,
             trains: trains.to_vec(),
             choice,
             began,
             begun: vec![false; troubles.len()],
             troubles: troubles.to_vec(),
             arrivals: VecDeque::new(),
-            holder: Holder::Guardian,
-            is_open: true,
-            transport,
+            is_open: false,
+            transport: Transport::of(&cable),
+            cable,
             has_answered: false,
-            after_death: Duration::ZERO,
-            will: None,
-            runs: false,
+            is_watched: false,
             stopped_at: None,
             notes: Vec::new(),
         }
     }
 
-    fn tell(&mut self, words: impl Into<String>) {
+    /// From now on, or no longer, it is noted when all trains are stopped.
+    pub(super) fn watch_stops(&mut self, is_watched: bool) {
+        (self.is_watched, self.stopped_at) = (is_watched, None);
+        self.look();
+    }
+
+    fn look(&mut self) {
+        if self.is_watched && self.stopped_at.is_none() && self.all_stopped() {
+            self.stopped_at = Some(self.time());
+        }
+    }
+
+    pub(super) fn tell(&mut self, words: impl Into<String>) {
         let now = self.time();
         self.notes.push((now, words.into()));
     }
 
-    fn time(&self) -> Timestamp {
+    pub(super) fn time(&self) -> Timestamp {
         self.station.borrow().now()
     }
 
     /// The time since the beginning of this life.
-    pub(super) fn age(&self) -> Timestamp {
+    fn age(&self) -> Timestamp {
         Timestamp::ZERO + (self.time() - self.began)
     }
 
@@ -124,15 +115,16 @@ impl<'l> FaultyLine<'l> {
         cuts.map(|cut| Spell { from: at(cut.spell.from), until: at(cut.spell.until) }).collect()
     }
 
-    /// Begins failures of one moment that are due.
-    fn happen(&mut self) {
+    /// Begins a failure of one moment that is due. Returns the one that a process has, and its time.
+    pub(super) fn happen(&mut self) -> Option<(Trouble, TimeSpan)> {
         for at in 0..self.troubles.len() {
             let Planned { trouble, spell } = self.troubles[at];
             if self.begun[at] || self.age() < spell.from {
                 continue;
             }
             self.begun[at] = true;
-            self.tell(format!("{trouble:?} for {:.2} s", (spell.until - spell.from).as_s()));
+            let lasts = spell.until - spell.from;
+            self.tell(format!("{trouble:?} for {:.2} s", lasts.as_s()));
             match trouble {
                 Trouble::Cut => {
                     self.arrivals.clear();
@@ -140,15 +132,12 @@ impl<'l> FaultyLine<'l> {
                         self.lose("the line is cut");
                     }
                 }
-                Trouble::StationOff => self.switch_station_off(spell.until - spell.from),
-                Trouble::Hang if !self.life.is_over() => self.hang(spell.until - spell.from),
+                Trouble::StationOff => self.switch_station_off(lasts),
+                Trouble::Hang | Trouble::GuardianHang => return Some((trouble, lasts)),
                 _ => {}
             }
         }
-        if self.life.death() == Some(Death::GuardianKilled) && self.holder == Holder::Guardian {
-            self.holder = Holder::None;
-            self.tell("the guardian is killed");
-        }
+        None
     }
 
     fn lose(&mut self, why: &str) {
@@ -182,26 +171,33 @@ impl<'l> FaultyLine<'l> {
         }
     }
 
-    /// The program hangs. Its guardian ends it if that lasts too long while trains run.
-    fn hang(&mut self, span: TimeSpan) {
-        let until = self.time() + span;
-        let is_watched = self.holder == Holder::Guardian && self.runs;
-        let late = if is_watched { self.time() + LATE } else { until };
-        self.advance(until.min(late));
-        if late < until {
-            self.tell("the guardian ends a program that hangs");
-            self.life.end(Death::Hangs);
+    /// Advances the world to a time at most, and to the next thing that happens before.
+    pub(super) fn step(&mut self, until: Timestamp) {
+        let now = self.time();
+        let due = self.arrivals.front().map(|(at, _)| *at);
+        let begins = self.troubles.iter().zip(&self.begun).filter(|(_, begun)| !**begun);
+        let begins = begins.map(|(planned, _)| self.began + (planned.spell.from - Timestamp::ZERO)).min();
+        let looks = self.is_watched.then(|| now + LOOK);
+        let next =
+            [due, begins, looks].into_iter().flatten().filter(|at| *at > now).fold(until, Timestamp::min);
+        let heard = self.station.borrow_mut().advance(next.max(now));
+        if let Some(heard) = heard {
+            self.hear(heard);
+        }
+        self.look();
+    }
+
+    /// Advances the world; what arrives waits.
+    fn advance(&mut self, until: Timestamp) {
+        while self.time() < until {
+            self.step(until);
         }
     }
 
-    /// Advances the world; bytes of the station wait for the program.
-    fn advance(&mut self, until: Timestamp) {
-        while self.time() < until {
-            let heard = self.station.borrow_mut().advance(until);
-            if let Some(heard) = heard {
-                self.hear(heard);
-            }
-        }
+    /// What has arrived by now.
+    pub(super) fn arrived(&mut self) -> Option<Heard> {
+        let now = self.time();
+        self.arrivals.pop_front_if(|(at, _)| *at <= now).map(|(_, heard)| heard)
     }
 
     /// Schedules the arrival of bytes from the station, unless they are lost.
@@ -234,7 +230,6 @@ impl<'l> FaultyLine<'l> {
                 }
             }
         }
-        self.has_answered = true;
     }
 
     fn happens(&mut self, percent: Option<f64>) -> bool {
@@ -275,7 +270,8 @@ impl<'l> FaultyLine<'l> {
         (!self.happens(loss) && !self.happens(noise)).then_some(datagram)
     }
 
-    fn put(&mut self, bytes: &[u8]) -> Result<(), Lost> {
+    /// Puts bytes on the line.
+    pub(super) fn put(&mut self, bytes: &[u8]) -> Result<(), Lost> {
         if self.transport == Transport::Datagrams {
             if !self.is_unreachable()
                 && let Some(bytes) = self.passed_datagram(bytes.to_vec())
@@ -304,7 +300,7 @@ impl<'l> FaultyLine<'l> {
     }
 
     /// Opens the line, anew if it is open.
-    fn connect(&mut self) -> Result<(), Lost> {
+    pub(super) fn connect(&mut self) -> Result<(), Lost> {
         if self.is_unreachable() && self.transport != Transport::Datagrams {
             return Err(Lost("the line is cut".to_owned()));
         }
@@ -314,60 +310,46 @@ impl<'l> FaultyLine<'l> {
         Ok(())
     }
 
-    fn dead() -> Lost {
-        Lost("this program is dead".to_owned())
+    /// Closes it: the process that held it has ended.
+    pub(super) fn close(&mut self) {
+        self.arrivals.clear();
+        self.is_open = false;
+    }
+
+    /// Lets a trouble begin that is due, in which the process that holds the line hangs.
+    fn hang(&mut self, hangs: Trouble) {
+        while let Some((trouble, span)) = self.happen() {
+            if trouble == hangs {
+                self.advance(self.time() + span);
+            }
+        }
     }
 }
 
+/// The line of a program without a guardian.
 impl Link for FaultyLine<'_> {
     fn now(&self) -> Timestamp {
         self.time()
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
-        if !self.life.step() {
-            return Err(Self::dead());
-        }
-        self.happen();
-        match self.holder {
-            _ if self.life.is_over() => Err(Self::dead()),
-            Holder::None => Err(Lost("the guardian has died".to_owned())),
-            Holder::Guardian | Holder::Program => self.put(bytes),
-        }
+        self.hang(Trouble::Hang);
+        self.put(bytes)
     }
 
     fn wait(&mut self, until: Timestamp) -> Heard {
-        if !self.life.step() {
-            return Heard::Lost(Self::dead());
-        }
         loop {
-            self.happen();
-            if self.life.is_over() {
-                return Heard::Lost(Self::dead());
-            }
-            if self.holder == Holder::None {
-                return Heard::Lost(Lost("the guardian has died".to_owned()));
-            }
-            let now = self.time();
-            if self.arrivals.front().is_some_and(|(at, _)| *at <= now)
-                && let Some((_, heard)) = self.arrivals.pop_front()
-            {
+            self.hang(Trouble::Hang);
+            if let Some(heard) = self.arrived() {
                 return heard;
             }
             if !self.is_open && self.transport != Transport::Datagrams {
                 return Heard::Lost(Lost("the line is gone".to_owned()));
             }
-            if now >= until {
+            if self.time() >= until {
                 return Heard::Nothing;
             }
-            let due = self.arrivals.front().map(|(at, _)| *at);
-            let begins = self.troubles.iter().zip(&self.begun).filter(|(_, begun)| !**begun);
-            let begins = begins.map(|(planned, _)| self.began + (planned.spell.from - Timestamp::ZERO)).min();
-            let next = [due, begins].into_iter().flatten().fold(until, Timestamp::min).max(now);
-            let heard = self.station.borrow_mut().advance(next);
-            if let Some(heard) = heard {
-                self.hear(heard);
-            }
+            self.step(until);
         }
     }
 
@@ -380,58 +362,11 @@ impl Link for FaultyLine<'_> {
     }
 
     fn reopen(&mut self) -> Result<(), Lost> {
-        if self.life.is_over() {
-            return Err(Self::dead());
-        }
-        if self.holder == Holder::None {
-            self.holder = Holder::Program;
-            self.life.orphan();
-        }
         self.connect()
     }
 
     fn real_time(&self) -> Duration {
-        Duration::from_secs_f64((self.time() - Timestamp::ZERO).as_s()) + self.after_death
-    }
-
-    fn pause(&mut self, span: Duration) {
-        if self.life.is_over() {
-            // Its loop ends, while the world stands still.
-            self.after_death += span;
-            return;
-        }
-        self.advance(self.time() + TimeSpan::from_s(span.as_secs_f64()));
-        self.happen();
-    }
-
-    fn guardian(&mut self) -> Option<&mut dyn Guardian> {
-        (self.holder == Holder::Guardian && !self.life.is_over()).then_some(self)
-    }
-}
-
-impl Guardian for FaultyLine<'_> {
-    fn bequeath(&mut self, will: &[Bequest]) -> Result<(), Lost> {
-        if !self.life.step() {
-            return Err(Self::dead());
-        }
-        self.will = Some(written(will, 1.0));
-        Ok(())
-    }
-
-    fn note_running(&mut self, runs: bool) -> Result<(), Lost> {
-        if !self.life.step() {
-            return Err(Self::dead());
-        }
-        self.runs = runs;
-        Ok(())
-    }
-
-    fn say_goodbye(&mut self) -> Result<(), Lost> {
-        if !self.life.step() {
-            return Err(Self::dead());
-        }
-        (self.runs, self.will) = (false, None);
-        Ok(())
+        Duration::from_secs_f64((self.time() - Timestamp::ZERO).as_s())
     }
 }
 
@@ -460,17 +395,16 @@ impl WillLine for FaultyLine<'_> {
     fn pause(&mut self, span: Duration) {
         let until = self.time() + TimeSpan::from_s(span.as_secs_f64());
         while self.time() < until {
-            self.advance(until.min(self.time() + LOOK));
-            self.happen();
-            if self.stopped_at.is_none() && self.all_stopped() {
-                self.stopped_at = Some(self.time());
+            self.step(until);
+            self.hang(Trouble::GuardianHang);
+            while let Some(heard) = self.arrived() {
+                self.has_answered |= matches!(heard, Heard::Byte(_) | Heard::Datagram(_));
             }
         }
-        self.arrivals.clear();
     }
 
     fn has_answered(&self) -> bool {
-        self.transport != Transport::Datagrams || self.has_answered
+        !self.cable.has_answers() || self.has_answered
     }
 
     fn expect_answer(&mut self) {

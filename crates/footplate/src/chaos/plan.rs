@@ -18,9 +18,13 @@ const LAST_LIFE_S: f64 = 240.0;
 const TROUBLES_WITHIN: f64 = 0.8;
 /// Steps of a life in which it may die: a loop makes some 100 a second.
 const STEPS_PER_S: f64 = 100.0;
+/// How long a guardian hangs that goes on afterwards (s): around the 0.7 s after which the program ends it.
+const GUARDIAN_HANGS_S: [f64; 2] = [0.01, 1.0];
 const MOST_TROUBLES: usize = 5;
 /// Seeds below this one draw one of the first four stations, so that the stories of seeds that failed once stay what they are.
-pub(crate) const FOUR_STATIONS_UNTIL: u64 = 20_000_000;
+const FOUR_STATIONS_UNTIL: u64 = 20_000_000;
+/// Seeds below this one draw no guardian that hangs, for the same reason.
+pub(crate) const NO_GUARDIAN_HANGS_UNTIL: u64 = 70_000_000;
 const STATIONS: [StationKind; 6] = [
     StationKind::Marklin,
     StationKind::DccEx,
@@ -45,6 +49,8 @@ pub(super) enum Trouble {
     StationOff,
     /// The program hangs, as on a computer that sleeps or swaps.
     Hang,
+    /// The guardian hangs.
+    GuardianHang,
     /// No byte can be written.
     DiskFull,
     /// The time that each commit takes.
@@ -82,7 +88,10 @@ impl Plan {
         let stations = if seed < FOUR_STATIONS_UNTIL { &STATIONS[..4] } else { &STATIONS };
         let station = choice.of(stations).copied().unwrap_or_default();
         let count = 1 + below(choice, MOST_LIVES);
-        let lives = (1..=count).map(|nth| PlannedLife::draw(choice, nth == count)).collect();
+        let mut lives: Vec<_> = (1..=count).map(|nth| PlannedLife::draw(choice, nth == count)).collect();
+        if seed >= NO_GUARDIAN_HANGS_UNTIL {
+            lives.iter_mut().for_each(|life| life.let_guardian_hang(choice));
+        }
         Self { station, lives }
     }
 
@@ -128,6 +137,23 @@ impl PlannedLife {
         let if_unkept = if below(choice, 2) == 0 { IfUnkept::Stop } else { IfUnkept::GoOn };
         let lasts_s = if is_last { lasts_s + LAST_LIFE_S } else { lasts_s };
         Self { lasts: TimeSpan::from_s(lasts_s), ends, troubles, if_unkept }
+    }
+}
+
+impl PlannedLife {
+    /// Half of the time it is the guardian that hangs, and a guardian that is killed hangs.
+    fn let_guardian_hang(&mut self, choice: &mut Choice) {
+        for Planned { trouble, spell } in &mut self.troubles {
+            if *trouble == Trouble::Hang && below(choice, 2) == 0 {
+                let lasts = TimeSpan::from_s(choice.between(GUARDIAN_HANGS_S[0], GUARDIAN_HANGS_S[1]));
+                (*trouble, spell.until) = (Trouble::GuardianHang, spell.from + lasts);
+            }
+        }
+        if let Some((_, death @ Death::GuardianKilled)) = &mut self.ends
+            && below(choice, 2) == 0
+        {
+            *death = Death::GuardianHangs;
+        }
     }
 }
 

@@ -18,15 +18,18 @@ use footplate_store::Store;
 
 use super::disk::FaultyDisk;
 use super::failure::{Failure, FailureKind};
-use super::life::{Death, Life, Spell, time_outside};
-use super::line::{FaultyLine, LATE, SharedStation};
+use super::life::{Life, Spell};
+use super::line::{FaultyLine, SharedStation};
+use super::pair::Pair;
 use super::people::{People, SEEN_AFTER, Seen, SharedDisk};
-use super::plan::{Plan, PlannedLife};
+use super::plan::{Plan, Planned, PlannedLife};
 use super::promises::Promises;
 use super::selection::Selection;
+use super::transport::cable_to;
 use crate::commands::{recall_directions, stop_all};
+use crate::guardian::WardLink;
 use crate::link::{Address, Link, OpenSession, Quirks, SimulatedStation, StationKind, open_session};
-use crate::runtime::{Ended, Runtime, carry_out};
+use crate::runtime::{Ended, Runtime};
 
 /// Trains of every story.
 const TRAINS: [TrainId; 3] = [TrainId(24), TrainId(58), TrainId(1)];
@@ -37,10 +40,6 @@ pub(crate) const STORIES_A_STAGE: u64 = 32;
 /// The distance of a train beyond a sensor at the beginning.
 const PAST: Length = Length::from_mm(150.0);
 const TRIES: usize = 1_000;
-/// Stops are on the line within this time after a death, unless the line is cut (a requirement).
-const STOPPED_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
-/// From a byte on the line to its effect on a decoder: the refresh of the slowest station, with a margin.
-const HEARD_WITHIN: TimeSpan = TimeSpan::from_ms(500);
 /// The longest time from a stop command to standstill.
 const BRAKES_WITHIN: TimeSpan = TimeSpan::from_ms(4_000);
 /// The calendar of the computer when a story begins; any other would do.
@@ -201,27 +200,27 @@ fn dispatcher_of(stage: &Stage<'_>, world: &LivingLayout<'_>, trains: &[TrainId]
 }
 
 /// State that all lives of a story share.
-struct Teller<'s, 'l> {
+pub(super) struct Teller<'s, 'l> {
     stage: &'s Stage<'l>,
     address: Address,
-    station: SharedStation<'l>,
+    pub(super) station: SharedStation<'l>,
     store: &'s Path,
-    choice: Choice,
-    fate: Fate,
+    pub(super) choice: Choice,
+    pub(super) fate: Fate,
 }
 
 impl<'l> Teller<'_, 'l> {
-    fn now(&self) -> Timestamp {
+    pub(super) fn now(&self) -> Timestamp {
         self.station.borrow().now()
     }
 
-    fn note(&mut self, words: String) {
+    pub(super) fn note(&mut self, words: String) {
         let now = self.now();
         self.fate.notes.push((now, words));
     }
 
     /// Notes the steps that decoders received last, and the leading ends of trains.
-    fn tell_truth(&mut self) {
+    pub(super) fn tell_truth(&mut self) {
         let truth = |train: &TrainId| {
             let station = self.station.borrow();
             let truth = station.world().truth().train(*train)?;
@@ -236,7 +235,7 @@ impl<'l> Teller<'_, 'l> {
         self.note(format!("really: {}", truths.join(", ")));
     }
 
-    fn fail(&mut self, kind: FailureKind, words: String) {
+    pub(super) fn fail(&mut self, kind: FailureKind, words: String) {
         self.note(format!("FAILED: {words}"));
         self.fate.failures.push(Failure { kind, words });
     }
@@ -250,6 +249,19 @@ impl<'l> Teller<'_, 'l> {
         open_session(&self.address, line, self.stage.layout)
     }
 
+    /// The line of a life, which its guardian has opened.
+    fn open(
+        &self,
+        life: Rc<Life>,
+        troubles: &[Planned],
+        noise: Choice,
+    ) -> anyhow::Result<WardLink<Pair<'l>>> {
+        let cable = cable_to(self.fate.station)?;
+        let line = FaultyLine::new(Rc::clone(&self.station), cable.clone(), &TRAINS, troubles, noise);
+        let pieces = Choice::new(self.fate.seed.wrapping_add(self.fate.lives.into()));
+        Ok(WardLink::over(Pair::new(line, life, pieces), cable)?)
+    }
+
     /// Stops all trains that the previous life may have left running, as the program does first.
     fn stop_left_running(&mut self) -> anyhow::Result<()> {
         if !self.store.exists() {
@@ -258,11 +270,11 @@ impl<'l> Teller<'_, 'l> {
         let Some(unfinished) = Store::open(self.store)?.unfinished_session()? else { return Ok(()) };
         let began = self.now();
         let life = Rc::new(Life::new(None));
-        let mut line = FaultyLine::new(Rc::clone(&self.station), life, &TRAINS, &[], Choice::new(0));
+        let mut line = self.open(life, &[], Choice::new(0))?;
         let mut opened = self.session(&line)?;
         recall_directions(opened.session.as_mut(), &Store::open(self.store)?)?;
         let closing = stop_all(&mut line, opened, unfinished.trains);
-        if !line.all_stopped() {
+        if !line.connection_mut().line.all_stopped() {
             // The end of a session takes its time; stops come first in it.
             self.fail(
                 FailureKind::RanOn,
@@ -300,8 +312,7 @@ impl<'l> Teller<'_, 'l> {
         let disk = Rc::new(RefCell::new(disk));
         let mut dispatcher = dispatcher_of(self.stage, self.station.borrow().world(), &TRAINS);
         let noise = Choice::new(self.choice.between(0.0, 1e15) as u64);
-        let mut line =
-            FaultyLine::new(Rc::clone(&self.station), Rc::clone(&life), &TRAINS, &planned.troubles, noise);
+        let mut line = self.open(Rc::clone(&life), &planned.troubles, noise)?;
         let mut opened = self.session(&line)?;
         recall_directions(opened.session.as_mut(), &Store::open(self.store)?)?;
         let mut recorder = SharedDisk(Rc::clone(&disk));
@@ -325,7 +336,8 @@ impl<'l> Teller<'_, 'l> {
         drop(people);
         drop(recorder);
         let disk = Rc::into_inner(disk).context("a disk that is still in use")?.into_inner();
-        self.fate.notes.extend(line.notes.drain(..).chain(disk.sent()));
+        let pair = line.connection_mut();
+        self.fate.notes.extend(pair.line.notes.drain(..).chain(disk.sent()));
         self.count(seen);
         let ended = match ended {
             Ok(Ended::Finished) => "finished".to_owned(),
@@ -337,9 +349,11 @@ impl<'l> Teller<'_, 'l> {
         if let Some(trouble) = trouble {
             self.fail(FailureKind::NotKept, format!("the journal failed: {trouble}"));
         }
-        let unreachable = line.unreachable();
-        self.check_incidents(incidents, &unreachable);
-        self.bury(death, began, closing.is_complete(), &mut line, disk)
+        self.check_incidents(incidents, &[pair.line.unreachable(), pair.without_guardian.clone()].concat());
+        if let Some(wronged) = pair.wronged {
+            self.fail(FailureKind::Wronged, wronged.to_owned());
+        }
+        self.bury(death, began, closing.is_complete(), pair, disk)
     }
 
     fn count(&mut self, mut seen: Seen) {
@@ -371,75 +385,6 @@ impl<'l> Teller<'_, 'l> {
             let words = format!("{:?} of {:?} at {:.2} s", incident.kind, incident.train, incident.at.as_s());
             self.fail(incident.kind.into(), words);
         }
-    }
-
-    /// The end of a life, in order or not.
-    fn bury(
-        &mut self,
-        death: Option<Death>,
-        began: Timestamp,
-        is_complete: bool,
-        line: &mut FaultyLine<'l>,
-        disk: FaultyDisk,
-    ) -> anyhow::Result<()> {
-        self.fate.deaths += u32::from(death.is_some());
-        let kept = match death {
-            None | Some(Death::GuardianKilled) if is_complete => disk.finish(),
-            None | Some(Death::GuardianKilled) => disk.die(),
-            Some(Death::Killed | Death::Hangs) => disk.die(),
-            Some(Death::PowerCut(_)) => disk.lose_power(&mut self.choice),
-        };
-        if let Err(error) = kept {
-            self.fail(FailureKind::NotKept, format!("{error:#}"));
-        }
-        let allowed = STOPPED_WITHIN + HEARD_WITHIN;
-        match death {
-            Some(Death::PowerCut(dark)) => {
-                // No process is left; trains run on.
-                let until = self.now() + dark;
-                while self.now() < until {
-                    let _ = self.station.borrow_mut().advance(until);
-                }
-                return Ok(());
-            }
-            Some(Death::Hangs) => wait(line, LATE),
-            // The program has stopped its trains itself.
-            Some(Death::GuardianKilled) => {
-                if !line.all_stopped() && !line.is_unreachable() {
-                    self.fail(FailureKind::RanOn, "trains run after their guardian was killed".to_owned());
-                }
-                return Ok(());
-            }
-            Some(Death::Killed) | None => {}
-        }
-        let Some(will) = line.will.take() else { return Ok(()) };
-        self.note(format!("the guardian begins with a last will of {} bytes", will.len()));
-        self.tell_truth();
-        if line.all_stopped() {
-            line.stopped_at = Some(began);
-        }
-        let is_said = carry_out(line, &will);
-        self.fate.notes.append(&mut line.notes);
-        match line.stopped_at {
-            Some(at) => {
-                let took = time_outside(began, at, line.unreachable());
-                self.fate.stopped_ms.push(took.as_ms());
-                self.note(format!(
-                    "all trains were stopped {:.0} ms after the death, {:.0} ms of them over a line that was there",
-                    (at - began).as_ms(),
-                    took.as_ms()
-                ));
-                if took > allowed {
-                    self.fail(
-                        FailureKind::RanOn,
-                        format!("trains were stopped only {:.0} ms after a death", took.as_ms()),
-                    );
-                }
-            }
-            None => self
-                .fail(FailureKind::RanOn, format!("trains were not stopped after a death (said: {is_said})")),
-        }
-        Ok(())
     }
 
     /// The operator looks after the turnouts, as the program asks after a crash.
@@ -474,9 +419,4 @@ impl<'l> Teller<'_, 'l> {
             }
         }
     }
-}
-
-fn wait(line: &mut FaultyLine<'_>, span: TimeSpan) {
-    use crate::runtime::WillLine;
-    WillLine::pause(line, std::time::Duration::from_secs_f64(span.as_s()));
 }

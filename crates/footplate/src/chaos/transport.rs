@@ -1,6 +1,6 @@
 //! How the bytes of a station travel, which decides what a failure of the line does to them.
 
-use crate::link::SimulatedStation;
+use crate::link::{Address, Cable, StationKind};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Transport {
@@ -13,11 +13,28 @@ pub(super) enum Transport {
 }
 
 impl Transport {
-    pub(super) const fn of(station: &SimulatedStation<'_>) -> Self {
-        match station {
-            SimulatedStation::Marklin(_) | SimulatedStation::DccEx(_) => Self::Serial,
-            SimulatedStation::Z21(_) | SimulatedStation::Can(_) => Self::Datagrams,
-            SimulatedStation::LocoNet(_) | SimulatedStation::Jmri(_) => Self::Connection,
+    pub(super) const fn of(cable: &Cable) -> Self {
+        match cable {
+            _ if cable.has_datagrams() => Self::Datagrams,
+            _ if cable.is_connection() => Self::Connection,
+            _ => Self::Serial,
         }
     }
+}
+
+/// The cable that a guardian would be given for a station of a kind; it is never opened.
+///
+/// # Errors
+/// Never: the addresses are those of the guides.
+pub(super) fn cable_to(station: StationKind) -> anyhow::Result<Cable> {
+    let address = match station {
+        StationKind::Marklin => "marklin-serial:/dev/ttyUSB0",
+        StationKind::DccEx => "dcc-ex:/dev/ttyACM0",
+        StationKind::Z21 => "z21:192.168.0.111",
+        StationKind::MarklinCan => "marklin-can:192.168.0.5",
+        StationKind::LocoNet => "loconet:192.168.0.20",
+        StationKind::Jmri => "jmri:192.168.0.20",
+    };
+    let address: Address = address.parse().map_err(anyhow::Error::msg)?;
+    anyhow::Context::context(address.cable(), "a station has a cable")
 }

@@ -1,11 +1,12 @@
 //! The line that a guardian holds. It opens the line when its child asks, and retries for ever when trains must be stopped.
 
 use std::io::Write;
-use std::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use super::frame::{FrameWriter, Kind, cts_byte, cts_of};
+use super::frame::Frame;
+use super::frame_stream::FrameWriter;
 use super::signals::Signals;
 use super::voice::say;
 use crate::link::{Arrival, Cable, Lost};
@@ -14,12 +15,21 @@ use crate::runtime::WillLine;
 /// The present child, which receives everything that arrives on the line.
 pub(super) type Ear = Arc<Mutex<Option<FrameWriter>>>;
 
+/// Sends a frame to the present child. If it is gone, reading from it reports that.
+pub(super) fn tell(ear: &Ear, frame: Frame<'_>) {
+    let _ = locked(ear).as_mut().map(|child| child.send(frame));
+}
+
+pub(super) fn locked<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// A line, open or not.
 pub(super) struct HeldLine {
     cable: Cable,
     ear: Ear,
     writer: Option<Box<dyn Write + Send>>,
-    cts: Arc<AtomicU8>,
+    cts: Arc<Mutex<Option<bool>>>,
     /// Counts openings, so that arrivals of an earlier one are ignored. An even number: the line is lost.
     opening: Arc<AtomicU32>,
     /// Whether the station has sent anything since this was cleared.
@@ -28,8 +38,8 @@ pub(super) struct HeldLine {
 
 impl HeldLine {
     pub(super) fn new(cable: Cable, ear: Ear) -> Self {
-        let cts = Arc::new(AtomicU8::new(cts_byte(None)));
-        Self { cable, ear, writer: None, cts, opening: Arc::default(), has_heard: Arc::default() }
+        let (cts, opening, has_heard) = (Arc::default(), Arc::default(), Arc::default());
+        Self { cable, ear, writer: None, cts, opening, has_heard }
     }
 
     pub(super) fn is_open(&self) -> bool {
@@ -51,23 +61,18 @@ impl HeldLine {
             if opening.load(Ordering::Acquire) != this {
                 return false;
             }
-            let tell = |kind, bytes: &[u8]| {
-                let mut ear = ear.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-                // If the child is gone, reading from it fails too.
-                let _ = ear.as_mut().map(|child| child.send(kind, bytes));
-            };
             match arrival {
                 Arrival::Bytes(bytes) => {
                     has_heard.store(true, Ordering::Release);
-                    tell(Kind::Heard, bytes);
+                    tell(&ear, Frame::Heard(bytes));
                 }
                 Arrival::Cts(up) => {
-                    cts.store(cts_byte(Some(up)), Ordering::Release);
-                    tell(Kind::Cts, &[up.into()]);
+                    *locked(&cts) = Some(up);
+                    tell(&ear, Frame::Cts(up));
                 }
                 Arrival::Lost(why) => {
                     let _ = opening.compare_exchange(this, this + 1, Ordering::AcqRel, Ordering::Acquire);
-                    tell(Kind::Lost, format!("`{name}` is gone: {why}").as_bytes());
+                    tell(&ear, Frame::Lost(&format!("`{name}` is gone: {why}")));
                     return false;
                 }
             }
@@ -75,7 +80,7 @@ impl HeldLine {
         });
         match end {
             Ok(end) => {
-                self.cts.store(cts_byte(end.cts), Ordering::Release);
+                *locked(&self.cts) = end.cts;
                 self.writer = Some(end.writer);
                 Ok(end.cts)
             }
@@ -125,7 +130,7 @@ impl WillLine for LastLine<'_> {
         self.line.write(bytes)
     }
     fn cts(&self) -> Option<bool> {
-        cts_of(self.line.cts.load(Ordering::Acquire))
+        *locked(&self.line.cts)
     }
     fn pause(&mut self, span: Duration) {
         std::thread::sleep(span);

@@ -7,15 +7,17 @@ use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::net::UnixStream;
 use std::os::unix::process::ExitStatusExt;
 use std::process::{Child, Command, ExitCode, ExitStatus};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use anyhow::Context;
 use rustix::net::{SendAncillaryBuffer, SendAncillaryMessage, SendFlags, sendmsg};
 use rustix::termios::{OptionalActions, Termios, tcgetattr, tcsetattr};
 
-use super::frame::{FrameReader, FrameWriter, Kind, MOST_BYTES, cts_byte};
-use super::held_line::{Ear, HeldLine, LastLine};
+use super::frame::Frame;
+use super::frame_stream::{FrameReader, FrameWriter};
+use super::held_line::{Ear, HeldLine, LastLine, locked, tell};
+use super::monitor::{LATE, LONG_ENOUGH, Monitor, Next, Request, Step};
 use super::signals::Signals;
 use super::voice::say;
 use super::ward::WARD;
@@ -23,30 +25,10 @@ use crate::clock::Stopwatch;
 use crate::link::Cable;
 use crate::runtime::carry_out;
 
-/// A child that drives trains counts as dead after this time without a frame (requirement: stops within 1 s).
-const LATE: Duration = Duration::from_millis(500);
 /// Pause before a restart.
 const RESTART_AFTER: Duration = Duration::from_secs(1);
-/// A child that dies sooner than this is not restarted: it would die again.
-const LONG_ENOUGH: Duration = Duration::from_secs(10);
 /// Exit status after a signal, less the number of the signal, as in shells.
 const ENDED_BY_SIGNAL: u8 = 128;
-
-/// How serving a child ended.
-enum Left {
-    /// The child closed its connection.
-    Gone,
-    /// The child sent nothing for too long.
-    Late,
-}
-
-/// State of the present child.
-struct Watched {
-    /// The bytes that stop its trains.
-    will: Vec<u8>,
-    has_will: bool,
-    runs: bool,
-}
 
 /// Runs the program again as a child and holds its line. Returns once the child has ended and all trains are stopped.
 ///
@@ -57,51 +39,56 @@ pub(crate) fn keep(cable: Cable, restarts: bool) -> anyhow::Result<ExitCode> {
     let modes = tcgetattr(std::io::stdin()).ok();
     let ear: Ear = Arc::new(Mutex::new(None));
     let mut line = HeldLine::new(cable, Arc::clone(&ear));
-    let mut watched = Watched { will: Vec::with_capacity(MOST_BYTES), has_will: false, runs: false };
+    let clock = Stopwatch::start();
     loop {
-        let since = Stopwatch::start();
-        (watched.has_will, watched.runs) = (false, false);
+        let mut monitor = Monitor::new(clock.now());
         let (mut child, stream) = start().context("cannot start the program that drives")?;
         signals.pass_on_to(Some(child.id()));
         if signals.ends() {
             signals.pass_on_late();
         }
         let mut frames = FrameReader::new(stream.try_clone()?);
-        *ear.lock().unwrap_or_else(PoisonError::into_inner) = Some(FrameWriter::new(stream));
-        let left = watch(&mut frames, &mut line, &ear, &mut watched);
-        let was_late = matches!(left, Left::Late);
-        if was_late {
-            say(&format!(
-                "the program has said nothing for {} ms while trains run; it is ended",
-                LATE.as_millis()
-            ));
-            // It cannot write any more: only this process holds the line.
-            let _ = child.kill();
+        *locked(&ear) = Some(FrameWriter::new(stream));
+        serve(&mut frames, &mut line, &ear, &mut monitor, &clock);
+        // Whether the program had left its trains, and they were stopped.
+        let (mut was_late, mut stopped) = (false, None);
+        while let Some(step) = monitor.step() {
+            match step {
+                Step::Kill => {
+                    was_late = true;
+                    say(&format!(
+                        "the program has said nothing for {:.0} ms while trains run; it is ended",
+                        LATE.as_ms()
+                    ));
+                    let _ = child.kill();
+                }
+                Step::CarryOut(will) => {
+                    signals.pass_on_to(None);
+                    say("the program has left its trains; stopping all of them now");
+                    stopped = Some(carry_out(&mut LastLine { line: &mut line, signals: &signals }, will));
+                    signals.pass_on_to(Some(child.id()));
+                }
+                Step::AwaitEnd => {}
+            }
         }
-        // Stopping trains comes first, before the guardian finds out how the child ended.
-        let died = watched.has_will;
-        let mut said = false;
-        if died {
-            signals.pass_on_to(None);
-            say("the program has left its trains; stopping all of them now");
-            said = carry_out(&mut LastLine { line: &mut line, signals: &signals }, &watched.will);
-        }
-        signals.pass_on_to(Some(child.id()));
         let ended = wait_for(&mut child)?;
         signals.pass_on_to(None);
-        drop(ear.lock().unwrap_or_else(PoisonError::into_inner).take());
-        if died {
-            say(&what_happened(ended, was_late, said));
+        drop(locked(&ear).take());
+        if let Some(stopped) = stopped {
+            say(&what_happened(ended, was_late, stopped));
             restore(modes.as_ref());
         }
-        if !(restarts && died && said && !ended.success()) || signals.ends() {
+        if !restarts || signals.ends() {
             return Ok(exit_code(ended));
         }
-        if since.elapsed() < LONG_ENOUGH {
-            say(&format!("it ran for less than {} s and is not started again", LONG_ENOUGH.as_secs()));
-            return Ok(exit_code(ended));
+        match monitor.next(clock.now(), stopped == Some(true), ended.success()) {
+            Next::End => return Ok(exit_code(ended)),
+            Next::DiedSoon => {
+                say(&format!("it ran for less than {:.0} s and is not started again", LONG_ENOUGH.as_s()));
+                return Ok(exit_code(ended));
+            }
+            Next::Restart => say("the program is started again"),
         }
-        say("the program is started again");
         std::thread::sleep(RESTART_AFTER);
         if signals.ends() {
             say("a signal asked it to end: it is not started again");
@@ -129,46 +116,31 @@ fn start() -> anyhow::Result<(Child, UnixStream)> {
 }
 
 /// Serves a child until it closes or is late.
-fn watch(frames: &mut FrameReader, line: &mut HeldLine, ear: &Ear, watched: &mut Watched) -> Left {
-    let tell = |kind, bytes: &[u8]| {
-        let mut ear = ear.lock().unwrap_or_else(PoisonError::into_inner);
-        // If the child is gone, reading reports it.
-        let _ = ear.as_mut().map(|child| child.send(kind, bytes));
-    };
-    let mut heard = Stopwatch::start();
-    loop {
-        let left = watched.runs.then(|| LATE.saturating_sub(heard.elapsed()));
-        let (kind, payload) = match frames.next(left) {
-            Ok(Some(frame)) => frame,
-            Ok(None) if watched.runs && heard.elapsed() >= LATE => return Left::Late,
-            Ok(None) => continue,
-            Err(_) => return Left::Gone,
+fn serve(frames: &mut FrameReader, line: &mut HeldLine, ear: &Ear, monitor: &mut Monitor, clock: &Stopwatch) {
+    while monitor.serves() {
+        let request = match frames.next(monitor.deadline().map(|deadline| deadline - clock.now())) {
+            Ok(Some(frame)) => monitor.hear(frame),
+            Ok(None) => {
+                monitor.silent(clock.now());
+                continue;
+            }
+            Err(_) => return monitor.closed(),
         };
-        match kind {
-            Kind::Open => match line.open() {
-                Ok(cts) => tell(Kind::Opened, &[cts_byte(cts)]),
-                Err(lost) => tell(Kind::Lost, lost.0.as_bytes()),
+        match request {
+            Some(Request::Open) => match line.open() {
+                Ok(cts) => tell(ear, Frame::Opened { cts }),
+                Err(lost) => tell(ear, Frame::NotOpened(&lost.0)),
             },
-            Kind::Write => {
-                if let Err(lost) = line.write(payload) {
-                    tell(Kind::Lost, lost.0.as_bytes());
+            Some(Request::Write(bytes)) => {
+                if let Err(lost) = line.write(bytes) {
+                    tell(ear, Frame::Lost(&lost.0));
                 }
             }
-            Kind::Will => {
-                watched.will.clear();
-                watched.will.extend_from_slice(payload);
-                watched.has_will = true;
-            }
-            Kind::Alive => {
-                watched.runs = payload == [1];
-                // From this thread, which would hang: the one that reads the line could go on without it.
-                tell(Kind::Here, &[]);
-            }
-            Kind::Goodbye => (watched.has_will, watched.runs) = (false, false),
-            // Only a guardian sends these.
-            Kind::Opened | Kind::Here | Kind::Heard | Kind::Cts | Kind::Lost => return Left::Gone,
+            // From this thread, which would hang: the one that reads the line could go on without it.
+            Some(Request::Answer) => tell(ear, Frame::Here),
+            None => {}
         }
-        heard = Stopwatch::start();
+        monitor.dealt(clock.now());
     }
 }
 
@@ -227,6 +199,7 @@ mod tests {
     use footplate_core::TimeSpan;
 
     use super::*;
+    use crate::guardian::ward_connection::WardConnection;
     use crate::guardian::ward_link::WardLink;
     use crate::link::{Address, CableLink, Heard, Link};
 
@@ -266,16 +239,18 @@ mod tests {
         turns
     }
 
-    fn guarded(cable: &Cable) -> WardLink {
+    fn guarded(cable: &Cable) -> WardLink<WardConnection> {
         let (here, there) = UnixStream::pair().expect("a pair of sockets");
         let cable_held = cable.clone();
         thread::spawn(move || {
             let ear: Ear = Arc::new(Mutex::new(Some(FrameWriter::new(here.try_clone().expect("a handle")))));
             let mut line = HeldLine::new(cable_held, Arc::clone(&ear));
-            let mut watched = Watched { will: Vec::new(), has_will: false, runs: false };
-            watch(&mut FrameReader::new(here), &mut line, &ear, &mut watched);
+            let clock = Stopwatch::start();
+            let mut monitor = Monitor::new(clock.now());
+            serve(&mut FrameReader::new(here), &mut line, &ear, &mut monitor, &clock);
         });
-        WardLink::over(there.try_clone().expect("a handle"), there, cable.clone()).expect("a guardian")
+        let connection = WardConnection::over(there, cable.clone()).expect("a handle");
+        WardLink::over(connection, cable.clone()).expect("a guardian")
     }
 
     #[test]

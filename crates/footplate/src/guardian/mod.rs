@@ -7,24 +7,47 @@
 //! and ends; one that answers no heartbeat is ended first.
 //!
 //! ```text
-//! frame     the protocol between the two
-//! keeper    the guardian: starts its child, monitors it, and sends its last will
+//! frame     frames between the two, and the pieces in which they arrive
+//! monitor   what the guardian decides about its child
+//! ward_link the line as the child sees it, over a connection to its guardian
+//! ```
+//!
+//! Neither of these has a thread, a socket or a clock: chaos (`crates/footplate/src/chaos`) runs them, too. Around them:
+//!
+//! ```text
+//! keeper    the guardian: starts its child, serves it, and does what the monitor decides
 //! held_line the line that the guardian holds
 //! signals   signals to the guardian
 //! voice     the guardian's messages
 //! ward      how the child finds its guardian
-//! ward_link the line as the child sees it
+//! ward_connection frame_stream   the child's connection to it; the sockets of both
 //! ```
 
 mod frame;
-mod held_line;
-mod keeper;
-mod signals;
-mod voice;
-mod ward;
+mod monitor;
 mod ward_link;
 
-pub(crate) use frame::read_fuzzed;
+#[cfg(unix)]
+mod frame_stream;
+#[cfg(unix)]
+mod held_line;
+#[cfg(unix)]
+mod keeper;
+#[cfg(unix)]
+mod signals;
+#[cfg(unix)]
+mod voice;
+#[cfg(unix)]
+mod ward;
+#[cfg(unix)]
+mod ward_connection;
+
+pub(crate) use frame::{Frame, FrameBuffer, read_fuzzed};
+#[cfg(unix)]
 pub(crate) use keeper::keep;
+pub(crate) use monitor::{Monitor, Request, Step};
+#[cfg(unix)]
 pub(crate) use ward::{become_ward, is_ward};
-pub(crate) use ward_link::WardLink;
+#[cfg(unix)]
+pub(crate) use ward_connection::WardConnection;
+pub(crate) use ward_link::{Connection, WardLink};

@@ -1,94 +1,133 @@
 //! The line as a guardian's child sees it: every byte passes through the guardian, which also receives the heartbeat.
 
 use std::collections::VecDeque;
-use std::io::{ErrorKind, Result as IoResult};
-use std::os::unix::net::UnixStream;
+use std::io::{Error as IoError, ErrorKind, Result as IoResult};
 use std::time::Duration;
 
 use footplate_core::{TimeSpan, Timestamp};
 
-use super::frame::{FrameReader, FrameWriter, Kind, cts_of};
-use super::ward::{connection, end_guardian};
-use crate::clock::Stopwatch;
-use crate::link::{Bequest, Cable, CableLink, Guardian, Heard, Link, Lost, PERSON_MS};
-use crate::runtime::{StopFlag, written};
-use crate::standard_error::say;
+use super::frame::Frame;
+use crate::link::{Bequest, Cable, Guardian, Heard, Link, Lost, PERSON_MS};
+use crate::runtime::written;
 
 /// Period of the heartbeat: a fifth of what the guardian tolerates.
-const ALIVE_EVERY: Duration = Duration::from_millis(100);
+const ALIVE_EVERY: TimeSpan = TimeSpan::from_ms(100);
 /// A guardian that leaves a heartbeat unanswered for this time hangs. More than it allows its child, because its answer waits for what
 /// it writes to the line; less than a second less the time that opening the line takes (requirement).
-const UNANSWERED: Duration = Duration::from_millis(700);
+const UNANSWERED: TimeSpan = TimeSpan::from_ms(700);
 /// A guardian opens a line within this time, or hangs: connecting and agreeing on a protocol have 2 s each at most.
-const OPENED_WITHIN: Duration = Duration::from_secs(5);
+const OPENED_WITHIN: TimeSpan = TimeSpan::from_ms(5_000);
 /// After this time between two looks, this process itself was suspended, and perhaps its guardian with it.
-const SUSPENDED: Duration = Duration::from_millis(300);
+const SUSPENDED: TimeSpan = TimeSpan::from_ms(300);
 
-/// A line that a guardian holds.
-pub(crate) struct WardLink {
-    cable: Cable,
-    frames: FrameReader,
-    guardian: FrameWriter,
-    /// Bytes of the last frame that were not returned yet.
-    bytes: VecDeque<u8>,
-    cts: Option<bool>,
-    stopwatch: Stopwatch,
-    /// Time since the last frame to the guardian.
-    spoken: Stopwatch,
-    /// Time since the first heartbeat that is not answered yet.
-    asked: Option<Stopwatch>,
-    /// Time since this process looked for an answer.
-    looked: Stopwatch,
-    runs: bool,
-    is_orphan: bool,
-    /// The line, which this process opens itself after the guardian's death.
-    own: Option<CableLink>,
-}
+/// A connection to a guardian, with a clock beside it.
+pub(crate) trait Connection {
+    /// Real time, since some moment before.
+    fn now(&self) -> Timestamp;
 
-impl WardLink {
-    /// Asks the guardian to open the line; `None` without a guardian.
+    /// Lets so much of it pass.
+    fn pause(&mut self, span: Duration) {
+        std::thread::sleep(span);
+    }
+
+    /// For how long at most a person waits for an answer of the program.
+    fn patience(&self) -> TimeSpan {
+        TimeSpan::from_s(1e-3 * PERSON_MS)
+    }
+
+    /// # Errors
+    /// The guardian is dead, or the frame is too long.
+    fn send(&mut self, frame: Frame<'_>) -> IoResult<()>;
+
+    /// Returns the next frame of the guardian; `None` after `within`.
+    ///
+    /// # Errors
+    /// The guardian is dead, or sent what is no frame.
+    fn receive(&mut self, within: TimeSpan) -> IoResult<Option<Frame<'_>>>;
+
+    /// Ends the guardian if it is still there, and waits until it has left the line.
+    fn end_guardian(&mut self);
+
+    /// Opens the line in this process, for a program that then stops all trains and ends.
     ///
     /// # Errors
     /// The line cannot be opened.
-    pub(crate) fn open(cable: &Cable) -> Result<Option<Self>, Lost> {
-        let unreached = |error| Lost(format!("cannot reach the guardian: {error}"));
-        let Some(stream) = connection().map_err(unreached)? else { return Ok(None) };
-        Self::over(stream.try_clone().map_err(unreached)?, stream, cable.clone()).map(Some)
-    }
+    fn open_line(&mut self) -> Result<(), Lost>;
 
-    /// The same over both ends of a connection to a guardian.
-    pub(super) fn over(reads: UnixStream, writes: UnixStream, cable: Cable) -> Result<Self, Lost> {
+    /// The line that this process has opened.
+    fn own_line(&self) -> Option<&dyn Link>;
+    fn own_line_mut(&mut self) -> Option<&mut dyn Link>;
+
+    /// Says something to people.
+    fn say(&mut self, words: &str);
+}
+
+/// A line that a guardian holds.
+pub(crate) struct WardLink<C> {
+    connection: C,
+    cable: Cable,
+    /// Bytes of the last frame that were not returned yet.
+    bytes: VecDeque<u8>,
+    cts: Option<bool>,
+    /// Why the line is not open.
+    lost: Option<Lost>,
+    /// Where the time of this link begins.
+    began: Timestamp,
+    /// Time of the last frame to the guardian.
+    spoken: Timestamp,
+    /// Time of the first heartbeat that is not answered yet.
+    asked: Option<Timestamp>,
+    /// When this process looked for an answer.
+    looked: Timestamp,
+    runs: bool,
+    is_orphan: bool,
+}
+
+impl<C: Connection> WardLink<C> {
+    /// Asks the guardian at the other end of a connection to open the line.
+    ///
+    /// # Errors
+    /// The line cannot be opened.
+    pub(crate) fn over(connection: C, cable: Cable) -> Result<Self, Lost> {
+        let now = connection.now();
         let mut link = Self {
+            connection,
             cable,
-            frames: FrameReader::new(reads),
-            guardian: FrameWriter::new(writes),
             bytes: VecDeque::new(),
             cts: None,
-            stopwatch: Stopwatch::start(),
-            spoken: Stopwatch::start(),
+            lost: None,
+            began: Timestamp::ZERO,
+            spoken: now,
             asked: None,
-            looked: Stopwatch::start(),
+            looked: now,
             runs: false,
             is_orphan: false,
-            own: None,
         };
         link.have_opened()?;
-        link.stopwatch = Stopwatch::start();
         Ok(link)
     }
 
-    fn tell(&mut self, kind: Kind, bytes: &[u8]) -> Result<(), Lost> {
+    /// Begins the time of this link.
+    pub(super) fn begin(&mut self) {
+        self.began = self.connection.now();
+    }
+
+    pub(crate) const fn connection_mut(&mut self) -> &mut C {
+        &mut self.connection
+    }
+
+    fn tell(&mut self, frame: Frame<'_>) -> Result<(), Lost> {
         if self.is_orphan {
             return Err(self.orphaned());
         }
-        self.spoken = Stopwatch::start();
-        if kind == Kind::Alive {
-            self.asked.get_or_insert_with(Stopwatch::start);
+        self.spoken = self.connection.now();
+        if let Frame::Alive { .. } = frame {
+            self.asked.get_or_insert(self.spoken);
         }
-        self.guardian.send(kind, bytes).map_err(|error| self.bereft(&error))
+        self.connection.send(frame).map_err(|error| self.bereft(&error))
     }
 
-    fn bereft(&mut self, error: &std::io::Error) -> Lost {
+    fn bereft(&mut self, error: &IoError) -> Lost {
         if error.kind() == ErrorKind::InvalidInput {
             return Lost("so much cannot be said to a guardian at once".to_owned());
         }
@@ -96,23 +135,29 @@ impl WardLink {
     }
 
     /// Ends a guardian that answers nothing, so that this process can open the line itself.
-    fn silent(&mut self, waited: Duration) -> Lost {
-        say!("the guardian has answered nothing for {} ms; it is ended", waited.as_millis());
+    fn silent(&mut self, waited: TimeSpan) -> Lost {
+        let words = format!("the guardian has answered nothing for {:.0} ms; it is ended", waited.as_ms());
+        self.connection.say(&words);
         self.without_guardian()
     }
 
     fn without_guardian(&mut self) -> Lost {
         self.is_orphan = true;
-        end_guardian();
+        self.connection.end_guardian();
         self.orphaned()
     }
 
     /// Notes that this process looks for an answer. If it was suspended, its guardian has its whole time again.
     fn look(&mut self) {
-        if self.looked.elapsed() > SUSPENDED {
-            self.asked = self.asked.as_ref().map(|_| Stopwatch::start());
+        let now = self.connection.now();
+        if now - self.looked > SUSPENDED {
+            self.asked = self.asked.map(|_| now);
         }
-        self.looked = Stopwatch::start();
+        self.looked = now;
+    }
+
+    fn is_unanswered(&self) -> bool {
+        self.asked.is_some_and(|asked| self.connection.now() - asked >= UNANSWERED)
     }
 
     fn orphaned(&self) -> Lost {
@@ -121,89 +166,97 @@ impl WardLink {
 
     /// Asks the guardian to open the line and waits for the answer.
     fn have_opened(&mut self) -> Result<(), Lost> {
-        self.tell(Kind::Open, &[])?;
+        self.tell(Frame::Open)?;
         self.bytes.clear();
-        let watch = Stopwatch::start();
+        let until = self.connection.now() + OPENED_WITHIN;
         loop {
-            let answer = match self.frames.next(Some(OPENED_WITHIN.saturating_sub(watch.elapsed()))) {
-                Ok(None) if watch.elapsed() >= OPENED_WITHIN => return Err(self.silent(OPENED_WITHIN)),
-                Ok(Some((Kind::Opened, payload))) => Ok(payload.first().copied().and_then(cts_of)),
-                Ok(Some((Kind::Lost, why))) => Err(Lost(String::from_utf8_lossy(why).into_owned())),
-                // Arrivals of an earlier opening.
+            let left = (until - self.connection.now()).max(TimeSpan::ZERO);
+            let answer = match self.connection.receive(left) {
+                Ok(None) if left == TimeSpan::ZERO => return Err(self.silent(OPENED_WITHIN)),
+                Ok(Some(Frame::Opened { cts })) => Ok(cts),
+                Ok(Some(Frame::NotOpened(why))) => Err(Lost(why.to_owned())),
+                // What was sent of an earlier opening.
                 Ok(_) => continue,
                 Err(error) => return Err(self.bereft(&error)),
             };
             // While it opened the line, it answered no heartbeat.
-            (self.spoken, self.asked) = (Stopwatch::start(), None);
+            (self.spoken, self.asked) = (self.connection.now(), None);
+            self.lost = answer.as_ref().err().cloned();
             self.cts = answer?;
             return Ok(());
         }
     }
 
     /// What comes first within a time.
-    fn hear(&mut self, within: Duration) -> IoResult<Heard> {
-        Ok(match self.frames.next(Some(within))? {
-            Some((Kind::Heard, bytes)) => {
+    fn hear(&mut self, within: TimeSpan) -> IoResult<Heard> {
+        Ok(match self.connection.receive(within)? {
+            Some(Frame::Heard(bytes)) => {
                 if self.cable.has_datagrams() {
                     return Ok(Heard::Datagram(bytes.to_vec()));
                 }
                 self.bytes.extend(bytes);
                 self.bytes.pop_front().map_or(Heard::Nothing, Heard::Byte)
             }
-            Some((Kind::Cts, up)) => {
-                let up = up == [1];
+            Some(Frame::Cts(up)) => {
                 self.cts = Some(up);
                 Heard::Cts(up)
             }
-            Some((Kind::Lost, why)) => Heard::Lost(Lost(String::from_utf8_lossy(why).into_owned())),
-            Some((Kind::Here, _)) => {
+            Some(Frame::Lost(why)) => {
+                let lost = Lost(why.to_owned());
+                self.lost = Some(lost.clone());
+                Heard::Lost(lost)
+            }
+            Some(Frame::Here) => {
                 self.asked = None;
                 Heard::Nothing
             }
             _ => Heard::Nothing,
         })
     }
+
+    /// Until the next heartbeat.
+    fn beats_in(&self) -> TimeSpan {
+        (self.spoken + ALIVE_EVERY - self.connection.now()).max(TimeSpan::ZERO)
+    }
 }
 
-impl Link for WardLink {
+impl<C: Connection> Link for WardLink<C> {
     fn now(&self) -> Timestamp {
-        Timestamp::from_s(self.stopwatch.elapsed().as_secs_f64() * self.cable.speed())
+        let since = self.connection.now() - self.began;
+        Timestamp::from_s(since.as_s() * self.cable.speed())
     }
 
     fn write(&mut self, bytes: &[u8]) -> Result<(), Lost> {
-        match &mut self.own {
+        match self.connection.own_line_mut() {
             Some(own) => own.write(bytes),
-            None => self.tell(Kind::Write, bytes),
+            None => self.lost.clone().map_or_else(|| self.tell(Frame::Write(bytes)), Err),
         }
     }
 
     fn wait(&mut self, until: Timestamp) -> Heard {
-        if let Some(own) = &mut self.own {
+        let span = until - self.now();
+        if let Some(own) = self.connection.own_line_mut() {
             // The clock of the own line began later.
-            let span = until - Timestamp::from_s(self.stopwatch.elapsed().as_secs_f64() * self.cable.speed());
             let until = own.now() + span;
             return own.wait(until);
         }
         if let Some(byte) = self.bytes.pop_front() {
             return Heard::Byte(byte);
         }
+        if let Some(lost) = &self.lost {
+            return Heard::Lost(lost.clone());
+        }
         loop {
-            let due = ALIVE_EVERY.saturating_sub(self.spoken.elapsed());
-            if due.is_zero()
-                && let Err(lost) = self.tell(Kind::Alive, &[self.runs.into()])
+            if self.beats_in() == TimeSpan::ZERO
+                && let Err(lost) = self.tell(Frame::Alive { runs: self.runs })
             {
                 return Heard::Lost(lost);
             }
-            let left_s = ((until - self.now()).as_s() / self.cable.speed()).max(0.0);
-            let due = ALIVE_EVERY.saturating_sub(self.spoken.elapsed());
+            let left = TimeSpan::from_s(((until - self.now()).as_s() / self.cable.speed()).max(0.0));
             self.look();
-            match self.hear(Duration::from_secs_f64(left_s).min(due)) {
-                Ok(Heard::Nothing)
-                    if self.asked.as_ref().is_some_and(|asked| asked.elapsed() >= UNANSWERED) =>
-                {
-                    return Heard::Lost(self.silent(UNANSWERED));
-                }
-                Ok(Heard::Nothing) if left_s > 0.0 => {}
+            match self.hear(left.min(self.beats_in())) {
+                Ok(Heard::Nothing) if self.is_unanswered() => return Heard::Lost(self.silent(UNANSWERED)),
+                Ok(Heard::Nothing) if self.now() < until => {}
                 Ok(heard) => return heard,
                 Err(error) => return Heard::Lost(self.bereft(&error)),
             }
@@ -211,28 +264,31 @@ impl Link for WardLink {
     }
 
     fn cts(&self) -> Option<bool> {
-        self.own.as_ref().map_or(self.cts, Link::cts)
+        self.connection.own_line().map_or(self.cts, Link::cts)
     }
 
     fn patience(&self) -> TimeSpan {
-        TimeSpan::from_s(PERSON_MS * 1e-3 * self.cable.speed())
+        TimeSpan::from_s(self.connection.patience().as_s() * self.cable.speed())
     }
 
     fn real_time(&self) -> Duration {
-        self.stopwatch.elapsed()
+        Duration::from_secs_f64((self.connection.now() - Timestamp::ZERO).as_s())
+    }
+
+    fn pause(&mut self, span: Duration) {
+        self.connection.pause(span);
     }
 
     fn reopen(&mut self) -> Result<(), Lost> {
-        if let Some(own) = &mut self.own {
+        if let Some(own) = self.connection.own_line_mut() {
             return own.reopen();
         }
         if !self.is_orphan {
             return self.have_opened();
         }
         // No train runs without a guardian: open the line to stop them.
-        self.own = Some(CableLink::open(self.cable.clone())?);
-        StopFlag::raise();
-        say!("without a guardian all trains are stopped, and the program ends");
+        self.connection.open_line()?;
+        self.connection.say("without a guardian all trains are stopped, and the program ends");
         Ok(())
     }
 
@@ -245,18 +301,18 @@ impl Link for WardLink {
     }
 }
 
-impl Guardian for WardLink {
+impl<C: Connection> Guardian for WardLink<C> {
     fn bequeath(&mut self, will: &[Bequest]) -> Result<(), Lost> {
-        self.tell(Kind::Will, &written(will, self.cable.speed()))
+        self.tell(Frame::Will(&written(will, self.cable.speed())))
     }
 
     fn note_running(&mut self, runs: bool) -> Result<(), Lost> {
         self.runs = runs;
-        self.tell(Kind::Alive, &[runs.into()])
+        self.tell(Frame::Alive { runs })
     }
 
     fn say_goodbye(&mut self) -> Result<(), Lost> {
         self.runs = false;
-        self.tell(Kind::Goodbye, &[])
+        self.tell(Frame::Goodbye)
     }
 }

@@ -11,7 +11,7 @@ use super::station_address::{StationAddress, StationSettings};
 use super::station_kind::StationKind;
 use super::{Cable, CableLink, Link, Lost, SimulatedLink, SimulatedStation};
 #[cfg(unix)]
-use crate::guardian::WardLink;
+use crate::guardian::WardConnection;
 
 /// How late a byte may come because this computer, an adapter or a network was busy; FTDI's adapters hand over every
 /// 16 ms unless set otherwise.
@@ -35,7 +35,7 @@ pub(crate) fn open<'l>(
 /// Opens a line outside this process, or has this program's guardian open it.
 pub(crate) fn open_cable(cable: Cable) -> Result<Box<dyn Link>, Lost> {
     #[cfg(unix)]
-    if let Some(link) = WardLink::open(&cable)? {
+    if let Some(link) = WardConnection::open(&cable)? {
         return Ok(Box::new(link));
     }
     Ok(Box::new(CableLink::open(cable)?))

@@ -17,7 +17,7 @@ use self::shares::{Bound, Share};
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
 use crate::chaos::{
-    FOUR_STATIONS_UNTIL, FailureKind, Fate, Promises, STORIES_A_STAGE, Selection, Stage, story,
+    FailureKind, Fate, NO_GUARDIAN_HANGS_UNTIL, Promises, STORIES_A_STAGE, Selection, Stage, story,
 };
 use crate::spread::each;
 use crate::standard_error::say;
@@ -104,7 +104,7 @@ impl Arguments {
 }
 
 fn seeds(text: &str) -> anyhow::Result<Seeds> {
-    Ok(Seeds::parse_in_rows(text, STORIES_A_STAGE)?.fresh_above(FOUR_STATIONS_UNTIL))
+    Ok(Seeds::parse_in_rows(text, STORIES_A_STAGE)?.fresh_above(NO_GUARDIAN_HANGS_UNTIL))
 }
 
 /// Tells the story of a seed, with all of its troubles or only some.
