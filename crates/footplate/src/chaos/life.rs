@@ -23,7 +23,7 @@ pub(super) enum Death {
 #[derive(Debug)]
 pub(super) struct Life {
     steps: Cell<u64>,
-    ends: Option<(u64, Death)>,
+    ends: Cell<Option<(u64, Death)>>,
     died: Cell<Option<Death>>,
     /// Whether the program has no guardian any more, and ends.
     is_orphan: Cell<bool>,
@@ -32,17 +32,27 @@ pub(super) struct Life {
 impl Life {
     /// A life that ends at a step, if it reaches it.
     pub(super) const fn new(ends: Option<(u64, Death)>) -> Self {
-        Self { steps: Cell::new(0), ends, died: Cell::new(None), is_orphan: Cell::new(false) }
+        Self {
+            steps: Cell::new(0),
+            ends: Cell::new(ends),
+            died: Cell::new(None),
+            is_orphan: Cell::new(false),
+        }
     }
 
     /// Counts a step before it is taken. Returns whether the program is still alive to take it.
     pub(super) fn step(&self) -> bool {
         let step = self.steps.get() + 1;
         self.steps.set(step);
-        if let Some((_, death)) = self.ends.filter(|(at, _)| *at == step) {
+        if let Some((_, death)) = self.ends.get().filter(|(at, _)| *at == step) {
             self.died.set(Some(death));
         }
         !self.is_over()
+    }
+
+    /// The program begins to end in order, and dies so many steps later.
+    pub(super) fn ends_during_farewell(&self, (steps, death): (u64, Death)) {
+        self.ends.set(Some((self.steps.get() + steps, death)));
     }
 
     /// Whether the program is dead. One whose guardian fails still stops its trains.

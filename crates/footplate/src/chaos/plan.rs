@@ -20,10 +20,12 @@ const TROUBLES_WITHIN: f64 = 0.8;
 const STEPS_PER_S: f64 = 100.0;
 /// How long a guardian hangs that goes on afterwards (s): around the 0.7 s after which the program ends it.
 const GUARDIAN_HANGS_S: [f64; 2] = [0.01, 1.0];
+/// Steps of an orderly end, at most: some end after three, some after a hundred.
+const FAREWELL_STEPS: usize = 40;
 const MOST_TROUBLES: usize = 5;
 /// Seeds below this one draw one of the first four stations, so that the stories of seeds that failed once stay what they are.
 const FOUR_STATIONS_UNTIL: u64 = 20_000_000;
-/// Seeds below this one draw no guardian that hangs, for the same reason.
+/// Seeds below this one draw no guardian that hangs, and no death while the last life ends, for the same reason.
 pub(crate) const NO_GUARDIAN_HANGS_UNTIL: u64 = 70_000_000;
 const STATIONS: [StationKind; 6] = [
     StationKind::Marklin,
@@ -72,6 +74,8 @@ pub(super) struct Planned {
 pub(super) struct PlannedLife {
     pub(super) lasts: TimeSpan,
     pub(super) ends: Option<(u64, Death)>,
+    /// Whether the step at which it ends is counted from its orderly end.
+    pub(super) ends_in_farewell: bool,
     pub(super) troubles: Vec<Planned>,
     pub(super) if_unkept: IfUnkept,
 }
@@ -90,7 +94,7 @@ impl Plan {
         let count = 1 + below(choice, MOST_LIVES);
         let mut lives: Vec<_> = (1..=count).map(|nth| PlannedLife::draw(choice, nth == count)).collect();
         if seed >= NO_GUARDIAN_HANGS_UNTIL {
-            lives.iter_mut().for_each(|life| life.let_guardian_hang(choice));
+            lives.iter_mut().for_each(|life| life.draw_guardian(choice));
         }
         Self { station, lives }
     }
@@ -99,8 +103,10 @@ impl Plan {
     pub(super) fn troubles(&self) -> Vec<String> {
         let of_life = |(nth, life): (usize, &PlannedLife)| {
             let mut troubles: Vec<String> = life.troubles.iter().map(|one| one.in_words(nth)).collect();
-            troubles
-                .extend(life.ends.map(|(step, death)| format!("life {nth} ends at step {step}: {death:?}")));
+            let of = if life.ends_in_farewell { " of its farewell" } else { "" };
+            troubles.extend(
+                life.ends.map(|(step, death)| format!("life {nth} ends at step {step}{of}: {death:?}")),
+            );
             troubles
         };
         (1..).zip(&self.lives).flat_map(of_life).collect()
@@ -136,13 +142,13 @@ impl PlannedLife {
         let ends = (!is_last).then_some((dies_at, death));
         let if_unkept = if below(choice, 2) == 0 { IfUnkept::Stop } else { IfUnkept::GoOn };
         let lasts_s = if is_last { lasts_s + LAST_LIFE_S } else { lasts_s };
-        Self { lasts: TimeSpan::from_s(lasts_s), ends, troubles, if_unkept }
+        Self { lasts: TimeSpan::from_s(lasts_s), ends, ends_in_farewell: false, troubles, if_unkept }
     }
 }
 
 impl PlannedLife {
-    /// Half of the time it is the guardian that hangs, and a guardian that is killed hangs.
-    fn let_guardian_hang(&mut self, choice: &mut Choice) {
+    /// Half of the time it is the guardian that hangs, a guardian that is killed hangs, and a process fails while the last life ends.
+    fn draw_guardian(&mut self, choice: &mut Choice) {
         for Planned { trouble, spell } in &mut self.troubles {
             if *trouble == Trouble::Hang && below(choice, 2) == 0 {
                 let lasts = TimeSpan::from_s(choice.between(GUARDIAN_HANGS_S[0], GUARDIAN_HANGS_S[1]));
@@ -153,6 +159,12 @@ impl PlannedLife {
             && below(choice, 2) == 0
         {
             *death = Death::GuardianHangs;
+        }
+        if self.ends.is_none() && below(choice, 2) == 0 {
+            let deaths = [Death::Killed, Death::Hangs, Death::GuardianKilled, Death::GuardianHangs];
+            let death = choice.of(&deaths).copied();
+            self.ends = death.map(|death| (1 + below(choice, FAREWELL_STEPS) as u64, death));
+            self.ends_in_farewell = true;
         }
     }
 }

@@ -293,11 +293,12 @@ impl<'l> Teller<'_, 'l> {
         self.check_turnouts();
         let incidents = self.station.borrow().world().incidents().len();
         self.fate.lives += 1;
-        let life = Rc::new(Life::new(planned.ends));
+        let life = Rc::new(Life::new(planned.ends.filter(|_| !planned.ends_in_farewell)));
         self.note(format!(
-            "a life of {:.0} s begins, which ends by {:?}",
+            "a life of {:.0} s begins, which ends by {:?}{}",
             planned.lasts.as_s(),
-            planned.ends
+            planned.ends,
+            if planned.ends_in_farewell { " of its farewell" } else { "" }
         ));
         let calendar = self.calendar();
         let disk = FaultyDisk::begin(
@@ -327,10 +328,17 @@ impl<'l> Teller<'_, 'l> {
         );
         let mut runtime = Runtime::new(&mut line, opened, Some(&mut recorder), None);
         let ended = runtime.run(&mut dispatcher, &mut people);
-        let began = self.station.borrow().now();
+        let mut died = self.station.borrow().now();
         disk.borrow_mut().close();
+        if let Some(ends) = planned.ends.filter(|_| planned.ends_in_farewell) {
+            life.ends_during_farewell(ends);
+        }
+        let was_over = life.is_over();
         // A living program stops its trains, whatever ended its loop.
         let closing = runtime.close();
+        if !was_over && life.is_over() {
+            died = self.station.borrow().now();
+        }
         drop(runtime);
         let (seen, trouble) = (std::mem::take(&mut people.seen), people.trouble.take());
         drop(people);
@@ -353,7 +361,7 @@ impl<'l> Teller<'_, 'l> {
         if let Some(wronged) = pair.wronged {
             self.fail(FailureKind::Wronged, wronged.to_owned());
         }
-        self.bury(death, began, closing.is_complete(), pair, disk)
+        self.bury(death, died, closing.is_complete(), pair, disk)
     }
 
     fn count(&mut self, mut seen: Seen) {

@@ -26,6 +26,11 @@ impl FrameWriter {
         frame.encode(&mut self.bytes)?;
         self.stream.write_all(&self.bytes)
     }
+
+    #[cfg(test)]
+    pub(super) fn stream(&self) -> UnixStream {
+        self.stream.try_clone().expect("a handle")
+    }
 }
 
 /// Reads frames.

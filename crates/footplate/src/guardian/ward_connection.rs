@@ -87,7 +87,7 @@ impl Connection for WardConnection {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::{Address, Heard};
+    use crate::link::{Address, Guardian, Heard};
 
     /// The line of a child whose guardian has said this, after it opened the line.
     fn guarded(frames: &[Frame<'_>]) -> (FrameWriter, WardLink<WardConnection>) {
@@ -120,5 +120,32 @@ mod tests {
         link.reopen().expect("the line is open, whatever was said of it before");
         link.write(b"stop").expect("the line is open");
         assert!(link.now() < until, "no wait was for nothing");
+    }
+    #[test]
+    fn a_guardian_is_released_once_it_has_taken_everything() {
+        let said_goodbye = |guardian: &FrameWriter| {
+            let mut frames = FrameReader::new(guardian.stream());
+            let mut letters = Vec::new();
+            while let Ok(Some(frame)) = frames.next(Some(TimeSpan::ZERO)) {
+                letters.push(format!("{frame:?}"));
+            }
+            letters
+        };
+        let alive = "Alive { runs: false }";
+        // One that answers,
+        let (guardian, mut link) = guarded(&[Frame::Heard(b"7"), Frame::Here]);
+        link.say_goodbye().expect("it answers");
+        assert_eq!(said_goodbye(&guardian), ["Open", alive, "Goodbye"]);
+        // one that could not write the last stops,
+        let (guardian, mut link) = guarded(&[Frame::Lost("it is gone"), Frame::Here]);
+        assert_eq!(link.say_goodbye().expect_err("the line is lost").0, "it is gone");
+        assert_eq!(said_goodbye(&guardian), ["Open", alive]);
+        // and one that hangs, which is ended; then the program opens the line itself.
+        let (guardian, mut link) = guarded(&[]);
+        let since = link.now();
+        assert!(link.say_goodbye().is_err() && Link::guardian(&mut link).is_none());
+        let waited = (link.now() - since).as_ms();
+        assert!((700.0..1_000.0).contains(&waited), "{waited}");
+        assert_eq!(said_goodbye(&guardian), ["Open", alive]);
     }
 }

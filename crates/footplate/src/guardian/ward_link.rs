@@ -75,7 +75,9 @@ pub(crate) struct WardLink<C> {
     began: Timestamp,
     /// Time of the last frame to the guardian.
     spoken: Timestamp,
-    /// Time of the first heartbeat that is not answered yet.
+    /// Heartbeats that are not answered yet.
+    unanswered: u32,
+    /// Since when the first of them is not.
     asked: Option<Timestamp>,
     /// When this process looked for an answer.
     looked: Timestamp,
@@ -98,6 +100,7 @@ impl<C: Connection> WardLink<C> {
             lost: None,
             began: Timestamp::ZERO,
             spoken: now,
+            unanswered: 0,
             asked: None,
             looked: now,
             runs: false,
@@ -122,6 +125,7 @@ impl<C: Connection> WardLink<C> {
         }
         self.spoken = self.connection.now();
         if let Frame::Alive { .. } = frame {
+            self.unanswered += 1;
             self.asked.get_or_insert(self.spoken);
         }
         self.connection.send(frame).map_err(|error| self.bereft(&error))
@@ -179,8 +183,8 @@ impl<C: Connection> WardLink<C> {
                 Ok(_) => continue,
                 Err(error) => return Err(self.bereft(&error)),
             };
-            // While it opened the line, it answered no heartbeat.
-            (self.spoken, self.asked) = (self.connection.now(), None);
+            // While it opened the line, it answered no heartbeat, and before that all of them.
+            (self.spoken, self.asked, self.unanswered) = (self.connection.now(), None, 0);
             self.lost = answer.as_ref().err().cloned();
             self.cts = answer?;
             return Ok(());
@@ -207,11 +211,27 @@ impl<C: Connection> WardLink<C> {
                 Heard::Lost(lost)
             }
             Some(Frame::Here) => {
-                self.asked = None;
+                self.unanswered = self.unanswered.saturating_sub(1);
+                self.asked = (self.unanswered > 0).then(|| self.connection.now());
                 Heard::Nothing
             }
             _ => Heard::Nothing,
         })
+    }
+
+    /// Waits until the guardian has taken everything that was sent to it.
+    fn await_answer(&mut self) -> Result<(), Lost> {
+        self.tell(Frame::Alive { runs: self.runs })?;
+        while let Some(asked) = self.asked {
+            self.look();
+            match self.hear((asked + UNANSWERED - self.connection.now()).max(TimeSpan::ZERO)) {
+                Ok(Heard::Lost(lost)) => return Err(lost),
+                Ok(_) if self.is_unanswered() => return Err(self.silent(UNANSWERED)),
+                Ok(_) => {}
+                Err(error) => return Err(self.bereft(&error)),
+            }
+        }
+        Ok(())
     }
 
     /// Until the next heartbeat.
@@ -312,6 +332,8 @@ impl<C: Connection> Guardian for WardLink<C> {
     }
 
     fn say_goodbye(&mut self) -> Result<(), Lost> {
+        // A guardian that hangs, or has lost the line, has not written the last stops.
+        self.await_answer()?;
         self.runs = false;
         self.tell(Frame::Goodbye)
     }

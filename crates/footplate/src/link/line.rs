@@ -59,6 +59,9 @@ pub(crate) trait Guardian {
     fn note_running(&mut self, runs: bool) -> Result<(), Lost>;
 
     /// All is said: there is nothing left to stop.
+    ///
+    /// # Errors
+    /// The guardian has not put on the line all that was said: the stops must be said again.
     fn say_goodbye(&mut self) -> Result<(), Lost>;
 }
 

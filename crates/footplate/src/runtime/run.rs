@@ -320,14 +320,26 @@ impl<'r, L: Link> Runtime<'r, L> {
         if !self.is_closed {
             self.is_closed = true;
             self.say_goodbye();
-            if self.session.closing().is_complete()
-                && let Some(guardian) = self.link.guardian()
-                && let Err(lost) = guardian.say_goodbye()
-            {
-                say!("{lost}");
+            if let Err(lost) = self.release_guardian() {
+                say!("{lost}; the stops are sent again");
+                if self.link.reopen().is_ok() {
+                    self.session.handle_reopened(self.link.now());
+                    self.say_goodbye();
+                    if let Err(lost) = self.release_guardian() {
+                        say!("{lost}");
+                    }
+                }
             }
         }
         self.session.closing()
+    }
+
+    /// Lets the guardian know that no train is left to stop.
+    fn release_guardian(&mut self) -> Result<(), Lost> {
+        match self.link.guardian() {
+            Some(guardian) if self.session.closing().is_complete() => guardian.say_goodbye(),
+            _ => Ok(()),
+        }
     }
 
     fn say_goodbye(&mut self) {
