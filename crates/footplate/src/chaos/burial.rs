@@ -57,7 +57,10 @@ impl<'l> Teller<'_, 'l> {
                 let failed = [cuts, pair.without_guardian.clone()].concat();
                 self.judge_stop(died, stopped_at, failed, allowed, &format!("said: {}", burial.is_said));
             }
-            (None, Guardian::Runs) => {}
+            (None, Guardian::Runs) if pair.line.all_stopped() || pair.line.is_unreachable() => {}
+            (None, Guardian::Runs) => {
+                self.fail(FailureKind::RanOn, "trains run, and their guardian does nothing".to_owned());
+            }
             (None, Guardian::Dead { .. } | Guardian::Hangs { .. })
                 if matches!(death, Some(Death::Killed | Death::Hangs)) =>
             {

@@ -242,8 +242,9 @@ impl<'l> Pair<'l> {
             self.monitor.dealt(now);
         }
         if self.monitor.is_late() && !self.life.is_over() {
-            if !self.is_hanging {
-                self.wronged = Some("the guardian ended a program that did not hang");
+            if !self.is_hanging || !self.said_running {
+                self.wronged =
+                    Some("the guardian ended a program that did not hang, or whose trains did not run");
             }
             self.life.end(Death::Hangs);
         }

@@ -148,4 +148,18 @@ mod tests {
         assert!((700.0..1_000.0).contains(&waited), "{waited}");
         assert_eq!(said_goodbye(&guardian), ["Open", alive]);
     }
+    #[test]
+    fn a_program_that_always_writes_notices_a_guardian_that_hangs() {
+        let (_guardian, mut link) = guarded(&[]);
+        let since = link.now();
+        // A 6051 is polled every 65 ms; here more often than heartbeats come.
+        let noticed = (1..100).find_map(|poll| {
+            link.write(&[0x85]).err().or_else(|| match link.wait(since + TimeSpan::from_ms(20 * poll)) {
+                Heard::Lost(lost) => Some(lost),
+                _ => None,
+            })
+        });
+        let waited = (link.now() - since).as_ms();
+        assert!(noticed.is_some() && (800.0..1_100.0).contains(&waited), "{waited}: {noticed:?}");
+    }
 }

@@ -73,8 +73,8 @@ pub(crate) struct WardLink<C> {
     lost: Option<Lost>,
     /// Where the time of this link begins.
     began: Timestamp,
-    /// Time of the last frame to the guardian.
-    spoken: Timestamp,
+    /// Time of the last heartbeat. A program that always writes sends it, too: only its answer shows that the guardian lives.
+    beat: Timestamp,
     /// Heartbeats that are not answered yet.
     unanswered: u32,
     /// Since when the first of them is not.
@@ -99,7 +99,7 @@ impl<C: Connection> WardLink<C> {
             cts: None,
             lost: None,
             began: Timestamp::ZERO,
-            spoken: now,
+            beat: now,
             unanswered: 0,
             asked: None,
             looked: now,
@@ -123,10 +123,10 @@ impl<C: Connection> WardLink<C> {
         if self.is_orphan {
             return Err(self.orphaned());
         }
-        self.spoken = self.connection.now();
         if let Frame::Alive { .. } = frame {
+            self.beat = self.connection.now();
             self.unanswered += 1;
-            self.asked.get_or_insert(self.spoken);
+            self.asked.get_or_insert(self.beat);
         }
         self.connection.send(frame).map_err(|error| self.bereft(&error))
     }
@@ -184,7 +184,7 @@ impl<C: Connection> WardLink<C> {
                 Err(error) => return Err(self.bereft(&error)),
             };
             // While it opened the line, it answered no heartbeat, and before that all of them.
-            (self.spoken, self.asked, self.unanswered) = (self.connection.now(), None, 0);
+            (self.beat, self.asked, self.unanswered) = (self.connection.now(), None, 0);
             self.lost = answer.as_ref().err().cloned();
             self.cts = answer?;
             return Ok(());
@@ -236,7 +236,7 @@ impl<C: Connection> WardLink<C> {
 
     /// Until the next heartbeat.
     fn beats_in(&self) -> TimeSpan {
-        (self.spoken + ALIVE_EVERY - self.connection.now()).max(TimeSpan::ZERO)
+        (self.beat + ALIVE_EVERY - self.connection.now()).max(TimeSpan::ZERO)
     }
 }
 

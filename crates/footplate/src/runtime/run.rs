@@ -47,6 +47,8 @@ pub(crate) struct Runtime<'r, L: Link> {
     /// Whether the station has answered since the line was opened last.
     has_answered: bool,
     is_closed: bool,
+    /// The session as it was when its end began, where a guardian writes what it says.
+    before_farewell: Option<Box<dyn Session>>,
 }
 
 /// What interrupts a turn of the loop.
@@ -82,6 +84,7 @@ impl<'r, L: Link> Runtime<'r, L> {
             reopened: 0,
             has_answered: false,
             is_closed: false,
+            before_farewell: None,
         }
     }
 
@@ -302,11 +305,7 @@ impl<'r, L: Link> Runtime<'r, L> {
         while self.link.real_time() - began < REOPEN_WITHIN && !self.stop.is_some_and(StopFlag::is_up) {
             self.link.pause(REOPEN_EVERY);
             if self.link.reopen().is_ok() {
-                let now = self.link.now();
-                self.session.handle_reopened(now);
-                if let Some(up) = self.link.cts() {
-                    self.session.handle_cts(now, up);
-                }
+                let now = self.reopened();
                 attendant.hear_of_line(now, &LinkNotice::Reopened);
                 return Ok(());
             }
@@ -319,11 +318,12 @@ impl<'r, L: Link> Runtime<'r, L> {
     pub(crate) fn close(&mut self) -> Closing {
         if !self.is_closed {
             self.is_closed = true;
+            self.before_farewell = self.link.guardian().is_some().then(|| self.session.copied());
             self.say_goodbye();
             if let Err(lost) = self.release_guardian() {
                 say!("{lost}; the stops are sent again");
                 if self.link.reopen().is_ok() {
-                    self.session.handle_reopened(self.link.now());
+                    self.reopened_in_farewell();
                     self.say_goodbye();
                     if let Err(lost) = self.release_guardian() {
                         say!("{lost}");
@@ -342,6 +342,25 @@ impl<'r, L: Link> Runtime<'r, L> {
         }
     }
 
+    /// The line is open again. What was given to a guardian that failed or lost it may not have been written: all is said again.
+    fn reopened_in_farewell(&mut self) {
+        if let Some(mut before) = self.before_farewell.take() {
+            while before.poll_output().is_some() {}
+            self.session = before;
+        }
+        let now = self.reopened();
+        self.session.close(now);
+    }
+
+    fn reopened(&mut self) -> Timestamp {
+        let now = self.link.now();
+        self.session.handle_reopened(now);
+        if let Some(up) = self.link.cts() {
+            self.session.handle_cts(now, up);
+        }
+        now
+    }
+
     fn say_goodbye(&mut self) {
         let (began, since) = (self.link.now(), self.link.real_time());
         self.session.close(began);
@@ -352,7 +371,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                 if std::mem::replace(&mut has_reopened, true) || self.link.reopen().is_err() {
                     return;
                 }
-                self.session.handle_reopened(self.link.now());
+                self.reopened_in_farewell();
                 continue;
             }
             // The last commands belong to the record, but a failing record must not keep a train running.
@@ -380,7 +399,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                 Heard::Lost(_) if has_reopened || self.link.reopen().is_err() => return,
                 Heard::Lost(_) => {
                     has_reopened = true;
-                    self.session.handle_reopened(self.link.now());
+                    self.reopened_in_farewell();
                 }
             }
         }

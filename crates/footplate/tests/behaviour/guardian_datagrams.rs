@@ -20,12 +20,46 @@ use crate::station::Standing;
 
 const EVERY: Duration = Duration::from_millis(5);
 
-/// What a datagram commands.
+/// What a message to a station commands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Said {
+pub(crate) enum Said {
     Run,
     Stop,
     PowerOff,
+}
+
+/// What was commanded at the station's end of the line, and when.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Commanded(Arc<Mutex<Vec<(Instant, Said)>>>);
+
+impl Commanded {
+    pub(crate) fn push(&self, said: Said) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push((Instant::now(), said));
+    }
+
+    fn time_of(&self, what: &[Said], since: Instant) -> Option<Instant> {
+        let said = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        said.iter().find(|(at, said)| *at >= since && what.contains(said)).map(|(at, _)| *at)
+    }
+
+    pub(crate) fn delay_of(&self, what: &[Said], since: Instant) -> Duration {
+        while since.elapsed() < PATIENCE {
+            if let Some(at) = self.time_of(what, since) {
+                return at - since;
+            }
+            thread::sleep(EVERY);
+        }
+        panic!("{what:?} was not commanded: {self:?}")
+    }
+
+    /// Asserts that the train is stopped in time, and the power switched off.
+    pub(crate) fn stopped(&self, since: Instant, how: &str) {
+        // A station that has to be asked for a train first switches the power off at once.
+        let stop = self.delay_of(&[Said::Stop, Said::PowerOff], since);
+        let off = self.delay_of(&[Said::PowerOff], since);
+        println!("{how}: the stop was on the line after {stop:.1?}, power off after {off:.1?}");
+        assert!(stop < WITHIN, "{how}: {stop:?}");
+    }
 }
 
 fn said_to_z21(datagram: &[u8]) -> Option<Said> {
@@ -55,7 +89,7 @@ fn said_to_central_station(datagram: &[u8]) -> Option<Said> {
 /// A network between the program and a station, which can be cut.
 struct Network {
     place: SocketAddr,
-    said: Arc<Mutex<Vec<(Instant, Said)>>>,
+    commanded: Commanded,
     is_cut: Arc<AtomicBool>,
 }
 
@@ -66,7 +100,7 @@ impl Network {
         towards.connect(station).expect("the station");
         let network = Self {
             place: program.local_addr().expect("an address"),
-            said: Arc::default(),
+            commanded: Commanded::default(),
             is_cut: Arc::default(),
         };
         let last = Arc::<Mutex<Option<SocketAddr>>>::default();
@@ -85,7 +119,7 @@ impl Network {
                 }
             }
         });
-        let (said, is_cut) = (Arc::clone(&network.said), Arc::clone(&network.is_cut));
+        let (commanded, is_cut) = (network.commanded.clone(), Arc::clone(&network.is_cut));
         thread::spawn(move || {
             let mut bytes = [0; 2000];
             while let Ok((count, from)) = program.recv_from(&mut bytes) {
@@ -94,27 +128,12 @@ impl Network {
                 }
                 *last.lock().unwrap_or_else(PoisonError::into_inner) = Some(from);
                 if let Some(what) = meaning(&bytes[..count]) {
-                    said.lock().unwrap_or_else(PoisonError::into_inner).push((Instant::now(), what));
+                    commanded.push(what);
                 }
                 let _ = towards.send(&bytes[..count]);
             }
         });
         network
-    }
-
-    fn time_of(&self, what: Said, since: Instant) -> Option<Instant> {
-        let said = self.said.lock().unwrap_or_else(PoisonError::into_inner);
-        said.iter().find(|(at, said)| *at >= since && *said == what).map(|(at, _)| *at)
-    }
-
-    fn delay_of(&self, what: Said, since: Instant) -> Duration {
-        while since.elapsed() < PATIENCE {
-            if let Some(at) = self.time_of(what, since) {
-                return at - since;
-            }
-            thread::sleep(EVERY);
-        }
-        panic!("{what:?} was not commanded: {:?}", self.said.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
@@ -141,16 +160,8 @@ fn running((name, link, begins, meaning): Kind, how: &str) -> (Standing, Network
     let driven = Driven::over(&link, &folder.join("railway.db"), &[]);
     let began = Instant::now();
     driven.order("speed 24 8");
-    network.delay_of(Said::Run, began);
+    network.commanded.delay_of(&[Said::Run], began);
     (station, network, driven)
-}
-
-/// Asserts that the train is stopped in time, and the power switched off.
-fn stopped(network: &Network, since: Instant, how: &str) {
-    let stop = network.delay_of(Said::Stop, since);
-    let off = network.delay_of(Said::PowerOff, since);
-    println!("{how}: the stop was on the line after {stop:.1?}, power off after {off:.1?}");
-    assert!(stop < WITHIN, "{how}: {stop:?}");
 }
 
 #[test]
@@ -160,7 +171,7 @@ fn every_death_stops_the_trains_over_datagrams() {
             let (_station, network, mut driven) = running(kind, death);
             let since = Instant::now();
             signal(death, driven.child());
-            stopped(&network, since, &format!("{} {death}", kind.0));
+            network.commanded.stopped(since, &format!("{} {death}", kind.0));
             assert!(driven.status().is_some_and(|status| status >= 128), "{}", driven.errors());
             driven.await_errors("all trains are commanded to stop");
         }
@@ -173,7 +184,7 @@ fn the_death_of_the_guardian_stops_the_trains_over_datagrams() {
         let (_station, network, mut driven) = running(kind, "guardian");
         let since = Instant::now();
         signal("KILL", driven.guardian());
-        stopped(&network, since, &format!("{}, guardian killed", kind.0));
+        network.commanded.stopped(since, &format!("{}, guardian killed", kind.0));
         driven.await_errors("without a guardian all trains are stopped");
         driven.status();
     }
@@ -188,7 +199,7 @@ fn a_network_that_was_cut_carries_the_stops_over_datagrams_once_it_is_back() {
         driven.await_errors("trying for ever");
         let back = Instant::now();
         network.is_cut.store(false, Ordering::Release);
-        let stop = network.delay_of(Said::Stop, back);
+        let stop = network.commanded.delay_of(&[Said::Stop], back);
         println!("{}: the stop was on the line {stop:.1?} after the network was back", kind.0);
         // The stops are repeated every two seconds or so: a datagram does not tell that it was lost.
         assert!(stop < 3 * WITHIN, "{stop:?}");

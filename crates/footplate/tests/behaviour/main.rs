@@ -15,6 +15,7 @@ mod emergency_stop;
 mod files_given;
 mod forecasts_hold;
 mod guardian;
+mod guardian_connections;
 mod guardian_datagrams;
 mod guides;
 mod imported_profile;
