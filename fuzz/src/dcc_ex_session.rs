@@ -47,6 +47,10 @@ impl Witness {
                     Reply::Locomotive { cab, register: 0, throttle, forward, functions: 0 }.to_string()
                 }
                 Request::Locomotive { cab } => format!("<l {cab} -1 128 0>"),
+                Request::Examine { .. } => Reply::Failed.to_string(),
+                Request::Define { id, address } => {
+                    Reply::Definition { id, address: Some(address), thrown: true }.to_string()
+                }
                 Request::Turnout { id, thrown } => Reply::Turnout { id, thrown }.to_string(),
                 _ => continue,
             };
@@ -69,9 +73,13 @@ impl Witness {
 
 pub(crate) fn fuzz(bytes: &[u8]) {
     let [options, deeds @ ..] = bytes else { return };
-    let turnouts = if options & 2 == 0 { TurnoutRequests::Accessory } else { TurnoutRequests::Defined };
+    let turnouts = match options >> 1 & 3 {
+        0 => TurnoutRequests::Accessory,
+        1 => TurnoutRequests::Defined,
+        _ => TurnoutRequests::Confirmed,
+    };
     let settings =
-        Settings { resets_on_open: options & 1 != 0, turnouts, first_sensor: u16::from(options >> 2) };
+        Settings { resets_on_open: options & 1 != 0, turnouts, first_sensor: u16::from(options >> 3) };
     let client = Client::new(Timestamp::ZERO, settings);
     let mut witness = Witness { client, now: Timestamp::ZERO, written: Vec::new(), asked: Vec::new() };
     for deed in deeds.chunks_exact(3) {

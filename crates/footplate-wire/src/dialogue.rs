@@ -261,15 +261,16 @@ impl<A: Awaited> Dialogue<A> {
         })
     }
 
-    /// Notes that a request was written; adds its command to the recording and returns the entry.
+    /// Notes that a request was written; adds its command to the recording, unless that waits for the answer, and returns the entry.
     pub(crate) fn sent(&mut self, now: Timestamp, outgoing: Outgoing<A>) -> Option<EventKind> {
         let Outgoing { request, awaited, command, tries } = outgoing;
         self.pacing.sent(now);
+        let is_entered = awaited.is_none_or(|awaited| !awaited.is_entered_when_answered());
         if let Some(awaited) = awaited {
             self.outstanding.push(Outstanding { request, awaited, command, sent: now, tries });
             self.silence.asked(now);
         }
-        let kind = command.and_then(|command| entry_of(&command, tries))?;
+        let kind = command.filter(|_| is_entered).and_then(|command| entry_of(&command, tries))?;
         self.enter(now, kind);
         Some(kind)
     }

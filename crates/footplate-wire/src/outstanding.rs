@@ -82,6 +82,11 @@ pub(crate) trait Awaited: Copy + Debug + PartialEq {
     /// Whether trains can be driven without the answer, so that the request is given up in the end.
     fn may_be_given_up(&self, is_command: bool) -> bool;
 
+    /// Whether the command is added to the recording when it is answered, instead of when it is written.
+    fn is_entered_when_answered(&self) -> bool {
+        false
+    }
+
     /// How often the request is written in all before it is given up.
     fn most_tries(&self) -> u8 {
         Self::REPEATS.most_tries

@@ -54,6 +54,8 @@ pub struct BoardSwitches {
     pub chatter: Ratio,
     /// Whether it confirms a command to a turnout that is already in that position.
     pub answers_unchanged: bool,
+    /// Whether turnouts can be defined by their kind, and shown. Firmware before version 4.2, and DCC++, refuse one or the other.
+    pub defines: bool,
     /// Whether bytes beyond its input buffer of 64 are lost.
     pub overruns: bool,
     /// How often a byte is lost on the line, in either direction.
@@ -68,6 +70,7 @@ impl Default for BoardSwitches {
             has_banner: true,
             chatter: Ratio::ZERO,
             answers_unchanged: false,
+            defines: true,
             overruns: true,
             lost: Ratio::ZERO,
             delivery: Delivery::Each,
@@ -82,6 +85,17 @@ struct Slot {
     throttle: Throttle,
     forward: bool,
     functions: u32,
+}
+
+/// A turnout that is defined on the board.
+#[derive(Debug, Clone, Copy)]
+struct Defined {
+    id: u16,
+    /// The linear address of its decoder's output.
+    turnout: TurnoutId,
+    thrown: bool,
+    /// Whether its owner has stored it, so that a reset does not delete it.
+    is_stored: bool,
 }
 
 /// A living layout behind a DCC-EX board, on a clock of its own.
@@ -104,7 +118,7 @@ pub struct VirtualBoard<'l> {
     pushes: DueQueue<(SensorId, bool)>,
     outgoing: Outgoing,
     slots: Vec<Slot>,
-    turnouts: Vec<(TurnoutId, bool)>,
+    turnouts: Vec<Defined>,
     /// The end of a power cut or a start.
     dark_until: Option<Timestamp>,
 }
@@ -131,8 +145,11 @@ impl<'l> VirtualBoard<'l> {
         };
         let slots = world.train_ids().map(known).collect();
         let turnouts = world.layout().turnouts();
-        let lies = |turnout| world.lies(turnout) == Some(Leg::Curved);
-        let turnouts = turnouts.map(|(turnout, _)| (turnout, lies(turnout))).collect();
+        let stored = |turnout: TurnoutId| {
+            let thrown = world.lies(turnout) == Some(Leg::Curved);
+            Defined { id: turnout.0, turnout, thrown, is_stored: true }
+        };
+        let turnouts = turnouts.map(|(turnout, _)| stored(turnout)).collect();
         world.power(false, now);
         world.s88.take_edges(now);
         Self {
@@ -166,6 +183,7 @@ impl<'l> VirtualBoard<'l> {
         self.world.power(false, now);
         self.world.forget_commands();
         self.slots.clear();
+        self.turnouts.retain(|defined| defined.is_stored);
         self.buffer.clear();
         self.replies.clear();
         self.pushes.clear();

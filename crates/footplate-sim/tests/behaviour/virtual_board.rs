@@ -43,6 +43,16 @@ fn requests_are_answered_as_the_firmware_answers_them() {
         ("<T 1 1>", "<H 1 1>\n"),
         ("<T 1 1>", ""),
         ("<T 77 1>", "<X>\n"),
+        // A turnout that is defined counts as thrown, and keeps its position when it is defined again.
+        ("<T 77 X>", "<X>\n"),
+        ("<T 77 DCC 2>", "<O>\n"),
+        ("<T 77 X>", "<H 77 DCC 1 1 1>\n<H 77 1 1 1>\n"),
+        ("<T 77 1>", ""),
+        ("<T 77 0>", "<H 77 0>\n"),
+        ("<T 77 DCC 1>", "<O>\n"),
+        ("<T 77 X>", "<H 77 DCC 1 0 0>\n<H 77 1 0 0>\n"),
+        ("<T 77>", "<O>\n"),
+        ("<T 77>", "<X>\n"),
         ("<a 1 0>", ""),
         ("<nonsense>", "<X>\n"),
         ("<- 24>", "<- 24>\n"),
@@ -168,4 +178,18 @@ fn it_may_chatter_between_messages() {
     assert!(heard.ends_with("<# 50>\n") && heard.len() > 12, "{heard}");
     let unknown = TrainId(99);
     assert!(board.world.truth().train(unknown).is_none());
+}
+
+#[test]
+fn a_reset_deletes_what_was_not_stored_and_an_old_board_defines_nothing() {
+    let layout = two_loops();
+    let mut board = board(&layout, End::Nose, BoardSwitches::default());
+    assert_eq!(answer(&mut board, "<T 77 DCC 1>"), "<O>\n");
+    board.restart();
+    ask(&mut board, "", 3_000);
+    assert_eq!(answer(&mut board, "<T 77 X>"), "<X>\n");
+    assert_eq!(answer(&mut board, "<T 1 X>").lines().count(), 2);
+    let mut old =
+        self::board(&layout, End::Nose, BoardSwitches { defines: false, ..BoardSwitches::default() });
+    assert_eq!(answer(&mut old, "<T 77 DCC 1><T 77 X>"), "<X>\n<X>\n");
 }

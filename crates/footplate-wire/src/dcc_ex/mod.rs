@@ -6,6 +6,8 @@
 //! - [`Request`] and [`Reply`] are texts and their meaning, [`Framing`] finds them among what arrives.
 //! - [`Client`] is the session: it knows what is outstanding and what comes next.
 
+mod definition_number;
+mod definitions;
 mod framing;
 mod opening;
 mod outstanding;

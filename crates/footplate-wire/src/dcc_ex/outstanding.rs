@@ -2,6 +2,7 @@
 
 use footplate_core::{FunctionNumber, TimeSpan, TrainId, TurnoutId};
 
+use super::definition_number::number_of;
 use super::reply::Reply;
 use super::request::{Request, Throttle};
 use super::time_model::ANSWER_LONGEST;
@@ -23,7 +24,12 @@ pub(crate) enum Awaited {
     /// That a function of a train is on, or off.
     Function(TrainId, FunctionNumber, bool),
     Power(bool),
+    /// That a turnout which its owner has defined lies so.
     Turnout(TurnoutId, bool),
+    /// What the board has under the number of the session's definition of a turnout.
+    Definition(TurnoutId),
+    /// That a turnout which the session has defined lies so.
+    Thrown(TurnoutId, bool),
 }
 
 impl AwaitedAnswer for Awaited {
@@ -53,8 +59,26 @@ impl AwaitedAnswer for Awaited {
             (Self::Turnout(turnout, curved), Reply::Turnout { id, thrown }) => {
                 turnout.0 == *id && curved == *thrown
             }
+            (Self::Definition(turnout), Reply::Definition { id, .. }) => number_of(turnout) == *id,
+            (Self::Thrown(turnout, curved), Reply::Turnout { id, thrown }) => {
+                number_of(turnout) == *id && curved == *thrown
+            }
+            (Self::Thrown(turnout, curved), Reply::Definition { id, address, thrown }) => {
+                number_of(turnout) == *id && Some(turnout.0) == *address && curved == *thrown
+            }
             _ => false,
         }
+    }
+
+    /// Until the board says so, no train may count on a turnout.
+    fn is_entered_when_answered(&self) -> bool {
+        matches!(self, Self::Definition(_) | Self::Thrown(..))
+    }
+
+    /// Over a line that loses bytes, an answer comes to one request in three, or fewer.
+    fn most_tries(&self) -> u8 {
+        let usual = Self::REPEATS.most_tries;
+        if self.is_entered_when_answered() { 2 * usual } else { usual }
     }
 
     fn subject(&self) -> Subject {
@@ -63,7 +87,9 @@ impl AwaitedAnswer for Awaited {
             Self::Locomotive(train) | Self::Driven(train, ..) => Subject::Train(train),
             Self::Function(train, function, _) => Subject::Function(train, function.get()),
             Self::Power(_) => Subject::Power,
-            Self::Turnout(turnout, _) => Subject::Turnout(turnout),
+            Self::Turnout(turnout, _) | Self::Definition(turnout) | Self::Thrown(turnout, _) => {
+                Subject::Turnout(turnout)
+            }
         }
     }
 

@@ -4,7 +4,7 @@ use alloc::borrow::ToOwned;
 use alloc::string::String;
 use core::fmt::{Display, Formatter, Result as FmtResult};
 
-use super::request::{Throttle, Words};
+use super::request::{Throttle, Words, decoder_output, flag_of, linear_address};
 
 /// Added to the speed code in `<l …>` when a locomotive runs forward.
 const FORWARD: u8 = 0x80;
@@ -47,6 +47,15 @@ pub enum Reply {
     Turnout {
         /// Its number on the board.
         id: u16,
+        /// `true` for the diverging leg.
+        thrown: bool,
+    },
+    /// `<H id DCC decoder output 0|1>`, or `<H id SERVO … 0|1>` and others: how a turnout is defined, and how it lies.
+    Definition {
+        /// Its number on the board.
+        id: u16,
+        /// The linear address of its accessory decoder; `None` for another kind.
+        address: Option<u16>,
         /// `true` for the diverging leg.
         thrown: bool,
     },
@@ -100,7 +109,11 @@ impl Reply {
             "p" => Self::power(rest),
             "l" => Self::locomotive(&mut words),
             "T" => Self::register(&mut words),
-            "H" => words.number().zip(words.flag()).map(|(id, thrown)| Self::Turnout { id, thrown }),
+            // A decoder's output, once more in the form of DCC++.
+            "H" if words.0.clone().nth(1).is_some_and(is_number) && words.0.clone().nth(2).is_some() => {
+                return Ok(None);
+            }
+            "H" => Self::turnout(&mut words),
             "Q" | "q" => Self::sensor(&mut words, opcode == "Q"),
             "#" => words.number().map(Self::Slots),
             "-" => words.number().map(|cab| Self::Forgotten { cab }),
@@ -151,6 +164,20 @@ impl Reply {
         Some(Self::Register { register, throttle, forward: words.flag()? })
     }
 
+    fn turnout(words: &mut Words<'_>) -> Option<Self> {
+        let id = words.number()?;
+        let kind = words.word()?;
+        if words.rest_is_empty() {
+            return Some(Self::Turnout { id, thrown: flag_of(kind.parse().ok()?)? });
+        }
+        if kind == "DCC" {
+            let address = linear_address(words.number()?, words.number()?);
+            return Some(Self::Definition { id, address, thrown: words.flag()? });
+        }
+        let last = words.0.by_ref().last()?;
+        Some(Self::Definition { id, address: None, thrown: flag_of(last.parse().ok()?)? })
+    }
+
     fn sensor(words: &mut Words<'_>, active: bool) -> Option<Self> {
         let id = words.number()?;
         if words.rest_is_empty() {
@@ -158,6 +185,10 @@ impl Reply {
         }
         Some(Self::SensorDefined { id, pin: words.number()?, pull_up: words.flag()? }).filter(|_| active)
     }
+}
+
+fn is_number(word: &str) -> bool {
+    word.bytes().all(|byte| byte.is_ascii_digit())
 }
 
 /// The text that is written, with its brackets.
@@ -176,6 +207,11 @@ impl Display for Reply {
                 write!(f, "<T {register} {throttle} {}>", bit(*forward))
             }
             Self::Turnout { id, thrown } => write!(f, "<H {id} {}>", bit(*thrown)),
+            Self::Definition { id, address: Some(address), thrown } => {
+                let (decoder, output) = decoder_output(*address);
+                write!(f, "<H {id} DCC {decoder} {output} {}>", bit(*thrown))
+            }
+            Self::Definition { id, address: None, thrown } => write!(f, "<H {id} LCN {}>", bit(*thrown)),
             Self::Sensor { id, active } => write!(f, "<{} {id}>", if *active { 'Q' } else { 'q' }),
             Self::SensorDefined { id, pin, pull_up } => write!(f, "<Q {id} {pin} {}>", bit(*pull_up)),
             Self::Slots(count) => write!(f, "<# {count}>"),

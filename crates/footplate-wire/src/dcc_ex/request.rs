@@ -14,6 +14,9 @@ pub const CABS: RangeInclusive<u16> = 1..=10_239;
 /// The highest of the board's speeds.
 const HIGHEST_SPEED: u8 = 126;
 
+/// The outputs of an accessory decoder.
+const OUTPUTS: u16 = 4;
+
 /// The functions that a board knows of a locomotive (F0 to F68).
 const FUNCTIONS: RangeInclusive<u8> = 0..=68;
 
@@ -101,6 +104,23 @@ pub enum Request {
     },
     /// `<T>`: the defined turnouts and how they lie.
     Turnouts,
+    /// `<T id X>`: how a turnout is defined, and how it lies.
+    Examine {
+        /// Its number on the board.
+        id: u16,
+    },
+    /// `<T id DCC address>`: define a turnout, or change its address. It counts as thrown until it has been closed.
+    Define {
+        /// Its number on the board.
+        id: u16,
+        /// The linear address of its accessory decoder.
+        address: u16,
+    },
+    /// `<T id>`: no longer define it.
+    Undefine {
+        /// Its number on the board.
+        id: u16,
+    },
     /// `<a address 0|1>`: switch an accessory decoder, by its linear address.
     Accessory {
         /// The linear address, from 1.
@@ -136,7 +156,7 @@ impl Request {
                 Self::Forget { cab: words.rest_is_empty().then_some(None).or_else(|| words.cab().map(Some))? }
             }
             "T" if words.rest_is_empty() => Self::Turnouts,
-            "T" => Self::Turnout { id: words.number()?, thrown: words.position()? },
+            "T" => Self::turnout(&mut words)?,
             "a" => Self::accessory(&mut words)?,
             "Q" => Self::SensorStates,
             "S" => Self::Sensors,
@@ -161,14 +181,29 @@ impl Request {
         Some(Self::DriveByRegister { register, cab, throttle, forward })
     }
 
-    /// `<a linear 0|1>` or `<a decoder output 0|1>`: four outputs a decoder, counted from decoder 1 and output 0.
+    fn turnout(words: &mut Words<'_>) -> Option<Self> {
+        let id = words.number()?;
+        Some(match words.word() {
+            None => Self::Undefine { id },
+            Some("X") => Self::Examine { id },
+            Some("DCC") => {
+                let first = words.number()?;
+                let linear = |second| linear_address(first, second);
+                let address =
+                    if words.rest_is_empty() { Some(first) } else { words.number().and_then(linear) };
+                Self::Define { id, address: address? }
+            }
+            Some(word) => Self::Turnout { id, thrown: position_of(word)? },
+        })
+    }
+
+    /// `<a linear 0|1>` or `<a decoder output 0|1>`.
     fn accessory(words: &mut Words<'_>) -> Option<Self> {
         let (first, second): (u16, u16) = (words.number()?, words.number()?);
         if words.rest_is_empty() {
             return Some(Self::Accessory { address: first, on: flag_of(second)? });
         }
-        let address = first.checked_sub(1)?.checked_mul(4)?.checked_add(second)?.checked_add(1)?;
-        Some(Self::Accessory { address, on: words.flag()? })
+        Some(Self::Accessory { address: linear_address(first, second)?, on: words.flag()? })
     }
 }
 
@@ -228,14 +263,6 @@ impl<'t> Words<'t> {
         self.number().filter(|function| FUNCTIONS.contains(function))
     }
 
-    fn position(&mut self) -> Option<bool> {
-        match self.word()? {
-            "1" | "T" => Some(true),
-            "0" | "C" => Some(false),
-            _ => None,
-        }
-    }
-
     fn tracks(&mut self) -> Option<Power> {
         match self.word() {
             None => Some(Power::All),
@@ -250,7 +277,26 @@ fn known_cab(number: u16) -> Option<u16> {
     CABS.contains(&number).then_some(number)
 }
 
-const fn flag_of(number: u16) -> Option<bool> {
+/// The linear address of a decoder's output: four outputs a decoder, counted from decoder 1 and output 0.
+pub(super) fn linear_address(decoder: u16, output: u16) -> Option<u16> {
+    decoder.checked_sub(1)?.checked_mul(OUTPUTS)?.checked_add(output)?.checked_add(1)
+}
+
+/// The decoder and output of a linear address.
+pub(super) const fn decoder_output(address: u16) -> (u16, u16) {
+    let from_zero = address.saturating_sub(1);
+    (from_zero / OUTPUTS + 1, from_zero % OUTPUTS)
+}
+
+fn position_of(word: &str) -> Option<bool> {
+    match word {
+        "1" | "T" => Some(true),
+        "0" | "C" => Some(false),
+        _ => None,
+    }
+}
+
+pub(super) const fn flag_of(number: u16) -> Option<bool> {
     match number {
         0 => Some(false),
         1 => Some(true),
@@ -293,6 +339,9 @@ impl Display for Request {
             Self::Forget { cab: None } => f.write_str("<->"),
             Self::Turnout { id, thrown } => write!(f, "<T {id} {}>", bit(thrown)),
             Self::Turnouts => f.write_str("<T>"),
+            Self::Examine { id } => write!(f, "<T {id} X>"),
+            Self::Define { id, address } => write!(f, "<T {id} DCC {address}>"),
+            Self::Undefine { id } => write!(f, "<T {id}>"),
             Self::Accessory { address, on } => write!(f, "<a {address} {}>", bit(on)),
             Self::SensorStates => f.write_str("<Q>"),
             Self::Sensors => f.write_str("<S>"),

@@ -11,6 +11,7 @@ use footplate_core::{FunctionNumber, SpeedStep, TimeSpan, Timestamp, TrainId, Tu
 
 use hearing::Driven;
 
+use super::definitions::{Definitions, by_address, question_after};
 use super::framing::Framing;
 use super::opening::Opening;
 use super::outstanding::Awaited;
@@ -50,6 +51,7 @@ pub struct Client {
     unverified: Vec<TrainId>,
     /// How each locomotive was driven by its last reports, which were alike, and how many of them there were; too few yet to count.
     unconfirmed: BTreeMap<TrainId, (Driven, u8)>,
+    definitions: Definitions,
 }
 
 impl Client {
@@ -63,6 +65,7 @@ impl Client {
             sensors: Sensors::default(),
             unverified: Vec::new(),
             unconfirmed: BTreeMap::new(),
+            definitions: Definitions::default(),
         };
         client.go_on(now);
         client
@@ -109,6 +112,12 @@ impl Protocol for Client {
             request => request,
         };
         let mut text = request.to_string();
+        if let Some(awaited) = next.awaited {
+            self.definitions.sent(awaited, self.dialogue.is_noisy());
+            if let Some(question) = question_after(awaited, request) {
+                text.push_str(&question.to_string());
+            }
+        }
         let is_ending = self.dialogue.farewell.has_begun();
         // A train of unknown direction has to stop now: the stop of all may have been lost as well.
         if matches!(request, Request::Locomotive { .. }) && next.tries > 1 && is_ending {
@@ -125,7 +134,9 @@ impl Protocol for Client {
 
     /// `<a 153 0>` that loses a digit throws turnout 15, under whatever train is there, and the board says nothing of it.
     fn may_throw(&self) -> bool {
-        !self.dialogue.is_noisy()
+        let is_confirmed =
+            self.settings.turnouts == TurnoutRequests::Confirmed && self.definitions.are_all_own();
+        is_confirmed || !self.dialogue.is_noisy()
     }
 
     fn addresses(&self, _train: TrainId) -> RangeInclusive<u16> {
@@ -154,7 +165,8 @@ impl Protocol for Client {
 
     fn throw(&mut self, _now: Timestamp, turnout: TurnoutId, curved: bool) -> (Request, Option<Awaited>) {
         match self.settings.turnouts {
-            TurnoutRequests::Accessory => (Request::Accessory { address: turnout.0, on: curved }, None),
+            TurnoutRequests::Confirmed => self.definitions.throw(turnout, curved),
+            TurnoutRequests::Accessory => by_address(turnout, curved),
             TurnoutRequests::Defined => {
                 // The board answers only when the state changes.
                 let changes = !self.dialogue.lies(turnout, curved);

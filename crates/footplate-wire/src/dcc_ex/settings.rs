@@ -5,9 +5,12 @@ use core::ops::RangeInclusive;
 /// How turnouts are commanded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum TurnoutRequests {
+    /// `<T id 0|1>`: by the linear address of the accessory decoder, for which the session makes a definition of its own, so that the board
+    /// confirms every command. A board that knows no such definitions is written to as with [`Accessory`](Self::Accessory).
+    #[default]
+    Confirmed,
     /// `<a address 0|1>`: by the linear address of the accessory decoder. The board needs no definition and answers nothing, so
     /// the program cannot see whether it heard.
-    #[default]
     Accessory,
     /// `<T id 0|1>`: by its number among the turnouts that are defined on the board, which answers when the state changes.
     Defined,
@@ -18,7 +21,7 @@ impl TurnoutRequests {
     /// are reserved) or any number of a definition.
     pub(super) const fn numbers(self) -> RangeInclusive<u16> {
         match self {
-            Self::Accessory => 1..=2044,
+            Self::Confirmed | Self::Accessory => 1..=2044,
             Self::Defined => 1..=32_767,
         }
     }

@@ -34,6 +34,9 @@ fn requests() -> impl Strategy<Value = Request> {
         }),
         proptest::option::of(cabs()).prop_map(|cab| Request::Forget { cab }),
         (any::<u16>(), any::<bool>()).prop_map(|(id, thrown)| Request::Turnout { id, thrown }),
+        any::<u16>().prop_map(|id| Request::Examine { id }),
+        any::<u16>().prop_map(|id| Request::Undefine { id }),
+        (any::<u16>(), any::<u16>()).prop_map(|(id, address)| Request::Define { id, address }),
         (any::<u16>(), any::<bool>()).prop_map(|(address, on)| Request::Accessory { address, on }),
     ]
 }
@@ -53,6 +56,8 @@ fn replies() -> impl Strategy<Value = Reply> {
             forward
         }),
         (any::<u16>(), any::<bool>()).prop_map(|(id, thrown)| Reply::Turnout { id, thrown }),
+        (any::<u16>(), proptest::option::of(1_u16..=2_044), any::<bool>())
+            .prop_map(|(id, address, thrown)| Reply::Definition { id, address, thrown }),
         (any::<u16>(), any::<bool>()).prop_map(|(id, active)| Reply::Sensor { id, active }),
         (any::<u16>(), any::<u16>(), any::<bool>()).prop_map(|(id, pin, pull_up)| Reply::SensorDefined {
             id,

@@ -80,29 +80,9 @@ fn a_direction_counts_once_enough_reports_agree() {
 }
 
 #[test]
-fn no_turnout_is_thrown_while_the_line_is_noisy() {
-    let mut desk = Desk::opened();
-    let curve = Command::Turnout { turnout: TurnoutId(9), curved: true };
-    desk.command(curve);
-    desk.run_for(100);
-    desk.hear("<l 24 x 0>\n");
-    desk.command(curve);
-    desk.run_for(6_000);
-    desk.command(curve);
-    desk.run_for(100);
-    // A line counts as noisy for five seconds.
-    let thrown = desk.written.iter().filter(|(_, text)| text.starts_with("<a"));
-    let thrown: Vec<(i64, &str)> = thrown.map(|(at, text)| (*at, text.as_str())).collect();
-    let [first, second, third] = thrown[..] else { panic!("{thrown:?}") };
-    assert!([first, second, third].iter().all(|(_, text)| *text == "<a 9 1>"), "{thrown:?}");
-    assert!((5_090..5_600).contains(&(second.0 - first.0)) && third.0 > second.0, "{thrown:?}");
-    let entries = desk.events.iter().filter(|event| matches!(event.kind, EventKind::Turnout { .. }));
-    assert_eq!(entries.count(), 3);
-}
-
-#[test]
 fn the_newest_speed_wins_and_a_stop_goes_first() {
-    let mut desk = Desk::opened();
+    let mut desk = Desk::new(Settings { turnouts: TurnoutRequests::Accessory, ..Settings::default() });
+    desk.run_until(ms(1_000));
     desk.command(speed(T24, 8));
     desk.run_for(200);
     desk.written.clear();

@@ -41,6 +41,10 @@ fn accessories_are_known_by_decoder_and_output_too() {
     // NMRA S-9.2.1: four outputs a decoder; decoder 7 has the linear addresses 25 to 28.
     assert_eq!(Request::read("a 7 1 1"), Request::read("a 26 1"));
     assert_eq!(Request::read("a 1 0 0"), Request::read("a 1 0"));
+    assert_eq!(Request::read("T 7 DCC 7 1"), Some(Request::Define { id: 7, address: 26 }));
+    // A servo is described by its pin, positions and speed.
+    let servo = Reply::Definition { id: 7, address: None, thrown: true };
+    assert_eq!(Reply::read("H 7 SERVO 101 400 200 0 1"), Ok(Some(servo)));
 }
 
 #[test]
@@ -53,6 +57,8 @@ fn what_the_board_would_refuse_is_not_read() {
         "t 10240 5 1",
         "F 24 69 1",
         "T 7 2",
+        "T 7 X 1",
+        "T 7 DCC",
         "1 SIDE",
         "s now",
         "D",
@@ -64,7 +70,14 @@ fn what_the_board_would_refuse_is_not_read() {
         assert!(Reply::read(text).is_err(), "{text}");
     }
     // Display text, names, currents: known to the board's other clients, not used here.
-    for text in ["@ 0 3 \"Ready\"", "jT 1 C \"Yard\"", "= A MAIN", "c CurrentMAIN 59 C Milli 0 1497 1 1497"] {
+    // Definitions as DCC++ writes them say the same as the line before.
+    for text in [
+        "H 7 7 1 1",
+        "@ 0 3 \"Ready\"",
+        "jT 1 C \"Yard\"",
+        "= A MAIN",
+        "c CurrentMAIN 59 C Milli 0 1497 1 1497",
+    ] {
         assert_eq!(Reply::read(text), Ok(None), "{text}");
     }
 }

@@ -10,6 +10,7 @@ mod confirmations;
 mod dcc_ex_desk;
 mod dcc_ex_round_trip;
 mod dcc_ex_session;
+mod dcc_ex_turnouts;
 mod dcc_ex_vectors;
 mod desk;
 mod directions;

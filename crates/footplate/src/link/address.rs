@@ -245,12 +245,13 @@ pub(crate) fn quirks(value: &str) -> Result<Quirks, String> {
             "split" => (board.delivery, loconet.delivery) = (Delivery::Split, Delivery::Split),
             "lossy" => board.lost = LOSSY,
             "silent" => board.has_banner = false,
+            "undefined" => board.defines = false,
             _ if is_of_another => {}
             _ => {
                 return Err(format!(
                     "there is no quirk `{one}`; there are chatter (other text between messages), merged and split \
-                     (messages arrive together or in parts), lossy (bytes are lost), silent (no banner after a reset) of a \
-                     DCC-EX board, of a Z21 {QUIRKS}, of a Central Station {}, of a LocoNet server {}, and of JMRI {}",
+                     (messages arrive together or in parts), lossy (bytes are lost), silent (no banner after a reset), \
+                     undefined (no turnout can be defined) of a DCC-EX board, of a Z21 {QUIRKS}, of a Central Station {}, of a LocoNet server {}, and of JMRI {}",
                     can_address::QUIRKS,
                     loconet_address::QUIRKS,
                     jmri_address::QUIRKS

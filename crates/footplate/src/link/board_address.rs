@@ -25,11 +25,12 @@ pub(super) fn read(port: &str) -> Result<(Place, Settings), String> {
 pub(super) fn set(settings: &mut Settings, key: &str, value: &str) -> Result<(), String> {
     match (key, value) {
         ("turnouts", "defined") => settings.turnouts = TurnoutRequests::Defined,
+        ("turnouts", "confirmed") => settings.turnouts = TurnoutRequests::Confirmed,
         ("turnouts", "accessory") => settings.turnouts = TurnoutRequests::Accessory,
         ("turnouts", _) => {
             return Err(format!(
-                "`{value}` is not a kind of turnouts: use turnouts=accessory for decoder addresses \
-                     or turnouts=defined for turnouts that are defined on the board"
+                "`{value}` is not a kind of turnouts: use turnouts=confirmed for decoder addresses, \
+                     turnouts=accessory for the same without an answer of the board, or turnouts=defined for turnouts that you have defined there"
             ));
         }
         ("first-sensor", _) => settings.first_sensor = number(key, value, "100")?,

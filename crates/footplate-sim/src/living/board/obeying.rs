@@ -4,7 +4,7 @@ use footplate_core::track::Leg;
 use footplate_core::{SensorId, Timestamp, TrainId, TurnoutId};
 use footplate_wire::dcc_ex::{Power, Reply, Request, Throttle};
 
-use super::{IDENTITY, Slot, VirtualBoard, line};
+use super::{Defined, IDENTITY, Slot, VirtualBoard, line};
 use crate::living::decoder::DecoderSpeed;
 
 /// Locomotives that it can drive: as many as a Mega.
@@ -57,12 +57,21 @@ impl VirtualBoard<'_> {
                 self.slots.retain(|slot| !cabs.contains(&slot.cab));
                 cabs.iter().map(|cab| line(&Reply::Forgotten { cab: *cab })).collect()
             }
-            Request::Turnout { id, thrown } => self.throw(at, TurnoutId(id), thrown),
+            Request::Turnout { id, thrown } => self.throw(at, id, thrown),
             Request::Turnouts if self.turnouts.is_empty() => line(&Reply::Failed),
             Request::Turnouts => {
-                let of =
-                    |(turnout, thrown): &(TurnoutId, bool)| Reply::Turnout { id: turnout.0, thrown: *thrown };
+                let of = |defined: &Defined| Reply::Turnout { id: defined.id, thrown: defined.thrown };
                 self.turnouts.iter().map(|turnout| line(&of(turnout))).collect()
+            }
+            Request::Examine { .. } | Request::Define { .. } if !self.switches.defines => {
+                line(&Reply::Failed)
+            }
+            Request::Examine { id } => self.show(id),
+            Request::Define { id, address } => self.define(id, TurnoutId(address)),
+            Request::Undefine { id } => {
+                let before = self.turnouts.len();
+                self.turnouts.retain(|defined| defined.id != id);
+                line(if self.turnouts.len() < before { &Reply::Done } else { &Reply::Failed })
             }
             Request::Accessory { address, on } => {
                 self.lay(at, TurnoutId(address), on);
@@ -136,13 +145,31 @@ impl VirtualBoard<'_> {
         line(&Reply::Locomotive { cab, register, throttle, forward, functions })
     }
 
-    fn throw(&mut self, at: Timestamp, turnout: TurnoutId, thrown: bool) -> String {
-        let known = self.turnouts.iter_mut().find(|(known, _)| *known == turnout);
-        let Some((_, state)) = known else { return line(&Reply::Failed) };
-        let changes = std::mem::replace(state, thrown) != thrown;
+    fn show(&self, id: u16) -> String {
+        let found = self.turnouts.iter().find(|defined| defined.id == id);
+        let Some(Defined { turnout, thrown, .. }) = found else { return line(&Reply::Failed) };
+        let shown = line(&Reply::Definition { id, address: Some(turnout.0), thrown: *thrown });
+        // A second time in the form of DCC++.
+        shown.clone() + &shown.replace(" DCC", "")
+    }
+
+    /// A definition that is there already keeps its position; a new one counts as thrown.
+    fn define(&mut self, id: u16, turnout: TurnoutId) -> String {
+        match self.turnouts.iter_mut().find(|defined| defined.id == id) {
+            Some(defined) => defined.turnout = turnout,
+            None => self.turnouts.push(Defined { id, turnout, thrown: true, is_stored: false }),
+        }
+        line(&Reply::Done)
+    }
+
+    fn throw(&mut self, at: Timestamp, id: u16, thrown: bool) -> String {
+        let known = self.turnouts.iter_mut().find(|known| known.id == id);
+        let Some(defined) = known else { return line(&Reply::Failed) };
+        let changes = std::mem::replace(&mut defined.thrown, thrown) != thrown;
+        let turnout = defined.turnout;
         self.lay(at, turnout, thrown);
         if changes || self.switches.answers_unchanged {
-            line(&Reply::Turnout { id: turnout.0, thrown })
+            line(&Reply::Turnout { id, thrown })
         } else {
             String::new()
         }

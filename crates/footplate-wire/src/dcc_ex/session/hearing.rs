@@ -4,6 +4,7 @@ use alloc::borrow::ToOwned;
 
 use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
 
+use super::super::definition_number::turnout_of;
 use super::super::opening::Opening;
 use super::super::outstanding::Awaited;
 use super::super::reply::{Malformed, Reply};
@@ -12,7 +13,7 @@ use super::super::settings::TurnoutRequests;
 use super::super::time_model::{SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST};
 use super::Client;
 use crate::locomotives::ReportedFunctions;
-use crate::outstanding::Awaited as _;
+use crate::outstanding::{Awaited as _, Outstanding};
 use crate::sensors::occupied;
 use crate::session::LinkNotice;
 
@@ -48,12 +49,14 @@ impl Client {
                 let reported = ReportedFunctions::all(functions);
                 let answer = answered.as_ref().map(|answered| &answered.awaited);
                 self.dialogue.hear_of_functions(TrainId(cab), reported, answer);
-                let driven =
-                    matches!(answered, Some(answered) if matches!(answered.awaited, Awaited::Driven(..)));
+                let driven = matches!(answer, Some(Awaited::Driven(..)));
                 self.hear_of_locomotive(TrainId(cab), Driven { register, throttle, forward }, driven);
             }
-            Reply::Turnout { id, thrown } => {
-                self.hear_of_turnout(now, TurnoutId(id), thrown, answered.is_some());
+            Reply::Turnout { id, thrown } => self.hear_of_turnout(now, id, thrown, answered.is_some()),
+            Reply::Definition { id, address, .. } => {
+                if let Some(turnout) = turnout_of(id) {
+                    self.definitions.heard(turnout, address);
+                }
             }
             Reply::Sensor { id, active } => self.hear_of_sensor(now, id, active),
             Reply::Slots(_) if matches!(&self.opening, Opening::States(requests) if requests.is_empty()) => {
@@ -61,9 +64,18 @@ impl Client {
             }
             Reply::Failed => {
                 let refused = self.dialogue.outstanding.take_first(|one| one.awaited.turnout().is_some());
-                if let Some(turnout) = refused.and_then(|refused| refused.awaited.turnout()) {
-                    self.dialogue.notify(LinkNotice::TurnoutRefused(turnout));
+                if let Some(refused) = refused {
+                    self.hear_of_refusal(&refused);
                 }
+            }
+            _ => {}
+        }
+        match answered {
+            Some(Outstanding { awaited: Awaited::Definition(_), command: Some(command), .. }) => {
+                self.dialogue.waiting.push_again(command);
+            }
+            Some(Outstanding { awaited: Awaited::Thrown(turnout, curved), .. }) => {
+                self.dialogue.enter(now, EventKind::Turnout { turnout, curved });
             }
             _ => {}
         }
@@ -92,6 +104,7 @@ impl Client {
 
     /// Reads all states again, including every locomotive's.
     fn verify(&mut self) {
+        self.definitions.clear();
         self.opening = Opening::ask_states(&self.settings);
         self.unverified = self.dialogue.directed();
     }
@@ -160,10 +173,29 @@ impl Client {
         count
     }
 
-    fn hear_of_turnout(&mut self, now: Timestamp, turnout: TurnoutId, thrown: bool, was_asked: bool) {
+    /// The board refuses a request that concerns a turnout, or one that was garbled.
+    fn hear_of_refusal(&mut self, refused: &Outstanding<Awaited>) {
+        match refused.awaited {
+            Awaited::Definition(turnout) => self.definitions.missing(turnout),
+            Awaited::Thrown(turnout, _) => self.definitions.forget(turnout),
+            Awaited::Turnout(turnout, _) => return self.dialogue.notify(LinkNotice::TurnoutRefused(turnout)),
+            _ => {}
+        }
+        // It is defined, and thrown then.
+        if let Some(command) = refused.command {
+            self.dialogue.waiting.push_again(command);
+        }
+    }
+
+    fn hear_of_turnout(&mut self, now: Timestamp, id: u16, thrown: bool, was_asked: bool) {
+        let turnout = match self.settings.turnouts {
+            TurnoutRequests::Confirmed => turnout_of(id),
+            TurnoutRequests::Defined => Some(TurnoutId(id)),
+            TurnoutRequests::Accessory => None,
+        };
+        let Some(turnout) = turnout else { return };
         let before = self.dialogue.hear_of_turnout(turnout, thrown);
-        let is_used = self.settings.turnouts == TurnoutRequests::Defined;
-        if is_used && !was_asked && before == Some(!thrown) {
+        if !was_asked && before == Some(!thrown) {
             // Another throttle has thrown it.
             self.dialogue.enter(now, EventKind::Turnout { turnout, curved: thrown });
         }
