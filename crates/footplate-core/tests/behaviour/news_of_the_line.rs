@@ -1,7 +1,8 @@
 //! What is heard of the line: a silent station, a line that garbles data, another throttle.
 
-use footplate_core::control::{Alarm, LinkNews, Order, Outcome, Refusal};
-use footplate_core::{Command, SpeedStep};
+use footplate_core::control::{Alarm, LinkNews, Machine, Notice, Order, Outcome, Refusal};
+use footplate_core::track::Leg;
+use footplate_core::{Command, Event, EventKind, Report, SensorId, SpeedStep, TurnoutId};
 
 use crate::toy_railway::step;
 use crate::watching::{FIRST, Watched};
@@ -64,4 +65,24 @@ fn a_train_that_another_throttle_has_driven_is_stopped_and_located_again() {
     let edge = watched.world.layout.edge(truth.edge).expect("on the layout");
     assert_eq!(located.at.node, edge.from);
     assert!((located.at.distance - truth.offset).as_mm().abs() < 40.0, "{located:?}, really {truth:?}");
+}
+
+#[test]
+fn a_turnout_that_seems_to_lie_otherwise_while_the_line_garbles_data_is_unknown_after_it() {
+    // Given a train behind turnout 1, whose straight leg leads to B and whose other leg to C, as far,
+    let mut watched = Watched::one();
+    watched.go(FIRST, 9);
+    watched.run(5.45);
+    assert_eq!(watched.dog.driver().turnouts().get(TurnoutId(1)), Some(Leg::Straight));
+    // when noise makes a report of C while replies are garbled,
+    watched.dog.handle_link(watched.world.now, LinkNews::Silent);
+    let (time, sensor) = (watched.world.now, SensorId(4));
+    let report = EventKind::Sensor(Report { sensor, poll_interval: None });
+    watched.dog.handle_event(time, &Event { time, kind: report });
+    watched.run(0.1);
+    let is_mismatch = |notice: &Notice| matches!(notice, Notice::TurnoutMismatch { curved: true, .. });
+    assert!(watched.notices.iter().any(is_mismatch), "{:#?}", watched.notices);
+    // then that counts no longer once the line is clean: a person who places the train next to it may mean either leg.
+    watched.dog.handle_link(watched.world.now, LinkNews::Answers);
+    assert_eq!(watched.dog.driver().turnouts().get(TurnoutId(1)), None);
 }

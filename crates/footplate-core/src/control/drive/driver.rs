@@ -290,7 +290,8 @@ impl Driver {
         self.all_turnouts_changed(now);
     }
 
-    /// The station may not have received commands since a time: turnouts that were to move lie in either position.
+    /// The station may not have received commands since a time, and reports may be noise: turnouts that were to move, or seem to have
+    /// moved, lie in either position.
     pub(in crate::control) fn forget_turnouts_changed(&mut self, now: Timestamp, since: Timestamp) {
         let turnouts = &mut self.track.turnouts;
         self.turnouts_changed.iter().filter(|(_, at)| **at >= since).for_each(|(id, _)| turnouts.forget(*id));
@@ -353,7 +354,7 @@ impl Driver {
     /// Updates a train that caused a detection.
     fn passed(&mut self, now: Timestamp, detection: Detection, explanation: Explanation) {
         if let Explanation::Turnout { train, turnout, leg } = explanation {
-            self.adopt_leg(train, turnout, leg);
+            self.adopt_leg(now, train, turnout, leg);
         } else if let Explanation::Train(train) = explanation {
             self.prove_turnouts(now, train, detection.sensor);
         }
@@ -381,7 +382,7 @@ impl Driver {
             let Detection { sensor, window } = detection;
             self.outputs.notify(Notice::Unexplained { sensor, time: window.until });
         }
-        legs.iter().for_each(|(turnout, leg)| self.adopt_leg(train, *turnout, *leg));
+        legs.iter().for_each(|(turnout, leg)| self.adopt_leg(now, train, *turnout, *leg));
         let context = self.track.context();
         let Some(train) = self.trains.get_mut(&train) else { return };
         train.locator = locator;
@@ -401,8 +402,9 @@ impl Driver {
         }
     }
 
-    /// Adopts a turnout position that a train has shown by the leg it took.
-    fn adopt_leg(&mut self, train: TrainId, turnout: TurnoutId, leg: Leg) {
+    /// Adopts a turnout position that a train has shown by the leg it took, or a report that noise on the line has made.
+    fn adopt_leg(&mut self, now: Timestamp, train: TrainId, turnout: TurnoutId, leg: Leg) {
+        self.turnouts_changed.insert(turnout, now);
         self.track.turnouts.set(turnout, leg);
         let curved = leg.is_curved();
         self.outputs.notify(Notice::TurnoutMismatch { turnout, curved, train });
