@@ -235,10 +235,10 @@ impl<A: Awaited> Dialogue<A> {
         self.farewell.switch_off_is_due(now, &self.locomotives)
     }
 
-    /// Returns a train with a waiting command whose direction must be asked for first.
+    /// Returns a train with a waiting command whose direction must be asked for first, or one whose direction is unchecked.
     pub(crate) fn undirected(&self, is_asked: impl Fn(TrainId) -> bool) -> Option<TrainId> {
         let asks = |train: &TrainId| !self.locomotives.has_direction(*train) && !is_asked(*train);
-        self.waiting.iter().filter_map(train_of).find(asks)
+        self.waiting.iter().filter_map(train_of).chain(self.locomotives.unchecked()).find(asks)
     }
 
     /// Removes and returns a train whose state may be asked for. A question would replace the request of a train that is not confirmed

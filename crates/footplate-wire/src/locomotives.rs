@@ -1,6 +1,6 @@
 //! The commanded state of each locomotive, and what the station has confirmed.
 
-use alloc::collections::BTreeMap;
+use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 
 use footplate_core::{Command, FunctionNumber, SpeedStep, TrainId};
@@ -60,6 +60,8 @@ pub(crate) struct Locomotives {
     known: Vec<Locomotive>,
     /// Whether each ran forward when it was commanded or reported last, in this session or an earlier one.
     directions: BTreeMap<TrainId, bool>,
+    /// Those whose direction is of a session without an end, until the station reports it.
+    unchecked: BTreeSet<TrainId>,
 }
 
 impl Locomotives {
@@ -96,11 +98,17 @@ impl Locomotives {
         self.directions.get(&train).copied()
     }
 
-    /// Whether a train runs forward whose station says so (`reported`) and has not been asked before. Stations that were restarted
-    /// have forgotten, and say *forward* of every locomotive, at rest and without functions (`is_blank`). A decoder does what it
-    /// is commanded next, so it is commanded on in the direction in which its train is known to have run last.
-    pub(crate) fn first_direction(&self, train: TrainId, reported: bool, is_blank: bool) -> bool {
-        self.last_direction(train).filter(|_| reported && is_blank).unwrap_or(reported)
+    /// The direction of a train is of a session without an end.
+    pub(crate) fn check_direction(&mut self, train: TrainId) {
+        if self.directions.contains_key(&train) {
+            self.know(train);
+            self.unchecked.insert(train);
+        }
+    }
+
+    /// The trains of which that is so.
+    pub(crate) fn unchecked(&self) -> impl Iterator<Item = TrainId> {
+        self.unchecked.iter().copied()
     }
 
     /// Takes back reversals that no station has confirmed: stops contain a direction, and would reverse a train that the next
@@ -188,8 +196,21 @@ impl<A: Awaited> Dialogue<A> {
         }
     }
 
+    /// Takes the first direction that a station reports of a train. Stations that were restarted have forgotten, and say *forward* of every
+    /// locomotive, at rest and without functions (`is_blank`). A decoder does what it is commanded next, so it is commanded on in
+    /// the direction in which its train is known to have run last.
+    pub(crate) fn hear_first_direction(&mut self, train: TrainId, reported: bool, is_blank: bool) {
+        let last = self.locomotives.last_direction(train);
+        if self.locomotives.unchecked.contains(&train) && last != Some(reported) {
+            self.notify(LinkNotice::DirectionContradicted(train));
+            return self.faces(train, reported);
+        }
+        self.faces(train, last.filter(|_| reported && is_blank).unwrap_or(reported));
+    }
+
     /// A train runs forward or backward next, as its station has reported.
     pub(crate) fn faces(&mut self, train: TrainId, forward: bool) {
+        self.locomotives.unchecked.remove(&train);
         if let Some(locomotive) = self.locomotives.get_mut(train) {
             locomotive.forward = Some(forward);
         }

@@ -17,7 +17,9 @@ impl LinkNotice {
             | Self::Reopened => Some(LinkNews::Silent),
             Self::Answers => Some(LinkNews::Answers),
             Self::PowerLost => Some(LinkNews::PowerLost),
-            Self::ReverseInDoubt(train) | Self::OtherThrottle { train, reversed: true } => {
+            Self::ReverseInDoubt(train)
+            | Self::DirectionContradicted(train)
+            | Self::OtherThrottle { train, reversed: true } => {
                 Some(LinkNews::ReverseInDoubt { train: *train })
             }
             Self::OtherThrottle { train, reversed: false } => Some(LinkNews::OtherThrottle { train: *train }),

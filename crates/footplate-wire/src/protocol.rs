@@ -166,7 +166,8 @@ pub(crate) trait Protocol {
         }
         let is_ending = dialogue.farewell.has_begun();
         let usual = if is_ending { Some(dialogue.pacing.urgent_at()) } else { self.asks_at() };
-        dialogue.next_timeout(usual, self.release_at(), self.has_questions())
+        let asks = self.has_questions() || dialogue.undirected(|train| self.is_asked(train)).is_some();
+        dialogue.next_timeout(usual, self.release_at(), asks)
     }
 
     /// Sends what is due.
@@ -260,6 +261,10 @@ impl<P: Protocol + Clone + 'static> Session for P {
 
     fn set_direction(&mut self, train: TrainId, forward: bool) {
         self.dialogue_mut().locomotives.keep_direction(train, forward);
+    }
+
+    fn check_direction(&mut self, train: TrainId) {
+        self.dialogue_mut().locomotives.check_direction(train);
     }
 
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError> {

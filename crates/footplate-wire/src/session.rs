@@ -43,6 +43,10 @@ pub trait Session: Any {
     /// Sets whether a train ran forward last in an earlier session, which its station may have forgotten. Not all know directions.
     fn set_direction(&mut self, _train: TrainId, _forward: bool) {}
 
+    /// The session of that [direction](Self::set_direction) has no end, and may have reversed the train since: the station is asked, and
+    /// if it says otherwise, [`LinkNotice::DirectionContradicted`] follows.
+    fn check_direction(&mut self, _train: TrainId) {}
+
     /// Sends a command as soon as the line is free.
     ///
     /// # Errors
@@ -184,6 +188,9 @@ pub enum LinkNotice {
     /// A train was commanded to reverse shortly before a reply was lost. The command is not repeated, because it toggles, and the
     /// direction cannot be read back: check how the train faces.
     ReverseInDoubt(TrainId),
+    /// A session that has no end commanded a train in one direction, as far as was kept, and its station has the other one: it is not known
+    /// which of them its decoder has heard.
+    DirectionContradicted(TrainId),
     /// This sensor was occupied when the line was opened: a train is on it, or it is stuck. It is reported again after it was free.
     HeldClosed(SensorId),
     /// The interface does not answer all reads of sensor modules.
@@ -401,6 +408,10 @@ impl Display for LinkNotice {
                 f,
                 "train {train} was commanded to reverse just before a reply was lost; it may face \
                  either direction"
+            ),
+            Self::DirectionContradicted(train) => write!(
+                f,
+                "train {train} may have been reversed just before the last session died; it may face either direction"
             ),
             Self::HeldClosed(sensor) => {
                 write!(f, "sensor {sensor} is occupied from the start: a train is on it, or it is stuck")

@@ -52,7 +52,7 @@ fn a_turnout_is_defined_once_and_thrown_by_its_definition() {
     desk.command(throws(true));
     desk.run_for(300);
     assert_eq!(thrown(&mut desk), ([EXAMINE, DEFINE, CURVE].map(String::from).to_vec(), vec![true]));
-    // Again, which changes nothing on the board, and the other way.
+    // Again, which changes nothing on the board, and the other leg.
     for curved in [true, false] {
         desk.command(throws(curved));
         desk.run_for(100);

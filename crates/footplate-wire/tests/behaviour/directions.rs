@@ -1,6 +1,7 @@
 //! In which direction a train runs next, whatever its station has forgotten.
 
 use footplate_core::{Command, DecoderSteps};
+use footplate_wire::dcc_ex::Settings;
 use footplate_wire::z21::{LocomotiveState, Request, Throttle};
 use footplate_wire::{LinkNotice, Session};
 
@@ -94,4 +95,53 @@ fn a_reversal_that_a_station_may_have_forgotten_leaves_the_direction_unknown() {
     assert!(desk.notices.contains(&LinkNotice::Restarted), "{:?}", desk.notices);
     assert!(desk.notices.contains(&LinkNotice::ReverseInDoubt(T24)), "{:?}", desk.notices);
     assert!(desk.station.slots[&1].forward);
+}
+
+#[test]
+fn a_direction_of_a_session_without_an_end_that_its_station_contradicts_is_unknown() {
+    // Given a session that died after it had kept that both trains run backward, and a station that says so of 58 only,
+    let mut desk = z21_desk::Desk::opened();
+    for (train, forward) in [(24, true), (58, false)] {
+        desk.station.locomotives.insert(train, state(train, Throttle::Stop, forward));
+    }
+    for train in [T24, T58] {
+        desk.client.set_direction(train, false);
+        desk.client.check_direction(train);
+    }
+    // when the next one begins,
+    desk.run_for(500);
+    // then it asks, and 24 may have been reversed just before the end, or the station may have forgotten how it ran:
+    assert!(desk.notices.contains(&LinkNotice::DirectionContradicted(T24)), "{:?}", desk.notices);
+    assert!(!desk.notices.contains(&LinkNotice::DirectionContradicted(T58)), "{:?}", desk.notices);
+    // it is commanded as the station says, and the store keeps that.
+    assert_eq!(desk.directions, [(T24, true)]);
+    desk.command(speed(T24, 8));
+    desk.run_for(300);
+    assert_eq!(desk.commands(), [z21_drive(24, Throttle::Step(72), true)]);
+    // Once is enough: a station that is restarted later has forgotten.
+    assert_eq!(
+        desk.notices.iter().filter(|notice| matches!(notice, LinkNotice::DirectionContradicted(_))).count(),
+        1
+    );
+}
+
+#[test]
+fn the_directions_of_a_session_without_an_end_are_read_at_once_from_every_board_that_drives_its_trains() {
+    // Given a board that drives 24 backward and forgot 58, and a store that says backward of 58 and forward of 24,
+    let mut desk = dcc_ex_desk::Desk::new(Settings { resets_on_open: true, ..Settings::default() });
+    for (train, forward) in [(T24, true), (T58, false)] {
+        desk.client.set_direction(train, forward);
+        desk.client.check_direction(train);
+    }
+    desk.hear("<iDCC-EX V-5.6.0 / MEGA / X G-x>\n");
+    desk.run_for(500);
+    // then the direction of 24 is unknown, and 58, of which the board knows nothing, runs on as it did.
+    let contradicted: Vec<&LinkNotice> =
+        desk.notices.iter().filter(|notice| matches!(notice, LinkNotice::DirectionContradicted(_))).collect();
+    assert_eq!(contradicted, [&LinkNotice::DirectionContradicted(T24)]);
+    assert!(!desk.notices.contains(&LinkNotice::Restarted), "the banner of the opening: {:?}", desk.notices);
+    assert_eq!(desk.directions, [(T24, false)]);
+    desk.command(speed(T58, 9));
+    desk.run_for(200);
+    assert_eq!(desk.texts().last(), Some(&"<t 58 81 0>"));
 }

@@ -84,6 +84,7 @@ export const LINE = [
   [/^the station has not been ready for (\S+) s \(CTS is down\); .*$/, "die Zentrale ist seit $1 s nicht bereit (CTS ist unten); Strom und Kabel prüfen, oder den zeitgesteuerten Modus versuchen, wenn der Adapter kein CTS hat"],
   [/^repeated, because a reply was lost after it: (.*)$/, (_, what) => `wiederholt, weil danach eine Antwort verloren ging: ${command(what)}`],
   [/^train (\d+) was commanded to reverse just before a reply was lost; .*$/, "Zug $1 sollte wenden, kurz bevor eine Antwort verloren ging; seine Fahrtrichtung ist unbekannt"],
+  [/^train (\d+) may have been reversed just before the last session died; .*$/, "Zug $1 sollte vielleicht wenden, kurz bevor die letzte Sitzung starb; seine Fahrtrichtung ist unbekannt"],
   [/^sensor (\S+) is occupied from the start: .*$/, "Rückmelder $1 ist von Anfang an belegt: ein Zug steht darauf, oder er klemmt"],
   [/^the interface answers reads of single sensor modules$/, "das Interface beantwortet das Lesen einzelner Rückmeldemodule"],
   [/^the interface answers reads of all sensor modules only: .*$/, "das Interface liest nur alle Rückmeldemodule auf einmal: jedes Lesen dauert so lange wie alle, und ein Rückmelder, der kürzer belegt ist, kann fehlen"],

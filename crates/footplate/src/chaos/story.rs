@@ -262,12 +262,12 @@ impl<'l> Teller<'_, 'l> {
         Ok(WardLink::over(Pair::new(line, life, pieces), cable)?)
     }
 
-    /// Stops all trains that the previous life may have left running, as the program does first.
-    fn stop_left_running(&mut self) -> anyhow::Result<()> {
+    /// Stops all trains that the previous life may have left running, as the program does first; returns whether it has no end.
+    fn stop_left_running(&mut self) -> anyhow::Result<bool> {
         if !self.store.exists() {
-            return Ok(());
+            return Ok(false);
         }
-        let Some(unfinished) = Store::open(self.store)?.unfinished_session()? else { return Ok(()) };
+        let Some(unfinished) = Store::open(self.store)?.unfinished_session()? else { return Ok(false) };
         let began = self.now();
         let life = Rc::new(Life::new(None));
         let mut line = self.open(life, &[], Choice::new(0))?;
@@ -283,12 +283,12 @@ impl<'l> Teller<'_, 'l> {
         }
         let took = (self.now() - began).as_ms();
         self.note(format!("the next start took {took:.0} ms: {closing}"));
-        Ok(())
+        Ok(true)
     }
 
     /// Runs one life, and its guardian's actions afterwards.
     fn live(&mut self, planned: &PlannedLife) -> anyhow::Result<()> {
-        self.stop_left_running()?;
+        let is_unfinished = self.stop_left_running()?;
         self.await_rest();
         self.check_turnouts();
         let incidents = self.station.borrow().world().incidents().len();
@@ -316,6 +316,7 @@ impl<'l> Teller<'_, 'l> {
         let mut line = self.open(Rc::clone(&life), &planned.troubles, noise)?;
         let mut opened = self.session(&line)?;
         recall_directions(opened.session.as_mut(), &Store::open(self.store)?)?;
+        TRAINS.iter().filter(|_| is_unfinished).for_each(|train| opened.session.check_direction(*train));
         let mut recorder = SharedDisk(Rc::clone(&disk));
         let mut people = People::new(
             self.stage.layout,

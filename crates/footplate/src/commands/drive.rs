@@ -321,7 +321,11 @@ impl Arguments {
         let mut opened = open_session(address, &link, layout)?;
         opened.session.expect_delays(address.excess(self.railway.line()?.as_ref()));
         if let (Some(store), None) = (&self.railway.store, address.simulated()) {
-            recall_directions(opened.session.as_mut(), &Store::open_to_read(store)?)?;
+            let store = Store::open_to_read(store)?;
+            recall_directions(opened.session.as_mut(), &store)?;
+            if store.unfinished_session()?.is_some() {
+                beginning.models.iter().for_each(|model| opened.session.check_direction(model.train()));
+            }
         }
         for model in &beginning.models {
             opened.session.set_decoder(model.train(), DecoderSteps::with(model.highest()))?;

@@ -125,6 +125,8 @@ pub(crate) fn stop_all(
     trains: impl IntoIterator<Item = TrainId>,
 ) -> Closing {
     for train in trains {
+        // The session that begins next compares it, too: what the station says must not be overwritten now.
+        opened.session.check_direction(train);
         let stop = Command::Speed { train, step: SpeedStep::STAND };
         // Power off stops a train, too, that this station has no address for.
         if let Err(error) = opened.session.handle_command(link.now(), stop) {

@@ -271,7 +271,9 @@ impl Alarm {
                 (Grade::Warning, "line-unexpected", None, vec![count.to_string()])
             }
             LinkNotice::Repeated(_) => (Grade::Warning, "line-repeated", None, Vec::new()),
-            LinkNotice::ReverseInDoubt(train) => (Grade::Danger, DIRECTION_UNKNOWN, Some(*train), Vec::new()),
+            LinkNotice::ReverseInDoubt(train) | LinkNotice::DirectionContradicted(train) => {
+                (Grade::Danger, DIRECTION_UNKNOWN, Some(*train), Vec::new())
+            }
             LinkNotice::HeldClosed(sensor) => {
                 (Grade::Warning, "line-held-closed", None, vec![sensor.to_string()])
             }

@@ -12,7 +12,7 @@ use super::super::request::Throttle;
 use super::super::settings::TurnoutRequests;
 use super::super::time_model::{SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST};
 use super::Client;
-use crate::locomotives::ReportedFunctions;
+use crate::locomotives::{Locomotive, ReportedFunctions};
 use crate::outstanding::{Awaited as _, Outstanding};
 use crate::sensors::occupied;
 use crate::session::LinkNotice;
@@ -85,8 +85,8 @@ impl Client {
     fn identified(&mut self, now: Timestamp, identity: &str, was_asked: bool) {
         match &self.opening {
             Opening::Banner { .. } | Opening::Identity => {
-                let was_reset =
-                    self.opening.awaits_banner() && self.dialogue.locomotives.iter().next().is_some();
+                let is_used = |known: &Locomotive| known.is_driven || known.forward.is_some();
+                let was_reset = self.opening.awaits_banner() && self.dialogue.locomotives.iter().any(is_used);
                 self.dialogue.notify(LinkNotice::Identified(identity.to_owned()));
                 if was_reset {
                     self.restarted();
@@ -139,7 +139,7 @@ impl Client {
             let alike = self.count_alike(train, driven);
             let known = u8::from(last == Some(driven.forward));
             if alike + known >= driven.reports_needed() {
-                self.dialogue.faces(train, driven.forward);
+                self.dialogue.hear_first_direction(train, driven.forward, false);
             }
             return;
         };

@@ -189,9 +189,7 @@ impl Client {
         };
         let Some(forward) = locomotive.forward else {
             // JMRI may have been restarted and not know: the direction is written with the next speed.
-            let forward =
-                self.dialogue.locomotives.first_direction(train, faces, throttle == Throttle::Speed(0));
-            return self.dialogue.faces(train, forward);
+            return self.dialogue.hear_first_direction(train, faces, throttle == Throttle::Speed(0));
         };
         if is_outstanding || (throttle == wanted && faces == forward) {
             return;

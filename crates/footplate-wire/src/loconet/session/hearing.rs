@@ -148,8 +148,7 @@ impl Client {
         let Some(forward) = locomotive.forward else {
             if data.slot_use() == SlotUse::InUse {
                 let is_blank = data.speed == 0 && data.functions == 0;
-                let forward = self.dialogue.locomotives.first_direction(train, data.forward, is_blank);
-                self.dialogue.faces(train, forward);
+                self.dialogue.hear_first_direction(train, data.forward, is_blank);
             }
             return;
         };

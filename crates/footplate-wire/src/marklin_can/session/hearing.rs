@@ -230,7 +230,10 @@ impl Client {
         if is_outstanding || locomotive.forward == Some(forward) {
             return;
         }
-        if locomotive.forward.is_none() || !locomotive.is_driven {
+        if locomotive.forward.is_none() {
+            return self.dialogue.hear_first_direction(train, forward, false);
+        }
+        if !locomotive.is_driven {
             return self.dialogue.faces(train, forward);
         }
         if answered.is_none() {

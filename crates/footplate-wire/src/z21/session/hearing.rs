@@ -179,8 +179,7 @@ impl Client {
         }
         let Some(forward) = locomotive.forward else {
             let is_blank = !state.busy && state.throttle == Throttle::Stop && state.functions == 0;
-            let forward = self.dialogue.locomotives.first_direction(train, state.forward, is_blank);
-            return self.dialogue.faces(train, forward);
+            return self.dialogue.hear_first_direction(train, state.forward, is_blank);
         };
         let as_fast = state.throttle.is_like(state.steps, wanted, steps);
         if is_outstanding || as_fast && state.forward == forward {
