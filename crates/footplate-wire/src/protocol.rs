@@ -166,7 +166,8 @@ pub(crate) trait Protocol {
         }
         let is_ending = dialogue.farewell.has_begun();
         let usual = if is_ending { Some(dialogue.pacing.urgent_at()) } else { self.asks_at() };
-        let asks = self.has_questions() || dialogue.undirected(|train| self.is_asked(train)).is_some();
+        let asks =
+            self.has_questions() || dialogue.locomotives.unchecked().any(|train| !self.is_asked(train));
         dialogue.next_timeout(usual, self.release_at(), asks)
     }
 
