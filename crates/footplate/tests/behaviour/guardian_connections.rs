@@ -62,12 +62,16 @@ fn frame_of(bytes: &mut Vec<u8>) -> Option<String> {
     Some(String::from_utf8_lossy(&text).into_owned())
 }
 
-/// A kind of server: its name, how messages to it are told apart, and what they mean.
-type Kind = (&'static str, fn(&mut Vec<u8>) -> Option<String>, fn(&str) -> Option<Said>);
-const KINDS: [Kind; 2] = [("loconet", line_of, said_to_loconet), ("jmri", frame_of, said_to_jmri)];
+/// A kind of server: its name, how messages to it are told apart, what they mean, and by what a guardian stops the train.
+type Kind = (&'static str, fn(&mut Vec<u8>) -> Option<String>, fn(&str) -> Option<Said>, Said);
+const KINDS: [Kind; 2] = [
+    ("loconet", line_of, said_to_loconet, Said::Stop),
+    // JMRI has to be asked for a train before it takes a stop, and a guardian reads no answer.
+    ("jmri", frame_of, said_to_jmri, Said::PowerOff),
+];
 
 /// Passes connections on to a server, and notes what is commanded over them.
-fn between(server: &str, (_, next, meaning): Kind) -> (SocketAddr, Commanded) {
+fn between(server: &str, (_, next, meaning, _): Kind) -> (SocketAddr, Commanded) {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     let place = listener.local_addr().expect("an address");
     let (all, server) = (Commanded::default(), server.to_owned());
@@ -113,7 +117,7 @@ fn running(kind: Kind, how: &str) -> (Standing, Commanded, Driven) {
     let driven = Driven::over(&format!("{begins}{place}?{more}"), &folder.join("railway.db"), &[]);
     let began = Instant::now();
     driven.order("speed 24 8");
-    commanded.delay_of(&[Said::Run], began);
+    commanded.delay_of(Said::Run, began);
     (station, commanded, driven)
 }
 
@@ -124,7 +128,7 @@ fn every_death_stops_the_trains_over_connections() {
             let (_station, commanded, mut driven) = running(kind, death);
             let since = Instant::now();
             signal(death, driven.child());
-            commanded.stopped(since, &format!("{} {death}", kind.0));
+            commanded.stopped(kind.3, since, &format!("{} {death}", kind.0));
             assert!(driven.status().is_some_and(|status| status >= 128), "{}", driven.errors());
             driven.await_errors("all trains are commanded to stop");
         }
@@ -137,7 +141,7 @@ fn the_death_of_the_guardian_stops_the_trains_over_connections() {
         let (_station, commanded, mut driven) = running(kind, "guardian");
         let since = Instant::now();
         signal("KILL", driven.guardian());
-        commanded.stopped(since, &format!("{}, guardian killed", kind.0));
+        commanded.stopped(Said::Stop, since, &format!("{}, guardian killed", kind.0));
         driven.await_errors("without a guardian all trains are stopped");
         driven.status();
     }

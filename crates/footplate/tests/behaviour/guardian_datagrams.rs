@@ -37,12 +37,12 @@ impl Commanded {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push((Instant::now(), said));
     }
 
-    fn time_of(&self, what: &[Said], since: Instant) -> Option<Instant> {
+    fn time_of(&self, what: Said, since: Instant) -> Option<Instant> {
         let said = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        said.iter().find(|(at, said)| *at >= since && what.contains(said)).map(|(at, _)| *at)
+        said.iter().find(|(at, said)| *at >= since && *said == what).map(|(at, _)| *at)
     }
 
-    pub(crate) fn delay_of(&self, what: &[Said], since: Instant) -> Duration {
+    pub(crate) fn delay_of(&self, what: Said, since: Instant) -> Duration {
         while since.elapsed() < PATIENCE {
             if let Some(at) = self.time_of(what, since) {
                 return at - since;
@@ -52,11 +52,10 @@ impl Commanded {
         panic!("{what:?} was not commanded: {self:?}")
     }
 
-    /// Asserts that the train is stopped in time, and the power switched off.
-    pub(crate) fn stopped(&self, since: Instant, how: &str) {
-        // A station that has to be asked for a train first switches the power off at once.
-        let stop = self.delay_of(&[Said::Stop, Said::PowerOff], since);
-        let off = self.delay_of(&[Said::PowerOff], since);
+    /// Asserts that the train is stopped in time by a command, and the power switched off.
+    pub(crate) fn stopped(&self, by: Said, since: Instant, how: &str) {
+        let stop = self.delay_of(by, since);
+        let off = self.delay_of(Said::PowerOff, since);
         println!("{how}: the stop was on the line after {stop:.1?}, power off after {off:.1?}");
         assert!(stop < WITHIN, "{how}: {stop:?}");
     }
@@ -160,7 +159,7 @@ fn running((name, link, begins, meaning): Kind, how: &str) -> (Standing, Network
     let driven = Driven::over(&link, &folder.join("railway.db"), &[]);
     let began = Instant::now();
     driven.order("speed 24 8");
-    network.commanded.delay_of(&[Said::Run], began);
+    network.commanded.delay_of(Said::Run, began);
     (station, network, driven)
 }
 
@@ -171,7 +170,7 @@ fn every_death_stops_the_trains_over_datagrams() {
             let (_station, network, mut driven) = running(kind, death);
             let since = Instant::now();
             signal(death, driven.child());
-            network.commanded.stopped(since, &format!("{} {death}", kind.0));
+            network.commanded.stopped(Said::Stop, since, &format!("{} {death}", kind.0));
             assert!(driven.status().is_some_and(|status| status >= 128), "{}", driven.errors());
             driven.await_errors("all trains are commanded to stop");
         }
@@ -184,7 +183,7 @@ fn the_death_of_the_guardian_stops_the_trains_over_datagrams() {
         let (_station, network, mut driven) = running(kind, "guardian");
         let since = Instant::now();
         signal("KILL", driven.guardian());
-        network.commanded.stopped(since, &format!("{}, guardian killed", kind.0));
+        network.commanded.stopped(Said::Stop, since, &format!("{}, guardian killed", kind.0));
         driven.await_errors("without a guardian all trains are stopped");
         driven.status();
     }
@@ -199,7 +198,7 @@ fn a_network_that_was_cut_carries_the_stops_over_datagrams_once_it_is_back() {
         driven.await_errors("trying for ever");
         let back = Instant::now();
         network.is_cut.store(false, Ordering::Release);
-        let stop = network.commanded.delay_of(&[Said::Stop], back);
+        let stop = network.commanded.delay_of(Said::Stop, back);
         println!("{}: the stop was on the line {stop:.1?} after the network was back", kind.0);
         // The stops are repeated every two seconds or so: a datagram does not tell that it was lost.
         assert!(stop < 3 * WITHIN, "{stop:?}");
