@@ -196,7 +196,7 @@ impl<A: Awaited> Dialogue<A> {
         }
     }
 
-    /// Takes the first direction that a station reports of a train. Stations that were restarted have forgotten, and say *forward* of every
+    /// Takes the direction that a station reports of a train before it is driven. Stations that were restarted have forgotten, and say *forward* of every
     /// locomotive, at rest and without functions (`is_blank`). A decoder does what it is commanded next, so it is commanded on in
     /// the direction in which its train is known to have run last.
     pub(crate) fn hear_first_direction(&mut self, train: TrainId, reported: bool, is_blank: bool) {

@@ -2,7 +2,7 @@
 
 use footplate_core::{Command, DecoderSteps};
 use footplate_wire::dcc_ex::Settings;
-use footplate_wire::z21::{LocomotiveState, Request, Throttle};
+use footplate_wire::z21::{Broadcasts, LocomotiveState, Request, Throttle};
 use footplate_wire::{LinkNotice, Session};
 
 use crate::desk::{T24, T58, speed};
@@ -123,6 +123,26 @@ fn a_direction_of_a_session_without_an_end_that_its_station_contradicts_is_unkno
         desk.notices.iter().filter(|notice| matches!(notice, LinkNotice::DirectionContradicted(_))).count(),
         1
     );
+}
+
+#[test]
+fn a_direction_that_was_checked_outlives_a_restart_of_the_station() {
+    let mut desk = z21_desk::Desk::opened();
+    desk.station.locomotives.insert(58, state(58, Throttle::Stop, false));
+    desk.client.set_direction(T58, false);
+    desk.client.check_direction(T58);
+    desk.run_for(500);
+    // When the station, which has confirmed it, is restarted before the train runs, and says `forward` of every locomotive,
+    desk.station.told = Broadcasts::NONE;
+    desk.station.locomotives.clear();
+    desk.run_for(6_000);
+    assert!(desk.notices.contains(&LinkNotice::Restarted), "{:?}", desk.notices);
+    desk.written.clear();
+    desk.command(speed(T58, 8));
+    desk.run_for(300);
+    // then the train runs on as it did.
+    assert_eq!(desk.commands(), [z21_drive(58, Throttle::Step(72), false)]);
+    assert_eq!(desk.directions, [], "the store knows it");
 }
 
 #[test]

@@ -177,8 +177,8 @@ impl Client {
             self.dialogue.obeyed(train);
             return self.suspected.retain(|(other, ..)| *other != train);
         }
+        let is_blank = !state.busy && state.throttle == Throttle::Stop && state.functions == 0;
         let Some(forward) = locomotive.forward else {
-            let is_blank = !state.busy && state.throttle == Throttle::Stop && state.functions == 0;
             return self.dialogue.hear_first_direction(train, state.forward, is_blank);
         };
         let as_fast = state.throttle.is_like(state.steps, wanted, steps);
@@ -186,7 +186,7 @@ impl Client {
             return self.suspected.retain(|(other, ..)| *other != train);
         }
         if !locomotive.is_driven {
-            return self.dialogue.faces(train, state.forward);
+            return self.dialogue.hear_first_direction(train, state.forward, is_blank);
         }
         // It may be an old datagram: it counts when the station repeats it in answer to a question.
         let said = (train, state.throttle, state.forward);
