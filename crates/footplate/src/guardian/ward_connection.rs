@@ -86,6 +86,8 @@ impl Connection for WardConnection {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
     use crate::link::{Address, Guardian, Heard};
 
@@ -99,6 +101,20 @@ mod tests {
         let cable = address.cable().expect("a cable");
         let connection = WardConnection::over(there, cable.clone()).expect("a connection");
         (guardian, WardLink::over(connection, cable).expect("a guardian"))
+    }
+
+    /// What a guardian has been sent.
+    fn heard_by(guardian: &FrameWriter) -> Vec<String> {
+        let mut frames = FrameReader::new(guardian.stream());
+        let next = || frames.next(Some(TimeSpan::ZERO)).ok()?.map(|frame| format!("{frame:?}"));
+        std::iter::from_fn(next).collect()
+    }
+
+    #[test]
+    fn a_program_that_pauses_says_that_it_lives() {
+        let (guardian, mut link) = guarded(&[]);
+        link.pause(Duration::from_millis(1));
+        assert_eq!(heard_by(&guardian), ["Open", "Alive { runs: false }"]);
     }
 
     #[test]
@@ -123,30 +139,22 @@ mod tests {
     }
     #[test]
     fn a_guardian_is_released_once_it_has_taken_everything() {
-        let said_goodbye = |guardian: &FrameWriter| {
-            let mut frames = FrameReader::new(guardian.stream());
-            let mut letters = Vec::new();
-            while let Ok(Some(frame)) = frames.next(Some(TimeSpan::ZERO)) {
-                letters.push(format!("{frame:?}"));
-            }
-            letters
-        };
         let alive = "Alive { runs: false }";
         // One that answers,
         let (guardian, mut link) = guarded(&[Frame::Heard(b"7"), Frame::Here]);
         link.say_goodbye().expect("it answers");
-        assert_eq!(said_goodbye(&guardian), ["Open", alive, "Goodbye"]);
+        assert_eq!(heard_by(&guardian), ["Open", alive, "Goodbye"]);
         // one that could not write the last stops,
         let (guardian, mut link) = guarded(&[Frame::Lost("it is gone"), Frame::Here]);
         assert_eq!(link.say_goodbye().expect_err("the line is lost").0, "it is gone");
-        assert_eq!(said_goodbye(&guardian), ["Open", alive]);
+        assert_eq!(heard_by(&guardian), ["Open", alive]);
         // and one that hangs, which is ended; then the program opens the line itself.
         let (guardian, mut link) = guarded(&[]);
         let since = link.now();
         assert!(link.say_goodbye().is_err() && Link::guardian(&mut link).is_none());
         let waited = (link.now() - since).as_ms();
         assert!((700.0..1_000.0).contains(&waited), "{waited}");
-        assert_eq!(said_goodbye(&guardian), ["Open", alive]);
+        assert_eq!(heard_by(&guardian), ["Open", alive]);
     }
     #[test]
     fn a_program_that_always_writes_notices_a_guardian_that_hangs() {

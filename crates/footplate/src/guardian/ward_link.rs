@@ -296,6 +296,8 @@ impl<C: Connection> Link for WardLink<C> {
     }
 
     fn pause(&mut self, span: Duration) {
+        // A program that pauses lives. If the guardian is dead, opening the line says so.
+        let _ = self.tell(Frame::Alive { runs: self.runs });
         self.connection.pause(span);
     }
 
