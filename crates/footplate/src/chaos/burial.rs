@@ -87,7 +87,10 @@ impl<'l> Teller<'_, 'l> {
         allowed: TimeSpan,
     ) {
         let runs_on = !pair.line.all_stopped();
-        if runs_on && pair.line.is_unreachable() {
+        // It ends whatever the line does, perhaps just before or after the end of a cut.
+        let had_time = time_outside(failed, self.now(), cuts.clone()) > allowed;
+        if runs_on && (pair.line.is_unreachable() || !had_time) {
+            self.note("the program has ended without a guardian, and the line was not there".to_owned());
             return;
         }
         let stopped_at = stopped_at.filter(|_| !runs_on);

@@ -93,6 +93,7 @@ const OF_LINE = [
   "turn around, train 24: the station has no such command", "power on: 256 commands already wait for the line; wait until some have been sent", "power off: the link is being closed; open it again to command trains", "train 24 reverse", "turnout 5 straight",
   "train 58 stopped: its position is lost", "train 58 stopped: the stop command could not be sent", "train 24 is not calibrated, so its stops are uncertain: run `footplate calibrate` first",
   "the last commands were not recorded: the reports are not of layout `track-a`: 12 of 63 sensors cannot follow the one before: B15 after C13 2 times (next is E7), C6 after B15 once (next is A3 or A1), and others; give the layout that was recorded with --layout, or correct its edges",
+  "train 24 may have been reversed just before the last session died; it may face either direction",
   "alarm 3 is over already", "`x` is not the number of an alarm; /api/picture lists them",
 ];
 
