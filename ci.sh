@@ -306,7 +306,7 @@ step_chaos() {
   need git git # seeds are drawn from the commit
   cargo build --quiet --workspace --bins --profile test
   local known=0 at=${TMPDIR:-/tmp}
-  [[ $CHAOS_SEEDS != fresh:* ]] || known=${CHAOS_KNOWN:-10}
+  [[ $CHAOS_SEEDS != fresh:* ]] || known=${CHAOS_KNOWN:-5}
   [[ ! -w /dev/shm ]] || at=/dev/shm
   TMPDIR=$at "$TARGET/debug/footplate" simulate chaos --seeds "$CHAOS_SEEDS" --accept-known "$known"
 }
