@@ -46,6 +46,15 @@ fn desk() -> Desk {
     desk
 }
 
+/// The same with a turnout that was defined and thrown.
+fn curved() -> Desk {
+    let mut desk = desk();
+    desk.command(throws(true));
+    desk.run_for(300);
+    thrown(&mut desk);
+    desk
+}
+
 #[test]
 fn a_turnout_is_defined_once_and_thrown_by_its_definition() {
     let mut desk = desk();
@@ -63,10 +72,7 @@ fn a_turnout_is_defined_once_and_thrown_by_its_definition() {
 
 #[test]
 fn a_turnout_counts_as_thrown_once_the_board_confirms_it() {
-    let mut desk = desk();
-    desk.command(throws(true));
-    desk.run_for(300);
-    thrown(&mut desk);
+    let mut desk = curved();
     // What the board writes is lost, then comes from another decoder, then says the other leg.
     answers(&mut desk, &[(STRAIGHTEN, "")]);
     desk.command(throws(false));
@@ -93,10 +99,7 @@ fn a_turnout_counts_as_thrown_once_the_board_confirms_it() {
 
 #[test]
 fn a_definition_that_the_board_has_lost_is_made_again() {
-    let mut desk = desk();
-    desk.command(throws(true));
-    desk.run_for(300);
-    thrown(&mut desk);
+    let mut desk = curved();
     answers(&mut desk, &[(STRAIGHTEN, "<X>\n<X>\n")]);
     desk.command(throws(false));
     desk.run_for(20);

@@ -163,6 +163,18 @@ fn running((name, link, begins, meaning): Kind, how: &str) -> (Standing, Network
     (station, network, driven)
 }
 
+/// A signal has ended the program, and its guardian says what it did.
+pub(crate) fn ended_by_signal(driven: &mut Driven) {
+    assert!(driven.status().is_some_and(|status| status >= 128), "{}", driven.errors());
+    driven.await_errors("all trains are commanded to stop");
+}
+
+/// The program has stopped all trains without its guardian, and ends.
+pub(crate) fn ended_without_guardian(driven: &mut Driven) {
+    driven.await_errors("without a guardian all trains are stopped");
+    driven.status();
+}
+
 #[test]
 fn every_death_stops_the_trains_over_datagrams() {
     for kind in KINDS {
@@ -171,8 +183,7 @@ fn every_death_stops_the_trains_over_datagrams() {
             let since = Instant::now();
             signal(death, driven.child());
             network.commanded.stopped(Said::Stop, since, &format!("{} {death}", kind.0));
-            assert!(driven.status().is_some_and(|status| status >= 128), "{}", driven.errors());
-            driven.await_errors("all trains are commanded to stop");
+            ended_by_signal(&mut driven);
         }
     }
 }
@@ -184,8 +195,7 @@ fn the_death_of_the_guardian_stops_the_trains_over_datagrams() {
         let since = Instant::now();
         signal("KILL", driven.guardian());
         network.commanded.stopped(Said::Stop, since, &format!("{}, guardian killed", kind.0));
-        driven.await_errors("without a guardian all trains are stopped");
-        driven.status();
+        ended_without_guardian(&mut driven);
     }
 }
 
