@@ -12,8 +12,6 @@ use super::story::Teller;
 const STOPPED_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
 /// From a byte on the line to its effect on a decoder: the refresh of the slowest station, with a margin.
 const HEARD_WITHIN: TimeSpan = TimeSpan::from_ms(500);
-/// A guardian that hangs is noticed so much later than one that is killed.
-const NOTICED_WITHIN: TimeSpan = TimeSpan::from_ms(800);
 
 impl<'l> Teller<'_, 'l> {
     /// The end of a life, in order or not.
@@ -67,34 +65,12 @@ impl<'l> Teller<'_, 'l> {
                 self.note("neither the program nor its guardian is left".to_owned());
             }
             // The program has stopped its trains itself.
-            (None, Guardian::Dead { since, hung: false }) => {
-                self.judge_own_stop(pair, since, stopped_at, cuts, allowed);
-            }
-            (None, Guardian::Dead { since, .. } | Guardian::Hangs { since, .. }) => {
-                self.judge_own_stop(pair, since, stopped_at, cuts, allowed + NOTICED_WITHIN);
+            (None, Guardian::Dead { since } | Guardian::Hangs { since, .. }) => {
+                let stopped_at = stopped_at.filter(|_| pair.line.all_stopped());
+                self.judge_stop(since, stopped_at, cuts, allowed, "its guardian had failed");
             }
         }
         Ok(())
-    }
-
-    /// Judges the stops of a program whose guardian failed.
-    fn judge_own_stop(
-        &mut self,
-        pair: &Pair<'l>,
-        failed: Timestamp,
-        stopped_at: Option<Timestamp>,
-        cuts: Vec<Spell>,
-        allowed: TimeSpan,
-    ) {
-        let runs_on = !pair.line.all_stopped();
-        // It ends whatever the line does, perhaps just before or after the end of a cut.
-        let had_time = time_outside(failed, self.now(), cuts.clone()) > allowed;
-        if runs_on && (pair.line.is_unreachable() || !had_time) {
-            self.note("the program has ended without a guardian, and the line was not there".to_owned());
-            return;
-        }
-        let stopped_at = stopped_at.filter(|_| !runs_on);
-        self.judge_stop(failed, stopped_at, cuts, allowed, "its guardian had failed");
     }
 
     /// Judges when all trains were stopped after a process died, leaving out the time in which no command could reach the station.

@@ -30,7 +30,6 @@ pub(super) enum Guardian {
     /// It was killed, or ended because it hung since a time.
     Dead {
         since: Timestamp,
-        hung: bool,
     },
 }
 
@@ -139,7 +138,7 @@ impl<'l> Pair<'l> {
         match self.life.death() {
             Some(Death::GuardianKilled) if lives => {
                 self.line.tell("the guardian is killed");
-                self.end_guardian(false);
+                self.lose_guardian();
             }
             Some(Death::GuardianHangs) if lives => {
                 self.line.tell("the guardian hangs for good");
@@ -158,13 +157,13 @@ impl<'l> Pair<'l> {
     }
 
     /// The guardian is gone, and with it its end of the line.
-    fn end_guardian(&mut self, hung: bool) {
+    fn lose_guardian(&mut self) {
         let now = self.line.time();
         let since = if let Guardian::Hangs { since, .. } = self.guardian { since } else { now };
         if let Some(spell) = self.without_guardian.last_mut() {
             spell.until = spell.until.min(now);
         }
-        self.guardian = Guardian::Dead { since, hung };
+        self.guardian = Guardian::Dead { since };
         self.line.close();
         if since == now {
             self.line.watch_stops(true);
@@ -376,7 +375,7 @@ impl Connection for Pair<'_> {
         if self.guardian == Guardian::Runs {
             self.wronged = Some("the program ended a guardian that did not hang");
         }
-        self.end_guardian(true);
+        self.lose_guardian();
     }
 
     fn open_line(&mut self) -> Result<(), Lost> {
@@ -395,6 +394,10 @@ impl Connection for Pair<'_> {
 
     fn own_line_mut(&mut self) -> Option<&mut dyn Link> {
         (self.holds_line && !self.life.is_over()).then_some(&mut self.line as &mut dyn Link)
+    }
+
+    fn gives_up(&self) -> bool {
+        self.life.is_over()
     }
 
     fn say(&mut self, words: &str) {

@@ -10,11 +10,11 @@ use super::frame::Frame;
 use crate::link::{Bequest, Cable, Guardian, Heard, Link, Lost, PERSON_MS};
 use crate::runtime::written;
 
-/// Period of the heartbeat: a fifth of what the guardian tolerates.
-const ALIVE_EVERY: TimeSpan = TimeSpan::from_ms(100);
+/// Period of the heartbeat: a tenth of what the guardian tolerates. A guardian that hangs is noticed so much later.
+const ALIVE_EVERY: TimeSpan = TimeSpan::from_ms(50);
 /// A guardian that leaves a heartbeat unanswered for this time hangs. More than it allows its child, because its answer waits for what
 /// it writes to the line; less than a second less the time that opening the line takes (requirement).
-const UNANSWERED: TimeSpan = TimeSpan::from_ms(700);
+const UNANSWERED: TimeSpan = TimeSpan::from_ms(600);
 /// A guardian opens a line within this time, or hangs: connecting and agreeing on a protocol have 2 s each at most.
 const OPENED_WITHIN: TimeSpan = TimeSpan::from_ms(5_000);
 /// After this time between two looks, this process itself was suspended, and perhaps its guardian with it.
@@ -58,6 +58,11 @@ pub(crate) trait Connection {
     fn own_line(&self) -> Option<&dyn Link>;
     fn own_line_mut(&mut self) -> Option<&mut dyn Link>;
 
+    /// Whether a person does not want to wait any longer until trains are stopped.
+    fn gives_up(&self) -> bool {
+        false
+    }
+
     /// Says something to people.
     fn say(&mut self, words: &str);
 }
@@ -83,6 +88,8 @@ pub(crate) struct WardLink<C> {
     looked: Timestamp,
     runs: bool,
     is_orphan: bool,
+    /// Whether it was said that stopping trains is tried for ever.
+    tries_on: bool,
 }
 
 impl<C: Connection> WardLink<C> {
@@ -105,6 +112,7 @@ impl<C: Connection> WardLink<C> {
             looked: now,
             runs: false,
             is_orphan: false,
+            tries_on: false,
         };
         link.have_opened()?;
         Ok(link)
@@ -302,16 +310,27 @@ impl<C: Connection> Link for WardLink<C> {
     }
 
     fn reopen(&mut self) -> Result<(), Lost> {
-        if let Some(own) = self.connection.own_line_mut() {
-            return own.reopen();
-        }
         if !self.is_orphan {
             return self.have_opened();
         }
         // No train runs without a guardian: open the line to stop them.
-        self.connection.open_line()?;
-        self.connection.say("without a guardian all trains are stopped, and the program ends");
-        Ok(())
+        let is_first = self.connection.own_line().is_none();
+        let opened = match self.connection.own_line_mut() {
+            Some(own) => own.reopen(),
+            None => self.connection.open_line(),
+        };
+        match &opened {
+            Ok(()) if is_first => {
+                self.connection.say("without a guardian all trains are stopped, and the program ends");
+            }
+            Err(lost) if !std::mem::replace(&mut self.tries_on, true) => {
+                self.connection.say(&format!(
+                    "{lost}; trying for ever to stop all trains (Ctrl-C three times gives up, and leaves trains running)"
+                ));
+            }
+            _ => {}
+        }
+        opened
     }
 
     fn may_be_half_open(&self) -> bool {
@@ -320,6 +339,10 @@ impl<C: Connection> Link for WardLink<C> {
 
     fn guardian(&mut self) -> Option<&mut dyn Guardian> {
         if self.is_orphan { None } else { Some(self) }
+    }
+
+    fn is_without_guardian(&self) -> bool {
+        self.is_orphan && !self.connection.gives_up()
     }
 }
 

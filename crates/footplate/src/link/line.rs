@@ -48,6 +48,11 @@ pub(crate) trait Link {
     fn guardian(&mut self) -> Option<&mut dyn Guardian> {
         None
     }
+
+    /// Whether the guardian of this line has failed, so that only this process is left to stop trains.
+    fn is_without_guardian(&self) -> bool {
+        false
+    }
 }
 
 /// A process that holds the line, seen from the one that drives trains.
@@ -127,6 +132,9 @@ macro_rules! passes_on {
         }
         fn guardian(&mut $self) -> Option<&mut dyn $crate::link::Guardian> {
             $link.guardian()
+        }
+        fn is_without_guardian(&$self) -> bool {
+            $link.is_without_guardian()
         }
     };
 }

@@ -36,7 +36,10 @@ impl Display for Ended {
             Self::Finished => f.write_str("finished"),
             Self::Interrupted => f.write_str("interrupted"),
             Self::LineLost(lost) => {
-                write!(f, "{lost}; trains may still be running: switch the track power off by hand")
+                write!(
+                    f,
+                    "{lost}; trains that were not commanded to stop since may still be running: switch the track power off by hand"
+                )
             }
             Self::NoAnswer(why) => f.write_str(why),
         }

@@ -47,8 +47,6 @@ pub(crate) struct Runtime<'r, L: Link> {
     /// Whether the station has answered since the line was opened last.
     has_answered: bool,
     is_closed: bool,
-    /// The session as it was when its end began, where a guardian writes what it says.
-    before_farewell: Option<Box<dyn Session>>,
 }
 
 /// What interrupts a turn of the loop.
@@ -84,7 +82,6 @@ impl<'r, L: Link> Runtime<'r, L> {
             reopened: 0,
             has_answered: false,
             is_closed: false,
-            before_farewell: None,
         }
     }
 
@@ -302,8 +299,10 @@ impl<'r, L: Link> Runtime<'r, L> {
         self.notices.drain(..).for_each(|notice| attendant.hear_of_line(now, &notice));
         attendant.read(&format!("{lost}; trying to open it again for {} s", REOPEN_WITHIN.as_secs()));
         let began = self.link.real_time();
+        // Where the guardian has failed, the line itself is there.
+        let mut pause = if self.link.is_without_guardian() { Duration::ZERO } else { REOPEN_EVERY };
         while self.link.real_time() - began < REOPEN_WITHIN && !self.stop.is_some_and(StopFlag::is_up) {
-            self.link.pause(REOPEN_EVERY);
+            self.link.pause(std::mem::replace(&mut pause, REOPEN_EVERY));
             if self.link.reopen().is_ok() {
                 let now = self.reopened();
                 attendant.hear_of_line(now, &LinkNotice::Reopened);
@@ -314,42 +313,52 @@ impl<'r, L: Link> Runtime<'r, L> {
     }
 
     /// Stops all trains, releases solenoids and switches the track power off. Returns what the station confirmed. Takes a few
-    /// seconds at most, whatever the line does.
+    /// seconds at most, whatever the line does, unless a guardian that would go on has failed: then this process tries as it would,
+    /// until the station has confirmed everything.
     pub(crate) fn close(&mut self) -> Closing {
-        if !self.is_closed {
-            self.is_closed = true;
-            self.before_farewell = self.link.guardian().is_some().then(|| self.session.copied());
-            self.say_goodbye();
-            if let Err(lost) = self.release_guardian() {
-                say!("{lost}; the stops are sent again");
-                if self.link.reopen().is_ok() {
-                    self.reopened_in_farewell();
-                    self.say_goodbye();
-                    if let Err(lost) = self.release_guardian() {
-                        say!("{lost}");
-                    }
+        if !std::mem::replace(&mut self.is_closed, true) {
+            let before = self.session.copied();
+            let mut has_reopened = false;
+            while self.say_goodbye().and_then(|()| self.release_guardian()).is_err() {
+                let is_alone = self.link.is_without_guardian();
+                if !is_alone && std::mem::replace(&mut has_reopened, true)
+                    || !self.reopen_for_farewell(before.as_ref())
+                {
+                    break;
                 }
             }
         }
         self.session.closing()
     }
 
-    /// Lets the guardian know that no train is left to stop.
-    fn release_guardian(&mut self) -> Result<(), Lost> {
-        match self.link.guardian() {
-            Some(guardian) if self.session.closing().is_complete() => guardian.say_goodbye(),
-            _ => Ok(()),
+    /// Opens the line again to say goodbye once more, until it is open where nothing else is left to stop trains.
+    fn reopen_for_farewell(&mut self, before: &dyn Session) -> bool {
+        while self.link.reopen().is_err() {
+            if !self.link.is_without_guardian() {
+                return false;
+            }
+            self.link.pause(REOPEN_EVERY);
         }
+        // What was given to a guardian that failed or lost the line may not have been written: all is said again.
+        self.session = before.copied();
+        while self.session.poll_output().is_some() {}
+        self.reopened();
+        true
     }
 
-    /// The line is open again. What was given to a guardian that failed or lost it may not have been written: all is said again.
-    fn reopened_in_farewell(&mut self) {
-        if let Some(mut before) = self.before_farewell.take() {
-            while before.poll_output().is_some() {}
-            self.session = before;
+    /// Lets the guardian know that no train is left to stop.
+    fn release_guardian(&mut self) -> Result<(), Lost> {
+        let is_complete = self.session.closing().is_complete();
+        if !is_complete && self.link.is_without_guardian() {
+            let lost = "the station has not confirmed that all trains are stopped, which is commanded again"
+                .to_owned();
+            say!("{lost}");
+            return Err(Lost(lost));
         }
-        let now = self.reopened();
-        self.session.close(now);
+        match self.link.guardian() {
+            Some(guardian) if is_complete => guardian.say_goodbye(),
+            _ => Ok(()),
+        }
     }
 
     fn reopened(&mut self) -> Timestamp {
@@ -361,19 +370,11 @@ impl<'r, L: Link> Runtime<'r, L> {
         now
     }
 
-    fn say_goodbye(&mut self) {
+    fn say_goodbye(&mut self) -> Result<(), Lost> {
         let (began, since) = (self.link.now(), self.link.real_time());
         self.session.close(began);
-        let mut has_reopened = false;
         loop {
-            if self.write().is_err() {
-                // A guardian that has just died stops no train: this process opens the line itself.
-                if std::mem::replace(&mut has_reopened, true) || self.link.reopen().is_err() {
-                    return;
-                }
-                self.reopened_in_farewell();
-                continue;
-            }
+            self.write()?;
             // The last commands belong to the record, but a failing record must not keep a train running.
             if !self.fresh.is_empty() {
                 if let Err(error) = self.write_down() {
@@ -388,7 +389,7 @@ impl<'r, L: Link> Runtime<'r, L> {
             let waited = self.link.real_time() - since;
             let late = now - began >= WITHIN || waited.as_secs_f64() >= WITHIN.as_s();
             if late || self.session.closing().is_complete() {
-                return;
+                return Ok(());
             }
             let end = began + WITHIN;
             match self.link.wait(self.session.next_timeout().unwrap_or(end).min(end)) {
@@ -396,11 +397,7 @@ impl<'r, L: Link> Runtime<'r, L> {
                 Heard::Datagram(datagram) => self.session.handle_bytes(self.link.now(), &datagram),
                 Heard::Cts(up) => self.session.handle_cts(self.link.now(), up),
                 Heard::Nothing => self.session.handle_timeout(self.link.now()),
-                Heard::Lost(_) if has_reopened || self.link.reopen().is_err() => return,
-                Heard::Lost(_) => {
-                    has_reopened = true;
-                    self.reopened_in_farewell();
-                }
+                Heard::Lost(lost) => return Err(lost),
             }
         }
     }

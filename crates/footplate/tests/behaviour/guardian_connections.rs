@@ -7,7 +7,7 @@
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
-use std::thread;
+use std::thread::{self, sleep};
 use std::time::Instant;
 
 use footplate_wire::dcc_ex::Throttle;
@@ -15,7 +15,7 @@ use footplate_wire::jmri::Request;
 use footplate_wire::loconet::{Line, Message};
 
 use crate::board::calibrated_over;
-use crate::guardian::{Driven, signal};
+use crate::guardian::{Driven, WITHIN, running as running_behind_a_board, signal, stopped};
 use crate::guardian_datagrams::{Commanded, Said, ended_by_signal, ended_without_guardian};
 use crate::station::Standing;
 
@@ -143,4 +143,18 @@ fn the_death_of_the_guardian_stops_the_trains_over_connections() {
         commanded.stopped(Said::Stop, since, &format!("{}, guardian killed", kind.0));
         ended_without_guardian(&mut driven);
     }
+}
+
+#[test]
+fn a_program_without_a_guardian_stops_the_trains_once_its_line_is_back() {
+    let (_board, line, mut driven, _) = running_behind_a_board("guardian-killed-and-unplugged");
+    line.is_pulled(true);
+    signal("KILL", driven.guardian());
+    driven.await_errors("trying for ever to stop all trains");
+    // Longer than a program waits for a line that it may still drive over.
+    sleep(8 * WITHIN);
+    let since = Instant::now();
+    line.is_pulled(false);
+    stopped(&line, since, "the guardian was killed, and the plug was put back");
+    ended_without_guardian(&mut driven);
 }
