@@ -98,12 +98,10 @@ impl Locomotives {
         self.directions.get(&train).copied()
     }
 
-    /// The direction of a train is of a session without an end.
+    /// What is known of a train's direction, if anything, is of a session without an end.
     pub(crate) fn check_direction(&mut self, train: TrainId) {
-        if self.directions.contains_key(&train) {
-            self.know(train);
-            self.unchecked.insert(train);
-        }
+        self.know(train);
+        self.unchecked.insert(train);
     }
 
     /// The trains of which that is so.
@@ -201,7 +199,7 @@ impl<A: Awaited> Dialogue<A> {
     /// the direction in which its train is known to have run last.
     pub(crate) fn hear_first_direction(&mut self, train: TrainId, reported: bool, is_blank: bool) {
         let last = self.locomotives.last_direction(train);
-        if self.locomotives.unchecked.contains(&train) && last != Some(reported) {
+        if self.locomotives.unchecked.contains(&train) && last.is_some_and(|last| last != reported) {
             self.notify(LinkNotice::DirectionContradicted(train));
             return self.faces(train, reported);
         }

@@ -43,8 +43,8 @@ pub trait Session: Any {
     /// Sets whether a train ran forward last in an earlier session, which its station may have forgotten. Not all know directions.
     fn set_direction(&mut self, _train: TrainId, _forward: bool) {}
 
-    /// The session of that [direction](Self::set_direction) has no end, and may have reversed the train since: the station is asked, and
-    /// if it says otherwise, [`LinkNotice::DirectionContradicted`] follows.
+    /// The session of that [direction](Self::set_direction) has no end, and may have reversed the train since, or not have kept any
+    /// direction: the station is asked, and if it says otherwise, [`LinkNotice::DirectionContradicted`] follows.
     fn check_direction(&mut self, _train: TrainId) {}
 
     /// Sends a command as soon as the line is free.

@@ -26,7 +26,7 @@ impl<'l> Teller<'_, 'l> {
         self.fate.deaths += u32::from(death.is_some());
         let kept = match death {
             None | Some(Death::GuardianKilled | Death::GuardianHangs) if is_complete => disk.finish(),
-            Some(Death::PowerCut(_)) => disk.lose_power(&mut self.choice),
+            Some(Death::PowerCut(_)) => disk.lose_power(),
             _ => disk.die(),
         };
         if let Err(error) = kept {

@@ -1,12 +1,11 @@
 //! The journal on a slow, full or failing disk, and what a power cut leaves of it.
 //!
-//! The store is real. The disk is simulated between commits: when a commit ends, whether it fails, and which sectors of the
-//! last commit survive a power cut. SQLite waits for the disk once in a commit (`synchronous = FULL`); sectors written
-//! before that wait may reach the disk in any order, or not at all.
+//! The store is real, and SQLite itself meets the failures, on [files](super::files) of their own. Here is when: a commit that a full
+//! disk cuts short, one that the disk does not confirm, and one that is cut off in the middle by the death of the program or the
+//! computer. SQLite waits for the disk once in a commit (`synchronous = FULL`).
 
 use std::collections::VecDeque;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::rc::Rc;
 
 use anyhow::{Context, bail, ensure};
@@ -14,6 +13,7 @@ use footplate_core::{Event, EventKind, TimeSpan, Timestamp, TrainId};
 use footplate_eval::seeds::Choice;
 use footplate_store::{Direction, Journal, JournalEntry, NewMachine, Side, Store, Traced};
 
+use super::files::{Fault, StoreDisk};
 use super::life::Life;
 use super::plan::{Planned, Trouble};
 use crate::clock::LATEST;
@@ -24,21 +24,25 @@ use crate::session_journal::IfUnkept;
 const COMMIT: TimeSpan = TimeSpan::from_ms(5);
 /// The pause after a failure, as in the writing thread of a session.
 const RETRY: TimeSpan = TimeSpan::from_ms(500);
-/// The unit that a disk writes as a whole.
-const SECTOR: usize = 512;
+/// What a full disk takes of a commit (bytes, at most): a few pages, each with its header in the log.
+const ROOM: f64 = 20_000.0;
+/// After how many operations on its files a commit is cut off, at most. Most take a dozen, and one that moves the log into the file a
+/// thousand; so the logarithm of the number is drawn.
+const OPERATIONS: f64 = 3_000.0;
 
 /// Entries of a commit that has not ended.
 #[derive(Debug)]
 struct Commit {
     entries: usize,
     ends: Timestamp,
-    fails: bool,
+    fault: Option<Fault>,
 }
 
 /// The recorder of one life of the program.
 pub(super) struct FaultyDisk {
     journal: Journal,
-    path: PathBuf,
+    files: StoreDisk,
+    choice: Choice,
     life: Rc<Life>,
     troubles: Vec<Planned>,
     began: Timestamp,
@@ -47,6 +51,8 @@ pub(super) struct FaultyDisk {
     pending: VecDeque<JournalEntry>,
     commit: Option<Commit>,
     retry_at: Timestamp,
+    /// Waiting entries of a commit that the disk did not confirm, and may have written all the same.
+    unconfirmed: usize,
     is_in_trouble: bool,
     if_unkept: IfUnkept,
     /// All entries passed on, in order.
@@ -57,9 +63,9 @@ pub(super) struct FaultyDisk {
 }
 
 impl FaultyDisk {
-    /// Begins a session in the store at `path`.
+    /// Begins a session in the store on a disk.
     pub(super) fn begin(
-        path: &Path,
+        files: StoreDisk,
         trains: &[TrainId],
         life: Rc<Life>,
         troubles: &[Planned],
@@ -67,14 +73,15 @@ impl FaultyDisk {
         began: Timestamp,
         calendar: Timestamp,
     ) -> anyhow::Result<Self> {
-        let store = Store::open_or_create(path)?;
+        let store = Store::open_or_create(&files.path)?;
         let mut journal = Journal::begin(store, "chaos", "track-a", None, &[], calendar)?;
         let trains: Vec<_> = trains.iter().map(|train| serde_json::json!({ "train": train.0 })).collect();
         let body = serde_json::json!({ "trains": trains }).to_string();
         journal.begin_machine(NewMachine { kind: "drive", program: "chaos", body: &body }, calendar)?;
         Ok(Self {
             journal,
-            path: path.to_owned(),
+            files,
+            choice: Choice::new(began.as_ns() as u64),
             life,
             troubles: troubles.to_vec(),
             began,
@@ -82,6 +89,7 @@ impl FaultyDisk {
             pending: VecDeque::new(),
             commit: None,
             retry_at: began,
+            unconfirmed: 0,
             is_in_trouble: false,
             if_unkept,
             recorded: Vec::new(),
@@ -121,11 +129,16 @@ impl FaultyDisk {
     pub(super) fn advance(&mut self, now: Timestamp) -> anyhow::Result<()> {
         self.now = now;
         if let Some(commit) = self.commit.take_if(|commit| commit.ends <= now) {
-            self.is_in_trouble = commit.fails;
-            if commit.fails {
+            self.files.fails(commit.fault);
+            let appended = self.append(commit.entries);
+            self.files.fails(None);
+            self.is_in_trouble = appended.is_err();
+            self.unconfirmed = if self.is_in_trouble { commit.entries } else { 0 };
+            if self.is_in_trouble {
                 self.retry_at = commit.ends + RETRY;
-            } else {
-                self.append(commit.entries)?;
+            }
+            if commit.fault.is_none() {
+                appended?;
             }
         }
         if self.commit.is_none() && !self.pending.is_empty() && now >= self.retry_at {
@@ -133,17 +146,22 @@ impl FaultyDisk {
                 Trouble::DiskSlow(takes) => Some(takes),
                 _ => None,
             });
-            let fails = self.trouble(now, |trouble| (trouble == Trouble::DiskFull).then_some(())).is_some();
+            let fails = self.trouble(now, |trouble| (trouble == Trouble::DiskFails).then_some(())).is_some();
+            let fault = fails.then(|| match self.choice.between(0.0, 1.0) < 0.5 {
+                true => Fault::Full(self.choice.between(0.0, ROOM) as usize),
+                false => Fault::Unsynced(0),
+            });
             let ends = now + slow.unwrap_or(COMMIT);
-            self.commit = Some(Commit { entries: self.pending.len(), ends, fails });
+            self.commit = Some(Commit { entries: self.pending.len(), ends, fault });
         }
         Ok(())
     }
 
     fn append(&mut self, count: usize) -> anyhow::Result<()> {
-        let entries: Vec<JournalEntry> = self.pending.drain(..count).collect();
         let calendar = self.calendar(self.now);
-        self.acknowledged = usize::try_from(self.journal.append_all(&entries, calendar)?)?;
+        let entries = self.pending.make_contiguous().get(..count).unwrap_or_default();
+        self.acknowledged = usize::try_from(self.journal.append_all(entries, calendar)?)?;
+        self.pending.drain(..count);
         Ok(())
     }
 
@@ -153,9 +171,9 @@ impl FaultyDisk {
         let end =
             Traced { number: 0, time: self.now, side: Side::Input, kind: "end".into(), text: String::new() };
         self.journal.append_all(&[JournalEntry::Traced(end)], self.calendar(self.now))?;
-        let (path, recorded, acknowledged) = (self.path.clone(), self.recorded.clone(), self.acknowledged);
+        let (files, recorded, acknowledged) = (self.files.clone(), self.recorded.clone(), self.acknowledged);
         drop(self);
-        kept(&path, &recorded, acknowledged, acknowledged)
+        kept(&files.path, &recorded, acknowledged, acknowledged)
     }
 
     /// The commands that were sent, with their times.
@@ -165,24 +183,36 @@ impl FaultyDisk {
         commands.map(|event| (event.time, format!("sent: {:?}", event.kind))).collect()
     }
 
-    /// The program dies. The store must hold all acknowledged entries, and no others than recorded ones.
+    /// The program dies, perhaps in the middle of a commit. What it wrote stays.
     pub(super) fn die(self) -> anyhow::Result<()> {
-        let (path, recorded, acknowledged) = (self.path.clone(), self.recorded.clone(), self.acknowledged);
-        drop(self);
-        kept(&path, &recorded, acknowledged, acknowledged)
+        self.cut_off(|files| {
+            files.restart();
+            Ok(())
+        })
     }
 
     /// The computer loses its power, perhaps in the middle of a commit.
-    pub(super) fn lose_power(mut self, choice: &mut Choice) -> anyhow::Result<()> {
-        let acknowledged = self.acknowledged;
+    pub(super) fn lose_power(self) -> anyhow::Result<()> {
+        self.cut_off(StoreDisk::lose_power)
+    }
+
+    /// Nothing reaches the files any more, perhaps in the middle of a commit. The store must hold all acknowledged entries, and no others
+    /// than recorded ones.
+    fn cut_off(mut self, end: impl FnOnce(&StoreDisk) -> std::io::Result<()>) -> anyhow::Result<()> {
         let uncommitted = self.commit.as_ref().map_or(0, |commit| commit.entries);
-        let before = Image::of(&self.path)?;
-        self.append(uncommitted)?;
-        let after = Image::of(&self.path)?;
-        let (path, recorded) = (self.path.clone(), self.recorded.clone());
+        let most = self.acknowledged + uncommitted.max(self.unconfirmed);
+        if uncommitted > 0 {
+            let operations = libm::exp(self.choice.between(0.0, libm::log(OPERATIONS))) as usize;
+            self.files.fails(Some(Fault::Over(operations)));
+            // It is not known whether it ended before.
+            let _ = self.append(uncommitted);
+        }
+        let (files, recorded) = (self.files.clone(), self.recorded.clone());
+        let least = self.acknowledged;
+        files.fails(Some(Fault::Over(0)));
         drop(self);
-        before.torn(&after, choice).write(&path)?;
-        kept(&path, &recorded, acknowledged, acknowledged + uncommitted)
+        end(&files)?;
+        kept(&files.path, &recorded, least, most)
     }
 }
 
@@ -205,50 +235,6 @@ impl Recorder for FaultyDisk {
     }
 }
 
-/// The files of a store: what would be there after a power cut between two commits.
-struct Image {
-    file: Vec<u8>,
-    log: Vec<u8>,
-}
-
-impl Image {
-    fn of(path: &Path) -> anyhow::Result<Self> {
-        Ok(Self { file: fs::read(path)?, log: fs::read(beside(path, "-wal")).unwrap_or_default() })
-    }
-
-    /// A power cut before the disk had said that the second image was written: the file of before, as the log is moved into it
-    /// only once it is on the disk, and of the log any of the sectors that are new.
-    fn torn(self, after: &Self, choice: &mut Choice) -> Self {
-        let mut log = self.log.clone();
-        for (nth, new) in after.log.chunks(SECTOR).enumerate() {
-            let at = nth * SECTOR;
-            let old = self.log.get(at..(at + SECTOR).min(self.log.len())).unwrap_or_default();
-            if old == new || choice.between(0.0, 1.0) < 0.5 {
-                continue;
-            }
-            if log.len() < at + new.len() {
-                log.resize(at + new.len(), 0);
-            }
-            log[at..at + new.len()].copy_from_slice(new);
-        }
-        Self { file: self.file, log }
-    }
-
-    fn write(&self, path: &Path) -> anyhow::Result<()> {
-        fs::write(path, &self.file)?;
-        fs::write(beside(path, "-wal"), &self.log)?;
-        // SQLite makes it again from the log.
-        let _ = fs::remove_file(beside(path, "-shm"));
-        Ok(())
-    }
-}
-
-fn beside(path: &Path, ending: &str) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(ending);
-    name.into()
-}
-
 /// Checks that the last session of a store holds the recorded entries in order: at least the acknowledged ones, and none
 /// beyond those of the unfinished commit.
 fn kept(path: &Path, recorded: &[Event], least: usize, most: usize) -> anyhow::Result<()> {
@@ -267,4 +253,94 @@ fn kept(path: &Path, recorded: &[Event], least: usize, most: usize) -> anyhow::R
     let first_other = events.iter().zip(recorded).position(|(one, other)| one != other);
     ensure!(first_other.is_none(), "event {first_other:?} is not what was recorded");
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use tempfile::TempDir;
+
+    use super::*;
+
+    /// Entries that were acknowledged before the disk fails, and in all.
+    const BEFORE: usize = 100;
+    const ALL: usize = 1_000;
+
+    fn events() -> Vec<Event> {
+        let at = |nth: usize| Timestamp::ZERO + TimeSpan::from_ms(nth as i64);
+        (0..ALL).map(|nth| Event { time: at(nth), kind: EventKind::Reverse { train: TrainId(24) } }).collect()
+    }
+
+    /// A session some of whose entries are acknowledged.
+    struct Trial {
+        files: StoreDisk,
+        journal: Journal,
+        _folder: TempDir,
+    }
+
+    impl Trial {
+        fn begin(seed: u64) -> Self {
+            let folder = tempfile::tempdir().expect("a folder");
+            let path = folder.path().join("store.db");
+            let files = StoreDisk::under(&path, seed).expect("a disk");
+            let store = Store::open_or_create(&path).expect("a store");
+            let mut journal =
+                Journal::begin(store, "drive", "track-a", None, &[], Timestamp::ZERO).expect("a session");
+            let machine = NewMachine { kind: "drive", program: "", body: "{}" };
+            journal.begin_machine(machine, Timestamp::ZERO).expect("a machine");
+            let mut trial = Self { files, journal, _folder: folder };
+            assert!(trial.append(0..BEFORE), "the disk is sound");
+            trial
+        }
+
+        fn append(&mut self, range: std::ops::Range<usize>) -> bool {
+            let entries: Vec<_> = events()[range].iter().copied().map(JournalEntry::Event).collect();
+            self.journal.append_all(&entries, Timestamp::ZERO).is_ok()
+        }
+
+        /// The program dies, and perhaps the computer with it. Checks what is left, and that a new session can be written down.
+        fn end(self, is_power_cut: bool, least: usize) {
+            self.files.fails(Some(Fault::Over(0)));
+            drop(self.journal);
+            match is_power_cut {
+                true => self.files.lose_power().expect("the files are there"),
+                false => self.files.restart(),
+            }
+            kept(&self.files.path, &events(), least, ALL)
+                .expect("all that was acknowledged, and no more than was recorded");
+            let store = Store::open(&self.files.path).expect("a store");
+            Journal::begin(store, "drive", "track-a", None, &[], Timestamp::ZERO).expect("a new session");
+        }
+    }
+
+    #[test]
+    fn a_commit_that_is_cut_off_anywhere_takes_nothing_with_it() {
+        for is_power_cut in [false, true] {
+            for operations in 0.. {
+                let mut trial = Trial::begin(operations);
+                trial.files.fails(Some(Fault::Over(operations as usize)));
+                let is_acknowledged = trial.append(BEFORE..ALL);
+                let was_cut_off = trial.files.has_refused();
+                assert_ne!(is_acknowledged, was_cut_off, "after {operations} operations");
+                trial.end(is_power_cut, if is_acknowledged { ALL } else { BEFORE });
+                if !was_cut_off {
+                    assert!(operations > 20, "a commit writes several pages, and waits for the disk");
+                    break;
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_commit_that_fails_is_tried_again_and_kept() {
+        let full = (0..100).map(|nth| Fault::Full(500 * nth));
+        for (nth, fault) in full.chain((0..4).map(Fault::Unsynced)).enumerate() {
+            let mut trial = Trial::begin(nth as u64);
+            trial.files.fails(Some(fault));
+            let is_acknowledged = trial.append(BEFORE..ALL);
+            assert_ne!(is_acknowledged, trial.files.has_refused(), "{fault:?}");
+            trial.files.fails(None);
+            assert!(is_acknowledged || trial.append(BEFORE..ALL), "{fault:?}");
+            trial.end(true, ALL);
+        }
+    }
 }

@@ -12,6 +12,7 @@
 //! line       the line to the station, which loses, delays, garbles and breaks
 //! pair       the program and its guardian as two processes, the bytes between them, and how either hangs and dies
 //! disk       the journal on a slow, full or failing disk, and what a power cut leaves of it
+//! files      the files of a store as SQLite sees them: writes cut short, waits for the disk that fail, power cuts
 //! people     the operator, who sends trains to places and helps them, and the checks of every step
 //! promises   what was promised in a story, and how much of it was kept
 //! story      all lives of one seed, and their result
@@ -23,6 +24,7 @@
 mod burial;
 mod disk;
 mod failure;
+mod files;
 mod life;
 mod line;
 mod pair;

@@ -18,7 +18,7 @@ const LAST_LIFE_S: f64 = 240.0;
 const TROUBLES_WITHIN: f64 = 0.8;
 /// Steps of a life in which it may die: a loop makes some 100 a second.
 const STEPS_PER_S: f64 = 100.0;
-/// How long a guardian hangs that goes on afterwards (s): around the 0.7 s after which the program ends it.
+/// How long a guardian hangs that goes on afterwards (s): around the 0.6 s after which the program ends it.
 const GUARDIAN_HANGS_S: [f64; 2] = [0.01, 1.0];
 /// Steps of an orderly end, at most: some end after three, some after a hundred.
 const FAREWELL_STEPS: usize = 40;
@@ -53,8 +53,8 @@ pub(super) enum Trouble {
     Hang,
     /// The guardian hangs.
     GuardianHang,
-    /// No byte can be written.
-    DiskFull,
+    /// The disk is full in the middle of a write, or does not confirm what was written.
+    DiskFails,
     /// The time that each commit takes.
     DiskSlow(TimeSpan),
     /// The computer's calendar jumps.
@@ -195,7 +195,7 @@ impl Planned {
             4 => (Trouble::Delay(ms(choice, 5.0, 300.0)), choice.between(0.5, 15.0)),
             5 => (Trouble::StationOff, choice.between(0.2, 6.0)),
             6 => (Trouble::Hang, choice.between(0.01, 0.7)),
-            7 => (Trouble::DiskFull, choice.between(0.2, 20.0)),
+            7 => (Trouble::DiskFails, choice.between(0.2, 20.0)),
             8 => (Trouble::DiskSlow(ms(choice, 20.0, 3_000.0)), choice.between(1.0, 30.0)),
             // Up to a day forward or back.
             _ => (Trouble::Calendar(TimeSpan::from_s(choice.between(-86_400.0, 86_400.0))), lasts_s),

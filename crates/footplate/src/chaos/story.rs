@@ -18,6 +18,7 @@ use footplate_store::Store;
 
 use super::disk::FaultyDisk;
 use super::failure::{Failure, FailureKind};
+use super::files::StoreDisk;
 use super::life::{Life, Spell};
 use super::line::{FaultyLine, SharedStation};
 use super::pair::Pair;
@@ -131,7 +132,7 @@ pub(crate) fn story(
             StationSwitches::default(),
             Quirks::default(),
         ))),
-        store,
+        files: StoreDisk::under(store, seed)?,
         choice,
         fate: Fate { seed, station: plan.station, troubles, ..Fate::default() },
     };
@@ -204,7 +205,8 @@ pub(super) struct Teller<'s, 'l> {
     stage: &'s Stage<'l>,
     address: Address,
     pub(super) station: SharedStation<'l>,
-    store: &'s Path,
+    /// The disk under the store.
+    files: StoreDisk,
     pub(super) choice: Choice,
     pub(super) fate: Fate,
 }
@@ -262,17 +264,17 @@ impl<'l> Teller<'_, 'l> {
         Ok(WardLink::over(Pair::new(line, life, pieces), cable)?)
     }
 
-    /// Stops all trains that the previous life may have left running, as the program does first; returns whether it has no end.
-    fn stop_left_running(&mut self) -> anyhow::Result<bool> {
-        if !self.store.exists() {
-            return Ok(false);
+    /// Stops all trains that the previous life may have left running, as the program does first.
+    fn stop_left_running(&mut self) -> anyhow::Result<()> {
+        if !self.files.path.exists() {
+            return Ok(());
         }
-        let Some(unfinished) = Store::open(self.store)?.unfinished_session()? else { return Ok(false) };
+        let Some(unfinished) = Store::open(&self.files.path)?.unfinished_session()? else { return Ok(()) };
         let began = self.now();
         let life = Rc::new(Life::new(None));
         let mut line = self.open(life, &[], Choice::new(0))?;
         let mut opened = self.session(&line)?;
-        recall_directions(opened.session.as_mut(), &Store::open(self.store)?)?;
+        recall_directions(opened.session.as_mut(), &Store::open(&self.files.path)?, [])?;
         let closing = stop_all(&mut line, opened, unfinished.trains);
         if !line.connection_mut().line.all_stopped() {
             // The end of a session takes its time; stops come first in it.
@@ -283,12 +285,12 @@ impl<'l> Teller<'_, 'l> {
         }
         let took = (self.now() - began).as_ms();
         self.note(format!("the next start took {took:.0} ms: {closing}"));
-        Ok(true)
+        Ok(())
     }
 
     /// Runs one life, and its guardian's actions afterwards.
     fn live(&mut self, planned: &PlannedLife) -> anyhow::Result<()> {
-        let is_unfinished = self.stop_left_running()?;
+        self.stop_left_running()?;
         self.await_rest();
         self.check_turnouts();
         let incidents = self.station.borrow().world().incidents().len();
@@ -300,9 +302,16 @@ impl<'l> Teller<'_, 'l> {
             planned.ends,
             if planned.ends_in_farewell { " of its farewell" } else { "" }
         ));
+        let mut dispatcher = dispatcher_of(self.stage, self.station.borrow().world(), &TRAINS);
+        let noise = Choice::new(self.choice.between(0.0, 1e15) as u64);
+        let mut line = self.open(Rc::clone(&life), &planned.troubles, noise)?;
+        let mut opened = self.session(&line)?;
+        if self.files.path.exists() {
+            recall_directions(opened.session.as_mut(), &Store::open(&self.files.path)?, TRAINS)?;
+        }
         let calendar = self.calendar();
         let disk = FaultyDisk::begin(
-            self.store,
+            self.files.clone(),
             &TRAINS,
             Rc::clone(&life),
             &planned.troubles,
@@ -311,12 +320,6 @@ impl<'l> Teller<'_, 'l> {
             calendar,
         )?;
         let disk = Rc::new(RefCell::new(disk));
-        let mut dispatcher = dispatcher_of(self.stage, self.station.borrow().world(), &TRAINS);
-        let noise = Choice::new(self.choice.between(0.0, 1e15) as u64);
-        let mut line = self.open(Rc::clone(&life), &planned.troubles, noise)?;
-        let mut opened = self.session(&line)?;
-        recall_directions(opened.session.as_mut(), &Store::open(self.store)?)?;
-        TRAINS.iter().filter(|_| is_unfinished).for_each(|train| opened.session.check_direction(*train));
         let mut recorder = SharedDisk(Rc::clone(&disk));
         let mut people = People::new(
             self.stage.layout,

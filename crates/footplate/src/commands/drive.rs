@@ -22,6 +22,7 @@ use std::sync::Arc;
 
 use anyhow::{anyhow, bail};
 use clap::Args;
+use footplate_core::model::MotionModel;
 use footplate_core::track::{Layout, Leg};
 use footplate_core::{DecoderSteps, Timestamp, TrainId, TurnoutId};
 use footplate_store::{Schedule, Store, layout_named, parse_layout};
@@ -321,11 +322,8 @@ impl Arguments {
         let mut opened = open_session(address, &link, layout)?;
         opened.session.expect_delays(address.excess(self.railway.line()?.as_ref()));
         if let (Some(store), None) = (&self.railway.store, address.simulated()) {
-            let store = Store::open_to_read(store)?;
-            recall_directions(opened.session.as_mut(), &store)?;
-            if store.unfinished_session()?.is_some() {
-                beginning.models.iter().for_each(|model| opened.session.check_direction(model.train()));
-            }
+            let trains = beginning.models.iter().map(MotionModel::train);
+            recall_directions(opened.session.as_mut(), &Store::open_to_read(store)?, trains)?;
         }
         for model in &beginning.models {
             opened.session.set_decoder(model.train(), DecoderSteps::with(model.highest()))?;

@@ -92,7 +92,7 @@ fn stop_over(
     let mut link = open_cable(cable)?;
     let mut opened = open_session_to_stop(address, &link)?;
     // A train of unknown direction is stopped together with all others.
-    let _ = store.map(|store| recall_directions(opened.session.as_mut(), store));
+    let _ = store.map(|store| recall_directions(opened.session.as_mut(), store, []));
     if all {
         opened.session.stop_all();
     }
@@ -106,14 +106,22 @@ fn stop_over(
 const CHECK_TURNOUTS: &str = "before trains run again, check the turnouts: a train may stand across one that lies for the \
      other track, and a coil that stayed under power may have burnt";
 
-/// Tells a session in which direction the trains of a store were commanded last. Not for a simulated railway, which is new each
-/// time.
+/// Tells a session in which direction the trains of a store were commanded last. If the newest session there has no end, the station is
+/// asked, too, how `trains` run: a reversal, or all of them, may not have been written down. Not for a simulated railway, which is
+/// new each time.
 ///
 /// # Errors
 /// The store cannot be read.
-pub(crate) fn recall_directions(session: &mut dyn Session, store: &Store) -> anyhow::Result<()> {
+pub(crate) fn recall_directions(
+    session: &mut dyn Session,
+    store: &Store,
+    trains: impl IntoIterator<Item = TrainId>,
+) -> anyhow::Result<()> {
     for (train, forward) in store.directions()? {
         session.set_direction(train, forward);
+    }
+    if store.unfinished_session()?.is_some() {
+        trains.into_iter().for_each(|train| session.check_direction(train));
     }
     Ok(())
 }

@@ -30,6 +30,7 @@ use super::picture;
 use crate::clock::{LATEST, now};
 use crate::commands::Outcome;
 use crate::commands::dashboard_routes::{SetUpMode, SetUpRoute, open_dashboard};
+use crate::commands::left_running::recall_directions;
 use crate::commands::plot::PictureFile;
 use crate::commands::written_layout::WrittenLayout;
 use crate::counted::counted;
@@ -157,14 +158,19 @@ impl Session<'_> {
         };
         let beginning =
             CalibrationBeginning::new(on, settings, fit, &turnouts, self.link.simulated().is_some());
-        let mut written = match self.store {
-            Some(path) => Some(kept::begin(path, layout, self.train, self.link, link.now(), &beginning)?),
-            None => None,
-        };
         let line = MeasuredLine::of(self.link, self.store)?;
         let mut opened = open_session(self.link, &link, layout)?;
         opened.session.expect_delays(self.link.excess(line.as_ref()));
         opened.session.set_decoder(self.train, decoder)?;
+        if let (Some(path), None) = (self.store, self.link.simulated())
+            && path.exists()
+        {
+            recall_directions(opened.session.as_mut(), &Store::open_to_read(path)?, [self.train])?;
+        }
+        let mut written = match self.store {
+            Some(path) => Some(kept::begin(path, layout, self.train, self.link, link.now(), &beginning)?),
+            None => None,
+        };
         let scribe = written.as_ref().and_then(SessionJournal::scribe);
         let recorder = written.as_mut().map(|written| written as &mut dyn Recorder);
         let mut calibrator = Recorded::new(beginning.calibrator(layout), scribe);
