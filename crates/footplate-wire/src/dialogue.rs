@@ -196,6 +196,10 @@ impl<A: Awaited> Dialogue<A> {
                 if let Some(command) = command {
                     self.notify(LinkNotice::Unconfirmed(command));
                 }
+                // The station may have heard it or not: it is asked before the train is commanded again.
+                if let Some(Command::Reverse { train }) = command {
+                    self.forget_direction(train);
+                }
                 return Some(Repeat::GivenUp(due));
             }
             if let Some(command) = command.filter(|_| tries > A::REPEATS.usual) {

@@ -98,6 +98,36 @@ fn a_reversal_that_a_station_may_have_forgotten_leaves_the_direction_unknown() {
 }
 
 #[test]
+fn a_reversal_that_is_given_up_leaves_the_direction_to_the_station() {
+    let mut desk = z21_desk::Desk::opened();
+    desk.station.locomotives.insert(24, state(24, Throttle::Stop, true));
+    for command in [speed(T24, 8), speed(T24, 0)] {
+        desk.command(command);
+        desk.run_for(300);
+    }
+    // Given a network that is cut until the reversal is given up,
+    desk.station.answers = false;
+    let reverse = Command::Reverse { train: T24 };
+    desk.command(reverse);
+    desk.run_for(1_400);
+    assert!(desk.notices.contains(&LinkNotice::Unconfirmed(reverse)), "{:?}", desk.notices);
+    assert!(desk.notices.contains(&LinkNotice::ReverseInDoubt(T24)), "{:?}", desk.notices);
+    // when the station, which has not heard it, answers again,
+    desk.station.locomotives.insert(24, state(24, Throttle::Stop, true));
+    desk.station.answers = true;
+    desk.written.clear();
+    for command in [speed(T24, 8), speed(T24, 0), reverse, speed(T24, 8)] {
+        desk.command(command);
+        desk.run_for(300);
+    }
+    // then the train is commanded as it faces, and the next reversal reverses it.
+    let run = |forward| z21_drive(24, Throttle::Step(72), forward);
+    let stand = |forward| z21_drive(24, Throttle::Stop, forward);
+    assert_eq!(desk.commands(), [run(true), stand(true), stand(false), run(false)]);
+    assert_eq!(desk.directions.last(), Some(&(T24, false)));
+}
+
+#[test]
 fn a_direction_of_a_session_without_an_end_that_its_station_contradicts_is_unknown() {
     // Given a session that died after it had kept that both trains run backward, and a station that says so of 58 only,
     let mut desk = z21_desk::Desk::opened();

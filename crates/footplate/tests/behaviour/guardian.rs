@@ -195,6 +195,16 @@ impl Driven {
         child_of(self.guardian.id()).expect("a child")
     }
 
+    /// Waits until a child has ended that its guardian has left.
+    pub(crate) fn ended_without_guardian(&self, child: u32) {
+        self.await_errors("without a guardian all trains are stopped");
+        let began = Instant::now();
+        while Path::new(&format!("/proc/{child}/exe")).exists() {
+            assert!(began.elapsed() < PATIENCE, "its child goes on: {}", self.errors());
+            sleep(EVERY);
+        }
+    }
+
     pub(crate) fn await_errors(&self, words: &str) {
         let began = Instant::now();
         while !self.errors().contains(words) {
@@ -313,12 +323,7 @@ fn a_guardian_that_dies_takes_its_program_with_it_and_no_train_runs() {
     let since = Instant::now();
     driven.guardian.kill().expect("killed");
     stopped(&line, since, "the guardian was killed");
-    let began = Instant::now();
-    while Path::new(&format!("/proc/{child}/exe")).exists() {
-        assert!(began.elapsed() < PATIENCE, "its child goes on: {}", driven.errors());
-        sleep(EVERY);
-    }
-    assert!(driven.errors().contains("without a guardian all trains are stopped"), "{}", driven.errors());
+    driven.ended_without_guardian(child);
     assert_eq!(locked(&line.heard).connections, 2);
 }
 
@@ -329,14 +334,9 @@ fn a_guardian_that_hangs_is_ended_by_its_program_and_no_train_runs() {
     let since = Instant::now();
     signal("STOP", driven.guardian.id());
     stopped(&line, since, "the guardian hangs");
-    let began = Instant::now();
-    while Path::new(&format!("/proc/{child}/exe")).exists() {
-        assert!(began.elapsed() < PATIENCE, "its child goes on: {}", driven.errors());
-        sleep(EVERY);
-    }
+    driven.ended_without_guardian(child);
     let errors = driven.errors();
     assert!(errors.contains("the guardian has answered nothing for 600 ms; it is ended"), "{errors}");
-    assert!(errors.contains("without a guardian all trains are stopped"), "{errors}");
     assert_eq!(driven.status(), None, "a signal ended it: {errors}");
     assert_eq!(locked(&line.heard).connections, 2);
 }

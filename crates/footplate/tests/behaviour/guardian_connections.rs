@@ -16,7 +16,7 @@ use footplate_wire::loconet::{Line, Message};
 
 use crate::board::calibrated_over;
 use crate::guardian::{Driven, WITHIN, running as running_behind_a_board, signal, stopped};
-use crate::guardian_datagrams::{Commanded, Said, ended_by_signal, ended_without_guardian};
+use crate::guardian_datagrams::{Commanded, Said, ended_by_signal};
 use crate::station::Standing;
 
 fn said_to_loconet(line: &str) -> Option<Said> {
@@ -137,17 +137,18 @@ fn every_death_stops_the_trains_over_connections() {
 #[test]
 fn the_death_of_the_guardian_stops_the_trains_over_connections() {
     for kind in KINDS {
-        let (_station, commanded, mut driven) = running(kind, "guardian");
-        let since = Instant::now();
+        let (_station, commanded, driven) = running(kind, "guardian");
+        let (child, since) = (driven.child(), Instant::now());
         signal("KILL", driven.guardian());
         commanded.stopped(Said::Stop, since, &format!("{}, guardian killed", kind.0));
-        ended_without_guardian(&mut driven);
+        driven.ended_without_guardian(child);
     }
 }
 
 #[test]
 fn a_program_without_a_guardian_stops_the_trains_once_its_line_is_back() {
-    let (_board, line, mut driven, _) = running_behind_a_board("guardian-killed-and-unplugged");
+    let (_board, line, driven, _) = running_behind_a_board("guardian-killed-and-unplugged");
+    let child = driven.child();
     line.is_pulled(true);
     signal("KILL", driven.guardian());
     driven.await_errors("trying for ever to stop all trains");
@@ -156,5 +157,5 @@ fn a_program_without_a_guardian_stops_the_trains_once_its_line_is_back() {
     let since = Instant::now();
     line.is_pulled(false);
     stopped(&line, since, "the guardian was killed, and the plug was put back");
-    ended_without_guardian(&mut driven);
+    driven.ended_without_guardian(child);
 }

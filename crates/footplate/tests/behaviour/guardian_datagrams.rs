@@ -169,12 +169,6 @@ pub(crate) fn ended_by_signal(driven: &mut Driven) {
     driven.await_errors("all trains are commanded to stop");
 }
 
-/// The program has stopped all trains without its guardian, and ends.
-pub(crate) fn ended_without_guardian(driven: &mut Driven) {
-    driven.await_errors("without a guardian all trains are stopped");
-    driven.status();
-}
-
 #[test]
 fn every_death_stops_the_trains_over_datagrams() {
     for kind in KINDS {
@@ -191,11 +185,11 @@ fn every_death_stops_the_trains_over_datagrams() {
 #[test]
 fn the_death_of_the_guardian_stops_the_trains_over_datagrams() {
     for kind in KINDS {
-        let (_station, network, mut driven) = running(kind, "guardian");
-        let since = Instant::now();
+        let (_station, network, driven) = running(kind, "guardian");
+        let (child, since) = (driven.child(), Instant::now());
         signal("KILL", driven.guardian());
         network.commanded.stopped(Said::Stop, since, &format!("{}, guardian killed", kind.0));
-        ended_without_guardian(&mut driven);
+        driven.ended_without_guardian(child);
     }
 }
 
