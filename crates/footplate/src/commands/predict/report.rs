@@ -13,7 +13,7 @@ use footplate_store::score::{
     ReferenceScore, ScoredHit, ScoredRecording,
 };
 
-use super::figures::{Hits, PHASES, in_phase, one_decimal, per_cent, ratio};
+use super::figures::{Hits, PHASES, by_step, in_phase, one_decimal, per_cent, ratio};
 
 /// In steady running after the first lap the median error is at most this, ...
 const STEADY_MEDIAN_MM: f64 = 12.0;
@@ -57,6 +57,7 @@ pub(super) fn write(
     ] {
         other_phase(output, phase, title, target, &groups, &all)?;
     }
+    steps(output, &all)?;
     everybody(output, &all)?;
     gates(output, recordings)
 }
@@ -224,6 +225,26 @@ fn missed_coverage(ours: &ForecastScore) -> Vec<&'static str> {
     })
     .map(|((name, _), _)| *name)
     .collect()
+}
+
+/// All trains together by step: coverages that are true in the mean may be so of no step.
+fn steps(output: &mut dyn Write, all: &[&ScoredHit]) -> io::Result<()> {
+    write!(
+        output,
+        "\n## By step, all logs\n\n\
+         | step | phase | n | median | 90 % | bias | in 50 % | in 90 % | in 99 % | missed |\n\
+         |--:|---|--:|--:|--:|--:|--:|--:|--:|---|\n"
+    )?;
+    for (step, hits) in by_step(all) {
+        for (phase, name, _) in PHASES {
+            let ours = in_phase(&hits, phase).ours;
+            if ours.scored > 0 {
+                let missed = missed_coverage(&ours).join(", ");
+                writeln!(output, "| {step} | {name} | {} | {missed} |", our_cells(&ours))?;
+            }
+        }
+    }
+    Ok(())
 }
 
 /// All forecasters side by side.
