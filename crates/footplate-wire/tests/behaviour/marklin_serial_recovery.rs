@@ -78,7 +78,7 @@ fn a_stop_does_not_wait_for_the_recovery() {
                 bench.run_for(1_000);
                 let stop = heard(&bench, said, |message| matches!(message, Message::Drive { .. })).unwrap();
                 let took = (stop - said).as_ms();
-                // It waits for a reply that is under way (51 ms of it, 20 of allowance), for 20 ms of silence, or for
+                // It waits for a reply that has begun (51 ms of it, 20 of allowance), for 20 ms of silence, or for
                 // the gap that the station is given after a word.
                 assert!(took <= 95.0, "{pace:?} {delay} {places:?}: {took} ms");
                 assert_eq!(bench.station.violations, [], "{pace:?} {delay} {places:?}");
