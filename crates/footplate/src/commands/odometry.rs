@@ -6,6 +6,7 @@ pub(super) mod json;
 mod recording;
 mod report;
 mod results;
+mod run_series;
 mod tables;
 mod uploaded;
 mod walked;

@@ -12,8 +12,8 @@ use footplate_store::{ColumnMapping, TachometerBlock, TachometerNote, Tachometer
 
 use super::STANDARD;
 use super::block_stream::each_block;
-use super::report::{MOST_POINTS, RunSeries};
 use super::results::Results;
+use super::run_series::{MOST_POINTS, RunSeries};
 use crate::progress::with_progress;
 use crate::standard_error::say;
 

@@ -1,10 +1,7 @@
 //! What recordings come to, as one page with charts.
 
-mod decimated;
-mod run_series;
 mod still;
 mod tables;
-mod wheel_speeds;
 
 use std::ffi::OsStr;
 use std::io;
@@ -13,18 +10,14 @@ use std::path::Path;
 use footplate_store::write_whole;
 use serde::Serialize;
 
+use super::run_series::{MOST_POINTS, SeriesForm};
 use super::walked::Walked;
 use crate::commands::web_page::{Language, WebPage};
-pub(super) use run_series::RunSeries;
-use run_series::SeriesForm;
 pub(super) use still::still;
-pub(super) use wheel_speeds::WheelSpeeds;
 
 const CHARTS: &str = include_str!("../../../assets/odometry/odometry.js");
 const STYLE: &str = include_str!("../../../assets/odometry/odometry.css");
 
-/// Most points of a line (chosen: several a pixel of any screen, so that zooming in a few times shows more).
-pub(super) const MOST_POINTS: usize = 4000;
 /// Most runs with charts (chosen: as many as a person picks from a list).
 pub(super) const MOST_RUNS: usize = 32;
 /// Runs that have all points; more share the points of so many, so that the page stays below some ten megabytes.

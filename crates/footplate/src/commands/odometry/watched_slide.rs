@@ -12,7 +12,7 @@ use footplate_store::odometry::{OdometryRun, Preset, RunContext, simulated_rows,
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::report::WheelSpeeds;
+use super::run_series::WheelSpeeds;
 use super::walked::leaves_bounds;
 
 /// A run that is gone through as time goes on.

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::run_series::SeriesForm;
-use super::{MOST_POINTS, Walked, tables};
+use super::super::run_series::{MOST_POINTS, SeriesForm};
+use super::{Walked, tables};
 use crate::commands::plot::{Ink, Layer, Panel, Picture, Shape};
 
 /// The first run of the first recording; nothing if there is none.

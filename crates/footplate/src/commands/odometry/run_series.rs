@@ -1,5 +1,8 @@
 //! One run as the lines and marks of its charts.
 
+mod decimated;
+mod wheel_speeds;
+
 use std::collections::BTreeMap;
 
 use footplate_core::odometry::wheels::{Period, Vehicle};
@@ -8,8 +11,11 @@ use footplate_core::{Acceleration, Length, Speed, TimeSpan, Timestamp};
 use footplate_store::Truth;
 use serde::Serialize;
 
-use super::decimated::{Decimated, Shape};
-use super::wheel_speeds::WheelSpeeds;
+use decimated::{Decimated, Shape};
+pub(super) use wheel_speeds::WheelSpeeds;
+
+/// Most points of a line (chosen: several a pixel of any screen, so that zooming in a few times shows more).
+pub(super) const MOST_POINTS: usize = 4000;
 
 /// What each line is called and how it is drawn where there are more rows than points.
 const LINES: [(&str, Shape); 21] = [
@@ -45,7 +51,7 @@ const MARKS: [(&str, &[&str]); 3] = [("wheel_1", &WHEELS), ("wheel_2", &WHEELS),
 
 /// One run as the lines and marks of its charts.
 #[derive(Debug, Clone)]
-pub(in crate::commands::odometry) struct RunSeries {
+pub(super) struct RunSeries {
     wheels: WheelSpeeds,
     begin: Option<Timestamp>,
     last: Timestamp,
@@ -82,7 +88,7 @@ impl SeriesForm {
 
 impl RunSeries {
     /// A run that has not begun, for lines of at most so many points.
-    pub(in crate::commands::odometry) fn new(vehicle: &Vehicle, most_points: usize) -> Self {
+    pub(super) fn new(vehicle: &Vehicle, most_points: usize) -> Self {
         Self {
             wheels: WheelSpeeds::new(vehicle),
             begin: None,
@@ -94,12 +100,7 @@ impl RunSeries {
     }
 
     /// Takes in a row: what was read, what became of it, and what is true.
-    pub(in crate::commands::odometry) fn push(
-        &mut self,
-        period: &Period,
-        estimate: &MotionEstimate,
-        truth: &Truth,
-    ) {
+    pub(super) fn push(&mut self, period: &Period, estimate: &MotionEstimate, truth: &Truth) {
         if self.begin.is_some() {
             self.elapsed += (period.time - self.last).max(TimeSpan::ZERO);
         }
