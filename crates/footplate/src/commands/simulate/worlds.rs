@@ -9,10 +9,9 @@ mod world;
 use std::io::Write;
 
 use clap::Args;
-use footplate_core::TimeSpan;
 
 use self::page::Page;
-use self::sessions::{ScoredWorld, score};
+use self::sessions::{Extent, ScoredWorld, score};
 use self::world::WorldName;
 use super::super::Outcome;
 use super::again::{FailedRun, name_failed};
@@ -51,14 +50,6 @@ pub(super) struct Arguments {
 const SESSIONS: u8 = 3;
 /// Stops in a session: with fewer, a share of 85 % is often chance.
 const STOPS: u16 = 30;
-
-/// How long trains are driven in one world.
-#[derive(Debug, Clone, Copy)]
-struct Extent {
-    sessions: u8,
-    stops: u16,
-    budget: TimeSpan,
-}
 
 impl Arguments {
     pub(super) fn run(self, output: &mut dyn Write) -> anyhow::Result<Outcome> {

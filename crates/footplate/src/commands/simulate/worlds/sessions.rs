@@ -10,7 +10,6 @@ use footplate_core::track::TurnoutStates;
 use footplate_core::{Approach, Length, NodeId, SpeedStep, TimeSpan, Timestamp};
 use footplate_sim::{LivingSwitches, TrainTruth, VirtualStation};
 
-use super::Extent;
 use super::timed::Timed;
 use super::world::WorldName;
 use crate::commands::drive::{DriveBeginning, ScriptRunner, SessionMessage};
@@ -35,6 +34,14 @@ const PAUSE: TimeSpan = TimeSpan::from_ms(3_600_000);
 /// How far early the start of the early-start world is, and at which step.
 const EARLY: Length = Length::from_mm(45.0);
 const EARLY_STEP: u8 = 10;
+
+/// How long trains are driven in one world.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Extent {
+    pub(super) sessions: u8,
+    pub(super) stops: u16,
+    pub(super) budget: TimeSpan,
+}
 
 /// One stop that was carried out.
 #[derive(Debug, Clone)]
