@@ -13,8 +13,8 @@ use footplate_store::{Journal, NewMachine, Schedule, Store};
 use serde::{Deserialize, Serialize};
 
 use super::reader::Known;
-use super::script::step;
-use super::script_runner::{CommandSource, ScriptRunner};
+use super::script::{CommandSource, step};
+use super::script_runner::ScriptRunner;
 use crate::clock::{local, now_after};
 use crate::commands::written_layout::WrittenLayout;
 use crate::session_journal::{IfUnkept, PROGRAM, SessionJournal, WhenFull};

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
 use footplate_store::read_at_most;
+use serde::{Deserialize, Serialize};
 
 use super::instruction::{Instruction, parse};
 use super::reader::Known;
@@ -11,6 +12,16 @@ use crate::comment::without_comment;
 
 /// The largest script, in bytes: about a day of driving.
 const LONGEST: usize = 1 << 20;
+
+/// The source of the instructions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum CommandSource {
+    /// A file or a program: a train finishes one order before it begins the next.
+    Script,
+    /// An operator: a new order replaces the previous one.
+    Person,
+}
 
 /// The number of a queue of steps in a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -18,14 +18,13 @@ use footplate_core::track::Landmark;
 use footplate_core::tracking::PathPoint;
 use footplate_core::{Event, Length, SpeedStep, TimeSpan, Timestamp, TrainId};
 use footplate_store::Schedule;
-use serde::{Deserialize, Serialize};
 
-use self::queue::{Queues, StepQueue};
-use self::waiting::{CHECK_INTERVAL, Wait, is_open_ended};
+use self::queue::{Queues, StepQueue, Wait};
+use self::waiting::{CHECK_INTERVAL, is_open_ended};
 use super::formatter::NoticeFormatter;
 use super::instruction::{HELP, Instruction, Until};
 use super::reader::Known;
-use super::script::{QueueId, Step, step};
+use super::script::{CommandSource, QueueId, Step, step};
 use super::session_message::SessionMessage;
 use super::words::Mistake;
 use crate::dashboard::{Painter, SchedulePicture, SessionState, TrainTask};
@@ -36,16 +35,6 @@ const FIT_INTERVAL: TimeSpan = TimeSpan::from_ms(5);
 /// The standard deviation of a position that an operator reads off: the end of the shoe beside a sensor, whose own
 /// place is known to 5 mm.
 const READ_OFF_BY_HAND: Length = Length::from_mm(12.0);
-
-/// The source of the instructions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(super) enum CommandSource {
-    /// A file or a program: a train finishes one order before it begins the next.
-    Script,
-    /// An operator: a new order replaces the previous one.
-    Person,
-}
 
 /// Drives trains by instructions.
 #[derive(Debug)]

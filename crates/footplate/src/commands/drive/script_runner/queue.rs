@@ -6,9 +6,8 @@ use std::ops::Bound;
 use footplate_core::{Timestamp, TrainId};
 use footplate_store::Schedule;
 
-use super::CommandSource;
-use super::waiting::Wait;
-use crate::commands::drive::script::{QueueId, Step};
+use crate::commands::drive::instruction::Until;
+use crate::commands::drive::script::{CommandSource, QueueId, Step};
 
 /// Steps that are carried out one after the other.
 #[derive(Debug)]
@@ -20,6 +19,18 @@ pub(super) struct StepQueue {
     pub(super) interrupted: Option<Timestamp>,
     /// The schedule that the steps belong to.
     pub(super) run: Option<ScheduleRun>,
+}
+
+/// A `wait` in progress.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wait {
+    pub(super) until: Until,
+    pub(super) since: Timestamp,
+    pub(super) is_met: bool,
+    /// Whether it is part of the search for a train.
+    pub(super) is_part: bool,
+    /// The number of its line in a schedule, from 0.
+    pub(super) line: usize,
 }
 
 /// A schedule that runs.

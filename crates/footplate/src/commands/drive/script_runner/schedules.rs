@@ -3,10 +3,10 @@
 use footplate_core::{TimeSpan, Timestamp, TrainId};
 use footplate_store::Schedule;
 
+use super::ScriptRunner;
 use super::waiting::is_open_ended;
-use super::{CommandSource, ScriptRunner};
 use crate::commands::drive::instruction::Instruction;
-use crate::commands::drive::script::{QueueId, Step, step};
+use crate::commands::drive::script::{CommandSource, QueueId, Step, step};
 use crate::dashboard::SchedulePicture;
 
 /// A round takes this long at least, so that a schedule without waiting times does not flood the station.

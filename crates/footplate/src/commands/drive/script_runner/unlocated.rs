@@ -4,7 +4,7 @@ use footplate_core::control::{Order, Refusal};
 use footplate_core::{SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::ScriptRunner;
-use super::waiting::Wait;
+use super::queue::Wait;
 use crate::commands::drive::instruction::{Instruction, Until};
 use crate::commands::drive::script::Step;
 

@@ -11,18 +11,6 @@ use crate::commands::drive::script::{QueueId, Step};
 /// How often to check whether a train is at rest.
 pub(super) const CHECK_INTERVAL: TimeSpan = TimeSpan::from_ms(100);
 
-/// A `wait` in progress.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Wait {
-    pub(super) until: Until,
-    pub(super) since: Timestamp,
-    pub(super) is_met: bool,
-    /// Whether it is part of the search for a train.
-    pub(super) is_part: bool,
-    /// The number of its line in a schedule, from 0.
-    pub(super) line: usize,
-}
-
 impl ScriptRunner {
     /// When the oldest journey of a script exceeds the wait limit.
     pub(super) fn journey_deadline(&self) -> Option<Timestamp> {
