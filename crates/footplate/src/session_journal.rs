@@ -5,49 +5,25 @@
 //! kept and tried again, so a full disk or another process that holds the store costs nothing once it is over. Entries that
 //! do not fit into the queue are lost and counted, and the run is broken there.
 
+mod entry;
 mod scribe;
 mod writer;
 
-use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
-use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::{Arc, PoisonError};
 use std::thread::{self, JoinHandle};
 
 use anyhow::bail;
 use footplate_core::{Event, Timestamp};
 use footplate_store::{Direction, Journal, JournalEntry, TrainAtStart};
 
+use self::entry::{Beginning, Entry, QUEUE, Shared};
+pub(crate) use self::entry::{PROGRAM, WhenFull};
 pub(crate) use self::scribe::Scribe;
 use self::writer::Writer;
 use crate::runtime::Recorder;
 use crate::standard_error::say;
-
-/// The version of the program that decides.
-pub(crate) const PROGRAM: &str = env!("CARGO_PKG_VERSION");
-/// Capacity of the queue: more than five minutes of a busy line (50 events a second) with all decisions, about 10 MB.
-const QUEUE: usize = 60_000;
-
-/// What to do when the queue is full.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum WhenFull {
-    /// Lose the entry: real trains do not wait.
-    Lose,
-    /// Wait for the disk: a simulated clock stands still meanwhile.
-    Wait,
-}
-
-impl WhenFull {
-    /// Offers an entry to a queue; returns whether the queue took it.
-    fn offer(self, queue: &SyncSender<Entry>, entry: Entry) -> bool {
-        match self {
-            Self::Wait => queue.send(entry).is_ok(),
-            Self::Lose => match queue.try_send(entry) {
-                Ok(()) => true,
-                Err(TrySendError::Full(_) | TrySendError::Disconnected(_)) => false,
-            },
-        }
-    }
-}
 
 /// What to do when the session cannot be recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,20 +49,6 @@ pub(crate) struct SessionJournal {
     thread: Option<JoinHandle<Journal>>,
 }
 
-/// State that the thread shares.
-#[derive(Debug, Default)]
-struct Shared {
-    /// No more entries follow.
-    ended: AtomicBool,
-    /// Events in the queue so far, and those of them that are on disk.
-    taken: AtomicU64,
-    acknowledged: AtomicU64,
-    /// Time of the last event on disk, in ns.
-    written_ns: AtomicI64,
-    lost: AtomicU64,
-    trouble: Mutex<Option<String>>,
-}
-
 /// Tells how much of a session is on disk.
 #[derive(Debug, Clone)]
 pub(crate) struct WrittenUntil(Arc<Shared>);
@@ -99,23 +61,6 @@ impl WrittenUntil {
         let written = Timestamp::from_ns(self.0.written_ns.load(Ordering::Acquire));
         if self.0.taken.load(Ordering::Acquire) <= acknowledged { now } else { written.min(now) }
     }
-}
-
-/// The beginning of a run.
-#[derive(Debug, Clone)]
-struct Beginning {
-    began_at: Option<Timestamp>,
-    trains: Vec<TrainAtStart>,
-}
-
-#[derive(Debug)]
-enum Entry {
-    Of(JournalEntry),
-    Run(Beginning),
-    /// The traced entries that follow belong to this machine: its kind and its body.
-    Machine(&'static str, String),
-    /// No more entries follow; it only wakes the thread.
-    End,
 }
 
 /// How much of a session was recorded.

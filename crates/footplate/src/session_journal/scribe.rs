@@ -8,7 +8,7 @@ use std::sync::mpsc::SyncSender;
 use footplate_core::Timestamp;
 use footplate_store::{JournalEntry, Side, Traced};
 
-use super::{Entry, Shared, WhenFull};
+use super::entry::{Entry, Shared, WhenFull};
 
 /// Records one machine through the queue of its session, which keeps the order of all entries.
 #[derive(Debug)]

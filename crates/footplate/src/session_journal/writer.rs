@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use footplate_store::{Journal, JournalEntry, NewMachine, StoreError};
 
-use super::{Entry, PROGRAM, QUEUE, Shared};
+use super::entry::{Entry, PROGRAM, QUEUE, Shared};
 use crate::clock::now;
 
 /// Most entries in one commit: so many are written in a few milliseconds.
@@ -72,15 +72,6 @@ impl Writer {
 
     fn say(&self, trouble: Option<String>) {
         *self.shared.trouble.lock().unwrap_or_else(PoisonError::into_inner) = trouble;
-    }
-}
-
-impl Entry {
-    const fn of_journal(&self) -> Option<&JournalEntry> {
-        match self {
-            Self::Of(entry) => Some(entry),
-            Self::Run(_) | Self::Machine(..) | Self::End => None,
-        }
     }
 }
 
