@@ -3,26 +3,11 @@
 mod families_page;
 mod family;
 mod mechanism;
+mod score_figures;
 mod scored_run;
 mod worlds_page;
 
-use footplate_store::odometry::OdometryScore;
-use serde_json::{Map, Value, json};
-
 pub use self::families_page::FamiliesPage;
+pub use self::score_figures::{figure, score_json};
 pub use self::scored_run::ScoredRun;
 pub use self::worlds_page::{ScoredWorld, WorldsPage};
-
-/// The figures of a score by their names in files.
-pub fn score_json(score: &OdometryScore) -> Value {
-    let figures =
-        score.figures().into_iter().map(|(key, value)| (key.to_owned(), value.map_or(Value::Null, figure)));
-    let mut fields: Map<String, Value> = figures.collect();
-    fields.insert("scored".into(), json!(score.scored));
-    fields.into()
-}
-
-/// A figure to a micrometre or a millionth of a per cent, so that files do not show the rounding of sums.
-pub fn figure(value: f64) -> Value {
-    json!((value * 1e6).round() / 1e6 + 0.0)
-}

@@ -6,7 +6,7 @@ use footplate_store::odometry::Preset;
 use serde_json::{Map, Value, json};
 
 use super::family::{Family, Figures, Spread};
-use super::score_json;
+use super::score_figures::score_json;
 use super::scored_run::{Odometer, ScoredRun};
 
 /// All that was scored, and how.

@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 use super::families_page::{one, rounded_down};
 use super::family::Spread;
 use super::mechanism::mechanism;
-use super::score_json;
+use super::score_figures::score_json;
 use crate::seeds::{FRESH, seeds_sentence};
 
 /// Number of the worst worlds that are named.
