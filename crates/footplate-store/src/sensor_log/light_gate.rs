@@ -6,7 +6,7 @@
 
 use footplate_core::{EventKind, Report, RunId, SpeedStep, Timestamp, TrainId};
 
-use super::read::FormReader;
+use super::form_reader::FormReader;
 use super::runs::{Runs, UNIX_TIMES_FROM, gate_named};
 use crate::decimal::scaled;
 use crate::recording::{Form, Note, Oddity, TrainAtStart};

@@ -4,6 +4,7 @@
 //! [`Recording`]; [`write_sensor_log`] writes Footplate's own. A form is a file
 //! here; what they share is in `runs`.
 
+mod form_reader;
 mod light_gate;
 mod own;
 mod read;
@@ -11,5 +12,6 @@ mod runs;
 mod since_command;
 mod write;
 
-pub use read::{LogContext, RecordingError, parse_sensor_log, read_sensor_log};
+pub use form_reader::LogContext;
+pub use read::{RecordingError, parse_sensor_log, read_sensor_log};
 pub use write::{WriteLogError, write_sensor_log};

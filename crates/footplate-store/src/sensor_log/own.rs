@@ -7,7 +7,7 @@ use std::io::BufRead;
 
 use footplate_core::{EventKind, Report, RunId, SpeedStep, TimeSpan, Timestamp, TrainId, TurnoutId};
 
-use super::read::{FormReader, LogContext};
+use super::form_reader::{FormReader, LogContext};
 use super::runs::{Runs, UNIX_TIMES_FROM, gate_named};
 use super::since_command::length_in_mm;
 use crate::decimal::scaled;

@@ -5,23 +5,14 @@ use std::path::Path;
 
 use footplate_core::TrainId;
 
+use super::form_reader::{FormReader, LogContext};
 use super::light_gate::LightGateLog;
 use super::own::OwnLog;
 use super::runs::Runs;
 use super::since_command::SinceCommandLog;
 use crate::recording::{Form, Note, Oddity, Recording};
-use crate::sensor_names::SensorNames;
-use crate::table::{LastLine, Row, Table, TableError, shown};
+use crate::table::{LastLine, Table, TableError, shown};
 use crate::whole_file::open_file;
-
-/// What a log leaves unsaid.
-#[derive(Clone, Copy)]
-pub struct LogContext<'a> {
-    /// What the sensors of its railway are called.
-    pub sensors: &'a dyn SensorNames,
-    /// The train of rows that name none, unless the name of the file says another one.
-    pub train: Option<TrainId>,
-}
 
 /// Why a sensor log could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -95,19 +86,6 @@ pub fn parse_sensor_log(
         return read_rows(&file, name, table, log);
     }
     Err(missing_columns(&table, file))
-}
-
-/// A reader of one form: takes in row after row.
-pub(super) trait FormReader {
-    /// The form.
-    const FORM: Form;
-    /// The columns that the form cannot do without.
-    const REQUIRED: &'static [&'static str];
-    /// The columns that it knows besides.
-    const OPTIONAL: &'static [&'static str];
-
-    /// Adds a row to the runs, or leaves them as they were.
-    fn read_row(&mut self, row: Row<'_>, runs: &mut Runs) -> Result<(), TableError>;
 }
 
 fn read_rows<L: FormReader, R: BufRead>(

@@ -8,7 +8,7 @@ use std::io::BufRead;
 
 use footplate_core::{EventKind, Length, Report, RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use super::read::FormReader;
+use super::form_reader::FormReader;
 use super::runs::{LONGEST_RUN, Runs};
 use crate::decimal::scaled;
 use crate::recording::{Form, Note, Oddity, TrainAtStart};
