@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::io::{self, Write};
 
-use super::writer::Cell;
+use super::cell::Cell;
 use crate::decimal::push_unscaled;
 
 /// The size of the write buffer (bytes).

@@ -11,7 +11,7 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::parser::parse_message_type;
 
-use super::writer::{Cell, Kind};
+use super::cell::{Cell, Kind};
 
 /// Rows per group: the usual size, a few megabytes in memory.
 const GROUP_ROWS: usize = 128 * 1024;

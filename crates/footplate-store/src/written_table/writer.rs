@@ -4,8 +4,7 @@ use std::fmt;
 use std::io::{self, Write};
 use std::path::Path;
 
-use footplate_core::Timestamp;
-
+use super::cell::{Cell, Kind};
 use super::csv::CsvTable;
 use super::parquet::ParquetTable;
 
@@ -87,38 +86,5 @@ impl<W: Write + Send> TableWriter<W> {
 impl<W: Write + Send> fmt::Debug for TableWriter<W> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("TableWriter").finish_non_exhaustive()
-    }
-}
-
-/// The type of a column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
-    /// Seconds.
-    Time,
-    /// Seconds, or empty.
-    OptionalTime,
-    /// A whole number, or empty.
-    Whole,
-    /// A number in every row.
-    Number,
-    /// A number, or empty.
-    OptionalNumber,
-    /// A text in every row.
-    Text,
-}
-
-/// The value of a field.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Cell<'c> {
-    Missing,
-    Time(Timestamp),
-    Whole(i64),
-    Number(f64),
-    Text(&'c str),
-}
-
-impl Cell<'_> {
-    pub(crate) fn optional_number(value: Option<f64>) -> Self {
-        value.map_or(Self::Missing, Self::Number)
     }
 }
