@@ -13,7 +13,7 @@ use footplate_core::track::{HopId, Reach};
 use footplate_core::tracking::{Hit, Phase, Verdict};
 use footplate_core::{Length, NodeId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use super::comparison::BASELINES;
+use super::reference_forecaster::BASELINES;
 
 /// α = 2⁻⁸ = 1/256 of the slow average.
 const SLOW_SHIFT: u32 = 8;

@@ -2,7 +2,7 @@
 
 use footplate_core::{HALF_95, TimeSpan};
 
-use super::comparison::ReferenceForecaster;
+use super::reference_forecaster::ReferenceForecaster;
 use super::scored_hit::ScoredHit;
 
 /// The levels of the intervals whose coverage is counted.

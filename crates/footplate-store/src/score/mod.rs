@@ -10,15 +10,17 @@ mod comparison;
 mod forecast_score;
 mod gate_check;
 mod oracle;
+mod reference_forecaster;
 mod replay;
 mod scored_hit;
 mod scorer;
 mod shift_average;
 
 pub use baselines::Baselines;
-pub use comparison::{BASELINES, Comparison, ReferenceForecaster, ReferenceScore};
+pub use comparison::{Comparison, ReferenceScore};
 pub use forecast_score::{Coverage, ForecastScore, LEVELS};
 pub use gate_check::{GATE_DISTANCE, GATE_TICK, GateAgreement, GateCheck};
+pub use reference_forecaster::{BASELINES, ReferenceForecaster};
 pub use replay::{ReplayContext, ReplayError, replay_run};
 pub use scored_hit::ScoredHit;
 pub use scorer::{Forecasters, ScoredRecording, score_recording};

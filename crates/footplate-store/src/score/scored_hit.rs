@@ -3,7 +3,7 @@
 use footplate_core::tracking::{Hit, Phase};
 use footplate_core::{RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
-use super::comparison::ReferenceForecaster;
+use super::reference_forecaster::ReferenceForecaster;
 
 /// A passage and the forecasts of its report.
 ///
