@@ -5,7 +5,7 @@ use rusqlite::{Connection, Transaction, params_from_iter};
 
 use super::leaf_pages::{FoundRow, Pages};
 use super::table_copy::{TableCopy, columns_of};
-use super::{Parent, RENUMBERED, TABLES, accepted, stand_in};
+use super::tables::{Parent, RENUMBERED, TABLES, accepted, stand_in};
 use crate::store::checksum;
 use crate::store::file::Store;
 

@@ -5,7 +5,7 @@ use rusqlite::{Connection, Statement, Transaction};
 
 use super::index_entries;
 use super::strays::Strays;
-use super::{Parent, SalvagedTable, accepted, stand_in};
+use super::tables::{Parent, SalvagedTable, accepted, stand_in};
 use crate::store::checksum;
 
 /// A table as far as it is copied.
