@@ -11,7 +11,7 @@ use footplate_core::{Event, EventKind, Report, SensorId, Timestamp, TrainId};
 use super::decisions::{MachineKey, Side, Traced};
 use super::error::StoreError;
 use super::file::Store;
-use super::recordings::RecordingKey;
+use super::keys::RecordingKey;
 
 /// The detections of a session that were assigned to trains.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -12,8 +12,8 @@ use super::archives::archived;
 use super::checksum;
 use super::error::StoreError;
 use super::file::Store;
+use super::keys::RecordingKey;
 use super::packed_body::PackedBody;
-use super::recordings::RecordingKey;
 use crate::content_hash::ContentHash;
 
 /// A machine by its number in the store.

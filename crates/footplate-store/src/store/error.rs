@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use rusqlite::ErrorCode;
 
-use super::recordings::{EventKey, RecordingKey};
+use super::keys::{EventKey, RecordingKey};
 
 /// Why a store could not do what it was asked. Whatever it says, what was acknowledged before is still there, and
 /// nothing of what failed is.

@@ -5,8 +5,9 @@ use rusqlite::{Connection, Row};
 
 use super::error::StoreError;
 use super::file::Store;
+use super::keys::{EventKey, RecordingKey, RunKey};
 use super::marks::{Mark, MarkKind};
-use super::recordings::{EventKey, LIVE, RecordingKey, RunKey};
+use super::recordings::LIVE;
 use super::row;
 use crate::recording::{GatePass, RawEvent, Run, TrainAtStart};
 

@@ -12,7 +12,7 @@ use super::decisions::{self, MachineKey, NewMachine, Traced};
 use super::directions::{self, Direction};
 use super::error::StoreError;
 use super::file::Store;
-use super::recordings::{RecordingKey, RunKey};
+use super::keys::{RecordingKey, RunKey};
 use super::row;
 use crate::recording::TrainAtStart;
 

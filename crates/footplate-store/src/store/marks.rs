@@ -7,7 +7,7 @@ use rusqlite::{OptionalExtension, Transaction};
 use super::checksum;
 use super::error::StoreError;
 use super::file::Store;
-use super::recordings::EventKey;
+use super::keys::EventKey;
 
 /// A mark on an event.
 #[derive(Debug, Clone, PartialEq, Eq)]

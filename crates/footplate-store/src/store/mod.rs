@@ -6,6 +6,7 @@
 //!
 //! ```text
 //! file          opens, creates and migrates the file; write access
+//! keys          numbers of recordings, runs and events
 //! recordings    imports recordings, appends the events of a live session
 //! journal       a live session from its beginning to its end
 //! decisions     inputs and decisions of a machine, for a replay
@@ -34,6 +35,7 @@ mod error;
 mod file;
 mod history;
 mod journal;
+mod keys;
 mod marks;
 mod packed_body;
 mod profiles;
@@ -53,8 +55,9 @@ pub use error::StoreError;
 pub use file::Store;
 pub use history::{Change, StoredEvent, StoredRecording, StoredRun};
 pub use journal::{Journal, JournalEntry};
+pub use keys::{EventKey, RecordingKey, RunKey};
 pub use marks::{Mark, MarkKind};
-pub use recordings::{EventKey, Import, RecordingKey, RunKey};
+pub use recordings::Import;
 pub(crate) use replays::KeptReplay;
 pub use salvage::{Salvaged, SalvagedTable, salvage};
 pub use schedules::Schedule;

@@ -1,44 +1,15 @@
 //! Writes a store: recordings from files, once each, and the events of a live session as they happen.
 
-use std::fmt;
-
 use footplate_core::{Event, RunId, Timestamp};
 use rusqlite::{Connection, OptionalExtension, ToSql, Transaction};
 
 use super::checksum;
 use super::error::StoreError;
 use super::file::Store;
+use super::keys::{RecordingKey, RunKey};
 use super::row;
 use crate::content_hash::ContentHash;
 use crate::recording::{Recording, Run, TrainAtStart};
-
-/// A newtype over the number of a row.
-macro_rules! key {
-    ($(#[$doc:meta])* $name:ident) => {
-        $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-        pub struct $name(pub i64);
-
-        impl fmt::Display for $name {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                self.0.fmt(f)
-            }
-        }
-    };
-}
-
-key!(
-    /// A recording by its number in the store.
-    RecordingKey
-);
-key!(
-    /// A run by its number in the store, unique over all recordings.
-    RunKey
-);
-key!(
-    /// An event by its number in the store, by which a person excludes it.
-    EventKey
-);
 
 /// The form of the recording of a live session.
 pub(super) const LIVE: &str = "live";
@@ -206,6 +177,7 @@ mod tests {
 
     use super::*;
     use crate::recording::Form;
+    use crate::store::EventKey;
 
     fn store(folder: &Path) -> Store {
         Store::open_or_create(&folder.join("railway.db")).unwrap()

@@ -7,7 +7,7 @@ use rusqlite::types::Type;
 use rusqlite::{Error, Row, Statement, ToSql};
 
 use super::checksum;
-use super::recordings::RunKey;
+use super::keys::RunKey;
 use crate::recording::RawEvent;
 
 /// The step of a sensor's row that reports a block free. The schema knows no kind of its own for it, and older programs
