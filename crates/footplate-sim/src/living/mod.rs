@@ -15,7 +15,8 @@
 //! live_train  drive  incident  one train; its motor; collisions, derailments and overruns
 //! body  points  s88        the track under a train; turnouts; sensors, and what modules remember of them
 //! detectors                the delays of the detectors of blocks
-//! rails  switches  truth   the rails; the faults of the world; the truth, for scorers only
+//! rails  switches         the rails; the faults of the world
+//! truth  past_truth        the truth now and before, for scorers only
 //! ```
 
 mod board;
@@ -33,6 +34,7 @@ mod jmri;
 mod live_train;
 mod loconet;
 mod network;
+mod past_truth;
 mod points;
 mod rails;
 mod s88;
@@ -53,9 +55,10 @@ pub use incident::{Incident, IncidentKind};
 pub use jmri::{JmriSwitches, VirtualJmri};
 pub use live_train::End;
 pub use loconet::{LocoNetSwitches, VirtualLocoNet};
+pub use past_truth::{PassTruth, RestTruth};
 pub use speed_reports::SpeedReports;
 pub use station::{CoilAlarm, FromStation, StationSwitches, VirtualStation};
 pub use switches::LivingSwitches;
-pub use truth::{PassTruth, RestTruth, TrainTruth, Truth};
+pub use truth::{TrainTruth, Truth};
 pub use world::LivingLayout;
 pub use z21::{VirtualZ21, Z21Switches};

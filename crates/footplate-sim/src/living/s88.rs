@@ -9,7 +9,7 @@ use footplate_wire::marklin_serial::{INPUTS_PER_MODULE, ModuleState};
 
 use crate::draws::Draws;
 use crate::living::detectors::Detectors;
-use crate::living::truth::PassTruth;
+use crate::living::past_truth::PassTruth;
 use crate::sensors::{Cause, Faults};
 
 /// A sensor closes or opens.
