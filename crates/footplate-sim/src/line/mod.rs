@@ -19,7 +19,8 @@
 //! scenario  normal_runs  slide_runs  fault_runs     named runs, drawn from a seed
 //! random_world  true_claims                      worlds drawn from ranges, and what is true of them
 //! service  kinds                                    any train on any line; the trains of scenarios
-//! setup  run  recording  diary  vehicle             the recorder reads; what comes out, what is claimed of the train
+//! setup  run  recording  diary                      the recorder reads; what comes out
+//! vehicle  claimed                                  what is claimed of the train
 //! tachometer  faults  balises  inertial_sensor      what is read
 //! world  steering  plan                             what happens between two samples, and who drives
 //! motion  consist  bogie  gradients                 a train of many wheelsets
@@ -30,6 +31,7 @@
 mod balises;
 mod bogie;
 mod brake_cylinder;
+mod claimed;
 mod consist;
 mod creep_force;
 mod diary;
