@@ -15,7 +15,7 @@ use core::ops::RangeInclusive;
 
 use footplate_core::FunctionNumber;
 
-use super::message::OPERAND;
+use super::operand::OPERAND;
 
 /// Length of the message, and the byte that follows it.
 pub(super) const PACKET_LENGTH: u8 = 11;
@@ -28,6 +28,8 @@ const ALWAYS: u8 = 0x20;
 /// The highest address that a decoder takes in one byte; higher ones have two, with both upper bits of the first set.
 const HIGHEST_SHORT: u16 = 127;
 const LONG: u8 = 0xC0;
+/// The direction bit of a locomotive: backward.
+const BACKWARD: u8 = 0x20;
 /// Instructions to a decoder (S-9.2.1): function group two, F9 to F12, and the two expansions.
 const GROUP_TWO: u8 = 0xA0;
 const EXPANSION_13: u8 = 0xDE;
@@ -150,13 +152,23 @@ impl FunctionPacket {
     }
 }
 
+/// Direction and functions F0 to F4 from their byte.
+pub(super) const fn direction_of(byte: u8) -> (bool, u32) {
+    (byte & BACKWARD == 0, beside_direction(byte))
+}
+
+/// The byte of a direction and functions F0 to F4.
+pub(super) const fn direction_byte(forward: bool, functions: u32) -> u8 {
+    direction_bits(functions) | if forward { 0 } else { BACKWARD }
+}
+
 /// F0 to F4 from their bits beside a direction, where F0 is above F1 to F4.
-pub(super) const fn beside_direction(bits: u8) -> u32 {
+const fn beside_direction(bits: u8) -> u32 {
     ((bits & 0x0F) << 1 | bits >> 4 & 1) as u32
 }
 
 /// The bits of F0 to F4 beside a direction.
-pub(super) const fn direction_bits(functions: u32) -> u8 {
+const fn direction_bits(functions: u32) -> u8 {
     let bits = FunctionGroup::Direction.bits(functions);
     bits >> 1 | (bits & 1) << 4
 }

@@ -10,7 +10,8 @@
 
 use alloc::vec::Vec;
 
-use super::functions::{FunctionPacket, beside_direction, direction_bits, sound, sound_bits};
+use super::functions::{FunctionPacket, direction_byte, direction_of, sound, sound_bits};
+use super::operand::{OPERAND, address_bytes};
 use super::slot::SlotData;
 
 const BUSY: u8 = 0x81;
@@ -29,10 +30,6 @@ const LOCOMOTIVE: u8 = 0xBF;
 const SLOT: u8 = 0xE7;
 const PACKET: u8 = 0xED;
 
-/// Operands have seven bits.
-pub(super) const OPERAND: u8 = 0x7F;
-/// The direction bit of a locomotive: backward.
-const BACKWARD: u8 = 0x20;
 /// Bits of a switch's second operand: the direction (closed) and whether the output is on.
 const CLOSED: u8 = 0x20;
 const ON: u8 = 0x10;
@@ -233,20 +230,4 @@ impl Message {
         bytes.push(bytes.iter().fold(u8::MAX, |xor, byte| xor ^ byte));
         bytes
     }
-}
-
-/// Direction and functions F0 to F4 from their byte.
-pub(super) const fn direction_of(byte: u8) -> (bool, u32) {
-    (byte & BACKWARD == 0, beside_direction(byte))
-}
-
-/// The byte of a direction and functions F0 to F4.
-pub(super) const fn direction_byte(forward: bool, functions: u32) -> u8 {
-    direction_bits(functions) | if forward { 0 } else { BACKWARD }
-}
-
-/// The upper and the lower seven bits of an address.
-pub(super) fn address_bytes(address: u16) -> (u8, u8) {
-    let part = |bits: u16| u8::try_from(bits & u16::from(OPERAND)).unwrap_or(OPERAND);
-    (part(address >> 7), part(address))
 }

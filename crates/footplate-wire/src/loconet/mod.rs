@@ -9,6 +9,7 @@
 mod functions;
 mod line;
 mod message;
+mod operand;
 mod outbox;
 mod outstanding;
 mod request;

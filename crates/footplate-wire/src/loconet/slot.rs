@@ -4,8 +4,8 @@ use alloc::vec::Vec;
 
 use footplate_core::TrainId;
 
-use super::functions::{FunctionGroup, sound, sound_bits};
-use super::message::{OPERAND, address_bytes, direction_byte, direction_of};
+use super::functions::{FunctionGroup, direction_byte, direction_of, sound, sound_bits};
+use super::operand::{OPERAND, address_bytes};
 
 /// Bits of a slot's status: who uses it.
 const USE: u8 = 0x30;
