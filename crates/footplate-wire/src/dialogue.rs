@@ -12,10 +12,11 @@ use footplate_core::{
 };
 
 use crate::farewell::Farewell;
-use crate::locomotives::{Locomotive, Locomotives, ReportedFunctions};
+use crate::locomotives::{Locomotive, Locomotives};
 use crate::outstanding::{AllOutstanding, Awaited, Outgoing, Outstanding};
 use crate::pacing::Pacing;
 use crate::queue::{Queue, entry_of, train_of};
+use crate::reported_functions::ReportedFunctions;
 use crate::session::{Closing, CommandError, LinkNotice, Transmit};
 use crate::silence::{Checks, Silence};
 

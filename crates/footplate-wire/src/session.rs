@@ -13,8 +13,8 @@ use footplate_core::{
     TurnoutId,
 };
 
-use crate::locomotives::ReportedFunctions;
 use crate::marklin_serial::ModuleReads;
+use crate::reported_functions::ReportedFunctions;
 
 /// A session, driven by the loop around a station's line.
 ///

@@ -4,8 +4,8 @@ use footplate_core::{FunctionNumber, TimeSpan, TrainId, TurnoutId};
 
 use super::request::Request;
 use crate::dcc_ex::Throttle;
-use crate::locomotives::ReportedFunctions;
 use crate::outstanding::{Awaited as AwaitedAnswer, Repeats, Subject};
+use crate::reported_functions::ReportedFunctions;
 
 /// A request without an answer is repeated after this time: JMRI answers at once, but may collect garbage or draw panels meanwhile.
 pub(super) const REPEATED_AFTER: TimeSpan = TimeSpan::from_ms(500);

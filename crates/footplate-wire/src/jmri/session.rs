@@ -16,10 +16,10 @@ use super::settings::{Settings, System};
 use super::throttle::ThrottleMessage;
 use crate::dcc_ex::{Throttle, speed_of};
 use crate::dialogue::Dialogue;
-use crate::locomotives::ReportedFunctions;
 use crate::outstanding::Outgoing;
 use crate::pacing::Pacing;
 use crate::protocol::{Opening, Protocol};
+use crate::reported_functions::ReportedFunctions;
 use crate::sensors::Sensors;
 use crate::silence::Checks;
 

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::json::{Malformed, Properties};
 use crate::dcc_ex::Throttle;
-use crate::locomotives::ReportedFunctions;
+use crate::reported_functions::ReportedFunctions;
 
 /// The steps into which JMRI divides the share of a decoder's highest speed for decoders of 126 steps.
 const HIGHEST: u8 = 126;

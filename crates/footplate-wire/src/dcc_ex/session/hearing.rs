@@ -12,8 +12,9 @@ use super::super::request::Throttle;
 use super::super::settings::TurnoutRequests;
 use super::super::time_model::{SENSOR_DELAY_LONGEST, SENSOR_DELAY_SHORTEST};
 use super::Client;
-use crate::locomotives::{Locomotive, ReportedFunctions};
+use crate::locomotives::Locomotive;
 use crate::outstanding::{Awaited as _, Outstanding};
+use crate::reported_functions::ReportedFunctions;
 use crate::sensors::occupied;
 use crate::session::LinkNotice;
 

@@ -11,8 +11,8 @@ use super::super::request::speed_of;
 use super::super::slot::{SlotData, SlotUse};
 use super::super::time_model::SENSOR_DELAY_SHORTEST;
 use super::Client;
-use crate::locomotives::ReportedFunctions;
 use crate::outstanding::Awaited as _;
+use crate::reported_functions::ReportedFunctions;
 use crate::sensors::occupied;
 use crate::session::LinkNotice;
 

@@ -13,10 +13,10 @@ use super::super::speed::step_of;
 use super::super::time_model::{INPUTS_PER_MODULE, Order};
 use super::super::uid::Uid;
 use super::{Client, Query};
-use crate::locomotives::ReportedFunctions;
 use crate::outstanding::Awaited as _;
 use crate::protocol::Opening;
 use crate::queue::train_of;
+use crate::reported_functions::ReportedFunctions;
 use crate::session::LinkNotice;
 
 /// What this program answers to a ping: the version of the protocol that it speaks, and a device without a cable of its

@@ -16,9 +16,9 @@ use super::super::speed::Throttle;
 use super::super::states::{Firmware, Lock, LocomotiveState, TurnoutPosition};
 use super::super::time_model::SENSOR_DELAY_SHORTEST;
 use super::{Client, DETECTORS_WITHIN};
-use crate::locomotives::ReportedFunctions;
 use crate::outstanding::{Awaited as _, Outstanding};
 use crate::protocol::Opening;
+use crate::reported_functions::ReportedFunctions;
 use crate::sensors::occupied;
 use crate::session::{LinkNotice, Transmit};
 
