@@ -13,7 +13,6 @@ use footplate_core::{
     TurnoutId,
 };
 
-use crate::marklin_serial::ModuleReads;
 use crate::reported_functions::ReportedFunctions;
 
 /// A session, driven by the loop around a station's line.
@@ -53,7 +52,7 @@ pub trait Session: Any {
     /// When the station has no such command, too many commands wait, or the session is closing. Nothing is sent then.
     fn handle_command(&mut self, now: Timestamp, command: Command) -> Result<(), CommandError>;
 
-    /// Stops all locomotives of the station next, also those that are unknown here. A 6051 has no such command.
+    /// Stops all locomotives of the station next, also those that are unknown here. No effect on stations without such a command.
     fn stop_all(&mut self) {}
 
     /// Keeps the line free for a command at this time: no poll begins that could still occupy it then. A later call replaces an
@@ -155,9 +154,16 @@ pub enum LinkNotice {
     BroadcastsRefused {
         /// The flags that it left out.
         missing: u32,
+        /// What a person should check on this kind of link.
+        check: &'static str,
     },
     /// The station has no such turnout.
-    TurnoutRefused(TurnoutId),
+    TurnoutRefused {
+        /// The turnout.
+        turnout: TurnoutId,
+        /// What a person should do at this kind of station.
+        check: String,
+    },
     /// The station refused a request.
     Refused(String),
     /// The station has no slot for a train: others use all of them.
@@ -182,6 +188,8 @@ pub enum LinkNotice {
     NotReady {
         /// For how long.
         since: TimeSpan,
+        /// What a person should check on this kind of link.
+        check: &'static str,
     },
     /// A command was sent shortly before a reply was lost, and was sent again.
     Repeated(Command),
@@ -194,7 +202,10 @@ pub enum LinkNotice {
     /// This sensor was occupied when the line was opened: a train is on it, or it is stuck. It is reported again after it was free.
     HeldClosed(SensorId),
     /// The interface does not answer all reads of sensor modules.
-    Reads(ModuleReads),
+    LimitedReads {
+        /// Which it answers, and what follows from that.
+        how: &'static str,
+    },
     /// The solenoid of a turnout was powered for longer than it tolerates.
     SolenoidLate {
         /// The turnout.
@@ -364,16 +375,13 @@ impl Display for LinkNotice {
             Self::Locked => f.write_str(
                 "the station is locked: it ignores driving over the network until its unlock code is entered in its app",
             ),
-            Self::BroadcastsRefused { missing } => write!(
+            Self::BroadcastsRefused { missing, check } => write!(
                 f,
-                "the station does not report everything it was asked to (broadcast flags {missing:#010x}): check its firmware, \
-                 and what its sensors are connected to (feedback=r-bus, can or loconet)"
+                "the station does not report everything it was asked to (broadcast flags {missing:#010x}): {check}"
             ),
-            Self::TurnoutRefused(turnout) => write!(
-                f,
-                "the station has no turnout {turnout}: define it there (<T {turnout} DCC address sub>), or leave out \
-                 `turnouts=defined`"
-            ),
+            Self::TurnoutRefused { turnout, check } => {
+                write!(f, "the station has no turnout {turnout}: {check}")
+            }
             Self::Refused(message) => write!(f, "the station refused a request: {message}"),
             Self::NoSlot(train) => write!(
                 f,
@@ -395,12 +403,9 @@ impl Display for LinkNotice {
                 "the track has lost its power: a short circuit, or another program switched it off; clear it, then \
                  switch the power on",
             ),
-            Self::NotReady { since } => write!(
-                f,
-                "the station has not been ready for {:.1} s (CTS is down); check its power and the cable, or try \
-                 the timed mode if the adapter has no CTS",
-                since.as_s()
-            ),
+            Self::NotReady { since, check } => {
+                write!(f, "the station has not been ready for {:.1} s (CTS is down); {check}", since.as_s())
+            }
             Self::Repeated(command) => {
                 write!(f, "repeated, because a reply was lost after it: {}", Said(*command))
             }
@@ -416,7 +421,7 @@ impl Display for LinkNotice {
             Self::HeldClosed(sensor) => {
                 write!(f, "sensor {sensor} is occupied from the start: a train is on it, or it is stuck")
             }
-            Self::Reads(reads) => write!(f, "the interface {reads}"),
+            Self::LimitedReads { how } => write!(f, "the interface {how}"),
             Self::SolenoidLate { turnout, held } => write!(
                 f,
                 "turnout {turnout} was powered for {:.0} ms; check that its coil is not hot",

@@ -20,17 +20,23 @@ pub enum ModuleReads {
 impl ModuleReads {
     /// Reads of single modules that are lost until it is known that none is answered.
     pub const READS_TRIED: usize = UNANSWERED as usize;
-}
 
-impl Display for ModuleReads {
-    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
-        f.write_str(match self {
+    /// What the interface does, after its name.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
             Self::Single => "answers reads of single sensor modules",
             Self::AllOnly => {
                 "answers reads of all sensor modules only: every read takes as long as all of them, and a sensor \
                  that is occupied for less may be missed"
             }
-        })
+        }
+    }
+}
+
+impl Display for ModuleReads {
+    fn fmt(&self, f: &mut Formatter<'_>) -> FmtResult {
+        f.write_str(self.text())
     }
 }
 

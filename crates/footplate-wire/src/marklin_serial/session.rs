@@ -27,6 +27,9 @@ use crate::session::{Closing, CommandError, LinkNotice, Session, Transmit};
 
 /// CTS down for longer than this is reported: no message and no reply takes so long.
 const NOT_READY_AFTER: TimeSpan = TimeSpan::from_ms(1_500);
+/// What to check then.
+const CHECK_OF_HAND_SHAKE: &str =
+    "check its power and the cable, or try the timed mode if the adapter has no CTS";
 
 /// The client's session with a 6050 or 6051.
 ///
@@ -140,7 +143,7 @@ impl Interface {
         match self.pacing.down_since() {
             Some(since) if now - since >= NOT_READY_AFTER && !self.said_not_ready => {
                 self.said_not_ready = true;
-                self.notify(LinkNotice::NotReady { since: now - since });
+                self.notify(LinkNotice::NotReady { since: now - since, check: CHECK_OF_HAND_SHAKE });
             }
             None => {
                 if core::mem::take(&mut self.said_not_ready) {

@@ -165,7 +165,12 @@ fn turnouts_that_are_defined_are_awaited_only_when_they_move() {
     }
     desk.run_for(450);
     assert_eq!(desk.texts(), ["<T 9 1>", "<T 7 1>", "<T 8 1>"]);
-    assert_eq!(desk.notices.last(), Some(&LinkNotice::TurnoutRefused(TurnoutId(8))));
+    assert_eq!(
+        desk.notices.last().map(ToString::to_string).as_deref(),
+        Some(
+            "the station has no turnout 8: define it there (<T 8 DCC address sub>), or leave out `turnouts=defined`"
+        )
+    );
 }
 
 #[test]

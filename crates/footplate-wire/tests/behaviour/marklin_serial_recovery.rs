@@ -112,7 +112,8 @@ fn an_interface_that_answers_reads_of_all_modules_only_is_found_out_and_read_so(
         bench.station.turnaround = TimeSpan::from_ms(lateness);
         bench.run_until(ms(3_000));
         assert_eq!(bench.session.module_reads(), Some(ModuleReads::AllOnly), "{pace:?} {lateness} ms");
-        assert!(bench.notices.contains(&LinkNotice::Reads(ModuleReads::AllOnly)));
+        let how = ModuleReads::AllOnly.text();
+        assert!(bench.notices.contains(&LinkNotice::LimitedReads { how }));
         // Nothing is lost any more, a watched input or not, and every input is seen.
         let (lost, before) = (bench.notices.len(), bench.now);
         bench.session.watch(Some(SensorId(3)));

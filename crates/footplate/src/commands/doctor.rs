@@ -302,7 +302,7 @@ impl<M: Machine> Attendant<M> for Ear {
         match notice {
             // The kind of reads has its own line in the report, and finding it out loses some replies.
             LinkNotice::Answers | LinkNotice::Identified(_) => return,
-            LinkNotice::Reads(_) => {
+            LinkNotice::LimitedReads { .. } => {
                 self.lost = self.lost.saturating_sub(ModuleReads::READS_TRIED);
                 return;
             }

@@ -263,7 +263,7 @@ impl Alarm {
                 (Grade::Danger, "line-silent", None, vec![format!("{:.1}", since.as_s())])
             }
             LinkNotice::Garbled => (Grade::Danger, "line-garbled", None, Vec::new()),
-            LinkNotice::NotReady { since } => {
+            LinkNotice::NotReady { since, .. } => {
                 (Grade::Danger, "line-not-ready", None, vec![format!("{:.1}", since.as_s())])
             }
             LinkNotice::ReplyLost { .. } => (Grade::Warning, "line-reply-lost", None, Vec::new()),
@@ -277,7 +277,7 @@ impl Alarm {
             LinkNotice::HeldClosed(sensor) => {
                 (Grade::Warning, "line-held-closed", None, vec![sensor.to_string()])
             }
-            LinkNotice::Reads(_) => (Grade::Warning, "line-reads-all-only", None, Vec::new()),
+            LinkNotice::LimitedReads { .. } => (Grade::Warning, "line-reads-all-only", None, Vec::new()),
             LinkNotice::SolenoidLate { turnout, held } => {
                 let blanks = vec![turnout.to_string(), format!("{:.0}", held.as_ms())];
                 (Grade::Danger, "line-solenoid-late", None, blanks)

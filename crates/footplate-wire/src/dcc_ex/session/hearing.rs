@@ -1,6 +1,7 @@
 //! Handles messages from the board.
 
 use alloc::borrow::ToOwned;
+use alloc::format;
 
 use footplate_core::{EventKind, SensorId, SpeedStep, Timestamp, TrainId, TurnoutId};
 
@@ -179,7 +180,12 @@ impl Client {
         match refused.awaited {
             Awaited::Definition(turnout) => self.definitions.missing(turnout),
             Awaited::Thrown(turnout, _) => self.definitions.forget(turnout),
-            Awaited::Turnout(turnout, _) => return self.dialogue.notify(LinkNotice::TurnoutRefused(turnout)),
+            Awaited::Turnout(turnout, _) => {
+                let check = format!(
+                    "define it there (<T {turnout} DCC address sub>), or leave out `turnouts=defined`"
+                );
+                return self.dialogue.notify(LinkNotice::TurnoutRefused { turnout, check });
+            }
             _ => {}
         }
         // It is defined, and thrown then.

@@ -83,7 +83,7 @@ impl Interface {
             }
         }
         if let Some(reads @ ModuleReads::AllOnly) = self.polls.answered(awaited.request) {
-            self.notify(LinkNotice::Reads(reads));
+            self.notify(LinkNotice::LimitedReads { how: reads.text() });
         }
         let answers = self.silence.answered(self.now);
         self.output.extend(answers.map(Transmit::Notice));

@@ -25,6 +25,9 @@ use crate::session::{LinkNotice, Transmit};
 /// A speed that a decoder reports again is passed on after this time: stations report many times a second (chosen: a few numbers
 /// between two sensors are enough).
 const SAME_SPEED_EVERY: TimeSpan = TimeSpan::from_ms(400);
+/// What to check on a station that does not report everything.
+const CHECK_OF_BROADCASTS: &str =
+    "check its firmware, and what its sensors are connected to (feedback=r-bus, can or loconet)";
 
 impl Client {
     /// Takes in one datagram.
@@ -148,7 +151,7 @@ impl Client {
         let missing = self.wanted.0 & !reported.0;
         self.wanted = Broadcasts(self.wanted.0 & reported.0);
         self.is_subscribed = true;
-        self.dialogue.notify(LinkNotice::BroadcastsRefused { missing });
+        self.dialogue.notify(LinkNotice::BroadcastsRefused { missing, check: CHECK_OF_BROADCASTS });
     }
 
     /// Whether trains can run, and whether that is because the track has no power.
