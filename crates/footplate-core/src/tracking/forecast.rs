@@ -8,7 +8,7 @@ use crate::units::{Length, Speed};
 /// What the train is doing before the sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
-pub enum Phase {
+pub enum ForecastPhase {
     /// Runs at a settled speed over a hop that it has passed before.
     Steady,
     /// Runs at a settled speed over a hop that it passes for the first time, or at a step it has not run at.
@@ -33,7 +33,7 @@ pub struct Forecast {
     /// The speed at which the train will pass it.
     pub speed: Speed,
     /// What the train does before it.
-    pub phase: Phase,
+    pub phase: ForecastPhase,
 }
 
 impl Forecast {
@@ -82,7 +82,7 @@ mod tests {
             report: Timestamp::from_s(10.0),
             spread: UniformNormal { deviation: 0.01, width: 0.07 },
             speed: Speed::from_mm_per_s(400.0),
-            phase: Phase::Steady,
+            phase: ForecastPhase::Steady,
         };
         let (low, high) = forecast.interval(0.9);
         let held = forecast.probability_by(high) - forecast.probability_by(low);

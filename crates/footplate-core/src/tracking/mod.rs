@@ -35,7 +35,7 @@ mod track_context;
 mod train_forecaster;
 
 pub use drift_test::{Drift, DriftTest};
-pub use forecast::{Forecast, Phase};
+pub use forecast::{Forecast, ForecastPhase};
 pub use location::{DueSensor, Located, PassedSensor, PathPoint, Rest};
 pub use locator::Locator;
 pub(crate) use motion_filter::INTERRUPTED;

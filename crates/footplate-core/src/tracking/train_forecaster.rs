@@ -3,7 +3,7 @@
 use super::DriftTest;
 use super::arrival::Arrival;
 use super::arrival_filter::ArrivalFilter;
-use super::forecast::{Forecast, Phase};
+use super::forecast::{Forecast, ForecastPhase};
 use super::polls::Polls;
 use super::predictor::{Hit, Verdict};
 use super::route_memory::RouteMemory;
@@ -260,7 +260,7 @@ impl TrainForecaster {
     /// A forecast of a steady train counts as one when it was ever seen to run.
     fn foreseeable(&self, forecast: Forecast) -> Option<Forecast> {
         let is_known = self.settled_hops > 0 || self.model.sensors_passed() > 0;
-        (is_known || forecast.phase == Phase::Change).then_some(forecast)
+        (is_known || forecast.phase == ForecastPhase::Change).then_some(forecast)
     }
 
     fn forecast_of(
@@ -272,11 +272,11 @@ impl TrainForecaster {
         polls: Polls,
     ) -> Forecast {
         let phase = if is_changing {
-            Phase::Change
+            ForecastPhase::Change
         } else if self.routes.has_passed(path, self.drive.step) {
-            Phase::Steady
+            ForecastPhase::Steady
         } else {
-            Phase::FirstLap
+            ForecastPhase::FirstLap
         };
         let contact = self.epoch.unwrap_or(Timestamp::ZERO) + TimeSpan::from_s(due.time);
         let time = contact + TimeSpan::from_ns(polls.period.as_ns() / 2);

@@ -94,7 +94,7 @@ fn taken_for(mode: Mode) -> &'static str {
 mod tests {
     use footplate_core::{Length, Timestamp};
     use footplate_sim::line::LineTruth;
-    use footplate_store::odometry::Phase;
+    use footplate_store::odometry::WheelPhase;
 
     use super::*;
 
@@ -103,7 +103,7 @@ mod tests {
         WorstMoment {
             time: Timestamp::ZERO,
             error_m_s: 9.0,
-            phase: Phase::BothSlip,
+            phase: WheelPhase::BothSlip,
             mode: Mode::Correction,
             estimated: Acceleration::from_m_per_s2(-0.1),
             truth: LineTruth {

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use footplate_core::TimeSpan;
 use footplate_sim::line::{LineLevel, LineWorld};
-use footplate_store::odometry::{OdometryScore, Phase, WorldOdometer, WorldScores};
+use footplate_store::odometry::{OdometryScore, WheelPhase, WorldOdometer, WorldScores};
 use serde_json::{Map, Value, json};
 
 use super::families_page::{one, rounded_down};
@@ -263,10 +263,10 @@ fn write_intervals(
 }
 
 /// ... and so many times that of the raw mean, by whether its wheels tell the truth.
-const fn at_most_raw_mean(phase: Phase) -> f64 {
+const fn at_most_raw_mean(phase: WheelPhase) -> f64 {
     match phase {
-        Phase::Rolling | Phase::RollingAgain | Phase::Standing => 1.05,
-        Phase::OneSlips | Phase::BothSlip => 0.5,
+        WheelPhase::Rolling | WheelPhase::RollingAgain | WheelPhase::Standing => 1.05,
+        WheelPhase::OneSlips | WheelPhase::BothSlip => 0.5,
     }
 }
 
@@ -275,7 +275,7 @@ const fn at_most_raw_mean(phase: Phase) -> f64 {
 fn times(
     all: &WorldScores,
     worlds: &[&ScoredWorld],
-    phase: Phase,
+    phase: WheelPhase,
     other: WorldOdometer,
     at_most: f64,
 ) -> String {
@@ -303,7 +303,7 @@ fn together(worlds: &[&ScoredWorld]) -> Option<WorldScores> {
 
 fn write_phases(output: &mut dyn Write, level: LineLevel, worlds: &[&ScoredWorld]) -> io::Result<()> {
     let Some(scores) = together(worlds) else { return Ok(()) };
-    for phase in Phase::ALL {
+    for phase in WheelPhase::ALL {
         let of = |odometer| scores.in_phase(phase, odometer);
         let rms = |odometer| one(of(odometer).speed_rms_m_s, 3);
         let ours = of(OURS);
@@ -337,7 +337,7 @@ fn as_json(scores: &WorldScores) -> Value {
             WorldOdometer::ALL.map(|odometer| (odometer.key().to_owned(), score_json(&of(odometer))));
         scored.into_iter().collect::<Map<_, _>>()
     };
-    let phases = Phase::ALL.map(|phase| {
+    let phases = WheelPhase::ALL.map(|phase| {
         (phase.key().to_owned(), Value::Object(each(&|odometer| scores.in_phase(phase, odometer))))
     });
     let [worlds, left] = scores.runs_and_left();
@@ -365,6 +365,6 @@ mod tests {
         assert_eq!(beside_asked(Some(1.5), Some(0.9), 1.5), "1.50 / 0.90");
         assert_eq!(beside_asked(Some(1.6), Some(1.7), 1.5), "**1.60** / 1.70");
         assert_eq!(beside_asked(None, None, 1.5), "– / –");
-        assert_eq!(Phase::ALL.map(at_most_raw_mean), [1.05, 0.5, 0.5, 1.05, 1.05]);
+        assert_eq!(WheelPhase::ALL.map(at_most_raw_mean), [1.05, 0.5, 0.5, 1.05, 1.05]);
     }
 }

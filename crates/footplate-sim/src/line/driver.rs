@@ -111,7 +111,7 @@ pub struct State {
 
 /// What the driver is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
+pub enum DrivingPhase {
     /// At a stop.
     Standing,
     /// Faster, as far as the train can.
@@ -132,7 +132,7 @@ pub struct Command {
     /// The same as a force (N), negative for the brake.
     pub force_n: f64,
     /// What it is for.
-    pub phase: Phase,
+    pub phase: DrivingPhase,
 }
 
 /// A place at which the train must not be faster than a speed.
@@ -236,7 +236,7 @@ impl Driver {
     /// The brake that keeps a standing train where it is.
     fn hold(&self, state: State) -> Command {
         let force_n = -self.train.inertia_kg() * self.train.brake.service.as_m_per_s2();
-        Command { effort: self.train.effort(force_n, state.speed), force_n, phase: Phase::Standing }
+        Command { effort: self.train.effort(force_n, state.speed), force_n, phase: DrivingPhase::Standing }
     }
 
     fn run(&mut self, state: State, step: TimeSpan, stop: Target) -> Command {
@@ -258,16 +258,16 @@ impl Driver {
         });
         let freely = -against_n / inertia;
         let (mut wanted, mut phase) = if self.coasting {
-            (hold.min(freely), Phase::Coasting)
+            (hold.min(freely), DrivingPhase::Coasting)
         } else if hold < fullest && speed >= AT_LIMIT * limit {
-            (hold, Phase::Cruising)
+            (hold, DrivingPhase::Cruising)
         } else {
-            (hold.min(fullest), Phase::Accelerating)
+            (hold.min(fullest), DrivingPhase::Accelerating)
         };
         if let Some(needed) = self.braking(state, stop, response, step)
             && needed < wanted
         {
-            (wanted, phase) = (needed, Phase::Braking);
+            (wanted, phase) = (needed, DrivingPhase::Braking);
         }
         if let Some(jerk) = self.style.jerk {
             let change = jerk.as_m_per_s3() * step.as_s();

@@ -5,7 +5,7 @@
 
 use footplate_core::{Acceleration, Length, Speed, TimeSpan};
 
-use super::driver::{Driver, Phase, State, Style, StyleError};
+use super::driver::{Driver, DrivingPhase, State, Style, StyleError};
 use super::profile::LineProfile;
 use super::train::{Train, TrainError};
 
@@ -28,7 +28,7 @@ pub struct Moment {
     /// The acceleration from here on.
     pub acceleration: Acceleration,
     /// What the driver is about.
-    pub phase: Phase,
+    pub phase: DrivingPhase,
 }
 
 /// A stop that was made.
@@ -94,7 +94,7 @@ impl Journey {
         let mut standing = true;
         loop {
             let command = driver.command(state, step);
-            let stands = command.phase == Phase::Standing;
+            let stands = command.phase == DrivingPhase::Standing;
             if stands && !standing {
                 let stop = driver.stop();
                 let beyond = line.stops().get(stop).map_or(Length::ZERO, |stop| state.front - stop.at);
@@ -119,7 +119,9 @@ impl Journey {
             let State { front, speed } = state;
             let moment = Moment { time, front, speed, acceleration, phase: command.phase };
             match run.moments.as_mut_slice() {
-                [.., before, last] if stands && before.phase == Phase::Standing && before.front == front => {
+                [.., before, last]
+                    if stands && before.phase == DrivingPhase::Standing && before.front == front =>
+                {
                     *last = moment;
                 }
                 _ => run.moments.push(moment),

@@ -67,7 +67,7 @@ mod true_claims;
 mod vehicle;
 mod world;
 
-pub use driver::{Command, Driver, Phase, State, Style, StyleError};
+pub use driver::{Command, Driver, DrivingPhase, State, Style, StyleError};
 pub use journey::{Call, Journey, JourneyError, Moment, Work};
 pub use profile::{
     LineError, LineParts, LineProblem, LineProfile, STEEPEST_PER_MILLE, Stop, TIGHTEST_PER_MILLE,

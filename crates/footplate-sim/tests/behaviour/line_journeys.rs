@@ -2,8 +2,8 @@
 
 use footplate_core::{Acceleration, Jerk, Length, Ratio, Speed, TimeSpan};
 use footplate_sim::line::{
-    Brake, Driver, Journey, JourneyError, LineParts, LineProfile, Phase, Resistance, State, Stop, Style,
-    TractiveEffort, Train,
+    Brake, Driver, DrivingPhase, Journey, JourneyError, LineParts, LineProfile, Resistance, State, Stop,
+    Style, TractiveEffort, Train,
 };
 use proptest::prelude::*;
 
@@ -113,7 +113,8 @@ fn jerk_stays_within_what_the_driver_was_given() {
     for coast_to in [None, Some(Ratio::from_percent(80.0))] {
         let style = Style { jerk: Some(Jerk::from_m_per_s3(0.5)), coast_to, ..Style::FASTEST };
         let run = Journey::run(&train(), &level, style, STEP).unwrap();
-        let moving: Vec<_> = run.moments.iter().filter(|moment| moment.phase != Phase::Standing).collect();
+        let moving: Vec<_> =
+            run.moments.iter().filter(|moment| moment.phase != DrivingPhase::Standing).collect();
         for pair in moving.windows(2) {
             let change = (pair[1].acceleration - pair[0].acceleration).as_m_per_s2().abs();
             assert!(change <= 0.5 * STEP.as_s() + 0.01, "{change} at {:?}", pair[0]);
@@ -158,8 +159,10 @@ fn of_a_long_stop_the_first_and_the_last_moment_are_kept() {
         ..LineParts::default()
     });
     let run = Journey::run(&train(), &long.unwrap(), Style::FASTEST, STEP).unwrap();
-    let night =
-        run.moments.iter().filter(|moment| moment.phase == Phase::Standing && moment.front > place(400.0));
+    let night = run
+        .moments
+        .iter()
+        .filter(|moment| moment.phase == DrivingPhase::Standing && moment.front > place(400.0));
     let times: Vec<_> = night.take(2).map(|moment| moment.time).collect();
     let call = run.calls[1];
     assert_eq!(times, [call.arrives, call.departs - STEP]);
@@ -206,7 +209,7 @@ fn who_coasts_takes_longer_and_uses_less() {
     let held = Journey::run(&train(), &level, Style::FASTEST, STEP).unwrap();
     let style = Style { coast_to: Some(Ratio::from_percent(85.0)), ..Style::FASTEST };
     let coasted = Journey::run(&train(), &level, style, STEP).unwrap();
-    assert!(coasted.moments.iter().any(|moment| moment.phase == Phase::Coasting));
+    assert!(coasted.moments.iter().any(|moment| moment.phase == DrivingPhase::Coasting));
     assert!(coasted.time() > held.time());
     assert!(coasted.work.traction_j < 0.97 * held.work.traction_j);
 }

@@ -23,5 +23,5 @@ pub use run::{OdometryRun, Preset, RunContext, RunScores};
 pub use score::OdometryScore;
 pub use simulated::{simulated_columns, simulated_rows, simulated_vehicle};
 pub use summary::{FlagCounts, ModeCounts, RunSummary};
-pub use world_score::{Phase, WorldOdometer, WorldScores};
+pub use world_score::{WheelPhase, WorldOdometer, WorldScores};
 pub use worst_moment::WorstMoment;

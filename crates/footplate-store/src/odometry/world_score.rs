@@ -25,7 +25,7 @@ const BOTH_FOR_S: f64 = 1.0;
 
 /// What the train and its wheels do in truth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
+pub enum WheelPhase {
     /// Both wheelsets roll, and have for a while.
     Rolling,
     /// One slips, slides or is locked.
@@ -38,7 +38,7 @@ pub enum Phase {
     Standing,
 }
 
-impl Phase {
+impl WheelPhase {
     /// All of them, in the order of tables.
     pub const ALL: [Self; 5] =
         [Self::Rolling, Self::OneSlips, Self::BothSlip, Self::RollingAgain, Self::Standing];
@@ -173,7 +173,7 @@ impl WorldScores {
             let likely = estimate.confidence;
             let sure = estimate.guaranteed;
             let width_of = width([likely.speed_low.as_m_per_s(), likely.speed_high.as_m_per_s()]);
-            if phase == Phase::Rolling {
+            if phase == WheelPhase::Rolling {
                 let [of_likely, of_sure] = &mut scores.widths;
                 of_likely.push(width_of);
                 of_sure.push(width([sure.speed_low.as_m_per_s(), sure.speed_high.as_m_per_s()]));
@@ -207,7 +207,7 @@ impl WorldScores {
 
     /// The score of an odometer in a phase; distances are not scored by phase.
     #[must_use]
-    pub fn in_phase(&self, phase: Phase, odometer: WorldOdometer) -> OdometryScore {
+    pub fn in_phase(&self, phase: WheelPhase, odometer: WorldOdometer) -> OdometryScore {
         self.phases[phase as usize][odometer as usize].score()
     }
 
@@ -251,18 +251,18 @@ struct PhaseWatch {
 }
 
 impl PhaseWatch {
-    fn see(&mut self, time: Timestamp, truth: &LineTruth) -> Phase {
+    fn see(&mut self, time: Timestamp, truth: &LineTruth) -> WheelPhase {
         let slipping = truth.wheels.iter().filter(|does| **does != WheelTruth::Rolling).count();
         if slipping > 0 {
             self.slipped = Some(time);
         }
         let again = self.slipped.is_some_and(|slipped| (time - slipped).as_s() < AGAIN_S);
         match slipping {
-            0 if truth.speed.as_m_per_s() == 0.0 => Phase::Standing,
-            0 if again => Phase::RollingAgain,
-            0 => Phase::Rolling,
-            1 => Phase::OneSlips,
-            _ => Phase::BothSlip,
+            0 if truth.speed.as_m_per_s() == 0.0 => WheelPhase::Standing,
+            0 if again => WheelPhase::RollingAgain,
+            0 => WheelPhase::Rolling,
+            1 => WheelPhase::OneSlips,
+            _ => WheelPhase::BothSlip,
         }
     }
 }
@@ -270,7 +270,7 @@ impl PhaseWatch {
 #[derive(Debug, Clone, Copy)]
 struct Moment {
     time: Timestamp,
-    phase: Phase,
+    phase: WheelPhase,
     width: f32,
 }
 
@@ -283,7 +283,7 @@ fn back_to_normal(seen: &[Moment], normal: Option<f64>) -> Vec<f32> {
     let mut normal_after = f32::INFINITY;
     let mut found = Vec::new();
     for moment in seen {
-        let rolls = matches!(moment.phase, Phase::Rolling | Phase::RollingAgain);
+        let rolls = matches!(moment.phase, WheelPhase::Rolling | WheelPhase::RollingAgain);
         if !rolls && let Some(since) = rolls_since.take() {
             if (moment.time - since).as_s() >= COHERENT_S {
                 found.push(normal_after);
@@ -291,13 +291,13 @@ fn back_to_normal(seen: &[Moment], normal: Option<f64>) -> Vec<f32> {
             normal_after = f32::INFINITY;
         }
         match moment.phase {
-            Phase::BothSlip => {
+            WheelPhase::BothSlip => {
                 both_since.get_or_insert(moment.time);
             }
             // Time counts from when both roll.
-            Phase::OneSlips => {}
-            Phase::Standing => both_since = None,
-            Phase::Rolling | Phase::RollingAgain => {
+            WheelPhase::OneSlips => {}
+            WheelPhase::Standing => both_since = None,
+            WheelPhase::Rolling | WheelPhase::RollingAgain => {
                 if let Some(since) = both_since.take()
                     && (moment.time - since).as_s() >= BOTH_FOR_S
                 {
@@ -330,10 +330,10 @@ fn median(values: &[f32]) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn moments(phases: &[(Phase, f32, usize)]) -> Vec<Moment> {
+    fn moments(phases: &[(WheelPhase, f32, usize)]) -> Vec<Moment> {
         let each =
             phases.iter().flat_map(|&(phase, width, times)| std::iter::repeat_n((phase, width), times));
-        let at = |(row, (phase, width)): (usize, (Phase, f32))| Moment {
+        let at = |(row, (phase, width)): (usize, (WheelPhase, f32))| Moment {
             time: Timestamp::ZERO + TimeSpan::from_ms(100 * row as i64),
             phase,
             width,
@@ -343,7 +343,7 @@ mod tests {
 
     #[test]
     fn the_time_until_the_interval_is_normal_begins_when_both_roll() {
-        use Phase::{BothSlip, OneSlips, Rolling, RollingAgain, Standing};
+        use WheelPhase::{BothSlip, OneSlips, Rolling, RollingAgain, Standing};
         let seen = moments(&[
             (Rolling, 0.5, 10),
             (BothSlip, 3.0, 20),

@@ -4,7 +4,7 @@ use footplate_core::odometry::{Mode, MotionEstimate};
 use footplate_core::{Acceleration, TimeSpan, Timestamp};
 use footplate_sim::line::{LineTruth, WheelTruth};
 
-use super::world_score::Phase;
+use super::world_score::WheelPhase;
 
 /// The moment of the largest speed error of the recommended preset.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,7 +14,7 @@ pub struct WorstMoment {
     /// Its speed less the true one (m/s).
     pub error_m_s: f64,
     /// The phase.
-    pub phase: Phase,
+    pub phase: WheelPhase,
     /// The mode of the estimate.
     pub mode: Mode,
     /// The acceleration that the odometer estimated.
@@ -42,7 +42,7 @@ impl WorstWatch {
         &mut self,
         estimate: &MotionEstimate,
         truth: &LineTruth,
-        phase: Phase,
+        phase: WheelPhase,
         command: Option<f64>,
         faulty_count: Option<i64>,
     ) {

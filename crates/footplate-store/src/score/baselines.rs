@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use super::shift_average::ShiftAverage;
 use footplate_core::track::{HopId, Reach};
-use footplate_core::tracking::{Hit, Phase, Verdict};
+use footplate_core::tracking::{ForecastPhase, Hit, Verdict};
 use footplate_core::{Length, NodeId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::reference_forecaster::BASELINES;
@@ -86,7 +86,7 @@ impl Baselines {
 /// Whether our estimator considers the hop as run at a steady speed.
 fn is_settled(hit: &Hit) -> bool {
     let learnt = matches!(hit.verdict, Verdict::Learnt | Verdict::Reopened);
-    learnt && hit.forecast.is_none_or(|forecast| forecast.phase != Phase::Change)
+    learnt && hit.forecast.is_none_or(|forecast| forecast.phase != ForecastPhase::Change)
 }
 
 fn arrival(last: Timestamp, path: &Reach, speed: Speed) -> Option<Timestamp> {

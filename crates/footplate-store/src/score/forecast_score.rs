@@ -133,7 +133,7 @@ impl Coverage {
 mod tests {
     use footplate_core::link::{DetectionWindow, UniformNormal};
     use footplate_core::model::{Drive, Passage};
-    use footplate_core::tracking::{Forecast, Hit, Phase, Verdict};
+    use footplate_core::tracking::{Forecast, ForecastPhase, Hit, Verdict};
     use footplate_core::{NodeId, RunId, SensorId, Speed, SpeedStep, TimeSpan, Timestamp, TrainId};
 
     use super::*;
@@ -149,7 +149,7 @@ mod tests {
             report: until - TimeSpan::from_ms(late_ms),
             spread: UniformNormal { deviation: 0.0, width: 0.1 },
             speed: Speed::from_mm_per_s(400.0),
-            phase: Phase::Steady,
+            phase: ForecastPhase::Steady,
         };
         let passage = Passage {
             sensor,

@@ -15,7 +15,7 @@ use footplate_core::model::Drive;
 use footplate_core::model::MotionModel;
 use footplate_core::model::survey::SectionIndex;
 use footplate_core::track::Layout;
-use footplate_core::tracking::{Hit, Phase, Predictor, TrainForecaster};
+use footplate_core::tracking::{ForecastPhase, Hit, Predictor, TrainForecaster};
 use footplate_core::{Length, Speed, SpeedStep, TimeSpan, Timestamp};
 
 use super::replay::{ReplayContext, ReplayError, replay_run};
@@ -96,7 +96,7 @@ fn stretches(hits: &[Hit]) -> impl Iterator<Item = &[Hit]> {
 
 /// Whether the train ran at a steady speed from the sensor before.
 fn is_steady(hit: &Hit) -> bool {
-    let is_steady = hit.forecast.is_none_or(|forecast| forecast.phase != Phase::Change);
+    let is_steady = hit.forecast.is_none_or(|forecast| forecast.phase != ForecastPhase::Change);
     is_steady && hit.passage.path.is_some()
 }
 

@@ -1,6 +1,6 @@
 //! One passage of a sensor with all its forecasts.
 
-use footplate_core::tracking::{Hit, Phase};
+use footplate_core::tracking::{ForecastPhase, Hit};
 use footplate_core::{RunId, SpeedStep, TimeSpan, Timestamp, TrainId};
 
 use super::reference_forecaster::ReferenceForecaster;
@@ -35,7 +35,7 @@ impl ScoredHit {
     }
 
     /// The phase of motion on the path; `None` without a forecast.
-    pub fn phase(&self) -> Option<Phase> {
+    pub fn phase(&self) -> Option<ForecastPhase> {
         self.hit.forecast.map(|forecast| forecast.phase)
     }
 

@@ -1,7 +1,7 @@
 //! How near forecasts come on the recordings of real trains: true numbers, not that two walks agree.
 
 use footplate_core::model::MotionModel;
-use footplate_core::tracking::{Phase, Predictor};
+use footplate_core::tracking::{ForecastPhase, Predictor};
 use footplate_core::{DecoderSteps, SpeedStep, TrainId};
 use footplate_store::score::{
     Comparison, Forecasters, ReferenceForecaster, ReplayContext, ScoredHit, ScoredRecording, score_recording,
@@ -19,7 +19,7 @@ fn scored(files: &[&str]) -> Vec<ScoredRecording> {
     files.iter().map(score).collect()
 }
 
-fn of_phase(logs: &[ScoredRecording], phase: Phase) -> Comparison {
+fn of_phase(logs: &[ScoredRecording], phase: ForecastPhase) -> Comparison {
     let hits: Vec<&ScoredHit> =
         logs.iter().flat_map(|log| &log.hits).filter(|hit| hit.phase() == Some(phase)).collect();
     Comparison::of(hits.iter().copied())
@@ -29,7 +29,7 @@ fn of_phase(logs: &[ScoredRecording], phase: Phase) -> Comparison {
 fn steady_forecasts_are_as_near_as_the_poll_lets_them_be() {
     let all = scored(&ALL);
     // Given 473 reports of trains that run steadily over hops they passed before, half are forecast to 7.7 mm,
-    let steady = of_phase(&all, Phase::Steady);
+    let steady = of_phase(&all, ForecastPhase::Steady);
     assert!(steady.ours.scored >= 450, "{:?}", steady.ours);
     assert!(steady.ours.median_abs_mm.unwrap() <= 7.7, "{:?}", steady.ours);
     // the mean, at a poll, is below that of repeating the last lap,
@@ -43,14 +43,14 @@ fn steady_forecasts_are_as_near_as_the_poll_lets_them_be() {
         assert!(low <= stated && stated <= high, "{coverage:?}");
     }
     // First laps are not forecast late or early as a whole.
-    let first = of_phase(&all, Phase::FirstLap);
+    let first = of_phase(&all, ForecastPhase::FirstLap);
     assert!(first.ours.bias_mm.unwrap().abs() < 3.0, "{:?}", first.ours);
 }
 
 #[test]
 fn little_is_left_to_learn_of_a_long_log() {
     // Given the one log with more than 40 steady reports, whose runs are steady from the beginning,
-    let steady = of_phase(&scored(&ALL[8..]), Phase::Steady);
+    let steady = of_phase(&scored(&ALL[8..]), ForecastPhase::Steady);
     assert!(steady.ours.scored > 390, "{:?}", steady.ours);
     // then knowing all of it beforehand would help by no more than 15 %.
     let ratio = steady.reference(ReferenceForecaster::Oracle).unwrap().ratio().unwrap();

@@ -7,7 +7,7 @@
 use std::path::PathBuf;
 
 use footplate_core::{Length, Speed, TimeSpan};
-use footplate_sim::line::{Journey, LineProfile, Phase, Style, Train};
+use footplate_sim::line::{DrivingPhase, Journey, LineProfile, Style, Train};
 use footplate_store::{read_line, read_train};
 
 /// One row of `reference_points.csv`.
@@ -188,9 +188,9 @@ fn the_train_does_where_the_reference_does() {
             let ours = run.passing(Length::from_m(point.at_m)).unwrap();
             let of = format!("{train_name} {line_name} {} m: {ours:?}", point.at_m);
             let phase = match point.behaviour.as_str() {
-                "accelerating" => Phase::Accelerating,
-                "cruising" => Phase::Cruising,
-                _ => Phase::Braking,
+                "accelerating" => DrivingPhase::Accelerating,
+                "cruising" => DrivingPhase::Cruising,
+                _ => DrivingPhase::Braking,
             };
             // Where a limit falls, one thing ends and the next begins.
             let is_border = line.speed_limit().steps().any(|(at, _)| at.as_m() == point.at_m);

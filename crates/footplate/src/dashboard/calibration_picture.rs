@@ -1,7 +1,9 @@
 //! The state of a calibration: experiment, reason, remaining time and achieved accuracy.
 
 use footplate_core::Approach;
-use footplate_core::control::learn::{CalibrationNotice, Experiment, Phase, Progress, StepAccuracy, Why};
+use footplate_core::control::learn::{
+    CalibrationNotice, CalibrationPhase, Experiment, Progress, StepAccuracy, Why,
+};
 use serde::Serialize;
 
 use super::picture::tenths;
@@ -81,13 +83,13 @@ impl CalibrationPicture {
 
     fn advance_to(&mut self, progress: &Progress) {
         self.phase = match progress.phase {
-            Phase::Finding => "finding",
-            Phase::Joining => "joining",
-            Phase::Experiment(_) => "experiment",
-            Phase::Ending => "ending",
-            Phase::Finished => "finished",
+            CalibrationPhase::Finding => "finding",
+            CalibrationPhase::Joining => "joining",
+            CalibrationPhase::Experiment(_) => "experiment",
+            CalibrationPhase::Ending => "ending",
+            CalibrationPhase::Finished => "finished",
         };
-        if !matches!(progress.phase, Phase::Experiment(_)) {
+        if !matches!(progress.phase, CalibrationPhase::Experiment(_)) {
             self.experiment = None;
             self.trial = None;
         }

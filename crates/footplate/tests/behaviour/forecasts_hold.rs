@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::tracking::{Phase, Predictor};
+use footplate_core::tracking::{ForecastPhase, Predictor};
 use footplate_store::layout_named;
 
 use crate::simulated::{TRAIN, for_each};
 
 /// Probabilities that forecasts gave to reports no later than theirs, by phase.
-fn probabilities(scenario: &str) -> BTreeMap<Phase, Vec<f64>> {
+fn probabilities(scenario: &str) -> BTreeMap<ForecastPhase, Vec<f64>> {
     let layout = layout_named("track-a").expect("built in").layout;
-    let mut found: BTreeMap<Phase, Vec<f64>> = BTreeMap::new();
+    let mut found: BTreeMap<ForecastPhase, Vec<f64>> = BTreeMap::new();
     for_each(&layout, scenario, 3, |_, recording| {
         let mut predictor = Predictor::new(&layout);
         for run in &recording.runs {
@@ -35,7 +35,7 @@ fn held(probabilities: &[f64], level: f64) -> f64 {
 fn after_the_first_lap_the_intervals_hold() {
     // Given starts from rest at every step, by trains of six laws,
     let found = probabilities("starts");
-    let steady = &found[&Phase::Steady];
+    let steady = &found[&ForecastPhase::Steady];
     assert!(steady.len() > 800, "{} forecasts", steady.len());
     // then each stated interval holds as often as the issue asks: 45 to 55, 87 to 93 (and not less than that),
     // and at least 98 per cent. One per cent is left for chance: 800 forecasts scatter by 1 to 1.8 %.
@@ -48,7 +48,7 @@ fn after_the_first_lap_the_intervals_hold() {
 #[test]
 fn through_speed_changes_the_intervals_are_not_too_narrow() {
     let found = probabilities("changes");
-    let changing = &found[&Phase::Change];
+    let changing = &found[&ForecastPhase::Change];
     assert!(changing.len() > 1000, "{} forecasts", changing.len());
     // Six laws against three in the live estimator: doubt of the law makes the middle too wide, never the
     // outside too narrow.

@@ -2,7 +2,7 @@
 
 use super::accuracy::StepAccuracy;
 use super::experiment::Experiment;
-use super::notice::Phase;
+use super::notice::CalibrationPhase;
 use crate::time::Timestamp;
 
 /// The present activity of the calibrator.
@@ -30,17 +30,17 @@ pub(super) enum Activity {
 
 impl Activity {
     /// The phase that notices report.
-    pub(super) fn phase(&self) -> Phase {
+    pub(super) fn phase(&self) -> CalibrationPhase {
         match self {
             Self::NotStarted
             | Self::Listening { .. }
             | Self::Finding { .. }
             | Self::Reversing { .. }
-            | Self::Waiting { .. } => Phase::Finding,
-            Self::Joining => Phase::Joining,
-            Self::Trying(trial) => Phase::Experiment(trial.experiment),
-            Self::Ending { .. } => Phase::Ending,
-            Self::Finished => Phase::Finished,
+            | Self::Waiting { .. } => CalibrationPhase::Finding,
+            Self::Joining => CalibrationPhase::Joining,
+            Self::Trying(trial) => CalibrationPhase::Experiment(trial.experiment),
+            Self::Ending { .. } => CalibrationPhase::Ending,
+            Self::Finished => CalibrationPhase::Finished,
         }
     }
 }

@@ -32,5 +32,5 @@ pub use accuracy::{StepAccuracy, usable_steps};
 pub use calibrator::Calibrator;
 pub use experiment::{Experiment, Why, gain, objective};
 pub use learning::Learning;
-pub use notice::{CalibrationNotice, Done, Ending, Fault, Phase, Progress};
+pub use notice::{CalibrationNotice, CalibrationPhase, Done, Ending, Fault, Progress};
 pub use settings::CalibratorSettings;

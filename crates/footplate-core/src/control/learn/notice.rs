@@ -65,7 +65,7 @@ pub struct Done {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Progress {
     /// The phase.
-    pub phase: Phase,
+    pub phase: CalibrationPhase,
     /// Track time since its first command.
     pub elapsed: TimeSpan,
     /// Remaining track time of the budget.
@@ -76,7 +76,7 @@ pub struct Progress {
 
 /// The phase of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Phase {
+pub enum CalibrationPhase {
     /// Finding the train.
     Finding,
     /// Running to a circuit.

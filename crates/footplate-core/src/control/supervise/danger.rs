@@ -12,7 +12,8 @@ use crate::track::{Layout, Position};
 use crate::units::Length;
 
 use super::alarm::Alarm;
-use super::recovery::{Phase, Recovery, UNKNOWN_RATIO};
+use super::recovery::{Recovery, UNKNOWN_RATIO};
+use super::recovery_phase::RecoveryPhase;
 use super::watchdog::{Power, Watchdog};
 use crate::control::{Notice, Outcome};
 
@@ -219,11 +220,12 @@ impl Watchdog {
     pub(super) fn need_operator(&mut self, now: Timestamp, train: TrainId) {
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let while_it = match recovery.phase {
-            Phase::Stopping | Phase::Waiting { .. } | Phase::Ending { .. } | Phase::Turning { .. } => {
-                "while it was being stopped"
-            }
-            Phase::Locating { .. } | Phase::Reversing { .. } => "while it crept to a sensor",
-            Phase::GivenUp => return,
+            RecoveryPhase::Stopping
+            | RecoveryPhase::Waiting { .. }
+            | RecoveryPhase::Ending { .. }
+            | RecoveryPhase::Turning { .. } => "while it was being stopped",
+            RecoveryPhase::Locating { .. } | RecoveryPhase::Reversing { .. } => "while it crept to a sensor",
+            RecoveryPhase::GivenUp => return,
             _ => "while it was measured again",
         };
         let order = recovery.give_up();
@@ -243,7 +245,7 @@ impl Watchdog {
     pub(super) fn interrupt_recoveries(&mut self, now: Timestamp) {
         self.permitted.clear();
         for recovery in self.dangers.values_mut() {
-            if let Phase::Waiting { has_asked } = &mut recovery.phase {
+            if let RecoveryPhase::Waiting { has_asked } = &mut recovery.phase {
                 *has_asked = false;
             } else if recovery.is_active() {
                 recovery.begin_again(now);

@@ -16,7 +16,7 @@
 //! intruder  noise      movements that no session drives; detections at random
 //! strayed  facing      trains that are not where they were estimated, or in another direction
 //! line  orders         the link and the track power; which orders are carried out now
-//! recovery             the recovery of one train
+//! recovery             the recovery of one train, in phases (recovery_phase)
 //! remeasuring  trials  its measurements, and the conclusions from them
 //! ```
 
@@ -29,6 +29,7 @@ mod line;
 mod noise;
 mod orders;
 mod recovery;
+mod recovery_phase;
 mod remeasuring;
 mod stops;
 mod strayed;

@@ -7,7 +7,7 @@ use crate::control::{Notice, Refusal};
 use crate::ids::{SpeedStep, TrainId};
 use crate::time::Timestamp;
 
-use super::recovery::Phase;
+use super::recovery_phase::RecoveryPhase;
 use super::watchdog::Watchdog;
 
 impl Watchdog {
@@ -35,7 +35,8 @@ impl Watchdog {
     /// locate it.
     fn trusted_by(&self, order: &Order) -> Option<TrainId> {
         let Order::Speed { train, .. } = order else { return None };
-        let is_given_up = self.dangers.get(train).is_some_and(|danger| danger.phase == Phase::GivenUp);
+        let is_given_up =
+            self.dangers.get(train).is_some_and(|danger| danger.phase == RecoveryPhase::GivenUp);
         (is_given_up && self.driver.trains().count() == 1).then_some(*train)
     }
 
@@ -93,7 +94,7 @@ impl Watchdog {
 
     /// Restores the earlier model of a train that could not be recovered, after an operator has checked it.
     pub(super) fn trust_again(&mut self, train: TrainId) {
-        let given_up = self.dangers.get(&train).filter(|danger| danger.phase == Phase::GivenUp);
+        let given_up = self.dangers.get(&train).filter(|danger| danger.phase == RecoveryPhase::GivenUp);
         if let Some(base) = given_up.map(|danger| danger.base().clone()) {
             self.driver.set_model(base);
             self.forget(train);

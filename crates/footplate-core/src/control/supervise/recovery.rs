@@ -14,7 +14,8 @@ use crate::units::Length;
 
 use super::alarm::Alarm;
 use super::facing::was_turned;
-use super::trials::{SpeedTrial, Steps};
+use super::recovery_phase::RecoveryPhase;
+use super::trials::Steps;
 use super::watchdog::Watchdog;
 use crate::control::{Notice, Outcome};
 
@@ -46,7 +47,7 @@ pub(super) struct Recovery {
     pub(super) interrupted: Option<(OrderId, Order)>,
     /// The edge along which it faced.
     faced: Option<EdgeId>,
-    pub(super) phase: Phase,
+    pub(super) phase: RecoveryPhase,
     began: Timestamp,
     pub(super) by: Timestamp,
     /// The model from before the alarm.
@@ -63,38 +64,6 @@ pub(super) struct Recovery {
     pub(super) closed: Option<Reservation>,
 }
 
-/// The phase of a recovery.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Phase {
-    /// The train comes to rest.
-    Stopping,
-    /// It is at rest and waits for its turn, for power, for the station, and for clearance to creep.
-    Waiting { has_asked: bool },
-    /// It creeps to two sensors; `seen` is the first one.
-    Locating { step: SpeedStep, pushed: Timestamp, seen: Option<NodeId> },
-    /// It reverses, to creep back; `seen` is its last sensor, in the new direction of travel.
-    Reversing { step: SpeedStep, seen: Option<NodeId> },
-    /// It runs at a step whose speed is measured.
-    Measuring { trial: SpeedTrial, from: SpeedStep },
-    /// It stops short of a sensor by the new model, with this predicted stopping distance.
-    StoppingShort { order: OrderId, distance: Length },
-    /// It creeps to that sensor.
-    Creeping { distance: Length },
-    /// It runs at a step from which it will stop, ...
-    LearningSpeed { trial: SpeedTrial, from: SpeedStep },
-    /// ... comes to rest ...
-    LearningStop { until: Timestamp },
-    /// ... and creeps to a sensor that measures where that was.
-    LearningRest,
-    /// The recovery is complete: it comes to rest ...
-    Ending { outcome: Outcome },
-    /// ... and is turned to the direction in which it was before, if it reversed an odd number of times, remains located and stands on no
-    /// points that it pushed over.
-    Turning { outcome: Outcome },
-    /// An operator is needed.
-    GivenUp,
-}
-
 impl Recovery {
     pub(super) fn new(
         now: Timestamp,
@@ -107,7 +76,7 @@ impl Recovery {
             why,
             interrupted,
             faced,
-            phase: Phase::Stopping,
+            phase: RecoveryPhase::Stopping,
             began: now,
             by: now + STOPPED_WITHIN,
             steps: Steps::of(&base),
@@ -129,18 +98,21 @@ impl Recovery {
 
     /// Whether the train may move on commands of its recovery.
     pub(super) const fn is_active(&self) -> bool {
-        !matches!(self.phase, Phase::Stopping | Phase::Waiting { .. } | Phase::GivenUp)
+        !matches!(
+            self.phase,
+            RecoveryPhase::Stopping | RecoveryPhase::Waiting { .. } | RecoveryPhase::GivenUp
+        )
     }
 
     /// Whether the train was located and runs, or is about to, so that its speeds and stops are measured.
     pub(super) const fn is_measuring(&self) -> bool {
-        let is_done = matches!(self.phase, Phase::Ending { .. } | Phase::Turning { .. });
+        let is_done = matches!(self.phase, RecoveryPhase::Ending { .. } | RecoveryPhase::Turning { .. });
         self.is_active() && !self.is_searched() && !is_done
     }
 
     /// Begins again once the train is at rest; it was commanded to stop.
     pub(super) fn begin_again(&mut self, now: Timestamp) {
-        self.phase = Phase::Stopping;
+        self.phase = RecoveryPhase::Stopping;
         self.by = now + STOPPED_WITHIN;
     }
 
@@ -151,35 +123,35 @@ impl Recovery {
 
     /// Whether it was begun by a report that turns out to be no train's, and nothing else has been done yet than to stop the train.
     pub(super) fn is_refuted_by(&self, sensor: SensorId, time: Timestamp) -> bool {
-        self.why == Alarm::Untimely(sensor) && time <= self.began && self.phase == Phase::Stopping
+        self.why == Alarm::Untimely(sensor) && time <= self.began && self.phase == RecoveryPhase::Stopping
     }
 
     /// Whether it is searched, or will be once it is at rest.
     pub(super) const fn is_searched(&self) -> bool {
         match self.phase {
-            Phase::Locating { .. } | Phase::Reversing { .. } => true,
-            Phase::Stopping | Phase::Waiting { .. } => !self.is_roughly_located(),
+            RecoveryPhase::Locating { .. } | RecoveryPhase::Reversing { .. } => true,
+            RecoveryPhase::Stopping | RecoveryPhase::Waiting { .. } => !self.is_roughly_located(),
             _ => false,
         }
     }
 
     /// An operator is needed; returns the order that it had interrupted.
     pub(super) const fn give_up(&mut self) -> Option<(OrderId, Order)> {
-        self.phase = Phase::GivenUp;
+        self.phase = RecoveryPhase::GivenUp;
         self.interrupted.take()
     }
 
     /// Whether it creeps to be located.
     pub(super) const fn creeps(&self) -> bool {
-        matches!(self.phase, Phase::Locating { .. })
+        matches!(self.phase, RecoveryPhase::Locating { .. })
     }
 
     /// When its phase has to be checked.
     pub(super) fn next_timeout(&self) -> Option<Timestamp> {
         match self.phase {
-            Phase::Waiting { .. } | Phase::GivenUp => None,
-            Phase::Locating { pushed, .. } => Some(self.by.min(pushed + PUSH_AFTER)),
-            Phase::LearningStop { until } => Some(self.by.min(until)),
+            RecoveryPhase::Waiting { .. } | RecoveryPhase::GivenUp => None,
+            RecoveryPhase::Locating { pushed, .. } => Some(self.by.min(pushed + PUSH_AFTER)),
+            RecoveryPhase::LearningStop { until } => Some(self.by.min(until)),
             _ => Some(self.by),
         }
     }
@@ -198,46 +170,50 @@ impl Watchdog {
         for train in trains {
             let Some(recovery) = self.dangers.get(&train) else { continue };
             match recovery.phase {
-                Phase::Stopping
+                RecoveryPhase::Stopping
                     if !self.is_powered()
                         || self.stops.at_rest(train).is_some_and(|at_rest| at_rest <= now) =>
                 {
-                    self.set_phase(train, Phase::Waiting { has_asked: false }, now);
+                    self.set_phase(train, RecoveryPhase::Waiting { has_asked: false }, now);
                     self.wait(now, train, false);
                 }
-                Phase::Waiting { has_asked } => self.wait(now, train, has_asked),
-                Phase::Locating { step, pushed, seen } if now - pushed >= PUSH_AFTER && now < recovery.by => {
+                RecoveryPhase::Waiting { has_asked } => self.wait(now, train, has_asked),
+                RecoveryPhase::Locating { step, pushed, seen }
+                    if now - pushed >= PUSH_AFTER && now < recovery.by =>
+                {
                     let next =
                         Some(recovery.base.next_knot(step)).filter(|next| *next <= recovery.steps.middle);
                     self.creep(now, train, next.unwrap_or(step), seen);
                 }
-                Phase::LearningStop { until } if until <= now => {
+                RecoveryPhase::LearningStop { until } if until <= now => {
                     let low = recovery.steps.low;
-                    self.set_phase(train, Phase::LearningRest, now + MEASURED_WITHIN);
+                    self.set_phase(train, RecoveryPhase::LearningRest, now + MEASURED_WITHIN);
                     self.issue(now, Order::Speed { train, step: low });
                 }
-                Phase::Ending { outcome }
+                RecoveryPhase::Ending { outcome }
                     if self.stops.at_rest(train).is_some_and(|at_rest| at_rest <= now) =>
                 {
                     let turns = !recovery.reversals.is_multiple_of(2)
                         && self.driver.stays_located_reversed(train, now)
                         && !self.has_pushed_over_points(now, train);
                     if turns {
-                        self.set_phase(train, Phase::Turning { outcome }, now + STOPPED_WITHIN);
+                        self.set_phase(train, RecoveryPhase::Turning { outcome }, now + STOPPED_WITHIN);
                         self.issue(now, Order::Reverse { train, then: SpeedStep::STAND });
                     } else {
                         self.recovered(now, train, outcome);
                     }
                 }
-                Phase::Measuring { trial, .. } if recovery.by <= now => self.skip(now, train, trial.step),
-                Phase::GivenUp => {}
+                RecoveryPhase::Measuring { trial, .. } if recovery.by <= now => {
+                    self.skip(now, train, trial.step);
+                }
+                RecoveryPhase::GivenUp => {}
                 _ if recovery.by <= now => self.need_operator(now, train),
                 _ => {}
             }
         }
     }
 
-    pub(super) fn set_phase(&mut self, train: TrainId, phase: Phase, by: Timestamp) {
+    pub(super) fn set_phase(&mut self, train: TrainId, phase: RecoveryPhase, by: Timestamp) {
         if let Some(recovery) = self.dangers.get_mut(&train) {
             recovery.phase = phase;
             recovery.by = by;
@@ -254,7 +230,7 @@ impl Watchdog {
         let closed = self.permitted.remove(&train);
         if !self.permits_all && closed.is_none() {
             if !has_asked {
-                self.set_phase(train, Phase::Waiting { has_asked: true }, now);
+                self.set_phase(train, RecoveryPhase::Waiting { has_asked: true }, now);
                 self.notify(Notice::AsksToCreep { train });
             }
             return;
@@ -303,7 +279,7 @@ impl Watchdog {
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         let step = recovery.steps.creep;
         recovery.reversals += 1;
-        recovery.phase = Phase::Reversing { step, seen };
+        recovery.phase = RecoveryPhase::Reversing { step, seen };
         recovery.by = now + STOPPED_WITHIN;
         self.driver.set_end_of_authority(now, train, None);
         self.notify(Notice::Creeps { train, step });
@@ -312,7 +288,7 @@ impl Watchdog {
 
     fn creep(&mut self, now: Timestamp, train: TrainId, step: SpeedStep, seen: Option<NodeId>) {
         if let Some(recovery) = self.dangers.get_mut(&train) {
-            recovery.phase = Phase::Locating { step, pushed: now, seen };
+            recovery.phase = RecoveryPhase::Locating { step, pushed: now, seen };
         }
         self.issue(now, Order::Speed { train, step });
     }
@@ -322,14 +298,18 @@ impl Watchdog {
         let (EventKind::Speed { train, .. } | EventKind::Reverse { train }) = event.kind else { return };
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
         recovery.fit.take(self.driver.layout(), self.driver.turnouts(), event);
-        if let (EventKind::Reverse { .. }, Phase::Reversing { step, seen }) = (event.kind, recovery.phase) {
-            recovery.phase = Phase::Locating { step, pushed: now, seen };
+        if let (EventKind::Reverse { .. }, RecoveryPhase::Reversing { step, seen }) =
+            (event.kind, recovery.phase)
+        {
+            recovery.phase = RecoveryPhase::Locating { step, pushed: now, seen };
             recovery.by = now + LOCATED_WITHIN;
             self.keep_clear(now, train);
-        } else if let (EventKind::Reverse { .. }, Phase::Turning { outcome }) = (event.kind, recovery.phase) {
+        } else if let (EventKind::Reverse { .. }, RecoveryPhase::Turning { outcome }) =
+            (event.kind, recovery.phase)
+        {
             self.recovered(now, train, outcome);
         } else if let EventKind::Speed { step, .. } = event.kind
-            && let Phase::Measuring { trial, from } | Phase::LearningSpeed { trial, from } =
+            && let RecoveryPhase::Measuring { trial, from } | RecoveryPhase::LearningSpeed { trial, from } =
                 &mut recovery.phase
             && trial.step == step
         {
@@ -340,7 +320,11 @@ impl Watchdog {
     /// A train in recovery has passed a sensor.
     pub(super) fn recovery_passed(&mut self, now: Timestamp, train: TrainId, passed: &PassedSensor) {
         let Some(node) = self.driver.node_passed(passed) else { return };
-        if !self.dangers.get(&train).is_some_and(|danger| matches!(danger.phase, Phase::Reversing { .. })) {
+        if !self
+            .dangers
+            .get(&train)
+            .is_some_and(|danger| matches!(danger.phase, RecoveryPhase::Reversing { .. }))
+        {
             self.keep_clear(now, train);
         }
         let Some(recovery) = self.dangers.get_mut(&train) else { return };
@@ -352,7 +336,7 @@ impl Watchdog {
         recovery.fit.take(self.driver.layout(), self.driver.turnouts(), &event);
         let commanded = self.driver.commanded(train);
         match recovery.phase {
-            Phase::Locating { step, seen: Some(seen), .. } => {
+            RecoveryPhase::Locating { step, seen: Some(seen), .. } => {
                 recovery.fit.note_use(step, StepUse::Moves);
                 // Two consecutive sensors show its direction, and so does one sensor passed in both directions.
                 if node == seen || self.driver.hop_length(train, seen, node).is_some() {
@@ -363,13 +347,13 @@ impl Watchdog {
                     self.creep(now, train, step, Some(node));
                 }
             }
-            Phase::Locating { step, seen: None, .. } => {
-                recovery.phase = Phase::Locating { step, pushed: now, seen: Some(node) };
+            RecoveryPhase::Locating { step, seen: None, .. } => {
+                recovery.phase = RecoveryPhase::Locating { step, pushed: now, seen: Some(node) };
             }
-            Phase::Measuring { mut trial, from } => {
+            RecoveryPhase::Measuring { mut trial, from } => {
                 let hop = trial.last().and_then(|last| self.driver.hop_length(train, last, node));
                 trial.pass(node, passed.window, hop);
-                recovery.phase = Phase::Measuring { trial, from };
+                recovery.phase = RecoveryPhase::Measuring { trial, from };
                 if trial.is_over() {
                     recovery.fit.note_use(trial.step, StepUse::Moves);
                     let ratio = trial.ratio(&recovery.base);
@@ -380,17 +364,17 @@ impl Watchdog {
                     self.measure(now, train);
                 }
             }
-            Phase::Creeping { distance } => self.check_stop(now, train, distance, passed),
-            Phase::LearningSpeed { mut trial, from } => {
+            RecoveryPhase::Creeping { distance } => self.check_stop(now, train, distance, passed),
+            RecoveryPhase::LearningSpeed { mut trial, from } => {
                 trial.pass(node, passed.window, None);
-                recovery.phase = Phase::LearningSpeed { trial, from };
+                recovery.phase = RecoveryPhase::LearningSpeed { trial, from };
                 if trial.last().is_some() && commanded == trial.step {
                     let until = now + LONGEST_STOP + LONGEST_STOP;
-                    self.set_phase(train, Phase::LearningStop { until }, until + MEASURED_WITHIN);
+                    self.set_phase(train, RecoveryPhase::LearningStop { until }, until + MEASURED_WITHIN);
                     self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
                 }
             }
-            Phase::LearningRest => self.learn_next(now, train),
+            RecoveryPhase::LearningRest => self.learn_next(now, train),
             _ => {}
         }
     }
@@ -404,13 +388,13 @@ impl Watchdog {
         why: Option<&Refusal>,
     ) {
         let Some(recovery) = self.dangers.get(&train) else { return };
-        let Phase::StoppingShort { order, distance } = recovery.phase else { return };
+        let RecoveryPhase::StoppingShort { order, distance } = recovery.phase else { return };
         if order != done {
             return;
         }
         let creep = recovery.steps.creep;
         if why.is_none() {
-            self.set_phase(train, Phase::Creeping { distance }, now + MEASURED_WITHIN);
+            self.set_phase(train, RecoveryPhase::Creeping { distance }, now + MEASURED_WITHIN);
             self.issue(now, Order::Speed { train, step: creep });
         } else {
             self.end_rescaled(now, train);
@@ -420,9 +404,13 @@ impl Watchdog {
     /// The track ahead of a train in recovery ends, or another train is there.
     pub(super) fn recovery_blocked(&mut self, now: Timestamp, train: TrainId) {
         match self.dangers.get(&train).map(|recovery| recovery.phase) {
-            Some(Phase::Locating { .. } | Phase::Measuring { .. }) => self.reverse_or_conclude(now, train),
-            Some(Phase::Creeping { .. } | Phase::StoppingShort { .. }) => self.end_rescaled(now, train),
-            Some(Phase::LearningSpeed { .. } | Phase::LearningRest) => {
+            Some(RecoveryPhase::Locating { .. } | RecoveryPhase::Measuring { .. }) => {
+                self.reverse_or_conclude(now, train);
+            }
+            Some(RecoveryPhase::Creeping { .. } | RecoveryPhase::StoppingShort { .. }) => {
+                self.end_rescaled(now, train);
+            }
+            Some(RecoveryPhase::LearningSpeed { .. } | RecoveryPhase::LearningRest) => {
                 self.end(now, train, Outcome::LearntAnew);
             }
             _ => {}
@@ -453,10 +441,10 @@ impl Watchdog {
             return self.measure(now, train);
         }
         let seen = match recovery.phase {
-            Phase::Locating { seen, .. } => seen.map(|node| node.reverse()),
+            RecoveryPhase::Locating { seen, .. } => seen.map(|node| node.reverse()),
             _ => None,
         };
-        let most = if matches!(recovery.phase, Phase::Measuring { .. }) { MAX_REVERSALS } else { 1 };
+        let most = if matches!(recovery.phase, RecoveryPhase::Measuring { .. }) { MAX_REVERSALS } else { 1 };
         if recovery.reversals >= most || self.has_pushed_over_points(now, train) {
             return self.need_operator(now, train);
         }

@@ -13,7 +13,8 @@ use crate::tracking::PassedSensor;
 use crate::units::Length;
 
 use super::alarm::Alarm;
-use super::recovery::{MEASURED_WITHIN, Phase, Recovery, STOPPED_WITHIN};
+use super::recovery::{MEASURED_WITHIN, Recovery, STOPPED_WITHIN};
+use super::recovery_phase::RecoveryPhase;
 use super::trials::{Remeasured, SpeedTrial, Steps, is_same};
 use super::watchdog::Watchdog;
 use crate::control::{Notice, Outcome};
@@ -51,7 +52,7 @@ impl Watchdog {
             }
         };
         self.driver.set_model(model);
-        self.set_phase(train, Phase::Ending { outcome }, now + STOPPED_WITHIN);
+        self.set_phase(train, RecoveryPhase::Ending { outcome }, now + STOPPED_WITHIN);
         self.issue(now, Order::Speed { train, step: SpeedStep::STAND });
     }
 
@@ -68,10 +69,10 @@ impl Watchdog {
         let next = plan.iter().find(|step| recovery.ratios.iter().all(|one| one.step != **step));
         if let Some(step) = next.filter(|_| !is_enough) {
             let trial = SpeedTrial::new(*step, commanded);
-            self.set_phase(train, Phase::Measuring { trial, from: commanded }, now + MEASURED_WITHIN);
+            self.set_phase(train, RecoveryPhase::Measuring { trial, from: commanded }, now + MEASURED_WITHIN);
             if commanded == *step {
                 let base = self.dangers.get(&train).map(|recovery| recovery.base.clone());
-                if let (Some(base), Some(Recovery { phase: Phase::Measuring { trial, .. }, .. })) =
+                if let (Some(base), Some(Recovery { phase: RecoveryPhase::Measuring { trial, .. }, .. })) =
                     (base, self.dangers.get_mut(&train))
                 {
                     trial.commanded(&base, commanded, now);
@@ -124,7 +125,11 @@ impl Watchdog {
         });
         match ordered {
             Some((order, distance)) => {
-                self.set_phase(train, Phase::StoppingShort { order, distance }, now + MEASURED_WITHIN);
+                self.set_phase(
+                    train,
+                    RecoveryPhase::StoppingShort { order, distance },
+                    now + MEASURED_WITHIN,
+                );
             }
             // If no stop can be checked, the uncertainty of stops remains large.
             None => self.end_rescaled(now, train),
@@ -188,9 +193,9 @@ impl Watchdog {
         };
         recovery.lessons_taken += 1;
         let trial = SpeedTrial::new(step, commanded);
-        self.set_phase(train, Phase::LearningSpeed { trial, from: commanded }, now + MEASURED_WITHIN);
+        self.set_phase(train, RecoveryPhase::LearningSpeed { trial, from: commanded }, now + MEASURED_WITHIN);
         if commanded == step {
-            if let Some(Recovery { phase: Phase::LearningSpeed { trial, .. }, base, .. }) =
+            if let Some(Recovery { phase: RecoveryPhase::LearningSpeed { trial, .. }, base, .. }) =
                 self.dangers.get_mut(&train)
             {
                 trial.commanded(base, commanded, now);

@@ -7,7 +7,8 @@ use crate::units::Length;
 
 use super::alarm::Alarm;
 use super::danger::BODY;
-use super::recovery::{Phase, Recovery};
+use super::recovery::Recovery;
+use super::recovery_phase::RecoveryPhase;
 use super::unheard::Behind;
 use super::watchdog::Watchdog;
 
@@ -59,7 +60,7 @@ impl Watchdog {
     /// else it is of a train that a hand has moved, or of none: nothing is known then of where this one is.
     pub(super) fn note_stopping(&mut self, sensor: SensorId, time: Timestamp) {
         let stops = |(train, danger): (&TrainId, &Recovery)| {
-            (danger.is_searched() && danger.phase == Phase::Stopping).then_some(*train)
+            (danger.is_searched() && danger.phase == RecoveryPhase::Stopping).then_some(*train)
         };
         let mut stopping = self.dangers.iter().filter_map(stops);
         if let (Some(train), None) = (stopping.next(), stopping.next()) {
@@ -107,7 +108,8 @@ impl Watchdog {
     /// reported it last or, if it stood on that, the next one.
     pub(super) fn direction_unknown(&mut self, now: Timestamp, train: TrainId, sensor: SensorId) {
         let may_be_turned = self.undirected.contains(&train);
-        let Some(Recovery { phase: Phase::Locating { pushed, seen, .. }, .. }) = self.dangers.get_mut(&train)
+        let Some(Recovery { phase: RecoveryPhase::Locating { pushed, seen, .. }, .. }) =
+            self.dangers.get_mut(&train)
         else {
             return;
         };

@@ -17,7 +17,8 @@ use crate::units::Length;
 use super::alarm::{Alarm, ConsistencyMonitor};
 use super::intruder::Intruder;
 use super::noise::Noise;
-use super::recovery::{Phase, Recovery};
+use super::recovery::Recovery;
+use super::recovery_phase::RecoveryPhase;
 use super::stops::Stops;
 use super::trials::Remeasured;
 use super::unheard::{Behind, Unheard};
@@ -203,7 +204,7 @@ impl Watchdog {
 
     /// Whether orders to a train are rejected for a temporary reason: a recovery or a silent station.
     pub fn is_interrupted(&self, now: Timestamp, train: TrainId) -> bool {
-        let may_end = self.dangers.values().any(|danger| danger.phase != Phase::GivenUp);
+        let may_end = self.dangers.values().any(|danger| danger.phase != RecoveryPhase::GivenUp);
         self.is_silent() || may_end && (self.is_held(train) || self.could_meet(now, train))
     }
 

@@ -1,7 +1,7 @@
 //! The first half of the demo: calibrates an unknown train.
 
 use footplate_core::control::learn::{
-    CalibrationNotice, CalibratorSettings, Ending, Phase, Progress, StepAccuracy,
+    CalibrationNotice, CalibrationPhase, CalibratorSettings, Ending, Progress, StepAccuracy,
 };
 use footplate_core::model::MotionFit;
 use footplate_core::model::StepUse;
@@ -136,10 +136,10 @@ fn detail(progress: &Progress, budget: TimeSpan) -> String {
     let full = (part * BAR as f64).round() as usize;
     let bar: String = (0..BAR).map(|at| if at < full { '━' } else { '─' }).collect();
     let about = match progress.phase {
-        Phase::Finding => "waits for its first sensor".to_owned(),
-        Phase::Joining => "goes to its circuit".to_owned(),
-        Phase::Experiment(experiment) => experiment.to_string(),
-        Phase::Ending | Phase::Finished => "comes to rest".to_owned(),
+        CalibrationPhase::Finding => "waits for its first sensor".to_owned(),
+        CalibrationPhase::Joining => "goes to its circuit".to_owned(),
+        CalibrationPhase::Experiment(experiment) => experiment.to_string(),
+        CalibrationPhase::Ending | CalibrationPhase::Finished => "comes to rest".to_owned(),
     };
     format!("{about:<32} {bar} {} of {}", minutes(progress.elapsed), minutes(budget))
 }

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use footplate_core::tracking::Phase;
+use footplate_core::tracking::ForecastPhase;
 use footplate_core::{SpeedStep, TrainId};
 use footplate_store::score::{Comparison, ScoredHit};
 
 /// The phases in the order of a train's day, with their names for people and for files.
-pub(super) const PHASES: [(Phase, &str, &str); 3] = [
-    (Phase::Steady, "steady", "steady"),
-    (Phase::FirstLap, "first lap", "first_lap"),
-    (Phase::Change, "change", "change"),
+pub(super) const PHASES: [(ForecastPhase, &str, &str); 3] = [
+    (ForecastPhase::Steady, "steady", "steady"),
+    (ForecastPhase::FirstLap, "first lap", "first_lap"),
+    (ForecastPhase::Change, "change", "change"),
 ];
 
 /// A selection of hits.
@@ -27,7 +27,7 @@ pub(super) fn comparison(hits: &[&ScoredHit]) -> Comparison {
 }
 
 /// Everybody's figures over the hits of one phase.
-pub(super) fn in_phase(hits: &[&ScoredHit], phase: Phase) -> Comparison {
+pub(super) fn in_phase(hits: &[&ScoredHit], phase: ForecastPhase) -> Comparison {
     comparison(&only(hits, |hit| hit.phase() == Some(phase)))
 }
 

@@ -7,7 +7,7 @@ use std::io::{self, Write};
 
 use footplate_core::TrainId;
 use footplate_core::track::Layout;
-use footplate_core::tracking::Phase;
+use footplate_core::tracking::ForecastPhase;
 use footplate_store::score::{
     BASELINES, Comparison, Coverage, ForecastScore, GateAgreement, GateCheck, LEVELS, ReferenceForecaster,
     ReferenceScore, ScoredHit, ScoredRecording,
@@ -52,8 +52,8 @@ pub(super) fn write(
     )?;
     steady(output, &groups, &all)?;
     for (phase, title, target) in [
-        (Phase::FirstLap, "First lap at a step", None),
-        (Phase::Change, "Starts and changes of speed", Some(CHANGE_MEDIAN_MM)),
+        (ForecastPhase::FirstLap, "First lap at a step", None),
+        (ForecastPhase::Change, "Starts and changes of speed", Some(CHANGE_MEDIAN_MM)),
     ] {
         other_phase(output, phase, title, target, &groups, &all)?;
     }
@@ -97,7 +97,7 @@ fn steady(output: &mut dyn Write, groups: &[Group<'_>], all: &[&ScoredHit]) -> i
          |---|--:|---|--:|--:|--:|--:|--:|--:|--:|--:|--:|---|--:|--:|--:|---|\n"
     )?;
     for_each(groups, all, |name, hits| {
-        let comparison = in_phase(hits, Phase::Steady);
+        let comparison = in_phase(hits, ForecastPhase::Steady);
         let ours = comparison.ours;
         if ours.scored == 0 {
             return writeln!(output, "| {name} | 0 | | | | | | | | | | | | | |");
@@ -135,7 +135,7 @@ fn steady(output: &mut dyn Write, groups: &[Group<'_>], all: &[&ScoredHit]) -> i
 fn lap_comparison(hits: &[&ScoredHit]) -> Option<[f64; 2]> {
     let both: Hits<'_> =
         hits.iter().filter(|hit| hit.late_by(ReferenceForecaster::LastLap).is_some()).copied().collect();
-    let comparison = in_phase(&both, Phase::Steady);
+    let comparison = in_phase(&both, ForecastPhase::Steady);
     let mean = |reference| comparison.reference(reference)?.score.mean_abs_mm;
     Some([mean(ReferenceForecaster::AtPoll)?, mean(ReferenceForecaster::LastLap)?])
 }
@@ -150,7 +150,7 @@ fn best_baseline(comparison: &Comparison) -> Option<&ReferenceScore> {
 
 fn other_phase(
     output: &mut dyn Write,
-    phase: Phase,
+    phase: ForecastPhase,
     title: &str,
     target: Option<f64>,
     groups: &[Group<'_>],

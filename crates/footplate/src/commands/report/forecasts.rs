@@ -3,7 +3,7 @@
 use footplate_core::TrainId;
 use footplate_core::model::Passage;
 use footplate_core::track::Layout;
-use footplate_core::tracking::{Phase, Predictor};
+use footplate_core::tracking::{ForecastPhase, Predictor};
 use footplate_store::Run;
 use footplate_store::score::{ReplayContext, replay_run};
 
@@ -31,9 +31,9 @@ pub(super) fn of_train(
                 let half = hit.forecast.map(|forecast| forecast.spread.half_width(LEVEL));
                 let speed = hit.forecast.map(|forecast| forecast.speed.as_mm_per_s());
                 let phase = hit.forecast.map(|forecast| match forecast.phase {
-                    Phase::Steady => "steady",
-                    Phase::FirstLap => "first_lap",
-                    Phase::Change => "change",
+                    ForecastPhase::Steady => "steady",
+                    ForecastPhase::FirstLap => "first_lap",
+                    ForecastPhase::Change => "change",
                 });
                 points.push(ForecastPoint {
                     recording: session.name.clone(),

@@ -1,6 +1,8 @@
 //! What a calibration says, in words.
 
-use footplate_core::control::learn::{CalibrationNotice, Done, Experiment, Fault, Phase, Progress, Why};
+use footplate_core::control::learn::{
+    CalibrationNotice, CalibrationPhase, Done, Experiment, Fault, Progress, Why,
+};
 use footplate_core::track::Layout;
 
 /// A line that is worth keeping; nothing for what only moves a bar.
@@ -96,11 +98,11 @@ fn happened(layout: &Layout, mishap: &Fault) -> String {
 /// The line beside the bar: what it is about, and how well stops are known by now.
 pub(super) fn state(progress: &Progress) -> String {
     let about = match &progress.phase {
-        Phase::Finding => "looking for the train".to_owned(),
-        Phase::Joining => "running to a circuit".to_owned(),
-        Phase::Experiment(experiment) => experiment.to_string(),
-        Phase::Ending => "coming to rest".to_owned(),
-        Phase::Finished => "done".to_owned(),
+        CalibrationPhase::Finding => "looking for the train".to_owned(),
+        CalibrationPhase::Joining => "running to a circuit".to_owned(),
+        CalibrationPhase::Experiment(experiment) => experiment.to_string(),
+        CalibrationPhase::Ending => "coming to rest".to_owned(),
+        CalibrationPhase::Finished => "done".to_owned(),
     };
     let middle = progress.accuracy.get(progress.accuracy.len() / 2);
     let reached = middle.map(|line| {
