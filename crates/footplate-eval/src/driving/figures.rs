@@ -52,6 +52,15 @@ impl Driven {
     }
 }
 
+/// Stops that should not end beyond their target.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Overruns {
+    /// Those that did.
+    pub(super) over: usize,
+    /// All.
+    pub(super) stops: usize,
+}
+
 /// The statistics of one driver over several trains.
 pub(super) struct Figures {
     /// Median and 95th percentile of the absolute errors of stops, in mm.
@@ -61,8 +70,8 @@ pub(super) struct Figures {
     pub(super) moves: Option<[f64; 2]>,
     /// Moves within 8 mm or 5 %, and all.
     pub(super) good_moves: [usize; 2],
-    /// Overruns and stops by allowed probability.
-    pub(super) beyond: [[usize; 2]; 2],
+    /// By allowed probability.
+    pub(super) beyond: [Overruns; 2],
     /// The median place of rest of such stops relative to the target, in mm; negative short of it.
     pub(super) median_rest: [Option<f64>; 2],
     /// Position checks, and those inside the interval.
@@ -92,7 +101,10 @@ impl Figures {
             ends.collect::<Vec<f64>>()
         };
         let (mid, top) = (all(|results| &results.mid), all(|results| &results.top));
-        let overruns = |ends: &[f64]| [ends.iter().filter(|end| **end > 0.0).count(), ends.len()];
+        let overruns = |ends: &[f64]| Overruns {
+            over: ends.iter().filter(|end| **end > 0.0).count(),
+            stops: ends.len(),
+        };
         let sum = |each: fn(&Results) -> u64| results.clone().map(each).sum::<u64>();
         Self {
             stops: [mid.len(), top.len()],
@@ -121,10 +133,10 @@ impl Figures {
         let beyond: Vec<Value> = NOT_BEYOND_PERCENT
             .iter()
             .zip(self.beyond)
-            .map(|(allowed, [over, of])| {
-                let [low, high] = binomial_interval(over, of);
+            .map(|(allowed, Overruns { over, stops })| {
+                let [low, high] = binomial_interval(over, stops);
                 json!({
-                    "allowed_pct": allowed, "overruns": over, "stops": of, "low_pct": 100.0 * low,
+                    "allowed_pct": allowed, "overruns": over, "stops": stops, "low_pct": 100.0 * low,
                     "high_pct": 100.0 * high,
                 })
             })

@@ -6,7 +6,7 @@ use footplate_core::HALF_95;
 use footplate_sim::LawFamily;
 use serde_json::{Value, json};
 
-use super::figures::{Driven, Figures, ScoredTrain};
+use super::figures::{Driven, Figures, Overruns, ScoredTrain};
 use super::trial::{NOT_BEYOND_PERCENT, Results};
 use crate::figures::{binomial_interval, quantile, shown_pair};
 use crate::written_scores::{Rate, WrittenScores};
@@ -85,14 +85,14 @@ impl WrittenScores for Page<'_> {
     fn rates(&self) -> Vec<Rate> {
         let ours = self.figures(None, Driven::Calibrated);
         let [_, moves] = ours.good_moves;
-        let limited: usize = ours.beyond.iter().map(|[_, stops]| *stops).sum();
+        let limited: usize = ours.beyond.iter().map(|overruns| overruns.stops).sum();
         let orders = ours.stops[0] + ours.stops[1] + limited + moves + ours.failed as usize;
         let wrecked = self.trains.iter().filter(|train| !train.incidents().is_empty());
         let mut rates = vec![
             Rate::grief(wrecked.count(), self.trains.len()),
             Rate::new("orders not carried out", ours.failed as usize, orders),
         ];
-        for (allowed, [over, stops]) in NOT_BEYOND_PERCENT.iter().zip(ours.beyond) {
+        for (allowed, Overruns { over, stops }) in NOT_BEYOND_PERCENT.iter().zip(ours.beyond) {
             rates.push(Rate::new(format!("beyond, allowed {allowed} %"), over, stops));
         }
         rates
@@ -154,7 +154,7 @@ impl Page<'_> {
         for (nth, allowed) in NOT_BEYOND_PERCENT.iter().enumerate() {
             for by in [Driven::Calibrated, Driven::Oracle] {
                 let figures = self.figures(None, by);
-                let [over, stops] = figures.beyond[nth];
+                let Overruns { over, stops } = figures.beyond[nth];
                 let [low, high] = binomial_interval(over, stops);
                 writeln!(
                     output,

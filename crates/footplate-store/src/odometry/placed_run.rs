@@ -8,13 +8,19 @@ use super::counted_distances::DistanceCounter;
 
 /// How far a place with a bound may have moved the reckoned distance (m). Chosen: beyond what such places are off.
 const MOVED_M: f64 = 5.0;
+/// How far the train went by the odometer while a wheelset rolled, and how far that wheelset turned (m).
+#[derive(Debug, Clone, Copy, Default)]
+struct RolledDistance {
+    by_odometer: f64,
+    turned: f64,
+}
+
 /// What places of stated accuracy say of one run.
 #[derive(Debug, Clone)]
 pub(super) struct PlacedRun {
     places: StatedPlaces,
     counter: DistanceCounter,
-    /// How far the train went by the odometer while each wheelset rolled, and how far that turned (m).
-    rolled: [[f64; 2]; 2],
+    rolled: [RolledDistance; 2],
     /// The reckoned distance of the period before, and how far off it may be by the present slide (m).
     before: Length,
     slide: f64,
@@ -28,7 +34,7 @@ impl PlacedRun {
         Self {
             places: StatedPlaces::new(tolerances.into_iter().fold(0.0, f64::max)),
             counter: DistanceCounter::new(vehicle),
-            rolled: [[0.0; 2]; 2],
+            rolled: [RolledDistance::default(); 2],
             before,
             slide: 0.0,
             latest: None,
@@ -43,9 +49,8 @@ impl PlacedRun {
         for ((rolled, distance), state) in self.rolled.iter_mut().zip(counted.distances).zip(estimate.wheels)
         {
             if let (Some(distance), WheelState::Rolling) = (distance, state) {
-                let [by_odometer, turned] = rolled;
-                *by_odometer += ran;
-                *turned += distance.as_m();
+                rolled.by_odometer += ran;
+                rolled.turned += distance.as_m();
             }
         }
         self.slide(estimate, counted.span.map_or(0.0, footplate_core::TimeSpan::as_s));
@@ -93,7 +98,7 @@ impl PlacedRun {
     /// True over stated diameter of each wheelset that has rolled.
     pub(super) fn scales(&self) -> [Option<PlacedValue>; 2] {
         let PlacedValue { value, deviation } = self.places.scale();
-        self.rolled.map(|[by_odometer, turned]| {
+        self.rolled.map(|RolledDistance { by_odometer, turned }| {
             let ratio = by_odometer / turned;
             (ratio.is_finite() && ratio > 0.0)
                 .then_some(PlacedValue { value: value * ratio, deviation: deviation * ratio })
