@@ -79,19 +79,21 @@ drawn from ranges that the [simulator's page](../theory/line_simulator.md#random
 ";
 
 const LEGEND: &str = "\
-Shares are over all periods. *Guaranteed* and *99.99 %* are the shares whose true speed lies within the interval, rounded
-down. The *oracle* knows which wheelset slips and which sensor is wrong, and when. *Times oracle* and *times raw mean* are
-our rms divided by theirs, over all periods together and in the median world. The first is bold where it is more than asked:
-1.5 times the oracle; 1.05 times the raw mean where that is right (rolling, rolling again, standing), half of it where wheels
-slip. *ETCS* is the share of periods whose speed is off by more than ETCS allows; *hindsight* is an odometer that knows the
-true speed but while both slip, and then the speed at which that began and the mean acceleration until one of them rolls
-again. A train rolls *again* for 20 s after a wheelset slipped.
+Shares are over all periods. *Guaranteed %* and *99.99 %* are the shares whose true speed lies within the interval, rounded
+down; *m/s* beside a phase is the mean width of that interval. *Normal width* is the median width while both have rolled for
+20 s, and *normal again* the time after a slip of both until the interval is no wider than 1.5 times that median of its world.
+The *oracle* knows which wheelset slips and which sensor is wrong, and when. *Times oracle* and *times raw mean* are our rms
+divided by theirs, over all periods together and in the median world. The first is bold where it is more than asked: 1.5 times
+the oracle; 1.05 times the raw mean where that is right (rolling, rolling again, standing), half of it where wheels slip.
+*ETCS* is the share of periods whose speed is off by more than ETCS allows, ours before those of others; *hindsight* is an
+odometer that knows the true speed but while both slip, and then the speed at which that began and the mean acceleration until
+one of them rolls again. A train rolls *again* for 20 s after a wheelset slipped.
 ";
 
 const PHASES: &str = "\
-| level | phase | periods | rms m/s | oracle | times oracle | raw mean | times raw mean | raw max | paper | guaranteed % | 99.99 % \
-| ETCS % | raw mean | hindsight |
-| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
+| level | phase | periods | rms m/s | oracle | times oracle | raw mean | times raw mean | raw max | paper | guaranteed m/s | guaranteed % \
+| 99.99 % m/s | 99.99 % | ETCS % | raw mean | raw max | paper | hindsight |
+| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |
 ";
 
 impl WorldsPage {
@@ -310,7 +312,7 @@ fn write_phases(output: &mut dyn Write, level: LineLevel, worlds: &[&ScoredWorld
         let etcs = |score: &OdometryScore| one(score.etcs_speed_violation_pct, 2);
         writeln!(
             output,
-            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            "| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |",
             level.name(),
             phase.title(),
             ours.scored,
@@ -321,10 +323,14 @@ fn write_phases(output: &mut dyn Write, level: LineLevel, worlds: &[&ScoredWorld
             times(&scores, worlds, phase, WorldOdometer::RawMean, at_most_raw_mean(phase)),
             rms(WorldOdometer::RawMax),
             rms(WorldOdometer::Paper),
+            one(ours.speed_width_mean_m_s, 2),
             rounded_down(ours.speed_inside_pct),
+            one(ours.confidence_speed_width_m_s, 2),
             rounded_down(ours.confidence_speed_inside_pct),
             etcs(&ours),
             etcs(&of(WorldOdometer::RawMean)),
+            etcs(&of(WorldOdometer::RawMax)),
+            etcs(&of(WorldOdometer::Paper)),
             etcs(&of(WorldOdometer::Hindsight)),
         )?;
     }
