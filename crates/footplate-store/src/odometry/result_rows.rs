@@ -73,12 +73,13 @@ pub struct ResultWriter<W: Write + Send> {
 }
 
 impl<W: Write + Send> ResultWriter<W> {
-    /// Begins the file; `with_runs` says that every row names its run.
+    /// Begins the file; `with_runs` says that every row names its run. A `warning` that holds for every row becomes metadata of a
+    /// Parquet file (key `warning`); CSV has no place for it.
     ///
     /// # Errors
     /// What the system said.
-    pub fn new(output: W, form: TableForm, with_runs: bool) -> io::Result<Self> {
-        Ok(Self { table: TableWriter::new(output, form, columns(with_runs))?, with_runs })
+    pub fn new(output: W, form: TableForm, with_runs: bool, warning: Option<&str>) -> io::Result<Self> {
+        Ok(Self { table: TableWriter::new(output, form, columns(with_runs), warning)?, with_runs })
     }
 
     /// Adds an estimate of a run.
@@ -180,7 +181,7 @@ mod tests {
 
     #[test]
     fn a_row_says_everything_in_the_order_of_the_header() {
-        let mut result = ResultWriter::new(Vec::new(), TableForm::Csv, true).unwrap();
+        let mut result = ResultWriter::new(Vec::new(), TableForm::Csv, true, Some("no vehicle")).unwrap();
         result.push("a, b", &estimate()).unwrap();
         let text = String::from_utf8(result.finish().unwrap()).unwrap();
         assert_eq!(

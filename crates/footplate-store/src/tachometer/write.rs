@@ -73,7 +73,7 @@ impl<W: Write + Send> TachometerWriter<W> {
     pub fn new(output: W, form: TableForm, columns: WrittenColumns) -> io::Result<Self> {
         let all = columns.all();
         let written = all.into_iter().filter(|(.., written)| *written).map(|(name, kind, _)| (name, kind));
-        let table = TableWriter::new(output, form, written)?;
+        let table = TableWriter::new(output, form, written, None)?;
         Ok(Self { table, is_written: all.map(|(.., written)| written) })
     }
 

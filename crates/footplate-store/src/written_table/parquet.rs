@@ -7,6 +7,7 @@ use std::sync::Arc;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::writer::{SerializedColumnWriter, SerializedFileWriter};
 use parquet::schema::parser::parse_message_type;
@@ -15,6 +16,9 @@ use super::cell::{Cell, Kind};
 
 /// Rows per group: the usual size, a few megabytes in memory.
 const GROUP_ROWS: usize = 128 * 1024;
+
+/// The key of a warning about the whole table.
+const WARNING: &str = "warning";
 
 /// A table as Parquet: doubles, 64-bit integers and texts, compressed with zstd.
 pub(super) struct ParquetTable<W: Write + Send> {
@@ -37,6 +41,7 @@ impl<W: Write + Send> ParquetTable<W> {
     pub(super) fn new<'n>(
         output: W,
         columns: impl Iterator<Item = (&'n str, Kind)> + Clone,
+        warning: Option<&str>,
     ) -> io::Result<Self> {
         let mut schema = "message table {".to_owned();
         for (name, kind) in columns.clone() {
@@ -56,7 +61,10 @@ impl<W: Write + Send> ParquetTable<W> {
             .set_dictionary_enabled(false)
             .set_compression(Compression::ZSTD(ZstdLevel::default()))
             // Recordings are read as a whole: statistics for searching are not needed.
-            .set_statistics_enabled(EnabledStatistics::None);
+            .set_statistics_enabled(EnabledStatistics::None)
+            .set_key_value_metadata(
+                warning.map(|text| vec![KeyValue::new(WARNING.to_owned(), text.to_owned())]),
+            );
         for (name, _) in columns.clone().filter(|(_, kind)| matches!(kind, Kind::Text | Kind::Whole)) {
             properties = properties.set_column_dictionary_enabled(name.into(), true);
         }

@@ -52,14 +52,16 @@ enum Output<W: Write + Send> {
 }
 
 impl<W: Write + Send> TableWriter<W> {
+    /// Begins a table; a `warning` about all of it is metadata of Parquet, and CSV has no place for it.
     pub(crate) fn new<'n>(
         output: W,
         form: TableForm,
         columns: impl Iterator<Item = (&'n str, Kind)> + Clone,
+        warning: Option<&str>,
     ) -> io::Result<Self> {
         let output = match form {
             TableForm::Csv => Output::Csv(CsvTable::new(output, columns.map(|(name, _)| name))),
-            TableForm::Parquet => Output::Parquet(Box::new(ParquetTable::new(output, columns)?)),
+            TableForm::Parquet => Output::Parquet(Box::new(ParquetTable::new(output, columns, warning)?)),
         };
         Ok(Self { output })
     }

@@ -29,7 +29,7 @@ use recording::{Mapped, OpenRecording, WalkedRecording};
 use results::Results;
 pub(super) use uploaded::{PassingFolder, uploaded_page};
 pub(super) use walked::SPEED_INSIDE_PCT;
-use walked::Walked;
+use walked::{Walked, no_vehicle};
 pub(super) use watched_slide::WatchedSlide;
 
 /// Estimate speed and distance, with bounds, from what two wheelsets counted.
@@ -238,7 +238,8 @@ impl Arguments {
             let recording = OpenRecording::open(file, self.score, mapped)?.one_of(self.files.len());
             if let (Some(out), Some(output)) = (&self.out, output.take()) {
                 let with_runs = self.files.len() > 1 || recording.has_run_ids();
-                results = Some(Results::begin(out, output, with_runs)?);
+                let warning = self.vehicle.is_none().then(|| no_vehicle(Language::English));
+                results = Some(Results::begin(out, output, with_runs, warning)?);
             }
             // A page says how good it was wherever the truth is there.
             let score = self.score || (is_drawn && recording.has_truth());

@@ -1,9 +1,11 @@
 //! `footplate odometry` turns recordings into estimates, scores them, and answers a live input line by line.
 
+use std::fs::File;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use serde_json::Value;
 
 use crate::program::{Run, folder, footplate};
@@ -51,6 +53,16 @@ fn without_a_vehicle_file_every_output_says_so_and_the_status_is_1() {
     assert!(json.status == 1 && read["warnings"][0].as_str().unwrap().contains(said));
     let rows = footplate(&["odometry", PLAIN, "--out", "-"]);
     assert!(rows.status == 1 && rows.errors.contains(said) && !rows.output.contains(said));
+    let file = folder("odometry-no-vehicle").join("result.parquet");
+    let warning = |run: Run, status: i32| {
+        assert_eq!(run.status, status, "{}", run.errors);
+        let read = SerializedFileReader::new(File::open(&file).unwrap()).unwrap();
+        let about = read.metadata().file_metadata().key_value_metadata().cloned().unwrap_or_default();
+        about.into_iter().find(|entry| entry.key == "warning").and_then(|entry| entry.value)
+    };
+    let written = file.to_str().unwrap();
+    assert!(warning(footplate(&["odometry", PLAIN, "--out", written]), 1).unwrap().contains(said));
+    assert_eq!(warning(odometry(&[PLAIN, "--out", written]), 0), None);
     assert_eq!(odometry(&[PLAIN]).status, 0);
 }
 

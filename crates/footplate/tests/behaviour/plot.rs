@@ -40,11 +40,15 @@ fn a_run_of_odometry_is_drawn_with_its_bounds_and_the_truth() {
         "Odometry of plain.csv",
         "speed (m/s)",
         "time since the first period (s)",
-        "bounds",
+        "99.99 % interval",
         "truth",
         "wheelset 2",
     ];
     says(&svg, &expected);
+    assert!(!words(&svg).contains("no vehicle file"));
+    let of_an_example = folder.join("example.svg");
+    assert_eq!(drawn(&["odometry", &recording], &of_an_example).status, 1);
+    says(&of_an_example, &["no vehicle file: figures of an example train, preset recommended"]);
     let png = folder.join("run.png");
     assert_eq!(drawn(&["odometry", "--vehicle", VEHICLE, &recording], &png).status, 0);
     assert_eq!(fs::read(&png).unwrap()[..8], PNG_SIGNATURE);

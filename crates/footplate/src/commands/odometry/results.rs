@@ -17,13 +17,18 @@ pub(super) enum Results<'o> {
 }
 
 impl<'o> Results<'o> {
-    /// Begins them. `with_runs` says that there are several runs, so that every row names its own.
-    pub(super) fn begin(out: &Path, output: &'o mut dyn Write, with_runs: bool) -> anyhow::Result<Self> {
+    /// Begins them. `with_runs` says that there are several runs, so that every row names its own; `warning` holds for all of them.
+    pub(super) fn begin(
+        out: &Path,
+        output: &'o mut dyn Write,
+        with_runs: bool,
+        warning: Option<&str>,
+    ) -> anyhow::Result<Self> {
         if out.as_os_str() == STANDARD {
             return Ok(Self::Output(LiveResult::new(output, with_runs)));
         }
         let form = TableForm::of_path(out)?;
-        let begun = WholeFile::create(out).and_then(|file| ResultWriter::new(file, form, with_runs));
+        let begun = WholeFile::create(out).and_then(|file| ResultWriter::new(file, form, with_runs, warning));
         Ok(Self::File(begun.with_context(|| format!("writing {}", out.display()))?))
     }
 

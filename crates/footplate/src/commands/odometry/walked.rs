@@ -15,7 +15,7 @@ const CONTRADICTED: f64 = 1e-3;
 /// Share of periods after a gap beyond which a recording is not what it says: losses are rarer, another unit of time is not.
 const GAPS: f64 = 0.5;
 /// What is said without a vehicle file.
-const fn no_vehicle(language: Language) -> &'static str {
+pub(super) const fn no_vehicle(language: Language) -> &'static str {
     match language {
         Language::English => {
             "no vehicle file: teeth, diameters and limits are those of a built-in example, so every speed and distance is \

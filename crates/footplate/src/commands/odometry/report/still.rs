@@ -1,4 +1,4 @@
-//! A run as a picture: speed with its bounds and wheels, and how far off the distance is.
+//! A run as a picture: speed with its interval and wheels, and how far off the distance is.
 
 use std::path::Path;
 
@@ -16,24 +16,30 @@ pub(in crate::commands::odometry) fn still(walked: &Walked) -> Option<Picture> {
         .map_or_else(|| recording.file.clone(), |name| name.display().to_string());
     let runs = recording.runs.len();
     let which = if runs > 1 { format!(", {} of {runs} runs", run.name) } else { String::new() };
-    let mut subtitle = format!("{}, preset {}", walked.vehicle, walked.preset.key());
+    let mut subtitle = format!("{}, preset {}", whose(walked), walked.preset.key());
     if let Some(score) =
         run.odometry.scores().map(|scores| scores.preset(walked.preset)).filter(|score| score.scored > 0)
     {
         subtitle.push_str("; ");
         subtitle.push_str(tables::held(&score));
     }
+    let interval = format!("{} % interval", walked.confidence_pct());
     Some(Picture {
         title: format!("Odometry of {file}{which}"),
         subtitle,
-        panels: vec![speed(&form), distance(&form)],
+        panels: vec![speed(&form, &interval), distance(&form, &interval)],
     })
 }
 
-fn speed(form: &SeriesForm) -> Panel {
+/// Whose figures they are: without a vehicle file those of no train that ran.
+fn whose(walked: &Walked) -> &str {
+    if walked.has_vehicle { &walked.vehicle } else { "no vehicle file: figures of an example train" }
+}
+
+fn speed(form: &SeriesForm, interval: &str) -> Panel {
     let mut layers = Vec::new();
     if let Some(band) = band(form, "confidence_speed_low_m_s", "confidence_speed_high_m_s") {
-        layers.push(Layer::new("bounds", Ink::First, band));
+        layers.push(Layer::new(interval, Ink::First, band));
     }
     let lines = [
         ("wheel_1_m_s", "wheelset 1", Ink::Second),
@@ -50,14 +56,14 @@ fn speed(form: &SeriesForm) -> Panel {
 }
 
 /// Against the truth where it is known, or else how wide the interval is.
-fn distance(form: &SeriesForm) -> Panel {
+fn distance(form: &SeriesForm, interval: &str) -> Panel {
     let x = "time since the first period (s)".to_owned();
     let (y, layers) =
         match (band(form, "confidence_error_low_m", "confidence_error_high_m"), points(form, "error_m")) {
             (Some(bounds), Some(error)) => (
                 "distance beyond the truth (m)",
                 vec![
-                    Layer::new("bounds", Ink::First, bounds),
+                    Layer::new(interval, Ink::First, bounds),
                     Layer::new("estimate", Ink::First, Shape::Line(error)),
                 ],
             ),
