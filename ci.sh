@@ -364,10 +364,29 @@ print_rates() {
   }
 }
 
+# The loops of the odometer give the same bits in registers of two numbers and of four. The core is compiled once more for that.
+check_same_bits() {
+  if ! { grep -qw avx2 /proc/cpuinfo && grep -qw bmi2 /proc/cpuinfo; } 2>/dev/null; then
+    echo "the odometer's bits in wide registers were not compared: this processor has none"
+    return
+  fi
+  cargo build --quiet --workspace --example odometer_bits --profile test
+  local narrow wide
+  narrow="$("$TARGET/debug/examples/odometer_bits")"
+  wide="$(RUSTFLAGS="${RUSTFLAGS:-} -C target-cpu=x86-64-v3" cargo run --quiet --profile test -p footplate-core \
+    --example odometer_bits --target-dir "$TARGET/x86-64-v3")"
+  if [[ $narrow != "$wide" ]]; then
+    echo "ci.sh: the odometer gives $wide with x86-64-v3 and $narrow without" >&2
+    return 1
+  fi
+  echo "the odometer gives the same bits with x86-64-v3"
+}
+
 step_fresh() {
   need_compiler
   need git git # seeds are drawn from the commit
   cargo build --quiet --workspace --bins --profile test
+  check_same_bits >&2
   : >"$TARGET/fresh.md"
   : >"$TARGET/fresh-failed.txt"
   echo "fresh seeds of commit $(git rev-parse --short=12 HEAD)$([[ -z $(git status --porcelain -uno) ]] || echo ', changed')"
