@@ -347,6 +347,7 @@ each_scorer() {
   "$1" "$all" zones
   "$1" "$all" traffic --hours 1
   "$1" "$(((all + 3) / 4))" worlds
+  "$1" "$(((all + 3) / 4))" survey
 }
 
 # Prints the rates of a scorer on fresh seeds; runs that failed are kept in the form of testdata/seeds.txt.
