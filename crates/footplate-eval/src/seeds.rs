@@ -13,7 +13,10 @@ pub const FRESH: &str = "fresh:";
 
 const OF_FRESH_SEEDS: &str =
     "The seeds are fresh: the commit behind the `@` drew them, so they were not chosen.";
-const OF_REGRESSION_SEEDS: &str = "The seeds are regression seeds: they were looked at while the program was made. `./ci.sh fresh` draws others.";
+/// Its link leads from one page of `docs/tables` to another.
+const OF_REGRESSION_SEEDS: &str = "The seeds are regression seeds: they were looked at while the program was made. \
+    [Rates on seeds that no one chose](fresh.md) states how many fresh seeds were run, and at which commit; \
+    `./ci.sh fresh` draws others.";
 
 /// Says on a page who chose its seeds.
 pub const fn seeds_sentence(are_fresh: bool) -> &'static str {
