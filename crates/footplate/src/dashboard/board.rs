@@ -13,7 +13,6 @@ use serde_json::json;
 use tokio::sync::{broadcast, oneshot, watch};
 
 use super::history::{History, Sample};
-use crate::comment::without_comment;
 use crate::session_journal::WrittenUntil;
 
 /// Events kept for watchers that reconnect: a quarter of an hour of a busy railway.
@@ -73,15 +72,11 @@ pub(crate) enum Request {
 }
 
 impl Request {
-    /// Whether it is carried out although its client does not wait for the answer any more: it stops trains, or only tells what has changed.
-    fn is_done_late(&self) -> bool {
+    /// Whether it is carried out although its client no longer waits for the answer: it stops trains, or only says what has changed.
+    fn is_done_late(&self, only_stops: impl Fn(&str) -> bool) -> bool {
         match self {
             Self::EmergencyStop | Self::SavedSchedules(_) => true,
-            Self::Line(line) => {
-                let words: Vec<&str> = without_comment(line).split_whitespace().collect();
-                // A stop at a place makes a train run that stands.
-                matches!(words[..], ["halt"] | ["stop", _] | ["speed", _, "0"])
-            }
+            Self::Line(line) => only_stops(line),
             _ => false,
         }
     }
@@ -265,12 +260,12 @@ impl Board {
     }
 
     /// The next request, until `None`. A client that has waited too long was answered that nothing was done, and its order is not carried
-    /// out later; what stops trains is.
-    pub(crate) fn next_request(&self) -> Option<PendingRequest> {
+    /// out later; a line that only stops trains is.
+    pub(crate) fn next_request(&self, only_stops: impl Fn(&str) -> bool) -> Option<PendingRequest> {
         let mut waiting = lock(&self.waiting);
         loop {
             let next = waiting.pop_front()?;
-            if !next.answer.is_closed() || next.request.is_done_late() {
+            if !next.answer.is_closed() || next.request.is_done_late(&only_stops) {
                 return Some(next);
             }
         }
@@ -401,7 +396,7 @@ mod tests {
         let _waiting: Vec<_> = (0..MAX_WAITING).map(|_| ask()).collect();
         assert!(board.ask(Request::Line("where".into())).is_err());
         let mut answered = board.ask(Request::EmergencyStop).expect("always");
-        let first = board.next_request().expect("one waits");
+        let first = board.next_request(|_| false).expect("one waits");
         assert_eq!(first.request, Request::EmergencyStop);
         first.answer(Answer::Taken);
         assert_eq!(answered.try_recv(), Ok(Answer::Taken));
@@ -410,23 +405,14 @@ mod tests {
     #[test]
     fn what_was_answered_with_a_timeout_is_not_carried_out_later_unless_it_stops_trains() {
         let board = Board::new(7);
-        let lines = [
-            "speed 24 8",
-            "reverse 24",
-            "stop 24 # now",
-            "stop 24 at C13 at step 8",
-            "speed 24 0",
-            "halt",
-            "power on",
-        ];
-        for line in lines {
+        for line in ["speed 24 8", "reverse 24", "stop 24", "power on"] {
             drop(board.ask(Request::Line(line.into())).expect("room"));
         }
         let _waits = board.ask(Request::Line("speed 58 8".into())).expect("room");
         drop(board.ask(Request::EmergencyStop).expect("always"));
-        let carried_out = std::iter::from_fn(|| board.next_request()).map(|pending| pending.request);
-        let expected =
-            ["stop 24 # now", "speed 24 0", "halt", "speed 58 8"].map(|line| Request::Line(line.into()));
+        let carried_out = std::iter::from_fn(|| board.next_request(|line| line == "stop 24"))
+            .map(|pending| pending.request);
+        let expected = ["stop 24", "speed 58 8"].map(|line| Request::Line(line.into()));
         assert!(carried_out.eq([Request::EmergencyStop].into_iter().chain(expected)));
     }
 }

@@ -45,14 +45,15 @@ impl ReadOnlyDashboard {
 
     /// Whether an emergency stop was requested. All other requests are rejected with `why`.
     pub(crate) fn is_halted(&mut self, now: Timestamp, why: &str) -> bool {
+        let is_halt = |line: &str| line.trim() == "halt";
         let mut is_halted = false;
-        while let Some(asked) = self.board.next_request() {
+        while let Some(asked) = self.board.next_request(is_halt) {
             let is_taken = match &asked.request {
                 Request::EmergencyStop => {
                     is_halted = true;
                     true
                 }
-                Request::Line(line) if line.trim() == "halt" => {
+                Request::Line(line) if is_halt(line) => {
                     is_halted = true;
                     true
                 }

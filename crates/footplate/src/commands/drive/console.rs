@@ -86,7 +86,7 @@ impl LiveView {
     /// Answers all requests but those for the simulated truth, which it returns.
     fn attend(&mut self, now: Timestamp, script_runner: &mut Recorded<ScriptRunner>) -> Vec<PendingRequest> {
         let mut for_truth = Vec::new();
-        while let Some(asked) = self.board.next_request() {
+        while let Some(asked) = self.board.next_request(|line| only_stops(script_runner.machine(), line)) {
             let answer = match &asked.request {
                 Request::Truth => {
                     for_truth.push(asked);
@@ -137,6 +137,11 @@ impl LiveView {
         }
         for_truth
     }
+}
+
+/// Whether a line stops trains and does nothing else.
+fn only_stops(script_runner: &ScriptRunner, line: &str) -> bool {
+    script_runner.read_line(line).is_ok_and(|step| step.is_some_and(|step| step.instruction.only_stops()))
 }
 
 /// Where lines for operators are printed.

@@ -77,6 +77,11 @@ impl Instruction {
         matches!(self, Self::Order(Order::Speed { step: SpeedStep::STAND, .. }))
     }
 
+    /// Whether it stops one train or all and does nothing else. A stop at a place makes a train at rest run.
+    pub(super) const fn only_stops(&self) -> bool {
+        self.is_plain_stop() || matches!(self, Self::Halt)
+    }
+
     /// Whether it is carried out at once, without further instructions.
     pub(super) const fn is_at_once(&self) -> bool {
         !matches!(self, Self::Go(..) | Self::Find(_) | Self::Place(..) | Self::Straighten | Self::Wait(_))
@@ -325,6 +330,17 @@ mod tests {
         match read(line) {
             Ok(Some(Instruction::Order(order))) => order,
             other => panic!("{line}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_line_only_stops_trains_unless_it_may_set_one_in_motion() {
+        let only_stops = |line: &str| read(line).expect(line).is_some_and(|read| read.only_stops());
+        for line in ["stop 24", "stop 24 # now", "speed 24 0", "halt"] {
+            assert!(only_stops(line), "{line}");
+        }
+        for line in ["speed 24 8", "reverse 24", "stop 24 at C13 at step 8", "power on", "# halt"] {
+            assert!(!only_stops(line), "{line}");
         }
     }
 
