@@ -21,12 +21,9 @@ pub struct TimeModel {
 }
 
 impl TimeModel {
-    /// A line of 2400 baud, eleven bits a byte, on which sensors are polled: the slowest link in use.
-    ///
-    /// Two bytes a command; the longest poll is eleven bytes of 4.583 ms and half of that is waited for, rounded; a
-    /// tenth is added to the soonest. A poll that just missed a detection, the next one and the command take 150 ms.
-    /// Intervals of up to 70 ms between polls were measured.
-    pub const POLLED_2400_BAUD: Self = Self {
+    /// Assumed until a link states its own: a slow serial line on which sensors are polled every 70 ms. No link in use
+    /// takes longer to send a command.
+    pub const ASSUMED: Self = Self {
         command: TimeSpan::from_us(9_167),
         usual_wait: TimeSpan::from_ms(29),
         soonest: TimeSpan::from_ms(66),
@@ -40,9 +37,9 @@ impl TimeModel {
     }
 }
 
-/// The slowest link.
+/// That of an unknown link.
 impl Default for TimeModel {
     fn default() -> Self {
-        Self::POLLED_2400_BAUD
+        Self::ASSUMED
     }
 }

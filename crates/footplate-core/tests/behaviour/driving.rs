@@ -124,7 +124,7 @@ fn a_faster_link_shortens_the_earliest_stop_by_the_distance_run_meanwhile() {
     };
     let over_the_slowest = missed_by(&mut driver);
     // when the command is sent within 6 ms instead of 66 ms,
-    driver.set_link(TimeModel { soonest: TimeSpan::from_ms(6), ..TimeModel::POLLED_2400_BAUD });
+    driver.set_link(TimeModel { soonest: TimeSpan::from_ms(6), ..TimeModel::ASSUMED });
     let sooner = over_the_slowest - missed_by(&mut driver);
     // then the nearest stop is closer by the distance run in 60 ms.
     let speed = driver.locate(TRAIN, world.now).expect("a place").speed;

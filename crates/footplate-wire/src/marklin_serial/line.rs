@@ -25,8 +25,18 @@ pub const SOLENOID_HOLD_SHORTEST: TimeSpan = TimeSpan::from_ms(100);
 /// The longest time a solenoid may be powered; forgetting to switch it off burns its coil (same source).
 pub const SOLENOID_HOLD_LONGEST: TimeSpan = TimeSpan::from_ms(500);
 
-/// The times for planners: those of a polled line of this speed.
-pub const TIME_MODEL: TimeModel = TimeModel::POLLED_2400_BAUD;
+/// The times for planners.
+///
+/// Two bytes a command; the longest poll is eleven bytes of 4.583 ms and half of that is waited for, rounded; a
+/// tenth is added to the soonest. A poll that just missed a detection, the next one and the command take 150 ms.
+/// Intervals of up to 70 ms between polls were measured.
+pub const TIME_MODEL: TimeModel = TimeModel {
+    command: TimeSpan::from_us(9_167),
+    usual_wait: TimeSpan::from_ms(29),
+    soonest: TimeSpan::from_ms(66),
+    reaction: TimeSpan::from_ms(150),
+    report_window: TimeSpan::from_ms(70),
+};
 
 /// How long a number of bytes without gaps occupies the line.
 pub const fn time_on_line(bytes: u32) -> TimeSpan {

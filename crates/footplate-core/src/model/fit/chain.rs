@@ -13,8 +13,8 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Layout, Reach, TurnoutStates};
 use crate::units::Length;
 
-/// The poll interval where the recording has none: that of the slowest link.
-const USUAL_INTERVAL: TimeSpan = TimeModel::POLLED_2400_BAUD.report_window;
+/// The poll interval where the recording has none: that of an unknown link.
+const USUAL_INTERVAL: TimeSpan = TimeModel::ASSUMED.report_window;
 /// Seconds between the last entry of a run and the first of the next, whose clocks have nothing in common.
 const BETWEEN_RUNS: f64 = 60.0;
 /// No stop is longer (m): published ones take up to 1.6 m.
