@@ -60,7 +60,7 @@ pub(crate) struct Arguments {
     /// marklin-can:192.168.0.5, loconet:192.168.0.20, jmri:192.168.0.20, or tcp://host:port in place of a device.
     #[arg(long)]
     link: Address,
-    /// The layout, whose contacts say how many sensor modules there are; a simulated link names its own.
+    /// The layout, whose sensors show how many feedback modules there are; a simulated link names its own.
     #[arg(long, default_value = "track-a")]
     layout: String,
     /// For how long to listen, in seconds of the station's time.

@@ -23,8 +23,8 @@ use session::replay_session;
 
 /// Decide a recorded session of driving or calibrating once more, and compare.
 ///
-/// The machine that decided is made again as it began, is told what it was told at the times at which it was told, and
-/// every decision is compared with the one of then: commands, what it asked of the line, and its notices. The same
+/// The machine that decided begins again as it began then and receives the same inputs at the same times. Every decision is
+/// compared with the recorded one: commands, what it asked of the line, and its notices. The same
 /// program decides the same, to the last bit. The notices of another version are worded otherwise and are not compared.
 ///
 /// With --diff a program that decides otherwise shows all that differs. The railway is not there to follow: behind the

@@ -30,7 +30,7 @@ use german_law::german_law;
 
 /// Write a page with charts of what recordings show.
 ///
-/// For every train: how it fares, speed by throttle step, the law by which it changes speed against the contacts
+/// For every train: its state, speed by throttle step, the law by which it changes speed against the detections
 /// measured, how far forecasts were off, stops, corrected lengths and suspicious measurements. The page is one
 /// file, needs no network, and the same input makes the same bytes.
 #[derive(Args)]

@@ -24,7 +24,7 @@ use crate::standard_error::say;
 /// Beyond this many standard deviations from what the model expects a reading is pointed out: one in 300 by chance.
 const REMARKABLE: f64 = 3.0;
 
-/// Add where a train stands, measured from the contact it passed last to its pickup shoe.
+/// Add where a train came to rest, measured from the sensor that it passed last to its pickup shoe.
 ///
 /// The measurement belongs to the last stop of the train in the store. It is an event like any other: `footplate
 /// store exclude` takes it out again.
@@ -41,7 +41,7 @@ pub(super) struct Arguments {
     /// The train.
     #[arg(long, value_name = "N")]
     train: u16,
-    /// The contact it passed last, and how far past it the leading end of its pickup shoe stands.
+    /// The sensor that it passed last, and the distance from there to the leading end of its pickup shoe.
     #[arg(long, value_name = "PLACE")]
     at: String,
     /// How long it took from the command to rest, by a watch.

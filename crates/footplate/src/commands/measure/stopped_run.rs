@@ -13,7 +13,7 @@ use crate::clock::{LATEST, now};
 /// A person who reads a tape does so at least this long after the train was commanded to stop; a reading without a watch
 /// is dated so late that its date is not taken for the time of the stop.
 const TAPE_LATER: TimeSpan = TimeSpan::from_ms(60_000);
-/// The layout is surveyed to the centimetre: a train may stand this far beyond the next contact by the survey before it
+/// The layout is surveyed to the centimetre: a train may stand this far beyond the next sensor by the survey before it
 /// has closed it.
 const SURVEY: Length = Length::from_m(0.03);
 

@@ -75,14 +75,14 @@ impl State {
     }
 }
 
-/// A change of speed: its law as curves, and the contacts measured.
+/// A change of speed: its law as curves, and the detections measured.
 #[derive(Debug, Serialize)]
 pub(super) struct ChangeChart {
     /// From which step to which.
     pub(super) steps: [u8; 2],
     pub(super) recording: String,
     pub(super) run: u32,
-    /// Seconds since the command, mm since the first contact, mm/s, mm/s².
+    /// Seconds since the command, mm since the first detection, mm/s, mm/s².
     pub(super) time_s: Vec<f64>,
     pub(super) way_mm: Vec<f64>,
     pub(super) speed_mm_s: Vec<f64>,
@@ -90,7 +90,7 @@ pub(super) struct ChangeChart {
     pub(super) contacts: Vec<DetectionPoint>,
 }
 
-/// A contact measured during a change of speed.
+/// A detection during a change of speed.
 #[derive(Debug, Serialize)]
 pub(super) struct DetectionPoint {
     pub(super) time_s: f64,
@@ -101,7 +101,7 @@ pub(super) struct DetectionPoint {
     pub(super) residual_mm: f64,
     /// One standard deviation of that.
     pub(super) doubt_mm: f64,
-    /// Mean speed since the contact before, at the time in the middle.
+    /// Mean speed since the detection before, at the time in the middle.
     pub(super) mean_speed: Option<[f64; 2]>,
     pub(super) told_by: String,
 }

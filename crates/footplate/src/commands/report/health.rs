@@ -12,7 +12,7 @@ const NOW: usize = 20;
 /// The error now, in units of the usual one, above which a look or a hand is needed (chosen: of 20 values the median
 /// is 1.5 times too large by chance once in thirty, twice hardly ever).
 const WORSE: [f64; 2] = [1.5, 2.0];
-/// Part of contacts that may be missed (the recordings that there are miss up to 3 in 100).
+/// Share of detections that may be missed (the recordings that there are miss up to 3 in 100).
 const MISSES: [f64; 2] = [0.05, 0.15];
 /// Part of runs that may stay without a report: low steps stall.
 const SILENT: [f64; 2] = [0.2, 0.5];
@@ -182,11 +182,11 @@ fn drift(points: &[ForecastPoint], language: Language) -> Check {
 fn misses(points: &[ForecastPoint], language: Language) -> Check {
     let missed: usize = points.iter().map(|point| point.missed).sum();
     Check {
-        name: language.pick("Contacts missed", "Verpasste Kontakte"),
+        name: language.pick("Detections missed", "Ausgebliebene Meldungen"),
         found: format!("{missed} {} {}", language.pick("of", "von"), missed + points.len()),
         state: graded(missed as f64 / (missed + points.len()).max(1) as f64, MISSES),
         says: language
-            .pick("sensors on the path that never reported", "Kontakte auf dem Weg, die sich nie meldeten"),
+            .pick("sensors on the path that never reported", "Rückmelder auf dem Weg, die sich nie meldeten"),
     }
 }
 

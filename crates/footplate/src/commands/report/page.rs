@@ -52,8 +52,8 @@ pub(super) fn page(data: &ReportData, language: Language) -> serde_json::Result<
 
 fn overview(data: &ReportData, language: Language) -> String {
     let columns = language.pick(
-        "train | state | what to know | prediction error | steps | contacts",
-        "Zug | Zustand | was zu wissen ist | Vorhersagefehler | Stufen | Kontakte",
+        "train | state | what to know | prediction error | steps | detections",
+        "Zug | Zustand | was zu wissen ist | Vorhersagefehler | Stufen | Meldungen",
     );
     let caption = language.pick("All trains", "Alle Züge");
     let mut table = Table::new(caption, columns, &[true, false, false, false, true, true]);

@@ -26,8 +26,8 @@ pub(super) fn health(health: &Health, language: Language) -> String {
 
 pub(super) fn speeds(train: &TrainFindings, language: Language) -> String {
     let columns = language.pick(
-        "step | reached from | speed | contacts | stopping distance | scatter | stops",
-        "Stufe | erreicht von | Tempo | Kontakte | Anhalteweg | Streuung | Halte",
+        "step | reached from | speed | detections | stopping distance | scatter | stops",
+        "Stufe | erreicht von | Tempo | Meldungen | Anhalteweg | Streuung | Halte",
     );
     let caption = language.pick("Speed and stop by throttle step", "Tempo und Halt je Fahrstufe");
     let mut table = Table::new(caption, columns, &[true, false, true, true, true, true, true]);

@@ -13,7 +13,7 @@ pub(super) enum Why {
     Ended(Ending),
     /// Somebody pressed Ctrl-C, or a signal came.
     Interrupted,
-    /// The times between contacts are those of another layout.
+    /// The times between detections are those of another layout.
     OtherLayout { other: String },
     /// The line or the station is gone.
     Lost(String),
