@@ -9,7 +9,7 @@ fn main() -> Result<(), StoppingError> {
     let speed = Speed::from_mm_per_s(412.0);
     let braking = Braking::Constant(Acceleration::from_mm_per_s2(120.0));
 
-    // On a 6051: a command waits its turn on the line, and contacts are read every 65 ms.
+    // On a 6051: a command waits its turn on the line, and sensors are read every 65 ms.
     let command_delay = TimeSpan::from_ms(90);
     let (to_stamp, poll_interval) = (TimeSpan::from_ms(50), TimeSpan::from_ms(65));
 
@@ -21,7 +21,7 @@ fn main() -> Result<(), StoppingError> {
     println!("  {:.0} mm after it begins to brake", from_braking.distance(speed).length().as_mm());
     println!("  {:.0} mm after the command", from_command.distance(speed).length().as_mm());
     println!(
-        "  {:.0} mm after the contact whose report prompts it",
+        "  {:.0} mm after the sensor whose report prompts it",
         from_report.distance(speed).length().as_mm()
     );
     Ok(())

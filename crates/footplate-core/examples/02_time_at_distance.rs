@@ -1,4 +1,4 @@
-//! When a train that pulls away passes three contacts, by each law of speed change.
+//! When a train that pulls away passes three sensors, by each law of speed change.
 //!
 //! The laws agree on speed and time, and differ in between: that is why a train's own law has to be found out.
 
@@ -7,11 +7,11 @@ use footplate_core::{Length, Speed, TimeSpan};
 
 fn main() {
     let target = Speed::from_mm_per_s(412.0);
-    let contacts = [100.0, 300.0, 500.0].map(Length::from_mm);
+    let sensors = [100.0, 300.0, 500.0].map(Length::from_mm);
 
     print!("{:<20}", "seconds from rest to");
-    for contact in contacts {
-        print!("{:>9.0} mm", contact.as_mm());
+    for sensor in sensors {
+        print!("{:>9.0} mm", sensor.as_mm());
     }
     println!();
     for law in SpeedLaw::ALL {
@@ -19,8 +19,8 @@ fn main() {
         let time = if law == SpeedLaw::Lag { TimeSpan::from_s(1.0) } else { TimeSpan::from_s(3.0) };
         let start = law.between(Speed::ZERO, target, time);
         print!("{:<20}", format!("{law:?}"));
-        for contact in contacts {
-            match start.time_at(contact) {
+        for sensor in sensors {
+            match start.time_at(sensor) {
                 Some(time) => print!("{:>12.3}", time.as_s()),
                 None => print!("{:>12}", "never"),
             }

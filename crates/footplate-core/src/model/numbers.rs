@@ -33,7 +33,7 @@ pub struct MotionNumbers {
     pub residual_scales: [f64; 2],
     /// By step from 0 on, what experience says of it.
     pub uses: Vec<StepUse>,
-    /// By step from 0 on, contacts passed and stops made from below and then from above.
+    /// By step from 0 on, detections and stops made from below and then from above.
     pub counts: Vec<[(u32, u32); 2]>,
     /// How far stops scatter against what trains usually do.
     pub scatter_scale: f64,

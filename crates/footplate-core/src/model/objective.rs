@@ -1,8 +1,8 @@
 //! What a calibration is to make small, as one number.
 //!
-//! The sum over steps and both approaches of `(u_stop² + u_run²) / s²`, with `u_stop` the doubt of a stop made there,
-//! `u_run` the uncertainty of the distance in half a second of running (a stop is commanded about so long after the last contact),
-//! and `s` the scatter that no knowledge would narrow; and over some short moves the same with their own doubt.
+//! The sum over steps and both approaches of `(u_stop² + u_run²) / s²`, with `u_stop` the uncertainty of a stop made there,
+//! `u_run` the uncertainty of the distance in half a second of running (a stop is commanded about so long after the last detection),
+//! and `s` the scatter that no knowledge would narrow; and over some short moves the same with their own uncertainty.
 //!
 //! A measurement sees a sum `hᵀx + noise` of the model's numbers `x`, whose covariance is `P`. It takes
 //! `(gᵀPh)² / (hᵀPh + n)` from the variance of every other sum `gᵀx` (Kalman, 1960), which needs no measured value: so the
@@ -16,7 +16,7 @@ use super::short_moves::move_distance;
 use crate::event::Approach;
 use crate::ids::SpeedStep;
 
-/// From the last contact to the command a stop runs about this long (s), by its speed as it is known.
+/// From the last detection to the command a stop runs about this long (s), by its speed as it is known.
 const RUN_BEFORE_STOP: f64 = 0.5;
 
 /// A scatter counts as no less than this (m): no one sees the difference on a railway of this size.
@@ -25,7 +25,7 @@ const LEAST_SCATTER: f64 = 0.006;
 /// Short moves that should be known: runs (s) at every second step ...
 const MOVES: [f64; 2] = [0.9, 1.6];
 const MOVES_EVERY: usize = 2;
-/// ... that is no faster than this (m/s): nobody makes short moves at full speed.
+/// ... that is no faster than this (m/s): no one makes short moves at full speed.
 const FASTEST_MOVE: f64 = 0.3;
 /// Part of its distance by which a short move may be off.
 const MOVE_PART: f64 = 0.02;
@@ -96,7 +96,7 @@ impl Objective {
 }
 
 impl MotionModel {
-    /// The doubt of a stop at a step once an experiment has been made (m), for showing what a plan would reach.
+    /// The uncertainty of a stop at a step once an experiment has been made (m), for showing what a plan would reach.
     pub fn stop_doubt_after(
         &self,
         step: SpeedStep,

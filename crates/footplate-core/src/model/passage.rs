@@ -1,8 +1,8 @@
 //! From the raw entries of a run to passages: the sensor that a train passed, the window of the detection, and the path.
 //!
-//! Recordings hold more reports than passages: a contact repeats in every poll while the shoe is on it, a
-//! station still remembers a contact from before the start, and now and then a contact stays silent. What
-//! each report is taken for is said here once, for whoever reviews runs and for the live estimator alike.
+//! Recordings hold more reports than passages: a sensor reports again in every poll while the shoe is on it, a
+//! station still remembers a detection from before the start, and now and then a sensor stays silent. This file classifies
+//! each report, for the review of runs and for the live estimator alike.
 
 use crate::event::{Approach, Event, EventKind};
 use crate::ids::{NodeId, SensorId, SpeedStep, TrainId};
@@ -10,12 +10,12 @@ use crate::link::{DetectionWindow, PollTimingEstimator};
 use crate::time::{TimeSpan, Timestamp};
 use crate::track::{DirectionFinder, Layout, Leg, Reach, TurnoutStates};
 
-/// A report this soon after a start from rest is of a contact the train stood on, or that the station still
+/// A report this soon after a start from rest is of a sensor that the train stood on, or that the station still
 /// remembered: command delay (0.1 to 0.6 s measured) and the first 0.5 s of any start move a train by less
 /// than its shoe is long.
 pub const STALE_WITHIN: TimeSpan = TimeSpan::from_ms(1_000);
-/// Contacts that may stay silent in a row before the path is no longer believed.
-const BELIEVED_MISSED: usize = 2;
+/// Sensors that may stay silent in a row before the path counts as unknown.
+const MOST_MISSED: usize = 2;
 
 /// Commands that follow one another this fast keep the line busy: a solenoid is switched off 150 to 200 ms after it is switched
 /// on, and the next one behind it.
@@ -28,7 +28,7 @@ pub struct Drive {
     pub step: SpeedStep,
     /// The step it ran at before.
     pub from: SpeedStep,
-    /// When it was told; `None` when the recording begins with the train running at `step`.
+    /// When it was commanded; `None` when the recording begins with the train running at `step`.
     pub commanded: Option<Timestamp>,
 }
 
@@ -49,13 +49,13 @@ impl Drive {
 pub struct Passage {
     /// The sensor.
     pub sensor: SensorId,
-    /// Its node, which tells the direction of travel.
+    /// Its node, which gives the direction of travel.
     pub node: NodeId,
     /// When it closed.
     pub window: DetectionWindow,
     /// The path from the passage before; `None` for the first of a run and where no path leads from there.
     pub path: Option<Reach>,
-    /// What the train was told at the time.
+    /// What the train was commanded at the time.
     pub drive: Drive,
     /// The entry of the run that reported it, counted from 0.
     pub entry: usize,
@@ -64,9 +64,9 @@ pub struct Passage {
 /// What a report was taken for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sighting {
-    /// The train passed the contact.
+    /// The train passed the sensor.
     Passage(Passage),
-    /// The shoe is still on the contact of the last passage.
+    /// The shoe is still on the sensor of the last passage.
     Repeat,
     /// The train stands on it, or the station remembered it from before.
     Standing,
@@ -143,7 +143,7 @@ impl PassageTracker {
             EventKind::Reverse { train } => {
                 self.command_sent(event.time);
                 if train == self.train {
-                    // The contact behind becomes the one ahead, at an unknown distance.
+                    // The sensor behind becomes the one ahead, at an unknown distance.
                     self.at = None;
                     self.last_sensor = None;
                     self.directions.reverse(layout, &self.turnouts);
@@ -203,13 +203,13 @@ impl PassageTracker {
             return Sighting::UnknownDirection;
         };
         if self.stands_until().is_some_and(|until| window.until < until) {
-            // It moves off from somewhere behind or on the contact: no path can be measured from here.
+            // It moves off from somewhere behind or on the sensor: no path can be measured from here.
             self.at = None;
             return Sighting::Standing;
         }
         let path = self.at.and_then(|from| {
-            // The path past the fewest silent contacts, and of these the shortest.
-            (0..=BELIEVED_MISSED).find_map(|missed| {
+            // The path past the fewest silent sensors, and of these the shortest.
+            (0..=MOST_MISSED).find_map(|missed| {
                 layout
                     .reaches(from, &self.turnouts, missed)
                     .filter(|reach| reach.sensor == Some(sensor))
@@ -234,7 +234,7 @@ impl PassageTracker {
         self.drive
     }
 
-    /// How the turnouts lie, as far as the run told.
+    /// The turnout positions, as far as the run shows them.
     pub const fn turnouts(&self) -> &TurnoutStates {
         &self.turnouts
     }

@@ -82,7 +82,7 @@ impl Rescaling {
         }
     }
 
-    /// A train that may be as it was or different by about such a part, nobody knows.
+    /// A train of which it is unknown whether it is as it was or differs by about this part.
     pub const fn uncertain_by(part: f64) -> Self {
         Self { measured: Vec::new(), ratio: 1.0, deviation: part, stops: 1.0, stops_deviation: part }
     }

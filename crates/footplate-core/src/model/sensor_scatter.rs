@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sensor_that_trips_within_2_mm_and_one_within_15_are_told_apart() {
+    fn a_sensor_that_trips_within_2_mm_and_one_within_15_are_distinguished() {
         // Given 200 detections of each, blurred by 5 mm of polling,
         let [exact, loose] = found(200, 0.005);
         // then each is known by its own figure to a millimetre or two.

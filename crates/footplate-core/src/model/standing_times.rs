@@ -84,7 +84,7 @@ mod tests {
     use crate::ids::{SpeedStep, TrainId};
     use crate::model::parameters::{FRICTION, SPEEDS, speed_at};
 
-    /// A train of which stopping distances are known well from 0.1 to 0.5 m/s, whatever the numbers are by which they are told:
+    /// A train of which stopping distances are known well from 0.1 to 0.5 m/s, whatever the numbers are that give them:
     /// each distance is a measurement of a sum of numbers, give or take 1 mm.
     fn known(distance: impl Fn(f64) -> f64, table: impl Fn(f64) -> f64) -> MotionModel {
         let mut model = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));
@@ -202,7 +202,7 @@ mod tests {
         let lagging = known(|speed| (0.2 + lag) * speed - friction * lag * lasts(speed), steep);
         let braking = known(|speed| 0.2 * speed + speed * speed / 0.4, steep);
         assert!(lagging.stop_shape_error() < 0.5 * braking.stop_shape_error());
-        // Nobody knows of a train that has not stopped yet.
+        // Of a train that has not stopped yet, nothing is known.
         let unknown = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));
         assert!((unknown.stop_shape_error() - braking.stop_shape_error()).abs() < 1e-12);
     }

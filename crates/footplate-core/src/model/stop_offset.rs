@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn offsets_count_in_full_at_a_middle_speed_and_little_at_a_crawl() {
+    fn offsets_count_in_full_at_a_middle_speed_and_little_at_a_creep() {
         assert!((stop_offset_share(REFERENCE_SPEED) - 1.0).abs() < 1e-12);
         assert!((0.1..0.2).contains(&stop_offset_share(0.03)));
         assert_eq!(stop_offset_share(-1.0), 0.0);

@@ -115,7 +115,7 @@ impl Apart {
 }
 
 impl FilterState {
-    /// Holds what a run and its step differ by within what is believed at all.
+    /// Limits by how much a run and its step may differ.
     pub(super) fn hold_deviations(&mut self) {
         for letter in [Some(E), self.speed].into_iter().flatten() {
             self.x[letter] = self.x[letter].clamp(-FARTHEST_DEVIATION, FARTHEST_DEVIATION);
@@ -265,7 +265,7 @@ mod tests {
         let model = MotionModel::unknown(TrainId(24), SpeedStep::new(14).expect("a step"));
         let exact = |mean: f64| Gaussian { mean, variance: 1e-6 };
         let running = || MotionFilter::<N>::running(&model, 0.0, 14, exact(0.0)).keep_apart(&model);
-        let (mut train, mut believed) = (running(), running());
+        let (mut train, mut estimated) = (running(), running());
         // when it is seen every second at step 14, at 9 and at 14 again,
         let mut found = Vec::new();
         for second in 1..30_u8 {
@@ -274,15 +274,15 @@ mod tests {
                 [(5, 9), (20, 14)].into_iter().find_map(|(at, step)| (at == second).then_some(step))
             {
                 train.command(&model, now, step);
-                believed.command(&model, now, step);
+                estimated.command(&model, now, step);
             }
             train = train.at(&model, now);
             if let Some(letter) = train.course.speed.filter(|_| train.course.step == 9) {
                 train.course.x[letter] = 0.13;
                 train.course.linearise(&model);
             }
-            believed.pass(&model, now, 0.0, exact(train.place(&model, now).mean));
-            found.push(believed.settled_speed().mean / train.settled_speed().mean);
+            estimated.pass(&model, now, 0.0, exact(train.place(&model, now).mean));
+            found.push(estimated.settled_speed().mean / train.settled_speed().mean);
         }
         // then it is found out how fast it is at 9, and that has nothing to do with 14.
         let at = |second: usize| (found[second - 1] - 1.0).abs();

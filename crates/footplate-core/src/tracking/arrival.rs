@@ -115,7 +115,7 @@ impl<const L: usize> MotionFilter<L> {
         Some(Arrival { time: high, variance: variance / (speed * speed), speed })
     }
 
-    /// Whether all that was told has taken effect by a time, and its speed no longer changes.
+    /// Whether all that was commanded has taken effect by a time, and its speed no longer changes.
     pub(crate) fn is_settled(&self, model: &MotionModel, time: f64) -> bool {
         self.course.next_effect(model).is_none()
             && (self.course.segment.is_steady() || self.course.segment.settled() <= time)

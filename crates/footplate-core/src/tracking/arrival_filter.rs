@@ -26,7 +26,7 @@ const LETTERS: usize = MOTION_LETTERS + SECTIONS;
 const ANYWHERE_M: f64 = 10.0;
 /// Hops to the next sensor: one, and one more for each sensor that may stay silent.
 const MOST_HOPS: usize = crate::track::MAX_MISSED + 1;
-/// The shortest distance between two sensors that is believed (m); closer ones cannot be distinguished.
+/// The shortest distance between two sensors that is accepted (m); closer ones cannot be distinguished.
 const SHORTEST_M: f64 = 0.01;
 
 /// The present run.
@@ -101,7 +101,7 @@ impl ArrivalFilter {
         self.following.settled_speed()
     }
 
-    /// Whether it ran steadily when it passed the last contact, and was commanded nothing since.
+    /// Whether it ran steadily when it passed the last sensor, and was commanded nothing since.
     pub(super) fn is_settled(&self) -> bool {
         self.following.is_settled(&self.model, self.passed)
     }

@@ -20,9 +20,9 @@ pub enum ForecastPhase {
 /// The forecast of one report.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Forecast {
-    /// The contact.
+    /// The sensor.
     pub sensor: SensorId,
-    /// Mean time of the report, wherever polls may be: the mean time of the contact and half a poll interval.
+    /// Mean time of the report, wherever polls may be: the mean time of the detection and half a poll interval.
     /// Intervals lie about it.
     pub time: Timestamp,
     /// The poll that will report it if it closes when it is due, where the rhythm of polls is known; otherwise

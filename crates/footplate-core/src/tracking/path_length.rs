@@ -14,7 +14,7 @@ const LOG_MISSED: f64 = -3.9;
 /// Most hops of a path to a place: more than a lap of any layout in use.
 const MOST_HOPS: usize = 200;
 /// One standard deviation of where a sensor closes against the survey (m): half a pickup's springiness and the length of a
-/// contact track (chosen; tapes laid from sensors agree with it).
+/// sensor track (chosen; tapes laid from sensors agree with it).
 const SENSOR_PLACE_M: f64 = 0.005;
 
 /// A path to a sensor, past missed detections, in path lengths.

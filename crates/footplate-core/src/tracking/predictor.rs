@@ -28,14 +28,14 @@ pub enum Verdict {
     Reopened,
 }
 
-/// One passage of a contact, beside what had been forecast.
+/// One passage of a sensor, beside what had been forecast.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     /// The passage.
     pub passage: Passage,
-    /// What had been forecast for this contact before it reported; `None` when nothing could be.
+    /// What had been forecast for this sensor before it reported; `None` when nothing could be.
     pub forecast: Option<Forecast>,
-    /// The contact that had been named as the next; it differs after a missed contact or another path.
+    /// The sensor that had been named as the next; it differs after a missed detection or another path.
     pub named: Option<SensorId>,
     /// What became of it.
     pub verdict: Verdict,

@@ -20,7 +20,7 @@ use crate::time::{TimeSpan, Timestamp};
 use crate::track::{Layout, Reach, TurnoutStates};
 use crate::units::Speed;
 
-/// A report that one forecast in this many allows is no longer believed.
+/// A report that one forecast in this many allows is rejected.
 const GATE: f64 = 1e-5;
 /// One standard deviation of ln speed that is added when the gate opens again or a drift was found.
 const REOPENED: f64 = 0.05;
@@ -98,7 +98,7 @@ impl TrainForecaster {
         self.model = model;
     }
 
-    /// The steady speed of the step as the present run has shown it up to the last contact. `None` before the first hop
+    /// The steady speed of the step as the present run has shown it up to the last detection. `None` before the first hop
     /// at a settled speed. The count is of such hops.
     pub fn running_speed(&self) -> Option<Estimate<Speed>> {
         if self.settled_hops == 0 {
@@ -278,12 +278,12 @@ impl TrainForecaster {
         } else {
             ForecastPhase::FirstLap
         };
-        let contact = self.epoch.unwrap_or(Timestamp::ZERO) + TimeSpan::from_s(due.time);
-        let time = contact + TimeSpan::from_ns(polls.period.as_ns() / 2);
+        let detection = self.epoch.unwrap_or(Timestamp::ZERO) + TimeSpan::from_s(due.time);
+        let time = detection + TimeSpan::from_ns(polls.period.as_ns() / 2);
         Forecast {
             sensor,
             time,
-            report: polls.rhythm.and_then(|rhythm| rhythm.poll_after(contact)).unwrap_or(time),
+            report: polls.rhythm.and_then(|rhythm| rhythm.poll_after(detection)).unwrap_or(time),
             spread: UniformNormal { deviation: libm::sqrt(due.variance), width: polls.period.as_s() },
             speed: Speed::from_m_per_s(due.speed),
             phase,

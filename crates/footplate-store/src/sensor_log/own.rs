@@ -184,13 +184,13 @@ impl FormReader for OwnLog<'_> {
             }
             Entry::Event(kind) => {
                 run.add(row, self.time, time, kind)?;
-                let told = match kind {
+                let named = match kind {
                     EventKind::Speed { train, .. }
                     | EventKind::Reverse { train }
                     | EventKind::Stopped { train, .. } => Some(train),
                     EventKind::Sensor(_) | EventKind::Freed(_) | EventKind::Turnout { .. } => None,
                 };
-                if let Some(train) = told.filter(|train| !run.knows(*train)) {
+                if let Some(train) = named.filter(|train| !run.knows(*train)) {
                     run.trains.push(TrainAtStart { train, step: SpeedStep::STAND });
                 }
                 Ok(())

@@ -49,7 +49,7 @@ pub enum Refusal {
     /// The place cannot be located with the turnouts as they are.
     Place(PathError),
     /// No path leads there with the turnouts as they are.
-    NoWay {
+    NoPath {
         /// The target.
         target: String,
         /// The sensor from which the path starts.
@@ -269,12 +269,12 @@ impl fmt::Display for Refusal {
                 write!(f, "distance {} mm is out of range: use 1 mm to 100000 mm", found.as_mm())
             }
             Self::Place(error) => error.fmt(f),
-            Self::NoWay { target, from, unknown: Some(turnout) } => write!(
+            Self::NoPath { target, from, unknown: Some(turnout) } => write!(
                 f,
                 "no known path from `{from}` to `{target}`: the position of turnout {turnout} is \
                  unknown; throw it first"
             ),
-            Self::NoWay { target, from, unknown: None } => {
+            Self::NoPath { target, from, unknown: None } => {
                 write!(
                     f,
                     "no path from `{from}` to `{target}` with the turnouts in their present \

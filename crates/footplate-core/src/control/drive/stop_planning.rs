@@ -221,7 +221,7 @@ impl DrivenTrain {
         from: NodeId,
         destination: &Destination,
     ) -> Refusal {
-        Refusal::NoWay {
+        Refusal::NoPath {
             target: name(context, destination),
             from: context.layout.node_name(from).to_string(),
             unknown: unknown_turnout(context, from),

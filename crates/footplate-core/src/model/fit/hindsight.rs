@@ -64,24 +64,24 @@ mod tests {
 
     /// Decoders of 14 steps have a number for each, those of 126 for every ninth.
     #[test]
-    fn a_speed_that_was_told_is_the_speed_of_its_step_and_approach() {
+    fn a_speed_that_was_given_is_the_speed_of_its_step_and_approach() {
         for highest in [14, 126] {
             let mut model = MotionModel::unknown(TrainId(24), SpeedStep::new(highest).unwrap());
-            let told = |step: u8, approach: Approach| {
+            let given = |step: u8, approach: Approach| {
                 let above = if approach == Approach::Above { 0.004 } else { 0.0 };
                 Speed::from_m_per_s(0.2 + 0.5 * f64::from(step) / f64::from(highest) + above)
             };
             let knots: Vec<SpeedStep> =
                 (1..=14).map(|knot| SpeedStep::new(knot * (highest / 14)).unwrap()).collect();
             for approach in [Approach::Below, Approach::Above] {
-                knots.iter().for_each(|step| model.tell_speed(*step, approach, told(step.get(), approach)));
+                knots.iter().for_each(|step| model.tell_speed(*step, approach, given(step.get(), approach)));
             }
             for approach in [Approach::Below, Approach::Above] {
                 for step in &knots {
-                    let (found, told) = (model.steady_speed(*step, approach), told(step.get(), approach));
+                    let (found, given) = (model.steady_speed(*step, approach), given(step.get(), approach));
                     assert!(
-                        (found - told).as_m_per_s().abs() < 1e-9,
-                        "{step:?} {approach:?}: {found:?}, not {told:?}"
+                        (found - given).as_m_per_s().abs() < 1e-9,
+                        "{step:?} {approach:?}: {found:?}, not {given:?}"
                     );
                 }
             }

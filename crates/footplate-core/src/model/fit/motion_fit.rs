@@ -45,7 +45,7 @@ const LONGEST_STEP: f64 = 0.6;
 /// A step that changes no number by more than this (in its unit) was the last.
 const SETTLED: f64 = 2e-4;
 /// In this many iterations all rows count in full: at first, large residuals are mostly not outliers.
-const ALL_BELIEVED: usize = 3;
+const ALL_ACCEPTED: usize = 3;
 /// How well the total of all sections passed counts as surveyed (m), ...
 const TOTAL: f64 = 0.001;
 /// ... where lengths of their own make that known to this part at least.

@@ -45,10 +45,10 @@ mod tests {
 
     #[test]
     fn the_slope_of_the_cost_is_twice_weight_times_residual() {
-        for belief in [RobustWeight::SENSORS, RobustWeight::STOPS] {
+        for robust in [RobustWeight::SENSORS, RobustWeight::STOPS] {
             for size in [0.5, 1.4, 1.6, 2.4, 2.6, 2.9, 3.1, 4.9, 5.1, 30.0] {
-                let slope = (belief.cost(size + 1e-6) - belief.cost(size - 1e-6)) / 2e-6;
-                assert!((slope - 2.0 * size * belief.weight(size)).abs() < 1e-6, "{size}");
+                let slope = (robust.cost(size + 1e-6) - robust.cost(size - 1e-6)) / 2e-6;
+                assert!((slope - 2.0 * size * robust.weight(size)).abs() < 1e-6, "{size}");
             }
         }
     }

@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn sensors_that_scatter_are_told_apart_whatever_the_lengths_are() {
+    fn sensors_that_scatter_are_distinguished_whatever_the_lengths_are() {
         let [exact, loose, other, middle] = found(60, [0.001, 0.012, 0.001, 0.006], 0.0);
         assert!((loose - 0.012).abs() < 0.003, "{loose}");
         assert!((middle - 0.006).abs() < 0.003, "{middle}");

@@ -28,7 +28,7 @@ const DELAY_SPREAD_S: f64 = 0.6;
 /// Prior of ln pace is that of the family, this much wider, so that the data decide.
 const PRIOR_WIDENED: f64 = 2.0;
 const MOST_ITERATIONS: usize = 60;
-/// Residuals beyond this many standard deviations count linearly (Huber, 1964): the first contact of a start
+/// Residuals beyond this many standard deviations count linearly (Huber, 1964): the first detection of a start
 /// may be of the train's rear end when it stood astride it.
 const HUBER: f64 = 2.5;
 /// Steps of the numerical derivatives.
@@ -59,7 +59,7 @@ pub struct FittedLaw {
     pub delay: [f64; 2],
     /// Sum of squared residuals over their variances; wild ones count linearly.
     pub chi_square: f64,
-    /// Contacts less unknowns.
+    /// Detections less unknowns.
     pub freedom: usize,
     /// Akaike's criterion; smaller is better.
     pub criterion: f64,

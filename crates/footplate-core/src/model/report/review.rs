@@ -23,7 +23,7 @@ use crate::units::Speed;
 /// The runs of one train beside its motion model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Review {
-    /// Contacts passed at a settled speed.
+    /// Sensors passed at a settled speed.
     pub running: SettledRunning,
     /// Changes of speed of which enough was seen.
     pub changes: Vec<Transient>,

@@ -19,11 +19,11 @@ pub struct MeasuredStop {
     pub from: SpeedStep,
     /// When a person saw the train stand, or read the tape.
     pub seen: Timestamp,
-    /// The contact from which the tape was laid, and how far past it the train stood.
+    /// The sensor from which the tape was laid, and how far past it the train stood.
     pub landmark: SensorId,
     /// See `landmark`.
     pub offset: Length,
-    /// The entry of the run that tells it.
+    /// The entry of the run that says so.
     pub entry: usize,
 }
 
@@ -71,13 +71,13 @@ impl RunPassages {
                 }
             }
             match event.kind {
-                EventKind::Speed { train: told, step } if told == train => {
+                EventKind::Speed { train: commanded, step } if commanded == train => {
                     // Who ends a session tells trains that stand to stand: the stop was the first time.
                     standing = standing
                         .or_else(|| Some((event.time, tracker.drive().from)))
                         .filter(|_| step == SpeedStep::STAND);
                 }
-                EventKind::Stopped { train: told, landmark, offset } if told == train => {
+                EventKind::Stopped { train: measured, landmark, offset } if measured == train => {
                     if let Some((commanded, from)) = standing {
                         read.stops.retain(|stop| stop.commanded != commanded);
                         let seen = event.time;

@@ -1,7 +1,7 @@
-//! Contacts passed at a settled speed, and how well each agrees with its neighbours.
+//! Sensors passed at a settled speed, and how well each detection agrees with its neighbours.
 //!
-//! Nothing is fitted here. Between the passages before and after it, a contact should close in proportion to the path as
-//! the train feels it: `late = t − (t₀ + s (t₁ − t₀))` with `s` the share of the path. A run that is faster or slower as a
+//! Nothing is fitted here. Between the passages before and after it, a sensor should close in proportion to the path length
+//! as the train runs it: `late = t − (t₀ + s (t₁ − t₀))` with `s` the share of the path. A run that is faster or slower as a
 //! whole, or wanders over a lap, does not show in it; a single wrong report does.
 
 use alloc::vec::Vec;
@@ -15,7 +15,7 @@ use crate::time::TimeSpan;
 use crate::track::{Layout, Reach};
 use crate::units::{Length, Speed};
 
-/// Contacts close a little earlier or later from one passage to the next: beginning of the iteration, and the least (m).
+/// Sensors close a little earlier or later from one passage to the next: beginning of the iteration, and the least (m).
 const SCATTER_M: f64 = 0.003;
 const LEAST_SCATTER_M: f64 = 0.001;
 /// A report that chance makes this rarely, both sides, is pointed out.
@@ -24,17 +24,17 @@ const SUSPICIOUS: f64 = 1e-4;
 const USUAL: f64 = 5.0;
 /// A change counts as over this much after the model says so: it is not quite true at its end.
 const MARGIN: f64 = 1.15;
-/// Contacts from which a run is compared with the speed of its step.
+/// Detections from which on a run is compared with the speed of its step.
 const FEWEST_OF_A_RUN: usize = 4;
 
-/// A contact passed at a settled speed.
+/// A sensor passed at a settled speed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SettledPassage {
     /// The run's place among those given.
     pub run: usize,
     /// The passage.
     pub passage: Passage,
-    /// The path from the passage before as the train feels it; zero for the first of a stretch.
+    /// The path length from the passage before, as the train runs it; zero for the first of a stretch.
     pub length: Length,
     /// How much later it was reported than its neighbours say; zero for the ends of a stretch, which have only one.
     pub late: TimeSpan,
@@ -49,9 +49,9 @@ pub struct SettledPassage {
 /// How the settled running of one train scatters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SettledRunning {
-    /// Stretches of a run at one step whose contacts are linked by known paths, in order.
+    /// Stretches of a run at one step whose sensors are linked by known paths, in order.
     pub stretches: Vec<Vec<SettledPassage>>,
-    /// One standard deviation of contacts about the place where they usually close.
+    /// One standard deviation of the places where sensors close about the usual ones.
     pub sensor_scatter: Length,
     /// One standard deviation of the speed of a run about that of its step, as a part of it.
     pub run_deviation: f64,
@@ -113,7 +113,7 @@ impl SettledRunning {
         self.stretches.iter().flatten().filter(|passage| passage.suspicious)
     }
 
-    /// The speed of a run at the step of a drive, with one standard deviation: as the model has it, and as the contacts of
+    /// The speed of a run at the step of a drive, with one standard deviation: as the model has it, and as the detections of
     /// the run itself show it as far as they can.
     pub(super) fn speed_in_run(&self, model: &MotionModel, run: usize, drive: Drive) -> [Speed; 2] {
         let usual = model.steady_speed(drive.step, drive.approach());
@@ -136,7 +136,7 @@ impl SettledRunning {
 }
 
 /// The passage against its neighbours that are not suspicious: late (s), variance of that from polls (s²), what the
-/// scatter of contacts is multiplied with, and speed (m/s).
+/// scatter of sensors is multiplied with, and speed (m/s).
 fn against_neighbours(stretch: &[SettledPassage], place: usize) -> Option<(f64, f64, f64, f64)> {
     let before = stretch.get(..place)?.iter().rposition(|passage| !passage.suspicious)?;
     let after = place + 1 + stretch.get(place + 1..)?.iter().position(|passage| !passage.suspicious)?;
@@ -218,7 +218,7 @@ fn run_deviation(model: &MotionModel, stretches: &[Vec<SettledPassage>], scatter
     if count > 0.0 { libm::sqrt((sum / count).max(0.0)) } else { 0.0 }
 }
 
-/// The speed of a stretch, and the variance of its logarithm: a straight line through its contacts, each of which counts by
+/// The speed of a stretch, and the variance of its logarithm: a straight line through its detections, each of which counts by
 /// how well it is dated. The first report of a recording may have closed long before.
 fn speed_of(stretch: &[SettledPassage], scatter: f64) -> Option<(Speed, f64)> {
     let (first, last) = (stretch.first()?.passage.window, stretch.last()?.passage.window);
@@ -229,15 +229,15 @@ fn speed_of(stretch: &[SettledPassage], scatter: f64) -> Option<(Speed, f64)> {
     }
     let by_scatter = scatter * took / length;
     let mut place = 0.0;
-    let contacts = stretch.iter().filter_map(|passage| {
+    let detections = stretch.iter().filter_map(|passage| {
         place += passage.length.as_m();
         let window = passage.passage.window;
         let weight = 1.0 / (window.variance_s2() + by_scatter * by_scatter);
         (!passage.suspicious).then_some((weight, place, (window.middle() - first.middle()).as_s()))
     });
-    let contacts: Vec<(f64, f64, f64)> = contacts.collect();
+    let detections: Vec<(f64, f64, f64)> = detections.collect();
     let sum = |of: fn(f64, f64) -> f64| -> f64 {
-        contacts.iter().map(|(weight, place, time)| weight * of(*place, *time)).sum()
+        detections.iter().map(|(weight, place, time)| weight * of(*place, *time)).sum()
     };
     let all = sum(|_, _| 1.0);
     let (place, time) = (sum(|place, _| place), sum(|_, time| time));

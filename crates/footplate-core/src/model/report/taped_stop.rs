@@ -14,7 +14,7 @@ use crate::units::{Length, Speed};
 const TAPE_M: f64 = 0.005;
 /// A person presses the key this long after the train stands (0.2 to 0.5 s).
 const HUMAN_DELAY: TimeSpan = TimeSpan::from_ms(350);
-/// Whoever says later than this after the command where a train stands has read a tape and not a watch: no published
+/// A person who says later than this after the command where a train is at rest has read a tape and not a watch: no published
 /// model train takes half as long to stop.
 const WATCHED: TimeSpan = TimeSpan::from_ms(15_000);
 
@@ -39,7 +39,7 @@ pub struct TapedStop {
 }
 
 impl TapedStop {
-    /// Counts a measured stop from its command: by the path from the contact passed last before the command to the one
+    /// Counts a measured stop from its command: by the path from the sensor passed last before the command to the one
     /// where the tape was laid, what the tape says, less what the train ran on until the command. `None` where the
     /// train was not reported on that path.
     pub fn of(

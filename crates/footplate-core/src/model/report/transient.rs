@@ -1,4 +1,4 @@
-//! Changes of speed as they were seen: contacts passed while a train got faster or slower.
+//! Changes of speed as they were observed: sensors passed while a train got faster or slower.
 
 use alloc::vec::Vec;
 
@@ -11,9 +11,9 @@ use crate::model::survey::SectionIndex;
 use crate::track::Layout;
 use crate::units::Speed;
 
-/// Contacts after the change was over that are kept with it: they pin down where the train was.
+/// Detections after the change was over that are kept with it: they determine where the train was.
 const SETTLED_KEPT: usize = 3;
-/// Fewest contacts of a change that tell anything of its law beyond where the train started.
+/// Fewest detections of a change that say anything about its law beyond where the train started.
 const FEWEST: usize = 3;
 
 /// Whether the train gets faster or slower.
@@ -26,14 +26,14 @@ pub enum Direction {
     Down,
 }
 
-/// One contact of a change of speed.
+/// One detection during a change of speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TransientPoint {
     /// Seconds since the command.
     pub since_command: f64,
     /// Variance of that, from the poll (s²).
     pub variance: f64,
-    /// Path since the first contact of the change (m), with the lengths of the motion model.
+    /// Path since the first detection of the change (m), with the lengths of the motion model.
     pub distance: f64,
     /// The entry of the run that reported it.
     pub entry: usize,
@@ -50,9 +50,9 @@ pub struct Transient {
     pub steps: [SpeedStep; 2],
     /// The speeds before and after.
     pub speeds: [Speed; 2],
-    /// Its contacts in order.
+    /// Its detections in order.
     pub points: Vec<TransientPoint>,
-    /// Scatter of the train's contacts and uncertainty of the path between them (m).
+    /// Scatter of the train's detections and uncertainty of the path between them (m).
     pub distance_deviation: f64,
 }
 
@@ -64,7 +64,7 @@ impl Transient {
     }
 }
 
-/// Uncertainty of the path between two contacts beyond their scatter (m): what is left of ten millimetres of survey
+/// Uncertainty of the path between two sensors beyond their scatter (m): what is left of ten millimetres of survey
 /// once a section was passed a few times.
 const PATH_UNCERTAINTY_M: f64 = 0.005;
 

@@ -3,7 +3,7 @@
 //! Letters: `x` length of an edge less what was thought of it, `l` what train `t` makes of a section, `m` what was thought of
 //! that, `g` factor by which the train feels everything longer. Each section that a train ran over says
 //! `Σ x + c − g l = l − m`, give or take what the train does not know of it and what it alone feels. `c` is what all trains
-//! feel of the section's curves and slopes, and where its contacts close: no second train tells more of that. Each `g` is free, so that trains tell how long sections are against each other; how long all of them are
+//! feel of the section's curves and slopes, and where its sensors close: no second train adds to that. Each `g` is free, so that trains tell how long sections are against each other; how long all of them are
 //! the measured edges tell. All unknowns are found together, with edges as they were known before as measurements of their
 //! own (Gauss, 1821); rows that are off count less (Huber, 1964).
 
@@ -17,13 +17,13 @@ use crate::model::{MotionFit, PATH_LENGTH_SPREAD, section_variance};
 use crate::track::{Hop, Layout, LayoutError, StretchLength, Survey, SurveyedDistance};
 use crate::units::Length;
 
-/// Contacts close within this of where a tape would be laid, one standard deviation (m): half a pickup's springiness and a
-/// contact track's own length.
+/// Sensors close within this of where a tape would be laid, one standard deviation (m): half a pickup's springiness and a
+/// sensor's own length.
 const SENSOR_PLACE: f64 = 0.005;
-/// The part of its variance that what trains feel of a section, and where its contacts close, have in common: curves and contacts
+/// The part of its variance that what trains feel of a section, and where its sensors close, have in common: curves and sensors
 /// are the same, bogies and pickups are not.
 const IN_COMMON: f64 = 0.5;
-/// An edge that nobody measured is held to the usual lengths of edges by so much less than one of known length: what is usual
+/// An edge that was not measured is held to the usual lengths of edges by so much less than one of known length: what is usual
 /// elsewhere is no measure of this layout's scale.
 const LOOSER: f64 = 3.0;
 /// A train may feel everything longer by any factor.
@@ -40,7 +40,7 @@ const LEAST: f64 = 0.001;
 /// Lengths of edges and distances between sensors, with their uncertainty.
 #[derive(Debug, Clone)]
 pub struct TrackSurvey {
-    /// By stretch, its length and one standard deviation (m); `None` where it was measured before and no train told more.
+    /// By stretch, its length and one standard deviation (m); `None` where it was measured before and no train added to it.
     edges: Vec<Option<(f64, f64)>>,
     /// By section, its length and one standard deviation (m), for those that a train ran over.
     sections: Vec<Option<(f64, f64)>>,

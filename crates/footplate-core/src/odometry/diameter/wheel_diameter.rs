@@ -20,7 +20,7 @@ use crate::units::Length;
 /// Least distance of balises that tell a diameter (m): half a metre in it is half a per cent.
 const NEAREST_PAIR_M: f64 = 100.0;
 /// Least distance that both wheelsets roll before they are compared (m): a pulse is then 0.02 %.
-const COMPARED_WAY_M: f64 = 200.0;
+const COMPARED_DISTANCE_M: f64 = 200.0;
 /// Standard deviation of the difference of two wheelsets that roll with little effort, from creepage and cone. Chosen: a
 /// third of what a curve does to one of them (0.1 %).
 const COMPARED_DEVIATION: f64 = 3e-4;
@@ -168,7 +168,7 @@ impl WheelDiameters {
             return;
         };
         let [first, second] = distances(from, counted);
-        if first.min(second).as_m() >= COMPARED_WAY_M {
+        if first.min(second).as_m() >= COMPARED_DISTANCE_M {
             self.comparing_from = Some(counted);
             self.compare(time, [first, second]);
         }

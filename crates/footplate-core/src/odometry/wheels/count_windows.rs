@@ -159,13 +159,13 @@ impl Turned {
         if self.back <= -SHAKEN {
             return [self.back * pitch.low, self.forth * pitch.high];
         }
-        self.little_ways(pitch)
+        self.short_distances(pitch)
     }
 
     /// The same of a wheel that may have stood or turned back. Apart from the rest, so that one that runs passes it by.
     #[cold]
     #[inline(never)]
-    fn little_ways(self, pitch: Range) -> [f64; 2] {
+    fn short_distances(self, pitch: Range) -> [f64; 2] {
         // Vibration of a tooth at the edge of the sensor is no motion.
         let shaken = 0.5 * (self.forth - self.back).abs() < SHAKEN;
         // A negative count is longest with the longest pitch.

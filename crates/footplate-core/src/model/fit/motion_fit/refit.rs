@@ -4,7 +4,7 @@
 //! fit.
 
 use super::{
-    ALL_BELIEVED, Closed, KEPT_TRIPS, LONGEST_STEP, MOST_HALVINGS, MOST_ITERATIONS, MOST_TRIPS, MotionFit,
+    ALL_ACCEPTED, Closed, KEPT_TRIPS, LONGEST_STEP, MOST_HALVINGS, MOST_ITERATIONS, MOST_TRIPS, MotionFit,
     SETTLED, Survey, Values,
 };
 use crate::model::fit::unknowns::Columns;
@@ -97,11 +97,11 @@ impl Refit {
     /// One step of the search; `false` where it was the last.
     fn step(&mut self) -> bool {
         let Self { fit, columns, values, survey, .. } = self;
-        let believes_all = self.iteration < ALL_BELIEVED;
-        let now = fit.reduced(columns, values, believes_all, fit.chain.trips.len());
+        let accepts_all = self.iteration < ALL_ACCEPTED;
+        let now = fit.reduced(columns, values, accepts_all, fit.chain.trips.len());
         let Some(now) = now.and_then(|now| now.closed(survey)) else { return false };
         let Some(next) = now.solved(columns, &fit.chain.trips) else { return false };
-        let before = fit.cost(columns, values, believes_all) + survey.cost(&values.lasting);
+        let before = fit.cost(columns, values, accepts_all) + survey.cost(&values.lasting);
         let logarithms = SPEEDS..SPEEDS + knots(fit.highest());
         let longest = values.lasting.get(logarithms.clone()).unwrap_or_default().iter();
         let longest = longest.zip(next.lasting.get(logarithms).unwrap_or_default());
@@ -110,7 +110,7 @@ impl Refit {
         let mut moved = 0.0_f64;
         for _ in 0..MOST_HALVINGS {
             let tried = values.towards(&next, part);
-            if fit.cost(columns, &tried, believes_all) + survey.cost(&tried.lasting) < before {
+            if fit.cost(columns, &tried, accepts_all) + survey.cost(&tried.lasting) < before {
                 let lasting = values.lasting.iter().zip(&tried.lasting);
                 moved = lasting.map(|(from, to)| (to - from).abs()).fold(0.0, f64::max);
                 *values = tried;
@@ -119,7 +119,7 @@ impl Refit {
             part *= 0.5;
         }
         self.closed = Some(now);
-        believes_all || moved >= SETTLED
+        accepts_all || moved >= SETTLED
     }
 
     /// Updates the model, and moves the oldest trips into the prior.
