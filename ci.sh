@@ -21,7 +21,7 @@
 #                then improbable (docs/trust.md). Lost measurements and trains that run on after a death fail the step at once, and so
 #                does any failure of seeds that were named.
 #
-# And three that are never part of "every step". `fresh` drives every scorer on seeds that nobody chose, drawn from the hash of
+# And three that are never part of "every step". `fresh` drives every scorer on seeds that no one chose, drawn from the hash of
 # the commit, prints how often happened what must not, with 95 % intervals, and fails on grief: trains that touched,
 # derailed or ran off the track. It takes hours; FRESH_SEEDS=4 makes it short.
 #
